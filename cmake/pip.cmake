@@ -1,0 +1,19 @@
+# The wheel: scikit-build-core takes flatland/**/*.py itself (pyproject.toml); here is what has to be built,
+# and the ROS package's data, which lands in <environment>/share/flatland.
+include(${CMAKE_CURRENT_LIST_DIR}/messages.cmake)
+
+set(FLATLAND_CORE_INSTALL_DIR ${SKBUILD_PLATLIB_DIR}/flatland)
+
+flatland_generate_messages(${PROJECT_BINARY_DIR}/messages/flatland)
+if(FLATLAND_HAVE_MESSAGES)
+  install(
+    DIRECTORY ${PROJECT_BINARY_DIR}/messages/flatland/msg ${PROJECT_BINARY_DIR}/messages/flatland/srv
+    DESTINATION ${SKBUILD_PLATLIB_DIR}/flatland COMPONENT flatland
+    FILES_MATCHING PATTERN "*.py")
+endif()
+
+include(${CMAKE_CURRENT_LIST_DIR}/ros_share.cmake)
+flatland_install_ros_share(${SKBUILD_DATA_DIR}/share/flatland)
+install(FILES package.xml DESTINATION ${SKBUILD_DATA_DIR}/share/flatland COMPONENT flatland)
+flatland_ros_scripts(scripts)
+install(PROGRAMS ${scripts} DESTINATION ${SKBUILD_DATA_DIR}/share/flatland/scripts COMPONENT flatland)
