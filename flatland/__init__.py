@@ -1,0 +1,79 @@
+"""flatland: a fast and exact 2-D robot simulator.
+
+Make a world with `World.from_yaml`, step it with `World.step`; see `docs/` for the file formats
+and for how to write plugins. Nothing here needs ROS; the ROS node is `flatland.ros`.
+"""
+
+from flatland.body import Body
+from flatland.contact import Contact, ContactImpulse, ModelContact, MutableContact
+from flatland.errors import (
+    FlatlandError,
+    MapFileError,
+    PhysicsError,
+    PluginError,
+    StaleHandleError,
+    WorldError,
+    WorldLockedError,
+    YamlError,
+)
+from flatland.joint import Joint
+from flatland.layer import Layer
+from flatland.model import Model
+from flatland.observer import WorldObserver
+from flatland.plugin import ModelPlugin, WorldPlugin
+from flatland.plugins.dynamics_limits import DynamicsLimits
+from flatland.plugins.update_timer import UpdateTimer
+from flatland.ports import Command, Output
+from flatland.timekeeper import Timekeeper
+from flatland.values import (
+    Collision,
+    Collisions,
+    Imu,
+    LaserScan,
+    NavSatFix,
+    Odometry,
+    Transform,
+    Twist,
+    TwistWithCovariance,
+)
+from flatland.world import World, load_world
+from flatland.yaml_reader import YamlReader
+
+__all__ = [
+    "Body",
+    "Collision",
+    "Collisions",
+    "Command",
+    "Contact",
+    "ContactImpulse",
+    "DynamicsLimits",
+    "FlatlandError",
+    "Imu",
+    "Joint",
+    "LaserScan",
+    "Layer",
+    "MapFileError",
+    "Model",
+    "ModelContact",
+    "ModelPlugin",
+    "MutableContact",
+    "NavSatFix",
+    "Odometry",
+    "Output",
+    "PhysicsError",
+    "PluginError",
+    "StaleHandleError",
+    "Timekeeper",
+    "Transform",
+    "Twist",
+    "TwistWithCovariance",
+    "UpdateTimer",
+    "World",
+    "WorldError",
+    "WorldLockedError",
+    "WorldObserver",
+    "WorldPlugin",
+    "YamlError",
+    "YamlReader",
+    "load_world",
+]

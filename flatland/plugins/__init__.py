@@ -1,0 +1,1 @@
+"""The included plugins, one module each; found through `flatland_plugins.xml`."""
