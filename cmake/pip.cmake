@@ -15,5 +15,12 @@ endif()
 include(${CMAKE_CURRENT_LIST_DIR}/ros_share.cmake)
 flatland_install_ros_share(${SKBUILD_DATA_DIR}/share/flatland)
 install(FILES package.xml DESTINATION ${SKBUILD_DATA_DIR}/share/flatland COMPONENT flatland)
+
+# Each script has a console entry point of its name (pyproject.toml), whose first line pip makes right.
 flatland_ros_scripts(scripts)
-install(PROGRAMS ${scripts} DESTINATION ${SKBUILD_DATA_DIR}/share/flatland/scripts COMPONENT flatland)
+foreach(script ${scripts})
+  get_filename_component(name ${script} NAME)
+  configure_file(cmake/prefix_launcher.sh.in ${PROJECT_BINARY_DIR}/launchers/${name} @ONLY)
+  install(PROGRAMS ${PROJECT_BINARY_DIR}/launchers/${name}
+          DESTINATION ${SKBUILD_DATA_DIR}/share/flatland/scripts COMPONENT flatland)
+endforeach()

@@ -1,0 +1,35 @@
+# catkin_make and catkin_make install.
+#
+# No setup.py: Debian's setuptools cannot read modern metadata, and catkin_python_setup() would put the
+# repository's root on sys.path. Instead the devel space's package is a relay to the source package.
+find_package(catkin REQUIRED COMPONENTS geometry_msgs message_generation std_msgs)
+
+# The extension must be for the Python that ROS runs on, which catkin chose.
+set(Python_EXECUTABLE ${PYTHON_EXECUTABLE})
+
+# Says that flatland/__init__.py exists, so that generate_messages() neither writes nor installs one.
+set(${PROJECT_NAME}_CATKIN_PYTHON_SETUP_HAS_PACKAGE_INIT TRUE)
+add_message_files(DIRECTORY msg FILES ${FLATLAND_MSG_FILES})
+add_service_files(DIRECTORY srv FILES ${FLATLAND_SRV_FILES})
+generate_messages(DEPENDENCIES geometry_msgs std_msgs)
+
+catkin_package(CATKIN_DEPENDS geometry_msgs message_runtime std_msgs)
+
+set(FLATLAND_DEVEL_PACKAGE_DIR ${CATKIN_DEVEL_PREFIX}/${CATKIN_PACKAGE_PYTHON_DESTINATION})
+set(FLATLAND_CORE_OUTPUT_DIR ${FLATLAND_DEVEL_PACKAGE_DIR})
+configure_file(${CMAKE_CURRENT_LIST_DIR}/devel_relay.py.in ${FLATLAND_DEVEL_PACKAGE_DIR}/__init__.py @ONLY)
+
+set(FLATLAND_CORE_INSTALL_DIR ${CATKIN_PACKAGE_PYTHON_DESTINATION})
+# msg, srv and _core in the source tree are what `make dev` left there; catkin installs its own.
+install(
+  DIRECTORY flatland/
+  DESTINATION ${CATKIN_PACKAGE_PYTHON_DESTINATION} COMPONENT flatland
+  PATTERN "__pycache__" EXCLUDE
+  PATTERN "*~" EXCLUDE
+  PATTERN "_core*.so" EXCLUDE
+  REGEX "/flatland/(msg|srv)$" EXCLUDE)
+
+include(${CMAKE_CURRENT_LIST_DIR}/ros_share.cmake)
+flatland_install_ros_share(${CATKIN_PACKAGE_SHARE_DESTINATION})
+flatland_ros_scripts(scripts)
+catkin_install_python(PROGRAMS ${scripts} DESTINATION ${CATKIN_PACKAGE_BIN_DESTINATION})
