@@ -2,7 +2,9 @@
 
 # flatland_install_ros_share(DESTINATION)
 function(flatland_install_ros_share destination)
-  install(FILES flatland_plugins.xml DESTINATION ${destination} COMPONENT flatland)
+  # A link to the manifest in the Python package; install() would copy the link.
+  get_filename_component(manifest ${PROJECT_SOURCE_DIR}/flatland_plugins.xml REALPATH)
+  install(FILES ${manifest} DESTINATION ${destination} COMPONENT flatland)
   foreach(folder launch msg srv rviz worlds)
     if(IS_DIRECTORY ${PROJECT_SOURCE_DIR}/${folder})
       install(DIRECTORY ${folder} DESTINATION ${destination} COMPONENT flatland
