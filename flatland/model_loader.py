@@ -267,8 +267,4 @@ def _made(reader: YamlReader, make: Any, *arguments: Any, **options: Any) -> Any
     try:
         return make(*arguments, **options)
     except (ValueError, PhysicsError) as error:
-        raise reader.error(
-            f"Invalid entry in {reader.location} {reader.name}, {error}"
-        ) from error
-
-
+        raise reader.error(f"Invalid entry in {reader.location} {reader.name}, {error}") from error

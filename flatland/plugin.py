@@ -53,6 +53,7 @@ class FlatlandPlugin:
     _outputs: list[Output[Any]]
     _commands: list[Command[Any]]
     _sent: set[tuple[str, str]]
+    _detached: bool
 
     def _attach(
         self, world: World, name: str, type_name: str, namespace: str, rng: np.random.Generator
@@ -67,9 +68,11 @@ class FlatlandPlugin:
         self._outputs = []
         self._commands = []
         self._sent = set()
+        self._detached = False
 
     def _detach(self) -> None:
         """Closes every port and forgets every transform, also what the plugin forgot itself."""
+        self._detached = True
         for output in self._outputs:
             self.world.ports.close_output(output)
         for command in self._commands:
@@ -117,6 +120,8 @@ class FlatlandPlugin:
         return command
 
     def _resolve(self, topic: str) -> str:
+        if self._detached:
+            raise PluginError(f'plugin "{self.name}" has ended and can open no "{topic}"')
         try:
             return resolve_topic(topic, self.namespace)
         except ValueError as error:
@@ -138,6 +143,8 @@ class FlatlandPlugin:
             yaw: [rad].
             roll: [rad].
         """
+        if self._detached:
+            return
         self._sent.add((parent, child))
         stamp = self.world.timekeeper.sim_time_ns
         self.world.post_transform(Transform(stamp, parent, child, x, y, yaw, roll))

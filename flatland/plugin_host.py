@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
+import ctypes
 import logging
+import threading
 import time
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any
 
 from flatland.contact import Contact, ContactImpulse, MutableContact
+from flatland.errors import PluginError
 from flatland.plugin import FlatlandPlugin, ModelPlugin, WorldPlugin
 
 if TYPE_CHECKING:
     from flatland.body import Body
     from flatland.physics import ContactEvent, OldManifold, PreSolveContact
     from flatland.timekeeper import Timekeeper
+    from flatland.yaml_reader import YamlReader
 
 _LOG = logging.getLogger("flatland")
 
@@ -34,10 +38,50 @@ def overrides(plugin: FlatlandPlugin, hook: str) -> bool:
 def describe(plugin: FlatlandPlugin) -> str:
     """Names a plugin in the words of the error messages."""
     if isinstance(plugin, ModelPlugin):
-        return (
-            f'Model Plugin "{plugin.name}" type "{plugin.type}" model "{plugin.model.name}"'
-        )
+        return f'Model Plugin "{plugin.name}" type "{plugin.type}" model "{plugin.model.name}"'
     return f'World Plugin "{plugin.name}" type "{plugin.type}"'
+
+
+def initialize(plugin: FlatlandPlugin, config: YamlReader, timeout: float | None) -> None:
+    """Runs a plugin's `on_initialize` and checks that it read every parameter.
+
+    With a timeout it runs in a thread of its own, since nothing else can be left behind when it
+    blocks for ever.
+
+    Args:
+        plugin: The plugin, attached to its world.
+        config: Its parameters.
+        timeout: Wall time [s] that it may take, None for as long as it likes.
+
+    Raises:
+        PluginError: It took longer.
+        Exception: What it raised itself.
+    """
+    if timeout is None:
+        plugin.on_initialize(config)
+        config.ensure_accessed_all()
+        return
+    raised: list[BaseException] = []
+
+    def run() -> None:
+        try:
+            plugin.on_initialize(config)
+        except BaseException as error:
+            raised.append(error)
+
+    worker = threading.Thread(target=run, name=f"on_initialize of {plugin.name}", daemon=True)
+    worker.start()
+    with plugin.world.initialized_by(worker):
+        worker.join(timeout)
+    if worker.is_alive():
+        # Ends a loop in Python; what blocks in C stays behind as a daemon thread.
+        ctypes.pythonapi.PyThreadState_SetAsyncExc(
+            ctypes.c_ulong(worker.ident or 0), ctypes.py_object(SystemExit)
+        )
+        raise PluginError(f"on_initialize did not return within {timeout:g} s")
+    if raised:
+        raise raised[0]
+    config.ensure_accessed_all()
 
 
 class PluginHost:
@@ -111,9 +155,7 @@ class PluginHost:
         """Runs `after_physics_step` of all plugins."""
         self._run("after_physics_step", timekeeper)
 
-    def dispatch_contacts(
-        self, events: Sequence[ContactEvent], bodies: dict[int, Body]
-    ) -> None:
+    def dispatch_contacts(self, events: Sequence[ContactEvent], bodies: dict[int, Body]) -> None:
         """Hands recorded contact events to the plugins that listen, in order.
 
         Args:

@@ -155,9 +155,7 @@ class Command(Generic[T]):
             TypeError: The value is not of the command's type.
         """
         if not isinstance(value, self.value_type):
-            raise TypeError(
-                f"command {self.topic} takes {self.value_type.__name__}, got {value!r}"
-            )
+            raise TypeError(f"command {self.topic} takes {self.value_type.__name__}, got {value!r}")
         if self.accept is None or self.accept(value):
             self.value = value
             self.received += 1

@@ -8,8 +8,10 @@ import secrets
 import threading
 import zlib
 from collections import deque
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import Future
+from contextlib import contextmanager
+from pathlib import Path
 from types import TracebackType
 from typing import Any, Final, TypeVar
 
@@ -26,7 +28,7 @@ from flatland.model_loader import ModelLoader
 from flatland.observer import WorldObserver
 from flatland.physics import PhysicsWorld
 from flatland.plugin import FlatlandPlugin, ModelPlugin, WorldPlugin
-from flatland.plugin_host import PluginHost, describe
+from flatland.plugin_host import PluginHost, describe, initialize
 from flatland.plugin_registry import PluginRegistry
 from flatland.ports import CommandTopic, Output, PortRegistry, is_legal_namespace
 from flatland.timekeeper import Timekeeper
@@ -34,6 +36,7 @@ from flatland.values import Transform
 from flatland.yaml_reader import YamlReader
 
 _LOG = logging.getLogger("flatland")
+PLUGIN_TIMEOUT: Final = 60.0
 _LOCK_PATIENCE: Final = 0.005  # s that a waiting thread sleeps before it looks again
 
 R = TypeVar("R")
@@ -67,6 +70,7 @@ class World:
         position_iterations: int = 10,
         base_dir: str | os.PathLike[str] = ".",
         observers: Iterable[WorldObserver] = (),
+        plugin_timeout: float | None = PLUGIN_TIMEOUT,
     ) -> None:
         """Makes an empty world; most users want `from_yaml`.
 
@@ -79,7 +83,11 @@ class World:
             position_iterations: Of Box2D's solver.
             base_dir: Folder that relative model paths start from.
             observers: Told of all that happens, from the start.
+            plugin_timeout: Wall time [s] that `on_initialize` of a plugin may take; None for as
+                long as it likes, in the thread that loads.
         """
+        if plugin_timeout is not None and not plugin_timeout > 0:
+            raise ValueError(f"plugin_timeout must be positive [s] or None, got {plugin_timeout}")
         if seed is None:
             seed = secrets.randbits(31)
             _LOG.info("seed %d drawn at random, give it again to repeat this run", seed)
@@ -95,7 +103,7 @@ class World:
         self.layers: list[Layer] = []
         self.ports = PortRegistry()
         self.transforms: dict[tuple[str, str], Transform] = {}
-        self._base_dir = os.path.abspath(os.fspath(base_dir))
+        self._base_dir = Path(base_dir).absolute()
         self._models: dict[str, Model] = {}
         self._physics = PhysicsWorld()
         self._registry = PluginRegistry()
@@ -106,6 +114,8 @@ class World:
         self._lock = threading.RLock()
         self._requests: deque[Callable[[], None]] = deque()
         self._stepping_thread: int | None = None
+        self._plugin_timeout = plugin_timeout
+        self._initializing_thread: threading.Thread | None = None
         self._paused = False
         self._closed = False
         for observer in observers:
@@ -120,6 +130,7 @@ class World:
         simplify_map: int = 0,
         step_size: float = 0.005,
         observers: Iterable[WorldObserver] = (),
+        plugin_timeout: float | None = PLUGIN_TIMEOUT,
     ) -> World:
         """Loads a world file: properties, layers, models with their plugins, world plugins.
 
@@ -130,14 +141,25 @@ class World:
             simplify_map: 0 exact, 1 simplified, 2 opened and simplified map boundaries.
             step_size: Simulated time of one step [s].
             observers: Told of all that happens, from the start.
+            plugin_timeout: Wall time [s] that `on_initialize` of a plugin may take.
 
         Raises:
             FlatlandError: Something in the files is wrong; nothing is left behind.
+            ValueError: An argument is out of its range.
         """
         # The loader knows the world, not the other way round; it is needed only here.
         from flatland.world_loader import load_world
 
-        return load_world(cls, path, seed, params, simplify_map, step_size, observers)
+        return load_world(
+            cls,
+            path,
+            params=params,
+            simplify_map=simplify_map,
+            seed=seed,
+            step_size=step_size,
+            observers=observers,
+            plugin_timeout=plugin_timeout,
+        )
 
     def __enter__(self) -> World:
         """Gives the world itself, which ends with the block."""
@@ -253,6 +275,9 @@ class World:
                 lambda done: done.exception() and _LOG.error("%s: %s", what, done.exception())
             )
             return None
+        if self._initializing_thread is threading.current_thread():
+            # The thread that loads waits for this one, with the lock in its hands.
+            return action()
         future = self.post(action)
         while not future.done():
             if self._lock.acquire(timeout=_LOCK_PATIENCE):
@@ -261,6 +286,15 @@ class World:
                 finally:
                     self._lock.release()
         return future.result()  # type: ignore[no-any-return]
+
+    @contextmanager
+    def initialized_by(self, thread: threading.Thread) -> Iterator[None]:
+        """Lets a thread that starts a plugin act for the one that waits for it meanwhile."""
+        before, self._initializing_thread = self._initializing_thread, thread
+        try:
+            yield
+        finally:
+            self._initializing_thread = before
 
     # -- models ----------------------------------------------------------------------------
 
@@ -340,7 +374,7 @@ class World:
     def _spawn(self, path: str, name: str, namespace: str, pose: Sequence[float]) -> Model:
         self._check_open()
         checked_pose = self._check_spawn(path, name, namespace, pose)
-        path = os.path.join(self._base_dir, os.path.expanduser(path))
+        path = str(self._base_dir / Path(path).expanduser())
         reader = YamlReader.from_file(path, self.params)
         model = Model(self, name, namespace, path)
         loader = ModelLoader(self._physics, self.collision_filter, model, reader)
@@ -467,8 +501,7 @@ class World:
         try:
             for observer in self._observers:
                 plugin.ros = plugin.ros or observer.plugin_ros(plugin)
-            plugin.on_initialize(config)
-            config.ensure_accessed_all()
+            initialize(plugin, config, self._plugin_timeout)
         except Exception as error:
             self._host.release(plugin)
             text = error.message if isinstance(error, PluginError) else str(error)

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import logging
 import os
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
 
 from flatland.errors import WorldError, YamlError
 from flatland.layer import Layer
 from flatland.map_file import load_map
-from flatland.observer import WorldObserver
 from flatland.world import World
 from flatland.yaml_reader import YamlReader
 
@@ -22,17 +23,16 @@ SIMPLIFICATIONS = (0, 1, 2)
 def load_world(
     world_class: type[World],
     path: str | os.PathLike[str],
-    seed: int | None,
+    *,
     params: Mapping[str, object] | Callable[[str], object] | None,
     simplify_map: int,
-    step_size: float,
-    observers: Iterable[WorldObserver],
+    **options: Any,
 ) -> World:
-    """Makes a world from a file; see `World.from_yaml`."""
+    """Makes a world from a file; see `World.from_yaml`, where the options are explained."""
     if simplify_map not in SIMPLIFICATIONS:
         raise ValueError(f"simplify_map must be 0, 1 or 2, got {simplify_map!r}")
-    path = os.path.abspath(os.path.expanduser(os.fspath(path)))
-    reader = YamlReader.from_file(path, params)
+    file = Path(path).expanduser().absolute()
+    reader = YamlReader.from_file(file, params)
     properties = reader.subnode("properties", "map")
     iterations = [
         _at_least_one(properties, "velocity_iterations"),
@@ -40,15 +40,13 @@ def load_world(
     ]
     properties.ensure_accessed_all()
     world = world_class(
-        seed=seed,
         params=params,
-        step_size=step_size,
         velocity_iterations=iterations[0],
         position_iterations=iterations[1],
-        base_dir=os.path.dirname(path),
-        observers=observers,
+        base_dir=file.parent,
+        **options,
     )
-    world.path = path
+    world.path = str(file)
     try:
         for entry in reader.subnode("layers", "list").items():
             _load_layer(world, entry, simplify_map)

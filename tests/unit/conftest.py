@@ -1,0 +1,86 @@
+"""World files made on the spot, for the tests of the simulation core."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from textwrap import dedent
+from typing import Any
+
+import cv2
+import numpy as np
+import pytest
+
+import flatland
+
+MINIMAL_MODEL = """
+bodies:
+  - name: base
+    footprints: [{type: circle, radius: 0.2, density: 1}]
+"""
+
+
+class WorldFiles:
+    """Writes world, model and map files into a folder and loads worlds from them."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        self._open: list[flatland.World] = []
+
+    def write(self, name: str, text: str) -> str:
+        """Writes a file and returns its path."""
+        path = self.folder / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(dedent(text))
+        return str(path)
+
+    def write_map(self, name: str, rows: list[str], **keys: object) -> str:
+        """Draws a map from text, `#` for a wall, and writes its YAML file."""
+        pixels = np.array([[0 if c == "#" else 255 for c in row] for row in rows], np.uint8)
+        cv2.imwrite(str(self.folder / f"{name}.png"), pixels)
+        values: dict[str, object] = {
+            "image": f"{name}.png",
+            "resolution": 1.0,
+            "origin": "[0, 0, 0]",
+            "occupied_thresh": 0.65,
+            **keys,
+        }
+        return self.write(f"{name}.yaml", "\n".join(f"{k}: {v}" for k, v in values.items()))
+
+    def load(self, text: str, **options: Any) -> flatland.World:
+        """Writes `world.yaml` and loads it; the world is closed after the test."""
+        world = flatland.World.from_yaml(self.write("world.yaml", text), **{"seed": 1, **options})
+        self._open.append(world)
+        return world
+
+    def load_model(self, model: str, **options: Any) -> flatland.World:
+        """Loads a world with two layers, `2d` and `3d`, and one model `robot` of the given text."""
+        self.write("robot.model.yaml", model)
+        return self.load(
+            """
+            properties: {}
+            layers: [{name: 2d}, {name: 3d}]
+            models: [{name: robot, model: robot.model.yaml}]
+            """,
+            **options,
+        )
+
+    def close(self) -> None:
+        """Ends all worlds."""
+        for world in self._open:
+            world.close()
+
+
+@pytest.fixture
+def files(tmp_path: Path) -> Iterator[WorldFiles]:
+    """A folder for world files, and worlds loaded from them."""
+    world_files = WorldFiles(tmp_path)
+    world_files.write("minimal.model.yaml", MINIMAL_MODEL)
+    yield world_files
+    world_files.close()
+
+
+@pytest.fixture
+def empty_world(files: WorldFiles) -> flatland.World:
+    """A world without layers and models."""
+    return files.load("{properties: {}, layers: []}")

@@ -1,0 +1,456 @@
+"""A world at run time: stepping, pause, models that come, move and go, requests of threads."""
+
+from __future__ import annotations
+
+import math
+import threading
+
+import pytest
+
+import flatland
+from flatland import ModelPlugin, WorldError, YamlError
+from flatland.world import World
+
+TWO_BODIES = """
+bodies:
+  - {name: base, pose: [1, 0, 0.1], footprints: [{type: circle, radius: 0.2, density: 1}]}
+  - {name: arm, pose: [1, 1, 0.4], footprints: [{type: circle, radius: 0.1, density: 1}]}
+joints:
+  - {name: j, type: weld, angle: 0.3,
+     bodies: [{name: base, anchor: [0, 1]}, {name: arm, anchor: [0, 0]}]}
+"""
+
+
+class Probe(ModelPlugin):
+    """Notes the hooks as they come; `act` runs in the hook that `hook` names."""
+
+    calls: list = []  # noqa: RUF012
+    hook = ""
+    act = None
+
+    def _note(self, hook):
+        type(self).calls.append((self.name, hook, self.world.timekeeper.sim_time_ns))
+        if self.hook == hook and type(self).act is not None:
+            type(self).act(self)
+
+    def before_physics_step(self, timekeeper):
+        self._note("before")
+
+    def after_physics_step(self, timekeeper):
+        self._note("after")
+
+    def begin_contact(self, contact):
+        self._note("begin")
+
+    def end_contact(self, contact):
+        self._note("end")
+
+    def on_shutdown(self):
+        self._note("shutdown")
+
+
+@pytest.fixture
+def probe(files, monkeypatch, request):
+    """The `Probe` class, found by manifest under `test::Probe`."""
+    monkeypatch.setenv(
+        "FLATLAND_PLUGIN_PATH",
+        files.write(
+            "probe.xml",
+            """
+            <library><class name="test::Probe" type="probe_plugin_for_tests.Probe"
+              base_class_type="flatland::ModelPlugin"/></library>
+            """,
+        ),
+    )
+    monkeypatch.setitem(
+        __import__("sys").modules, "probe_plugin_for_tests", type("Module", (), {"Probe": Probe})
+    )
+    Probe.calls = []
+    Probe.hook = ""
+    Probe.act = None
+    files.write(
+        "probe.model.yaml",
+        """
+        bodies: [{name: base, footprints: [{type: circle, radius: 0.5, density: 1}]}]
+        plugins: [{name: p, type: "test::Probe"}, {name: q, type: "test::Probe"}]
+        """,
+    )
+    return Probe
+
+
+def test_time_is_exact_after_many_steps(files):
+    world = files.load("{properties: {}, layers: []}", step_size=0.001)
+    world.step(12345)
+    assert world.timekeeper.sim_time_ns == 12_345_000_000
+    assert world.time == 12.345
+    assert world.timekeeper.step_size == 0.001
+    assert world.timekeeper.max_step_size == 0.001
+
+
+def test_hooks_run_in_order_and_at_their_times(files, probe):
+    world = files.load("{properties: {}, layers: []}")
+    world.spawn_model("probe.model.yaml", "a")
+    world.step(2)
+    dt = 5_000_000
+    assert probe.calls == [
+        ("p", "before", 0),
+        ("q", "before", 0),
+        ("p", "after", dt),
+        ("q", "after", dt),
+        ("p", "before", dt),
+        ("q", "before", dt),
+        ("p", "after", 2 * dt),
+        ("q", "after", 2 * dt),
+    ]
+
+
+def test_contact_hooks_see_the_time_before_the_step(files, probe):
+    world = files.load("{properties: {}, layers: []}")
+    world.spawn_model("probe.model.yaml", "a")
+    world.spawn_model("minimal.model.yaml", "b", pose=(0.3, 0, 0))
+    world.step()
+    assert ("p", "begin", 0) in probe.calls
+    assert world.contacts[0].body_a.entity.name in ("a", "b")
+    world.delete_model("b")
+    assert ("p", "end", 5_000_000) in probe.calls
+    assert world.contacts == []
+
+
+def test_contact_ends_when_a_body_is_moved_away(files, probe):
+    world = files.load("{properties: {}, layers: []}")
+    world.spawn_model("probe.model.yaml", "a")
+    world.spawn_model("minimal.model.yaml", "b", pose=(0.3, 0, 0))
+    world.step()
+    world.move_model("b", (50, 0, 0))
+    world.step()
+    assert ("p", "end", 5_000_000) in probe.calls
+
+
+def test_pause_stops_hooks_and_time(files, probe):
+    world = files.load("{properties: {}, layers: []}")
+    world.spawn_model("probe.model.yaml", "a")
+    world.pause()
+    assert world.paused
+    world.step(10)
+    assert (world.time, probe.calls) == (0.0, [])
+    world.toggle_pause()
+    world.step()
+    assert world.time == pytest.approx(0.005)
+    world.toggle_pause()
+    assert world.paused
+    world.resume()
+    assert not world.paused
+
+
+def test_gravity_is_zero(files):
+    world = files.load("{properties: {}, layers: []}")
+    model = world.spawn_model("minimal.model.yaml", "a", pose=(1, 2, 3))
+    world.step(100)
+    assert model.pose == pytest.approx((1, 2, 3))
+
+
+def test_move_is_rigid_and_stops_everything(files):
+    files.write("two.model.yaml", TWO_BODIES)
+    world = files.load("{properties: {}, layers: []}")
+    model = world.spawn_model("two.model.yaml", "m", pose=(5, 5, 0.7))
+    base, arm = model.bodies
+    base.set_velocity(1, 2, 3)
+    arm.set_velocity(1, 2, 3)
+    world.move_model("m", (-1, -2, 0.1 + math.pi / 2))
+    assert base.pose == pytest.approx((-1, -2, 0.1 + math.pi / 2), abs=1e-5)
+    # The arm was 1 m to the left of the base (in the model's frame) and turned 0.3 against it.
+    assert arm.pose == pytest.approx((-2, -2, 0.4 + math.pi / 2), abs=1e-5)
+    assert base.velocity == pytest.approx((0, 0, 0))
+    assert arm.velocity == pytest.approx((0, 0, 0))
+    world.step(50)
+    assert base.pose == pytest.approx((-1, -2, 0.1 + math.pi / 2), abs=1e-4)
+
+
+NAN, INF = math.nan, math.inf
+
+
+@pytest.mark.parametrize("pose", [(NAN, 0, 0), (0, INF, 0), (0, 0, -INF), (0, 0), "abc"])
+def test_poses_that_are_none_are_refused(files, pose):
+    world = files.load("{properties: {}, layers: []}")
+    model = world.spawn_model("minimal.model.yaml", "m", pose=(1, 2, 3))
+    with pytest.raises(WorldError, match=r'failed to move model "m", pose must be'):
+        world.move_model("m", pose)
+    with pytest.raises(WorldError, match=r'failed to spawn model "n", pose must be'):
+        world.spawn_model("minimal.model.yaml", "n", pose=pose)
+    assert model.pose == pytest.approx((1, 2, 3))
+    assert [other.name for other in world.models] == ["m"]
+    if len(pose) == 3 and not isinstance(pose, str):
+        with pytest.raises(ValueError, match="must be finite"):
+            model.bodies[0].set_pose(*pose)
+        with pytest.raises(ValueError, match="finite"):
+            model.bodies[0].set_velocity(*pose)
+
+
+def test_unknown_names(files):
+    world = files.load("{properties: {}, layers: []}")
+    with pytest.raises(WorldError) as caught:
+        world.delete_model("M")
+    assert (
+        str(caught.value)
+        == 'Flatland World: failed to delete model, model with name "M" does not exist'
+    )
+    with pytest.raises(WorldError) as caught:
+        world.move_model("M", (0, 0, 0))
+    assert (
+        str(caught.value)
+        == 'Flatland World: failed to move model, model with name "M" does not exist'
+    )
+    with pytest.raises(WorldError, match='model with name "M" does not exist'):
+        world.model("M")
+
+
+@pytest.mark.parametrize(
+    ("path", "name", "namespace", "error"),
+    [
+        ("minimal.model.yaml", "", "", "its name must not be empty"),
+        ("", "m", "", "the path must not be empty"),
+        ("minimal.model.yaml", "m", "my robot", 'namespace "my robot" is not a legal ROS name'),
+        ("minimal.model.yaml", "m", "1st", "is not a legal ROS name"),
+        ("minimal.model.yaml", "m", "a//b", "is not a legal ROS name"),
+        ("minimal.model.yaml", "there", "", 'Model with name "there" already exists'),
+        ("nowhere.yaml", "m", "", 'File does not exist, path="'),
+        (".", "m", "", "Flatland YAML: "),
+    ],
+)
+def test_spawns_that_fail_leave_the_world_as_it_was(files, path, name, namespace, error):
+    world = files.load("{properties: {}, layers: []}")
+    there = world.spawn_model("minimal.model.yaml", "there")
+    bodies = len(world.physics.bodies)
+    with pytest.raises((WorldError, YamlError)) as caught:
+        world.spawn_model(path, name, namespace)
+    assert error in str(caught.value)
+    assert world.models == [there]
+    assert len(world.physics.bodies) == bodies
+    world.step()
+
+
+def test_a_spawn_that_fails_late_leaves_nothing(files, probe):
+    files.write(
+        "bad.model.yaml",
+        """
+        bodies: [{name: base, footprints: []}, {name: other, footprints: []}]
+        joints: [{name: j, type: weld,
+                  bodies: [{name: base, anchor: [0, 0]}, {name: other, anchor: [0, 0]}]}]
+        plugins:
+          - {name: good, type: "test::Probe"}
+          - {name: drive, type: DiffDrive, body: base}
+          - {name: bad, type: "test::Probe", unknown_key: 1}
+        """,
+    )
+    world = files.load("{properties: {}, layers: []}")
+    with pytest.raises(flatland.PluginError) as caught:
+        world.spawn_model("bad.model.yaml", "m")
+    assert str(caught.value).startswith(
+        'Flatland plugin: Model Plugin "bad" type "test::Probe" model "m": Flatland YAML: Entry '
+        'plugin "bad" contains unrecognized entry(s) {"unknown_key"} (in model "m")'
+    )
+    assert isinstance(caught.value.__cause__, YamlError)
+    assert world.models == []
+    assert world.physics.bodies == []
+    assert world.ports.outputs == {}
+    assert world.ports.commands == {}
+    # The plugin that had started was stopped, the one that had not was never called.
+    assert probe.calls == [("good", "shutdown", 0)]
+    world.step()
+    assert probe.calls == [("good", "shutdown", 0)]
+
+
+def test_delete_stops_plugins_and_frees_all(files, probe):
+    world = files.load("{properties: {}, layers: []}")
+    model = world.spawn_model("probe.model.yaml", "a")
+    body = model.bodies[0]
+    world.delete_model("a")
+    assert [call[:2] for call in probe.calls] == [("q", "shutdown"), ("p", "shutdown")]
+    world.step()
+    assert len(probe.calls) == 2
+    assert world.models == []
+    with pytest.raises(flatland.StaleHandleError):
+        body.pose  # noqa: B018
+    world.spawn_model("probe.model.yaml", "a")
+    assert [other.name for other in world.models] == ["a"]
+
+
+@pytest.mark.parametrize("hook", ["before", "after", "begin"])
+def test_requests_from_a_hook_act_after_the_step(files, probe, hook):
+    world = files.load("{properties: {}, layers: []}")
+    world.spawn_model("probe.model.yaml", "a")
+    world.spawn_model("minimal.model.yaml", "b", pose=(0.3, 0, 0))
+    seen = []
+
+    def act(plugin):
+        probe.act = None
+        assert plugin.world.spawn_model("minimal.model.yaml", "new") is None
+        plugin.world.move_model("b", (7, 8, 0))
+        plugin.world.delete_model("a")
+        seen.extend(model.name for model in plugin.world.models)
+
+    probe.hook, probe.act = hook, staticmethod(act)
+    world.step()
+    assert seen == ["a", "b"]
+    assert [model.name for model in world.models] == ["b", "new"]
+    assert world.model("b").pose == pytest.approx((7, 8, 0))
+    world.step(10)
+
+
+def test_a_failed_request_from_a_hook_is_logged(files, probe, caplog):
+    world = files.load("{properties: {}, layers: []}")
+    world.spawn_model("probe.model.yaml", "a")
+    probe.hook, probe.act = "before", staticmethod(lambda p: p.world.delete_model("nobody"))
+    world.step()
+    assert 'model with name "nobody" does not exist' in caplog.text
+
+
+def test_step_and_close_in_a_hook_are_refused(files, probe, caplog):
+    world = files.load("{properties: {}, layers: []}")
+    world.spawn_model("probe.model.yaml", "a")
+    probe.hook, probe.act = "before", staticmethod(lambda p: p.world.step())
+    world.step()
+    assert "step must not be called from a plugin's hook" in caplog.text
+    probe.act = staticmethod(lambda p: p.world.close())
+    world.step()
+    assert "close must not be called from a plugin's hook" in caplog.text
+    assert world.timekeeper.sim_time_ns == 10_000_000
+
+
+def test_other_threads_may_ask_while_the_world_steps(files):
+    world = files.load("{properties: {}, layers: []}")
+    errors = []
+    running = threading.Event()
+    stop = threading.Event()
+
+    def drive():
+        running.set()
+        while not stop.is_set():
+            world.step(10)
+
+    def ask(index):
+        try:
+            for turn in range(20):
+                name = f"m{index}"
+                world.spawn_model("minimal.model.yaml", name, pose=(index, 0, 0))
+                world.move_model(name, (index, turn, 0))
+                assert world.model(name).pose[1] == pytest.approx(turn)
+                world.delete_model(name)
+            with pytest.raises(WorldError):
+                world.delete_model(f"nobody{index}")
+        except BaseException as error:
+            errors.append(error)
+
+    driver = threading.Thread(target=drive)
+    askers = [threading.Thread(target=ask, args=(i,)) for i in range(4)]
+    driver.start()
+    running.wait()
+    for thread in askers:
+        thread.start()
+    for thread in askers:
+        thread.join()
+    stop.set()
+    driver.join()
+    assert errors == []
+    assert world.models == []
+    assert world.time > 0
+
+
+def test_posted_actions_run_in_order_also_while_paused(files):
+    world = files.load("{properties: {}, layers: []}")
+    world.pause()
+    done = []
+    futures = [world.post(lambda i=i: done.append(i) or i) for i in range(5)]
+    failing = world.post(lambda: 1 / 0)
+    assert done == []
+    world.step()
+    assert done == [0, 1, 2, 3, 4]
+    assert [future.result() for future in futures] == [0, 1, 2, 3, 4]
+    assert isinstance(failing.exception(), ZeroDivisionError)
+
+
+def test_closing_is_final_and_may_be_repeated(files, probe):
+    world = files.load("{properties: {}, layers: []}")
+    body = world.spawn_model("probe.model.yaml", "a").bodies[0]
+    with world as same:
+        assert same is world
+    assert world.closed
+    assert [call[1] for call in probe.calls] == ["shutdown", "shutdown"]
+    world.close()
+    for action in (
+        world.step,
+        lambda: world.spawn_model("minimal.model.yaml", "x"),
+        lambda: world.move_model("a", (0, 0, 0)),
+        lambda: world.delete_model("a"),
+    ):
+        with pytest.raises(WorldError, match="the world is closed"):
+            action()
+    with pytest.raises(flatland.StaleHandleError):
+        body.pose  # noqa: B018
+
+
+def test_ports_are_found_by_topic(files):
+    files.write(
+        "driven.model.yaml",
+        """
+        bodies: [{name: base, footprints: [{type: circle, radius: 0.2, density: 1}]}]
+        plugins: [{name: drive, type: DiffDrive, body: base}]
+        """,
+    )
+    world = files.load("{properties: {}, layers: []}")
+    world.spawn_model("driven.model.yaml", "a", "r1")
+    odometry = world.output("/r1/odometry/filtered")
+    assert odometry.latest is None
+    assert odometry.wanted
+    world.command("/r1/cmd_vel").set(flatland.Twist(linear_x=1.0))
+    world.step(200)
+    assert odometry.latest.pose[0] == pytest.approx(0.995, abs=0.01)
+    assert world.transforms["odom", "r1_base"].x == odometry.latest.pose[0]
+    with pytest.raises(WorldError, match=r'no output "/scan", there are: /r1/odometry/filtered'):
+        world.output("/scan")
+    with pytest.raises(WorldError, match=r'no command "/cmd_vel", there are: /r1/cmd_vel'):
+        world.command("/cmd_vel")
+    command = world.command("/r1/cmd_vel")
+    world.delete_model("a")
+    assert world.transforms == {}
+    with pytest.raises(WorldError, match="gone"):
+        command.set(flatland.Twist())
+
+
+def test_seed_makes_noise_repeatable(files):
+    files.write(
+        "noisy.model.yaml",
+        """
+        bodies: [{name: base, footprints: [{type: circle, radius: 0.2, density: 1}]}]
+        plugins: [{name: drive, type: DiffDrive, body: base, odom_pose_noise: [1, 1, 1]}]
+        """,
+    )
+
+    def run(seed):
+        world = files.load("{properties: {}, layers: []}", seed=seed)
+        for name in ("a", "b"):
+            world.spawn_model("noisy.model.yaml", name, name)
+        outputs = [world.output(f"/{name}/odometry/filtered") for name in ("a", "b")]
+        world.step(3)
+        return [output.latest.pose for output in outputs]
+
+    assert run(5) == run(5)
+    assert run(5) != run(6)
+    first, second = run(5)
+    assert first != second
+
+
+@pytest.mark.parametrize("step_size", [0.0, -1.0, math.nan, math.inf])
+def test_step_size_is_checked(files, step_size):
+    with pytest.raises(ValueError, match="step_size must be finite and positive"):
+        files.load("{properties: {}, layers: []}", step_size=step_size)
+
+
+def test_a_world_can_be_made_without_a_file(tmp_path):
+    with World(seed=3, base_dir=tmp_path) as world:
+        (tmp_path / "m.yaml").write_text("bodies: [{name: b, footprints: []}]")
+        world.spawn_model("m.yaml", "m")
+        world.step(3)
+        assert world.time == pytest.approx(0.015)
+    with pytest.raises(ValueError, match="seed must not be negative"):
+        World(seed=-1)

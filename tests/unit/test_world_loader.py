@@ -1,0 +1,296 @@
+"""World files: every entry and every error text."""
+
+from __future__ import annotations
+
+import gc
+import logging
+
+import numpy as np
+import pytest
+
+import flatland
+from flatland import FlatlandError, YamlError
+
+SEVENTEEN = ", ".join(f"l{i}" for i in range(17))
+
+ERRORS = {
+    "no properties": ("layers: []", 'Entry "properties" does not exist'),
+    "properties no map": ("{properties: [], layers: []}", 'Entry "properties" must be a map'),
+    "no layers": ("properties: {}", 'Entry "layers" does not exist'),
+    "layers no list": ("{properties: {}, layers: {}}", 'Entry "layers" must be a list'),
+    "unknown property": (
+        "{properties: {speed: 1}, layers: []}",
+        'Entry "properties" contains unrecognized entry(s) {"speed"}',
+    ),
+    "iterations no int": (
+        "{properties: {velocity_iterations: 1.5}, layers: []}",
+        'Error converting entry "velocity_iterations" to int (in "properties")',
+    ),
+    "no iterations": (
+        "{properties: {position_iterations: 0}, layers: []}",
+        'Invalid "position_iterations" in "properties", must be at least 1, got 0',
+    ),
+    "unknown world key": (
+        "{properties: {}, layers: [], b: 1, a: 2}",
+        'Entry contains unrecognized entry(s) {"a", "b"}',
+    ),
+    "layer without name": (
+        "{properties: {}, layers: [{map: x}]}",
+        'Entry "name" does not exist (in "layers" index=0)',
+    ),
+    "layer with no names": (
+        "{properties: {}, layers: [{name: []}]}",
+        'Entry "name" must have size >= 1 (in "layers" index=0)',
+    ),
+    "layer twice": (
+        "{properties: {}, layers: [{name: a}, {name: [b, a]}]}",
+        'Layer with name "a" already exists',
+    ),
+    "layer alias twice": (
+        "{properties: {}, layers: [{name: [b, b]}]}",
+        'Layer with name "b" already exists',
+    ),
+    "too many layers": (
+        f"{{properties: {{}}, layers: [{{name: [{SEVENTEEN}]}}]}}",
+        f"Unable to add 17 additional layer(s) {{{SEVENTEEN}}}, current layers count is 0, max "
+        "allowed is 16",
+    ),
+    "layer color": (
+        "{properties: {}, layers: [{name: L, color: [1, 1]}]}",
+        'Entry "color" must have size of exactly 4 (in layer "l")',
+    ),
+    "unknown layer key": (
+        "{properties: {}, layers: [{name: L, colour: red}]}",
+        'Entry layer "l" contains unrecognized entry(s) {"colour"}',
+    ),
+    "map not there": (
+        "{properties: {}, layers: [{name: L, map: nowhere.yaml}]}",
+        'File does not exist, path="',
+    ),
+    "model without name": (
+        "{properties: {}, layers: [], models: [{model: minimal.model.yaml}]}",
+        'Entry "name" does not exist (in "models" index=0)',
+    ),
+    "model without file": (
+        "{properties: {}, layers: [], models: [{name: M}]}",
+        'Entry "model" does not exist (in model "m")',
+    ),
+    "model file not there": (
+        "{properties: {}, layers: [], models: [{name: M, model: nowhere.yaml}]}",
+        'File does not exist, path="',
+    ),
+    "model twice": (
+        "{properties: {}, layers: [], models: [{name: M, model: minimal.model.yaml}, "
+        "{name: M, model: minimal.model.yaml}]}",
+        'Model with name "M" already exists',
+    ),
+    "model pose": (
+        "{properties: {}, layers: [], models: [{name: M, model: minimal.model.yaml, pose: [1]}]}",
+        'Entry "pose" must have size of exactly 3 (in model "m")',
+    ),
+    "model pose nan": (
+        "{properties: {}, layers: [], "
+        "models: [{name: M, model: minimal.model.yaml, pose: [.nan, 0, 0]}]}",
+        "pose must be finite",
+    ),
+    "model namespace": (
+        "{properties: {}, layers: [], "
+        "models: [{name: M, model: minimal.model.yaml, namespace: my robot}]}",
+        'namespace "my robot" is not a legal ROS name',
+    ),
+    "unknown model key": (
+        "{properties: {}, layers: [], models: [{name: M, model: minimal.model.yaml, x: 1}]}",
+        'Entry model "m" contains unrecognized entry(s) {"x"}',
+    ),
+    "world plugin twice": (
+        "{properties: {}, layers: [], plugins: [{name: W, type: DummyWorldPlugin}, "
+        "{name: W, type: DummyWorldPlugin}]}",
+        'Invalid "world plugins" with name "W", type "DummyWorldPlugin" already exists',
+    ),
+}
+
+
+@pytest.mark.parametrize("case", ERRORS)
+def test_error_text(files, case):
+    world, text = ERRORS[case]
+    with pytest.raises(YamlError) as caught:
+        files.load(world)
+    assert str(caught.value).startswith("Flatland YAML: ")
+    assert text in str(caught.value)
+    if not text.startswith("File does not exist"):
+        assert "world.yaml:" in str(caught.value)
+
+
+def test_missing_world_file(tmp_path):
+    path = tmp_path / "nowhere.yaml"
+    with pytest.raises(YamlError) as caught:
+        flatland.World.from_yaml(path)
+    assert str(caught.value).startswith(f'Flatland YAML: File does not exist, path="{path}"')
+
+
+def test_world_plugin_errors_name_the_plugin(files):
+    with pytest.raises(flatland.PluginError) as caught:
+        files.load("{properties: {}, layers: [], plugins: [{name: W, type: Nothing}]}")
+    assert str(caught.value).startswith(
+        'Flatland plugin: World Plugin "W" type "Nothing": no plugin "flatland_plugins::Nothing"'
+    )
+
+
+def test_world_plugin_same_name_other_type_is_allowed(files):
+    world = files.load(
+        "{properties: {}, layers: [], plugins: [{name: W, type: DummyWorldPlugin}, "
+        "{name: V, type: DummyWorldPlugin}, {name: X, type: Nothing, enabled: false}]}"
+    )
+    assert [plugin.name for plugin in world.plugins] == ["W", "V"]
+
+
+def test_defaults(empty_world):
+    assert empty_world.velocity_iterations == 10
+    assert empty_world.position_iterations == 10
+    assert empty_world.layers == []
+    assert empty_world.models == []
+    assert empty_world.time == 0.0
+
+
+def test_properties(files):
+    world = files.load(
+        "{properties: {velocity_iterations: 11, position_iterations: 12}, layers: []}"
+    )
+    assert (world.velocity_iterations, world.position_iterations) == (11, 12)
+
+
+def test_layers(files):
+    files.write_map("map", ["   ", " # ", "   "], origin="[1, 2, 0.5]", resolution=0.5)
+    world = files.load(
+        """
+        properties: {}
+        layers:
+          - {name: 2d, map: map.yaml, color: [1, 0, 0, 0.5],
+             properties: {debug: {min_z: 0.5, max_z: 2}}}
+          - name: [a, b]
+          - {name: [1, 2]}
+        models: []
+        """
+    )
+    walls, aliases, numbers = world.layers
+    assert (walls.name, walls.names) == ("2d", ["2d"])
+    assert walls.color == (1, 0, 0, 0.5)
+    assert walls.properties["debug"] == {"min_z": "0.5", "max_z": "2"}
+    assert walls.body.pose == pytest.approx((1, 2, 0.5))
+    assert walls.body.type == "static"
+    expected = {(0.5, 0.5, 1, 0.5), (0.5, 1, 1, 1), (0.5, 0.5, 0.5, 1), (1, 0.5, 1, 1)}
+    edges = walls.edges
+    assert edges.shape == (4, 4)
+    assert edges.dtype == np.float32
+    ordered = np.where(
+        (edges[:, :2].sum(1) > edges[:, 2:].sum(1))[:, None], np.roll(edges, 2, 1), edges
+    )
+    assert set(map(tuple, ordered.tolist())) == expected
+    assert aliases.names == ["a", "b"]
+    assert aliases.edges.shape == (0, 4)
+    assert aliases.color == (1, 1, 1, 1)
+    assert numbers.names == ["1", "2"]
+    bits = world.collision_filter
+    assert [bits.layer_id(name) for name in ("2d", "a", "b", "1", "2", "x")] == [0, 1, 2, 3, 4, -1]
+    assert bits.category_bits(["all"]) == 0xFFFF
+    assert bits.category_bits([]) == 0
+    assert bits.category_bits(["2d", "b"]) == 0b101
+    assert aliases.category_bits == 0b110
+    assert {fixture.category_bits for fixture in walls.body.fixtures} == {1}
+    assert {fixture.mask_bits for fixture in walls.body.fixtures} == {1}
+    assert world.layer("b") is aliases
+    with pytest.raises(flatland.WorldError, match='layer with name "x" does not exist'):
+        world.layer("x")
+
+
+def test_sixteen_layers_fit(files):
+    names = ", ".join(f"l{i}" for i in range(16))
+    world = files.load(f"{{properties: {{}}, layers: [{{name: [{names}]}}]}}")
+    assert world.layers[0].category_bits == 0xFFFF
+
+
+def test_paths_start_from_the_world_file(files, monkeypatch, tmp_path):
+    files.write("sub/robot.model.yaml", "bodies: [{name: base, footprints: []}]")
+    monkeypatch.chdir("/")
+    world = files.load(
+        """
+        properties: {}
+        layers: []
+        models:
+          - {name: M, model: sub/robot.model.yaml, pose: [1, 2, 3], namespace: ns}
+        """
+    )
+    model = world.model("M")
+    assert model.path == str(tmp_path / "sub/robot.model.yaml")
+    assert model.pose == pytest.approx((1, 2, 3))
+    assert model.namespace == "ns"
+    assert world.spawn_model("sub/robot.model.yaml", "N").path == model.path
+
+
+class Recorder(flatland.WorldObserver):
+    """Keeps the names of what is open."""
+
+    def __init__(self):
+        self.open = set()
+        self.ever = set()
+
+    def output_opened(self, output):
+        self.open.add(output.topic)
+        self.ever.add(output.topic)
+
+    def output_closed(self, output):
+        self.open.remove(output.topic)
+
+    def command_opened(self, command):
+        self.open.add(command.topic)
+        self.ever.add(command.topic)
+
+    def command_closed(self, command):
+        self.open.remove(command.topic)
+
+
+def test_a_failure_leaves_nothing_behind(files):
+    files.write(
+        "driven.model.yaml",
+        """
+        bodies: [{name: base, footprints: [{type: circle, radius: 0.2, density: 1}]}]
+        plugins: [{name: drive, type: DiffDrive, body: base}]
+        """,
+    )
+    recorder = Recorder()
+    with pytest.raises(FlatlandError):
+        files.load(
+            """
+            properties: {}
+            layers: []
+            models: [{name: good, model: driven.model.yaml}, {name: bad, model: nowhere.yaml}]
+            """,
+            observers=[recorder],
+        )
+    assert "/cmd_vel" in recorder.ever
+    assert recorder.open == set()
+    gc.collect()
+    assert not [thing for thing in gc.get_objects() if isinstance(thing, flatland.Model)]
+
+
+@pytest.mark.parametrize("value", [3, -1, True + 5, "0", None])
+def test_simplify_map_is_checked(files, value):
+    with pytest.raises(ValueError, match="simplify_map must be 0, 1 or 2"):
+        files.load("{properties: {}, layers: []}", simplify_map=value)
+
+
+def test_a_drawn_seed_is_logged(files, caplog):
+    caplog.set_level(logging.INFO, "flatland")
+    world = files.load("{properties: {}, layers: []}", seed=None)
+    assert f"seed {world.seed} drawn at random" in caplog.text
+
+
+def test_params_reach_the_files(files):
+    world = files.load(
+        """
+        properties: {velocity_iterations: $eval param("/iterations", 3)}
+        layers: []
+        """,
+        params={"/iterations": 7},
+    )
+    assert world.velocity_iterations == 7
