@@ -1,0 +1,46 @@
+"""A switch that is on while a body touches something."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from flatland.plugin import ModelPlugin
+from flatland.plugins.parameters import read_body_or_first, read_rate
+from flatland.plugins.update_timer import UpdateTimer
+
+if TYPE_CHECKING:
+    from flatland.contact import Contact
+    from flatland.timekeeper import Timekeeper
+    from flatland.yaml_reader import YamlReader
+
+
+class BoolSensor(ModelPlugin):
+    """Tells whether one body touches anything (`bool`)."""
+
+    def on_initialize(self, config: YamlReader) -> None:
+        """Reads the parameters."""
+        self._body = read_body_or_first(config, self.model, "body")
+        self._timer = UpdateTimer(read_rate(config))
+        self._output = self.output(config.get("topic", "string", "bool_sensor"), bool)
+        self._touching: set[int] = set()
+        self._touched_since_last = False
+
+    # Unlike the reference: contacts of the model's other bodies do not count.
+    def begin_contact(self, contact: Contact) -> None:
+        """Counts a contact of the body."""
+        if contact.body_a is self._body or contact.body_b is self._body:
+            self._touching.add(contact.contact_id)
+            self._touched_since_last = True
+
+    def end_contact(self, contact: Contact) -> None:
+        """Counts a contact no more."""
+        self._touching.discard(contact.contact_id)
+
+    def after_physics_step(self, timekeeper: Timekeeper) -> None:
+        """Publishes when it is time."""
+        if not self._timer.check_update(timekeeper):
+            return
+        if self._output.wanted:
+            self._output.emit(bool(self._touching) or self._touched_since_last)
+        # Also with nobody listening, or a touch of long ago would greet the first listener.
+        self._touched_since_last = False

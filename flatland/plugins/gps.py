@@ -1,0 +1,50 @@
+"""A satellite receiver."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from flatland.geometry import compose
+from flatland.plugin import ModelPlugin
+from flatland.plugins.geodesy import TangentPlane
+from flatland.plugins.parameters import at_key, read_body, read_finite, read_pose, read_rate
+from flatland.plugins.update_timer import UpdateTimer
+from flatland.values import NavSatFix
+
+if TYPE_CHECKING:
+    from flatland.timekeeper import Timekeeper
+    from flatland.yaml_reader import YamlReader
+
+_DEFAULT_RATE = 10.0  # Hz
+
+
+class Gps(ModelPlugin):
+    """Reports where on Earth its antenna is (`flatland.NavSatFix`)."""
+
+    def on_initialize(self, config: YamlReader) -> None:
+        """Reads the parameters."""
+        self._body = read_body(config, self.model)
+        self._origin = read_pose(config, "origin")
+        self._timer = UpdateTimer(read_rate(config, default=_DEFAULT_RATE))
+        self._broadcast_tf: bool = config.get("broadcast_tf", "bool", True)
+        self._frame_id = self.model.frame(config.get("frame", "string", self.name))
+        latitude = read_finite(config, "ref_lat", 0.0)
+        if not -90.0 <= latitude <= 90.0:
+            raise at_key(config, "ref_lat").error(
+                f'Invalid "ref_lat", must be from -90 to 90, got {latitude}'
+            )
+        self._plane = TangentPlane(latitude, read_finite(config, "ref_lon", 0.0))
+        self._output = self.output(config.get("topic", "string", "gps/fix"), NavSatFix)
+
+    def before_physics_step(self, timekeeper: Timekeeper) -> None:
+        """Publishes when it is time."""
+        if not self._timer.check_update(timekeeper):
+            return
+        if self._output.wanted:
+            east, north, _ = compose(self._body.pose, self._origin)
+            latitude, longitude = self._plane.geodetic(east, north)
+            stamp = timekeeper.sim_time_ns
+            self._output.emit(NavSatFix(stamp, self._frame_id, latitude, longitude, 0.0))
+        if self._broadcast_tf:
+            parent = self.model.frame(self._body.name)
+            self.send_transform(parent, self._frame_id, *self._origin)

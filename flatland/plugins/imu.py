@@ -1,0 +1,116 @@
+"""An inertial measurement unit."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from flatland.geometry import Vector2, rotate
+from flatland.plugin import ModelPlugin
+from flatland.plugins.gaussian_noise import GaussianNoise
+from flatland.plugins.parameters import (
+    at_key,
+    read_body,
+    read_covariance,
+    read_rate,
+    read_variances,
+)
+from flatland.plugins.update_timer import UpdateTimer
+from flatland.timekeeper import NANOSECONDS
+from flatland.values import Imu as ImuValue
+
+if TYPE_CHECKING:
+    from flatland.geometry import Pose
+    from flatland.ports import Output
+    from flatland.timekeeper import Timekeeper
+    from flatland.yaml_reader import YamlReader
+
+
+class Imu(ModelPlugin):
+    """Reports orientation, yaw rate and acceleration of a body (`flatland.Imu`)."""
+
+    def on_initialize(self, config: YamlReader) -> None:
+        """Reads the parameters."""
+        self._body = read_body(config, self.model)
+        # Unlike the reference: the frame is the namespaced one that the transform names, too.
+        self._frame_id = self.model.frame(config.get("imu_frame_id", "string", "imu"))
+        self._parent_frame_id = self.model.frame(self._body.name)
+        self._broadcast_tf: bool = config.get("broadcast_tf", "bool", True)
+        self._timer = UpdateTimer(_read_update_rate(config))
+
+        yaw_variances = read_variances(config, "orientation_noise")
+        rate_variances = read_variances(config, "angular_velocity_noise")
+        acceleration_variances = read_variances(config, "linear_acceleration_noise")
+        self._noise = GaussianNoise(
+            self.rng, (yaw_variances[2], rate_variances[2], *acceleration_variances[:2])
+        )
+        self._covariances = (
+            read_covariance(config, "orientation_covariance", yaw_variances),
+            read_covariance(config, "angular_velocity_covariance", rate_variances),
+            read_covariance(config, "linear_acceleration_covariance", acceleration_variances),
+        )
+        filtered_topic = config.get("imu_pub", "string", "imu/filtered")
+        truth_topic = config.get("ground_truth_pub", "string", "imu/ground_truth")
+        self._filtered: Output[ImuValue] | None = None
+        self._ground_truth: Output[ImuValue] | None = None
+        if config.get("enable_imu_pub", "bool", True):
+            self._filtered = self.output(filtered_topic, ImuValue)
+            self._ground_truth = self.output(truth_topic, ImuValue)
+        # Stamp and velocity at the last time that a message was due, sent or not: the first
+        # message that somebody hears is as good as any other.
+        self._last: tuple[int, Pose] | None = None
+
+    def after_physics_step(self, timekeeper: Timekeeper) -> None:
+        """Publishes when it is time."""
+        if not self._timer.check_update(timekeeper):
+            return
+        stamp, velocity = timekeeper.sim_time_ns, self._body.velocity
+        truth_wanted = self._ground_truth is not None and self._ground_truth.wanted
+        filtered_wanted = self._filtered is not None and self._filtered.wanted
+        if truth_wanted or filtered_wanted:
+            yaw = self._body.pose[2]
+            truth = ImuValue(
+                stamp, self._frame_id, yaw, velocity[2], self._acceleration(stamp, velocity, yaw)
+            )
+            if self._ground_truth is not None and truth_wanted:
+                self._ground_truth.emit(truth)
+            if self._filtered is not None and filtered_wanted:
+                self._filtered.emit(self._with_noise(truth))
+        self._last = (stamp, velocity)
+        # The body's own frame may serve as the frame of the sensor; TF has no frame within itself.
+        if self._broadcast_tf and self._frame_id != self._parent_frame_id:
+            self.send_transform(self._parent_frame_id, self._frame_id, 0.0, 0.0, 0.0)
+
+    def _acceleration(self, stamp: int, velocity: Pose, yaw: float) -> Vector2:
+        """Mean acceleration since the last message, in the body frame [m/s²]."""
+        if self._last is None:
+            return (0.0, 0.0)
+        last_stamp, last_velocity = self._last
+        # Unlike the reference: the simulated time between, not a product with the rate, which
+        # is infinite by default; and a proper rotation.
+        dt = (stamp - last_stamp) / NANOSECONDS
+        change = ((velocity[0] - last_velocity[0]) / dt, (velocity[1] - last_velocity[1]) / dt)
+        return rotate(change, -yaw)
+
+    def _with_noise(self, truth: ImuValue) -> ImuValue:
+        noise = self._noise.sample
+        ax, ay = truth.linear_acceleration
+        return ImuValue(
+            truth.stamp,
+            truth.frame_id,
+            truth.yaw + noise(0),
+            truth.yaw_rate + noise(1),
+            (ax + noise(2), ay + noise(3)),
+            *self._covariances,
+        )
+
+
+def _read_update_rate(config: YamlReader) -> float:
+    """Reads the rate [Hz] under either of its names."""
+    if "pub_rate" not in config:
+        return read_rate(config)
+    if "update_rate" in config:
+        raise at_key(config, "pub_rate").error(
+            'Invalid "pub_rate", it is the older spelling of "update_rate" and must not stand '
+            "beside it"
+        )
+    return read_rate(config, "pub_rate")
