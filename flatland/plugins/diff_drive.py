@@ -1,0 +1,90 @@
+"""A differential drive: follows velocity commands and reports odometry."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+from flatland.plugin import ModelPlugin
+from flatland.plugins.dynamics_limits import DynamicsLimits
+from flatland.plugins.odometry import Odometer
+from flatland.plugins.parameters import read_body, read_rate
+from flatland.plugins.twist_command import open_twist_command
+from flatland.plugins.update_timer import UpdateTimer
+from flatland.values import TwistWithCovariance
+
+if TYPE_CHECKING:
+    from flatland.geometry import Pose
+    from flatland.ports import Output
+    from flatland.timekeeper import Timekeeper
+    from flatland.yaml_reader import YamlReader
+
+
+class DiffDrive(ModelPlugin):
+    """Makes the origin of a body move forward and turn as commanded."""
+
+    def on_initialize(self, config: YamlReader) -> None:
+        """Reads the parameters and declares the ports.
+
+        Raises:
+            YamlError: A parameter is wrong.
+            PluginError: A topic is no legal name.
+        """
+        self.body = read_body(config, self.model)
+        self.timer = UpdateTimer(read_rate(config, "pub_rate"))
+        self.linear_dynamics = DynamicsLimits.from_config(
+            config.optional_subnode("linear_dynamics", "map")
+        )
+        self.angular_dynamics = DynamicsLimits.from_config(
+            config.optional_subnode("angular_dynamics", "map")
+        )
+        self._sends_transform: bool = config.get("enable_odom_tf_pub", "bool", True)
+        self._odometer = Odometer(
+            self,
+            config,
+            self.body,
+            twist_in_local_frame=True,
+            publish=config.get("enable_odom_pub", "bool", True),
+        )
+        twist_topic = config.get("twist_pub", "string", "twist")
+        self._twist: Output[TwistWithCovariance] | None = None
+        if config.get("enable_twist_pub", "bool", True):
+            self._twist = self.output(twist_topic, TwistWithCovariance)
+        self._command = open_twist_command(self, config.get("twist_sub", "string", "cmd_vel"))
+        self._velocity = 0.0
+        self._yaw_rate = 0.0
+
+    def before_physics_step(self, timekeeper: Timekeeper) -> None:
+        """Sets the body's velocity, then reports where it is and how it moves now."""
+        dt = timekeeper.step_size
+        command = self._command.value
+        v = self._velocity = self.linear_dynamics.limit(self._velocity, command.linear_x, dt)
+        omega = self._yaw_rate = self.angular_dynamics.limit(self._yaw_rate, command.angular_z, dt)
+        physics = self.body.physics
+        pose = physics.pose
+        # In every step, or friction and contacts would slow the robot down.
+        physics.set_velocity(v * math.cos(pose[2]), v * math.sin(pose[2]), omega)
+        if self.timer.check_update(timekeeper):
+            self._publish(timekeeper.sim_time_ns, pose)
+
+    def _publish(self, stamp: int, pose: Pose) -> None:
+        twist = self._twist
+        wants_twist = twist is not None and twist.wanted
+        if not (wants_twist or self._sends_transform or self._odometer.wanted):
+            return
+        odometer = self._odometer
+        velocity = self.body.physics.velocity
+        noisy_pose = odometer.report(stamp, pose, velocity)
+        if twist is not None and wants_twist:
+            forward = velocity[0] * math.cos(pose[2]) + velocity[1] * math.sin(pose[2])
+            noise = odometer.twist_noise
+            twist.emit(
+                TwistWithCovariance(
+                    stamp,
+                    odometer.child_frame_id,
+                    (forward + noise.sample(0), 0.0, velocity[2] + noise.sample(2)),
+                    odometer.twist_covariance,
+                )
+            )
+        if self._sends_transform:
+            self.send_transform(odometer.frame_id, odometer.child_frame_id, *noisy_pose)

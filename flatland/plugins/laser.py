@@ -1,0 +1,192 @@
+"""A planar laser range finder."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from flatland.geometry import compose
+from flatland.plugin import ModelPlugin
+from flatland.plugins.parameters import at_key, read_body, read_not_negative, read_pose, read_rate
+from flatland.plugins.update_timer import UpdateTimer
+from flatland.values import FloatArray, LaserScan
+
+if TYPE_CHECKING:
+    from flatland.timekeeper import Timekeeper
+    from flatland.yaml_reader import YamlReader
+
+MAX_BEAMS = 1_000_000
+MAX_RANGE = 1e6  # m; a single-precision number has steps of 6 cm there
+REFLECTANCE_LAYER = "reflectance"
+REFLECTIVE = 255.0
+
+
+@dataclass(frozen=True, slots=True)
+class BeamAngles:
+    """The fan of a laser [rad]; beam i is at `minimum + i * increment`."""
+
+    minimum: float
+    maximum: float
+    increment: float
+    count: int
+
+    @classmethod
+    def from_config(cls, reader: YamlReader) -> BeamAngles:
+        """Reads the fan.
+
+        Args:
+            reader: Over the map `angle`.
+
+        Raises:
+            YamlError: A number is missing or not finite, the increment does not lead from the
+                minimum to the maximum, or there would be absurdly many beams.
+        """
+        numbers = [reader.get(key, "float") for key in ("min", "max", "increment")]
+        reader.ensure_accessed_all()
+        if not all(map(math.isfinite, numbers)):
+            raise reader.error(f'Invalid "angle" params, must be finite, got {numbers}')
+        minimum, maximum, increment = numbers
+        if increment == 0:
+            raise reader.error('Invalid "angle" params, increment must not be zero!')
+        if increment > 0 and maximum < minimum:
+            raise reader.error('Invalid "angle" params, must have max > min when increment > 0')
+        if increment < 0 and minimum < maximum:
+            raise reader.error('Invalid "angle" params, must have min > max when increment < 0')
+        # Divided last, as this overflows for an increment next to nothing.
+        if abs(maximum - minimum) >= (MAX_BEAMS - 0.5) * abs(increment):
+            raise reader.error(
+                f'Invalid "angle" params, more than {MAX_BEAMS} beams between {minimum} and '
+                f"{maximum} in steps of {increment}"
+            )
+        count = math.floor((maximum - minimum) / increment + 0.5) + 1
+        return cls(minimum, maximum, increment, count)
+
+    def end_points(self, length: float, upside_down: bool) -> FloatArray:
+        """Returns where beams of a length end, sensor frame [m], shape (count, 2)."""
+        angles = self.minimum + self.increment * np.arange(self.count, dtype=np.float64)
+        if upside_down:
+            angles = -angles
+        ends = length * np.stack([np.cos(angles), np.sin(angles)], axis=1)
+        return np.ascontiguousarray(ends, dtype=np.float32)
+
+
+class Laser(ModelPlugin):
+    """Measures the distance to the nearest fixture along each of its beams.
+
+    Attributes:
+        body: The body that it is mounted on.
+        angles: Its fan.
+        range: Length of a beam [m].
+        origin: (x, y, theta) of the sensor in the body frame.
+        intensities: Of the last scan computed: 255 for a beam whose nearest hit is in the layer
+            `reflectance`, else 0; shape (n,), or (0,) in a world without that layer; float32.
+    """
+
+    def on_initialize(self, config: YamlReader) -> None:
+        """Reads the parameters and declares the output.
+
+        Raises:
+            YamlError: A parameter is wrong.
+            PluginError: The topic is no legal name.
+        """
+        self.body = read_body(config, self.model)
+        self.range = self._read_range(config)
+        self.angles = BeamAngles.from_config(config.subnode("angle", "map"))
+        self.origin = read_pose(config, "origin")
+        self.timer = UpdateTimer(read_rate(config))
+        self.always_publish: bool = config.get("always_publish", "bool", False)
+        self._deviation = np.float32(self._read_deviation(config))
+        self._no_hit = self._read_no_hit(config)
+        self._mask = self._read_mask(config)
+        self._sends_transform: bool = config.get("broadcast_tf", "bool", True)
+        upside_down: bool = config.get("upside_down", "bool", False)
+        self._roll = math.pi if upside_down else 0.0
+        self._ends = self.angles.end_points(self.range, upside_down)
+        reflectance = self.world.collision_filter.layer_id(REFLECTANCE_LAYER)
+        self._reflect_mask = 1 << reflectance if reflectance >= 0 else 0
+        self.intensities: FloatArray = np.zeros(0, dtype=np.float32)
+        self._body_frame_id = self.model.frame(self.body.name)
+        self.frame_id = self.model.frame(config.get("frame", "string", self.name))
+        self._scan = self.output(config.get("topic", "string", "scan"), LaserScan)
+
+    @staticmethod
+    def _read_range(config: YamlReader) -> float:
+        length: float = config.get("range", "float")
+        if not 0 < length <= MAX_RANGE:
+            raise at_key(config, "range").error(
+                f'Invalid "range", must be greater than 0 and at most {MAX_RANGE:g} m, got {length}'
+            )
+        return length
+
+    @staticmethod
+    def _read_deviation(config: YamlReader) -> float:
+        deviation = read_not_negative(config, "noise_std_dev", 0.0)
+        if math.isinf(deviation):
+            raise at_key(config, "noise_std_dev").error('Invalid "noise_std_dev", must be finite')
+        return deviation
+
+    def _read_no_hit(self, config: YamlReader) -> float:
+        values = {"nan": math.nan, "inf": math.inf, "range": self.range}
+        name = config.get("no_hit", "string", "nan")
+        if name not in values:
+            raise at_key(config, "no_hit").error(
+                f'Invalid "no_hit", must be one of: {", ".join(values)}, got {name}'
+            )
+        return values[name]
+
+    def _read_mask(self, config: YamlReader) -> int:
+        layers = config.get_list("layers", "string", ["all"])
+        collision_filter = self.world.collision_filter
+        unknown = collision_filter.unknown(layers)
+        if unknown:
+            raise at_key(config, "layers").error(f"Cannot find layer(s): {{{','.join(unknown)}}}")
+        return collision_filter.category_bits(layers)
+
+    def before_physics_step(self, timekeeper: Timekeeper) -> None:
+        """Sends the transform and, if anybody listens, a scan, when they are due."""
+        if not self.timer.check_update(timekeeper):
+            return
+        if self._sends_transform:
+            self.send_transform(self._body_frame_id, self.frame_id, *self.origin, roll=self._roll)
+        if not (self._scan.wanted or self.always_publish):
+            return
+        angles = self.angles
+        ranges = self.compute_ranges()
+        self._scan.emit(
+            LaserScan(
+                stamp=timekeeper.sim_time_ns,
+                frame_id=self.frame_id,
+                angle_min=angles.minimum,
+                angle_max=angles.maximum,
+                angle_increment=angles.increment,
+                time_increment=0.0,
+                scan_time=0.0,
+                range_min=0.0,
+                range_max=self.range,
+                ranges=ranges,
+                intensities=self.intensities,
+            )
+        )
+
+    def compute_ranges(self) -> FloatArray:
+        """Scans from where the body is now, noise included; sets `intensities` as well.
+
+        Returns:
+            Range of each beam [m], shape (n,), float32, new with each call.
+        """
+        fractions, reflects = self.world.physics.cast_rays(
+            compose(self.body.physics.pose, self.origin), self._ends, self._mask, self._reflect_mask
+        )
+        ranges = fractions * np.float32(self.range)
+        if self._deviation:
+            # A miss is NaN and stays so.
+            noise = self.rng.standard_normal(ranges.shape, dtype=np.float32)
+            ranges += noise * self._deviation
+        if not math.isnan(self._no_hit):
+            ranges[np.isnan(fractions)] = self._no_hit
+        if self._reflect_mask:
+            self.intensities = np.where(reflects, np.float32(REFLECTIVE), np.float32(0.0))
+        return ranges

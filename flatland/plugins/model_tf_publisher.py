@@ -1,0 +1,52 @@
+"""Sends the transforms between the bodies of a model."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+from flatland.plugin import ModelPlugin
+from flatland.plugins.parameters import read_bodies, read_body_or_first, read_rate
+from flatland.plugins.update_timer import UpdateTimer
+
+if TYPE_CHECKING:
+    from flatland.timekeeper import Timekeeper
+    from flatland.yaml_reader import YamlReader
+
+
+class ModelTfPublisher(ModelPlugin):
+    """Sends the pose of each body relative to one of them, and of that one in the world."""
+
+    def on_initialize(self, config: YamlReader) -> None:
+        """Reads the parameters.
+
+        Raises:
+            YamlError: A parameter is wrong.
+        """
+        self.reference = read_body_or_first(config, self.model, "reference")
+        excluded = read_bodies(config, self.model, "exclude")
+        self.timer = UpdateTimer(read_rate(config))
+        self._sends_world: bool = config.get("publish_tf_world", "bool", False)
+        self._world_frame_id: str = config.get("world_frame_id", "string", "map")
+        self._reference_frame_id = self.model.frame(self.reference.name)
+        self._others = [
+            (body, self.model.frame(body.name))
+            for body in self.model.bodies
+            if body is not self.reference and body not in excluded
+        ]
+
+    def before_physics_step(self, timekeeper: Timekeeper) -> None:
+        """Sends the transforms when they are due."""
+        if not self.timer.check_update(timekeeper):
+            return
+        x, y, yaw = self.reference.physics.pose
+        c, s = math.cos(yaw), math.sin(yaw)
+        reference_frame_id = self._reference_frame_id
+        for body, frame_id in self._others:
+            body_x, body_y, body_yaw = body.physics.pose
+            dx, dy = body_x - x, body_y - y
+            self.send_transform(
+                reference_frame_id, frame_id, c * dx + s * dy, c * dy - s * dx, body_yaw - yaw
+            )
+        if self._sends_world:
+            self.send_transform(self._world_frame_id, reference_frame_id, x, y, yaw)
