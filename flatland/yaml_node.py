@@ -1,0 +1,262 @@
+"""Loads YAML files to trees of nodes that know where they stand.
+
+Scalars stay text; what type they have is decided when a parameter is read. Anchors and aliases
+share one node. A merge key (`<<`) is a key like any other, as in yaml-cpp, so that no map has
+entries that are not written in it.
+"""
+
+from __future__ import annotations
+
+import re
+import stat
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import NoReturn, Union
+
+import yaml
+
+from flatland.errors import YamlError
+
+MAX_NESTING = 100
+_MAX_FILE_BYTES = 64 * 1024 * 1024
+
+_Loader: type = getattr(yaml, "CBaseLoader", yaml.BaseLoader)
+_NULLS = frozenset(("", "~", "null", "Null", "NULL"))
+_NULL_TAG = "tag:yaml.org,2002:null"
+_NOT_YAML_TEXT = re.compile("[^\t\n\r\x20-\x7e\x85\xa0-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
+
+
+@dataclass(frozen=True, slots=True)
+class Source:
+    """Where a text comes from.
+
+    Attributes:
+        path: File as the user named it, empty for a text that is in no file.
+        folder: Absolute folder that relative paths in the text start from.
+    """
+
+    path: str
+    folder: str
+
+    @classmethod
+    def of_file(cls, path: str) -> Source:
+        """Returns the source for a file."""
+        return cls(path, str(Path.cwd() / Path(path).parent))
+
+    def resolve(self, path: str) -> str:
+        """Makes a path absolute: `~` is the home folder, a relative one starts in `folder`."""
+        try:
+            return str(self.folder / Path(path).expanduser())
+        except RuntimeError:  # `~name` of nobody
+            return str(self.folder / Path(path))
+
+    def place(self, line: int | None) -> str:
+        """Returns what error texts end with, such as ` [model.yaml:12]`."""
+        if line is None:
+            return f" [{self.path}]" if self.path else ""
+        return f" [{self.path}:{line}]" if self.path else f" [line {line}]"
+
+
+@dataclass(slots=True, eq=False)
+class NullNode:
+    """No value: nothing, or a plain `~` or `null`."""
+
+    source: Source
+    line: int
+
+
+@dataclass(slots=True, eq=False)
+class ScalarNode:
+    """A text."""
+
+    source: Source
+    line: int
+    text: str
+
+
+@dataclass(slots=True, eq=False)
+class ListNode:
+    """A sequence; its items may be replaced by the preprocessor."""
+
+    source: Source
+    line: int
+    items: list[Node] = field(default_factory=list)
+
+
+@dataclass(slots=True, eq=False)
+class MapNode:
+    """A mapping, in the order of the file; its values may be replaced by the preprocessor."""
+
+    source: Source
+    line: int
+    entries: dict[str, Node] = field(default_factory=dict)
+    key_lines: dict[str, int] = field(default_factory=dict)
+
+
+Node = Union[NullNode, ScalarNode, ListNode, MapNode]  # noqa: UP007 (used before it is defined)
+
+
+def load_documents(path: str) -> list[Node]:
+    """Loads all documents of a file.
+
+    Args:
+        path: The file, UTF-8 or with the byte order mark of UTF-16.
+
+    Returns:
+        The root of each document, none for a file that holds only comments.
+
+    Raises:
+        YamlError: There is no such file, it cannot be read, or it is not YAML.
+    """
+    source = Source.of_file(path)
+    return parse_documents(_decode(_read(path), source), source)
+
+
+def parse_documents(text: str, source: Source) -> list[Node]:
+    """Parses all documents of a text.
+
+    Raises:
+        YamlError: The text is not YAML.
+    """
+    bad = _NOT_YAML_TEXT.search(text)
+    if bad:
+        line, column = _line_and_column(text[: bad.start()])
+        _fail(source, line, column, f"character U+{ord(bad.group()):04X} is not allowed")
+    return _Composer(text.removeprefix("\ufeff"), source).documents()
+
+
+def _read(path: str) -> bytes:
+    try:
+        # Anything but a plain file may block for ever (a pipe) or never end (a device).
+        if not stat.S_ISREG(Path(path).stat().st_mode):
+            raise YamlError(f'Failed to read file, path="{path}", it is not a regular file')
+        with Path(path).open("rb") as file:
+            content = file.read(_MAX_FILE_BYTES + 1)
+    except (FileNotFoundError, NotADirectoryError, ValueError):
+        raise YamlError(f'File does not exist, path="{path}"') from None
+    except OSError as error:
+        raise YamlError(f'Failed to read file, path="{path}", {error.strerror}') from error
+    if len(content) > _MAX_FILE_BYTES:
+        raise YamlError(f'Failed to read file, path="{path}", it has more than 64 MiB')
+    return content
+
+
+def _decode(content: bytes, source: Source) -> str:
+    encoding = "utf-16" if content[:2] in (b"\xff\xfe", b"\xfe\xff") else "utf-8"
+    try:
+        return content.decode(encoding)
+    except UnicodeDecodeError as error:
+        before = content[: error.start].decode(encoding, "replace")
+        line, column = _line_and_column(before)
+        byte = content[error.start]
+        _fail(source, line, column, f"byte 0x{byte:02x} is not {encoding.upper()} text")
+
+
+def _line_and_column(before: str) -> tuple[int, int]:
+    lines = before.replace("\r\n", "\n").replace("\r", "\n").split("\n")
+    return len(lines), len(lines[-1]) + 1
+
+
+def _fail(source: Source, line: int, column: int, why: str) -> NoReturn:
+    raise YamlError(f'Malformatted file, path="{source.path}", line {line} col {column}, {why}')
+
+
+class _Composer:
+    """Builds trees from the parser's events, without recursion, so that no file is too deep."""
+
+    def __init__(self, text: str, source: Source) -> None:
+        self._text = text
+        self._source = source
+        self._roots: list[Node] = []
+        self._anchors: dict[str, Node] = {}
+        self._open: list[ListNode | MapNode] = []
+        self._keys: list[str | None] = []  # of each open node; None: a map's key is due
+
+    def documents(self) -> list[Node]:
+        try:
+            for event in yaml.parse(self._text, Loader=_Loader):
+                self._take(event)
+        except yaml.MarkedYAMLError as error:
+            mark = error.problem_mark or error.context_mark
+            line, column = (mark.line + 1, mark.column + 1) if mark else (1, 1)
+            _fail(self._source, line, column, error.problem or error.context or "not YAML")
+        except yaml.YAMLError as error:
+            _fail(self._source, 1, 1, str(error))
+        return self._roots
+
+    def _take(self, event: yaml.Event) -> None:
+        if isinstance(event, yaml.DocumentStartEvent):
+            self._anchors.clear()
+        elif isinstance(event, yaml.AliasEvent):
+            self._add(self._aliased(event), event)
+        elif isinstance(event, yaml.ScalarEvent):
+            self._name(event, self._add(self._scalar(event), event))
+        elif isinstance(event, yaml.SequenceStartEvent):
+            self._begin(ListNode(self._source, _position(event)[0]), event)
+        elif isinstance(event, yaml.MappingStartEvent):
+            self._begin(MapNode(self._source, _position(event)[0]), event)
+        elif isinstance(event, yaml.CollectionEndEvent):
+            self._open.pop()
+            self._keys.pop()
+
+    def _begin(self, node: ListNode | MapNode, event: yaml.CollectionStartEvent) -> None:
+        self._name(event, self._add(node, event))
+        if len(self._open) >= MAX_NESTING:
+            self._fail_at(event, f"nested deeper than {MAX_NESTING} levels")
+        self._open.append(node)
+        self._keys.append(None)
+
+    def _name(self, event: yaml.NodeEvent, node: Node) -> None:
+        if event.anchor is not None:
+            self._anchors[event.anchor] = node
+
+    def _aliased(self, event: yaml.AliasEvent) -> Node:
+        node = self._anchors.get(event.anchor or "")
+        if node is None:
+            self._fail_at(event, f'no anchor "{event.anchor}" before its alias')
+        if any(node is open_node for open_node in self._open):
+            self._fail_at(event, f'alias "{event.anchor}" stands inside its own anchor')
+        return node
+
+    def _scalar(self, event: yaml.ScalarEvent) -> Node:
+        line = _position(event)[0]
+        plain = not event.style and event.tag in (None, _NULL_TAG)
+        if plain and event.value in _NULLS and not self._key_is_due():
+            return NullNode(self._source, line)
+        return ScalarNode(self._source, line, event.value)
+
+    def _key_is_due(self) -> bool:
+        return bool(self._open) and isinstance(self._open[-1], MapNode) and self._keys[-1] is None
+
+    def _add(self, node: Node, event: yaml.Event) -> Node:
+        """Puts a node where it stands: a root, an item, a key or the value of one."""
+        parent = self._open[-1] if self._open else None
+        if parent is None:
+            self._roots.append(node)
+        elif isinstance(parent, ListNode):
+            parent.items.append(node)
+        elif self._keys[-1] is not None:
+            parent.entries[self._keys[-1]] = node
+            self._keys[-1] = None
+        else:
+            self._keys[-1] = self._new_key(parent, node, event)
+        return node
+
+    def _new_key(self, parent: MapNode, node: Node, event: yaml.Event) -> str:
+        if not isinstance(node, ScalarNode):
+            self._fail_at(event, "a key must be a scalar")
+        key = node.text
+        first = parent.key_lines.get(key)
+        if first is not None:
+            self._fail_at(event, f'duplicate key "{key}", first used in line {first}')
+        parent.key_lines[key] = _position(event)[0]
+        return key
+
+    def _fail_at(self, event: yaml.Event, why: str) -> NoReturn:
+        _fail(self._source, *_position(event), why)
+
+
+def _position(event: yaml.Event) -> tuple[int, int]:
+    """Returns line and column of an event, from 1."""
+    mark = event.start_mark
+    return (mark.line + 1, mark.column + 1) if mark is not None else (1, 1)
