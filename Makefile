@@ -1,15 +1,62 @@
-# Everything by one command. `make` alone says which there are.
+# Everything by one command; `make` alone says which there are.
 SHELL := /bin/bash
 .DEFAULT_GOAL := help
 
 VENV := .venv
 PYTHON := $(VENV)/bin/python
+# Folders with Python that the project wrote; the generated messages are no part of it.
+PYTHON_FOLDERS := flatland tests $(wildcard bench examples tools worlds docs)
+CPP_FILES = $(shell find src/cpp $(wildcard bench) -name '*.h' -o -name '*.cpp')
 
 .PHONY: help
 help:  ## say which commands there are
 	@sed -n 's/^\([a-z-]*\):.*## /  make \1\t/p' $(MAKEFILE_LIST) | expand -t 18
 
+.PHONY: setup
+setup:  ## install what is missing (Debian packages, .venv) and build; seconds when nothing changed
+	@tools/setup.sh run
+
+.PHONY: setup-dev
+setup-dev:  ## the same, with what tests, linters and catkin need
+	@tools/setup.sh dev
+
+.PHONY: run
+run: setup  ## run the simulator: make run [WORLD=world.yaml] [ARGS="show_viz:=false seed:=1"]
+	@tools/run.sh "$(WORLD)" $(ARGS)
+
+.PHONY: test
+test: setup-dev  ## run all tests: make test [ARGS="-k laser"]
+	@. ./setup.bash && pytest $(ARGS)
+
+.PHONY: lint
+lint: setup-dev  ## check style, types, and the stubs of the extension against the binary
+	$(VENV)/bin/ruff check
+	$(VENV)/bin/ruff format --check
+	$(VENV)/bin/mypy
+	cd build && ../$(VENV)/bin/stubtest flatland._core
+	clang-format --dry-run -Werror $(CPP_FILES)
+
+.PHONY: format
+format: setup-dev  ## bring Python and C++ sources into shape
+	$(VENV)/bin/ruff check --fix-only --exit-zero
+	$(VENV)/bin/ruff format
+	clang-format -i $(CPP_FILES)
+
+.PHONY: bench
+bench: setup-dev  ## measure speed, the ray casts against plain b2World::RayCast among it
+	@. ./setup.bash && python bench
+
+.PHONY: docs
+docs: setup  ## check that every link and picture of README.md and docs/ leads somewhere
+	@$(PYTHON) tools/check_links.py README.md docs
+
 .PHONY: dev
 dev:  ## build the extension and the messages into the source tree (PYTHONPATH=. then runs it)
-	cmake -S . -B build/dev -G Ninja -DFLATLAND_IN_TREE=ON -DFLATLAND_WERROR=ON -DPython_EXECUTABLE="$$PWD/$(PYTHON)" >build/dev.log || { cat build/dev.log; exit 1; }
+	@mkdir -p build
+	@cmake -S . -B build/dev -G Ninja -DFLATLAND_IN_TREE=ON -DFLATLAND_WERROR=ON \
+	  -DPython_EXECUTABLE="$$PWD/$(PYTHON)" >build/dev.log || { cat build/dev.log; exit 1; }
 	cmake --build build/dev
+
+.PHONY: clean
+clean:  ## remove all that was built, .venv too
+	rm -rf $(VENV) build flatland/_core*.so flatland/msg flatland/srv
