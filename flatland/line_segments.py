@@ -1,0 +1,60 @@
+"""Data files of line segments, one a line: `x1 y1 x2 y2`."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+from flatland.errors import MapFileError
+
+_COLUMNS = 4
+
+
+def read_line_segments(path: str) -> npt.NDArray[np.float64]:
+    """Reads all segments of a file.
+
+    Columns after the fourth, blank lines and lines that start with `#` are ignored.
+
+    Args:
+        path: Text file.
+
+    Returns:
+        Segments (x1, y1, x2, y2) as written, all finite, shape (n, 4).
+
+    Raises:
+        OSError: The file cannot be read.
+        MapFileError: A line has fewer than four numbers, or one is NaN or infinite.
+    """
+    with Path(path).open(encoding="utf-8-sig", errors="replace") as file:
+        numbered = [
+            (number, line)
+            for number, line in enumerate(file, start=1)
+            if line.strip() and not line.lstrip().startswith("#")
+        ]
+    if not numbered:
+        return np.empty((0, _COLUMNS))
+    try:
+        # Fast: numpy reads the numbers, but it cannot say in which line of the file it fails.
+        lines = [line for _, line in numbered]
+        segments = np.loadtxt(lines, comments=None, usecols=range(_COLUMNS), ndmin=2)
+        if np.isfinite(segments).all():
+            return segments
+    except ValueError:
+        pass
+    return np.array([_parse(line, number, path) for number, line in numbered])
+
+
+def _parse(line: str, number: int, path: str) -> list[float]:
+    try:
+        segment = [float(word) for word in line.split()[:_COLUMNS]]
+    except ValueError:
+        segment = []
+    if len(segment) < _COLUMNS or not all(math.isfinite(value) for value in segment):
+        raise MapFileError(
+            f'Failed to read line segment from line {number}, in file "{Path(path).name}"'
+            f" [{path}:{number}]"
+        )
+    return segment
