@@ -1,0 +1,83 @@
+// Ids for things that come and go: a slot and how often it was used before.
+#pragma once
+
+#include <cstdint>
+#include <utility>
+#include <vector>
+
+namespace flatland {
+
+// 4 bits of kind, 28 of generation, 32 of slot. Kinds start at 1, so that an id is never 0 and one
+// of a body is never one of a fixture; they end at 7, so that it is positive as a signed number.
+using Id = std::uint64_t;
+
+enum class IdKind : std::uint64_t { kBody = 1, kFixture = 2, kJoint = 3 };
+
+// Values by id. An id is found until it is erased and never again, also when its slot is reused.
+template <typename Value, IdKind kKind>
+class SlotMap {
+ public:
+  Id insert(Value value) {
+    std::uint32_t slot;
+    if (free_.empty()) {
+      slot = static_cast<std::uint32_t>(slots_.size());
+      slots_.push_back({std::move(value), 0, true});
+    } else {
+      slot = free_.back();
+      free_.pop_back();
+      slots_[slot].value = std::move(value);
+      slots_[slot].used = true;
+    }
+    ++size_;
+    return make_id(slot);
+  }
+
+  // The value, or null when the id is unknown or its value was erased.
+  Value* find(Id id) {
+    const auto slot = static_cast<std::uint32_t>(id);
+    if (slot >= slots_.size() || !slots_[slot].used || make_id(slot) != id) return nullptr;
+    return &slots_[slot].value;
+  }
+  const Value* find(Id id) const { return const_cast<SlotMap*>(this)->find(id); }
+
+  void erase(Id id) {
+    if (find(id) == nullptr) return;
+    const auto slot = static_cast<std::uint32_t>(id);
+    slots_[slot].value = Value{};
+    slots_[slot].used = false;
+    --size_;
+    // A slot whose generations are used up is left alone.
+    if (slots_[slot].generation < kLastGeneration) {
+      ++slots_[slot].generation;
+      free_.push_back(slot);
+    }
+  }
+
+  void reserve(std::size_t more) { slots_.reserve(slots_.size() + more); }
+  std::size_t size() const { return size_; }
+
+  void clear() {
+    slots_.clear();
+    free_.clear();
+    size_ = 0;
+  }
+
+ private:
+  static constexpr std::uint32_t kLastGeneration = (1U << 28U) - 1U;
+
+  struct Slot {
+    Value value;
+    std::uint32_t generation;
+    bool used;
+  };
+
+  Id make_id(std::uint32_t slot) const {
+    return static_cast<Id>(kKind) << 60U | static_cast<Id>(slots_[slot].generation) << 32U | slot;
+  }
+
+  std::vector<Slot> slots_;
+  std::vector<std::uint32_t> free_;
+  std::size_t size_ = 0;
+};
+
+}  // namespace flatland
