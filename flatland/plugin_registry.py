@@ -109,7 +109,7 @@ def included_manifest() -> Path:
     return Path(str(importlib.resources.files("flatland.plugins") / "flatland_plugins.xml"))
 
 
-def _package_path_manifests() -> list[str]:
+def _package_path_manifests(problems: list[PluginError]) -> list[str]:
     """Lists the manifests that packages on `ROS_PACKAGE_PATH` export; rospkg is no ROS client."""
     if not os.environ.get("ROS_PACKAGE_PATH"):
         return []
@@ -125,8 +125,11 @@ def _package_path_manifests() -> list[str]:
         try:
             exports = packages.get_manifest(package).get_export("flatland", "plugin")
             folder = packages.get_path(package)
-        except (rospkg.InvalidManifest, rospkg.ResourceNotFound) as error:
-            _LOG.debug("package %s is passed over: %s", package, error)
+        except Exception as error:
+            # Several libraries read package.xml, each with errors of its own; a package that is
+            # broken is no reason to miss the others.
+            reason = " ".join(str(error).split())
+            problems.append(PluginError(f'package "{package}" cannot be read: {reason}'))
             continue
         manifests += [export.replace("${prefix}", folder) for export in exports]
     return manifests
@@ -238,7 +241,8 @@ class PluginRegistry:
             self._read_included = True
             self.add_manifest(included_manifest())
         listed = [path for path in os.environ.get(MANIFEST_VARIABLE, "").split(":") if path]
-        for path in [*listed, *_package_path_manifests(), *_entry_point_manifests()]:
+        exported = _package_path_manifests(self._problems)
+        for path in [*listed, *exported, *_entry_point_manifests()]:
             try:
                 self.add_manifest(path)
             except PluginError as error:

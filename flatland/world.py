@@ -114,6 +114,7 @@ class World:
         self._lock = threading.RLock()
         self._requests: deque[Callable[[], None]] = deque()
         self._stepping_thread: int | None = None
+        self._requests_thread: int | None = None
         self._plugin_timeout = plugin_timeout
         self._initializing_thread: threading.Thread | None = None
         self._paused = False
@@ -261,11 +262,15 @@ class World:
     def process_requests(self) -> None:
         """Runs what other threads asked for; `step` does so by itself, also while paused."""
         with self._lock:
-            # Only what is there now: an action that posts another must not keep us here. An action
-            # may come back to here, so the queue can be empty sooner.
-            for _ in range(len(self._requests)):
-                if self._requests:
-                    self._requests.popleft()()
+            outer, self._requests_thread = self._requests_thread, threading.get_ident()
+            try:
+                # Only what is there now: an action that posts another must not keep us here. An
+                # action may come back to here, so the queue can be empty sooner.
+                for _ in range(len(self._requests)):
+                    if self._requests:
+                        self._requests.popleft()()
+            finally:
+                self._requests_thread = outer
 
     def _perform(self, action: Callable[[], R], what: str) -> R | None:
         """Runs a change of the world now, or after the step when a hook asks for it."""
@@ -275,6 +280,9 @@ class World:
                 lambda done: done.exception() and _LOG.error("%s: %s", what, done.exception())
             )
             return None
+        if self._requests_thread == threading.get_ident():
+            # Part of a request: those that came after it wait for their turn.
+            return action()
         if self._initializing_thread is threading.current_thread():
             # The thread that loads waits for this one, with the lock in its hands.
             return action()
@@ -466,6 +474,12 @@ class World:
         model.plugins.append(plugin)
 
     def start_world_plugin(self, entry: YamlReader, world_config: YamlReader) -> None:
+        """Starts a world plugin; for the loader.
+
+        Raises:
+            YamlError: There is one of that name and type.
+            PluginError: It cannot be found, made or initialised.
+        """
         name, type_name = entry.get("name", "string"), entry.get("type", "string")
         for other in self._host.world_plugins:
             if (other.name, other.type) == (name, type_name):

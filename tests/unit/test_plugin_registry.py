@@ -137,7 +137,7 @@ def test_unknown_names_list_the_nearest_first(package):
 @pytest.mark.parametrize(
     ("content", "text"),
     [
-        ("<library", 'manifest "{0}" is not XML, line 1 col 8, '),
+        ("<library", 'manifest "{0}" is not XML, line 1 col 0, unclosed token'),
         ("", 'manifest "{0}" is not XML, line 1 col 0, '),
         ("<a/>", 'manifest "{0}" must hold <library> or <class_libraries>, got <a>'),
         ('<library><class name="X" base_class_type="flatland::ModelPlugin"/></library>',
@@ -179,23 +179,35 @@ def test_several_libraries_in_one_manifest(files):
     assert (second.class_path, second.import_path) == ("c.D", str(files.folder / "x"))
 
 
+PACKAGE = """
+<package format="2">
+  <name>{name}</name><version>0.0.1</version><description>x</description>
+  <maintainer email="{email}">a</maintainer><license>BSD</license>
+  <export><flatland plugin="${{prefix}}/plugins.xml"/></export>
+</package>
+"""
+
+
 def test_packages_on_the_ros_package_path_are_found(package, files, monkeypatch):
     name, manifest = package
-    files.write(
-        "package.xml",
-        f"""
-        <package format="2">
-          <name>{name}</name><version>0.0.1</version><description>x</description>
-          <maintainer email="a@b.c">a</maintainer><license>BSD</license>
-          <export><flatland plugin="${{prefix}}/plugins.xml"/></export>
-        </package>
-        """,
-    )
+    files.write("package.xml", PACKAGE.format(name=name, email="a@example.org"))
     monkeypatch.delenv("FLATLAND_PLUGIN_PATH")
     with pytest.raises(PluginError):
         PluginRegistry().find(f"{name}::Good")
     monkeypatch.setenv("ROS_PACKAGE_PATH", str(files.folder))
     assert PluginRegistry().find(f"{name}::Good").manifest == manifest
+
+
+def test_a_broken_package_does_not_hide_the_others(package, files, monkeypatch):
+    name, manifest = package
+    files.write("package.xml", PACKAGE.format(name=name, email="a@example.org"))
+    files.write("other/package.xml", PACKAGE.format(name="other", email="nobody"))
+    monkeypatch.delenv("FLATLAND_PLUGIN_PATH")
+    monkeypatch.setenv("ROS_PACKAGE_PATH", f"{files.folder / 'other'}:{files.folder}")
+    registry = PluginRegistry()
+    assert registry.find(f"{name}::Good").manifest == manifest
+    with pytest.raises(PluginError, match='not read: package "other" cannot be read: .*email'):
+        registry.find("other::Good")
 
 
 def test_python_distributions_are_found(package, files, monkeypatch):

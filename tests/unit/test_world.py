@@ -17,7 +17,7 @@ bodies:
   - {name: arm, pose: [1, 1, 0.4], footprints: [{type: circle, radius: 0.1, density: 1}]}
 joints:
   - {name: j, type: weld, angle: 0.3,
-     bodies: [{name: base, anchor: [0, 1]}, {name: arm, anchor: [0, 0]}]}
+     bodies: [{name: base, anchor: [0.0998334, 0.9950042]}, {name: arm, anchor: [0, 0]}]}
 """
 
 
@@ -219,13 +219,12 @@ def test_unknown_names(files):
 )
 def test_spawns_that_fail_leave_the_world_as_it_was(files, path, name, namespace, error):
     world = files.load("{properties: {}, layers: []}")
-    there = world.spawn_model("minimal.model.yaml", "there")
-    bodies = len(world.physics.bodies)
+    there = world.spawn_model("minimal.model.yaml", "there", pose=(20, 20, 0))
     with pytest.raises((WorldError, YamlError)) as caught:
         world.spawn_model(path, name, namespace)
     assert error in str(caught.value)
     assert world.models == [there]
-    assert len(world.physics.bodies) == bodies
+    assert world.physics.ray_cast((-5, 0), (5, 0)) is None
     world.step()
 
 
@@ -233,7 +232,9 @@ def test_a_spawn_that_fails_late_leaves_nothing(files, probe):
     files.write(
         "bad.model.yaml",
         """
-        bodies: [{name: base, footprints: []}, {name: other, footprints: []}]
+        bodies:
+          - {name: base, footprints: [{type: circle, radius: 1, density: 1}]}
+          - {name: other, footprints: []}
         joints: [{name: j, type: weld,
                   bodies: [{name: base, anchor: [0, 0]}, {name: other, anchor: [0, 0]}]}]
         plugins:
@@ -251,7 +252,7 @@ def test_a_spawn_that_fails_late_leaves_nothing(files, probe):
     )
     assert isinstance(caught.value.__cause__, YamlError)
     assert world.models == []
-    assert world.physics.bodies == []
+    assert world.physics.ray_cast((-5, 0), (5, 0)) is None
     assert world.ports.outputs == {}
     assert world.ports.commands == {}
     # The plugin that had started was stopped, the one that had not was never called.
@@ -311,6 +312,8 @@ def test_step_and_close_in_a_hook_are_refused(files, probe, caplog):
     probe.hook, probe.act = "before", staticmethod(lambda p: p.world.step())
     world.step()
     assert "step must not be called from a plugin's hook" in caplog.text
+    world.delete_model("a")
+    world.spawn_model("probe.model.yaml", "b")
     probe.act = staticmethod(lambda p: p.world.close())
     world.step()
     assert "close must not be called from a plugin's hook" in caplog.text

@@ -61,7 +61,7 @@ ERRORS = {
     ),
     "unknown layer key": (
         "{properties: {}, layers: [{name: L, colour: red}]}",
-        'Entry layer "l" contains unrecognized entry(s) {"colour"}',
+        'Entry contains unrecognized entry(s) {"colour"} (in layer "l")',
     ),
     "map not there": (
         "{properties: {}, layers: [{name: L, map: nowhere.yaml}]}",
@@ -100,7 +100,7 @@ ERRORS = {
     ),
     "unknown model key": (
         "{properties: {}, layers: [], models: [{name: M, model: minimal.model.yaml, x: 1}]}",
-        'Entry model "m" contains unrecognized entry(s) {"x"}',
+        'Entry contains unrecognized entry(s) {"x"} (in model "m")',
     ),
     "world plugin twice": (
         "{properties: {}, layers: [], plugins: [{name: W, type: DummyWorldPlugin}, "
@@ -288,7 +288,7 @@ def test_a_drawn_seed_is_logged(files, caplog):
 def test_params_reach_the_files(files):
     world = files.load(
         """
-        properties: {velocity_iterations: $eval param("/iterations", 3)}
+        properties: {velocity_iterations: '$eval param("/iterations", 3)'}
         layers: []
         """,
         params={"/iterations": 7},
