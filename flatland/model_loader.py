@@ -191,6 +191,7 @@ class ModelLoader:
             anchors.append(_finite(end, "anchor", end.get("anchor", "vector")))
             end.ensure_accessed_all()
         options: dict[str, Any] = {"collide_connected": collide_connected}
+        make: Any
         if kind == "revolute":
             make = self._physics.create_revolute_joint
             options["limits"] = _read_limits(reader)

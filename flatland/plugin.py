@@ -5,6 +5,7 @@ A plugin declares its ports and hooks and knows no ROS. See `docs/plugins.md`.
 
 from __future__ import annotations
 
+import builtins
 from typing import TYPE_CHECKING, Any, ClassVar, TypeVar
 
 import numpy as np
@@ -82,7 +83,7 @@ class FlatlandPlugin:
         self.world.forget_transforms(self._sent)
         self._sent.clear()
 
-    def output(self, topic: str, value_type: type[T]) -> Output[T]:
+    def output(self, topic: str, value_type: builtins.type[T]) -> Output[T]:
         """Declares a stream of values.
 
         Args:
@@ -99,7 +100,7 @@ class FlatlandPlugin:
     def command(
         self,
         topic: str,
-        value_type: type[T],
+        value_type: builtins.type[T],
         default: T | None = None,
         accept: Callable[[T], bool] | None = None,
     ) -> Command[T]:

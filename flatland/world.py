@@ -276,9 +276,7 @@ class World:
         """Runs a change of the world now, or after the step when a hook asks for it."""
         if self._stepping_thread == threading.get_ident():
             future = self.post(action)
-            future.add_done_callback(
-                lambda done: done.exception() and _LOG.error("%s: %s", what, done.exception())
-            )
+            future.add_done_callback(lambda done: _log_failure(what, done))
             return None
         if self._requests_thread == threading.get_ident():
             # Part of a request: those that came after it wait for their turn.
@@ -653,6 +651,12 @@ class World:
             self._requests.clear()
             self._bodies.clear()
             self._physics.close()
+
+
+def _log_failure(what: str, done: Future[Any]) -> None:
+    error = done.exception()
+    if error is not None:
+        _LOG.error("%s: %s", what, error)
 
 
 def load_world(path: str | os.PathLike[str], **options: Any) -> World:
