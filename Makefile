@@ -4,8 +4,6 @@ SHELL := /bin/bash
 
 VENV := .venv
 PYTHON := $(VENV)/bin/python
-# Folders with Python that the project wrote; the generated messages are no part of it.
-PYTHON_FOLDERS := flatland tests $(wildcard bench examples tools worlds docs)
 CPP_FILES = $(shell find src/cpp $(wildcard bench) -name '*.h' -o -name '*.cpp')
 
 .PHONY: help
@@ -53,9 +51,16 @@ docs: setup  ## check that every link and picture of README.md and docs/ leads s
 .PHONY: dev
 dev:  ## build the extension and the messages into the source tree (PYTHONPATH=. then runs it)
 	@mkdir -p build
-	@cmake -S . -B build/dev -G Ninja -DFLATLAND_IN_TREE=ON -DFLATLAND_WERROR=ON \
-	  -DPython_EXECUTABLE="$$PWD/$(PYTHON)" >build/dev.log || { cat build/dev.log; exit 1; }
+	@cmake --preset dev >build/dev.log || { cat build/dev.log; exit 1; }
 	cmake --build build/dev
+
+.PHONY: sanitize
+sanitize: setup-dev  ## run the unit tests with address and undefined-behaviour sanitizers in the extension
+	@cmake --preset sanitize >build/sanitize.log || { cat build/sanitize.log; exit 1; }
+	cmake --build build/sanitize
+	. ./setup.bash && LD_PRELOAD="$$(g++ -print-file-name=libasan.so) $$(g++ -print-file-name=libubsan.so)" \
+	  ASAN_OPTIONS=detect_leaks=0 UBSAN_OPTIONS=print_stacktrace=1 PYTHONPATH="$$PWD/build/sanitize/python:$$PYTHONPATH" \
+	  pytest tests/unit $(ARGS)
 
 .PHONY: clean
 clean:  ## remove all that was built, .venv too

@@ -8,6 +8,7 @@ function(flatland_install_ros_share destination)
   foreach(folder launch msg srv rviz worlds)
     if(IS_DIRECTORY ${PROJECT_SOURCE_DIR}/${folder})
       install(DIRECTORY ${folder} DESTINATION ${destination} COMPONENT flatland
+              PATTERN "*.py" EXCLUDE  # draws worlds/, is no part of them
               PATTERN "__pycache__" EXCLUDE
               PATTERN "*~" EXCLUDE)
     endif()

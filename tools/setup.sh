@@ -79,3 +79,4 @@ quietly "pip install of the build's requirements" "${pip[@]}" install "${require
 quietly "pip install" "${pip[@]}" install --no-build-isolation --config-settings=build-dir=build/pip ".$extra"
 rm -f "$stamps/run" "$stamps/dev"
 echo "$content" >"$stamps/$level"
+echo "flatland: ready"

@@ -1,0 +1,116 @@
+"""A catkin workspace that all tests of this folder share, and clean environments to run things in."""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+
+WORLD = """
+properties: {}
+layers: []
+models: [{name: ball, model: ball.yaml, pose: [1, 2, 0]}]
+"""
+MODEL = """
+bodies:
+  - name: base
+    footprints: [{type: circle, radius: 0.2, density: 1}]
+"""
+
+
+def clean_environment(home: Path) -> dict[str, str]:
+    """What a fresh login has: nothing of a virtual environment, a workspace or the caller's ROS."""
+    return {"HOME": str(home), "PATH": "/usr/bin:/bin", "LANG": "C.UTF-8"}
+
+
+def run(
+    command: Sequence[str | Path], environment: dict[str, str], folder: Path, timeout: float = 60
+) -> str:
+    """Runs a command and returns what it printed; a failure shows that and fails the test."""
+    done = subprocess.run(
+        command,
+        env=environment,
+        cwd=folder,
+        timeout=timeout,
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+    )
+    assert done.returncode == 0, f"{command} exited with {done.returncode}:\n{done.stdout}"
+    return done.stdout
+
+
+@dataclass(frozen=True)
+class Space:
+    """The devel or the install space of the workspace.
+
+    Attributes:
+        name: `devel` or `install`.
+        folder: Where it is.
+        environment: What `setup.bash` of the space exports.
+        scratch: An empty folder to run in.
+    """
+
+    name: str
+    folder: Path
+    environment: dict[str, str]
+    scratch: Path
+
+    def run(self, *command: str | Path, timeout: float = 60) -> str:
+        """Runs a command in the space's environment and returns what it printed."""
+        return run(command, self.environment, self.scratch, timeout)
+
+
+@pytest.fixture(scope="session")
+def world_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A world with one ball and no map."""
+    folder = tmp_path_factory.mktemp("world")
+    (folder / "ball.yaml").write_text(MODEL)
+    path = folder / "world.yaml"
+    path.write_text(WORLD)
+    return path
+
+
+@pytest.fixture(scope="session")
+def catkin_workspace(tmp_path_factory: pytest.TempPathFactory, checkout: Path) -> Path:
+    """A workspace with the checkout linked into src/, built and installed by catkin_make."""
+    if shutil.which("catkin_make", path="/usr/bin") is None:
+        pytest.skip("catkin is not installed")
+    workspace = tmp_path_factory.mktemp("catkin") / "work space"
+    (workspace / "src").mkdir(parents=True)
+    (workspace / "src" / "flatland").symlink_to(checkout)
+    environment = clean_environment(workspace)
+    run(["catkin_make", "-j2"], environment, workspace, timeout=400)
+    run(["catkin_make", "install", "-j2"], environment, workspace, timeout=100)
+    return workspace
+
+
+@pytest.fixture(scope="session")
+def make_space(
+    catkin_workspace: Path, tmp_path_factory: pytest.TempPathFactory
+) -> Callable[[str], Space]:
+    """Enters a space of the workspace by name."""
+
+    def enter(name: str) -> Space:
+        scratch = tmp_path_factory.mktemp(name)
+        exported = run(
+            ["bash", "-c", '. "$0" && env -0', catkin_workspace / name / "setup.bash"],
+            clean_environment(scratch),
+            scratch,
+        )
+        environment = dict(line.split("=", 1) for line in exported.split("\0") if "=" in line)
+        environment["ROS_LOG_DIR"] = str(scratch / "log")
+        return Space(name, catkin_workspace / name, environment, scratch)
+
+    return enter
+
+
+@pytest.fixture(params=["devel", "install"])
+def space(make_space: Callable[[str], Space], request: pytest.FixtureRequest) -> Space:
+    """The devel space, then the install space."""
+    return make_space(request.param)

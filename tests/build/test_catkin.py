@@ -1,0 +1,130 @@
+"""catkin_make and catkin_make install give a ROS package that works, from devel and install space."""
+
+from __future__ import annotations
+
+import os
+import signal
+import socket
+import subprocess
+from pathlib import Path
+
+import pytest
+
+# Building the workspace is part of the first test.
+pytestmark = pytest.mark.timeout(600)
+
+STEP_A_WORLD = """
+import sys, flatland, flatland._core, flatland.msg, flatland.plugins
+with flatland.World.from_yaml(sys.argv[1]) as world:
+    world.model("ball").body("base").set_velocity(1, 0, 0)
+    world.step(200)
+    x, y, _ = world.model("ball").body("base").pose
+assert abs(x - 2) < 1e-4 and y == 2, (x, y)
+for module in (flatland, flatland._core, flatland.msg, flatland.world):
+    print(module.__file__)
+"""
+
+
+def test_ros_tools_find_the_package(space, checkout):
+    expected = checkout if space.name == "devel" else space.folder / "share" / "flatland"
+    assert Path(space.run("rospack", "find", "flatland").strip()) == expected
+    assert "Collision[] collisions" in space.run("rosmsg", "show", "-r", "flatland/Collisions")
+    md5 = space.run("rossrv", "md5", "flatland/SpawnModel").split()[0]
+    assert md5 == "952237af09cbedc354d376afc6d2fc71"
+
+
+def test_a_world_steps_in_the_systems_python(space, world_file, checkout):
+    printed = space.run("/usr/bin/python3", "-W", "error", "-c", STEP_A_WORLD, world_file)
+    package, core, messages, world = map(Path, printed.split("\n")[:4])
+    built = space.folder / "lib" / "python3" / "dist-packages" / "flatland"
+    assert (package.parent, core.parent, messages.parent) == (built, built, built / "msg")
+    # The devel space leads to the sources, so that an edit counts at once.
+    assert world.parent == (checkout / "flatland" if space.name == "devel" else built)
+
+
+def test_devel_space_puts_only_the_package_on_the_path(make_space, checkout):
+    path = make_space("devel").run("/usr/bin/python3", "-c", "import sys; print(*sys.path, sep='\\n')")
+    assert str(checkout) not in path.splitlines()
+
+
+def test_the_plugin_manifest_is_exported(space):
+    script = (
+        "import rospkg; p = rospkg.RosPack(); "
+        "print(p.get_manifest('flatland').get_export('flatland', 'plugin')[0]"
+        ".replace('${prefix}', p.get_path('flatland')))"
+    )
+    manifest = Path(space.run("/usr/bin/python3", "-c", script).strip())
+    assert manifest.read_text().count("<class ") >= 10
+
+
+def test_install_space_holds_all_and_nothing_of_make_dev(make_space, checkout):
+    folder = make_space("install").folder
+    package = folder / "lib" / "python3" / "dist-packages" / "flatland"
+    sources = {
+        path.relative_to(checkout / "flatland")
+        for pattern in ("*.py", "*.pyi", "*.xml", "py.typed")
+        for path in (checkout / "flatland").rglob(pattern)
+    }
+    generated = {Path("msg"), Path("srv")}
+    sources = {path for path in sources if path.parent not in generated}
+    installed = {path.relative_to(package) for path in package.rglob("*") if path.is_file()}
+    assert sources <= installed
+    assert len([path for path in installed if path.match("_core*.so")]) == 1
+    for data in ("launch", "msg", "srv", "rviz", "worlds"):
+        if (checkout / data).is_dir():
+            assert (folder / "share" / "flatland" / data).is_dir()
+    assert not [path for path in folder.rglob("*") if path.is_symlink()]
+
+
+@pytest.mark.parametrize("launch_file", ["server.launch", "benchmark.launch"])
+def test_roslaunch_reads_the_launch_files(space, launch_file):
+    files = space.run("roslaunch", "--files", "flatland", launch_file, "show_viz:=false")
+    assert Path(files.split()[0]).name == launch_file
+    nodes = space.run("roslaunch", "--nodes", "flatland", launch_file, "show_viz:=false")
+    assert nodes.strip()
+
+
+def test_the_node_runs(space, world_file):
+    """The server comes up from the space, ticks, and ends with roslaunch."""
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        port = free.getsockname()[1]
+    environment = {**space.environment, "ROS_MASTER_URI": f"http://127.0.0.1:{port}"}
+    log = space.scratch / f"{space.name}.log"
+    command = ["roslaunch", "-p", str(port), "flatland", "server.launch"]
+    with log.open("w") as output:
+        launch = subprocess.Popen(
+            [*command, f"world_path:={world_file}", "show_viz:=false"],
+            env=environment,
+            cwd=space.scratch,
+            stdout=output,
+            stderr=subprocess.STDOUT,
+            start_new_session=True,
+        )
+    wait_for_clock = (
+        "import rospy; from rosgraph_msgs.msg import Clock; "
+        "rospy.init_node('waiter', anonymous=True); rospy.wait_for_message('/clock', Clock, 60)"
+    )
+    try:
+        # The master is the first thing that roslaunch starts.
+        wait_for_master = (
+            "import rosgraph, time\n"
+            "end = time.monotonic() + 30\n"
+            "while not rosgraph.is_master_online():\n"
+            "    assert time.monotonic() < end\n"
+            "    time.sleep(0.1)\n"
+        )
+        for script in (wait_for_master, wait_for_clock):
+            waited = subprocess.run(
+                ["/usr/bin/python3", "-c", script],
+                env=environment,
+                timeout=90,
+                capture_output=True,
+                text=True,
+            )
+            assert waited.returncode == 0, waited.stderr + log.read_text()
+        os.kill(launch.pid, signal.SIGINT)
+        assert launch.wait(30) == 0, log.read_text()
+    finally:
+        if launch.poll() is None:
+            os.killpg(launch.pid, signal.SIGKILL)

@@ -1,0 +1,107 @@
+"""What `make setup` leaves and `setup.bash` exports: the environment of a user."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+from pathlib import Path
+
+import pytest
+
+from flatland.errors import FlatlandError
+
+
+@pytest.fixture(scope="module")
+def installed(checkout: Path) -> Path:
+    """The checkout, once `make setup` has been run in it."""
+    if not (checkout / ".venv" / "share" / "flatland" / "package.xml").exists():
+        pytest.skip("`make setup` has not been run")
+    return checkout
+
+
+@pytest.fixture
+def shell(installed, tmp_path):
+    """Runs a script of a fresh login shell in an empty folder; $0 is setup.bash."""
+
+    def run_script(script: str, **variables: str) -> subprocess.CompletedProcess[str]:
+        environment = {"HOME": str(tmp_path), "PATH": "/usr/bin:/bin", "LANG": "C.UTF-8"}
+        return subprocess.run(
+            ["bash", "-c", script, installed / "setup.bash"],
+            env={**environment, **variables},
+            cwd=tmp_path,
+            stdin=subprocess.DEVNULL,
+            capture_output=True,
+            text=True,
+        )
+
+    return run_script
+
+
+def test_ros_tools_know_the_package(shell, installed):
+    done = shell('set -eu; . "$0"; rospack find flatland; rosmsg show flatland/Collisions')
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.startswith(f"{installed}/.venv/share/flatland\n")
+    assert "flatland/Collision[] collisions" in done.stdout
+    assert "string entity_A" in done.stdout
+
+
+def test_system_python_imports_services(shell, installed):
+    """rosservice runs on /usr/bin/python3 and imports the service's class."""
+    done = shell('. "$0"; rossrv show flatland/SpawnModel; /usr/bin/python3 -c "'
+                 'import flatland.srv; print(flatland.srv.__file__)"')  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    assert f"{installed}/.venv/lib" in done.stdout
+
+
+def test_launch_files_are_found(shell):
+    done = shell('. "$0"; roslaunch --nodes flatland server.launch show_viz:=false')
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.strip()
+
+
+def test_sourcing_twice_changes_nothing(shell):
+    names = "$PATH $PYTHONPATH $ROS_PACKAGE_PATH"
+    once, twice = shell(f'. "$0"; echo {names}'), shell(f'. "$0"; . "$0"; echo {names}')
+    assert once.stdout == twice.stdout
+    assert once.stdout.strip()
+
+
+def test_what_the_shell_had_is_kept(shell):
+    done = shell(
+        '. "$0"; echo "$ROS_MASTER_URI"; echo "$ROS_PACKAGE_PATH"; echo "$PYTHONPATH"',
+        ROS_MASTER_URI="http://robot:11311",
+        ROS_PACKAGE_PATH="/opt/mine",
+        PYTHONPATH="/opt/python",
+    )
+    uri, packages, python = done.stdout.splitlines()
+    assert uri == "http://robot:11311"
+    assert packages.endswith(":/opt/mine")
+    assert python.endswith(":/opt/python")
+
+
+def test_run_names_a_world_that_is_not_there(shell, installed):
+    done = shell(f"'{installed}/tools/run.sh' nowhere.yaml")
+    assert done.returncode == 1
+    assert "there is no world file nowhere.yaml" in done.stderr
+
+
+def test_server_starts_by_launcher_whatever_python_is_first(shell, installed):
+    """roslaunch starts share/flatland/scripts/flatland_server without the environment's PATH."""
+    launcher = installed / ".venv" / "share" / "flatland" / "scripts" / "flatland_server"
+    assert os.access(launcher, os.X_OK)
+    assert os.access(installed / ".venv" / "bin" / "flatland_server", os.X_OK)
+
+
+def test_numpy_is_debians(shell):
+    """ROS's modules were built against it: nothing may pull a newer one in."""
+    done = shell('. "$0"; python -c "import numpy, yaml; print(numpy.__file__, yaml.__file__)"')
+    assert done.stdout.count("/usr/lib/python3/dist-packages/") == 2
+
+
+def test_tests_test_what_users_get(installed):
+    """Under `make test` the package is the installed one, not the source tree."""
+    if os.environ.get("VIRTUAL_ENV") != str(installed / ".venv"):
+        pytest.skip("not run by `make test`")
+    import inspect
+
+    assert inspect.getfile(FlatlandError).startswith(f"{installed}/.venv/lib/")
