@@ -23,13 +23,14 @@ def _linear(p: float) -> float:
 
 def _power(exponent: int) -> Easing:
     def ease_in(p: float) -> float:
-        return p**exponent
+        eased: float = p**exponent
+        return eased
 
     return ease_in
 
 
 def _exponential(p: float) -> float:
-    return 2.0 ** (10.0 * (p - 1.0))
+    return math.exp2(10.0 * (p - 1.0))
 
 
 def _circular(p: float) -> float:
@@ -46,7 +47,7 @@ def _back(overshoot: float) -> Easing:
 def _elastic(period: float) -> Easing:
     def ease_in(p: float) -> float:
         phase = (p - 1.0 - period / 4.0) * math.tau / period
-        return -(2.0 ** (10.0 * (p - 1.0))) * math.sin(phase)
+        return -_exponential(p) * math.sin(phase)
 
     return ease_in
 

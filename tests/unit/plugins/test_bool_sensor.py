@@ -1,0 +1,202 @@
+"""BoolSensor: which touches count, when it publishes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+
+import flatland
+
+WALL = """
+bodies:
+  - name: slab
+    type: static
+    footprints:
+      - {type: polygon, density: 1, points: [[0, -1], [0.2, -1], [0.2, 1], [0, 1]]}
+"""
+# The arm is well above the base, and does not reach the wall at x = 0.199 from its place.
+TWO_BODIES = """
+- name: base
+  footprints: [{type: circle, radius: 0.2, density: 1}]
+- name: arm
+  pose: [-0.5, 0, 0]
+  footprints: [{type: circle, radius: 0.2, density: 1}]
+"""
+SENSOR = "[{type: BoolSensor, name: switch}]"
+
+Collect = Callable[[flatland.World, str], list[Any]]
+
+
+def put_wall(world: flatland.World, files: Any, x: float = 0.199) -> None:
+    world.spawn_model(files.write("wall.model.yaml", WALL), "wall", pose=(x, 0, 0))
+
+
+def test_defaults(plugin_world: Any, files: Any, collect: Collect) -> None:
+    # [fix] The reference doubles the namespace in the topic.
+    world = plugin_world(SENSOR, namespace="r1")
+    assert list(world.ports.outputs) == ["/r1/bool_sensor"]
+    messages = collect(world, "/r1/bool_sensor")
+    world.step(2)
+    put_wall(world, files)
+    world.step(2)
+    assert messages == [False, False, True, True]
+    assert all(type(message) is bool for message in messages)
+
+
+def test_topic(plugin_world: Any) -> None:
+    world = plugin_world("[{type: BoolSensor, name: switch, topic: /pressed}]", namespace="r1")
+    assert list(world.ports.outputs) == ["/pressed"]
+
+
+def test_off_again_when_the_contact_ends(plugin_world: Any, files: Any, collect: Collect) -> None:
+    world = plugin_world(SENSOR)
+    put_wall(world, files)
+    messages = collect(world, "/bool_sensor")
+    world.step()
+    world.move_model("robot", (-3, 0, 0))
+    world.step(2)
+    assert messages == [True, False, False]
+
+
+def test_off_again_when_the_other_model_goes(plugin_world: Any, files: Any) -> None:
+    world = plugin_world(SENSOR)
+    put_wall(world, files)
+    output = world.output("/bool_sensor")
+    world.step()
+    assert output.latest is True
+    world.delete_model("wall")
+    world.step()
+    assert output.latest is False
+
+
+@pytest.mark.parametrize(("body", "expected"), [("base", True), ("arm", False)])
+def test_only_that_body_counts(plugin_world: Any, files: Any, body: str, expected: bool) -> None:
+    # [fix] The reference counts the contacts of every body of the model.
+    world = plugin_world(f"[{{type: BoolSensor, name: switch, body: {body}}}]", bodies=TWO_BODIES)
+    put_wall(world, files)
+    output = world.output("/bool_sensor")
+    world.step()
+    assert output.latest is expected
+
+
+def test_the_first_body_is_the_default(plugin_world: Any, files: Any) -> None:
+    world = plugin_world(SENSOR, bodies=TWO_BODIES)
+    output = world.output("/bool_sensor")
+    put_wall(world, files)
+    world.step()
+    assert output.latest is True
+    world.move_model("wall", (-0.899, 0, 0))
+    world.step()
+    assert output.latest is False
+    assert len(world.contacts) == 1
+
+
+@pytest.mark.parametrize("body", ["base", "arm"])
+def test_other_bodies_of_the_model_count_as_anything(plugin_world: Any, body: str) -> None:
+    world = plugin_world(
+        f"[{{type: BoolSensor, name: switch, body: {body}}}]",
+        bodies=TWO_BODIES.replace("-0.5", "-0.39"),
+    )
+    output = world.output("/bool_sensor")
+    world.step()
+    assert output.latest is True
+
+
+def test_fixtures_of_one_body_do_not_touch_each_other(plugin_world: Any) -> None:
+    two = """
+    - name: base
+      footprints:
+        - {type: circle, radius: 0.2, density: 1}
+        - {type: circle, radius: 0.3, density: 1, sensor: true}
+    """
+    world = plugin_world(SENSOR, bodies=two)
+    output = world.output("/bool_sensor")
+    world.step()
+    assert output.latest is False
+
+
+def test_sensor_fixtures_count(plugin_world: Any, files: Any) -> None:
+    sensor = """
+    - name: base
+      footprints: [{type: circle, radius: 0.2, density: 1, sensor: true}]
+    """
+    world = plugin_world(SENSOR, bodies=sensor)
+    put_wall(world, files)
+    output = world.output("/bool_sensor")
+    world.step()
+    assert output.latest is True
+
+
+def test_walls_count(plugin_world: Any, files: Any) -> None:
+    map_path = files.write_map("room", ["...", ".#.", "..."])
+    world = plugin_world(SENSOR, pose=(0.9, 1.5, 0), layers=f"[{{name: 2d, map: {map_path}}}]")
+    output = world.output("/bool_sensor")
+    world.step()
+    assert output.latest is True
+
+
+def test_several_contacts_end_one_by_one(plugin_world: Any, files: Any) -> None:
+    world = plugin_world(SENSOR, bodies=TWO_BODIES.replace("-0.5", "-0.39"))
+    put_wall(world, files)
+    output = world.output("/bool_sensor")
+    world.step()
+    assert len(world.contacts) == 2
+    world.delete_model("wall")
+    world.step()
+    assert output.latest is True
+
+
+def test_touch_between_two_messages_is_told_once(
+    plugin_world: Any, files: Any, collect: Collect
+) -> None:
+    world = plugin_world("[{type: BoolSensor, name: switch, update_rate: 20}]")
+    messages = collect(world, "/bool_sensor")
+    world.step(10)
+    assert messages == [False]
+    put_wall(world, files)
+    world.step(2)
+    world.move_model("robot", (-3, 0, 0))
+    world.step(28)
+    assert messages == [False, True, False, False]
+
+
+def test_rate(plugin_world: Any, collect: Collect) -> None:
+    world = plugin_world("[{type: BoolSensor, name: switch, update_rate: 40}]")
+    messages = collect(world, "/bool_sensor")
+    world.step(200)
+    assert len(messages) == 40
+
+
+def test_late_listener_hears_of_a_contact_that_is_old(plugin_world: Any, files: Any) -> None:
+    world = plugin_world(SENSOR)
+    put_wall(world, files)
+    world.step(10)
+    assert world.ports.find_output("/bool_sensor").latest is None
+    output = world.output("/bool_sensor")
+    world.step()
+    assert output.latest is True
+
+
+def test_late_listener_hears_nothing_of_a_touch_that_is_over(plugin_world: Any, files: Any) -> None:
+    world = plugin_world(SENSOR)
+    put_wall(world, files)
+    world.step()
+    world.move_model("robot", (-3, 0, 0))
+    world.step(10)
+    output = world.output("/bool_sensor")
+    world.step()
+    assert output.latest is False
+
+
+@pytest.mark.parametrize(
+    ("entry", "text"),
+    [
+        ("body: nose", 'Body with name "nose" does not exist'),
+        ("update_rate: .nan", 'Invalid "update_rate", must not be negative or NaN'),
+        ("rate: 3", 'unrecognized entry(s) {"rate"}'),
+    ],
+)
+def test_errors(plugin_world: Any, entry: str, text: str) -> None:
+    assert text in plugin_world.error(f"[{{type: BoolSensor, name: switch, {entry}}}]")

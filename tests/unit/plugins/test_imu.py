@@ -1,0 +1,276 @@
+"""Imu: orientation, rate, acceleration, noise, message and transform."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+import flatland
+from flatland import Imu
+
+IMU = "[{type: Imu, name: imu, body: base}]"
+DT = 0.005
+
+Collect = Callable[[flatland.World, str], list[Any]]
+
+
+def imu(entry: str) -> str:
+    return f"[{{type: Imu, name: imu, body: base, {entry}}}]"
+
+
+def accelerate(world: flatland.World, steps: int, ax: float, ay: float) -> None:
+    """Speeds the robot up from rest, evenly, in the world frame."""
+    base = world.model("robot").body("base")
+    for _ in range(steps):
+        vx, vy, omega = base.velocity
+        base.set_velocity(vx + ax * DT, vy + ay * DT, omega)
+        world.step()
+
+
+def test_defaults(plugin_world: Any, collect: Collect) -> None:
+    world = plugin_world(IMU, namespace="r1", pose=(0, 0, 0.7))
+    assert set(world.ports.outputs) == {"/r1/imu/filtered", "/r1/imu/ground_truth"}
+    filtered = collect(world, "/r1/imu/filtered")
+    truth = collect(world, "/r1/imu/ground_truth")
+    world.model("robot").body("base").set_velocity(0.0, 0.0, 2.0)
+    world.step(2)
+    for messages in (filtered, truth):
+        # [fix] Simulated time after the step, and a frame with the namespace.
+        assert [message.stamp for message in messages] == [5_000_000, 10_000_000]
+        assert type(messages[1]) is Imu
+        assert messages[1].frame_id == "r1_imu"
+        assert messages[1].yaw == pytest.approx(0.7 + 2 * 2.0 * DT, abs=1e-5)
+        assert messages[1].yaw_rate == pytest.approx(2.0, abs=1e-5)
+        for covariance in (
+            messages[1].orientation_covariance,
+            messages[1].angular_velocity_covariance,
+            messages[1].linear_acceleration_covariance,
+        ):
+            assert covariance.tolist() == np.zeros((3, 3)).tolist()
+    transform = world.transforms["r1_base", "r1_imu"]
+    assert transform.stamp == 10_000_000
+    assert (transform.x, transform.y, transform.yaw, transform.roll) == (0, 0, 0, 0)
+
+
+def test_first_message_has_no_acceleration(plugin_world: Any, collect: Collect) -> None:
+    world = plugin_world(IMU)
+    messages = collect(world, "/imu/ground_truth")
+    world.model("robot").body("base").set_velocity(3.0, 0.0, 0.0)
+    world.step()
+    assert messages[0].linear_acceleration == (0.0, 0.0)
+
+
+def test_acceleration_at_the_default_rate(plugin_world: Any, collect: Collect) -> None:
+    # [fix] The reference multiplies by the rate, which is infinite by default: NaN.
+    world = plugin_world(IMU)
+    messages = collect(world, "/imu/filtered")
+    accelerate(world, 5, 2.0, -1.0)
+    assert messages[-1].linear_acceleration == pytest.approx((2.0, -1.0), abs=1e-3)
+
+
+@pytest.mark.parametrize("yaw", [0.3, math.pi / 2, 2.5, -1.0])
+def test_acceleration_is_turned_into_the_body_frame(
+    plugin_world: Any, collect: Collect, yaw: float
+) -> None:
+    # [fix] The reference turns with a wrong sign: the y axis comes out as sin and cos summed.
+    world = plugin_world(IMU, pose=(0, 0, yaw))
+    messages = collect(world, "/imu/filtered")
+    ahead, left = 3.0, 0.5
+    accelerate(
+        world,
+        3,
+        ahead * math.cos(yaw) - left * math.sin(yaw),
+        ahead * math.sin(yaw) + left * math.cos(yaw),
+    )
+    assert messages[-1].linear_acceleration == pytest.approx((ahead, left), abs=1e-3)
+
+
+@pytest.mark.parametrize("rate", [100, 30])
+def test_acceleration_over_the_true_interval(
+    plugin_world: Any, collect: Collect, rate: float
+) -> None:
+    # At 30 Hz and 5 ms the messages are 30 or 35 ms apart, never 1/30 s.
+    world = plugin_world(imu(f"update_rate: {rate}"))
+    messages = collect(world, "/imu/filtered")
+    accelerate(world, 60, 2.0, 0.0)
+    assert len(messages) == round(60 * DT * rate)
+    for message in messages[1:]:
+        assert message.linear_acceleration == pytest.approx((2.0, 0.0), abs=2e-3)
+
+
+def test_circular_motion_points_to_the_centre(plugin_world: Any, collect: Collect) -> None:
+    world = plugin_world(
+        "[{type: DiffDrive, name: drive, body: base}, {type: Imu, name: imu, body: base}]"
+    )
+    messages = collect(world, "/imu/filtered")
+    world.command("/cmd_vel").set(flatland.Twist(linear_x=1.0, angular_z=0.5))
+    world.step(20)
+    ahead, left = messages[-1].linear_acceleration
+    # v * omega to the left; the velocity is half a step behind the heading.
+    assert left == pytest.approx(0.5, abs=1e-3)
+    assert ahead == pytest.approx(0.0, abs=5e-3)
+
+
+def test_it_measures_the_origin_not_the_centre_of_mass(plugin_world: Any, collect: Collect) -> None:
+    lopsided = """
+    - name: base
+      footprints: [{type: circle, radius: 0.2, center: [0.5, 0], density: 1}]
+    """
+    world = plugin_world(IMU, bodies=lopsided)
+    messages = collect(world, "/imu/filtered")
+    base = world.model("robot").body("base")
+    world.step()
+    base.apply_torque(1.0)
+    world.step()
+    # The centre stays where it is, the origin is 0.5 m behind it: it goes to the right.
+    yaw_acceleration = base.velocity[2] / DT
+    assert messages[-1].linear_acceleration[1] == pytest.approx(-0.5 * yaw_acceleration, rel=1e-2)
+
+
+def test_late_listener_gets_the_acceleration_of_the_last_interval(
+    plugin_world: Any, collect: Collect
+) -> None:
+    world = plugin_world(IMU)
+    accelerate(world, 10, 0.0, 0.0)
+    accelerate(world, 10, 2.0, 0.0)
+    assert world.ports.find_output("/imu/filtered").latest is None
+    messages = collect(world, "/imu/filtered")
+    accelerate(world, 1, 4.0, 0.0)
+    assert messages[0].linear_acceleration == pytest.approx((4.0, 0.0), abs=1e-3)
+
+
+def test_names(plugin_world: Any) -> None:
+    world = plugin_world(
+        imu("imu_pub: /a, ground_truth_pub: b/c, imu_frame_id: box"), namespace="r1"
+    )
+    output = world.output("/a")
+    assert set(world.ports.outputs) == {"/a", "/r1/b/c"}
+    world.step()
+    assert output.latest.frame_id == "r1_box"
+    assert list(world.transforms) == [("r1_base", "r1_box")]
+
+
+def test_only_what_is_wanted_goes_out(plugin_world: Any) -> None:
+    world = plugin_world(IMU)
+    truth = world.output("/imu/ground_truth")
+    world.step()
+    assert truth.latest is not None
+    assert world.ports.find_output("/imu/filtered").latest is None
+
+
+def test_without_messages(plugin_world: Any) -> None:
+    world = plugin_world(imu("enable_imu_pub: false"))
+    world.step()
+    assert world.ports.outputs == {}
+    assert list(world.transforms) == [("base", "imu")]
+
+
+def test_broadcast_tf_off(plugin_world: Any) -> None:
+    world = plugin_world(imu("broadcast_tf: false"))
+    world.step()
+    assert world.transforms == {}
+
+
+def test_no_transform_of_a_frame_to_itself(plugin_world: Any) -> None:
+    world = plugin_world(imu("imu_frame_id: base"))
+    world.step()
+    assert world.transforms == {}
+
+
+@pytest.mark.parametrize("key", ["update_rate", "pub_rate"])
+def test_rate(plugin_world: Any, collect: Collect, key: str) -> None:
+    world = plugin_world(imu(f"{key}: 40"))
+    messages = collect(world, "/imu/filtered")
+    sent = []
+    for _ in range(200):
+        world.step()
+        sent.append(world.transforms.get(("base", "imu")))
+    assert len(messages) == 40
+    assert [m.stamp for m in messages][:2] == [25_000_000, 50_000_000]
+    # The transform keeps to the rate, too.
+    assert len({transform.stamp for transform in sent if transform}) == 40
+
+
+def test_noise(plugin_world: Any, collect: Collect) -> None:
+    world = plugin_world(
+        imu(
+            "orientation_noise: [9, 9, 0.01], angular_velocity_noise: [9, 9, 0.04], "
+            "linear_acceleration_noise: [0.09, 0.25, 9]"
+        )
+    )
+    filtered = collect(world, "/imu/filtered")
+    truth = collect(world, "/imu/ground_truth")
+    world.step(2000)
+    assert all(m.yaw == 0 and m.yaw_rate == 0 for m in truth)
+    assert all(m.linear_acceleration == (0, 0) for m in truth)
+    samples = np.array([(m.yaw, m.yaw_rate, *m.linear_acceleration) for m in filtered])
+    # Variances, of which the yaw, the yaw rate, x and y are used.
+    assert samples.std(axis=0) == pytest.approx([0.1, 0.2, 0.3, 0.5], rel=0.08)
+    assert samples.mean(axis=0) == pytest.approx(np.zeros(4), abs=0.04)
+    # Independent of each other.
+    assert np.corrcoef(samples.T) == pytest.approx(np.eye(4), abs=0.1)
+
+
+def test_noise_is_repeatable(plugin_world: Any, collect: Collect) -> None:
+    runs = []
+    for seed in (1, 1, 2):
+        world = plugin_world(imu("orientation_noise: [0, 0, 1]"), seed=seed)
+        messages = collect(world, "/imu/filtered")
+        world.step(3)
+        runs.append([message.yaw for message in messages])
+    assert runs[0] == runs[1] != runs[2]
+
+
+def test_covariances_come_from_the_noises(plugin_world: Any, collect: Collect) -> None:
+    world = plugin_world(
+        imu(
+            "orientation_noise: [1, 2, 3], angular_velocity_noise: [4, 5, 6], "
+            "linear_acceleration_noise: [7, 8, 9]"
+        )
+    )
+    filtered = collect(world, "/imu/filtered")
+    truth = collect(world, "/imu/ground_truth")
+    world.step()
+    (message,) = filtered
+    assert message.orientation_covariance.tolist() == np.diag([1, 2, 3]).tolist()
+    assert message.angular_velocity_covariance.tolist() == np.diag([4, 5, 6]).tolist()
+    assert message.linear_acceleration_covariance.tolist() == np.diag([7, 8, 9]).tolist()
+    assert not truth[0].orientation_covariance.any()
+
+
+@pytest.mark.parametrize("kind", ["orientation", "angular_velocity", "linear_acceleration"])
+def test_covariances_as_given(plugin_world: Any, collect: Collect, kind: str) -> None:
+    world = plugin_world(
+        imu(f"{kind}_noise: [1, 1, 1], {kind}_covariance: [1, 2, 3, 4, 5, 6, 7, 8, 9]")
+    )
+    messages = collect(world, "/imu/filtered")
+    world.step()
+    covariance = getattr(messages[0], f"{kind}_covariance")
+    assert covariance.tolist() == [[1, 2, 3], [4, 5, 6], [7, 8, 9]]
+
+
+@pytest.mark.parametrize(
+    ("entry", "text"),
+    [
+        ("", 'Entry "body" does not exist'),
+        ("body: nose", 'Body with name "nose" does not exist'),
+        (
+            "body: base, orientation_noise: [0, 0]",
+            '"orientation_noise" must have size of exactly 3',
+        ),
+        # [fix] The reference takes the root of a negative variance.
+        ("body: base, orientation_noise: [0, 0, -1]", 'Invalid "orientation_noise", variances'),
+        ("body: base, angular_velocity_noise: [-1, 0, 0]", 'Invalid "angular_velocity_noise"'),
+        ("body: base, linear_acceleration_noise: [.nan, 0, 0]", '"linear_acceleration_noise"'),
+        ("body: base, orientation_covariance: [1]", "must have size of exactly 9"),
+        ("body: base, update_rate: -1", 'Invalid "update_rate", must not be negative'),
+        ("body: base, update_rate: 5, pub_rate: 5", 'Invalid "pub_rate", it is the older spelling'),
+        ("body: base, noise: 1", 'unrecognized entry(s) {"noise"}'),
+    ],
+)
+def test_errors(plugin_world: Any, entry: str, text: str) -> None:
+    assert text in plugin_world.error(f"[{{type: Imu, name: imu, {entry}}}]".replace(", }", "}"))

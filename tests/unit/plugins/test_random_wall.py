@@ -1,0 +1,256 @@
+"""RandomWall: where the new walls stand, and which edges they belong to."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+
+import flatland
+
+ROOM = ["#######", "#.....#", "#.....#", "#.....#", "#######"]
+
+
+def wall(entry: str = "") -> str:
+    return f"[{{type: RandomWall, name: walls, layer: 2d, robot_name: robot, {entry}}}]".replace(
+        ", }", "}"
+    )
+
+
+def lines(files: Any, *segments: str, origin: str = "[0, 0, 0]") -> str:
+    """Writes a map of line segments and returns the layers' text."""
+    files.write("lines.dat", "\n".join(segments))
+    path = files.write(
+        "lines.yaml", f"{{type: line_segments, data: lines.dat, scale: 1, origin: {origin}}}"
+    )
+    return f"[{{name: [2d, floor], map: {path}}}, {{name: 3d}}]"
+
+
+def edge_set(edges: Any) -> set[tuple[tuple[float, float], ...]]:
+    """Edges without order or direction, rounded."""
+    return {
+        tuple(sorted(((round(x1, 4), round(y1, 4)), (round(x2, 4), round(y2, 4)))))
+        for x1, y1, x2, y2 in np.asarray(edges, dtype=float).tolist()
+    }
+
+
+def test_one_wall_on_the_robots_side(plugin_world: Any, files: Any) -> None:
+    layers = lines(files, "0 0 4 0")
+    world = plugin_world(
+        pose=(2, 3, 0), layers=layers, world_plugins=wall("num_of_walls: 1, wall_wall_dist: 0.5")
+    )
+    assert edge_set(world.layer("2d").edges) == edge_set(
+        [(0, 0, 4, 0), (0, 0.5, 4, 0.5), (0, 0, 0, 0.5), (4, 0, 4, 0.5)]
+    )
+
+
+def test_other_side(plugin_world: Any, files: Any) -> None:
+    layers = lines(files, "0 0 4 0")
+    world = plugin_world(
+        pose=(2, -3, 0), layers=layers, world_plugins=wall("num_of_walls: 1, wall_wall_dist: 0.5")
+    )
+    assert edge_set(world.layer("2d").edges[1:]) == edge_set(
+        [(0, -0.5, 4, -0.5), (0, 0, 0, -0.5), (4, 0, 4, -0.5)]
+    )
+
+
+def test_direction_of_the_edge_does_not_matter(plugin_world: Any, files: Any) -> None:
+    layers = lines(files, "4 0 0 0")
+    world = plugin_world(
+        pose=(2, 3, 0), layers=layers, world_plugins=wall("num_of_walls: 1, wall_wall_dist: 0.5")
+    )
+    assert ((0.0, 0.5), (4.0, 0.5)) in edge_set(world.layer("2d").edges)
+
+
+def test_default_distance_is_a_metre_and_default_count_none(plugin_world: Any, files: Any) -> None:
+    layers = lines(files, "0 0 4 0")
+    world = plugin_world(pose=(2, 3, 0), layers=layers, world_plugins=wall("num_of_walls: 1"))
+    assert ((0.0, 1.0), (4.0, 1.0)) in edge_set(world.layer("2d").edges)
+    world = plugin_world(pose=(2, 3, 0), layers=layers, world_plugins=wall())
+    assert len(world.layer("2d").edges) == 1
+
+
+def test_double_wall(plugin_world: Any, files: Any) -> None:
+    layers = lines(files, "0 0 4 0")
+    world = plugin_world(
+        pose=(2, 3, 0), layers=layers, world_plugins=wall("num_of_walls: 1, double_wall: true")
+    )
+    assert edge_set(world.layer("2d").edges[1:]) == edge_set(
+        [
+            *[(0, 1, 4, 1), (0, 0, 0, 1), (4, 0, 4, 1)],
+            *[(0, -1, 4, -1), (0, 0, 0, -1), (4, 0, 4, -1)],
+        ]
+    )
+
+
+def test_slanted_edges_get_their_distance(plugin_world: Any, files: Any) -> None:
+    # [fix] The reference moves them along x and along y at once, too far and slanting.
+    layers = lines(files, "0 0 4 3")
+    world = plugin_world(
+        pose=(0, 3, 0), layers=layers, world_plugins=wall("num_of_walls: 1, wall_wall_dist: 0.5")
+    )
+    assert edge_set(world.layer("2d").edges[1:]) == edge_set(
+        [(-0.3, 0.4, 3.7, 3.4), (0, 0, -0.3, 0.4), (4, 3, 3.7, 3.4)]
+    )
+
+
+def test_robot_is_looked_for_in_the_layers_frame(plugin_world: Any, files: Any) -> None:
+    # Turned by 90 degrees and moved, the edge runs from (10, 0) up to (10, 4).
+    layers = lines(files, "0 0 4 0", origin=f"[10, 0, {math.pi / 2}]")
+    world = plugin_world(
+        pose=(9, 2, 0), layers=layers, world_plugins=wall("num_of_walls: 1, wall_wall_dist: 0.5")
+    )
+    # Left of the edge, as seen along it, is to the west in the world.
+    assert ((0.0, 0.5), (4.0, 0.5)) in edge_set(world.layer("2d").edges)
+    robot = world.model("robot").body("base")
+    hit = world.physics.ray_cast(robot.pose[:2], (20.0, 2.0), world.layer("2d").category_bits)
+    assert hit is not None
+    assert hit.point == pytest.approx((9.5, 2.0), abs=1e-5)
+
+
+def test_start_pose_counts_not_where_the_first_body_is(plugin_world: Any, files: Any) -> None:
+    body = """
+    - name: base
+      pose: [0, -10, 0]
+      footprints: [{type: circle, radius: 0.2, density: 1}]
+    """
+    world = plugin_world(
+        bodies=body,
+        pose=(2, 3, 0),
+        layers=lines(files, "0 0 4 0"),
+        world_plugins=wall("num_of_walls: 1"),
+    )
+    assert ((0.0, 1.0), (4.0, 1.0)) in edge_set(world.layer("2d").edges)
+
+
+def test_new_walls_have_the_bits_of_the_layer(plugin_world: Any, files: Any) -> None:
+    world = plugin_world(
+        pose=(2, 3, 0), layers=lines(files, "0 0 4 0"), world_plugins=wall("num_of_walls: 1")
+    )
+    layer = world.layer("2d")
+    assert layer.category_bits == 0b11
+    assert len(layer.body.fixtures) == 4
+    assert {(f.category_bits, f.mask_bits) for f in layer.body.fixtures} == {(0b11, 0b11)}
+    assert world.physics.ray_cast((2.0, 3.0), (2.0, 0.5), 0b10) is not None
+    assert world.physics.ray_cast((2.0, 3.0), (2.0, 0.5), 0b100) is None
+
+
+def test_lasers_see_the_new_wall(plugin_world: Any, files: Any) -> None:
+    # Two beams, to the right and ahead.
+    angle = "{min: -1.570796, max: 0, increment: 1.570796}"
+    laser = f"[{{type: Laser, name: l, body: base, range: 9, angle: {angle}}}]"
+    world = plugin_world(
+        laser,
+        pose=(2, 3, 0),
+        layers=lines(files, "0 0 4 0"),
+        world_plugins=wall("num_of_walls: 1, wall_wall_dist: 0.75"),
+    )
+    assert world.model("robot").plugin("l").compute_ranges()[0] == pytest.approx(2.25, abs=1e-4)
+
+
+def test_robots_collide_with_the_new_wall(plugin_world: Any, files: Any) -> None:
+    world = plugin_world(
+        pose=(2, 3, 0), layers=lines(files, "0 0 4 0"), world_plugins=wall("num_of_walls: 1")
+    )
+    base = world.model("robot").body("base")
+    base.set_velocity(0.0, -1.0, 0.0)
+    world.step(600)
+    assert base.pose[1] == pytest.approx(1.2, abs=0.02)
+
+
+def test_observers_are_told(plugin_world: Any, files: Any) -> None:
+    class Watcher(flatland.WorldObserver):
+        def __init__(self) -> None:
+            self.changes: list[tuple[str, int]] = []
+            self.world: Any = None
+
+        def layer_changed(self, layer_name: str) -> None:
+            self.changes.append(layer_name)
+
+    watcher = Watcher()
+    plugin_world(
+        pose=(2, 3, 0),
+        layers=lines(files, "0 0 4 0"),
+        world_plugins=wall("num_of_walls: 1"),
+        observers=[watcher],
+    )
+    # Once new each, and once more with the wall in it.
+    assert watcher.changes == ["2d", "3d", "2d"]
+
+
+def pick(plugin_world: Any, files: Any, count: int, seed: int) -> set[int]:
+    """Which of twelve parallel edges get a wall."""
+    layers = lines(files, *(f"{10 * i} 0 {10 * i + 1} 0" for i in range(12)))
+    world = plugin_world(
+        pose=(0, 3, 0), layers=layers, world_plugins=wall(f"num_of_walls: {count}"), seed=seed
+    )
+    new = world.layer("2d").edges[12:]
+    assert len(new) == 3 * count
+    return {int(edge[0] // 10) for edge in new}
+
+
+def test_different_edges_are_picked(plugin_world: Any, files: Any) -> None:
+    assert pick(plugin_world, files, 12, 1) == set(range(12))
+    for seed in range(5):
+        assert len(pick(plugin_world, files, 6, seed)) == 6
+
+
+def test_seed_decides(plugin_world: Any, files: Any) -> None:
+    picked = [pick(plugin_world, files, 4, seed) for seed in (1, 1, 2, 3)]
+    assert picked[0] == picked[1]
+    assert len({frozenset(p) for p in picked}) > 1
+
+
+def test_image_maps_too(plugin_world: Any, files: Any) -> None:
+    path = files.write_map("room", ROOM)
+    world = plugin_world(
+        pose=(3.3, 2.2, 0),
+        layers=f"[{{name: 2d, map: {path}}}]",
+        world_plugins=wall("num_of_walls: 3, wall_wall_dist: 0.25"),
+    )
+    exact = world.layer("2d").exact_edge_count
+    assert len(world.layer("2d").edges) == exact + 9
+
+
+@pytest.mark.parametrize(
+    ("plugin", "text"),
+    [
+        ("layer: 4d, robot_name: robot", 'layer with name "4d" does not exist'),
+        ("layer: 2d, robot_name: rob", 'robot "rob" does not exist'),
+        (
+            "layer: 2d, robot_name: robot, num_of_walls: 3",
+            'num_of_walls is 3, but layer "2d" has only 2 edges',
+        ),
+        (
+            "layer: 2d, robot_name: robot, num_of_walls: 2",
+            'robot "robot" stands on the line of the wall from (0, 0) to (4, 0) of layer "2d"',
+        ),
+        ("layer: 2d, robot_name: robot, num_of_walls: -1", '"num_of_walls", must not be negative'),
+        ("layer: 2d, robot_name: robot, wall_wall_dist: 0", '"wall_wall_dist", must be greater'),
+        ("layer: 2d, robot_name: robot, wall_wall_dist: .nan", '"wall_wall_dist", must be finite'),
+        ("layer: 2d", 'Entry "robot_name" does not exist'),
+        ("robot_name: robot", 'Entry "layer" does not exist'),
+        ("layer: 2d, robot_name: robot, walls: 1", 'unrecognized entry(s) {"walls"}'),
+    ],
+)
+def test_errors(plugin_world: Any, files: Any, plugin: str, text: str) -> None:
+    layers = lines(files, "0 0 4 0", "0 1 4 1")
+    with pytest.raises(flatland.PluginError) as caught:
+        plugin_world(
+            pose=(9, 0, 0),
+            layers=layers,
+            world_plugins=f"[{{type: RandomWall, name: walls, {plugin}}}]",
+        )
+    assert text in str(caught.value)
+    assert 'World Plugin "walls" type "RandomWall"' in str(caught.value)
+
+
+def test_on_the_line_is_no_matter_for_double_walls(plugin_world: Any, files: Any) -> None:
+    world = plugin_world(
+        pose=(9, 0, 0),
+        layers=lines(files, "0 0 4 0"),
+        world_plugins=wall("num_of_walls: 1, double_wall: true"),
+    )
+    assert len(world.layer("2d").edges) == 7

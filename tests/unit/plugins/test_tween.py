@@ -1,0 +1,270 @@
+"""Tween: modes, timing, the last word over the physics."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import pytest
+
+import flatland
+
+STATIC = """
+- name: base
+  type: kinematic
+  footprints: [{type: circle, radius: 0.2, density: 1}]
+"""
+WALL = """
+bodies:
+  - name: slab
+    type: static
+    footprints:
+      - {type: polygon, density: 1, points: [[0, -1], [0.2, -1], [0.2, 1], [0, 1]]}
+"""
+CRATE = """
+bodies:
+  - name: box
+    footprints:
+      - {type: polygon, density: 1, points: [[-0.1, -0.1], [0.1, -0.1], [0.1, 0.1], [-0.1, 0.1]]}
+"""
+
+
+def tween(entry: str) -> str:
+    return f"[{{type: Tween, name: tween, body: base, {entry}}}]"
+
+
+def poses(world: flatland.World, steps: int) -> list[tuple[float, float, float]]:
+    """Poses of the body after each step."""
+    found = []
+    for _ in range(steps):
+        world.step()
+        found.append(world.model("robot").body("base").pose)
+    return found
+
+
+def xs(world: flatland.World, steps: int) -> list[float]:
+    return [pose[0] for pose in poses(world, steps)]
+
+
+def test_once(plugin_world: Any) -> None:
+    world = plugin_world(tween("delta: [1, 3, 2], duration: 1, mode: once"), step_size=0.5)
+    expected = [(0.5, 1.5, 1), (1, 3, 2), (1, 3, 2)]
+    assert poses(world, 3) == [pytest.approx(pose, abs=1e-5) for pose in expected]
+
+
+def test_loop(plugin_world: Any) -> None:
+    world = plugin_world(tween("delta: [10, 10, 1], duration: 2, mode: loop"), step_size=0.5)
+    found = poses(world, 6)
+    assert [pose[0] for pose in found] == pytest.approx([2.5, 5, 7.5, 10, 2.5, 5], abs=1e-5)
+    assert [pose[2] for pose in found] == pytest.approx([0.25, 0.5, 0.75, 1, 0.25, 0.5], abs=1e-5)
+
+
+def test_yoyo(plugin_world: Any) -> None:
+    world = plugin_world(tween("delta: [10, 10, 1], duration: 1, mode: yoyo"), step_size=0.5)
+    assert xs(world, 9) == pytest.approx([5, 10, 5, 0, 5, 10, 5, 0, 5], abs=1e-5)
+
+
+def test_yoyo_is_the_default_mode(plugin_world: Any) -> None:
+    world = plugin_world(tween("delta: [10, 10, 1]"), step_size=0.5)
+    assert xs(world, 5) == pytest.approx([5, 10, 5, 0, 5], abs=1e-5)
+
+
+def test_ends_are_reached_when_the_steps_do_not_fit(plugin_world: Any) -> None:
+    world = plugin_world(tween("delta: [1, 0, 0], mode: yoyo"), step_size=0.3)
+    assert xs(world, 9) == pytest.approx([0.3, 0.6, 0.9, 1, 0.7, 0.4, 0.1, 0, 0.3], abs=1e-5)
+    world = plugin_world(tween("delta: [1, 0, 0], mode: loop"), step_size=0.3)
+    assert xs(world, 6) == pytest.approx([0.3, 0.6, 0.9, 1, 0.3, 0.6], abs=1e-5)
+
+
+def test_trigger(plugin_world: Any) -> None:
+    world = plugin_world(
+        tween("delta: [1, 0, 0], duration: 1, mode: trigger, trigger_topic: open"),
+        step_size=0.25,
+        namespace="gate",
+    )
+    command = world.command("/gate/open")
+    # Shut until told otherwise.
+    assert xs(world, 2) == [0, 0]
+    command.set(True)
+    assert xs(world, 3) == pytest.approx([0.25, 0.5, 0.75], abs=1e-5)
+    command.set(False)
+    assert xs(world, 1) == pytest.approx([0.5], abs=1e-5)
+    command.set(True)
+    assert xs(world, 3) == pytest.approx([0.75, 1, 1], abs=1e-5)
+    command.set(False)
+    assert xs(world, 5) == pytest.approx([0.75, 0.5, 0.25, 0, 0], abs=1e-5)
+
+
+def test_trigger_takes_booleans_only(plugin_world: Any) -> None:
+    world = plugin_world(tween("mode: trigger, trigger_topic: open"))
+    with pytest.raises(TypeError, match="takes bool"):
+        world.command("/open").set(1)
+
+
+def test_trigger_without_topic_stays_and_says_so(
+    plugin_world: Any, caplog: pytest.LogCaptureFixture
+) -> None:
+    world = plugin_world(tween("delta: [1, 0, 0], mode: trigger"))
+    assert xs(world, 2) == [0, 0]
+    assert world.ports.commands == {}
+    assert "mode trigger needs a trigger_topic" in caplog.text
+
+
+def test_topic_without_trigger_opens_no_port_and_says_so(
+    plugin_world: Any, caplog: pytest.LogCaptureFixture
+) -> None:
+    world = plugin_world(tween("mode: once, trigger_topic: open"))
+    assert world.ports.commands == {}
+    assert "no use for a trigger_topic in mode once" in caplog.text
+
+
+def test_defaults_move_nothing(plugin_world: Any) -> None:
+    world = plugin_world("[{type: Tween, name: tween, body: base}]", pose=(1, 2, 0.5))
+    assert poses(world, 2) == [pytest.approx((1, 2, 0.5), abs=1e-6)] * 2
+
+
+def test_default_duration_is_a_second_and_easing_is_linear(plugin_world: Any) -> None:
+    world = plugin_world(tween("delta: [1, 0, 0], mode: once"), step_size=0.1)
+    assert xs(world, 11) == pytest.approx([*(i / 10 for i in range(1, 11)), 1], abs=1e-6)
+
+
+def test_easing(plugin_world: Any) -> None:
+    world = plugin_world(tween("delta: [1, 2, 0], mode: once, easing: quadraticIn"), step_size=0.25)
+    expected = [(p * p, 2 * p * p, 0) for p in (0.25, 0.5, 0.75, 1)]
+    assert poses(world, 4) == [pytest.approx(pose, abs=1e-6) for pose in expected]
+
+
+def test_way_starts_at_the_pose_in_the_world(plugin_world: Any) -> None:
+    # The delta is along the axes of the world, whichever way the body looks.
+    world = plugin_world(
+        tween("delta: [1, 0, 0.5], mode: once"), pose=(3, 4, math.pi / 2), step_size=0.5
+    )
+    assert poses(world, 2)[-1] == pytest.approx((4, 4, math.pi / 2 + 0.5), abs=1e-5)
+
+
+@pytest.mark.parametrize(("duration", "dt"), [(0.1, 1 / 30), (1.5, 0.005), (0.7, 0.1)])
+def test_rounding_costs_no_step_at_the_ends(plugin_world: Any, duration: float, dt: float) -> None:
+    world = plugin_world(tween(f"delta: [1, 0, 0], duration: {duration}"), step_size=dt)
+    n = round(duration / dt)
+    found = xs(world, 4 * n)
+    assert found[n - 1] == 1.0
+    assert found[2 * n - 1] == 0.0
+    assert found[3 * n - 1] == 1.0
+    assert found[4 * n - 1] == 0.0
+
+
+def test_steps_under_a_millisecond(plugin_world: Any) -> None:
+    # [fix] The reference counts whole milliseconds: it would stand still.
+    world = plugin_world(tween("delta: [1, 0, 0], mode: once"), step_size=0.0001)
+    assert xs(world, 5000)[-1] == pytest.approx(0.5, abs=1e-5)
+
+
+def test_part_of_a_millisecond_is_not_lost(plugin_world: Any) -> None:
+    # [fix] The reference would take 2.5 ms for 2.
+    world = plugin_world(tween("delta: [1, 0, 0], mode: once"), step_size=0.0025)
+    assert xs(world, 200)[-1] == pytest.approx(0.5, abs=1e-5)
+
+
+def test_long_ways_in_fine_steps_keep_time(plugin_world: Any) -> None:
+    # A sum in single precision would be 2 % late here.
+    world = plugin_world(tween("delta: [1, 0, 0], duration: 60, mode: once"), step_size=0.0001)
+    world.model("robot").plugin("tween")._progress = 0.5
+    world.step(3000)
+    assert world.model("robot").body("base").pose[0] == pytest.approx(0.505, abs=1e-5)
+
+
+@pytest.mark.parametrize("body_type", ["dynamic", "kinematic", "static"])
+def test_every_type_of_body_moves(plugin_world: Any, body_type: str) -> None:
+    bodies = STATIC.replace("kinematic", body_type)
+    world = plugin_world(tween("delta: [1, 0, 0], mode: once"), bodies=bodies, step_size=0.25)
+    assert xs(world, 4) == pytest.approx([0.25, 0.5, 0.75, 1], abs=1e-6)
+
+
+def test_wall_does_not_hold_it_up(plugin_world: Any, files: Any) -> None:
+    # Box2D would push the body out of the wall within the same step.
+    world = plugin_world(tween("delta: [1, 0, 0], mode: once"), step_size=0.05)
+    world.spawn_model(files.write("wall.model.yaml", WALL), "wall", pose=(0.4, 0, 0))
+    found = poses(world, 20)
+    assert [pose[0] for pose in found] == pytest.approx([i / 20 for i in range(1, 21)], abs=1e-6)
+    assert [pose[1:] for pose in found] == [(0.0, 0.0)] * 20
+
+
+def test_velocity_does_not_carry_it_off(plugin_world: Any) -> None:
+    world = plugin_world(tween("delta: [1, 0, 0], mode: once"), step_size=0.25)
+    world.model("robot").body("base").set_velocity(5.0, 5.0, 5.0)
+    assert poses(world, 1)[0] == pytest.approx((0.25, 0, 0), abs=1e-6)
+
+
+def test_pushing_gives_it_no_velocity(plugin_world: Any, files: Any) -> None:
+    world = plugin_world(tween("delta: [0, 0, 0]"))
+    world.spawn_model(files.write("crate.model.yaml", CRATE), "crate", pose=(-0.31, 0, 0))
+    box = world.model("crate").body("box")
+    for _ in range(50):
+        box.set_velocity(1.0, 0.0, 0.0)
+        world.step()
+    assert world.contacts
+    assert world.model("robot").body("base").velocity == (0.0, 0.0, 0.0)
+
+
+def test_it_pushes_what_is_in_its_way(plugin_world: Any, files: Any) -> None:
+    world = plugin_world(tween("delta: [1, 0, 0], duration: 2, mode: once"), bodies=STATIC)
+    world.spawn_model(files.write("crate.model.yaml", CRATE), "crate", pose=(0.35, 0, 0))
+    world.step(400)
+    x, y, _ = world.model("crate").body("box").pose
+    # The disc's edge is at 1.2 at the end, the crate's half width is 0.1.
+    assert x == pytest.approx(1.3, abs=0.02)
+    assert y == pytest.approx(0.0, abs=0.02)
+
+
+def test_it_stays_awake(plugin_world: Any) -> None:
+    world = plugin_world(tween("delta: [1, 0, 0], duration: 0.1, mode: once"))
+    world.step(400)
+    assert world.model("robot").body("base").awake
+
+
+def test_a_body_without_tween_would_sleep(plugin_world: Any) -> None:
+    world = plugin_world("")
+    world.step(400)
+    assert not world.model("robot").body("base").awake
+
+
+def test_touching_is_heard_at_the_end_of_the_way(plugin_world: Any, files: Any) -> None:
+    # Needs contacts of a body that was put there and has stood still for long.
+    world = plugin_world(
+        "[{type: Tween, name: tween, body: base, delta: [1, 0, 0], duration: 0.1, mode: once}, "
+        "{type: BoolSensor, name: switch}]"
+    )
+    output = world.output("/bool_sensor")
+    world.step(400)
+    assert output.latest is False
+    world.spawn_model(files.write("wall.model.yaml", WALL), "wall", pose=(1.1, 0, 0))
+    world.step(2)
+    assert output.latest is True
+
+
+def test_moved_model_comes_back(plugin_world: Any) -> None:
+    world = plugin_world(tween("delta: [1, 0, 0], mode: once"), step_size=0.25)
+    world.step()
+    world.move_model("robot", (5, 5, 5))
+    assert poses(world, 1)[0] == pytest.approx((0.5, 0, 0), abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("entry", "text"),
+    [
+        ("", 'Entry "body" does not exist'),
+        ("body: nose", 'Body with name "nose" does not exist'),
+        ("body: base, mode: sometimes", "Mode sometimes does not exist"),
+        ("body: base, easing: slowly", "Easing slowly does not exist"),
+        ("body: base, easing: CubicIn", "Easing CubicIn does not exist"),
+        ("body: base, duration: 0", 'Invalid "duration", must be greater than 0, got 0'),
+        ("body: base, duration: -1", 'Invalid "duration", must be greater than 0, got -1'),
+        ("body: base, duration: .inf", 'Invalid "duration", must be finite'),
+        ("body: base, delta: [1, 2]", 'Entry "delta" must have size of exactly 3'),
+        ("body: base, delta: [1, .nan, 0]", 'Invalid "delta", must be finite'),
+        ("body: base, rate: 3", 'unrecognized entry(s) {"rate"}'),
+    ],
+)
+def test_errors(plugin_world: Any, entry: str, text: str) -> None:
+    error = plugin_world.error(f"[{{type: Tween, name: tween, {entry}}}]".replace(", }", "}"))
+    assert text in error
