@@ -44,7 +44,7 @@ def test_no_segments(tmp_path: Path, text: str) -> None:
 )
 @pytest.mark.parametrize("before", [0, 1, 7])
 def test_the_line_of_an_error_is_that_of_the_file(tmp_path: Path, bad: str, before: int) -> None:
-    text = "# head\n\n" + "1 2 3 4\n" * before + bad + "\n1 2 3 4\n1 2\n"
+    text = "# head\n\n" + "1 2 3 4\n" * before + bad + "\n1 2 3 4\n"
     line = 3 + before
     with pytest.raises(MapFileError) as caught:
         read(tmp_path, text)
@@ -52,6 +52,11 @@ def test_the_line_of_an_error_is_that_of_the_file(tmp_path: Path, bad: str, befo
         f'Flatland File: Failed to read line segment from line {line}, in file "lines.dat"'
         f" [{tmp_path / 'lines.dat'}:{line}]"
     )
+
+
+def test_of_two_bad_lines_the_first_is_named(tmp_path: Path) -> None:
+    with pytest.raises(MapFileError, match="line segment from line 2,"):
+        read(tmp_path, "1 2 3 4\n1 2 nan 4\n1 2\n")
 
 
 def test_a_binary_file(tmp_path: Path) -> None:
