@@ -16,8 +16,8 @@ if TYPE_CHECKING:
 _LOG = logging.getLogger("flatland")
 
 WARNING_PERIOD = 1.0  # s of wall time between two warnings of one drive
-# No robot gets there, and Box2D squares speeds in single precision, which ends at 1e38.
-MAX_COMMAND = 1e9
+# No robot gets there, and what a drive makes of it stays within the bounds of the physics.
+MAX_COMMAND = 1e6
 
 
 class TwistGuard:

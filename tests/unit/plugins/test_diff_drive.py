@@ -1,0 +1,430 @@
+from __future__ import annotations
+
+import logging
+import math
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+import flatland
+from flatland.values import Odometry, TwistWithCovariance
+
+Collect = Callable[[flatland.World, str], list[Any]]
+
+# Its centre of mass is 0.3 m ahead of and 0.2 m beside its origin.
+LOPSIDED = """
+- name: base
+  footprints: [{type: circle, radius: 0.2, center: [0.3, 0.2], density: 1}]
+"""
+TRUTH = "/odometry/ground_truth"
+ODOMETRY = "/odometry/filtered"
+
+
+def drive(extra: str = "") -> str:
+    return f"- {{type: DiffDrive, name: wheels, body: base, {extra}}}"
+
+
+def command(world: flatland.World, v: float, omega: float, topic: str = "/cmd_vel") -> None:
+    world.command(topic).set(flatland.Twist(linear_x=v, angular_z=omega))
+
+
+def base(world: flatland.World) -> flatland.Body:
+    return world.model("robot").body("base")
+
+
+class TestMotion:
+    def test_it_stands_without_a_command(self, plugin_world: Any) -> None:
+        world = plugin_world(drive(), pose=(1.0, 2.0, 0.5))
+        world.step(20)
+        assert base(world).pose == pytest.approx((1.0, 2.0, 0.5), abs=1e-6)
+
+    def test_it_drives_along_its_heading(self, plugin_world: Any) -> None:
+        world = plugin_world(drive(), pose=(1.0, 2.0, 0.5))
+        command(world, 0.8, 0.0)
+        world.step(200)
+        expected = (1.0 + 0.8 * math.cos(0.5), 2.0 + 0.8 * math.sin(0.5), 0.5)
+        assert base(world).pose == pytest.approx(expected, abs=1e-4)
+
+    def test_the_origin_not_the_centre_of_mass_has_the_velocity(self, plugin_world: Any) -> None:
+        world = plugin_world(drive(), bodies=LOPSIDED, pose=(0.0, 0.0, 0.7))
+        command(world, 0.5, 2.0)
+        plugin = world.model("robot").plugin("wheels")
+        plugin.before_physics_step(world.timekeeper)
+        assert base(world).velocity == pytest.approx(
+            (0.5 * math.cos(0.7), 0.5 * math.sin(0.7), 2.0), abs=1e-5
+        )
+
+    def test_it_turns_about_its_origin(self, plugin_world: Any) -> None:
+        world = plugin_world(drive(), bodies=LOPSIDED, pose=(3.0, 4.0, 0.0))
+        command(world, 0.0, 1.0)
+        world.step(400)
+        x, y, theta = base(world).pose
+        assert (x, y) == pytest.approx((3.0, 4.0), abs=5e-3)
+        assert theta == pytest.approx(2.0, abs=1e-4)
+
+    def test_the_velocity_acts_in_every_step(self, plugin_world: Any) -> None:
+        bodies = """
+        - name: base
+          linear_damping: 5
+          angular_damping: 5
+          footprints: [{type: circle, radius: 0.2, density: 1}]
+        """
+        world = plugin_world(drive("pub_rate: 1"), bodies=bodies)
+        command(world, 1.0, 0.0)
+        world.step(100)
+        # Damping takes its share of each step, but does not add up.
+        assert base(world).pose[0] == pytest.approx(0.5 / (1 + 5 * 0.005), rel=1e-3)
+
+    def test_sideways_part_of_a_command_is_not_used(self, plugin_world: Any) -> None:
+        world = plugin_world(drive())
+        world.command("/cmd_vel").set(flatland.Twist(linear_y=3.0))
+        world.step(10)
+        assert base(world).pose == pytest.approx((0.0, 0.0, 0.0), abs=1e-7)
+
+    def test_command_topic(self, plugin_world: Any) -> None:
+        world = plugin_world(drive("twist_sub: go"), namespace="r1")
+        command(world, 1.0, 0.0, "/r1/go")
+        world.step(10)
+        assert base(world).pose[0] == pytest.approx(0.05, abs=1e-5)
+
+
+class TestDynamics:
+    def test_linear_dynamics(self, plugin_world: Any) -> None:
+        limits = "{acceleration_limit: 1.0, deceleration_limit: 2.0, velocity_limit: 0.012}"
+        world = plugin_world(drive(f"linear_dynamics: {limits}"))
+        command(world, 5.0, 0.0)
+        speeds = []
+        for step in range(6):
+            if step == 4:
+                command(world, 0.0, 0.0)
+            world.step()
+            speeds.append(base(world).velocity[0])
+        assert speeds == pytest.approx([0.005, 0.01, 0.012, 0.012, 0.002, 0.0], abs=1e-6)
+
+    def test_angular_dynamics(self, plugin_world: Any) -> None:
+        world = plugin_world(drive("angular_dynamics: {acceleration_limit: 2.0}"))
+        command(world, 0.0, -5.0)
+        rates = []
+        for _ in range(3):
+            world.step()
+            rates.append(base(world).velocity[2])
+        assert rates == pytest.approx([-0.01, -0.02, -0.03], abs=1e-6)
+
+    @pytest.mark.parametrize("name", ["linear_dynamics", "angular_dynamics"])
+    def test_wrong_limits_are_errors(self, plugin_world: Any, name: str) -> None:
+        text = plugin_world.error(drive(f"{name}: {{velocity_limit: -1}}"))
+        assert 'Invalid "velocity_limit", must not be negative' in text
+        assert "top" in plugin_world.error(drive(f"{name}: {{top: 1}}"))
+
+
+class TestGroundTruth:
+    def test_message(self, plugin_world: Any, collect: Collect) -> None:
+        world = plugin_world(drive(), namespace="r1", pose=(1.0, 2.0, 0.5), bodies=LOPSIDED)
+        truths = collect(world, "/r1" + TRUTH)
+        command(world, 0.6, 0.4, "/r1/cmd_vel")
+        world.step(2)
+        first, second = truths
+        assert isinstance(first, Odometry)
+        assert (first.stamp, second.stamp) == (0, 5_000_000)
+        assert (first.frame_id, first.child_frame_id) == ("map", "r1_base")
+        assert first.pose == pytest.approx((1.0, 2.0, 0.5), abs=1e-6)
+        assert second.pose[2] == pytest.approx(0.502, abs=1e-6)
+        assert second.pose[0] == pytest.approx(1.0 + 0.003 * math.cos(0.5), abs=1e-5)
+        assert not first.pose_covariance.any()
+        assert not first.twist_covariance.any()
+
+    def test_velocity_is_that_after_the_command_of_this_step(
+        self, plugin_world: Any, collect: Collect
+    ) -> None:
+        world = plugin_world(drive(), bodies=LOPSIDED, pose=(0.0, 0.0, 1.0))
+        truths = collect(world, TRUTH)
+        command(world, 0.6, 0.4)
+        world.step()
+        assert truths[0].twist == pytest.approx((0.6, 0.0, 0.4), abs=1e-5)
+
+    def test_twist_in_the_world_frame(self, plugin_world: Any, collect: Collect) -> None:
+        extra = "twist_in_local_frame: false"
+        world = plugin_world(drive(extra), bodies=LOPSIDED, pose=(0.0, 0.0, 1.0))
+        truths, odometry = collect(world, TRUTH), collect(world, ODOMETRY)
+        command(world, 0.6, 0.4)
+        world.step()
+        expected = (0.6 * math.cos(1.0), 0.6 * math.sin(1.0), 0.4)
+        assert truths[0].twist == pytest.approx(expected, abs=1e-5)
+        assert odometry[0].twist == pytest.approx(expected, abs=1e-5)
+
+    @pytest.mark.parametrize("frame", ["world", "/world"])
+    def test_frame_is_used_as_written(
+        self, plugin_world: Any, collect: Collect, frame: str
+    ) -> None:
+        world = plugin_world(drive(f"ground_truth_frame_id: {frame}"), namespace="r1")
+        truths = collect(world, "/r1" + TRUTH)
+        world.step()
+        assert truths[0].frame_id == frame
+
+
+class TestOdometry:
+    def test_without_noise_it_is_the_ground_truth(
+        self, plugin_world: Any, collect: Collect
+    ) -> None:
+        world = plugin_world(drive(), namespace="r1", pose=(1.0, 2.0, 0.5))
+        truths, odometry = collect(world, "/r1" + TRUTH), collect(world, "/r1" + ODOMETRY)
+        command(world, 0.6, 0.4, "/r1/cmd_vel")
+        world.step(3)
+        for exact, measured in zip(truths, odometry, strict=True):
+            assert measured.stamp == exact.stamp
+            assert (measured.frame_id, measured.child_frame_id) == ("odom", "r1_base")
+            assert measured.pose == exact.pose
+            assert measured.twist == exact.twist
+
+    def test_noise_is_given_by_variances(self, plugin_world: Any, collect: Collect) -> None:
+        extra = (
+            "odom_pose_noise: [0.04, 0.09, 0.16], odom_twist_noise: [0.25, 0.36, 0.49], "
+            "twist_in_local_frame: false"
+        )
+        world = plugin_world(drive(extra))
+        truths, odometry = collect(world, TRUTH), collect(world, ODOMETRY)
+        command(world, 0.5, 0.1)
+        world.step(2000)
+        exact = np.array([[*value.pose, *value.twist] for value in truths])
+        error = np.array([[*value.pose, *value.twist] for value in odometry]) - exact
+        assert error.std(axis=0) == pytest.approx([0.2, 0.3, 0.4, 0.5, 0.6, 0.7], rel=0.08)
+        assert np.abs(error.mean(axis=0)).max() < 0.07
+        correlation = np.corrcoef(error.T) - np.eye(6)
+        assert np.abs(correlation).max() < 0.1
+
+    def test_noise_does_not_move_the_robot(self, plugin_world: Any) -> None:
+        world = plugin_world(drive("odom_pose_noise: [1, 1, 1], odom_twist_noise: [1, 1, 1]"))
+        world.output(ODOMETRY)
+        world.step(20)
+        assert base(world).pose == (0.0, 0.0, 0.0)
+
+    def test_variance_of_zero_draws_nothing(self, plugin_world: Any) -> None:
+        world = plugin_world(drive())
+        for topic in (TRUTH, ODOMETRY, "/twist"):
+            world.output(topic)
+        rng = world.model("robot").plugin("wheels").rng
+        before = rng.bit_generator.state
+        world.step(5)
+        assert rng.bit_generator.state == before
+
+    def test_the_seed_decides(self, plugin_world: Any, collect: Collect) -> None:
+        def poses(seed: int) -> list[Any]:
+            world = plugin_world(drive("odom_pose_noise: [1, 1, 1]"), seed=seed)
+            odometry = collect(world, ODOMETRY)
+            world.step(3)
+            return [value.pose for value in odometry]
+
+        assert poses(1) == poses(1)
+        assert poses(1) != poses(2)
+
+    def test_covariance_has_the_variances(self, plugin_world: Any, collect: Collect) -> None:
+        extra = "odom_pose_noise: [1, 2, 3], odom_twist_noise: [4, 5, 6]"
+        world = plugin_world(drive(extra))
+        odometry, truths = collect(world, ODOMETRY), collect(world, TRUTH)
+        world.step()
+        assert np.array_equal(odometry[0].pose_covariance, np.diag([1, 2, 0, 0, 0, 3]))
+        assert np.array_equal(odometry[0].twist_covariance, np.diag([4, 5, 0, 0, 0, 6]))
+        assert not truths[0].pose_covariance.any()
+        assert not truths[0].twist_covariance.any()
+
+    def test_covariance_as_written(self, plugin_world: Any, collect: Collect) -> None:
+        pose, twist = list(range(36)), list(range(100, 136))
+        extra = (
+            f"odom_pose_covariance: {pose}, odom_twist_covariance: {twist}, "
+            "odom_pose_noise: [7, 7, 7]"
+        )
+        world = plugin_world(drive(extra))
+        odometry = collect(world, ODOMETRY)
+        world.step()
+        assert odometry[0].pose_covariance.ravel().tolist() == pose
+        assert odometry[0].twist_covariance.ravel().tolist() == twist
+
+    @pytest.mark.parametrize("frame", ["wheel_odom", "/wheel_odom"])
+    def test_frame_is_used_as_written(
+        self, plugin_world: Any, collect: Collect, frame: str
+    ) -> None:
+        world = plugin_world(drive(f"odom_frame_id: {frame}"), namespace="r1")
+        odometry = collect(world, "/r1" + ODOMETRY)
+        world.step()
+        assert odometry[0].frame_id == frame
+        assert list(world.transforms) == [(frame, "r1_base")]
+
+
+class TestTwist:
+    def test_forward_velocity_and_yaw_rate(self, plugin_world: Any, collect: Collect) -> None:
+        world = plugin_world(drive(), bodies=LOPSIDED, namespace="r1", pose=(0.0, 0.0, 2.0))
+        twists = collect(world, "/r1/twist")
+        command(world, -0.6, 0.4, "/r1/cmd_vel")
+        world.step(2)
+        twist = twists[1]
+        assert isinstance(twist, TwistWithCovariance)
+        assert twist.stamp == 5_000_000
+        assert twist.frame_id == "r1_base"
+        assert twist.twist == pytest.approx((-0.6, 0.0, 0.4), abs=1e-5)
+
+    def test_it_has_noise_of_its_own(self, plugin_world: Any, collect: Collect) -> None:
+        world = plugin_world(drive("odom_twist_noise: [0.04, 0.09, 0.16]"))
+        odometry, twists = collect(world, ODOMETRY), collect(world, "/twist")
+        world.step(1500)
+        measured = np.array([value.twist for value in twists])
+        other = np.array([value.twist for value in odometry])
+        assert measured.std(axis=0) == pytest.approx([0.2, 0.0, 0.4], rel=0.1)
+        assert abs(np.corrcoef(measured[:, 0], other[:, 0])[0, 1]) < 0.1
+        assert abs(np.corrcoef(measured[:, 2], other[:, 2])[0, 1]) < 0.1
+
+    def test_covariance(self, plugin_world: Any, collect: Collect) -> None:
+        world = plugin_world(drive("odom_twist_noise: [4, 5, 6]"))
+        twists = collect(world, "/twist")
+        world.step()
+        assert np.array_equal(twists[0].covariance, np.diag([4, 5, 0, 0, 0, 6]))
+
+
+class TestTransform:
+    def test_it_repeats_the_noisy_pose(self, plugin_world: Any, collect: Collect) -> None:
+        world = plugin_world(drive("odom_pose_noise: [1, 1, 1]"), namespace="r1")
+        odometry = collect(world, "/r1" + ODOMETRY)
+        for step in range(3):
+            world.step()
+            sent = world.transforms["odom", "r1_base"]
+            assert (sent.x, sent.y, sent.yaw) == odometry[-1].pose
+            assert sent.x != 0
+            assert sent.roll == 0
+            assert sent.stamp == odometry[-1].stamp == step * 5_000_000
+
+    def test_sent_although_nobody_wants_the_odometry(self, plugin_world: Any) -> None:
+        world = plugin_world(drive("enable_odom_pub: false, enable_twist_pub: false"))
+        command(world, 1.0, 0.0)
+        world.step(11)
+        assert world.transforms["odom", "base"].x == pytest.approx(0.05, abs=1e-5)
+
+
+class TestSwitches:
+    def test_all_topics(self, plugin_world: Any) -> None:
+        extra = "odom_pub: a, ground_truth_pub: b/c, twist_pub: /d"
+        world = plugin_world(drive(extra), namespace="r1")
+        outputs = world.ports.outputs
+        types = {topic: output.value_type for topic, output in outputs.items()}
+        assert types == {"/r1/a": Odometry, "/r1/b/c": Odometry, "/d": TwistWithCovariance}
+
+    def test_default_topics(self, plugin_world: Any) -> None:
+        world = plugin_world(drive())
+        assert sorted(world.ports.outputs) == [ODOMETRY, TRUTH, "/twist"]
+        assert list(world.ports.commands) == ["/cmd_vel"]
+
+    @pytest.mark.parametrize(
+        ("extra", "topics"),
+        [
+            ("enable_odom_pub: false", ["/twist"]),
+            ("enable_twist_pub: false", [ODOMETRY, TRUTH]),
+            ("enable_odom_pub: false, enable_twist_pub: false", []),
+        ],
+    )
+    def test_outputs(self, plugin_world: Any, extra: str, topics: list[str]) -> None:
+        world = plugin_world(drive(extra))
+        assert sorted(world.ports.outputs) == topics
+        command(world, 1.0, 0.0)
+        world.step(10)
+        assert base(world).pose[0] == pytest.approx(0.05, abs=1e-5)
+
+    def test_transform_off(self, plugin_world: Any) -> None:
+        world = plugin_world(drive("enable_odom_tf_pub: false"))
+        world.step()
+        assert world.transforms == {}
+
+    def test_pub_rate(self, plugin_world: Any, collect: Collect) -> None:
+        world = plugin_world(drive("pub_rate: 50"))
+        values = [collect(world, topic) for topic in (TRUTH, ODOMETRY, "/twist")]
+        world.step(20)
+        for emitted in values:
+            assert [value.stamp for value in emitted] == [k * 20_000_000 for k in range(5)]
+        assert world.transforms["odom", "base"].stamp == 80_000_000
+
+    def test_nothing_is_read_or_emitted_when_nobody_listens(
+        self, plugin_world: Any, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        world = plugin_world(drive("enable_odom_tf_pub: false, odom_pose_noise: [1, 1, 1]"))
+        plugin = world.model("robot").plugin("wheels")
+        monkeypatch.setattr(plugin._odometer, "report", lambda *_: pytest.fail("reported"))
+        before = plugin.rng.bit_generator.state
+        world.step(5)
+        assert plugin.rng.bit_generator.state == before
+        assert all(output.latest is None for output in world.ports.outputs.values())
+
+
+class TestBadCommands:
+    @pytest.mark.parametrize(
+        "bad",
+        [
+            flatland.Twist(linear_x=math.nan),
+            flatland.Twist(angular_z=math.nan),
+            flatland.Twist(linear_x=math.inf),
+            flatland.Twist(angular_z=-math.inf),
+            flatland.Twist(linear_y=math.nan),
+            flatland.Twist(linear_x=1e30),
+        ],
+        ids=str,
+    )
+    def test_the_last_good_one_stays(
+        self, plugin_world: Any, caplog: pytest.LogCaptureFixture, bad: flatland.Twist
+    ) -> None:
+        world = plugin_world(drive())
+        command(world, 1.0, 0.0)
+        world.step(5)
+        with caplog.at_level(logging.WARNING, "flatland"):
+            world.command("/cmd_vel").set(bad)
+        world.step(5)
+        assert base(world).pose[0] == pytest.approx(0.05, abs=1e-5)
+        assert 'plugin "wheels" of model "robot"' in caplog.text
+        assert world.command("/cmd_vel").value.linear_x == 1.0
+
+    def test_the_warning_is_throttled(
+        self, plugin_world: Any, caplog: pytest.LogCaptureFixture, monkeypatch: Any
+    ) -> None:
+        now = [100.0]
+        monkeypatch.setattr("flatland.plugins.twist_command.time.monotonic", lambda: now[0])
+        world = plugin_world(drive())
+
+        def warnings_of_ten_bad_commands() -> int:
+            caplog.clear()
+            with caplog.at_level(logging.WARNING, "flatland"):
+                for _ in range(10):
+                    command(world, math.nan, 0.0)
+            return len(caplog.records)
+
+        assert warnings_of_ten_bad_commands() == 1
+        now[0] += 0.5
+        assert warnings_of_ten_bad_commands() == 0
+        now[0] += 0.6
+        assert warnings_of_ten_bad_commands() == 1
+
+
+class TestErrors:
+    @pytest.mark.parametrize(
+        ("extra", "message"),
+        [
+            ("pub_rate: -1", 'Invalid "pub_rate", must not be negative'),
+            ("odom_pose_noise: [0, -1, 0]", 'Invalid "odom_pose_noise", variances must be'),
+            ("odom_twist_noise: [0, 0, .nan]", 'Invalid "odom_twist_noise", variances must be'),
+            ("odom_twist_noise: [0, 0, .inf]", 'Invalid "odom_twist_noise", variances must be'),
+            ("odom_pose_noise: [0, 0]", "odom_pose_noise"),
+            ("odom_pose_covariance: [1, 2, 3]", "odom_pose_covariance"),
+            (
+                f"odom_twist_covariance: [{', '.join(['.nan'] * 36)}]",
+                'Invalid "odom_twist_covariance", must not hold NaN',
+            ),
+            ("odom_pub: ''", '"" is not a legal topic name'),
+            ("twist_sub: 9lives", '"9lives" is not a legal topic name'),
+            ("speed: 3", "speed"),
+        ],
+    )
+    def test_parameters(self, plugin_world: Any, extra: str, message: str) -> None:
+        text = plugin_world.error(drive(extra))
+        assert 'Flatland plugin: Model Plugin "wheels" type "DiffDrive" model "robot": ' in text
+        assert message in text
+
+    def test_body(self, plugin_world: Any) -> None:
+        assert '"body"' in plugin_world.error("- {type: DiffDrive, name: wheels}")
+        text = plugin_world.error("- {type: DiffDrive, name: wheels, body: nose}")
+        assert 'Body with name "nose" does not exist' in text

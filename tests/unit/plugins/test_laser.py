@@ -1,0 +1,434 @@
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+import flatland
+
+ROOM = [
+    "##########",
+    "#........#",
+    "#........#",
+    "#........#",
+    "#........#",
+    "#........#",
+    "#........#",
+    "#........#",
+    "#........#",
+    "##########",
+]  # 1 m cells: walls at x, y = 1 and 9
+ROOM_LAYERS = "[{name: 2d, map: room.yaml}, {name: 3d}]"
+CROSS = "{min: 0, max: 4.8, increment: 1.5707963267948966}"  # right, up, left, down
+
+
+def laser(extra: str = "", angle: str = CROSS) -> str:
+    return f"- {{type: Laser, name: eye, body: base, range: 20, angle: {angle}, {extra}}}"
+
+
+class Walls:
+    """Worlds with walls, and a robot with a laser in them."""
+
+    def __init__(self, plugin_world: Any) -> None:
+        self.load = plugin_world
+        self.files = plugin_world.files
+
+    def room(self, extra: str = "", angle: str = CROSS, **options: Any) -> flatland.World:
+        self.files.write_map("room", ROOM)
+        options = {"pose": (3.0, 4.0, 0.0), "layers": ROOM_LAYERS, **options}
+        return self.load(laser(extra, angle), **options)
+
+    def segments(self, name: str, lines: str) -> str:
+        self.files.write(f"{name}.dat", lines)
+        self.files.write(
+            f"{name}.yaml",
+            f"{{type: line_segments, data: {name}.dat, scale: 1, origin: [0, 0, 0]}}",
+        )
+        return f"{name}.yaml"
+
+
+@pytest.fixture
+def walls(plugin_world: Any) -> Walls:
+    return Walls(plugin_world)
+
+
+def eye(world: flatland.World) -> Any:
+    return world.model("robot").plugin("eye")
+
+
+class TestRanges:
+    def test_distance_to_axis_aligned_walls_is_exact(self, walls: Walls) -> None:
+        ranges = eye(walls.room()).compute_ranges()
+        assert ranges.dtype == np.float32
+        assert ranges == pytest.approx([6.0, 5.0, 2.0, 3.0], abs=1e-4)
+
+    def test_the_sensor_turns_with_its_body(self, walls: Walls) -> None:
+        ranges = eye(walls.room(pose=(3.0, 4.0, math.pi / 2))).compute_ranges()
+        assert ranges == pytest.approx([5.0, 2.0, 3.0, 6.0], abs=1e-4)
+
+    def test_origin_is_a_pose_in_the_body_frame(self, walls: Walls) -> None:
+        world = walls.room("origin: [0.5, 0.25, 3.141592653589793]", pose=(3.0, 4.0, math.pi / 2))
+        # Body at (3, 4) looking up, sensor at (2.75, 4.5) looking down.
+        ranges = eye(world).compute_ranges()
+        assert ranges == pytest.approx([3.5, 6.25, 4.5, 1.75], abs=1e-4)
+
+    def test_upside_down_turns_the_other_way(self, walls: Walls) -> None:
+        ranges = eye(walls.room("upside_down: true")).compute_ranges()
+        assert ranges == pytest.approx([6.0, 3.0, 2.0, 5.0], abs=1e-4)
+
+    def test_negative_increment_scans_clockwise(self, walls: Walls) -> None:
+        angle = "{min: 1.5707963267948966, max: -1.6, increment: -1.5707963267948966}"
+        ranges = eye(walls.room(angle=angle)).compute_ranges()
+        assert ranges == pytest.approx([5.0, 6.0, 3.0], abs=1e-4)
+
+    @pytest.mark.parametrize(
+        ("angle", "count"),
+        [
+            ("{min: -1, max: 1, increment: 0.1}", 21),
+            ("{min: 0, max: 1, increment: 0.3}", 4),
+            ("{min: 0, max: 1, increment: 0.35}", 4),
+            ("{min: 0, max: 1, increment: 0.4}", 4),
+            ("{min: 0, max: 0.5, increment: 0.2}", 4),
+            ("{min: 2, max: 2, increment: 1}", 1),
+            ("{min: 1.5, max: -1.5, increment: -0.02}", 151),
+        ],
+    )
+    def test_number_of_beams_is_rounded(self, walls: Walls, angle: str, count: int) -> None:
+        assert eye(walls.room(angle=angle)).compute_ranges().shape == (count,)
+
+    def test_beam_i_is_at_min_plus_i_increments(self, walls: Walls) -> None:
+        ranges = eye(walls.room(angle="{min: -0.3, max: 0.3, increment: 0.01}")).compute_ranges()
+        angles = -0.3 + 0.01 * np.arange(61)
+        assert ranges == pytest.approx(6.0 / np.cos(angles), abs=1e-4)
+
+    def test_scan_follows_a_moved_body_at_once(self, walls: Walls) -> None:
+        world = walls.room()
+        world.model("robot").body("base").set_pose(5.0, 5.0, 0.0)
+        assert eye(world).compute_ranges() == pytest.approx([4.0] * 4, abs=1e-4)
+
+    def test_each_call_gives_a_new_array(self, walls: Walls) -> None:
+        plugin = eye(walls.room())
+        first = plugin.compute_ranges()
+        first[:] = 0
+        assert plugin.compute_ranges()[0] == pytest.approx(6.0, abs=1e-4)
+
+
+class TestWhatItSees:
+    def bodies(self, footprint: str) -> str:
+        return f"""
+        - name: base
+          footprints: [{{type: circle, radius: 0.3, density: 1}}]
+        - name: post
+          pose: [2, 0, 0]
+          footprints: [{footprint}]
+        """
+
+    def ahead(self, walls: Walls, footprint: str, extra: str = "") -> float:
+        return float(eye(walls.room(extra, bodies=self.bodies(footprint))).compute_ranges()[0])
+
+    def test_other_body_of_its_own_model_counts(self, walls: Walls) -> None:
+        seen = self.ahead(walls, "{type: circle, radius: 0.5, density: 1}")
+        assert seen == pytest.approx(1.5, abs=1e-4)
+
+    def test_body_that_collides_with_nothing_is_seen(self, walls: Walls) -> None:
+        seen = self.ahead(walls, "{type: circle, radius: 0.5, density: 1, collision: false}")
+        assert seen == pytest.approx(1.5, abs=1e-4)
+
+    def test_sensor_fixture_is_not_seen(self, walls: Walls) -> None:
+        seen = self.ahead(walls, "{type: circle, radius: 0.5, density: 1, sensor: true}")
+        assert seen == pytest.approx(6.0, abs=1e-4)
+
+    def test_ray_that_starts_inside_a_shape_does_not_hit_it(self, walls: Walls) -> None:
+        polygon = "{type: polygon, density: 1, points: [[-3, -1], [1, -1], [1, 1], [-3, 1]]}"
+        assert self.ahead(walls, polygon) == pytest.approx(6.0, abs=1e-4)
+
+    def test_only_the_given_layers_count(self, walls: Walls) -> None:
+        post = "{type: circle, radius: 0.5, density: 1, layers: [3d]}"
+        assert self.ahead(walls, post, "layers: [3d]") == pytest.approx(1.5, abs=1e-4)
+        assert self.ahead(walls, post, "layers: [2d]") == pytest.approx(6.0, abs=1e-4)
+        assert self.ahead(walls, post, "layers: [3d, 2d]") == pytest.approx(1.5, abs=1e-4)
+        assert self.ahead(walls, post, "layers: [all]") == pytest.approx(1.5, abs=1e-4)
+        assert math.isnan(self.ahead(walls, post, "layers: []"))
+
+
+class TestNoHit:
+    @pytest.mark.parametrize(
+        ("extra", "value"),
+        [
+            ("", math.nan),
+            ("no_hit: nan", math.nan),
+            ("no_hit: inf", math.inf),
+            ("no_hit: range", 20.0),
+        ],
+    )
+    def test_value_of_a_beam_without_hit(self, walls: Walls, extra: str, value: float) -> None:
+        ranges = eye(walls.load(laser(extra))).compute_ranges()
+        np.testing.assert_array_equal(ranges, np.full(4, value, np.float32))
+
+    def test_wall_beyond_the_range_is_no_hit(self, walls: Walls) -> None:
+        walls.files.write_map("room", ROOM)
+        plugin = laser().replace("range: 20", "range: 4")
+        world = walls.load(plugin, layers=ROOM_LAYERS, pose=(3.0, 4.0, 0.0))
+        np.testing.assert_allclose(
+            eye(world).compute_ranges(), [math.nan, math.nan, 2.0, 3.0], atol=1e-4
+        )
+
+
+class TestNoise:
+    ANGLE = "{min: -0.5, max: 0.5, increment: 0.0005}"
+
+    def test_standard_deviation_is_as_asked(self, walls: Walls) -> None:
+        exact = eye(walls.room(angle=self.ANGLE)).compute_ranges()
+        noisy = eye(walls.room("noise_std_dev: 0.2", angle=self.ANGLE)).compute_ranges()
+        error = noisy - exact
+        assert abs(error.mean()) < 0.02
+        assert error.std() == pytest.approx(0.2, rel=0.1)
+
+    @pytest.mark.parametrize(("no_hit", "value"), [("nan", math.nan), ("range", 20.0)])
+    def test_misses_have_no_noise(self, walls: Walls, no_hit: str, value: float) -> None:
+        world = walls.load(laser(f"noise_std_dev: 0.2, no_hit: {no_hit}"))
+        np.testing.assert_array_equal(eye(world).compute_ranges(), np.full(4, value, np.float32))
+
+    def test_each_scan_has_new_noise(self, walls: Walls) -> None:
+        plugin = eye(walls.room("noise_std_dev: 0.2"))
+        assert (plugin.compute_ranges() != plugin.compute_ranges()).all()
+
+    def test_the_seed_decides(self, walls: Walls) -> None:
+        def scan(seed: int) -> list[float]:
+            world = walls.room("noise_std_dev: 0.2", seed=seed)
+            return eye(world).compute_ranges().tolist()  # type: ignore[no-any-return]
+
+        assert scan(3) == scan(3)
+        assert scan(3) != scan(4)
+
+    def test_without_noise_nothing_is_drawn(self, walls: Walls) -> None:
+        plugin = eye(walls.room())
+        before = plugin.rng.bit_generator.state
+        plugin.compute_ranges()
+        assert plugin.rng.bit_generator.state == before
+
+
+class TestIntensities:
+    def load(self, walls: Walls, near: str, far: str, layers: str = "[all]") -> Any:
+        """A segment 2 m ahead in the layer `plain`, one 4 m ahead in `reflectance`."""
+        maps = (walls.segments("near", near), walls.segments("far", far))
+        text = f"[{{name: plain, map: {maps[0]}}}, {{name: reflectance, map: {maps[1]}}}]"
+        return eye(walls.load(laser(f"layers: {layers}"), layers=text))
+
+    def test_empty_without_a_reflectance_layer(self, walls: Walls) -> None:
+        plugin = eye(walls.room())
+        plugin.compute_ranges()
+        assert plugin.intensities.shape == (0,)
+        assert plugin.intensities.dtype == np.float32
+
+    def test_255_where_the_hit_is_in_the_layer(self, walls: Walls) -> None:
+        plugin = self.load(walls, "-2 -1 -2 1", "4 -1 4 1")
+        plugin.compute_ranges()
+        assert plugin.intensities.dtype == np.float32
+        assert plugin.intensities.tolist() == [255.0, 0.0, 0.0, 0.0]
+
+    def test_a_farther_hit_does_not_shine_through(self, walls: Walls) -> None:
+        plugin = self.load(walls, "2 -1 2 1", "4 -1 4 1")
+        assert plugin.compute_ranges()[0] == pytest.approx(2.0, abs=1e-4)
+        assert plugin.intensities.tolist() == [0.0] * 4
+
+    def test_any_of_several_hits_at_one_distance(self, walls: Walls) -> None:
+        plugin = self.load(walls, "4 -1 4 1", "4 -1 4 1")
+        plugin.compute_ranges()
+        assert plugin.intensities[0] == 255.0
+
+    def test_layer_that_the_laser_does_not_see(self, walls: Walls) -> None:
+        plugin = self.load(walls, "-2 -1 -2 1", "4 -1 4 1", "[plain]")
+        assert math.isnan(plugin.compute_ranges()[0])
+        assert plugin.intensities.tolist() == [0.0] * 4
+
+    def test_they_are_part_of_the_message(self, walls: Walls) -> None:
+        plugin = self.load(walls, "-2 -1 -2 1", "4 -1 4 1")
+        output = plugin.world.output("/scan")
+        plugin.world.step()
+        assert output.latest.intensities.tolist() == [255.0, 0.0, 0.0, 0.0]
+
+
+class TestMessage:
+    def test_fields(self, walls: Walls) -> None:
+        world = walls.room(angle="{min: -1, max: 1, increment: 0.3}", namespace="r1")
+        output = world.output("/r1/scan")
+        world.step(3)
+        scan = output.latest
+        assert isinstance(scan, flatland.LaserScan)
+        assert scan.stamp == 10_000_000
+        assert scan.frame_id == "r1_eye"
+        assert (scan.angle_min, scan.angle_max, scan.angle_increment) == (-1.0, 1.0, 0.3)
+        assert (scan.time_increment, scan.scan_time) == (0.0, 0.0)
+        assert (scan.range_min, scan.range_max) == (0.0, 20.0)
+        assert scan.ranges.shape == (8,)
+        assert scan.intensities.shape == (0,)
+
+    def test_upside_down_reports_the_angles_as_configured(self, walls: Walls) -> None:
+        world = walls.room("upside_down: true", "{min: -1, max: 2, increment: 0.5}")
+        output = world.output("/scan")
+        world.step()
+        assert (output.latest.angle_min, output.latest.angle_max) == (-1.0, 2.0)
+        assert output.latest.angle_increment == 0.5
+
+    @pytest.mark.parametrize(
+        ("topic", "resolved"), [("front/scan", "/r1/front/scan"), ("/scan", "/scan")]
+    )
+    def test_topic(self, walls: Walls, topic: str, resolved: str) -> None:
+        world = walls.room(f"topic: {topic}", namespace="r1")
+        assert list(world.ports.outputs) == [resolved]
+
+    @pytest.mark.parametrize(("frame", "frame_id"), [("lidar", "r1_lidar"), ("/lidar", "lidar")])
+    def test_frame(self, walls: Walls, frame: str, frame_id: str) -> None:
+        world = walls.room(f"frame: {frame}", namespace="r1")
+        output = world.output("/r1/scan")
+        world.step()
+        assert output.latest.frame_id == frame_id
+        assert list(world.transforms) == [("r1_base", frame_id)]
+
+    def test_scan_is_of_the_pose_before_the_step(self, walls: Walls) -> None:
+        world = walls.room()
+        world.model("robot").body("base").set_velocity(1.0, 0.0, 0.0)
+        output = world.output("/scan")
+        world.step()
+        assert output.latest.ranges[0] == pytest.approx(6.0, abs=1e-4)
+        world.step()
+        assert output.latest.ranges[0] == pytest.approx(5.995, abs=1e-4)
+
+
+class TestWhenItWorks:
+    def count_scans(self, world: flatland.World, steps: int, monkeypatch: Any) -> int:
+        plugin = eye(world)
+        calls = []
+        compute = plugin.compute_ranges
+        monkeypatch.setattr(plugin, "compute_ranges", lambda: (calls.append(1), compute())[1])
+        world.step(steps)
+        return len(calls)
+
+    def test_nothing_is_computed_when_nobody_listens(
+        self, walls: Walls, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        assert self.count_scans(walls.room(), 10, monkeypatch) == 0
+
+    def test_a_listener_makes_it_compute(
+        self, walls: Walls, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        world = walls.room()
+        world.output("/scan")
+        assert self.count_scans(world, 10, monkeypatch) == 10
+
+    def test_always_publish(
+        self,
+        walls: Walls,
+        monkeypatch: pytest.MonkeyPatch,
+    ) -> None:
+        world = walls.room("always_publish: true")
+        assert self.count_scans(world, 10, monkeypatch) == 10
+        assert world.ports.find_output("/scan").latest is not None
+
+    def test_update_rate(
+        self, walls: Walls, collect: Callable[[flatland.World, str], list[Any]]
+    ) -> None:
+        world = walls.room("update_rate: 40")
+        scans = collect(world, "/scan")
+        world.step(100)
+        assert [scan.stamp for scan in scans] == [k * 25_000_000 for k in range(20)]
+
+
+class TestTransform:
+    def test_sent_although_nobody_wants_the_scan(self, walls: Walls) -> None:
+        world = walls.room("origin: [0.1, 0.2, 0.3]", namespace="r1")
+        world.step(2)
+        sent = world.transforms["r1_base", "r1_eye"]
+        assert sent == flatland.Transform(5_000_000, "r1_base", "r1_eye", 0.1, 0.2, 0.3, 0.0)
+
+    def test_upside_down_is_a_roll(self, walls: Walls) -> None:
+        world = walls.room("upside_down: true")
+        world.step()
+        assert world.transforms["base", "eye"].roll == pytest.approx(math.pi)
+
+    def test_broadcast_tf_false(self, walls: Walls) -> None:
+        world = walls.room("broadcast_tf: false")
+        world.step()
+        assert world.transforms == {}
+
+    def test_sent_at_the_update_rate(self, walls: Walls) -> None:
+        world = walls.room("update_rate: 40")
+        stamps = []
+        for _ in range(20):
+            world.step()
+            stamps.append(world.transforms["base", "eye"].stamp)
+        assert sorted(set(stamps)) == [0, 25_000_000, 50_000_000, 75_000_000]
+
+
+class TestErrors:
+    @pytest.mark.parametrize("key", ["body", "range", "angle"])
+    def test_required(self, plugin_world: Any, key: str) -> None:
+        keys = {"body": "base", "range": "20", "angle": CROSS}
+        del keys[key]
+        entry = ", ".join(f"{name}: {value}" for name, value in keys.items())
+        text = plugin_world.error(f"- {{type: Laser, name: eye, {entry}}}")
+        assert f'"{key}"' in text
+
+    def test_unknown_body(self, plugin_world: Any) -> None:
+        text = plugin_world.error(laser().replace("body: base", "body: nose"))
+        assert 'Model Plugin "eye" type "Laser" model "robot": ' in text
+        assert 'Body with name "nose" does not exist' in text
+        assert "robot.model.yaml:" in text
+
+    @pytest.mark.parametrize(
+        ("angle", "message"),
+        [
+            (
+                "{min: 1, max: 0, increment: 0.1}",
+                'Invalid "angle" params, must have max > min when increment > 0',
+            ),
+            (
+                "{min: 0, max: 1, increment: -0.1}",
+                'Invalid "angle" params, must have min > max when increment < 0',
+            ),
+            (
+                "{min: 0, max: 1, increment: 0}",
+                'Invalid "angle" params, increment must not be zero!',
+            ),
+            ("{min: 0, max: .inf, increment: 1}", 'Invalid "angle" params, must be finite'),
+            ("{min: .nan, max: 1, increment: 1}", 'Invalid "angle" params, must be finite'),
+            ("{min: 0, max: 1, increment: .nan}", 'Invalid "angle" params, must be finite'),
+            ("{min: 0, max: 1, increment: 1.0e-9}", "more than 1000000 beams"),
+            ("{min: 0, max: 1, increment: 1.0e-320}", "more than 1000000 beams"),
+            ("{min: 0, max: -1.0e300, increment: -1}", "more than 1000000 beams"),
+            ("{min: 0, max: 1, increment: 1, step: 2}", "step"),
+            ("{min: 0, max: 1}", '"increment"'),
+            ("1.5", '"angle"'),
+        ],
+    )
+    def test_angle(self, plugin_world: Any, angle: str, message: str) -> None:
+        assert message in plugin_world.error(laser(angle=angle))
+
+    @pytest.mark.parametrize("value", ["0", "-1", ".inf", ".nan", "1.0e+30"])
+    def test_range(self, plugin_world: Any, value: str) -> None:
+        text = plugin_world.error(laser().replace("range: 20", f"range: {value}"))
+        assert 'Invalid "range", must be greater than 0 and at most 1e+06 m' in text
+
+    def test_unknown_layers(self, plugin_world: Any) -> None:
+        text = plugin_world.error(laser("layers: [4d, 2d, 5d]"))
+        assert "Cannot find layer(s): {4d,5d}" in text
+
+    @pytest.mark.parametrize(
+        ("extra", "message"),
+        [
+            ("noise_std_dev: -0.1", 'Invalid "noise_std_dev", must not be negative'),
+            ("noise_std_dev: .inf", 'Invalid "noise_std_dev", must be finite'),
+            ("update_rate: -1", 'Invalid "update_rate", must not be negative'),
+            ("update_rate: .nan", 'Invalid "update_rate", must not be negative'),
+            ("origin: [0, .nan, 0]", 'Invalid "origin", must be finite'),
+            ("no_hit: zero", 'Invalid "no_hit", must be one of: nan, inf, range, got zero'),
+            ("topic: 'a b'", '"a b" is not a legal topic name'),
+            ("colour: red", "colour"),
+        ],
+    )
+    def test_other_parameters(self, plugin_world: Any, extra: str, message: str) -> None:
+        assert message in plugin_world.error(laser(extra))

@@ -1,0 +1,119 @@
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+
+import flatland
+from flatland.geometry import compose
+
+BODIES = """
+- name: base
+  footprints: [{type: circle, radius: 0.1, density: 1}]
+- name: arm
+  pose: [1, 2, 0.5]
+  footprints: []
+- name: hand
+  pose: [-3, 1, -1.5]
+  footprints: []
+"""
+
+
+@pytest.fixture
+def tf(plugin_world: Any) -> Callable[..., flatland.World]:
+    def load(extra: str = "", **options: Any) -> flatland.World:
+        options = {"bodies": BODIES, "pose": (4.0, 5.0, 0.8), **options}
+        world: flatland.World = plugin_world(
+            f"- {{type: ModelTfPublisher, name: tf, {extra}}}", **options
+        )
+        return world
+
+    return load
+
+
+def pose(transform: flatland.Transform) -> tuple[float, float, float]:
+    return (transform.x, transform.y, transform.yaw)
+
+
+def test_from_the_first_body_to_all_others(tf: Any) -> None:
+    world = tf()
+    world.step(3)
+    assert set(world.transforms) == {("base", "arm"), ("base", "hand")}
+    arm, hand = world.transforms["base", "arm"], world.transforms["base", "hand"]
+    assert pose(arm) == pytest.approx((1.0, 2.0, 0.5), abs=1e-5)
+    assert pose(hand) == pytest.approx((-3.0, 1.0, -1.5), abs=1e-5)
+    assert arm.stamp == hand.stamp == 10_000_000
+    assert arm.roll == 0
+
+
+def test_reference_body(tf: Any) -> None:
+    world = tf("reference: arm")
+    world.step()
+    assert set(world.transforms) == {("arm", "base"), ("arm", "hand")}
+    # The arm is where its inverse says that the base is not.
+    back = compose((1.0, 2.0, 0.5), pose(world.transforms["arm", "base"]))
+    assert back == pytest.approx((0.0, 0.0, 0.0), abs=1e-5)
+
+
+def test_frames_are_namespaced(tf: Any) -> None:
+    world = tf("publish_tf_world: true", namespace="r1")
+    world.step()
+    assert set(world.transforms) == {
+        ("r1_base", "r1_arm"),
+        ("r1_base", "r1_hand"),
+        ("map", "r1_base"),
+    }
+
+
+def test_world_transform(tf: Any) -> None:
+    world = tf("publish_tf_world: true, reference: arm")
+    world.step()
+    expected = compose((4.0, 5.0, 0.8), (1.0, 2.0, 0.5))
+    assert pose(world.transforms["map", "arm"]) == pytest.approx(expected, abs=1e-5)
+
+
+@pytest.mark.parametrize("frame", ["earth", "/earth"])
+def test_world_frame_is_used_as_written(tf: Any, frame: str) -> None:
+    world = tf(f"publish_tf_world: true, world_frame_id: {frame}", namespace="r1")
+    world.step()
+    assert (frame, "r1_base") in world.transforms
+
+
+def test_exclude(tf: Any) -> None:
+    world = tf("exclude: [hand], publish_tf_world: true")
+    world.step()
+    assert set(world.transforms) == {("base", "arm"), ("map", "base")}
+
+
+def test_it_follows_the_bodies(tf: Any) -> None:
+    world = tf()
+    world.step()
+    world.model("robot").body("arm").set_pose(4.0, 5.0, 0.8 + math.pi / 2)
+    world.step()
+    assert pose(world.transforms["base", "arm"]) == pytest.approx((0, 0, math.pi / 2), abs=1e-5)
+
+
+def test_update_rate(tf: Any) -> None:
+    world = tf("update_rate: 50")
+    stamps = []
+    for _ in range(20):
+        world.step()
+        stamps.append(world.transforms["base", "arm"].stamp)
+    assert sorted(set(stamps)) == [0, 20_000_000, 40_000_000, 60_000_000, 80_000_000]
+
+
+@pytest.mark.parametrize(
+    ("extra", "message"),
+    [
+        ("reference: nose", 'Body with name "nose" does not exist'),
+        ("exclude: [arm, tail]", 'Body with name "tail" does not exist'),
+        ("update_rate: -1", 'Invalid "update_rate", must not be negative'),
+        ("rate: 1", "rate"),
+    ],
+)
+def test_errors(plugin_world: Any, extra: str, message: str) -> None:
+    text = plugin_world.error(f"- {{type: ModelTfPublisher, name: tf, {extra}}}", bodies=BODIES)
+    assert 'Model Plugin "tf" type "ModelTfPublisher" model "robot": ' in text
+    assert message in text

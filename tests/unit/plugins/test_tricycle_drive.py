@@ -1,0 +1,424 @@
+from __future__ import annotations
+
+import logging
+import math
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+import flatland
+from flatland.values import Odometry
+
+Collect = Callable[[flatland.World, str], list[Any]]
+
+WHEEL = "footprints: [{type: circle, radius: 0.05, density: 1, collision: false}]"
+# Rear axle 1 m behind the front wheel, which is at the origin; the centre of mass is elsewhere.
+BODIES = f"""
+- name: base
+  footprints: [{{type: circle, radius: 0.3, center: [-0.4, 0.1], density: 100}}]
+- {{name: front, {WHEEL}}}
+- {{name: left, pose: [-1, 0.4, 0], {WHEEL}}}
+- {{name: right, pose: [-1, -0.4, 0], {WHEEL}}}
+"""
+TRUTH = "/odometry/ground_truth"
+ODOMETRY = "/odometry/filtered"
+
+
+def joint(
+    name: str,
+    kind: str,
+    wheel: str,
+    anchor: str,
+    *,
+    on: str = "base",
+    wheel_anchor: str = "[0, 0]",
+    base_first: bool = True,
+) -> str:
+    ends = [f"{{name: {on}, anchor: {anchor}}}", f"{{name: {wheel}, anchor: {wheel_anchor}}}"]
+    if not base_first:
+        ends.reverse()
+    return f"- {{type: {kind}, name: {name}, bodies: [{', '.join(ends)}]}}"
+
+
+def joints(**changes: str) -> str:
+    lines = {
+        "front": joint("front_j", "revolute", "front", "[0, 0]"),
+        "left": joint("left_j", "weld", "left", "[-1, 0.4]"),
+        "right": joint("right_j", "weld", "right", "[-1, -0.4]"),
+        **changes,
+    }
+    return "\n".join(lines.values())
+
+
+def drive(extra: str = "", front: str = "front_j", left: str = "left_j") -> str:
+    return (
+        f"- {{type: TricycleDrive, name: wheels, body: base, front_wheel_joint: {front}, "
+        f"rear_left_wheel_joint: {left}, rear_right_wheel_joint: right_j, {extra}}}"
+    )
+
+
+@pytest.fixture
+def trike(plugin_world: Any) -> Callable[..., flatland.World]:
+    def load(extra: str = "", **options: Any) -> flatland.World:
+        options = {"bodies": BODIES, "joints": joints(), **options}
+        world: flatland.World = plugin_world(drive(extra), **options)
+        return world
+
+    return load
+
+
+def command(world: flatland.World, v: float, angle: float) -> None:
+    world.command("/cmd_vel").set(flatland.Twist(linear_x=v, angular_z=angle))
+
+
+def plugin(world: flatland.World) -> Any:
+    return world.model("robot").plugin("wheels")
+
+
+def base(world: flatland.World) -> flatland.Body:
+    return world.model("robot").body("base")
+
+
+class TestMotion:
+    def test_straight_ahead(self, trike: Any) -> None:
+        world = trike(pose=(1.0, 2.0, 0.5))
+        command(world, 0.8, 0.0)
+        world.step(200)
+        expected = (1.0 + 0.8 * math.cos(0.5), 2.0 + 0.8 * math.sin(0.5), 0.5)
+        assert base(world).pose == pytest.approx(expected, abs=1e-3)
+
+    def test_velocities_of_the_bicycle_model(self, trike: Any) -> None:
+        world = trike(pose=(0.0, 0.0, 0.7))
+        command(world, 0.6, 0.5)
+        plugin(world).before_physics_step(world.timekeeper)
+        omega = 0.6 * math.sin(0.5) / 1.0
+        vx, vy, rate = base(world).velocity
+        assert rate == pytest.approx(omega, abs=1e-5)
+        # The front wheel, at the origin, moves at 0.6 m/s where it points to.
+        assert (vx, vy) == pytest.approx((0.6 * math.cos(1.2), 0.6 * math.sin(1.2)), abs=1e-5)
+
+    def test_rear_centre_moves_along_the_heading(self, trike: Any) -> None:
+        # A slanted axle whose middle is the foot of the perpendicular from the origin.
+        line = joints(
+            left=joint("left_j", "weld", "left", "[-0.88, 0.7]"),
+            right=joint("right_j", "weld", "right", "[-1.12, -0.1]"),
+        )
+        world = trike(pose=(0.0, 0.0, 0.7), joints=line)
+        command(world, 0.6, 0.5)
+        geometry = plugin(world).geometry
+        assert geometry.rear_center == pytest.approx((-1.0, 0.3), abs=1e-6)
+        assert geometry.wheelbase == pytest.approx(math.hypot(1.0, 0.3), abs=1e-6)
+        plugin(world).before_physics_step(world.timekeeper)
+        vx, vy, omega = base(world).velocity
+        assert omega == pytest.approx(0.6 * math.sin(0.5) / math.hypot(1.0, 0.3), abs=1e-5)
+        c, s = math.cos(0.7), math.sin(0.7)
+        rx, ry = -c * 1.0 - s * 0.3, -s * 1.0 + c * 0.3
+        rear = (vx - omega * ry, vy + omega * rx)
+        forward = 0.6 * math.cos(0.5)
+        assert rear == pytest.approx((forward * c, forward * s), abs=1e-5)
+
+    def test_it_drives_a_circle_about_the_rear_axle(self, trike: Any) -> None:
+        world = trike()
+        command(world, 0.5, math.pi / 4)
+        world.step(2)
+        for _ in range(50):
+            world.step(20)
+            x, y, theta = base(world).pose
+            # Turning centre: on the axle's line, 1 m to the left of the rear centre.
+            rear = (x - math.cos(theta), y - math.sin(theta))
+            centre = (rear[0] - math.sin(theta), rear[1] + math.cos(theta))
+            assert centre == pytest.approx((-1.0, 1.0), abs=0.02)
+
+    def test_the_front_wheel_steers_at_any_speed(self, trike: Any) -> None:
+        world = trike("max_steer_angle: 0.5")
+        command(world, 0.0, 3.0)
+        world.step()
+        assert plugin(world).steering_angle == 0.5
+        assert base(world).velocity == pytest.approx((0.0, 0.0, 0.0), abs=1e-6)
+
+
+class TestSteering:
+    def steps(self, world: flatland.World, target: float, n: int) -> list[float]:
+        command(world, 0.0, target)
+        angles = []
+        for _ in range(n):
+            world.step()
+            angles.append(plugin(world).steering_angle)
+        return angles
+
+    def test_without_limits_at_once(self, trike: Any) -> None:
+        assert self.steps(trike(), 1.2, 2) == pytest.approx([1.2, 1.2])
+
+    def test_max_steer_angle_of_zero_is_no_bound(self, trike: Any) -> None:
+        assert self.steps(trike("max_steer_angle: 0"), 3.0, 1) == pytest.approx([3.0])
+
+    @pytest.mark.parametrize("sign", [1.0, -1.0])
+    def test_max_steer_angle(self, trike: Any, sign: float) -> None:
+        world = trike("max_steer_angle: 0.7")
+        assert self.steps(world, sign * 3.0, 2) == pytest.approx([sign * 0.7] * 2)
+
+    @pytest.mark.parametrize(
+        "extra", ["angular_dynamics: {velocity_limit: 2.0}", "max_angular_velocity: 2.0"]
+    )
+    def test_steering_velocity_limit(self, trike: Any, extra: str) -> None:
+        angles = self.steps(trike(extra), 0.025, 4)
+        assert angles == pytest.approx([0.01, 0.02, 0.025, 0.025])
+
+    @pytest.mark.parametrize(
+        "extra",
+        ["angular_dynamics: {acceleration_limit: 4.0}", "max_steer_acceleration: 4.0"],
+    )
+    def test_steering_acceleration_limit(self, trike: Any, extra: str) -> None:
+        world = trike(extra)
+        angles = self.steps(world, 1.0, 3)
+        step = 4.0 * 0.005**2
+        assert angles == pytest.approx([step, 3 * step, 6 * step])
+        assert plugin(world).steering_velocity == pytest.approx(0.06)
+
+    def test_the_wheel_brakes_before_its_target(self, trike: Any) -> None:
+        world = trike("angular_dynamics: {acceleration_limit: 4.0}")
+        angles = self.steps(world, 0.5, 300)
+        assert max(angles) < 0.51  # unbraked it would stop at 1.0
+        assert angles[-1] == pytest.approx(0.5, abs=0.01)
+
+    def test_braking_starts_where_it_still_suffices(self, trike: Any) -> None:
+        world = trike("angular_dynamics: {acceleration_limit: 4.0}")
+        drive = plugin(world)
+        drive.steering_velocity = 1.0  # needs 0.125 rad to stop
+        command(world, 0.0, 0.125)
+        world.step()
+        assert drive.steering_velocity == pytest.approx(1.0 + 4.0 * 0.005)
+        drive.steering_velocity, drive.steering_angle = 1.0, 0.0
+        command(world, 0.0, 0.1249)
+        world.step()
+        assert drive.steering_velocity == pytest.approx(1.0 - 4.0 * 0.005)
+
+    def test_older_keys_give_way_to_the_newer(self, trike: Any) -> None:
+        world = trike(
+            "max_angular_velocity: 1, max_steer_acceleration: 2, "
+            "angular_dynamics: {velocity_limit: 3, acceleration_limit: 4, deceleration_limit: 5}"
+        )
+        limits = plugin(world).angular_dynamics
+        assert limits.velocity_limit == 3
+        assert limits.acceleration_limit == 4
+        assert limits.deceleration_limit == 5
+
+    def test_older_acceleration_is_the_deceleration_too(self, trike: Any) -> None:
+        world = trike("max_steer_acceleration: 2, angular_dynamics: {deceleration_limit: 5}")
+        limits = plugin(world).angular_dynamics
+        assert (limits.acceleration_limit, limits.deceleration_limit) == (2, 2)
+
+    def test_deceleration_limit_alone_is_not_forgotten(self, trike: Any) -> None:
+        limits = plugin(trike("angular_dynamics: {deceleration_limit: 5}")).angular_dynamics
+        assert (limits.acceleration_limit, limits.deceleration_limit) == (0, 5)
+
+    @pytest.mark.parametrize(("base_first", "sign"), [(True, 1.0), (False, -1.0)])
+    def test_the_front_wheel_is_seen_to_turn(
+        self, trike: Any, base_first: bool, sign: float
+    ) -> None:
+        front = joint("front_j", "revolute", "front", "[0, 0]", base_first=base_first)
+        world = trike("max_angular_velocity: 2", joints=joints(front=front))
+        command(world, 0.2, 0.4)
+        world.step(100)
+        limits = world.model("robot").joint("front_j").limits
+        assert limits == pytest.approx((sign * 0.4, sign * 0.4), abs=1e-6)
+        wheel = world.model("robot").body("front").pose[2]
+        assert wheel - base(world).pose[2] == pytest.approx(0.4, abs=0.01)
+
+    def test_linear_dynamics(self, trike: Any) -> None:
+        world = trike("linear_dynamics: {acceleration_limit: 1.0, velocity_limit: 0.012}")
+        command(world, 5.0, 0.0)
+        speeds = []
+        for _ in range(4):
+            world.step()
+            speeds.append(plugin(world).front_velocity)
+        assert speeds == pytest.approx([0.005, 0.01, 0.012, 0.012])
+
+
+class TestOdometry:
+    def test_messages_show_the_state_before_the_command(self, trike: Any, collect: Collect) -> None:
+        world = trike(pose=(1.0, 2.0, 0.5))
+        truths, odometry = collect(world, TRUTH), collect(world, ODOMETRY)
+        command(world, 0.6, 0.0)
+        world.step(2)
+        assert isinstance(truths[0], Odometry)
+        assert [value.stamp for value in truths] == [0, 5_000_000]
+        assert truths[0].pose == pytest.approx((1.0, 2.0, 0.5), abs=1e-6)
+        assert truths[0].twist == pytest.approx((0.0, 0.0, 0.0), abs=1e-6)
+        assert odometry[1].pose == truths[1].pose
+        assert truths[1].pose[0] == pytest.approx(1.0 + 0.003 * math.cos(0.5), abs=1e-4)
+
+    @pytest.mark.parametrize(("extra", "heading"), [("", 0.5), ("twist_in_local_frame: true", 0.0)])
+    def test_twist_is_in_the_world_frame_unless_asked(
+        self, trike: Any, collect: Collect, extra: str, heading: float
+    ) -> None:
+        world = trike(extra, pose=(0.0, 0.0, 0.5))
+        truths, odometry = collect(world, TRUTH), collect(world, ODOMETRY)
+        command(world, 0.6, 0.0)
+        world.step(3)
+        expected = (0.6 * math.cos(heading), 0.6 * math.sin(heading), 0.0)
+        assert odometry[-1].twist == pytest.approx(expected, abs=1e-3)
+        assert truths[-1].twist == pytest.approx(expected, abs=1e-3)
+
+    def test_odometry_is_in_its_own_frame(self, trike: Any, collect: Collect) -> None:
+        world = trike()
+        truths, odometry = collect(world, TRUTH), collect(world, ODOMETRY)
+        world.step()
+        assert (odometry[0].frame_id, odometry[0].child_frame_id) == ("odom", "base")
+        assert (truths[0].frame_id, truths[0].child_frame_id) == ("map", "base")
+
+    def test_frames_as_written(self, plugin_world: Any, collect: Collect) -> None:
+        world = plugin_world(
+            drive("odom_frame_id: o, ground_truth_frame_id: /w, odom_pub: a, ground_truth_pub: b"),
+            bodies=BODIES,
+            joints=joints(),
+            namespace="r1",
+        )
+        truths, odometry = collect(world, "/r1/b"), collect(world, "/r1/a")
+        world.step()
+        assert (odometry[0].frame_id, odometry[0].child_frame_id) == ("o", "r1_base")
+        assert (truths[0].frame_id, truths[0].child_frame_id) == ("/w", "r1_base")
+
+    def test_noise_and_covariance(self, trike: Any, collect: Collect) -> None:
+        world = trike("odom_pose_noise: [0.04, 0.09, 0.16], odom_twist_noise: [0.25, 0.36, 0.49]")
+        odometry = collect(world, ODOMETRY)
+        world.step(1500)
+        measured = np.array([[*value.pose, *value.twist] for value in odometry])
+        assert measured.std(axis=0) == pytest.approx([0.2, 0.3, 0.4, 0.5, 0.6, 0.7], rel=0.1)
+        assert odometry[0].pose_covariance.diagonal().tolist() == [0.04, 0.09, 0, 0, 0, 0.16]
+        assert odometry[0].twist_covariance.diagonal().tolist() == [0.25, 0.36, 0, 0, 0, 0.49]
+
+    def test_no_transform_and_no_twist_topic(self, trike: Any) -> None:
+        world = trike()
+        world.step()
+        assert world.transforms == {}
+        assert sorted(world.ports.outputs) == [ODOMETRY, TRUTH]
+
+    def test_pub_rate(self, trike: Any, collect: Collect) -> None:
+        world = trike("pub_rate: 50")
+        truths = collect(world, TRUTH)
+        world.step(20)
+        assert [value.stamp for value in truths] == [k * 20_000_000 for k in range(5)]
+
+
+def test_bad_command_is_refused(trike: Any, caplog: pytest.LogCaptureFixture) -> None:
+    world = trike()
+    command(world, 0.5, 0.0)
+    world.step(5)
+    with caplog.at_level(logging.WARNING, "flatland"):
+        command(world, 0.5, math.nan)
+    world.step(5)
+    assert 'plugin "wheels" of model "robot"' in caplog.text
+    assert base(world).pose[0] == pytest.approx(0.025, abs=1e-4)
+
+
+def test_command_topic(trike: Any) -> None:
+    assert list(trike("twist_sub: go").ports.commands) == ["/go"]
+
+
+class TestErrors:
+    def error(self, plugin_world: Any, plugins: str, changed: str | None = None) -> str:
+        text: str = plugin_world.error(plugins, bodies=BODIES, joints=changed or joints())
+        assert 'Model Plugin "wheels" type "TricycleDrive" model "robot": ' in text
+        assert "robot.model.yaml:" in text
+        return text
+
+    @pytest.mark.parametrize(
+        "key",
+        ["body", "front_wheel_joint", "rear_left_wheel_joint", "rear_right_wheel_joint"],
+    )
+    def test_required(self, plugin_world: Any, key: str) -> None:
+        text = drive().replace(f"{key}:", "unused:")
+        assert f'"{key}"' in self.error(plugin_world, text)
+
+    def test_unknown_body(self, plugin_world: Any) -> None:
+        text = self.error(plugin_world, drive().replace("body: base", "body: nose"))
+        assert 'Body with name "nose" does not exist' in text
+
+    @pytest.mark.parametrize("name", ["front_j", "left_j", "right_j"])
+    def test_unknown_joint(self, plugin_world: Any, name: str) -> None:
+        text = self.error(plugin_world, drive().replace(name, "elbow"))
+        assert 'Joint with name "elbow" does not exist' in text
+
+    @pytest.mark.parametrize(
+        ("name", "kind", "message"),
+        [
+            ("front", "weld", "Front wheel joint must be a revolute joint"),
+            ("left", "revolute", "Rear left wheel joint must be a weld joint"),
+            ("right", "revolute", "Rear right wheel joint must be a weld joint"),
+        ],
+    )
+    def test_kind_of_joint(self, plugin_world: Any, name: str, kind: str, message: str) -> None:
+        anchor = {"front": "[0, 0]", "left": "[-1, 0.4]", "right": "[-1, -0.4]"}[name]
+        changed = joints(**{name: joint(f"{name}_j", kind, name, anchor)})
+        assert message in self.error(plugin_world, drive(), changed)
+
+    @pytest.mark.parametrize("name", ["front", "left", "right"])
+    def test_joint_on_another_body(self, plugin_world: Any, name: str) -> None:
+        kind = "revolute" if name == "front" else "weld"
+        other = "left" if name == "front" else "front"
+        changed = joints(**{name: joint(f"{name}_j", kind, name, "[0, 0]", on=other)})
+        text = self.error(plugin_world, drive(), changed)
+        assert f'Joint "{name}_j" does not anchor on body "base"' in text
+
+    @pytest.mark.parametrize("base_first", [True, False])
+    @pytest.mark.parametrize("name", ["front", "left", "right"])
+    def test_anchor_on_the_wheel(self, plugin_world: Any, name: str, base_first: bool) -> None:
+        kind = "revolute" if name == "front" else "weld"
+        anchor = {"front": "[0, 0]", "left": "[-1, 0.4]", "right": "[-1, -0.4]"}[name]
+        wrong = joint(
+            f"{name}_j", kind, name, anchor, wheel_anchor="[0, 0.01]", base_first=base_first
+        )
+        text = self.error(plugin_world, drive(), joints(**{name: wrong}))
+        assert f'Joint "{name}_j" must be anchored at (0, 0) on the wheel' in text
+
+    def test_front_wheel_away_from_the_origin(self, plugin_world: Any) -> None:
+        changed = joints(front=joint("front_j", "revolute", "front", "[0.1, 0]"))
+        text = self.error(plugin_world, drive(), changed)
+        assert "Front wheel joint must have its body anchored at (0, 0)" in text
+
+    def test_rear_wheels_not_in_line(self, plugin_world: Any) -> None:
+        changed = joints(left=joint("left_j", "weld", "left", "[-1, 0.5]"))
+        assert (
+            "The mid point between the rear wheel anchors on the body must equal the "
+            "perpendicular intersection between the rear axel (line segment between rear "
+            "anchors) and the front wheel anchor"
+        ) in self.error(plugin_world, drive(), changed)
+
+    def test_rear_wheels_in_line_within_tolerance(self, trike: Any) -> None:
+        trike(joints=joints(left=joint("left_j", "weld", "left", "[-1, 0.400005]")))
+
+    def test_rear_wheels_in_one_place(self, plugin_world: Any) -> None:
+        changed = joints(left=joint("left_j", "weld", "left", "[-1, -0.4]"))
+        text = self.error(plugin_world, drive(), changed)
+        assert "The rear wheel joints must not have the same anchor" in text
+
+    def test_front_wheel_on_the_rear_axle(self, plugin_world: Any) -> None:
+        changed = joints(
+            left=joint("left_j", "weld", "left", "[0, 0.4]"),
+            right=joint("right_j", "weld", "right", "[0, -0.4]"),
+        )
+        text = self.error(plugin_world, drive(), changed)
+        assert "The front wheel joint must not be anchored on the rear axle" in text
+
+    @pytest.mark.parametrize(
+        ("extra", "message"),
+        [
+            ("max_steer_angle: -1", 'Invalid "max_steer_angle", must not be negative'),
+            ("max_angular_velocity: -1", 'Invalid "max_angular_velocity", must not be negative'),
+            (
+                "max_steer_acceleration: .nan",
+                'Invalid "max_steer_acceleration", must not be negative',
+            ),
+            ("pub_rate: -1", 'Invalid "pub_rate", must not be negative'),
+            ("odom_pose_noise: [-1, 0, 0]", 'Invalid "odom_pose_noise", variances must be'),
+            ("angular_dynamics: {top: 1}", "top"),
+            ("linear_dynamics: {velocity_limit: -1}", 'Invalid "velocity_limit"'),
+            ("enable_odom_tf_pub: true", "enable_odom_tf_pub"),
+            ("twist_pub: t", "twist_pub"),
+        ],
+    )
+    def test_parameters(self, plugin_world: Any, extra: str, message: str) -> None:
+        assert message in self.error(plugin_world, drive(extra))
