@@ -5,9 +5,29 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable
-from typing import Any, Final
+from typing import Any, Final, Literal, TypedDict
 
 from flatland.yaml_node import ListNode, MapNode, Node, ScalarNode
+
+BoolKind = Literal["bool"] | type[bool]
+IntKind = Literal["int"] | type[int]
+FloatKind = Literal["float"] | type[float]
+StringKind = Literal["string"] | type[str]
+Kind = BoolKind | IntKind | FloatKind | StringKind | Literal["vector", "pose", "color"]
+NodeKind = Literal["any", "map", "list"]
+Key = str | int
+Vector = tuple[float, float]
+Pose = tuple[float, float, float]
+Color = tuple[float, float, float, float]
+
+
+class Sizes(TypedDict, total=False):
+    """How many items a list may have."""
+
+    min_size: int
+    max_size: int | None
+    size: int | None
+
 
 _FLOAT: Final = re.compile(r"[-+]?(\.[0-9]+|[0-9]+(\.[0-9]*)?)([eE][-+]?[0-9]+)?")
 _DECIMAL: Final = re.compile(r"[-+]?(0|[1-9][0-9]*)")
@@ -87,22 +107,6 @@ def to_bool(text: str) -> bool:
     raise ValueError("not a bool")
 
 
-SCALARS: Final[dict[object, tuple[str, Callable[[str], Any]]]] = {
-    "string": ("string", to_string),
-    str: ("string", to_string),
-    "float": ("float", to_float),
-    float: ("float", to_float),
-    "int": ("int", to_int),
-    int: ("int", to_int),
-    "bool": ("bool", to_bool),
-    bool: ("bool", to_bool),
-}
-"""The name for messages and the conversion of each scalar kind."""
-
-TUPLE_SIZES: Final = {"pose": 3, "color": 4}
-"""How many floats each kind of fixed size has."""
-
-
 def to_vector(node: Node) -> tuple[float, float]:
     """Converts a list of two floats.
 
@@ -126,3 +130,25 @@ def to_plain(node: Node, _done: dict[int, object] | None = None) -> object:
         elif isinstance(node, MapNode):
             done[id(node)] = {key: to_plain(value, done) for key, value in node.entries.items()}
     return done.get(id(node))
+
+
+def _scalar(convert: Callable[[str], object]) -> Callable[[Node], object]:
+    def convert_node(node: Node) -> object:
+        if not isinstance(node, ScalarNode):
+            raise ValueError("not a scalar")
+        return convert(node.text)
+
+    return convert_node
+
+
+CONVERSIONS: Final[dict[object, tuple[str, Callable[[Node], Any]]]] = {
+    **dict.fromkeys(("string", str), ("string", _scalar(to_string))),
+    **dict.fromkeys(("float", float), ("float", _scalar(to_float))),
+    **dict.fromkeys(("int", int), ("int", _scalar(to_int))),
+    **dict.fromkeys(("bool", bool), ("bool", _scalar(to_bool))),
+    "vector": ("vector", to_vector),
+}
+"""The name for messages and the conversion of each kind of a single value."""
+
+TUPLE_SIZES: Final = {"pose": 3, "color": 4}
+"""How many floats each kind of fixed size has."""

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import functools
 import importlib
+import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from numbers import Real
@@ -56,8 +57,11 @@ def evaluate(expression: str, param: Callable[[str], object]) -> EvalResult:
     """
     code = expression if "return " in expression else "return " + expression
     params: list[object] = []
+    spent = 0.0
     for _ in range(_MAX_RUNS):
-        status, *rest = _run(code, params)
+        start = time.process_time()
+        status, *rest = _run(code, params, spent)
+        spent += time.process_time() - start
         texts = [_decode(text) for text in rest]
         if status == b"value":
             return EvalResult(texts[0], tuple(texts[1:]))
@@ -73,7 +77,7 @@ def _lua_value(name: str, value: object) -> object:
     if isinstance(value, Real):
         return float(value)
     if isinstance(value, str):
-        return value.encode()
+        return value.encode(errors="replace")
     raise EvalError(
         f'param "{name}" must be a number, a string or a bool, got {type(value).__name__}'
     )
@@ -83,58 +87,55 @@ def _decode(text: bytes) -> str:
     try:
         return text.decode()
     except UnicodeDecodeError:
-        raise EvalError(f"the result {text[:40]!r} is not UTF-8 text") from None
+        raise EvalError(f"{text[:40]!r} is not UTF-8 text") from None
 
 
-def _run(code: str, params: list[object]) -> tuple[bytes, ...]:
+def _run(code: str, params: list[object], spent: float) -> tuple[bytes, ...]:
     source = code.encode()
     size = len(source) + sum(len(value) for value in params if isinstance(value, bytes))
     if size > _MAX_INPUT:
         raise EvalError(f"the expression and its parameters have more than {_MAX_INPUT} bytes")
+    new_state, interval = _state_factory()
     try:
-        runtime, bounded = _new_state()
-        # An outer bound where the state has none of its own is checked more often.
-        interval = 100 if bounded else 10
-        result: tuple[bytes, ...] = runtime.execute(
-            _SANDBOX, source, TIME_LIMIT, MEMORY_LIMIT, interval, *params
+        result: tuple[bytes, ...] = new_state().execute(
+            _SANDBOX, source, spent, TIME_LIMIT, MEMORY_LIMIT, interval, *params
         )
         return result
     except MemoryError:
         raise EvalError("not enough memory") from None
     except Exception as error:
-        raise EvalError(str(error)) from error
+        raise EvalError(str(error).partition("\nstack traceback:")[0]) from error
 
 
-def _new_state() -> tuple[Any, bool]:
-    """Makes a Lua state, and tells whether it has a bound on its memory."""
+@functools.cache
+def _state_factory() -> tuple[Callable[[], Any], int]:
+    """Finds a Lua, and how many of its instructions may pass between two checks."""
     options = {"encoding": None, "register_eval": False, "attribute_filter": _refuse}
-    runtime_class = _runtime_class()
-    try:
-        return runtime_class(register_builtins=False, max_memory=MEMORY_LIMIT, **options), True
-    except Exception:
-        return runtime_class(**options), False
+    more_options = {"register_builtins": False, "max_memory": MEMORY_LIMIT}
+    for name in _RUNTIMES:
+        try:
+            runtime = importlib.import_module(name).LuaRuntime
+        except ImportError:
+            continue
+        if runtime().lua_version != (5, 1):
+            continue
+        try:
+            runtime(**options, **more_options)
+        except Exception:
+            # An older lupa or LuaJIT, without a bound of its own on the memory: check more often.
+            return functools.partial(runtime, **options), 10
+        return functools.partial(runtime, **options, **more_options), 100
+    raise EvalError("it needs the Python package lupa with Lua 5.1 or LuaJIT")
 
 
 def _refuse(_object: object, name: object, _is_setting: bool) -> NoReturn:
     raise AttributeError(f"access to {name!r} is refused")
 
 
-@functools.cache
-def _runtime_class() -> Any:
-    for name in _RUNTIMES:
-        try:
-            runtime_class = importlib.import_module(name).LuaRuntime
-        except ImportError:
-            continue
-        if runtime_class().lua_version == (5, 1):
-            return runtime_class
-    raise EvalError("$eval needs the Python package lupa with Lua 5.1 or LuaJIT")
-
-
 # Runs once in each state, as its only chunk. All that the guards use is in locals, so that the
 # expression can neither see nor change it, whatever it does to the globals.
 _SANDBOX = rb"""
-local code, time_limit, memory_limit, interval = ...
+local code, spent, time_limit, memory_limit, interval = ...
 local error, getmetatable, ipairs, pairs, pcall, select, tonumber, tostring, type, unpack =
   error, getmetatable, ipairs, pairs, pcall, select, tonumber, tostring, type, unpack
 local clock, getenv, sethook, memory_used = os.clock, os.getenv, debug.sethook, collectgarbage
@@ -143,7 +144,7 @@ local byte, find, gsub, rep, sort = string.byte, string.find, string.gsub, strin
 local concat = table.concat
 
 local known = {}  -- parameters: a table with the value, or with nothing for one that is unset
-for i = 5, select("#", ...), 2 do known[(select(i, ...))] = {(select(i + 1, ...))} end
+for i = 6, select("#", ...), 2 do known[(select(i, ...))] = {(select(i + 1, ...))} end
 
 if jit then jit.off() end  -- compiled code calls no hooks
 for _, name in ipairs{"execute", "exit", "remove", "rename", "tmpname", "setlocale"} do
@@ -158,14 +159,18 @@ end
 
 -- Stopping: once `stopped` is set, nothing that catches errors lets the expression run on.
 local stopped, wanted
-local start = clock()
-local function check()
+local start = clock() - spent
+local check
+function check()
   if not stopped and clock() - start > time_limit then
     stopped = "it runs for more than " .. time_limit .. " s"
   elseif not stopped and memory_used("count") * 1024 > memory_limit then
     stopped = "not enough memory"
   end
-  if stopped then error(stopped, 0) end
+  if stopped then
+    sethook(check, "", interval)  -- LuaJIT does not count anew after an error
+    error(stopped, 0)
+  end
 end
 local function pass(...)
   if stopped then error(stopped, 0) end
@@ -220,18 +225,23 @@ end
 -- One call of these may work for ever, and no hook comes in between: the cost is bounded first.
 local function limit(steps, what)
   check()
-  if steps > 1e8 then error(what, 3) end
+  if steps > 2e8 then error(what, 3) end  -- about 1 s
+end
+-- not tostring: the expression may have changed what that makes of strings
+local function text_of(value)
+  local kind = type(value)
+  return kind == "string" and value or kind == "number" and tostring(value) or ""
 end
 local function guard(name, plain_allowed)
   local run = string[name]
   string[name] = function(text, pattern, third, plain)
-    local n, m = #tostring(text), #tostring(pattern)
+    local n, m = #text_of(text), #text_of(pattern)
     if plain_allowed and plain then
       limit(n * m / 16, "the text to find is too long")
     else
       if m > 1000 then error("the pattern has more than 1000 characters", 2) end
       -- %b and %1 go through the text too; sets are single characters
-      local bare = gsub(gsub(tostring(pattern), "%%[b%d]", "x*"), "%%.", "x")
+      local bare = gsub(gsub(text_of(pattern), "%%[b%d]", "x*"), "%%.", "x")
       bare = gsub(bare, "%[%^?.[^%]]*%]", "x")
       local _, many = gsub(bare, "[*+-]", "")
       local _, maybe = gsub(bare, "%?", "")
@@ -245,7 +255,7 @@ end
 guard("find", true) guard("match") guard("gmatch") guard("gsub")
 string.gfind = nil
 function string.rep(text, count)
-  local size = #tostring(text)
+  local size = #text_of(text)
   if size == 0 then return "" end
   if (tonumber(count) or 0) * size > memory_limit then error("not enough memory", 2) end
   return rep(text, count)
@@ -293,8 +303,10 @@ if wanted then return "param", wanted end
 if stopped then return "error", stopped end
 local kind = type(value)
 if kind == "nil" and ok then return "value", "", unpack(unset) end
+if value ~= value then value = "nan" end  -- Lua 5.1 adds a sign, LuaJIT does not
+if kind == "boolean" then value = value and "true" or "false" end
 if kind == "string" or kind == "number" or kind == "boolean" then
-  return ok and "value" or "error", tostring(value), unpack(unset)
+  return ok and "value" or "error", text_of(value), unpack(unset)
 end
 return "error", ok and "the result is a " .. kind .. ", not a value" or "error of type " .. kind
 """

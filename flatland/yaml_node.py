@@ -11,7 +11,7 @@ import re
 import stat
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import NoReturn, Union
+from typing import NoReturn
 
 import yaml
 
@@ -93,7 +93,7 @@ class MapNode:
     key_lines: dict[str, int] = field(default_factory=dict)
 
 
-Node = Union[NullNode, ScalarNode, ListNode, MapNode]  # noqa: UP007 (used before it is defined)
+Node = NullNode | ScalarNode | ListNode | MapNode
 
 
 def load_documents(path: str) -> list[Node]:
@@ -171,6 +171,7 @@ class _Composer:
         self._anchors: dict[str, Node] = {}
         self._open: list[ListNode | MapNode] = []
         self._keys: list[str | None] = []  # of each open node; None: a map's key is due
+        self._heights: dict[int, int] = {}  # levels in each list and map, aliases counted
 
     def documents(self) -> list[Node]:
         try:
@@ -188,7 +189,10 @@ class _Composer:
         if isinstance(event, yaml.DocumentStartEvent):
             self._anchors.clear()
         elif isinstance(event, yaml.AliasEvent):
-            self._add(self._aliased(event), event)
+            node = self._add(self._aliased(event), event)
+            self._heighten(self._heights.get(id(node), 0))
+            if len(self._open) + self._heights.get(id(node), 0) > MAX_NESTING:
+                self._fail_at(event, f"nested deeper than {MAX_NESTING} levels")
         elif isinstance(event, yaml.ScalarEvent):
             self._name(event, self._add(self._scalar(event), event))
         elif isinstance(event, yaml.SequenceStartEvent):
@@ -196,8 +200,9 @@ class _Composer:
         elif isinstance(event, yaml.MappingStartEvent):
             self._begin(MapNode(self._source, _position(event)[0]), event)
         elif isinstance(event, yaml.CollectionEndEvent):
-            self._open.pop()
             self._keys.pop()
+            node = self._open.pop()
+            self._heighten(self._heights[id(node)])
 
     def _begin(self, node: ListNode | MapNode, event: yaml.CollectionStartEvent) -> None:
         self._name(event, self._add(node, event))
@@ -205,6 +210,13 @@ class _Composer:
             self._fail_at(event, f"nested deeper than {MAX_NESTING} levels")
         self._open.append(node)
         self._keys.append(None)
+        self._heights[id(node)] = 1
+
+    def _heighten(self, height: int) -> None:
+        """Lets the innermost open node know how high one that it holds is."""
+        if self._open:
+            parent = id(self._open[-1])
+            self._heights[parent] = max(self._heights[parent], height + 1)
 
     def _name(self, event: yaml.NodeEvent, node: Node) -> None:
         if event.anchor is not None:

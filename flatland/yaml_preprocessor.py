@@ -44,9 +44,8 @@ def preprocess_file(path: str, params: Params = None) -> Node:
     Raises:
         YamlError: The file cannot be read, is not YAML, or its preprocessing fails.
     """
-    chain = ((_identity(path), path),)
     root = _first(load_documents(path), Source.of_file(path))
-    return _Preprocessor(params).expand(root, chain, 0)
+    return _Preprocessor(params).expand(root, ((_identity(path), path),), 0)
 
 
 def preprocess_text(text: str, base_dir: str, params: Params = None) -> Node:

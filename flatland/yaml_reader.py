@@ -5,42 +5,31 @@ from __future__ import annotations
 import copy
 import os
 from collections.abc import Iterator
-from typing import Any, Literal, TypedDict, TypeVar, Union, Unpack, overload
+from typing import Any, Literal, TypeVar, Unpack, overload
 
 from flatland.errors import YamlError
-from flatland.yaml_convert import SCALARS, TUPLE_SIZES, to_plain, to_vector
+from flatland.yaml_convert import (
+    CONVERSIONS,
+    TUPLE_SIZES,
+    BoolKind,
+    Color,
+    FloatKind,
+    IntKind,
+    Key,
+    Kind,
+    NodeKind,
+    Pose,
+    Sizes,
+    StringKind,
+    Vector,
+    to_plain,
+)
 from flatland.yaml_node import ListNode, MapNode, Node, NullNode, ScalarNode
 from flatland.yaml_preprocessor import Params, preprocess_file, preprocess_text
 
-
-class _Required:
-    """Type of the default that stands for none."""
-
-    def __repr__(self) -> str:
-        return "REQUIRED"
-
-
-REQUIRED = _Required()
-
 D = TypeVar("D")
-Key = Union[str, int]  # noqa: UP007
-BoolKind = Literal["bool"] | type[bool]
-IntKind = Literal["int"] | type[int]
-FloatKind = Literal["float"] | type[float]
-StringKind = Literal["string"] | type[str]
-Kind = BoolKind | IntKind | FloatKind | StringKind | Literal["vector", "pose", "color"]
-NodeKind = Literal["any", "map", "list"]
-Vector = tuple[float, float]
-Pose = tuple[float, float, float]
-Color = tuple[float, float, float, float]
-
-
-class Sizes(TypedDict, total=False):
-    """How many items a list may have."""
-
-    min_size: int
-    max_size: int | None
-    size: int | None
+REQUIRED = object()
+"""The default that stands for none."""
 
 
 class YamlReader:
@@ -137,7 +126,10 @@ class YamlReader:
         Raises:
             YamlError: The node is not a map.
         """
-        node = self._as_map()
+        node = self._node
+        if not isinstance(node, MapNode):
+            self._check_kind("map")
+            return self
         entries = {key: value for key, value in node.entries.items() if key not in keys}
         rest = MapNode(node.source, node.line, entries, node.key_lines)
         return YamlReader(rest, self.location, self.name)
@@ -170,8 +162,9 @@ class YamlReader:
         Raises:
             YamlError: The entry is missing or is of another kind.
         """
-        child = self._child(key, default)
-        return default if child is None else child._convert(kind)
+        if default is not REQUIRED and self._is_missing(key):
+            return default
+        return self._open(key)._convert(kind)
 
     @overload
     def value(self, kind: BoolKind) -> bool: ...
@@ -236,7 +229,7 @@ class YamlReader:
         Raises:
             YamlError: The entry is missing, not a list, of another size or with other items.
         """
-        if self._child(key, default) is None:
+        if default is not REQUIRED and self._is_missing(key):
             return default
         entry = self.subnode(key, "list")
         entry._check_size(min_size, max_size, size)
@@ -252,10 +245,9 @@ class YamlReader:
         Raises:
             YamlError: There is none, or it is of another kind.
         """
-        child = self._child(key, REQUIRED)
-        assert child is not None  # noqa: S101 (tells mypy; a missing one has raised)
-        child._check_kind(kind, self._quote(key), self._inner_location())
-        return child
+        entry = self._open(key)
+        entry._check_kind(kind)
+        return entry
 
     def optional_subnode(self, key: Key, kind: NodeKind = "any") -> YamlReader:
         """Opens an entry; one that is missing or empty gives a reader whose `is_null` is true.
@@ -263,12 +255,9 @@ class YamlReader:
         Raises:
             YamlError: It is of another kind.
         """
-        child = self._child(key, None)
-        if child is None:
-            null = NullNode(self._node.source, self._node.line)
-            return YamlReader(null, self._inner_location(), self._quote(key))
-        child._check_kind(kind, self._quote(key), self._inner_location())
-        return child
+        if self._is_missing(key):
+            return self._reader(NullNode(self._node.source, self._node.line), key)
+        return self.subnode(key, kind)
 
     def items(self) -> Iterator[YamlReader]:
         """Iterates the items of a list; an empty node has none.
@@ -276,11 +265,10 @@ class YamlReader:
         Raises:
             YamlError: The node is neither.
         """
-        if isinstance(self._node, NullNode):
-            return
-        self._check_kind("list", self.name, self.location)
+        if not self.is_null:
+            self._check_kind("list")
         for index in range(len(self)):
-            yield self.subnode(index)
+            yield self._open(index)
 
     def plain(self) -> Any:
         """Returns the node as dict, list, str or None, for whoever keeps it unread."""
@@ -292,7 +280,9 @@ class YamlReader:
         Raises:
             YamlError: The node is neither.
         """
-        return [] if self.is_null else list(self._as_map().entries)
+        if not self.is_null:
+            self._check_kind("map")
+        return list(self._node.entries) if isinstance(self._node, MapNode) else []
 
     def __contains__(self, key: object) -> bool:
         """Tells whether a map has a key."""
@@ -315,11 +305,8 @@ class YamlReader:
         unknown = [key for key in self._node.entries if key not in self._accessed]
         if unknown:
             names = ", ".join(f'"{key}"' for key in sorted(unknown))
-            raise self._error(
-                f"Entry {self._label()}contains unrecognized entry(s) {{{names}}}",
-                self.location,
-                self._node.source.place(self._node.key_lines[unknown[0]]),
-            )
+            message = f"Entry {self._label()}contains unrecognized entry(s) {{{names}}}"
+            raise self._error(message, self._node.key_lines[unknown[0]])
 
     def error(self, message: str) -> YamlError:
         """Makes an error with the node's place, such as ` [model.yaml:12]`, behind the text."""
@@ -334,55 +321,47 @@ class YamlReader:
         """
         return self._node.source.resolve(path)
 
-    def _place(self) -> str:
-        return self._node.source.place(self._node.line)
+    def _place(self, line: int | None = None) -> str:
+        return self._node.source.place(line or self._node.line)
 
     def _label(self) -> str:
         return f"{self.name.lower()} " if self.name else ""
 
-    def _inner_location(self) -> str:
-        return f"{self.location} {self.name}".strip()
+    def _error(self, message: str, line: int | None = None) -> YamlError:
+        where = f" (in {self.location.lower()})" if self.location else ""
+        return YamlError(message + where + self._place(line))
 
-    @staticmethod
-    def _quote(key: Key) -> str:
-        return f"index={key}" if isinstance(key, int) else f'"{key}"'
+    def _check_kind(self, kind: NodeKind) -> None:
+        if not {"any": True, "map": self.is_map, "list": self.is_list}[kind]:
+            name = f"{self.name} " if self.name else ""
+            raise self._error(f"Entry {name}must be a {kind}")
 
-    def _error(self, message: str, location: str, place: str) -> YamlError:
-        where = f" (in {location.lower()})" if location else ""
-        return YamlError(f"{message}{where}{place}")
-
-    def _as_map(self) -> MapNode:
-        self._check_kind("map", self.name, self.location)
-        assert isinstance(self._node, MapNode)  # noqa: S101
-        return self._node
-
-    def _check_kind(self, kind: NodeKind, name: str, location: str) -> None:
-        fits = {"any": True, "map": self.is_map, "list": self.is_list}[kind]
-        if not fits:
-            label = f"{name} " if name else ""
-            raise self._error(f"Entry {label}must be a {kind}", location, self._place())
-
-    def _child(self, key: Key, default: object) -> YamlReader | None:
-        """Opens an entry, None for one that is missing or empty if there is a default."""
-        node: Node | None = None
-        if isinstance(key, int):
-            if not self.is_null:
-                self._check_kind("list", self.name, self.location)
-            if isinstance(self._node, ListNode) and 0 <= key < len(self._node.items):
-                node = self._node.items[key]
-        else:
-            if not self.is_null:
-                self._check_kind("map", self.name, self.location)
+    def _find(self, key: Key) -> Node | None:
+        """Returns an entry's node and records that its key was read."""
+        if isinstance(key, str):
             if isinstance(self._node, MapNode):
                 self._accessed.add(key)
-                node = self._node.entries.get(key)
-        if default is not REQUIRED and (node is None or isinstance(node, NullNode)):
-            return None
+                return self._node.entries.get(key)
+        elif isinstance(self._node, ListNode):
+            return self._node.items[key] if 0 <= key < len(self._node.items) else None
+        if not self.is_null:
+            self._check_kind("map" if isinstance(key, str) else "list")
+        return None
+
+    def _is_missing(self, key: Key) -> bool:
+        node = self._find(key)
+        return node is None or isinstance(node, NullNode)
+
+    def _open(self, key: Key) -> YamlReader:
+        node = self._find(key)
         if node is None:
-            raise self._error(
-                f"Entry {self._quote(key)} does not exist", self._inner_location(), self._place()
-            )
-        return YamlReader(node, self._inner_location(), self._quote(key))
+            missing = self._reader(self._node, key)
+            raise missing._error(f"Entry {missing.name} does not exist")
+        return self._reader(node, key)
+
+    def _reader(self, node: Node, key: Key) -> YamlReader:
+        name = f'"{key}"' if isinstance(key, str) else f"index={key}"
+        return YamlReader(node, f"{self.location} {self.name}".strip(), name)
 
     def _check_size(self, min_size: int, max_size: int | None, size: int | None) -> None:
         count = len(self)
@@ -396,23 +375,16 @@ class YamlReader:
             wanted = f"<= {max_size}"
         else:
             return
-        raise self._error(
-            f"Entry {self._label()}must have size {wanted}", self.location, self._place()
-        )
+        raise self._error(f"Entry {self._label()}must have size {wanted}")
 
     def _convert(self, kind: Kind) -> Any:
         if kind in TUPLE_SIZES:
-            self._check_kind("list", self.name, self.location)
+            self._check_kind("list")
             self._check_size(0, None, TUPLE_SIZES[kind])
             return tuple(item._convert("float") for item in self.items())
-        type_name, convert = SCALARS.get(kind, ("vector", None))
+        type_name, convert = CONVERSIONS[kind]
         try:
-            if convert is None:
-                return to_vector(self._node)
-            if isinstance(self._node, ScalarNode):
-                return convert(self._node.text)
+            return convert(self._node)
         except ValueError:
             pass
-        raise self._error(
-            f"Error converting entry {self._label()}to {type_name}", self.location, self._place()
-        )
+        raise self._error(f"Error converting entry {self._label()}to {type_name}")
