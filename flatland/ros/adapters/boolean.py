@@ -1,0 +1,18 @@
+"""`bool` as `std_msgs/Bool`."""
+
+from std_msgs.msg import Bool
+
+from flatland.ros.adapters import register_adapter
+
+
+def to_message(value: bool) -> Bool:
+    """Makes a message from a value."""
+    return Bool(value)
+
+
+def from_message(message: Bool) -> bool:
+    """Makes a value from a message."""
+    return bool(message.data)
+
+
+register_adapter(bool, Bool, to_message, from_message)

@@ -1,0 +1,22 @@
+"""`Odometry` as `nav_msgs/Odometry`."""
+
+from geometry_msgs.msg import PoseWithCovariance, TwistWithCovariance
+from nav_msgs.msg import Odometry as OdometryMessage
+
+from flatland.ros.adapters import convert, register_adapter
+from flatland.values import Odometry
+
+
+def to_message(value: Odometry) -> OdometryMessage:
+    """Makes a message from a value."""
+    return OdometryMessage(
+        convert.header(value.stamp, value.frame_id),
+        value.child_frame_id,
+        PoseWithCovariance(convert.pose(*value.pose), convert.covariance(value.pose_covariance)),
+        TwistWithCovariance(
+            convert.twist(*value.twist), convert.covariance(value.twist_covariance)
+        ),
+    )
+
+
+register_adapter(Odometry, OdometryMessage, to_message)

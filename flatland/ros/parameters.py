@@ -1,0 +1,162 @@
+"""The node's private parameters, read once and checked."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+ParameterSource = Callable[[str], object]
+"""Gives the value of a parameter, None where it is not set."""
+
+NO_WORLD_PATH = "No world_path parameter given!"
+_MIN_STEP_SIZE = 1e-9  # s, the resolution of the simulated time
+_SIMPLIFICATIONS = (0, 1, 2)
+
+
+class ParameterError(Exception):
+    """A parameter of the node is missing or bad; the text names it and its value."""
+
+
+@dataclass(frozen=True, slots=True)
+class NodeParameters:
+    """What the node is told by its parameters.
+
+    Attributes:
+        world_path: The world file.
+        update_rate: Steps in a second of wall time [Hz], 0 for as many as possible.
+        step_size: Simulated time of a step [s].
+        show_viz: Whether to publish debug markers.
+        viz_pub_rate: Debug markers in a second of wall time [Hz].
+        simplify_map: 0 exact, 1 simplified, 2 opened and simplified map boundaries.
+        seed: Makes all noise repeatable; None draws one.
+        benchmark_duration: Simulated time after which the node ends and says how fast it was
+            [s]; None runs for ever.
+    """
+
+    world_path: str
+    update_rate: float
+    step_size: float
+    show_viz: bool
+    viz_pub_rate: float
+    simplify_map: int
+    seed: int | None
+    benchmark_duration: float | None
+
+
+def read_parameters(get: ParameterSource) -> NodeParameters:
+    """Reads and checks all parameters of the node.
+
+    Args:
+        get: Gives the value of a parameter of the node, None where it is not set.
+
+    Raises:
+        ParameterError: One is missing or bad.
+    """
+    reader = _Reader(get)
+    return NodeParameters(
+        world_path=reader.path("world_path"),
+        update_rate=reader.rate("update_rate", 200.0),
+        step_size=reader.step_size("step_size", 0.005),
+        show_viz=reader.boolean("show_viz", False),
+        viz_pub_rate=reader.positive("viz_pub_rate", 30.0),
+        simplify_map=reader.choice("simplify_map", 0, _SIMPLIFICATIONS),
+        seed=reader.natural("seed"),
+        benchmark_duration=reader.optional_positive("benchmark_duration"),
+    )
+
+
+class _Reader:
+    """Converts and checks one parameter at a time."""
+
+    def __init__(self, get: ParameterSource) -> None:
+        self._get = get
+
+    def path(self, name: str) -> str:
+        value = self._get(name)
+        if value is None or value == "":
+            raise ParameterError(NO_WORLD_PATH)
+        if not isinstance(value, str):
+            raise _bad(name, "the path of a world file", value)
+        return value
+
+    def rate(self, name: str, default: float) -> float:
+        wanted = "a number of Hz that is not negative (0 or inf: as fast as possible)"
+        rate = self._number(name, default, wanted)
+        if rate < 0:
+            raise _bad(name, wanted, rate)
+        return 0.0 if math.isinf(rate) else rate
+
+    def step_size(self, name: str, default: float) -> float:
+        wanted = "a positive number of seconds, at least 1e-9"
+        size = self._number(name, default, wanted)
+        if math.isinf(size) or size < _MIN_STEP_SIZE:
+            raise _bad(name, wanted, size)
+        return size
+
+    def positive(self, name: str, default: float) -> float:
+        wanted = "a positive number"
+        number = self._number(name, default, wanted)
+        if number <= 0:
+            raise _bad(name, wanted, number)
+        return number
+
+    def optional_positive(self, name: str) -> float | None:
+        return None if self._get(name) is None else self.positive(name, 0.0)
+
+    def boolean(self, name: str, default: bool) -> bool:
+        value = self._get(name)
+        if value is None:
+            return default
+        if isinstance(value, bool):
+            return value
+        if isinstance(value, str) and value.lower() in ("true", "false"):
+            return value.lower() == "true"
+        raise _bad(name, "true or false", value)
+
+    def choice(self, name: str, default: int, choices: tuple[int, ...]) -> int:
+        wanted = "one of " + ", ".join(map(str, choices))
+        value = self._integer(name, wanted)
+        if value is None:
+            return default
+        if value not in choices:
+            raise _bad(name, wanted, value)
+        return value
+
+    def natural(self, name: str) -> int | None:
+        wanted = "an integer that is not negative"
+        value = self._integer(name, wanted)
+        if value is not None and value < 0:
+            raise _bad(name, wanted, value)
+        return value
+
+    def _number(self, name: str, default: float, wanted: str) -> float:
+        """Reads a number that may be infinite; roslaunch hands over `inf` and `1e3` as text."""
+        value = self._get(name)
+        if value is None:
+            return default
+        if isinstance(value, bool) or not isinstance(value, (int, float, str)):
+            raise _bad(name, wanted, value)
+        try:
+            number = float(value)
+        except (ValueError, OverflowError):
+            raise _bad(name, wanted, value) from None
+        if math.isnan(number):
+            raise _bad(name, wanted, value)
+        return number
+
+    def _integer(self, name: str, wanted: str) -> int | None:
+        """Reads an integer; one too great for XML-RPC comes as text."""
+        value = self._get(name)
+        if value is None:
+            return None
+        if isinstance(value, bool) or not isinstance(value, (int, str)):
+            raise _bad(name, wanted, value)
+        try:
+            return int(value)
+        except ValueError:
+            raise _bad(name, wanted, value) from None
+
+
+def _bad(name: str, wanted: str, value: object) -> ParameterError:
+    return ParameterError(f'Invalid parameter "~{name}": it must be {wanted}, got {value!r}')

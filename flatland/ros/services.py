@@ -1,0 +1,97 @@
+"""The node's services: spawn, delete and move models, pause and resume."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable
+from typing import Any
+
+import rospy
+from std_srvs.srv import Empty, EmptyResponse
+
+from flatland.errors import FlatlandError
+from flatland.ros.plugin_ros import wait_for
+from flatland.simulation import Simulation
+from flatland.srv import (
+    DeleteModel,
+    DeleteModelRequest,
+    DeleteModelResponse,
+    MoveModel,
+    MoveModelRequest,
+    MoveModelResponse,
+    SpawnModel,
+    SpawnModelRequest,
+    SpawnModelResponse,
+)
+
+_LOG = logging.getLogger("flatland")
+
+
+class Services:
+    """Offers the services of one simulation in the node's namespace.
+
+    Each call is carried out in the simulation's thread between two steps, in order of arrival,
+    also while paused, and answered when it has taken effect.
+    """
+
+    def __init__(self, simulation: Simulation) -> None:
+        """Starts to offer the services."""
+        self._simulation = simulation
+        world = simulation.world
+        rospy.Service("spawn_model", SpawnModel, self._spawn_model)
+        rospy.Service("delete_model", DeleteModel, self._delete_model)
+        rospy.Service("move_model", MoveModel, self._move_model)
+        for name, action in (
+            ("pause", world.pause),
+            ("resume", world.resume),
+            ("toggle_pause", world.toggle_pause),
+        ):
+            rospy.Service(name, Empty, self._switch(action))
+
+    def _spawn_model(self, request: SpawnModelRequest) -> SpawnModelResponse:
+        pose = _pose(request.pose)
+        return SpawnModelResponse(
+            *self._carry_out(
+                lambda: self._simulation.world.spawn_model(
+                    request.yaml_path, request.name, request.ns, pose
+                )
+            )
+        )
+
+    def _delete_model(self, request: DeleteModelRequest) -> DeleteModelResponse:
+        return DeleteModelResponse(
+            *self._carry_out(lambda: self._simulation.world.delete_model(request.name))
+        )
+
+    def _move_model(self, request: MoveModelRequest) -> MoveModelResponse:
+        pose = _pose(request.pose)
+        return MoveModelResponse(
+            *self._carry_out(lambda: self._simulation.world.move_model(request.name, pose))
+        )
+
+    def _switch(self, action: Callable[[], None]) -> Callable[[Any], EmptyResponse]:
+        def serve(_request: Any) -> EmptyResponse:
+            self._carry_out(action)
+            return EmptyResponse()
+
+        return serve
+
+    def _carry_out(self, action: Callable[[], object]) -> tuple[bool, str]:
+        """Runs an action between two steps and says whether it worked, and if not, why."""
+        try:
+            wait_for(self._simulation.post(action))
+        except (FlatlandError, rospy.ServiceException) as error:
+            return False, _sendable(str(error))
+        except Exception as error:
+            _LOG.exception("a service call failed in an unforeseen way")
+            return False, _sendable(f"{type(error).__name__}: {error}")
+        return True, ""
+
+
+def _pose(pose: Any) -> tuple[float, float, float]:
+    return (pose.x, pose.y, pose.theta)
+
+
+def _sendable(text: str) -> str:
+    """Replaces what UTF-8 cannot hold, such as parts of a file name that is none."""
+    return text.encode("utf-8", "replace").decode()
