@@ -1,4 +1,4 @@
-"""A catkin workspace that all tests of this folder share, and clean environments to run things in."""
+"""A catkin workspace that all tests of this folder share, and clean environments."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""catkin_make and catkin_make install give a ROS package that works, from devel and install space."""
+"""catkin_make and catkin_make install give a ROS package that works in both spaces."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ for module in (flatland, flatland._core, flatland.msg, flatland.world):
 
 def test_ros_tools_find_the_package(space, checkout):
     expected = checkout if space.name == "devel" else space.folder / "share" / "flatland"
-    assert Path(space.run("rospack", "find", "flatland").strip()) == expected
+    assert Path(space.run("rospack", "find", "flatland").strip()).resolve() == expected
     assert "Collision[] collisions" in space.run("rosmsg", "show", "-r", "flatland/Collisions")
     md5 = space.run("rossrv", "md5", "flatland/SpawnModel").split()[0]
     assert md5 == "952237af09cbedc354d376afc6d2fc71"
@@ -39,11 +39,13 @@ def test_a_world_steps_in_the_systems_python(space, world_file, checkout):
     built = space.folder / "lib" / "python3" / "dist-packages" / "flatland"
     assert (package.parent, core.parent, messages.parent) == (built, built, built / "msg")
     # The devel space leads to the sources, so that an edit counts at once.
-    assert world.parent == (checkout / "flatland" if space.name == "devel" else built)
+    assert world.parent.resolve() == (checkout / "flatland" if space.name == "devel" else built)
 
 
 def test_devel_space_puts_only_the_package_on_the_path(make_space, checkout):
-    path = make_space("devel").run("/usr/bin/python3", "-c", "import sys; print(*sys.path, sep='\\n')")
+    path = make_space("devel").run(
+        "/usr/bin/python3", "-c", "import sys; print(*sys.path, sep='\\n')"
+    )
     assert str(checkout) not in path.splitlines()
 
 
@@ -79,7 +81,7 @@ def test_install_space_holds_all_and_nothing_of_make_dev(make_space, checkout):
 @pytest.mark.parametrize("launch_file", ["server.launch", "benchmark.launch"])
 def test_roslaunch_reads_the_launch_files(space, launch_file):
     files = space.run("roslaunch", "--files", "flatland", launch_file, "show_viz:=false")
-    assert Path(files.split()[0]).name == launch_file
+    assert Path(files.splitlines()[0]).name == launch_file
     nodes = space.run("roslaunch", "--nodes", "flatland", launch_file, "show_viz:=false")
     assert nodes.strip()
 

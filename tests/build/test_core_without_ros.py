@@ -11,9 +11,9 @@ import importlib, pkgutil, sys
 
 WITH_ROS = {"flatland.ros", "flatland.viewer", "flatland.msg", "flatland.srv"}
 BLOCKED = {
-    "rospy", "roslib", "rosgraph", "roslaunch", "rosservice", "rostopic", "genpy", "genmsg", "tf2_ros",
-    "tf2_msgs", "std_msgs", "std_srvs", "geometry_msgs", "nav_msgs", "sensor_msgs", "rosgraph_msgs",
-    "visualization_msgs", "interactive_markers", "rviz",
+    "rospy", "roslib", "rosgraph", "roslaunch", "rosservice", "rostopic", "genpy", "genmsg",
+    "tf2_ros", "tf2_msgs", "std_msgs", "std_srvs", "geometry_msgs", "nav_msgs", "sensor_msgs",
+    "rosgraph_msgs", "visualization_msgs", "interactive_markers", "rviz",
 }
 
 class Block:

@@ -28,7 +28,7 @@ def source_files(checkout: Path) -> list[str]:
 
 @pytest.fixture(scope="module")
 def wheel(tmp_path_factory: pytest.TempPathFactory, checkout: Path) -> zipfile.ZipFile:
-    """A wheel built in a path with a space from a copy of the sources with leavings of `make dev`."""
+    """A wheel built in a path with a space, from sources with leavings of `make dev`."""
     pytest.importorskip("scikit_build_core")
     folder = tmp_path_factory.mktemp("wheel") / "source tree"
     for name in source_files(checkout):
@@ -40,7 +40,17 @@ def wheel(tmp_path_factory: pytest.TempPathFactory, checkout: Path) -> zipfile.Z
         path.parent.mkdir(exist_ok=True)
         path.write_text("stale")
     built = subprocess.run(
-        [sys.executable, "-m", "pip", "wheel", "--no-deps", "--no-build-isolation", "-w", "..", "."],
+        [
+            sys.executable,
+            "-m",
+            "pip",
+            "wheel",
+            "--no-deps",
+            "--no-build-isolation",
+            "-w",
+            "..",
+            ".",
+        ],
         cwd=folder,
         stdout=subprocess.PIPE,
         stderr=subprocess.STDOUT,
@@ -65,7 +75,9 @@ def test_package_files(wheel, checkout):
 
 
 def test_ros_package_data(wheel, checkout):
-    prefix = next(n for n in wheel.namelist() if n.endswith("data/share/flatland/package.xml"))[:-11]
+    prefix = next(n for n in wheel.namelist() if n.endswith("data/share/flatland/package.xml"))[
+        :-11
+    ]
     names = {name.removeprefix(prefix) for name in wheel.namelist() if name.startswith(prefix)}
     expected = {
         name
@@ -78,7 +90,9 @@ def test_ros_package_data(wheel, checkout):
 
 def test_each_script_is_an_entry_point(wheel, checkout):
     entry_points = next(n for n in wheel.namelist() if n.endswith("entry_points.txt"))
-    commands = {line.split("=")[0].strip() for line in wheel.read(entry_points).decode().split("\n")}
+    commands = {
+        line.split("=")[0].strip() for line in wheel.read(entry_points).decode().split("\n")
+    }
     scripts = sorted(path.name for path in (checkout / "scripts").iterdir() if path.is_file())
     assert "flatland_server" in scripts
     for script in scripts:
