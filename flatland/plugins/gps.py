@@ -41,10 +41,13 @@ class Gps(ModelPlugin):
         if not self._timer.check_update(timekeeper):
             return
         if self._output.wanted:
-            east, north, _ = compose(self._body.pose, self._origin)
-            latitude, longitude = self._plane.geodetic(east, north)
             stamp = timekeeper.sim_time_ns
-            self._output.emit(NavSatFix(stamp, self._frame_id, latitude, longitude, 0.0))
+            self._output.emit(NavSatFix(stamp, self._frame_id, *self.compute_position(), 0.0))
         if self._broadcast_tf:
             parent = self.model.frame(self._body.name)
             self.send_transform(parent, self._frame_id, *self._origin)
+
+    def compute_position(self) -> tuple[float, float]:
+        """Returns the latitude and longitude [deg] where the antenna is now."""
+        east, north, _ = compose(self._body.pose, self._origin)
+        return self._plane.geodetic(east, north)

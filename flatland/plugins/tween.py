@@ -21,15 +21,9 @@ _LOG = logging.getLogger("flatland")
 
 MODES = ("yoyo", "loop", "once", "trigger")
 
-# How near to its end a motion counts as there: the sum of many steps misses 1 by some rounding,
-# and the end would come a step late.
-_END_TOLERANCE = 1e-6
-
-# The reference adds up its progress in 32-bit floats. One curve shows the last bit of that sum:
-# circularInOut is vertical in the middle, where 6e-8 of progress are 0.24 mm in a metre. So the
-# same sum is taken, as long as it is as good as this; 64 bits beside it keep it there, for steps
-# that are too small for 32.
-_ROUNDING_TOLERANCE = 1e-6
+# How far the 32-bit progress may be from the exact one before it is set right, and from 0 to be
+# there when it comes back.
+_ROUNDING_TOLERANCE = 1e-5
 
 
 class Tween(ModelPlugin):
@@ -57,8 +51,7 @@ class Tween(ModelPlugin):
         self._trigger = self._read_trigger(config)
 
         self._start = self._body.pose
-        self._progress = 0.0
-        self._rounded = np.float32(0.0)
+        self._put(0.0)
         self._forward = True
         self._pose: Pose = self._start
 
@@ -84,7 +77,7 @@ class Tween(ModelPlugin):
     def before_physics_step(self, timekeeper: Timekeeper) -> None:
         """Moves the body on."""
         self._advance(timekeeper.step_size / self._duration)
-        eased = self._ease(float(self._rounded))
+        eased = self._ease(float(self._progress))
         start, delta = self._start, self._delta
         self._pose = (
             start[0] + delta[0] * eased,
@@ -109,17 +102,22 @@ class Tween(ModelPlugin):
         if self._mode == "trigger":
             self._forward = self._trigger is not None and self._trigger.value
         elif self._mode == "loop" and self._progress == 1.0:
-            self._progress = 0.0
-            self._rounded = np.float32(0.0)
+            self._put(0.0)
         elif self._mode == "yoyo" and self._progress in (0.0, 1.0):
             self._forward = self._progress == 0.0
         signed = step if self._forward else -step
-        self._progress += signed
-        if self._forward and self._progress > 1.0 - _END_TOLERANCE:
-            self._progress = 1.0
-        elif not self._forward and self._progress < _END_TOLERANCE:
-            self._progress = 0.0
-        self._rounded += np.float32(signed)
-        at_end = self._progress in (0.0, 1.0)
-        if at_end or abs(self._rounded - self._progress) > _ROUNDING_TOLERANCE:
-            self._rounded = np.float32(self._progress)
+        # The reference adds up 32-bit floats, and what they round away decides in which of two
+        # steps the end comes: so they are added up here, too. Unlike there, an exact sum beside
+        # them keeps them in time when the steps are too small or too many for 32 bits.
+        self._progress += np.float32(signed)
+        self._exact_progress += signed
+        if abs(self._progress - self._exact_progress) > _ROUNDING_TOLERANCE:
+            self._progress = np.float32(self._exact_progress)
+        if self._forward and self._progress >= 1.0:
+            self._put(1.0)
+        elif not self._forward and self._progress < _ROUNDING_TOLERANCE:
+            self._put(0.0)
+
+    def _put(self, progress: float) -> None:
+        self._progress = np.float32(progress)
+        self._exact_progress = progress

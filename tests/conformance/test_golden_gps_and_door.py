@@ -1,0 +1,63 @@
+"""The satellite position of a driving robot, and a sliding door, as the reference recorded them."""
+
+from __future__ import annotations
+
+import json
+import math
+import shutil
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import flatland
+from flatland.plugins.gps import Gps
+
+GPS_TOLERANCE = 1e-8  # deg
+POSE_TOLERANCE = 2e-4  # m and rad
+
+
+@pytest.fixture(scope="module")
+def records(shared_dir: Path) -> list[dict[str, Any]]:
+    trace = json.loads((shared_dir / "golden" / "free.trace.json").read_text())
+    found: list[dict[str, Any]] = trace["records"]
+    return found
+
+
+def test_gps(shared_dir: Path, records: list[dict[str, Any]], tmp_path: Path) -> None:
+    # The antenna is put where the trace has the robot: this is about the conversion alone.
+    golden = tmp_path / "golden"
+    shutil.copytree(shared_dir / "golden", golden)
+    worst = 0.0
+    with flatland.World.from_yaml(golden / "free.yaml", seed=1) as world:
+        model = world.model("diff1")
+        gps = model.plugin("gps")
+        assert isinstance(gps, Gps)
+        for record in records:
+            model.body("base").set_pose(*record["bodies"]["diff1/base"][:3])
+            latitude, longitude = gps.compute_position()
+            expected = record["gps"]["diff1/gps"]
+            worst = max(worst, abs(latitude - expected[0]), abs(longitude - expected[1]))
+    print(f"\nGPS within {worst:.2g} degrees")
+    assert worst < GPS_TOLERANCE
+
+
+def test_door(shared_dir: Path, records: list[dict[str, Any]], tmp_path: Path) -> None:
+    golden = tmp_path / "golden"
+    shutil.copytree(shared_dir / "golden", golden)
+    by_step = {record["step"]: record["bodies"]["door1/panel"] for record in records}
+    worst = 0.0
+    with flatland.World.from_yaml(golden / "free.yaml", seed=1, step_size=0.005) as world:
+        panel = world.model("door1").body("panel")
+        for step in range(max(by_step) + 1):
+            if step in by_step:
+                expected = by_step[step]
+                worst = max(
+                    worst, *(abs(a - b) for a, b in zip(panel.pose, expected[:3], strict=True))
+                )
+                # It is moved by poses: no other body feels a velocity of it.
+                assert panel.velocity == tuple(expected[3:]) == (0.0, 0.0, 0.0)
+            world.step()
+    print(f"\ndoor within {worst:.2g} m and rad")
+    assert not math.isnan(worst)
+    assert worst < POSE_TOLERANCE
