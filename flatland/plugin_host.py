@@ -111,10 +111,6 @@ class PluginHost:
         """Whether any plugin changes contacts."""
         return bool(self._hooks["pre_solve"])
 
-    def pre_solve_plugins(self) -> list[FlatlandPlugin]:
-        """Lists the plugins that change contacts."""
-        return [plugin for plugin, _ in self._hooks["pre_solve"]]
-
     def is_disabled(self, plugin: FlatlandPlugin) -> bool:
         """Tells whether a plugin is called no more because of its faults."""
         return plugin in self._disabled
@@ -149,11 +145,13 @@ class PluginHost:
 
     def before_physics_step(self, timekeeper: Timekeeper) -> None:
         """Runs `before_physics_step` of all plugins."""
-        self._run("before_physics_step", timekeeper)
+        if self._hooks["before_physics_step"]:
+            self._run("before_physics_step", timekeeper)
 
     def after_physics_step(self, timekeeper: Timekeeper) -> None:
         """Runs `after_physics_step` of all plugins."""
-        self._run("after_physics_step", timekeeper)
+        if self._hooks["after_physics_step"]:
+            self._run("after_physics_step", timekeeper)
 
     def dispatch_contacts(self, events: Sequence[ContactEvent], bodies: dict[int, Body]) -> None:
         """Hands recorded contact events to the plugins that listen, in order.
