@@ -341,6 +341,14 @@ class TestSwitches:
             assert [value.stamp for value in emitted] == [k * 20_000_000 for k in range(5)]
         assert world.transforms["odom", "base"].stamp == 80_000_000
 
+    @pytest.mark.parametrize("topic", [TRUTH, ODOMETRY, "/twist"])
+    def test_only_what_is_wanted_is_emitted(self, plugin_world: Any, topic: str) -> None:
+        world = plugin_world(drive())
+        world.output(topic)
+        world.step()
+        emitted = {name for name, port in world.ports.outputs.items() if port.latest is not None}
+        assert emitted == {topic}
+
     def test_nothing_is_read_or_emitted_when_nobody_listens(
         self, plugin_world: Any, monkeypatch: pytest.MonkeyPatch
     ) -> None:
