@@ -143,7 +143,7 @@ def test_the_robots_drive_and_see(office: flatland.World) -> None:
     office.command("/cmd_vel").set(flatland.Twist(linear_x=0.5))
     office.command("/tricycle/cmd_vel").set(flatland.Twist(linear_x=0.5))
     office.step(400)
-    x, y, _ = office.model("diff_robot").body("base_link").pose
+    x, y, _ = office.model("robot").body("base_link").pose
     assert x == pytest.approx(-3 + 0.5 * 2, abs=0.1)
     assert y == pytest.approx(-5.5, abs=1e-3)
     assert office.model("tricycle").body("base_link").pose[0] > -8 + 0.5
@@ -157,7 +157,7 @@ def test_the_robots_drive_and_see(office: flatland.World) -> None:
 
 def test_only_the_tall_robot_sees_table_tops(office: flatland.World) -> None:
     # In front of the long table of the large meeting room.
-    office.move_model("diff_robot", (-16.5, 7.6, math.pi / 2))
+    office.move_model("robot", (-16.5, 7.6, math.pi / 2))
     office.move_model("tricycle", (-15.5, 7.8, math.pi / 2))
     low, tall = office.output("/scan"), office.output("/tricycle/scan")
     office.step(100)
