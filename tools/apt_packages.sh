@@ -32,7 +32,7 @@ if [[ $(id -u) -ne 0 ]]; then
   fi
   sudo=(sudo)
 fi
-echo "flatland: installing ${#missing[@]} Debian packages${sudo:+ with sudo} (packages-apt.txt says why each):"
+echo "flatland: installing ${#missing[@]} Debian packages${sudo:+ with sudo} (minutes; packages-apt.txt says why each):"
 echo "  ${missing[*]}" | fold -s -w 100
 log=$(mktemp)
 trap 'rm -f "$log"' EXIT

@@ -18,7 +18,7 @@ models: [{name: ball, model: ball.yaml, pose: [1, 2, 0]}]
 MODEL = """
 bodies:
   - name: base
-    footprints: [{type: circle, radius: 0.2, density: 1}]
+    footprints: [{type: circle, radius: $eval 0.1 * 2, density: 1}]
 """
 
 
@@ -68,7 +68,7 @@ class Space:
 
 @pytest.fixture(scope="session")
 def world_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A world with one ball and no map."""
+    """A world with one ball and no map; it takes Lua to read."""
     folder = tmp_path_factory.mktemp("world")
     (folder / "ball.yaml").write_text(MODEL)
     path = folder / "world.yaml"
