@@ -30,6 +30,7 @@ from flatland import ModelPlugin, WorldPlugin
 
 HOOKS = {hooks}
 woken = threading.Event()
+started = []
 
 
 class _Faulty:
@@ -82,6 +83,7 @@ class Here(ModelPlugin):
 
 class Looping(ModelPlugin):
     def on_initialize(self, config):
+        started.append(self)
         self.output("early", float)
         while True:
             pass
@@ -89,6 +91,7 @@ class Looping(ModelPlugin):
 
 class Blocking(ModelPlugin):
     def on_initialize(self, config):
+        started.append(self)
         self.output("early", float)
         woken.wait()  # a lock, taken in C
         self.output("late", float)
@@ -256,11 +259,15 @@ def test_a_plugin_that_never_starts_is_given_up(files, faults, which):
     live_through_it(world)
     assert all(count > 3 for count in witness(world).values())
     # A loop in Python is ended; a call in C ends when it returns, and can do no harm then.
-    importlib.import_module(faults.module).woken.set()
+    module = importlib.import_module(faults.module)
+    module.woken.set()
     for thread in threading.enumerate():
         if thread.name == "on_initialize of bad":
             thread.join(20)
             assert not thread.is_alive()
+    [plugin] = module.started
+    with pytest.raises(PluginError, match='plugin "bad" has ended and can open no "late"'):
+        plugin.output("late", float)
     assert world.ports.outputs == {}
 
 
