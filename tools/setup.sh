@@ -53,7 +53,7 @@ if [[ ! -x $venv/bin/python || $(cat "$stamps/venv" 2>/dev/null) != "$venv_is" ]
 fi
 pip=("$venv/bin/python" -m pip --disable-pip-version-check --no-input)
 
-# Whatever goes into the install; what `make dev` leaves in flatland/ does not.
+# Whatever goes into the install; what was built into flatland/ does not.
 sources() {
   local inputs=(pyproject.toml CMakeLists.txt package.xml README.md LICENSE flatland_plugins.xml
     cmake src/cpp flatland msg srv launch rviz worlds scripts) there=() input
@@ -77,6 +77,16 @@ print(*tomllib.load(open("pyproject.toml", "rb"))["build-system"]["requires"], s
 echo "flatland: building and installing into $venv"
 quietly "pip install of the build's requirements" "${pip[@]}" install "${requires[@]}"
 quietly "pip install" "${pip[@]}" install --no-build-isolation --config-settings=build-dir=build/pip ".$extra"
+
+# A Python started in this folder finds the package's sources before the installed one, so they get what
+# was built too; each file is replaced at once, never while another process reads it.
+site=$("$venv/bin/python" -c 'import sysconfig; print(sysconfig.get_path("platlib"))')/flatland
+(cd "$site" && find . -name '_core*.so' -o -path './msg/*.py' -o -path './srv/*.py') | while IFS= read -r file; do
+  mkdir -p "flatland/$(dirname "$file")"
+  cp "$site/$file" "flatland/$file.new"
+  mv "flatland/$file.new" "flatland/$file"
+done
+
 rm -f "$stamps/run" "$stamps/dev"
 echo "$content" >"$stamps/$level"
 echo "flatland: ready"
