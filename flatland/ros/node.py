@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 _LOG = logging.getLogger("flatland")
 
 NODE_NAME: Final = "flatland_server"
+_MASTER_PERIOD: Final = 0.2  # s between two attempts to reach the ROS master
 _UNREGISTERING: Final = 0.5  # s that saying good-bye to the ROS master may take
 
 
@@ -47,6 +48,8 @@ class ServerNode:
         preload_opencv()
         import rospy
 
+        if not self._wait_for_master():
+            return 0
         try:
             # Without rostime: rospy would subscribe to our own clock. The bridge sets its time.
             rospy.init_node(NODE_NAME, disable_signals=True, disable_rostime=True)
@@ -69,6 +72,20 @@ class ServerNode:
             code = 0
         _leave_ros("the simulation ended")
         return code
+
+    def _wait_for_master(self) -> bool:
+        """Waits until a ROS master answers; returns False when the node is stopped first."""
+        import rosgraph
+
+        waiting = False
+        while not rosgraph.is_master_online():
+            if not waiting:
+                # To standard error: rospy's logs begin with a master.
+                _LOG.warning("waiting for the ROS master at %s", rosgraph.get_master_uri())
+                waiting = True
+            if self._stopping.wait(_MASTER_PERIOD):
+                return False
+        return True
 
     def _stop(self) -> None:
         """Makes the simulation end soon; safe from any thread."""
@@ -128,12 +145,11 @@ def _load(parameters: NodeParameters, bridge: Any) -> World:
         observers=[bridge],
     )
     _LOG.info(
-        'loaded "%s" in %.2f s: %d layers, %d models, seed %d',
+        'loaded "%s" in %.2f s: %d layers, %d models',
         world.path,
         time.perf_counter() - start,
         len(world.layers),
         len(world.models),
-        world.seed,
     )
     return world
 

@@ -1,0 +1,460 @@
+"""A ROS master of our own, nodes as roslaunch starts them, and helpers that wait for events."""
+
+from __future__ import annotations
+
+import contextlib
+import gc
+import os
+import queue
+import re
+import signal
+import socket
+import subprocess
+import sys
+import threading
+import time
+import warnings
+from collections.abc import Callable, Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+pytest.importorskip("rospy", reason="ROS is not installed")
+pytest.importorskip("flatland.msg", reason="the messages are not built")
+
+import rosgraph
+import roslib.packages
+import rospy
+
+import flatland
+from flatland.srv import DeleteModel, MoveModel, SpawnModel
+
+PATIENCE = 20.0  # s; only a test that fails waits that long
+
+MAP = "type: line_segments\ndata: walls.dat\nscale: 1.0\norigin: [0, 0, 0]\n"
+WALLS = "-5 -5 5 -5\n5 -5 5 5\n5 5 -5 5\n-5 5 -5 -5\n"  # a room of 10 m by 10 m around (0, 0)
+LAYER = "{name: 2d, map: map.yaml}"
+BODY = "{name: base, footprints: [{type: circle, radius: 0.2, density: 1}]}"
+BALL = f"bodies: [{BODY}]\n"
+ROBOT = f"""
+bodies: [{BODY}]
+plugins:
+  - {{type: DiffDrive, name: drive, body: base, pub_rate: 50}}
+  - {{type: Laser, name: laser, body: base, range: 20, update_rate: 10,
+     angle: {{min: -1.5, max: 1.5, increment: 0.5}}}}
+"""
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """rospy itself uses what Python calls deprecated, and closes its sockets when it likes."""
+    for item in items:
+        if Path(__file__).parent in item.path.parents:
+            for ignored in ("ignore::DeprecationWarning", "ignore::ResourceWarning"):
+                item.add_marker(pytest.mark.filterwarnings(ignored))
+
+
+def _collect_leavings() -> None:
+    """Lets go of what rospy left open, where nobody minds."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        gc.collect()
+
+
+def wait_until(what: str, condition: Callable[[], Any], timeout: float = PATIENCE) -> Any:
+    """Waits until a condition holds and returns what it gave; for states that nobody tells of."""
+    end = time.monotonic() + timeout
+    while time.monotonic() < end:
+        result = condition()
+        if result:
+            return result
+        time.sleep(0.01)
+    pytest.fail(f"{what} did not come true in {timeout} s")
+
+
+class Process:
+    """A program and what it prints, line by line."""
+
+    def __init__(self, command: list[str], environment: Mapping[str, str]) -> None:
+        self.lines: list[str] = []
+        self._changed = threading.Condition()
+        self._popen = subprocess.Popen(
+            command,
+            env=environment,
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+            start_new_session=True,
+        )
+        self._reader = threading.Thread(target=self._read, daemon=True)
+        self._reader.start()
+
+    def _read(self) -> None:
+        assert self._popen.stdout is not None
+        for line in self._popen.stdout:
+            with self._changed:
+                self.lines.append(re.sub(r"\x1b\[[0-9;]*m", "", line.rstrip("\n")))
+                self._changed.notify_all()
+        self._popen.stdout.close()
+        with self._changed:
+            self._changed.notify_all()
+
+    @property
+    def output(self) -> str:
+        """All that was printed so far."""
+        with self._changed:
+            return "\n".join(self.lines)
+
+    @property
+    def running(self) -> bool:
+        """Whether it has not ended."""
+        return self._popen.poll() is None
+
+    def wait_for_line(self, pattern: str, timeout: float = PATIENCE) -> re.Match[str]:
+        """Waits for a line that holds a pattern."""
+        end = time.monotonic() + timeout
+        seen = 0
+        with self._changed:
+            while True:
+                for line in self.lines[seen:]:
+                    match = re.search(pattern, line)
+                    if match:
+                        return match
+                seen = len(self.lines)
+                left = end - time.monotonic()
+                ended = not self._reader.is_alive()
+                if left <= 0 or ended:
+                    break
+                self._changed.wait(min(left, 0.5))
+        pytest.fail(f"no line with {pattern!r} in:\n{self.output}")
+
+    def send(self, number: signal.Signals) -> None:
+        """Sends a signal."""
+        self._popen.send_signal(number)
+
+    def wait(self, timeout: float = PATIENCE) -> int:
+        """Waits until the program ends and returns its exit code."""
+        try:
+            code = self._popen.wait(timeout)
+        except subprocess.TimeoutExpired:
+            self.kill()
+            pytest.fail(f"still running after {timeout} s:\n{self.output}")
+        self._reader.join(PATIENCE)
+        return code
+
+    def stop(self) -> int:
+        """Asks the program to end and returns its exit code."""
+        if self.running:
+            self.send(signal.SIGINT)
+        return self.wait()
+
+    def kill(self) -> None:
+        """Ends the program and its children by force."""
+        with contextlib.suppress(ProcessLookupError):
+            os.killpg(self._popen.pid, signal.SIGKILL)
+        self._popen.wait()
+
+
+class Topic:
+    """What comes on a topic, from now on."""
+
+    def __init__(self, name: str, message_type: type[Any]) -> None:
+        self.name = name
+        self._messages: queue.Queue[Any] = queue.Queue()
+        self._subscriber = rospy.Subscriber(name, message_type, self._messages.put)
+
+    def next(self, timeout: float = PATIENCE) -> Any:
+        """Waits for a message."""
+        try:
+            return self._messages.get(timeout=timeout)
+        except queue.Empty:
+            pytest.fail(f"nothing came on {self.name} for {timeout} s")
+
+    def until(self, accept: Callable[[Any], bool]) -> Any:
+        """Waits for a message that is as wanted."""
+        end = time.monotonic() + PATIENCE
+        message = self.next()
+        while not accept(message):
+            assert time.monotonic() < end, f"last on {self.name}:\n{message}"
+            message = self.next()
+        return message
+
+    def take(self, count: int) -> list[Any]:
+        """Waits for some messages."""
+        return [self.next() for _ in range(count)]
+
+    def drop(self) -> None:
+        """Forgets all that came so far."""
+        with contextlib.suppress(queue.Empty):
+            while True:
+                self._messages.get_nowait()
+
+    def rest(self, silence: float = 0.2) -> list[Any]:
+        """Takes messages until none comes for some time."""
+        messages = []
+        with contextlib.suppress(queue.Empty):
+            while True:
+                messages.append(self._messages.get(timeout=silence))
+        return messages
+
+    @property
+    def connected(self) -> bool:
+        """Whether a publisher is connected."""
+        return self._subscriber.get_num_connections() > 0
+
+    def close(self) -> None:
+        """Unsubscribes."""
+        self._subscriber.unregister()
+
+
+class Ros:
+    """The test's own node, and what it sees of the others."""
+
+    def __init__(self) -> None:
+        self.master = rosgraph.Master("/flatland_tests")
+        self._closers: list[Callable[[], None]] = []
+
+    def topic(self, name: str, message_type: type[Any]) -> Topic:
+        """Subscribes to a topic for the length of the test; waits for its publisher."""
+        topic = Topic(name, message_type)
+        self._closers.append(topic.close)
+        wait_until(f"a publisher of {name}", lambda: topic.connected)
+        return topic
+
+    def publisher(self, name: str, message_type: type[Any]) -> rospy.Publisher:
+        """Advertises a topic for the length of the test; waits for its subscriber."""
+        publisher = rospy.Publisher(name, message_type, queue_size=10)
+        self._closers.append(publisher.unregister)
+        wait_until(f"a subscriber of {name}", publisher.get_num_connections)
+        return publisher
+
+    def call(self, name: str, service_type: type[Any], *arguments: Any) -> Any:
+        """Calls a service."""
+        rospy.wait_for_service(name, PATIENCE)
+        return rospy.ServiceProxy(name, service_type)(*arguments)
+
+    def spawn(
+        self,
+        path: Path | str,
+        name: str,
+        ns: str = "",
+        pose: tuple[float, float, float] = (0.0, 0.0, 0.0),
+    ) -> Any:
+        """Calls /spawn_model."""
+        from geometry_msgs.msg import Pose2D
+
+        return self.call("/spawn_model", SpawnModel, str(path), name, ns, Pose2D(*pose))
+
+    def delete(self, name: str) -> Any:
+        """Calls /delete_model."""
+        return self.call("/delete_model", DeleteModel, name)
+
+    def move(self, name: str, pose: tuple[float, float, float]) -> Any:
+        """Calls /move_model."""
+        from geometry_msgs.msg import Pose2D
+
+        return self.call("/move_model", MoveModel, name, Pose2D(*pose))
+
+    def registered(self, node: str = "/flatland_server") -> dict[str, set[str]]:
+        """What a node has registered with the master: publishers, subscribers, services."""
+        state = self.master.getSystemState()
+        kinds = ("publishers", "subscribers", "services")
+        return {
+            kind: {name for name, nodes in entries if node in nodes}
+            for kind, entries in zip(kinds, state, strict=True)
+        }
+
+    def types(self) -> dict[str, str]:
+        """The message type of each topic."""
+        return dict(self.master.getTopicTypes())
+
+    def close(self) -> None:
+        """Ends what this test opened."""
+        while self._closers:
+            self._closers.pop()()
+
+
+@pytest.fixture(scope="session")
+def ros_environment(checkout: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
+    """Environment of ROS programs: a port of its own, and the package under test."""
+    folder = tmp_path_factory.mktemp("ros")
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        port = probe.getsockname()[1]
+    environment = {
+        **os.environ,
+        "ROS_MASTER_URI": f"http://127.0.0.1:{port}",
+        "ROS_IP": "127.0.0.1",
+        "ROS_HOME": str(folder),
+        "ROS_LOG_DIR": str(folder / "log"),
+        "ROS_ETC_DIR": os.environ.get("ROS_ETC_DIR", "/etc/ros"),
+        "ROS_VERSION": "1",
+        "ROS_PYTHON_VERSION": "3",
+        "ROS_DISTRO": os.environ.get("ROS_DISTRO", "Debian"),
+        "PYTHONUNBUFFERED": "1",
+    }
+    environment.pop("ROS_HOSTNAME", None)
+    package = Path(flatland.__file__).resolve().parent
+    if package.parent == checkout:
+        environment["PYTHONPATH"] = f"{checkout}:{os.environ.get('PYTHONPATH', '')}"
+        environment["ROS_PACKAGE_PATH"] = f"{_overlay(checkout, folder)}:/usr/share"
+    elif "ROS_PACKAGE_PATH" not in environment:
+        environment["ROS_PACKAGE_PATH"] = f"{sys.prefix}/share:/usr/share"
+    return environment
+
+
+def _overlay(checkout: Path, folder: Path) -> Path:
+    """The package as an install would lay it out, with links into the source tree."""
+    share = folder / "share" / "flatland"
+    (share / "scripts").mkdir(parents=True)
+    for name in ("package.xml", "flatland_plugins.xml", "launch", "msg", "srv", "worlds"):
+        (share / name).symlink_to(checkout / name)
+    for script in (checkout / "scripts").iterdir():
+        if script.is_file():
+            starter = share / "scripts" / script.name
+            starter.write_text(f'#!/bin/sh\nexec "{sys.executable}" "{script}" "$@"\n')
+            starter.chmod(0o755)
+    return share.parent
+
+
+@pytest.fixture(scope="session")
+def ros_master(ros_environment: dict[str, str]) -> Iterator[dict[str, str]]:
+    """A running roscore, and this process as a node of it; gives the environment."""
+    port = ros_environment["ROS_MASTER_URI"].rsplit(":", 1)[1]
+    core = Process(["roscore", "-p", port], ros_environment)
+    names = [name for name in ros_environment if name.startswith("ROS_")]
+    os.environ.update({name: ros_environment[name] for name in names})
+    try:
+        core.wait_for_line("started core service")
+        rosgraph.Master("/flatland_tests").setParam("/use_sim_time", True)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            # Without ROS time: this process measures and waits in wall time.
+            rospy.init_node("flatland_tests", disable_signals=True, disable_rostime=True)
+        yield ros_environment
+        rospy.signal_shutdown("the tests are over")
+    finally:
+        core.send(signal.SIGINT)
+        core.wait()
+        _collect_leavings()
+
+
+@pytest.fixture
+def ros(ros_master: dict[str, str]) -> Iterator[Ros]:
+    """The test's own node; what a test opens ends with it."""
+    del ros_master
+    ros = Ros()
+    yield ros
+    ros.close()
+
+
+@pytest.fixture(scope="session")
+def server_path(ros_environment: dict[str, str]) -> str:
+    """The program that roslaunch would start as flatland_server."""
+    paths = ros_environment["ROS_PACKAGE_PATH"].split(":")
+    import rospkg
+
+    found = roslib.packages.find_node("flatland", "flatland_server", rospkg.RosPack(paths))
+    assert found, f"no flatland_server in {paths}"
+    return str(found[0])
+
+
+class Launcher:
+    """Starts nodes and launch files, and ends them."""
+
+    def __init__(self, environment: dict[str, str], server: str) -> None:
+        self.environment = environment
+        self._server = server
+        self._processes: list[Process] = []
+
+    def program(self, *command: str, **environment: str) -> Process:
+        """Starts any program."""
+        process = Process(list(command), {**self.environment, **environment})
+        self._processes.append(process)
+        return process
+
+    def start(self, *arguments: str, **parameters: object) -> Process:
+        """Starts a server with private parameters; does not wait for it."""
+        clear = rosgraph.Master("/flatland_tests")
+        for node in ("/flatland_server", "/flatland_benchmark"):
+            with contextlib.suppress(rosgraph.MasterException):
+                clear.deleteParam(node)
+        given = [f"_{name}:={value}" for name, value in parameters.items()]
+        return self.program(self._server, *arguments, *given)
+
+    def server(self, world: Path, *arguments: str, **parameters: object) -> Process:
+        """Starts a server and waits until its services are there."""
+        process = self.start(*arguments, world_path=world, **parameters)
+        wait_for_services(process)
+        return process
+
+    def launch(self, *arguments: str) -> Process:
+        """Starts roslaunch."""
+        return self.program("roslaunch", *arguments)
+
+    def stop(self) -> None:
+        """Ends all that still runs."""
+        for process in reversed(self._processes):
+            if process.running:
+                process.send(signal.SIGINT)
+        for process in self._processes:
+            process.wait()
+        self._processes.clear()
+
+
+def wait_for_services(process: Process, name: str = "/toggle_pause") -> None:
+    """Waits until a server offers its services; the last one it offers is `toggle_pause`."""
+    master = rosgraph.Master("/flatland_tests")
+
+    def ready() -> bool:
+        if not process.running:
+            process.wait()
+            pytest.fail(f"the server ended:\n{process.output}")
+        with contextlib.suppress(rosgraph.MasterError):
+            return bool(master.lookupService(name))
+        return False
+
+    wait_until(f"service {name}", ready)
+
+
+@pytest.fixture
+def launcher(ros_master: dict[str, str], server_path: str) -> Iterator[Launcher]:
+    """Starts nodes that end with the test."""
+    launcher = Launcher(ros_master, server_path)
+    yield launcher
+    launcher.stop()
+
+
+@pytest.fixture(scope="module")
+def module_launcher(ros_master: dict[str, str], server_path: str) -> Iterator[Launcher]:
+    """Starts nodes that end with the last test of the file."""
+    launcher = Launcher(ros_master, server_path)
+    yield launcher
+    launcher.stop()
+
+
+@pytest.fixture(scope="session")
+def write_world(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., Path]:
+    """Writes a world with a room of 10 m by 10 m: models as YAML, and further files by name."""
+
+    def write(models: str = "[]", plugins: str = "[]", **files: str) -> Path:
+        folder = tmp_path_factory.mktemp("world")
+        (folder / "map.yaml").write_text(MAP)
+        (folder / "walls.dat").write_text(WALLS)
+        files = {"ball": BALL, "robot": ROBOT, **files}
+        for name, text in files.items():
+            (folder / f"{name}.model.yaml").write_text(text)
+        path = folder / "world.yaml"
+        path.write_text(
+            f"properties: {{}}\nlayers: [{LAYER}]\nmodels: {models}\nplugins: {plugins}\n"
+        )
+        return path
+
+    return write
+
+
+@pytest.fixture(scope="session")
+def eventually() -> Callable[..., Any]:
+    """Waits until a condition holds: `eventually("what", condition)`."""
+    return wait_until

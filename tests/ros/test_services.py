@@ -1,0 +1,227 @@
+"""The services of a running node: what they do, what they refuse, and in which words."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from geometry_msgs.msg import Pose2D
+from nav_msgs.msg import Odometry
+from rosgraph_msgs.msg import Clock
+from std_srvs.srv import Empty
+
+from flatland.srv import DeleteModel, MoveModel, SpawnModel
+
+NAN, INF = float("nan"), float("inf")
+ROBOT_PUBLISHERS = {"scan", "odometry/filtered", "odometry/ground_truth", "twist"}
+
+
+@pytest.fixture(scope="module")
+def world(write_world: Callable[..., Path]) -> Path:
+    return write_world(
+        "[{name: first, model: robot.model.yaml, namespace: first, pose: [3, 3, 0]}]",
+        broken="bodies: []\n",
+        unplugged="bodies: [{name: b, footprints: []}]\nplugins: [{name: p, type: Nothing}]\n",
+        spaced="bodies: [{name: b, footprints: []}]\n"
+        "plugins: [{name: p, type: Bumper, topic: my topic}]\n",
+    )
+
+
+@pytest.fixture(scope="module", autouse=True)
+def server(module_launcher: Any, world: Path) -> Any:
+    return module_launcher.server(world)
+
+
+@pytest.fixture(autouse=True)
+def tidy(ros: Any) -> Iterator[None]:
+    """Every test finds the one model that the file has, and a running world."""
+    yield
+    ros.call("/resume", Empty)
+    assert ros.registered()["subscribers"] == {"/first/cmd_vel"}
+
+
+def truth(ros: Any, namespace: str) -> Any:
+    """Where a robot is now."""
+    return ros.topic(f"/{namespace}/odometry/ground_truth", Odometry)
+
+
+def test_types_are_those_of_the_reference() -> None:
+    assert SpawnModel._md5sum == "952237af09cbedc354d376afc6d2fc71"
+    assert DeleteModel._md5sum == "d82dc6474dd88dad5e1615ab1b2ca74c"
+    assert MoveModel._md5sum == "47b5f16cf15e326c7400f4504d3a0f75"
+
+
+def test_spawn_move_and_delete(ros: Any) -> None:
+    answer = ros.spawn("robot.model.yaml", "new", "new", (1, 2, 0.5))
+    assert (answer.success, answer.message) == (True, "")
+    registered = ros.registered()
+    assert {f"/new/{topic}" for topic in ROBOT_PUBLISHERS} <= registered["publishers"]
+    assert "/new/cmd_vel" in registered["subscribers"]
+    odometry = truth(ros, "new")
+    pose = odometry.next().pose.pose
+    assert (pose.position.x, pose.position.y) == pytest.approx((1, 2), abs=1e-5)
+
+    answer = ros.move("new", (-1, -2, 0))
+    assert (answer.success, answer.message) == (True, "")
+    odometry.until(lambda m: abs(m.pose.pose.position.x + 1) < 1e-5)
+
+    answer = ros.delete("new")
+    assert (answer.success, answer.message) == (True, "")
+    registered = ros.registered()
+    assert not [name for name in registered["publishers"] if name.startswith("/new/")]
+
+
+def test_spawn_takes_an_absolute_path(ros: Any, world: Path) -> None:
+    assert ros.spawn(world.parent / "ball.model.yaml", "absolute").success
+    assert ros.delete("absolute").success
+
+
+@pytest.mark.parametrize(
+    ("path", "name", "ns", "pose", "message"),
+    [
+        ("missing.yaml", "m", "", (0, 0, 0), 'Flatland YAML: File does not exist, path="'),
+        ("ball.model.yaml", "first", "", (0, 0, 0), "already exists"),
+        ("ball.model.yaml", "", "", (0, 0, 0), "name must not be empty"),
+        ("", "m", "", (0, 0, 0), "path must not be empty"),
+        (".", "m", "", (0, 0, 0), "Flatland YAML: "),
+        ("ball.model.yaml", "m", "my robot", (0, 0, 0), "not a legal ROS name"),
+        ("ball.model.yaml", "m", "1st", (0, 0, 0), "not a legal ROS name"),
+        ("ball.model.yaml", "m", "ä", (0, 0, 0), "not a legal ROS name"),
+        ("ball.model.yaml", "m", "", (NAN, 0, 0), "pose must be finite"),
+        ("ball.model.yaml", "m", "", (0, 0, INF), "pose must be finite"),
+        ("broken.model.yaml", "m", "", (0, 0, 0), 'Invalid "bodies" in "m" model, must be a list'),
+        ("unplugged.model.yaml", "m", "", (0, 0, 0), "Flatland plugin: "),
+        ("spaced.model.yaml", "m", "", (0, 0, 0), '"my topic" is not a legal topic name'),
+        ("missing/ünïcode.yaml", "ñ", "", (0, 0, 0), "ünïcode"),
+    ],
+)
+def test_refused_spawn_says_why_and_leaves_nothing(
+    ros: Any, path: str, name: str, ns: str, pose: tuple[float, float, float], message: str
+) -> None:
+    before = ros.registered()
+    answer = ros.spawn(path, name, ns, pose)
+    assert answer.success is False
+    assert answer.message.startswith("Flatland ")
+    assert message in answer.message
+    assert ros.registered() == before
+    assert not ros.delete("m").success
+
+
+def test_delete_and_move_of_an_unknown_model(ros: Any) -> None:
+    answer = ros.delete("ghost")
+    assert (answer.success, answer.message) == (
+        False,
+        'Flatland World: failed to delete model, model with name "ghost" does not exist',
+    )
+    answer = ros.move("ghost", (0, 0, 0))
+    assert (answer.success, answer.message) == (
+        False,
+        'Flatland World: failed to move model, model with name "ghost" does not exist',
+    )
+
+
+def test_move_to_a_pose_that_is_none(ros: Any) -> None:
+    odometry = truth(ros, "first")
+    answer = ros.move("first", (0, NAN, 0))
+    assert answer.success is False
+    assert "pose must be finite" in answer.message
+    odometry.drop()
+    assert odometry.next().pose.pose.position.x == pytest.approx(3, abs=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("stop", "go"), [("/pause", "/resume"), ("/toggle_pause", "/toggle_pause")]
+)
+def test_time_stands_still_while_paused(ros: Any, stop: str, go: str) -> None:
+    clock = ros.topic("/clock", Clock)
+    clock.next()
+    ros.call(stop, Empty)
+    last = clock.rest()[-1].clock.to_nsec()
+    assert clock.rest() == []
+    ros.call(go, Empty)
+    assert clock.next().clock.to_nsec() == last + 5_000_000
+
+
+def test_pausing_twice_is_pausing_once(ros: Any) -> None:
+    clock = ros.topic("/clock", Clock)
+    ros.call("/pause", Empty)
+    ros.call("/pause", Empty)
+    ros.call("/resume", Empty)
+    clock.drop()
+    clock.next()
+
+
+def test_calls_while_paused_take_effect_at_once(ros: Any) -> None:
+    ros.call("/pause", Empty)
+    assert ros.spawn("robot.model.yaml", "still", "still").success
+    assert "/still/cmd_vel" in ros.registered()["subscribers"]
+    assert ros.move("still", (2, 2, 0)).success
+    assert not ros.spawn("robot.model.yaml", "still").success
+    assert ros.delete("still").success
+    assert "/still/cmd_vel" not in ros.registered()["subscribers"]
+
+
+def test_concurrent_clients_are_all_served(ros: Any) -> None:
+    problems: list[str] = []
+
+    def client(number: int) -> None:
+        for i in range(10):
+            name = f"c{number}_{i}"
+            for call in (
+                lambda name=name: ros.spawn("robot.model.yaml", name, name, (number, i / 10, 0)),
+                lambda name=name: ros.move(name, (0, 0, 0)),
+                lambda name=name: ros.delete(name),
+            ):
+                answer = call()
+                if not answer.success:
+                    problems.append(answer.message)
+
+    threads = [threading.Thread(target=client, args=(number,)) for number in range(4)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert problems == []
+
+
+def test_one_name_is_given_to_one_of_many_clients(ros: Any) -> None:
+    answers: list[Any] = []
+    threads = [
+        threading.Thread(target=lambda: answers.append(ros.spawn("ball.model.yaml", "same")))
+        for _ in range(6)
+    ]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert sorted(answer.success for answer in answers) == [False] * 5 + [True]
+    assert ros.delete("same").success
+
+
+def test_200_models_come_and_go_without_a_trace(ros: Any) -> None:
+    before = ros.registered()
+    for i in range(200):
+        answer = ros.spawn("robot.model.yaml", f"m{i}", f"m{i}", (i % 20 / 5 - 2, i // 20 / 5, 0))
+        assert answer.success, answer.message
+    registered = ros.registered()
+    assert len(registered["publishers"]) == len(before["publishers"]) + 200 * 4
+    assert len(registered["subscribers"]) == len(before["subscribers"]) + 200
+    truth(ros, "m199").next()
+    for i in range(200):
+        assert ros.delete(f"m{i}").success
+    assert ros.registered() == before
+
+
+def test_persistent_client_gets_all_answers(ros: Any) -> None:
+    import rospy
+
+    rospy.wait_for_service("/move_model")
+    move = rospy.ServiceProxy("/move_model", MoveModel, persistent=True)
+    for i in range(20):
+        answer = move("first", Pose2D(3, 3 + i / 100, 0))
+        assert answer.success
+    move.close()
+    assert ros.move("first", (3, 3, 0)).success

@@ -1,0 +1,260 @@
+"""How the node starts and ends: parameters, failures, signals, a master that goes away."""
+
+from __future__ import annotations
+
+import signal
+import socket
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+from rosgraph_msgs.msg import Clock
+from std_srvs.srv import Empty
+
+STOP_TIME = 1.0 + 0.5  # s; a busy machine gets some more than the one second that is promised
+
+SLOW_PLUGINS = """
+import time
+import flatland
+
+class SlowStart(flatland.WorldPlugin):
+    def on_initialize(self, config):
+        print("initializing", flush=True)
+        time.sleep(60)
+
+class EndlessStep(flatland.WorldPlugin):
+    def before_physics_step(self, timekeeper):
+        print("stepping", flush=True)
+        while True:
+            pass
+
+class EndlessEnd(flatland.WorldPlugin):
+    def on_shutdown(self):
+        while True:
+            pass
+"""
+MANIFEST = """
+<library path=".">
+  <class name="slow::SlowStart" type="slow_plugins.SlowStart"
+         base_class_type="flatland::WorldPlugin"/>
+  <class name="slow::EndlessStep" type="slow_plugins.EndlessStep"
+         base_class_type="flatland::WorldPlugin"/>
+  <class name="slow::EndlessEnd" type="slow_plugins.EndlessEnd"
+         base_class_type="flatland::WorldPlugin"/>
+</library>
+"""
+
+
+@pytest.fixture(scope="module")
+def world(write_world: Callable[..., Path]) -> Path:
+    return write_world("[{name: robot, model: robot.model.yaml}]")
+
+
+def fatal_lines(process: Any) -> list[str]:
+    return [line for line in process.lines if "[FATAL]" in line]
+
+
+def assert_stops(process: Any, number: signal.Signals) -> None:
+    start = time.monotonic()
+    process.send(number)
+    assert process.wait() == 0
+    assert time.monotonic() - start < STOP_TIME
+    assert fatal_lines(process) == []
+    assert "Traceback" not in process.output
+
+
+@pytest.mark.parametrize(
+    ("parameter", "value"),
+    [
+        ("update_rate", "fast"),
+        ("update_rate", "-1"),
+        ("update_rate", ".nan"),
+        ("step_size", "0"),
+        ("step_size", ".inf"),
+        ("show_viz", "maybe"),
+        ("viz_pub_rate", "0"),
+        ("viz_pub_rate", "[1, 2]"),
+        ("simplify_map", "3"),
+        ("simplify_map", "0.5"),
+        ("seed", "-1"),
+        ("seed", "lucky"),
+        ("benchmark_duration", "0"),
+    ],
+)
+def test_bad_parameter_is_named_in_one_fatal_line(
+    launcher: Any, world: Path, parameter: str, value: str
+) -> None:
+    process = launcher.start(world_path=world, **{parameter: value})
+    assert process.wait() == 1
+    (line,) = fatal_lines(process)
+    assert f'Invalid parameter "~{parameter}"' in line
+    # YAML gives rospy a float where the text has one.
+    assert value.lstrip(".") in line or str(float(value)) in line
+    assert "Traceback" not in process.output
+
+
+@pytest.mark.parametrize("given", [{}, {"world_path": "''"}])
+def test_missing_world_path(launcher: Any, given: dict[str, str]) -> None:
+    process = launcher.start(**given)
+    assert process.wait() == 1
+    (line,) = fatal_lines(process)
+    assert line.endswith("No world_path parameter given!")
+
+
+@pytest.mark.parametrize(
+    ("text", "reason"),
+    [
+        (None, "Flatland YAML: File does not exist, path="),
+        ("properties: {}\nlayers: [\n", "Flatland YAML: Malformatted file"),
+        ("properties: {}\nlayers: []\nmodles: []\n", 'unrecognized entry(s) {"modles"}'),
+        (
+            "properties: {}\nlayers: []\nplugins: [{name: p, type: Nope}]\n",
+            "Flatland plugin: ",
+        ),
+    ],
+)
+def test_failing_world_is_told_in_one_fatal_line(
+    launcher: Any, ros: Any, tmp_path: Path, text: str | None, reason: str
+) -> None:
+    path = tmp_path / "world.yaml"
+    if text is not None:
+        path.write_text(text)
+    process = launcher.start(world_path=path)
+    assert process.wait() == 1
+    (line,) = fatal_lines(process)
+    assert reason in line
+    assert "Traceback" not in process.output
+    assert ros.registered() == {"publishers": set(), "subscribers": set(), "services": set()}
+
+
+def test_world_that_fails_late_leaves_no_topics(
+    launcher: Any, ros: Any, write_world: Callable[..., Path]
+) -> None:
+    world = write_world(
+        "[{name: good, model: robot.model.yaml}, {name: bad, model: bad.model.yaml}]",
+        bad="bodies: []\n",
+    )
+    process = launcher.start(world_path=world)
+    assert process.wait() == 1
+    assert len(fatal_lines(process)) == 1
+    assert ros.registered() == {"publishers": set(), "subscribers": set(), "services": set()}
+
+
+def test_roslaunch_ends_with_a_failed_start(launcher: Any) -> None:
+    process = launcher.launch(
+        "flatland", "server.launch", "world_path:=/no/such/world.yaml", "show_viz:=false"
+    )
+    process.wait_for_line(r'\[FATAL\].*Flatland YAML: File does not exist, path="/no/such')
+    process.wait_for_line("process has died .*exit code 1")
+    process.wait()
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("state", ["running", "paused", "as fast as possible"])
+def test_signal_ends_the_node(
+    launcher: Any, ros: Any, world: Path, number: signal.Signals, state: str
+) -> None:
+    rate = 0 if state == "as fast as possible" else 200
+    process = launcher.server(world, update_rate=rate)
+    ros.topic("/clock", Clock).next()
+    if state == "paused":
+        ros.call("/pause", Empty)
+    assert_stops(process, number)
+    assert ros.registered() == {"publishers": set(), "subscribers": set(), "services": set()}
+
+
+@pytest.mark.parametrize(
+    ("plugin", "line"),
+    [("SlowStart", "initializing"), ("EndlessStep", "stepping"), ("EndlessEnd", "loaded")],
+)
+def test_signal_ends_a_node_that_a_plugin_holds_up(
+    launcher: Any, ros: Any, write_world: Callable[..., Path], plugin: str, line: str
+) -> None:
+    world = write_world(plugins=f"[{{name: slow, type: 'slow::{plugin}'}}]")
+    (world.parent / "slow_plugins.py").write_text(SLOW_PLUGINS)
+    manifest = world.parent / "manifest.xml"
+    manifest.write_text(MANIFEST)
+    launcher.environment = {**launcher.environment, "FLATLAND_PLUGIN_PATH": str(manifest)}
+    process = launcher.start(world_path=world)
+    process.wait_for_line(line)
+    assert_stops(process, signal.SIGINT)
+    assert ros.registered() == {"publishers": set(), "subscribers": set(), "services": set()}
+
+
+def test_rosnode_kill_ends_the_node(launcher: Any, ros: Any, world: Path) -> None:
+    process = launcher.server(world)
+    launcher.program("rosnode", "kill", "/flatland_server").wait()
+    assert process.wait() == 0
+    assert ros.registered() == {"publishers": set(), "subscribers": set(), "services": set()}
+
+
+def test_node_waits_for_a_master_and_can_be_stopped_meanwhile(launcher: Any, world: Path) -> None:
+    uri = f"http://127.0.0.1:{free_port()}"
+    launcher.environment = {**launcher.environment, "ROS_MASTER_URI": uri}
+    process = launcher.start(world_path=world)
+    process.wait_for_line(f"waiting for the ROS master at {uri}")
+    start = time.monotonic()
+    process.send(signal.SIGINT)
+    assert process.wait() == 0
+    assert time.monotonic() - start < STOP_TIME
+
+
+def test_node_outlives_its_master(launcher: Any, world: Path, eventually: Any) -> None:
+    port = free_port()
+    uri = f"http://127.0.0.1:{port}"
+    launcher.environment = {**launcher.environment, "ROS_MASTER_URI": uri}
+    process = launcher.start(world_path=world)
+    process.wait_for_line("waiting for the ROS master")
+    core = launcher.program("rosmaster", "--core", "-p", str(port))
+    process.wait_for_line("loaded")
+    core.kill()
+    reports = process.output.count("cycle use")
+    eventually("two more reports", lambda: process.output.count("cycle use") >= reports + 2)
+    assert_stops(process, signal.SIGTERM)
+
+
+def test_show_viz_without_a_display_is_no_failure(launcher: Any, ros: Any, world: Path) -> None:
+    environment = {name: v for name, v in launcher.environment.items() if name != "DISPLAY"}
+    launcher.environment = environment
+    process = launcher.launch("flatland", "server.launch", f"world_path:={world}")
+    process.wait_for_line("show_viz is true, but")
+    ros.topic("/clock", Clock).next()
+
+
+def test_server_launch_sets_all_parameters(launcher: Any, ros: Any, world: Path) -> None:
+    process = launcher.launch(
+        "flatland",
+        "server.launch",
+        f"world_path:={world}",
+        "update_rate:=inf",
+        "step_size:=0.01",
+        "show_viz:=false",
+        "viz_pub_rate:=15",
+        "simplify_map:=1",
+        "seed:=7",
+    )
+    times = [message.clock.to_nsec() for message in ros.topic("/clock", Clock).take(20)]
+    assert {time % 10_000_000 for time in times} == {0}
+    parameters = ros.master.getParam("/flatland_server")
+    assert parameters == {
+        "world_path": str(world),
+        "update_rate": "inf",
+        "step_size": 0.01,
+        "show_viz": False,
+        "viz_pub_rate": 15,
+        "simplify_map": 1,
+        "seed": 7,
+    }
+    assert ros.master.getParam("/use_sim_time") is True
+    process.wait_for_line("real-time factor asked inf")
+    assert "drawn at random" not in process.output
+    assert process.stop() == 0
+
+
+def free_port() -> int:
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        port: int = probe.getsockname()[1]
+        return port
