@@ -51,7 +51,8 @@ class Tween(ModelPlugin):
         self._trigger = self._read_trigger(config)
 
         self._start = self._body.pose
-        self._put(0.0)
+        self._progress = np.float32(0.0)
+        self._exact_progress = 0.0
         self._forward = True
         self._pose: Pose = self._start
 

@@ -1,0 +1,193 @@
+"""Turns an image map into a map of line segments.
+
+For noisy maps whose exact pixel boundary has more edges than one wants to simulate.
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import cv2
+import numpy as np
+import yaml
+
+from flatland.errors import FlatlandError, MapFileError
+from flatland.geometry import Pose
+from flatland.map_image import GreyImage, read_grey_image, threshold_in_place
+from flatland.tools.wall_segments import DoubleArray, find_wall_segments
+from flatland.yaml_reader import YamlReader
+
+IMAGE_SCALES = {"low": 1.05, "med": 1.5, "high": 2.0}
+
+_LINE_COLOR = (0, 0, 255)  # blue, green, red
+_SUBPIXEL_BITS = 4
+
+
+@dataclass(frozen=True)
+class ImageMap:
+    """What the map file says and names."""
+
+    image_path: str
+    image: GreyImage
+    resolution: float
+    origin: Pose
+    occupied_thresh: float
+
+
+def read_image_map(path: str) -> ImageMap:
+    """Reads a map file of map_server and its image.
+
+    Raises:
+        FlatlandError: The file or the image cannot be read, or a key is missing or wrong.
+    """
+    reader = YamlReader.from_file(path)
+    if "type" in reader:
+        raise reader.subnode("type").error("The map must be an image map, which has no type")
+    image_path = reader.resolve_path(reader.get("image", "string"))
+    resolution = reader.get("resolution", "float")
+    origin = reader.get("origin", "pose")
+    occupied_thresh = reader.get("occupied_thresh", "float")
+    if not (math.isfinite(resolution) and resolution > 0):
+        raise reader.subnode("resolution").error(
+            f'Invalid "resolution", must be greater than 0, got {resolution}'
+        )
+    for key, values in (("origin", origin), ("occupied_thresh", [occupied_thresh])):
+        if not all(map(math.isfinite, values)):
+            raise reader.subnode(key).error(f'Invalid "{key}", must be finite')
+    try:
+        image = read_grey_image(image_path)
+    except OSError as error:
+        raise reader.subnode("image").error(f'Failed to load "{image_path}"') from error
+    return ImageMap(image_path, image, resolution, origin, occupied_thresh)
+
+
+def find_segments(image_map: ImageMap, detail: str) -> DoubleArray:
+    """Finds the line segments of a map.
+
+    Args:
+        image_map: The map.
+        detail: Key of `IMAGE_SCALES`.
+
+    Returns:
+        Segments (x1, y1, x2, y2) in pixels, y upwards from the image's bottom edge, shape (n, 4).
+    """
+    mask = threshold_in_place(image_map.image.copy(), image_map.occupied_thresh).astype(bool)
+    segments = find_wall_segments(mask, IMAGE_SCALES[detail])
+    segments[:, 1::2] = len(mask) - segments[:, 1::2]
+    return segments
+
+
+def write_data(path: Path, segments: DoubleArray) -> None:
+    """Writes the segments, one a line."""
+    np.savetxt(path, segments, fmt="%.3f")
+
+
+def write_map(path: Path, data_name: str, image_map: ImageMap) -> None:
+    """Writes the map file of line segments."""
+    entries = {
+        "type": "line_segments",
+        "data": data_name,
+        "scale": image_map.resolution,
+        "origin": list(image_map.origin),
+    }
+    path.write_text(yaml.safe_dump(entries, sort_keys=False, default_flow_style=None))
+
+
+def write_picture(path: Path, segments: DoubleArray, image: GreyImage) -> None:
+    """Draws the segments over the map.
+
+    Raises:
+        OSError: The picture cannot be written.
+    """
+    picture = cv2.cvtColor(image, cv2.COLOR_GRAY2BGR)
+    for x1, y1, x2, y2 in segments:
+        # OpenCV counts from the centre of the top left pixel.
+        ends = np.array([[x1, len(image) - y1], [x2, len(image) - y2]]) - 0.5
+        start, end = np.rint(ends * 2**_SUBPIXEL_BITS).astype(int).tolist()
+        cv2.line(picture, start, end, _LINE_COLOR, 1, cv2.LINE_AA, _SUBPIXEL_BITS)
+    if not cv2.imwrite(str(path), picture):
+        raise OSError(f"OpenCV cannot write {path}")
+
+
+def convert(
+    map_path: str, folder: Path, name: str, *, detail: str, picture: bool, force: bool
+) -> None:
+    """Converts a map and says what was read and written.
+
+    Args:
+        map_path: Map file of map_server.
+        folder: Where the files go.
+        name: Of the files, without extension.
+        detail: Key of `IMAGE_SCALES`.
+        picture: Whether to write a picture as well.
+        force: Whether files that are there may be overwritten.
+
+    Raises:
+        FlatlandError: Something is wrong with the map or the folder.
+        OSError: A file cannot be written.
+    """
+    if not folder.is_dir():
+        raise MapFileError(f'Folder does not exist, path="{folder}"')
+    if name != Path(name).name:
+        raise MapFileError(f'The name of the files must have no folder in it, got "{name}"')
+    map_file, data_file, picture_file = (folder / f"{name}.{e}" for e in ("yaml", "dat", "png"))
+    outputs = [map_file, data_file, *([picture_file] if picture else [])]
+    taken = [str(path) for path in outputs if path.exists()]
+    if taken and not force:
+        raise MapFileError(f"Already there, --force overwrites: {', '.join(taken)}")
+
+    image_map = read_image_map(map_path)
+    rows, columns = image_map.image.shape
+    print(f"Read {map_path}: {image_map.image_path}, {columns} x {rows} pixels")
+    segments = find_segments(image_map, detail)
+    if not len(segments):
+        raise MapFileError(f'No line segments found in "{image_map.image_path}"')
+    write_data(data_file, segments)
+    write_map(map_file, data_file.name, image_map)
+    if picture:
+        write_picture(picture_file, segments, image_map.image)
+    print(f"Wrote {', '.join(map(str, outputs))}: {len(segments)} line segments")
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Runs the tool.
+
+    Returns:
+        0, or 1 after an error, which is printed.
+    """
+    parser = argparse.ArgumentParser(prog="map_to_lines.py", description=__doc__)
+    parser.add_argument("map", metavar="MAP_YAML", help="map file of map_server")
+    parser.add_argument("folder", metavar="OUTPUT_DIR", type=Path, help="where the files go")
+    parser.add_argument(
+        "-f", "--file", default="map_lines", metavar="NAME", help="of the files (map_lines)"
+    )
+    parser.add_argument(
+        "-i", "--image", action="store_true", help="also draw the segments over the map, NAME.png"
+    )
+    parser.add_argument(
+        "-d", "--detail", choices=IMAGE_SCALES, default="med", help="how much of it (med)"
+    )
+    parser.add_argument("--force", action="store_true", help="overwrite files that are there")
+    options = parser.parse_args(arguments)
+    try:
+        convert(
+            options.map,
+            options.folder,
+            options.file,
+            detail=options.detail,
+            picture=options.image,
+            force=options.force,
+        )
+    except (FlatlandError, OSError) as error:
+        print(f"map_to_lines.py: {error}", file=sys.stderr)
+        return 1
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

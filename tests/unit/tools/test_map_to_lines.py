@@ -1,0 +1,264 @@
+"""The tool that turns image maps into maps of line segments."""
+
+from __future__ import annotations
+
+import math
+import os
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+import pytest
+import yaml
+
+from flatland.line_segments import read_line_segments
+from flatland.map_file import load_map
+from flatland.tools.map_to_lines import main
+
+ROWS, COLUMNS = 100, 150
+
+
+@pytest.fixture
+def image_map(tmp_path: Path) -> Path:
+    """A map with a room of 80 x 60 pixels, 30 pixels from the left and 10 from the bottom."""
+    folder = tmp_path / "in"
+    folder.mkdir()
+    image = np.full((ROWS, COLUMNS), 205, np.uint8)
+    image[30:90, 30:110] = 0
+    image[32:88, 32:108] = 254
+    cv2.imwrite(str(folder / "room.png"), image)
+    path = folder / "room.yaml"
+    path.write_text(
+        "image: room.png\nresolution: 0.05\norigin: [-1.5, 2.25, 0.5]\nnegate: 0\n"
+        "occupied_thresh: 0.65\nfree_thresh: 0.196\n"
+    )
+    return path
+
+
+@pytest.fixture
+def out(tmp_path: Path) -> Path:
+    folder = tmp_path / "out"
+    folder.mkdir()
+    return folder
+
+
+def names(folder: Path) -> set[str]:
+    return {path.name for path in folder.iterdir()}
+
+
+def test_files_and_what_is_said(image_map: Path, out: Path, capsys: Any) -> None:
+    assert main([str(image_map), str(out)]) == 0
+    assert names(out) == {"map_lines.yaml", "map_lines.dat"}
+    assert yaml.safe_load((out / "map_lines.yaml").read_text()) == {
+        "type": "line_segments",
+        "data": "map_lines.dat",
+        "scale": 0.05,
+        "origin": [-1.5, 2.25, 0.5],
+    }
+    segments = read_line_segments(str(out / "map_lines.dat"))
+    said = capsys.readouterr()
+    assert str(image_map) in said.out
+    assert "room.png, 150 x 100 pixels" in said.out
+    assert f"{out / 'map_lines.dat'}: {len(segments)} line segments" in said.out
+    assert said.err == ""
+
+
+def test_pixels_are_counted_upwards_from_the_bottom(image_map: Path, out: Path) -> None:
+    assert main([str(image_map), str(out)]) == 0
+    segments = read_line_segments(str(out / "map_lines.dat"))
+    xs, ys = segments[:, ::2], segments[:, 1::2]
+    assert (xs.min(), xs.max()) == pytest.approx((30, 110), abs=1)
+    assert (ys.min(), ys.max()) == pytest.approx((10, 70), abs=1)
+
+
+@pytest.mark.parametrize("detail", ["low", "med", "high"])
+def test_result_is_the_same_layer_within_a_pixel(image_map: Path, out: Path, detail: str) -> None:
+    assert main([str(image_map), str(out), "-d", detail]) == 0
+    exact, lines = load_map(str(image_map), "2d"), load_map(str(out / "map_lines.yaml"), "2d")
+    assert lines.origin == exact.origin
+    pixel = 0.05
+
+    def farthest(of: Any, to: Any) -> float:
+        """Greatest distance of the inner points of edges from other edges."""
+        points = np.concatenate([np.linspace(e[:2], e[2:], 40)[1:-1] for e in of])
+        start, way = to[:, :2], to[:, 2:] - to[:, :2]
+        t = ((points[:, None] - start) * way).sum(2) / (way**2).sum(1)
+        nearest = start + np.clip(t, 0, 1)[:, :, None] * way
+        return float(np.linalg.norm(points[:, None] - nearest, axis=2).min(axis=1).max())
+
+    assert farthest(lines.edges.astype(float), exact.edges.astype(float)) <= pixel
+    assert farthest(exact.edges.astype(float), lines.edges.astype(float)) <= 2 * pixel
+
+
+def test_threshold_decides(image_map: Path, out: Path) -> None:
+    # At 0.9 the grey around the room is off as well, and only the inner side of the wall is left.
+    image_map.write_text(image_map.read_text().replace("0.65", "0.9"))
+    assert main([str(image_map), str(out)]) == 0
+    segments = read_line_segments(str(out / "map_lines.dat"))
+    inside = np.abs(segments[:, ::2] - 75).max(axis=1) < 60
+    assert segments[inside][:, ::2].min() == pytest.approx(32, abs=0.5)
+
+
+def test_name_and_picture(image_map: Path, out: Path) -> None:
+    assert main([str(image_map), str(out), "-f", "walls", "-i"]) == 0
+    assert names(out) == {"walls.yaml", "walls.dat", "walls.png"}
+    assert yaml.safe_load((out / "walls.yaml").read_text())["data"] == "walls.dat"
+    picture = cv2.imread(str(out / "walls.png"))
+    assert picture.shape == (ROWS, COLUMNS, 3)
+    red = (picture[:, :, 2].astype(int) - picture[:, :, 1]) > 60
+    # The room's left wall, from outside.
+    assert red[40:80, 29:31].any(axis=1).all()
+    assert not red[40:80, 50:100].any()
+    # What is not drawn over is the map.
+    assert (picture[5, 5] == 205).all()
+
+
+def test_details_differ(image_map: Path, out: Path) -> None:
+    picture = cv2.imread(str(image_map.parent / "room.png"), 0)
+    rng = np.random.default_rng(1)
+    for x, y in rng.integers((35, 35), (100, 80), (25, 2)):
+        picture[y : y + 3, x : x + 3] = 0
+    cv2.imwrite(str(image_map.parent / "room.png"), picture)
+    counts = {}
+    for detail in ("low", "med", "high"):
+        assert main([str(image_map), str(out), "-d", detail, "-f", detail]) == 0
+        counts[detail] = len(read_line_segments(str(out / f"{detail}.dat")))
+    assert counts["low"] < counts["med"] < counts["high"]
+    # Medium is the default.
+    assert main([str(image_map), str(out)]) == 0
+    assert (out / "map_lines.dat").read_text() == (out / "med.dat").read_text()
+
+
+@pytest.mark.parametrize("taken", ["map_lines.yaml", "map_lines.dat", "map_lines.png"])
+def test_nothing_is_overwritten_without_force(
+    image_map: Path, out: Path, taken: str, capsys: Any
+) -> None:
+    (out / taken).write_text("mine")
+    assert main([str(image_map), str(out), "-i"]) == 1
+    assert names(out) == {taken}
+    assert (out / taken).read_text() == "mine"
+    said = capsys.readouterr()
+    assert str(out / taken) in said.err
+    assert "--force" in said.err
+    assert main([str(image_map), str(out), "-i", "--force"]) == 0
+    assert (out / taken).read_bytes() != b"mine"
+
+
+def test_picture_that_is_not_asked_for_is_in_nobodys_way(image_map: Path, out: Path) -> None:
+    (out / "map_lines.png").write_text("mine")
+    assert main([str(image_map), str(out)]) == 0
+    assert (out / "map_lines.png").read_text() == "mine"
+
+
+@pytest.mark.parametrize("key", ["image", "resolution", "origin", "occupied_thresh"])
+def test_missing_key(image_map: Path, out: Path, key: str, capsys: Any) -> None:
+    lines = image_map.read_text().splitlines()
+    image_map.write_text("\n".join(line for line in lines if not line.startswith(key)))
+    assert main([str(image_map), str(out)]) == 1
+    assert f'Entry "{key}" does not exist' in capsys.readouterr().err
+    assert names(out) == set()
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "text"),
+    [
+        ("room.png", "rooms.png", "rooms.png"),
+        ("room.png", "room.yaml", 'Failed to load "'),
+        ("0.05", "0", 'Invalid "resolution", must be greater than 0'),
+        ("0.05", "wide", 'Error converting entry "resolution" to float'),
+        ("[-1.5, 2.25, 0.5]", "[.nan, 0, 0]", 'Invalid "origin", must be finite'),
+        ("negate: 0", "type: line_segments", "The map must be an image map"),
+        ("negate: 0", "negate: [", "Malformatted file"),
+    ],
+)
+def test_wrong_map(image_map: Path, out: Path, old: str, new: str, text: str, capsys: Any) -> None:
+    image_map.write_text(image_map.read_text().replace(old, new))
+    assert main([str(image_map), str(out)]) == 1
+    assert text in capsys.readouterr().err
+    assert names(out) == set()
+
+
+def test_missing_map(out: Path, capsys: Any) -> None:
+    assert main([str(out / "no.yaml"), str(out)]) == 1
+    assert 'File does not exist, path="' in capsys.readouterr().err
+
+
+def test_missing_folder(image_map: Path, out: Path, capsys: Any) -> None:
+    assert main([str(image_map), str(out / "no")]) == 1
+    assert 'Folder does not exist, path="' in capsys.readouterr().err
+    assert not (out / "no").exists()
+
+
+def test_name_with_a_folder(image_map: Path, out: Path, capsys: Any) -> None:
+    assert main([str(image_map), str(out), "-f", "a/b"]) == 1
+    assert 'must have no folder in it, got "a/b"' in capsys.readouterr().err
+
+
+def test_map_without_walls(image_map: Path, out: Path, capsys: Any) -> None:
+    cv2.imwrite(str(image_map.parent / "room.png"), np.full((50, 50), 255, np.uint8))
+    assert main([str(image_map), str(out)]) == 1
+    assert 'No line segments found in "' in capsys.readouterr().err
+    assert names(out) == set()
+
+
+def test_unknown_detail(image_map: Path, out: Path, capsys: Any) -> None:
+    with pytest.raises(SystemExit) as caught:
+        main([str(image_map), str(out), "-d", "huge"])
+    assert caught.value.code == 2
+    assert "huge" in capsys.readouterr().err
+
+
+def test_as_a_program(image_map: Path, out: Path, checkout: Path) -> None:
+    # As rosrun starts it, from another folder.
+    script = checkout / "scripts" / "map_to_lines.py"
+    assert os.access(script, os.X_OK)
+    environment = {**os.environ, "PYTHONPATH": str(checkout)}
+    result = subprocess.run(
+        [sys.executable, script, image_map, "out"],
+        cwd=out.parent,
+        env=environment,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert result.returncode == 0, result.stderr
+    assert names(out) == {"map_lines.yaml", "map_lines.dat"}
+    again = subprocess.run(
+        [sys.executable, script, image_map, "out"],
+        cwd=out.parent,
+        env=environment,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert again.returncode == 1
+    assert again.stderr.startswith("map_to_lines.py: Flatland File: Already there")
+
+
+def test_world_with_the_result(image_map: Path, out: Path, files: Any) -> None:
+    assert main([str(image_map), str(out)]) == 0
+    files.write(
+        "robot.model.yaml",
+        """
+        bodies: [{name: base, footprints: [{type: circle, radius: 0.1, density: 1}]}]
+        plugins:
+          - {type: Laser, name: l, body: base, range: 20,
+             angle: {min: 0, max: 4.712389, increment: 1.570796}}
+        """,
+    )
+    # In the middle of the room, in the map's frame, looking along its x axis.
+    x, y = 70 * 0.05, 40 * 0.05
+    c, s = math.cos(0.5), math.sin(0.5)
+    pose = [-1.5 + c * x - s * y, 2.25 + s * x + c * y, 0.5]
+    world = files.load(
+        f"""
+        properties: {{}}
+        layers: [{{name: 2d, map: {out / "map_lines.yaml"}}}]
+        models: [{{name: robot, model: robot.model.yaml, pose: {pose}}}]
+        """
+    )
+    ranges = world.model("robot").plugin("l").compute_ranges()
+    assert ranges == pytest.approx([1.9, 1.4, 1.9, 1.4], abs=0.05)

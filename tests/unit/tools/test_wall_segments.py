@@ -1,0 +1,134 @@
+"""Line segments along the walls of bitmaps."""
+
+from __future__ import annotations
+
+import math
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+import pytest
+
+from flatland.bitmap import boundary_edges
+from flatland.tools.wall_segments import WallBoundary, find_wall_segments
+
+SCALES = [1.05, 1.5, 2.0]
+
+
+def edges_of(mask: npt.NDArray[np.bool_]) -> npt.NDArray[np.float64]:
+    """The exact boundary as a layer has it, y downwards."""
+    edges = np.asarray(boundary_edges(mask.astype(np.uint8), 1.0), dtype=np.float64)
+    edges[:, 1::2] = len(mask) - edges[:, 1::2]
+    return edges
+
+
+def distance(points: npt.NDArray[np.float64], segments: npt.NDArray[np.float64]) -> float:
+    """Greatest distance of any of some points from the nearest of some segments."""
+    worst = 0.0
+    for point in points:
+        start, way = segments[:, :2], segments[:, 2:] - segments[:, :2]
+        square = np.maximum((way**2).sum(axis=1), 1e-12)
+        t = np.clip(((point - start) * way).sum(axis=1) / square, 0, 1)
+        nearest = start + t[:, None] * way
+        worst = max(worst, float(np.hypot(*(nearest - point).T).min()))
+    return worst
+
+
+def samples(segments: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+    return np.concatenate(
+        [np.linspace(s[:2], s[2:], 2 + int(3 * math.hypot(*(s[2:] - s[:2])))) for s in segments]
+    )
+
+
+def drawing() -> npt.NDArray[np.bool_]:
+    """A room with thick, thin, slanted and round things in it."""
+    image = np.full((160, 220), 255, np.uint8)
+    cv2.rectangle(image, (10, 10), (209, 149), 0, 2)
+    image[40:70, 30:80] = 0
+    image[90, 30:180] = 0
+    image[110:112, 30:150] = 0
+    image[20:130, 190] = 0
+    cv2.line(image, (100, 30), (170, 75), 0, 4)
+    cv2.circle(image, (60, 130), 9, 0, -1)
+    return image > 100
+
+
+@pytest.mark.parametrize("scale", SCALES)
+def test_segments_lie_on_the_walls_within_a_pixel(scale: float) -> None:
+    mask = drawing()
+    segments = find_wall_segments(mask, scale)
+    assert len(segments) > 20
+    assert distance(samples(segments), edges_of(mask)) <= 1.0
+
+
+@pytest.mark.parametrize("scale", SCALES)
+def test_walls_of_a_noisy_map(scale: float) -> None:
+    rng = np.random.default_rng(3)
+    mask = drawing()
+    # Every tenth pixel beside a wall is wrong.
+    walls = cv2.morphologyEx(mask.astype(np.uint8), cv2.MORPH_GRADIENT, np.ones((3, 3))) > 0
+    mask ^= walls & (rng.random(mask.shape) < 0.1)
+    segments = find_wall_segments(mask, scale)
+    assert distance(samples(segments), edges_of(mask)) <= 1.0
+    assert len(segments) < len(edges_of(mask))
+
+
+@pytest.mark.parametrize("scale", SCALES)
+def test_straight_walls_are_where_they_are(scale: float) -> None:
+    mask = np.ones((100, 150), bool)
+    mask[30:60, 40:120] = False
+    segments = find_wall_segments(mask, scale)
+    sides = edges_of(mask)
+    assert len(sides) == 4
+    # Each side is there, but for its corners, and no side is off by more than a tenth.
+    middles = np.concatenate([np.linspace(s[:2], s[2:], 20)[2:-2] for s in sides])
+    assert distance(middles, segments) < 0.1
+
+
+@pytest.mark.parametrize("scale", SCALES)
+def test_wall_of_one_pixel_is_not_thickened(scale: float) -> None:
+    mask = np.ones((60, 150), bool)
+    mask[30, 20:130] = False
+    segments = find_wall_segments(mask, scale)
+    ys = sorted(
+        {round(float(y), 2) for y in segments[np.abs(np.ptp(segments[:, ::2], 1)) > 50][:, 1]}
+    )
+    assert ys == pytest.approx([30.0, 31.0], abs=0.1)
+
+
+@pytest.mark.parametrize("scale", SCALES)
+def test_rim_of_the_image_is_a_wall_where_it_is_off(scale: float) -> None:
+    mask = np.zeros((60, 80), bool)
+    mask[5:-5, 5:-5] = True
+    segments = find_wall_segments(mask, scale)
+    for wall in ([0, 30], [80, 30], [40, 0], [40, 60], [5, 30], [40, 55]):
+        assert distance(np.array([wall], dtype=float), segments) < 0.5
+
+
+@pytest.mark.parametrize("value", [True, False])
+def test_nothing_to_find(value: bool) -> None:
+    found = find_wall_segments(np.full((1, 1), value), 1.5)
+    assert found.shape[1] == 4
+    assert len(find_wall_segments(np.ones((50, 50), bool), 1.5)) == 0
+
+
+def test_more_detail_finds_more() -> None:
+    mask = drawing()
+    counts = [len(find_wall_segments(mask, scale)) for scale in SCALES]
+    assert counts == sorted(counts)
+    assert counts[0] < counts[-1]
+
+
+def test_offsets_against_all_edges_one_by_one() -> None:
+    rng = np.random.default_rng(5)
+    mask = rng.random((12, 17)) < 0.8
+    points = rng.uniform((-3, -3), (20, 15), (500, 2))
+    ways = WallBoundary(mask).offsets(points)
+    edges = edges_of(mask)
+    for point, way in zip(points, ways, strict=True):
+        expected = distance(point[None], edges)
+        if expected <= 2.0:
+            assert math.hypot(*way) == pytest.approx(expected, abs=1e-9)
+            assert distance((point + way)[None], edges) == pytest.approx(0.0, abs=1e-9)
+        else:
+            assert np.isinf(way).all()
