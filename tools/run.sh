@@ -19,4 +19,6 @@ if [[ -z ${DISPLAY:-} && " $* " != *" show_viz:="* ]]; then
   echo "flatland: no display (DISPLAY is not set), so this runs without a window: show_viz:=false"
   arguments+=("show_viz:=false")
 fi
+# Into a pipe or a file, the node's lines go out as they come too.
+export PYTHONUNBUFFERED=1
 exec roslaunch flatland server.launch "${arguments[@]}"
