@@ -1,0 +1,146 @@
+"""The example package, a shell that knows flatland, and programs that run in the background."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import re
+import signal
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from pathlib import Path
+
+import pytest
+
+import flatland
+
+PATIENCE = 60.0  # s; only a test that fails waits that long
+
+
+def free_port() -> int:
+    """A port of this machine that nobody listens on."""
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        port: int = probe.getsockname()[1]
+        return port
+
+
+def run(
+    command: Sequence[str | Path],
+    environment: Mapping[str, str],
+    folder: Path,
+    timeout: float = PATIENCE,
+) -> str:
+    """Runs a command and returns what it printed; a failure shows that and fails the test."""
+    done = subprocess.run(
+        command,
+        env=environment,
+        cwd=folder,
+        timeout=timeout,
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+    )
+    assert done.returncode == 0, f"{command} exited with {done.returncode}:\n{done.stdout}"
+    return done.stdout
+
+
+class Background:
+    """A program that runs while the test goes on, such as roslaunch."""
+
+    def __init__(
+        self, command: Sequence[str | Path], environment: Mapping[str, str], folder: Path, log: Path
+    ) -> None:
+        self._log = log
+        with log.open("w") as output:
+            self._process = subprocess.Popen(
+                command,
+                env=environment,
+                cwd=folder,
+                stdin=subprocess.DEVNULL,
+                stdout=output,
+                stderr=subprocess.STDOUT,
+                start_new_session=True,
+            )
+
+    @property
+    def output(self) -> str:
+        """What it printed so far."""
+        return self._log.read_text(errors="replace")
+
+    def wait_for(self, pattern: str) -> None:
+        """Waits until its output holds a pattern."""
+        end = time.monotonic() + PATIENCE
+        while not re.search(pattern, self.output):
+            assert self._process.poll() is None, f"ended:\n{self.output}"
+            assert time.monotonic() < end, f"no {pattern!r} in:\n{self.output}"
+            time.sleep(0.05)
+
+    def stop(self) -> None:
+        """Ends it as Control-C does."""
+        if self._process.poll() is None:
+            os.killpg(self._process.pid, signal.SIGINT)
+            try:
+                self._process.wait(PATIENCE)
+            except subprocess.TimeoutExpired:
+                with contextlib.suppress(ProcessLookupError):
+                    os.killpg(self._process.pid, signal.SIGKILL)
+                self._process.wait()
+                pytest.fail(f"did not end by itself:\n{self.output}")
+
+
+@pytest.fixture(scope="session")
+def example(checkout: Path) -> Path:
+    """The example package."""
+    return checkout / "examples" / "my_robots"
+
+
+@pytest.fixture
+def environment(checkout: Path, tmp_path: Path) -> dict[str, str]:
+    """What a shell after `. setup.bash` exports, with a home and a ROS master of its own."""
+    package = Path(flatland.__file__).resolve().parent
+    # The package is the installed one, or the source tree after `make dev`.
+    share = checkout if package.parent == checkout else Path(sys.prefix) / "share"
+    home = tmp_path / "home"
+    home.mkdir()
+    return {
+        "HOME": str(home),
+        "PATH": f"{Path(sys.executable).parent}:/usr/bin:/bin",
+        "LANG": "C.UTF-8",
+        "PYTHONPATH": str(package.parent),
+        "ROS_PACKAGE_PATH": f"{share}:/usr/share",
+        "ROS_DISTRO": "Debian",
+        "ROS_VERSION": "1",
+        "ROS_PYTHON_VERSION": "3",
+        "ROS_ETC_DIR": "/etc/ros",
+        "ROS_MASTER_URI": f"http://127.0.0.1:{free_port()}",
+        "ROS_IP": "127.0.0.1",
+        "PYTHONUNBUFFERED": "1",
+    }
+
+
+@pytest.fixture
+def start(tmp_path: Path) -> Iterator[Callable[..., Background]]:
+    """Starts programs that end with the test."""
+    started: list[Background] = []
+
+    def start_program(
+        command: Sequence[str | Path], environment: Mapping[str, str], folder: Path = tmp_path
+    ) -> Background:
+        log = tmp_path / f"background{len(started)}.log"
+        started.append(Background(command, environment, folder, log))
+        return started[-1]
+
+    yield start_program
+    for program in reversed(started):
+        program.stop()
+
+
+@pytest.fixture(scope="session")
+def run_command() -> Callable[..., str]:
+    """Runs a command: `run_command(command, environment, folder, timeout=...)`."""
+    return run
