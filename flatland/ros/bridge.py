@@ -18,6 +18,8 @@ from flatland.ports import Command, Output
 from flatland.ros.adapters import find_adapter, transform
 from flatland.ros.plugin_ros import PluginRos
 from flatland.ros.publisher import Publisher
+from flatland.ros.registrar import Registrar
+from flatland.ros.subscriber import Subscriber
 from flatland.timekeeper import NANOSECONDS
 from flatland.values import Transform
 from flatland.world import World
@@ -34,15 +36,20 @@ class Bridge(WorldObserver):
     not subscribe to the clock that it publishes.
     """
 
-    def __init__(self) -> None:
-        """Advertises the clock and the transforms, at time 0."""
+    def __init__(self, registrar: Registrar) -> None:
+        """Advertises the clock and the transforms, at time 0.
+
+        Args:
+            registrar: Talks to the ROS master.
+        """
+        self._registrar = registrar
         self._world: World | None = None
         self._closed = False
         self._outputs: dict[Output[Any], tuple[Publisher, Callable[[], None]]] = {}
-        self._commands: dict[Command[Any], rospy.Subscriber] = {}
-        self._clock = Publisher("/clock", Clock)
+        self._commands: dict[Command[Any], Subscriber] = {}
+        self._clock = Publisher(registrar, "/clock", Clock)
         self._clock_message = Clock()
-        self._tf = Publisher("/tf", TFMessage, queue_size=TF_QUEUE_SIZE)
+        self._tf = Publisher(registrar, "/tf", TFMessage, queue_size=TF_QUEUE_SIZE)
         _set_rostime(rospy.Time(0))
 
     def close(self) -> None:
@@ -73,6 +80,7 @@ class Bridge(WorldObserver):
             self._warn_of_missing_adapter("output", output)
             return
         publisher = Publisher(
+            self._registrar,
             output.name,
             adapter.message_type,
             on_connection=lambda connected: (output.want if connected else output.unwant)(self),
@@ -105,13 +113,15 @@ class Bridge(WorldObserver):
             value = from_message(message)
             self._post(lambda: None if command.closed else command.set(value))
 
-        self._commands[command] = rospy.Subscriber(command.name, adapter.message_type, receive)
+        self._commands[command] = Subscriber(
+            self._registrar, command.name, adapter.message_type, receive
+        )
 
     def command_closed(self, command: Command[Any]) -> None:
         """Ends the subscription of a command."""
         subscriber = self._commands.pop(command, None)
         if subscriber is not None and not self._closed:
-            subscriber.unregister()
+            subscriber.close()
 
     def _warn_of_missing_adapter(self, kind: str, port: Output[Any] | Command[Any]) -> None:
         _LOG.warning(
@@ -127,7 +137,7 @@ class Bridge(WorldObserver):
     def plugin_ros(self, plugin: FlatlandPlugin) -> PluginRos:
         """Gives a plugin its own access to ROS."""
         self._world = plugin.world
-        return PluginRos(plugin, self._post, lambda: self._closed)
+        return PluginRos(plugin, self._registrar, self._post, lambda: self._closed)
 
     def _post(self, action: Callable[[], object]) -> Future[Any]:
         """Runs an action between two steps, in order of arrival."""

@@ -13,6 +13,7 @@ from flatland.ros.preload import preload_opencv
 from flatland.ros.shutdown import StopSignals
 
 if TYPE_CHECKING:
+    from flatland.ros.registrar import Registrar
     from flatland.simulation import RunResult, Simulation
     from flatland.world import World
 
@@ -40,6 +41,7 @@ class ServerNode:
         """Does nothing yet."""
         self._stopping = threading.Event()
         self._simulation: Simulation | None = None
+        self._registrar: Registrar | None = None
 
     def run(self) -> int:
         """Runs until the node is asked to stop, and returns the exit code."""
@@ -70,6 +72,8 @@ class ServerNode:
             code = self._fail("the simulator failed in an unforeseen way", exc_info=True)
         else:
             code = 0
+        if self._registrar is not None:
+            self._registrar.close(_UNREGISTERING)
         _leave_ros("the simulation ended")
         return code
 
@@ -104,13 +108,15 @@ class ServerNode:
     def _simulate(self, parameters: NodeParameters) -> None:
         """Loads the world and steps it until the node is asked to stop."""
         from flatland.ros.bridge import Bridge
+        from flatland.ros.registrar import Registrar
         from flatland.ros.services import Services
         from flatland.simulation import Simulation
 
         _warn_of_wall_time()
         if parameters.show_viz:
             _LOG.warning("show_viz is true, but this version has no debug markers and no viewer")
-        bridge = Bridge()
+        self._registrar = Registrar()
+        bridge = Bridge(self._registrar)
         world = _load(parameters, bridge)
         simulation = Simulation(
             world, parameters.update_rate, report=lambda report: _LOG.info("%s", report)
@@ -119,7 +125,7 @@ class ServerNode:
         if self._stopping.is_set():
             simulation.stop()
         try:
-            Services(simulation)
+            Services(self._registrar, simulation)
             if parameters.benchmark_duration is None:
                 simulation.run()
             else:

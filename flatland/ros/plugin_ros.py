@@ -13,6 +13,9 @@ from flatland.errors import PluginError
 from flatland.plugin import FlatlandPlugin
 from flatland.ports import resolve_topic
 from flatland.ros.publisher import Publisher
+from flatland.ros.registrar import Registrar
+from flatland.ros.service import Service, wait_for
+from flatland.ros.subscriber import Subscriber
 
 _LOG = logging.getLogger("flatland")
 
@@ -29,6 +32,7 @@ class PluginRos:
     def __init__(
         self,
         plugin: FlatlandPlugin,
+        registrar: Registrar,
         post: Callable[[Callable[[], object]], Future[Any]],
         shutting_down: Callable[[], bool],
     ) -> None:
@@ -36,10 +40,12 @@ class PluginRos:
 
         Args:
             plugin: Whose access this is.
+            registrar: Talks to the ROS master.
             post: Runs an action between two steps.
             shutting_down: Tells whether the node ends, and all connections with it.
         """
         self._plugin = plugin
+        self._registrar = registrar
         self._post = post
         self._shutting_down = shutting_down
         self._closers: list[Callable[[], None]] = []
@@ -60,15 +66,15 @@ class PluginRos:
             FlatlandError: The topic is no legal name, or carries another type.
         """
         publisher = Publisher(
-            self._resolve(topic), message_type, queue_size=queue_size, latch=latch
+            self._registrar, self._resolve(topic), message_type, queue_size=queue_size, latch=latch
         )
         self._closers.append(publisher.close)
         return publisher
 
     def subscribe(
         self, topic: str, message_type: type[Any], callback: Callable[[Any], object]
-    ) -> rospy.Subscriber:
-        """Calls a function with each message of a topic; `unregister` of the result ends it.
+    ) -> Subscriber:
+        """Calls a function with each message of a topic; `close` of the result ends it.
 
         Args:
             topic: Under the model's namespace.
@@ -76,7 +82,7 @@ class PluginRos:
             callback: Called between two steps; what it raises is logged.
 
         Raises:
-            PluginError: The topic is no legal name.
+            FlatlandError: The topic is no legal name, or carries another type.
         """
 
         def call(message: Any) -> None:
@@ -86,16 +92,19 @@ class PluginRos:
                 except Exception:
                     _LOG.exception("plugin %r: callback of %s raised", self._plugin.name, topic)
 
-        subscriber = rospy.Subscriber(
-            self._resolve(topic), message_type, lambda message: self._post(lambda: call(message))
+        subscriber = Subscriber(
+            self._registrar,
+            self._resolve(topic),
+            message_type,
+            lambda message: self._post(lambda: call(message)),
         )
-        self._closers.append(subscriber.unregister)
+        self._closers.append(subscriber.close)
         return subscriber
 
     def advertise_service(
         self, name: str, service_type: type[Any], handler: Callable[[Any], Any]
-    ) -> rospy.Service:
-        """Offers a service; `shutdown` of the result ends it.
+    ) -> Service:
+        """Offers a service; `close` of the result ends it.
 
         Args:
             name: Under the model's namespace.
@@ -104,7 +113,7 @@ class PluginRos:
                 raises is the caller's error.
 
         Raises:
-            PluginError: The service has no legal name, or the node has it already.
+            FlatlandError: The service has no legal name, or this node has it already.
         """
 
         def run(request: Any) -> Any:
@@ -112,14 +121,13 @@ class PluginRos:
                 raise rospy.ServiceException(f"service {name} is gone with its model")
             return handler(request)
 
-        def serve(request: Any) -> Any:
-            return wait_for(self._post(lambda: run(request)))
-
-        try:
-            service = rospy.Service(self._resolve(name), service_type, serve)
-        except rospy.ServiceException as error:
-            raise PluginError(str(error)) from error
-        self._closers.append(lambda: None if service.done else service.shutdown())
+        service = Service(
+            self._registrar,
+            self._resolve(name),
+            service_type,
+            lambda request: wait_for(self._post(lambda: run(request))),
+        )
+        self._closers.append(service.close)
         return service
 
     def param(self, name: str, default: Any = _REQUIRED) -> Any:
@@ -155,19 +163,3 @@ class PluginRos:
             return resolve_topic(name, self._plugin.namespace)
         except ValueError as error:
             raise PluginError(str(error)) from None
-
-
-def wait_for(future: Future[Any]) -> Any:
-    """Waits in a service's thread for what the simulation's thread makes of a request.
-
-    Raises:
-        rospy.ServiceException: The node shuts down first.
-    """
-    while True:
-        try:
-            return future.result(timeout=0.2)
-        except TimeoutError:
-            if future.done():
-                raise
-            if rospy.is_shutdown() or rospy.core.is_shutdown_requested():
-                raise rospy.ServiceException("the simulator is shutting down") from None

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Callable
-from typing import Any
+from typing import Any, Final
 
 import rospy
 from std_srvs.srv import Empty, EmptyResponse
 
 from flatland.errors import FlatlandError
-from flatland.ros.plugin_ros import wait_for
+from flatland.ros.registrar import Registrar
+from flatland.ros.service import Service, wait_for
 from flatland.simulation import Simulation
 from flatland.srv import (
     DeleteModel,
@@ -26,6 +27,8 @@ from flatland.srv import (
 
 _LOG = logging.getLogger("flatland")
 
+_REGISTRATION_PATIENCE: Final = 5.0  # s that an answer waits for the ROS master to know the topics
+
 
 class Services:
     """Offers the services of one simulation in the node's namespace.
@@ -34,19 +37,28 @@ class Services:
     also while paused, and answered when it has taken effect.
     """
 
-    def __init__(self, simulation: Simulation) -> None:
-        """Starts to offer the services."""
+    def __init__(self, registrar: Registrar, simulation: Simulation) -> None:
+        """Offers the services, soon.
+
+        Args:
+            registrar: Talks to the ROS master.
+            simulation: What the services act on.
+
+        Raises:
+            FlatlandError: A plugin has taken the name of a service.
+        """
+        self._registrar = registrar
         self._simulation = simulation
         world = simulation.world
-        rospy.Service("spawn_model", SpawnModel, self._spawn_model)
-        rospy.Service("delete_model", DeleteModel, self._delete_model)
-        rospy.Service("move_model", MoveModel, self._move_model)
-        for name, action in (
-            ("pause", world.pause),
-            ("resume", world.resume),
-            ("toggle_pause", world.toggle_pause),
+        for name, service_type, handler in (
+            ("spawn_model", SpawnModel, self._spawn_model),
+            ("delete_model", DeleteModel, self._delete_model),
+            ("move_model", MoveModel, self._move_model),
+            ("pause", Empty, self._switch(world.pause)),
+            ("resume", Empty, self._switch(world.resume)),
+            ("toggle_pause", Empty, self._switch(world.toggle_pause)),
         ):
-            rospy.Service(name, Empty, self._switch(action))
+            Service(registrar, name, service_type, handler)
 
     def _spawn_model(self, request: SpawnModelRequest) -> SpawnModelResponse:
         pose = _pose(request.pose)
@@ -80,7 +92,10 @@ class Services:
         """Runs an action between two steps and says whether it worked, and if not, why."""
         try:
             wait_for(self._simulation.post(action))
+            # Whoever spawned a model may look for its topics at once.
+            self._registrar.flush(_REGISTRATION_PATIENCE)
         except (FlatlandError, rospy.ServiceException) as error:
+            self._registrar.flush(_REGISTRATION_PATIENCE)
             return False, _sendable(str(error))
         except Exception as error:
             _LOG.exception("a service call failed in an unforeseen way")

@@ -1,0 +1,65 @@
+"""A subscriber that is registered without waiting for the ROS master."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import rospy
+
+from flatland.ros.registrar import Registrar
+
+
+class Subscriber:
+    """Calls a function with each message of a topic, in a thread of rospy.
+
+    Attributes:
+        topic: The resolved name of the topic.
+    """
+
+    def __init__(
+        self,
+        registrar: Registrar,
+        topic: str,
+        message_type: type[Any],
+        callback: Callable[[Any], object],
+    ) -> None:
+        """Subscribes to a topic, soon.
+
+        Args:
+            registrar: Talks to the ROS master.
+            topic: Under the node's namespace, global with a leading `/`.
+            message_type: The ROS message class.
+            callback: Called with each message.
+
+        Raises:
+            FlatlandError: This node takes messages of another type from the topic.
+        """
+        self.topic: str = rospy.resolve_name(topic)
+        self._registrar = registrar
+        self._message_type = message_type
+        self._callback = callback
+        self._closed = False
+        self._subscriber: rospy.Subscriber | None = None
+        registrar.claim("subscriber", self.topic, message_type)
+        registrar.submit(self._open)
+
+    def close(self) -> None:
+        """Ends the subscription, soon; no message is handed over from now on."""
+        if self._closed:
+            return
+        self._closed = True
+        self._registrar.release("subscriber", self.topic)
+        self._registrar.submit(self._end)
+
+    def _receive(self, message: Any) -> None:
+        if not self._closed:
+            self._callback(message)
+
+    def _open(self) -> None:
+        if not self._closed:
+            self._subscriber = rospy.Subscriber(self.topic, self._message_type, self._receive)
+
+    def _end(self) -> None:
+        if self._subscriber is not None:
+            self._subscriber.unregister()
