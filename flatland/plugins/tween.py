@@ -51,6 +51,7 @@ class Tween(ModelPlugin):
         self._trigger = self._read_trigger(config)
 
         self._start = self._body.pose
+        self._is_dynamic = self._body.type == "dynamic"
         self._progress = np.float32(0.0)
         self._exact_progress = 0.0
         self._forward = True
@@ -86,17 +87,17 @@ class Tween(ModelPlugin):
             start[2] + delta[2] * eased,
         )
         self._hold()
-        # Box2D lets what does not move by itself fall asleep, and then asks for no contacts.
-        self._body.awake = True
 
     def after_physics_step(self, timekeeper: Timekeeper) -> None:
         """Takes back what the physics step did to the body."""
         self._hold()
 
     def _hold(self) -> None:
+        # Wakes the body, too: Box2D lets what does not move by itself fall asleep, and then finds
+        # no new contacts for it.
         self._body.set_pose(*self._pose)
         # A dynamic body keeps what others gave it, and would push like a conveyor belt.
-        if self._body.type == "dynamic":
+        if self._is_dynamic:
             self._body.set_velocity(0.0, 0.0, 0.0)
 
     def _advance(self, step: float) -> None:

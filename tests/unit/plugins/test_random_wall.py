@@ -100,14 +100,14 @@ def test_robot_is_looked_for_in_the_layers_frame(plugin_world: Any, files: Any) 
     # Turned by 90 degrees and moved, the edge runs from (10, 0) up to (10, 4).
     layers = lines(files, "0 0 4 0", origin=f"[10, 0, {math.pi / 2}]")
     world = plugin_world(
-        pose=(9, 2, 0), layers=layers, world_plugins=wall("num_of_walls: 1, wall_wall_dist: 0.5")
+        pose=(11, 2, 0), layers=layers, world_plugins=wall("num_of_walls: 1, wall_wall_dist: 0.5")
     )
-    # Left of the edge, as seen along it, is to the west in the world.
-    assert ((0.0, 0.5), (4.0, 0.5)) in edge_set(world.layer("2d").edges)
+    # East of it, as the robot is, is to the right when one looks along it.
+    assert ((0.0, -0.5), (4.0, -0.5)) in edge_set(world.layer("2d").edges)
     robot = world.model("robot").body("base")
-    hit = world.physics.ray_cast(robot.pose[:2], (20.0, 2.0), world.layer("2d").category_bits)
+    hit = world.physics.ray_cast(robot.pose[:2], (0.0, 2.0), world.layer("2d").category_bits)
     assert hit is not None
-    assert hit.point == pytest.approx((9.5, 2.0), abs=1e-5)
+    assert hit.point == pytest.approx((10.5, 2.0), abs=1e-5)
 
 
 def test_start_pose_counts_not_where_the_first_body_is(plugin_world: Any, files: Any) -> None:

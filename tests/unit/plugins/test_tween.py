@@ -229,6 +229,19 @@ def test_it_pushes_what_is_in_its_way(plugin_world: Any, files: Any) -> None:
     assert y == pytest.approx(0.0, abs=0.02)
 
 
+def test_it_pushes_what_has_fallen_asleep(plugin_world: Any, files: Any) -> None:
+    world = plugin_world(
+        tween("delta: [1, 0, 0], duration: 2, mode: trigger, trigger_topic: go"), bodies=STATIC
+    )
+    world.spawn_model(files.write("crate.model.yaml", CRATE), "crate", pose=(0.35, 0, 0))
+    box = world.model("crate").body("box")
+    world.step(400)
+    assert not box.awake
+    world.command("/go").set(True)
+    world.step(400)
+    assert box.pose[0] == pytest.approx(1.3, abs=0.02)
+
+
 def test_it_stays_awake(plugin_world: Any) -> None:
     world = plugin_world(tween("delta: [1, 0, 0], duration: 0.1, mode: once"))
     world.step(400)
