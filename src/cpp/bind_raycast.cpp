@@ -56,7 +56,7 @@ py::tuple py_cast_rays(World& world, const PyPose& pose, const Ends& ends, std::
                        std::int64_t reflect_mask) {
   return scan(world, pose, ends, mask, reflect_mask,
               [&](const ScanRequest& request, const ScanResult& result) {
-                cast_rays(world.rays(), world.engine(), request, result);
+                cast_rays(world.rays(), request, result);
               });
 }
 

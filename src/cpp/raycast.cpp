@@ -5,8 +5,11 @@
 
 #include <algorithm>
 #include <limits>
+#include <memory>
+#include <vector>
 
 #include "contacts.h"
+#include "depth_scan.h"
 #include "ray_scene.h"
 
 namespace flatland {
@@ -67,9 +70,47 @@ void cast_rays_reference(const b2World& world, const ScanRequest& request,
   }
 }
 
-void cast_rays(RayScene& /*scene*/, const b2World& world, const ScanRequest& request,
-               const ScanResult& result) {
-  cast_rays_reference(world, request, result);
+namespace {
+
+void draw_all(DepthScan& scan, RayScene& scene, RayMasks masks) {
+  for (const EdgeBody& edges : scene.edge_bodies()) {
+    scan.draw(*edges.tree, edges.body->GetTransform(), masks);
+  }
+  scan.draw(scene.solids(), masks);
+}
+
+// Casts again, only for what reflects, and only as far as the nearest hits.
+void find_reflections(const DepthScan& hits, const BeamFan& fan, RayScene& scene,
+                      const ScanRequest& request, bool* reflect) {
+  std::vector<float> limits(fan.padded_count(), -1.0F);
+  for (std::size_t i = 0; i < fan.count(); ++i) {
+    if (hits.fractions()[i] <= 1.0F) {
+      limits[i] = hits.fractions()[i] + kSameFraction + kSameDistance / fan.length()[i];
+    }
+  }
+  DepthScan mirrors(fan, request.pose);
+  mirrors.set_limits(limits);
+  draw_all(mirrors, scene, {request.mask, request.reflect_mask});
+  for (std::size_t i = 0; i < fan.count(); ++i) {
+    reflect[fan.order()[i]] = mirrors.fractions()[i] < limits[i];
+  }
+}
+
+}  // namespace
+
+void cast_rays(RayScene& scene, const ScanRequest& request, const ScanResult& result) {
+  std::fill_n(result.fractions, request.count, std::numeric_limits<float>::quiet_NaN());
+  std::fill_n(result.reflect, request.count, false);
+  const std::shared_ptr<const BeamFan> fan = scene.fans().get(request.ends, request.count);
+  DepthScan scan(*fan, request.pose);
+  constexpr std::uint16_t kAny = 0xFFFF;
+  draw_all(scan, scene, {request.mask, kAny});
+  for (std::size_t i = 0; i < fan->count(); ++i) {
+    if (scan.fractions()[i] <= 1.0F) result.fractions[fan->order()[i]] = scan.fractions()[i];
+  }
+  if (request.reflect_mask != 0) {
+    find_reflections(scan, *fan, scene, request, result.reflect);
+  }
 }
 
 }  // namespace flatland

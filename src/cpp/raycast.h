@@ -55,7 +55,6 @@ void cast_rays_reference(const b2World& world, const ScanRequest& request,
                          const ScanResult& result);
 
 // The scan by the fast way.
-void cast_rays(RayScene& scene, const b2World& world, const ScanRequest& request,
-               const ScanResult& result);
+void cast_rays(RayScene& scene, const ScanRequest& request, const ScanResult& result);
 
 }  // namespace flatland

@@ -1,0 +1,63 @@
+// Eight floats at a time, by the compiler's vector types: one instruction with AVX, two with SSE2
+// or NEON. Without contraction to fused operations (see CMakeLists.txt), so that the numbers are
+// the same on every machine.
+//
+// All functions are inlined by force: their code then takes the instruction set of the function
+// that calls them, which is how one source serves several processors.
+#pragma once
+
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+
+#define FLATLAND_INLINE inline __attribute__((always_inline))
+
+namespace flatland::simd {
+
+inline constexpr std::size_t kWidth = 8;
+
+using Floats = float __attribute__((vector_size(32), aligned(4), may_alias));
+using Ints = std::int32_t __attribute__((vector_size(32), aligned(4), may_alias));
+
+FLATLAND_INLINE Floats load(const float* p) { return *reinterpret_cast<const Floats*>(p); }
+FLATLAND_INLINE void store(float* p, Floats v) { *reinterpret_cast<Floats*>(p) = v; }
+FLATLAND_INLINE void store(std::int32_t* p, Ints v) { *reinterpret_cast<Ints*>(p) = v; }
+FLATLAND_INLINE Floats all(float x) { return Floats{x, x, x, x, x, x, x, x}; }
+
+FLATLAND_INLINE Floats min(Floats a, Floats b) { return a < b ? a : b; }
+FLATLAND_INLINE Floats max(Floats a, Floats b) { return a > b ? a : b; }
+FLATLAND_INLINE Floats abs(Floats a) { return a < 0.0F ? -a : a; }
+
+// Of numbers that are not negative.
+FLATLAND_INLINE Floats sqrt(Floats a) {
+  Floats root;
+  for (std::size_t i = 0; i < kWidth; ++i) root[i] = std::sqrt(a[i]);
+  return root;
+}
+
+FLATLAND_INLINE float largest(Floats v) {
+  const auto max1 = [](float a, float b) { return a > b ? a : b; };
+  return max1(max1(max1(v[0], v[1]), max1(v[2], v[3])), max1(max1(v[4], v[5]), max1(v[6], v[7])));
+}
+
+// Greatest whole number that is not above each; of numbers that fit 31 bits.
+FLATLAND_INLINE Ints floor(Floats a) {
+  const Ints cut = __builtin_convertvector(a, Ints);
+  return cut + (__builtin_convertvector(cut, Floats) > a);  // true is -1
+}
+
+// A stand-in for the angle of (x, y) that needs no trigonometry: 0 to 4 over the full circle,
+// grows with the angle, and opposite directions differ by 2. NaN for (0, 0).
+FLATLAND_INLINE Floats diamond_angle(Floats x, Floats y) {
+  const Floats q = y / (abs(x) + abs(y));
+  const Floats right = y < 0.0F ? q + 4.0F : q;
+  return x < 0.0F ? 2.0F - q : right;
+}
+
+// The same angle difference within -2 to 2.
+FLATLAND_INLINE Floats wrap_difference(Floats d) {
+  d = d > 2.0F ? d - 4.0F : d;
+  return d < -2.0F ? d + 4.0F : d;
+}
+
+}  // namespace flatland::simd
