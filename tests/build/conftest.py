@@ -78,12 +78,13 @@ def world_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="session")
 def catkin_workspace(tmp_path_factory: pytest.TempPathFactory, checkout: Path) -> Path:
-    """A workspace with the checkout linked into src/, built and installed by catkin_make."""
+    """A workspace with flatland and the example package in src/, built and installed."""
     if shutil.which("catkin_make", path="/usr/bin") is None:
         pytest.skip("catkin is not installed")
     workspace = tmp_path_factory.mktemp("catkin") / "work space"
     (workspace / "src").mkdir(parents=True)
     (workspace / "src" / "flatland").symlink_to(checkout)
+    (workspace / "src" / "my_robots").symlink_to(checkout / "examples" / "my_robots")
     environment = clean_environment(workspace)
     run(["catkin_make", "-j2"], environment, workspace, timeout=400)
     run(["catkin_make", "install", "-j2"], environment, workspace, timeout=100)

@@ -1,0 +1,50 @@
+"""The example package, built in the workspace beside flatland: its plugins are found and work."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+# Building the workspace is part of the first test.
+pytestmark = pytest.mark.timeout(600)
+
+DRIVE_THROUGH_THE_GATE = """
+import rospkg, flatland
+yard = rospkg.RosPack().get_path("my_robots") + "/worlds/yard/world.yaml"
+with flatland.World.from_yaml(yard, seed=1) as world:
+    battery = world.output("/battery")
+    world.command("/cmd_vel").set(flatland.Twist(linear_x=1.0))
+    world.step(1200)
+    assert world.model("cart").pose[0] > 7.9, world.model("cart").pose
+    assert abs(battery.latest.energy - (2 - 60 * 6 / 3600)) < 1e-6, battery.latest
+    [reset] = world.plugins
+    assert reset.reset() == ["cart"]
+import my_robots.battery, my_robots.battery_ros
+from flatland.ros.adapters import find_adapter
+print(find_adapter(my_robots.battery.BatteryReading).message_type._type)
+print(my_robots.battery.__file__)
+"""
+
+
+def test_the_manifest_is_found(space, checkout):
+    packages = space.run("rospack", "plugins", "--attrib=plugin", "flatland").splitlines()
+    found = dict(line.split(" ", 1) for line in packages)
+    share = space.folder / "share" / "my_robots"
+    folder = checkout / "examples" / "my_robots" if space.name == "devel" else share
+    assert Path(found["my_robots"]).resolve() == folder / "flatland_plugins.xml"
+
+
+def test_the_plugins_work_in_the_systems_python(space, checkout):
+    printed = space.run("/usr/bin/python3", "-W", "error", "-c", DRIVE_THROUGH_THE_GATE)
+    message, module = printed.splitlines()
+    assert message == "sensor_msgs/BatteryState"
+    if space.name == "devel":
+        # The sources themselves, so that an edit counts at once.
+        assert (
+            Path(module).resolve().parent
+            == checkout / "examples" / "my_robots" / "src" / "my_robots"
+        )
+    else:
+        packages = space.folder / "lib" / "python3" / "dist-packages"
+        assert Path(module).parent == packages / "my_robots"
