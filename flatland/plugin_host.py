@@ -145,13 +145,11 @@ class PluginHost:
 
     def before_physics_step(self, timekeeper: Timekeeper) -> None:
         """Runs `before_physics_step` of all plugins."""
-        if self._hooks["before_physics_step"]:
-            self._run("before_physics_step", timekeeper)
+        self._run("before_physics_step", timekeeper)
 
     def after_physics_step(self, timekeeper: Timekeeper) -> None:
         """Runs `after_physics_step` of all plugins."""
-        if self._hooks["after_physics_step"]:
-            self._run("after_physics_step", timekeeper)
+        self._run("after_physics_step", timekeeper)
 
     def dispatch_contacts(self, events: Sequence[ContactEvent], bodies: dict[int, Body]) -> None:
         """Hands recorded contact events to the plugins that listen, in order.

@@ -2,31 +2,40 @@
 
 from __future__ import annotations
 
-import math
-
 NANOSECONDS = 1_000_000_000
 
 
+# What Box2D's solver can be asked for [s].
+_LEAST_STEP, _GREATEST_STEP = 1e-6, 1000.0
+
+
 class Timekeeper:
-    """Holds the simulated time and the size of a step."""
+    """Holds the simulated time and the size of a step.
 
-    __slots__ = ("_step_ns", "sim_time_ns")
+    Attributes:
+        sim_time_ns: Simulated time since the start [ns].
+        step_size: Simulated time of one step [s].
+        step_size_ns: The same [ns], exact.
+    """
 
-    sim_time_ns: int
-    """Simulated time since the start [ns]."""
+    # Plain attributes, as they are read many times in every step.
+    __slots__ = ("sim_time_ns", "step_size", "step_size_ns")
 
     def __init__(self, step_size: float = 0.005) -> None:
         """Starts at time 0.
 
         Args:
-            step_size: Simulated time of one step [s], at least 1 ns.
+            step_size: Simulated time of one step [s], from 1e-6 to 1000; rounded to nanoseconds.
 
         Raises:
-            ValueError: The step size is not a finite number of at least 1 ns.
+            ValueError: The step size is out of its range or not a number.
         """
-        if not (math.isfinite(step_size) and step_size * NANOSECONDS >= 1):
-            raise ValueError(f"step_size must be finite and positive [s], got {step_size}")
-        self._step_ns = round(step_size * NANOSECONDS)
+        if not _LEAST_STEP <= step_size <= _GREATEST_STEP:
+            raise ValueError(
+                f"step_size must be from {_LEAST_STEP:g} to {_GREATEST_STEP:g} s, got {step_size}"
+            )
+        self.step_size_ns = round(step_size * NANOSECONDS)
+        self.step_size = self.step_size_ns / NANOSECONDS
         self.sim_time_ns = 0
 
     @property
@@ -35,20 +44,10 @@ class Timekeeper:
         return self.sim_time_ns / NANOSECONDS
 
     @property
-    def step_size(self) -> float:
-        """Simulated time of one step [s]."""
-        return self._step_ns / NANOSECONDS
-
-    @property
-    def step_size_ns(self) -> int:
-        """Simulated time of one step [ns], exact."""
-        return self._step_ns
-
-    @property
     def max_step_size(self) -> float:
         """Longest step that may come [s]; the same as `step_size`, steps being of one size."""
         return self.step_size
 
     def advance(self) -> None:
         """Moves the time on by one step."""
-        self.sim_time_ns += self._step_ns
+        self.sim_time_ns += self.step_size_ns

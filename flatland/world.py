@@ -115,6 +115,7 @@ class World:
         self._requests: deque[Callable[[], None]] = deque()
         self._stepping_thread: int | None = None
         self._requests_thread: int | None = None
+        self._records_contacts = False
         self._plugin_timeout = plugin_timeout
         self._initializing_thread: threading.Thread | None = None
         self._paused = False
@@ -208,7 +209,7 @@ class World:
             self._physics.step(
                 timekeeper.step_size, self.velocity_iterations, self.position_iterations
             )
-            if self._physics.record_contacts:
+            if self._records_contacts:
                 self._dispatch_contacts()
             timekeeper.advance()
             for observer in self._observers:
@@ -449,7 +450,7 @@ class World:
             joint.physics.destroy()
         for body in reversed(model.bodies):
             body.physics.destroy()
-        if self._physics.record_contacts:
+        if self._records_contacts:
             self._dispatch_contacts()
         for body in model.bodies:
             self._bodies.pop(body.physics.id, None)
@@ -594,7 +595,8 @@ class World:
         self._host.dispatch_contacts(self._physics.take_contact_events(), self._bodies)
 
     def _update_contact_recording(self) -> None:
-        self._physics.record_contacts = self._host.wants_contacts
+        self._records_contacts = self._host.wants_contacts
+        self._physics.record_contacts = self._records_contacts
         if self._host.wants_pre_solve:
             self._physics.pre_solve = self._pre_solve
             self._physics.pre_solve_bodies = set(self._bodies)

@@ -15,7 +15,7 @@ class UpdateTimer:
         rate: [Hz]; infinity means every step, 0 at time 0 only.
     """
 
-    __slots__ = ("_always", "_cycle", "_per_nanosecond", "rate")
+    __slots__ = ("_always", "_cycle", "_idle_from", "_idle_until", "_per_nanosecond", "rate")
 
     def __init__(self, rate: float = math.inf) -> None:
         """Makes a timer.
@@ -32,6 +32,8 @@ class UpdateTimer:
         self._always = math.isinf(rate)
         self._cycle = 0
         self._per_nanosecond = 0
+        # No update is due at times [ns] from the first to before the second.
+        self._idle_from = self._idle_until = 0
         if not self._always:
             # The rate as it was written, 0.1 as 1/10: integers, so that nothing drifts in hours.
             exact = Fraction(repr(self.rate))
@@ -46,10 +48,17 @@ class UpdateTimer:
         """
         if self._always:
             return True
-        # fmod(t + dt / 2, period) < dt, all of it times 2 / period * cycle.
+        now = timekeeper.sim_time_ns
+        if self._idle_from <= now < self._idle_until:
+            return False
         weight = self._per_nanosecond
-        step = timekeeper.step_size_ns
         if weight == 0:
-            return timekeeper.sim_time_ns == 0
-        phase = (2 * timekeeper.sim_time_ns + step) * weight % (2 * self._cycle)
-        return phase < 2 * step * weight
+            return now == 0
+        # fmod(t + dt / 2, period) < dt, all of it times 2 / period * cycle.
+        step = timekeeper.step_size_ns
+        phase = (2 * now + step) * weight % (2 * self._cycle)
+        is_due = phase < 2 * step * weight
+        # A step later the phase is past what is due, up to where it starts again.
+        self._idle_from = now + step if is_due else now
+        self._idle_until = now + (2 * self._cycle - phase + 2 * weight - 1) // (2 * weight)
+        return is_due

@@ -443,9 +443,9 @@ def test_seed_makes_noise_repeatable(files):
     assert first != second
 
 
-@pytest.mark.parametrize("step_size", [0.0, -1.0, math.nan, math.inf])
+@pytest.mark.parametrize("step_size", [0.0, -1.0, math.nan, math.inf, 1e-7, 1001.0])
 def test_step_size_is_checked(files, step_size):
-    with pytest.raises(ValueError, match="step_size must be finite and positive"):
+    with pytest.raises(ValueError, match="step_size must be from 1e-06 to 1000 s"):
         files.load("{properties: {}, layers: []}", step_size=step_size)
 
 
