@@ -144,3 +144,32 @@ def start(tmp_path: Path) -> Iterator[Callable[..., Background]]:
 def run_command() -> Callable[..., str]:
     """Runs a command: `run_command(command, environment, folder, timeout=...)`."""
     return run
+
+
+@pytest.fixture
+def found_by_variable(example: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The package is found as a Python program without ROS finds it."""
+    monkeypatch.setenv("FLATLAND_PLUGIN_PATH", str(example / "flatland_plugins.xml"))
+    monkeypatch.delenv("ROS_PACKAGE_PATH", raising=False)
+    monkeypatch.setattr(sys, "path", list(sys.path))
+
+
+@pytest.fixture
+def load(found_by_variable: None, tmp_path: Path) -> Iterator[Callable[..., flatland.World]]:
+    """Loads a world with models, given by name as their file's text, and world plugins."""
+    worlds: list[flatland.World] = []
+
+    def load_world(plugins: str = "[]", **models: str) -> flatland.World:
+        lines = []
+        for name, text in models.items():
+            (tmp_path / f"{name}.yaml").write_text(text)
+            lines.append(f"  - {{name: {name}, model: {name}.yaml}}")
+        (tmp_path / "world.yaml").write_text(
+            "properties: {}\nlayers: []\nmodels:\n" + "\n".join(lines) + f"\nplugins: {plugins}\n"
+        )
+        worlds.append(flatland.World.from_yaml(tmp_path / "world.yaml", seed=1))
+        return worlds[-1]
+
+    yield load_world
+    for world in worlds:
+        world.close()

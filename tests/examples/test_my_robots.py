@@ -1,0 +1,126 @@
+"""The example package: found where it stands, also on ROS, and apart from flatland's own code."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from textwrap import dedent
+
+import pytest
+
+
+def test_the_packages_own_test_passes_without_ros(example, environment, tmp_path, run_command):
+    """Nothing of ROS is imported: its modules cannot even be found."""
+    blocked = tmp_path / "blocked"
+    blocked.mkdir()
+    for module in ("rospy", "genpy", "rosgraph", "sensor_msgs", "std_srvs", "std_msgs"):
+        (blocked / f"{module}.py").write_text(f"raise RuntimeError('{module} was imported')")
+    environment["PYTHONPATH"] = f"{blocked}:{environment['PYTHONPATH']}"
+    del environment["ROS_PACKAGE_PATH"]
+    printed = run_command(
+        [sys.executable, "-W", "error", "-m", "unittest", "discover", "-s", str(example / "test")],
+        environment,
+        tmp_path,
+    )
+    assert "Ran 3 tests" in printed
+
+
+def test_flatland_alone_does_not_know_the_package(environment, tmp_path):
+    code = "import flatland, importlib.util as u; print(u.find_spec('my_robots'))"
+    done = subprocess.run(
+        [sys.executable, "-c", code],
+        env=environment,
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert done.stdout.strip() == "None"
+
+
+LISTEN = dedent(
+    """
+    import sys, time, rospy
+    from nav_msgs.msg import Odometry
+    from sensor_msgs.msg import BatteryState
+    from std_msgs.msg import Bool
+    from std_srvs.srv import Trigger
+    from geometry_msgs.msg import Twist
+    from flatland.srv import DeleteModel
+
+    rospy.init_node("listener", disable_rostime=True)
+    rospy.wait_for_service("/reset_models", 30)
+
+    def until(topic, kind, accept):
+        end = time.monotonic() + 30
+        while time.monotonic() < end:
+            message = rospy.wait_for_message(topic, kind, 30)
+            if accept(message):
+                return message
+        sys.exit(f"the last on {topic} is {message}")
+
+    def sender(topic, kind):
+        publisher = rospy.Publisher(topic, kind, queue_size=1)
+        while not publisher.get_num_connections():
+            time.sleep(0.01)
+        return publisher
+
+    first = rospy.wait_for_message("/battery", BatteryState, 30)
+    assert (first.voltage, first.present) == (24.0, True), first
+    assert first.power_supply_status == BatteryState.POWER_SUPPLY_STATUS_DISCHARGING
+    assert abs(first.capacity - 2 / 24) < 1e-6 and abs(first.current + 10 / 24) < 1e-6, first
+    assert first.temperature != first.temperature
+    stamp = first.header.stamp.to_nsec()
+    assert stamp > 0 and stamp % 500_000_000 == 0, stamp
+    energy = 2 - 10 * stamp / 1e9 / 3600
+    assert abs(first.charge - energy / 24) < 1e-6, first
+    assert abs(first.percentage - energy / 2) < 1e-6, first
+
+    drive = sender("/cmd_vel", Twist)
+    twist = Twist()
+    twist.linear.x = 1.0
+    drive.publish(twist)
+    until("/battery", BatteryState, lambda m: abs(m.current + 60 / 24) < 1e-3)
+    until("/odometry/ground_truth", Odometry, lambda m: m.pose.pose.position.x > 2.5)
+    drive.publish(Twist())
+
+    recharge = sender("/recharge", Bool)
+    recharge.publish(True)
+    full = BatteryState.POWER_SUPPLY_STATUS_FULL
+    until("/battery", BatteryState, lambda m: m.power_supply_status == full)
+
+    answer = rospy.ServiceProxy("/reset_models", Trigger)()
+    assert (answer.success, answer.message) == (True, "moved: cart"), answer
+    until("/odometry/ground_truth", Odometry, lambda m: m.pose.pose.position.x == 2.0)
+
+    assert rospy.ServiceProxy("/delete_model", DeleteModel)("cart").success
+    answer = rospy.ServiceProxy("/reset_models", Trigger)()
+    assert (answer.success, answer.message) == (True, "moved: "), answer
+    topics = dict(rospy.get_published_topics())
+    assert "/battery" not in topics, topics
+    print("all as it should be")
+    """
+)
+
+
+def test_on_ros_it_only_has_to_stand_on_the_package_path(
+    example, environment, tmp_path, start, run_command
+):
+    pytest.importorskip("rospy", reason="ROS is not installed")
+    environment["ROS_PACKAGE_PATH"] += f":{example.parent}"
+    packages = run_command(
+        ["rospack", "plugins", "--attrib=plugin", "flatland"], environment, tmp_path
+    )
+    assert f"my_robots {example}/flatland_plugins.xml" in packages.splitlines()
+    world = example / "worlds" / "yard" / "world.yaml"
+    server = start(
+        ["roslaunch", "flatland", "server.launch", f"world_path:={world}", "show_viz:=false"],
+        environment,
+    )
+    server.wait_for('loaded ".*world.yaml"')
+    printed = run_command([sys.executable, "-c", LISTEN], environment, tmp_path, timeout=100)
+    assert printed.endswith("all as it should be\n")
+    assert "Traceback" not in server.output
+    assert "WARN" not in server.output
+    server.stop()
+    assert "killing on exit" in server.output
