@@ -110,11 +110,10 @@ class ServerNode:
         from flatland.ros.bridge import Bridge
         from flatland.ros.registrar import Registrar
         from flatland.ros.services import Services
+        from flatland.ros.visualization import Visualization
         from flatland.simulation import Simulation
 
         _warn_of_wall_time()
-        if parameters.show_viz:
-            _LOG.warning("show_viz is true, but this version has no debug markers and no viewer")
         self._registrar = Registrar()
         bridge = Bridge(self._registrar)
         world = _load(parameters, bridge)
@@ -124,6 +123,8 @@ class ServerNode:
         self._simulation = simulation
         if self._stopping.is_set():
             simulation.stop()
+        debug_rate = parameters.viz_pub_rate if parameters.show_viz else None
+        visualization = Visualization(self._registrar, simulation, debug_rate=debug_rate)
         try:
             Services(self._registrar, simulation)
             if parameters.benchmark_duration is None:
@@ -133,6 +134,7 @@ class ServerNode:
                 if not simulation.stopped:
                     _log_benchmark(result)
         finally:
+            visualization.close()
             # Plugins end first, so that they can still publish; then all topics at once.
             bridge.close()
             world.close()

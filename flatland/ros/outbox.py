@@ -31,13 +31,14 @@ class Outbox:
         """Takes over the writing of a connection.
 
         Args:
-            transport: rospy's `TCPROSTransport`.
+            transport: rospy's `TCPROSTransport`, its handshake done.
             queue_size: How many whole messages wait at most.
         """
         self._transport = transport
         self._lock = threading.Lock()
         self._under_way: memoryview | None = None
         self._waiting: deque[bytes] = deque(maxlen=queue_size)
+        transport.socket.setblocking(False)
         transport.set_cleanup_callback(self._closed)
         transport.write_data = self.write
 
@@ -47,6 +48,8 @@ class Outbox:
         Raises:
             TransportTerminated: The connection is closed, or broke; rospy drops it then.
         """
+        if self._transport.done:
+            raise TransportTerminated("connection closed")
         with self._lock:
             self._waiting.append(data)
             if self._under_way is not None or len(self._waiting) > 1:
@@ -79,7 +82,7 @@ class Outbox:
             if rest is None:
                 rest = memoryview(self._waiting[0])
             try:
-                sent = connection.send(rest, socket.MSG_DONTWAIT)
+                sent = connection.send(rest)
             except BlockingIOError:
                 return False
             except OSError as error:

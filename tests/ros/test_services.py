@@ -170,14 +170,12 @@ def test_concurrent_clients_are_all_served(ros: Any) -> None:
     def client(number: int) -> None:
         for i in range(10):
             name = f"c{number}_{i}"
-            for call in (
-                lambda name=name: ros.spawn("robot.model.yaml", name, name, (number, i / 10, 0)),
-                lambda name=name: ros.move(name, (0, 0, 0)),
-                lambda name=name: ros.delete(name),
-            ):
-                answer = call()
-                if not answer.success:
-                    problems.append(answer.message)
+            answers = [
+                ros.spawn("robot.model.yaml", name, name, (number, i / 10, 0)),
+                ros.move(name, (0, 0, 0)),
+                ros.delete(name),
+            ]
+            problems.extend(answer.message for answer in answers if not answer.success)
 
     threads = [threading.Thread(target=client, args=(number,)) for number in range(4)]
     for thread in threads:

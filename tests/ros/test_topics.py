@@ -16,6 +16,7 @@ from std_msgs.msg import Bool
 from tf2_msgs.msg import TFMessage
 
 from flatland.msg import Collisions
+import itertools
 
 ROBOT = """
 bodies:
@@ -108,7 +109,7 @@ def test_offers_exactly_the_topics_and_services_of_its_world(ros: Any) -> None:
 
 def test_clock_shows_every_step_and_starts_from_zero(ros: Any) -> None:
     times = [message.clock.to_nsec() for message in ros.topic("/clock", Clock).take(50)]
-    steps = [after - before for before, after in zip(times, times[1:], strict=False)]
+    steps = [after - before for before, after in itertools.pairwise(times)]
     # A slow reader may miss some, none comes twice or early, and each is a multiple of the step.
     assert all(step > 0 and step % 5_000_000 == 0 for step in steps)
     assert steps.count(5_000_000) > 30
@@ -132,7 +133,7 @@ def test_rates_hold_in_simulated_time(
     ros: Any, topic: str, message_type: type[Any], period: float
 ) -> None:
     times = stamps(ros.topic(topic, message_type).take(8))
-    steps = [after - before for before, after in zip(times, times[1:], strict=False)]
+    steps = [after - before for before, after in itertools.pairwise(times)]
     assert steps == [round(period * 1e9)] * 7
 
 

@@ -1,0 +1,191 @@
+"""Debug markers: layers, models and joints on topics of their own, for RViz and the viewer."""
+
+from __future__ import annotations
+
+import logging
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Final
+
+from visualization_msgs.msg import MarkerArray
+
+from flatland.errors import FlatlandError
+from flatland.layer import Layer
+from flatland.model import Model
+from flatland.msg import DebugTopicList
+from flatland.observer import WorldObserver
+from flatland.ros.latched_topic import LatchedTopic
+from flatland.ros.layer_markers import LayerMarkers
+from flatland.ros.model_markers import ModelMarkers
+from flatland.ros.names import UniqueNames, legal_name
+from flatland.ros.packed_markers import PackedMarkers
+from flatland.ros.registrar import Registrar
+from flatland.ros.ticker import Ticker
+from flatland.simulation import Simulation
+
+_LOG = logging.getLogger("flatland")
+
+NAMESPACE: Final = "~debug"
+FAREWELL_TIME: Final = 0.2  # s of wall time that a topic lives on after its last message
+
+
+@dataclass(frozen=True, slots=True)
+class _Entry:
+    """One topic with markers: its name below the namespace, and itself."""
+
+    name: str
+    topic: LatchedTopic
+
+
+class DebugVisualization(WorldObserver):
+    """Shows a world as markers.
+
+    A topic without subscribers costs nothing; the first one gets the present state, also while
+    the world is paused.
+    """
+
+    def __init__(self, registrar: Registrar, simulation: Simulation, rate: float) -> None:
+        """Advertises the topics of a world, now and from now on; between two steps.
+
+        Args:
+            registrar: Talks to the ROS master.
+            simulation: Whose world to show.
+            rate: Messages for each model in a second of wall time [Hz].
+        """
+        self._registrar = registrar
+        self._post = simulation.post
+        self._world = simulation.world
+        self._closed = False
+        self._names = UniqueNames()
+        self._layers: dict[str, list[_Entry]] = {}
+        self._models: dict[str, _Entry] = {}
+        self._ending: dict[str, tuple[LatchedTopic, float]] = {}  # by name, with the end
+        self._ticker = Ticker("flatland-markers", rate, self._post, self._tick)
+        self._topics = self._open("topics", DebugTopicList, self._topic_list)
+        for layer in self._world.layers:
+            self._add_layer(layer)
+        for model in self._world.models:
+            self._add_model(model)
+        self._world.add_observer(self)
+
+    def close(self) -> None:
+        """Leaves topics alone from now on: rospy ends all of them at once at shutdown."""
+        self._closed = True
+        self._ticker.close()
+
+    # -- what happens in the world ---------------------------------------------------------
+
+    def layer_changed(self, layer_name: str) -> None:
+        """Shows a layer anew."""
+        if self._closed:
+            return
+        if layer_name in self._layers:
+            for entry in self._layers[layer_name]:
+                entry.topic.send()
+        else:
+            self._add_layer(self._world.layer(layer_name))
+            self._topics.send()
+
+    def model_added(self, model: Model) -> None:
+        """Shows a model."""
+        if not self._closed:
+            self._add_model(model)
+            self._topics.send()
+
+    def model_removed(self, model: Model) -> None:
+        """Removes a model's markers, and a little later its topic."""
+        entry = self._models.pop(model.name, None)
+        if entry is None or self._closed:
+            return
+        self._names.release(entry.name)
+        entry.topic.replace(self._with_time(_deletion))
+        self._ending[entry.name] = entry.topic, time.monotonic() + FAREWELL_TIME
+        self._topics.send()
+        self._ticker.wake()
+
+    def _add_layer(self, layer: Layer) -> None:
+        markers = LayerMarkers(layer)
+        self._layers[layer.name] = [
+            self._open_entry("layer", layer.name, "", markers.lines),
+            self._open_entry("layer", layer.name, "_3d", markers.walls),
+        ]
+
+    def _add_model(self, model: Model) -> None:
+        markers = ModelMarkers(model)
+        self._models[model.name] = self._open_entry(
+            "model", model.name, "", markers.message, lambda _connected: self._ticker.wake()
+        )
+
+    # -- topics ----------------------------------------------------------------------------
+
+    def _open_entry(
+        self,
+        kind: str,
+        name: str,
+        suffix: str,
+        make: Callable[[int], PackedMarkers],
+        on_connection: Callable[[bool], None] | None = None,
+    ) -> _Entry:
+        """Advertises the markers of a layer or a model under a legal name that is free."""
+        wanted = f"{kind}/{legal_name(name)}{suffix}"
+        while True:
+            free = self._names.claim(wanted)
+            if free in self._ending:
+                topic, _due = self._ending.pop(free)
+                topic.replace(self._with_time(make))
+            else:
+                try:
+                    topic = self._open(free, MarkerArray, self._with_time(make), on_connection)
+                except FlatlandError:
+                    continue  # A plugin has that topic for something else.
+            if free != f"{kind}/{name}{suffix}":
+                _LOG.warning(
+                    '%s "%s" is shown on topic "%s": its name is no legal ROS name, or taken',
+                    kind,
+                    name,
+                    topic.topic,
+                )
+            return _Entry(free, topic)
+
+    def _open(
+        self,
+        name: str,
+        message_type: type[Any],
+        make: Callable[[], Any],
+        on_connection: Callable[[bool], None] | None = None,
+    ) -> LatchedTopic:
+        return LatchedTopic(
+            self._registrar,
+            f"{NAMESPACE}/{name}",
+            message_type,
+            make,
+            self._post,
+            on_connection=on_connection,
+        )
+
+    def _with_time(self, make: Callable[[int], PackedMarkers]) -> Callable[[], PackedMarkers]:
+        return lambda: make(self._world.timekeeper.sim_time_ns)
+
+    def _topic_list(self) -> DebugTopicList:
+        layers = [entry for entries in self._layers.values() for entry in entries]
+        return DebugTopicList([entry.name for entry in (*layers, *self._models.values())])
+
+    def _tick(self, now: float) -> None:
+        """Sends the models that somebody watches, and ends the topics of those that are gone."""
+        self._ticker.rest()
+        for name in [name for name, (_topic, due) in self._ending.items() if due <= now]:
+            self._ending.pop(name)[0].close()
+        for entry in self._models.values():
+            entry.topic.send()
+        # Looked at after the rest: a subscriber that came meanwhile has woken us itself.
+        if self._ending or any(entry.topic.connected for entry in self._models.values()):
+            self._ticker.wake()
+
+
+def _deletion(time_ns: int) -> PackedMarkers:
+    """Makes the message that removes all markers of a topic."""
+    markers = PackedMarkers()
+    markers.add_deletion_of_all()
+    markers.set_stamp(time_ns)
+    return markers

@@ -1,0 +1,113 @@
+"""The debug markers of one layer: its edges as lines and as walls."""
+
+from __future__ import annotations
+
+import logging
+import math
+from typing import Any, Final
+
+from visualization_msgs.msg import Marker
+
+from flatland.layer import Layer
+from flatland.ros.marker_geometry import edge_lines, wall_triangles
+from flatland.ros.model_markers import LINE_WIDTH
+from flatland.ros.packed_markers import PackedMarkers
+
+_LOG = logging.getLogger("flatland")
+
+DEFAULT_HEIGHTS: Final = (0.0, 1.0)  # m
+
+
+class LayerMarkers:
+    """Makes the markers of a layer."""
+
+    def __init__(self, layer: Layer) -> None:
+        """Reads how high the layer's walls are; warns where the file says nonsense.
+
+        Args:
+            layer: Whose markers.
+        """
+        self._layer = layer
+        self._heights = wall_heights(layer)
+
+    def lines(self, time_ns: int) -> PackedMarkers:
+        """Makes the edges as lines; no marker for a layer without edges.
+
+        Args:
+            time_ns: The stamp, simulated time [ns].
+        """
+        layer, markers = self._layer, PackedMarkers(self._layer.name)
+        edges = layer.edges
+        if len(edges):
+            markers.add(Marker.LINE_LIST, edge_lines(edges), scale=LINE_WIDTH, color=layer.color)
+        return self._placed(markers, time_ns)
+
+    def walls(self, time_ns: int) -> PackedMarkers:
+        """Makes the edges as walls; no marker for a layer without edges.
+
+        Args:
+            time_ns: The stamp, simulated time [ns].
+        """
+        layer, markers = self._layer, PackedMarkers(self._layer.name)
+        edges = layer.edges
+        if len(edges):
+            markers.add(
+                Marker.TRIANGLE_LIST,
+                wall_triangles(edges, *self._heights),
+                scale=(1.0, 1.0, 1.0),
+                color=layer.color,
+                frame_locked=True,
+            )
+        return self._placed(markers, time_ns)
+
+    def _placed(self, markers: PackedMarkers, time_ns: int) -> PackedMarkers:
+        markers.set_stamp(time_ns)
+        for number in range(len(markers)):
+            markers.set_pose(number, self._layer.body.pose)
+        return markers
+
+
+def wall_heights(layer: Layer) -> tuple[float, float]:
+    """Reads where a layer's walls begin and end [m] from its properties.
+
+    What is no pair of heights leads to a warning and to the default.
+    """
+    debug = layer.properties.get("debug")
+    if debug is None:
+        return DEFAULT_HEIGHTS
+    if not isinstance(debug, dict):
+        _warn(layer, f"debug must be a map with min_z and max_z, got {debug!r}")
+        return DEFAULT_HEIGHTS
+    heights = []
+    for key, default in zip(("min_z", "max_z"), DEFAULT_HEIGHTS, strict=True):
+        value = debug.get(key)
+        height = default if value is None else _number(value)
+        if height is None:
+            _warn(layer, f"{key} must be a finite number, got {value!r}")
+            return DEFAULT_HEIGHTS
+        heights.append(height)
+    min_z, max_z = heights
+    if min_z >= max_z:
+        _warn(layer, f"min_z must be less than max_z, got {min_z:g} and {max_z:g}")
+        return DEFAULT_HEIGHTS
+    return min_z, max_z
+
+
+def _number(value: Any) -> float | None:
+    """Converts a value of the file, where numbers may stand as text."""
+    if isinstance(value, bool):
+        return None
+    try:
+        number = float(value)
+    except (TypeError, ValueError, OverflowError):
+        return None
+    return number if math.isfinite(number) else None
+
+
+def _warn(layer: Layer, problem: str) -> None:
+    _LOG.warning(
+        'layer "%s", properties of debug: %s; its walls are shown from %g to %g m',
+        layer.name,
+        problem,
+        *DEFAULT_HEIGHTS,
+    )

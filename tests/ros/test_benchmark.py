@@ -1,0 +1,36 @@
+"""benchmark.launch: runs for some simulated time, says how fast it was, and ends."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+
+def test_benchmark_reports_and_ends(launcher: Any, write_world: Callable[..., Path]) -> None:
+    world = write_world("[{name: robot, model: robot.model.yaml}]")
+    process = launcher.launch(
+        "flatland", "benchmark.launch", f"world_path:={world}", "benchmark_duration:=12.5"
+    )
+    match = process.wait_for_line(
+        r"benchmark: (\d+) iterations in ([\d.]+) s of wall time, ([\d.]+) iterations a second"
+    )
+    iterations, seconds, rate = (float(text) for text in match.groups())
+    assert iterations == 2500
+    assert rate == pytest.approx(iterations / seconds, rel=0.01)
+    assert rate > 200  # faster than real time
+    process.wait()
+    assert "FATAL" not in process.output
+
+
+def test_interrupted_benchmark_reports_nothing(
+    launcher: Any, ros: Any, write_world: Callable[..., Path]
+) -> None:
+    world = write_world("[{name: robot, model: robot.model.yaml}]")
+    process = launcher.start(world_path=world, update_rate=0, benchmark_duration=1e9)
+    process.wait_for_line("cycle use")
+    assert process.stop() == 0
+    assert "benchmark:" not in process.output
+    assert ros.registered() == {"publishers": set(), "subscribers": set(), "services": set()}

@@ -1,0 +1,102 @@
+"""Where names go: model namespaces, global names, node groups and remappings."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+from nav_msgs.msg import Odometry
+
+from flatland.srv import SpawnModel
+
+GROUP = """
+<launch>
+  <param name="/use_sim_time" value="true"/>
+  <param name="/robots/start_x" value="2.5"/>
+  <group ns="robots">
+    <node name="sim" pkg="flatland" type="flatland_server" required="true">
+      <param name="world_path" value="{world}"/>
+      <remap from="scan" to="laser"/>
+    </node>
+  </group>
+</launch>
+"""
+GLOBAL = """
+bodies: [{name: base, footprints: [{type: circle, radius: 0.2, density: 1}]}]
+plugins:
+  - {type: DiffDrive, name: drive, body: base, odom_pub: /odom, twist_sub: nested/cmd_vel}
+"""
+
+
+def test_node_in_a_group(
+    ros: Any, launcher: Any, write_world: Callable[..., Path], tmp_path: Path
+) -> None:
+    world = write_world(
+        """
+  - {name: robot, model: robot.model.yaml, pose: ['$eval param("start_x")', 0, 0]}
+  - {name: spaced, model: robot.model.yaml, namespace: r1}
+  - {name: rooted, model: global.model.yaml, namespace: /r2}
+""",
+        **{"global": GLOBAL},
+    )
+    file = tmp_path / "group.launch"
+    file.write_text(GROUP.format(world=world))
+    launcher.launch(str(file))
+    answer = ros.call("/robots/spawn_model", SpawnModel, "missing.yaml", "m", "", None)
+    assert answer.success is False
+
+    registered = ros.registered("/robots/sim")
+    assert registered["services"] >= {
+        f"/robots/{name}"
+        for name in ("spawn_model", "delete_model", "move_model", "pause", "resume", "toggle_pause")
+    }
+    assert registered["publishers"] == {
+        "/clock",
+        "/tf",
+        "/rosout",
+        "/robots/laser",  # remapped
+        "/robots/odometry/filtered",
+        "/robots/odometry/ground_truth",
+        "/robots/twist",
+        "/robots/r1/scan",
+        "/robots/r1/odometry/filtered",
+        "/robots/r1/odometry/ground_truth",
+        "/robots/r1/twist",
+        "/odom",
+        "/r2/odometry/ground_truth",
+        "/r2/twist",
+    }
+    assert registered["subscribers"] == {
+        "/robots/cmd_vel",
+        "/robots/r1/cmd_vel",
+        "/r2/nested/cmd_vel",
+    }
+    # param() looks in the node's namespace.
+    truth = ros.topic("/robots/odometry/ground_truth", Odometry).next()
+    assert truth.pose.pose.position.x == pytest.approx(2.5, abs=1e-4)
+
+
+@pytest.mark.parametrize("namespace", ["my robot", "1robot", "robot-1", "ro//bot", "~robot"])
+def test_world_with_an_illegal_namespace_does_not_start(
+    launcher: Any, write_world: Callable[..., Path], namespace: str
+) -> None:
+    world = write_world(f"[{{name: robot, model: robot.model.yaml, namespace: '{namespace}'}}]")
+    process = launcher.start(world_path=world)
+    assert process.wait() == 1
+    (line,) = [line for line in process.lines if "[FATAL]" in line]
+    assert f'namespace "{namespace}" is not a legal ROS name' in line
+
+
+def test_topic_that_the_node_itself_publishes_with_another_type(
+    launcher: Any, write_world: Callable[..., Path]
+) -> None:
+    world = write_world(
+        "[{name: robot, model: clock.model.yaml}]",
+        clock=GLOBAL.replace("/odom,", "/clock,"),
+    )
+    process = launcher.start(world_path=world)
+    assert process.wait() == 1
+    (line,) = [line for line in process.lines if "[FATAL]" in line]
+    assert 'publisher "/clock" has the type rosgraph_msgs/Clock already' in line

@@ -1,0 +1,208 @@
+"""`self.ros` of a plugin, values of its own type, and that all of it ends with the model."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+from std_msgs.msg import Float32, String
+from std_srvs.srv import SetBool, Trigger
+
+PLUGINS = """
+import threading
+from dataclasses import dataclass
+
+from std_msgs.msg import Float32, String
+from std_srvs.srv import SetBool, Trigger, TriggerResponse, SetBoolResponse
+
+import flatland
+from flatland.ros.adapters import register_adapter
+
+
+@dataclass(frozen=True)
+class Temperature:
+    celsius: float
+
+
+@dataclass(frozen=True)
+class Unknown:
+    pass
+
+
+register_adapter(Temperature, Float32, lambda value: Float32(value.celsius),
+                 lambda message: Temperature(message.data))
+
+
+class Talker(flatland.ModelPlugin):
+    def on_initialize(self, config):
+        self.hello = self.ros.advertise("hello", String, latch=True)
+        self.hello.publish(String("from " + self.ros.param("town", "nowhere")))
+        self.echo = self.ros.advertise("echo", String)
+        self.ros.subscribe("listen", String, self.on_message)
+        self.ros.advertise_service("touch", Trigger, self.on_touch)
+        self.ros.advertise_service("/fail", SetBool, self.on_fail)
+        self.world.output_thread = None
+
+    def before_physics_step(self, timekeeper):
+        self.thread = threading.get_ident()
+
+    def on_message(self, message):
+        if message.data == "raise":
+            raise ValueError("as asked for")
+        same = threading.get_ident() == self.thread
+        self.echo.publish(String(f"{message.data} {same}"))
+
+    def on_touch(self, request):
+        return TriggerResponse(threading.get_ident() == self.thread, self.model.name)
+
+    def on_fail(self, request):
+        raise RuntimeError("no such luck")
+
+
+class Stove(flatland.ModelPlugin):
+    def on_initialize(self, config):
+        self.temperature = self.output("temperature", Temperature)
+        self.target = self.command("target", Temperature, Temperature(20.0))
+        self.secret = self.output("secret", Unknown)
+
+    def after_physics_step(self, timekeeper):
+        self.temperature.emit(Temperature(self.target.value.celsius))
+
+
+class NeedsParam(flatland.ModelPlugin):
+    def on_initialize(self, config):
+        self.ros.advertise("left_over", String)
+        self.ros.param("not_there")
+
+
+class WrongType(flatland.ModelPlugin):
+    def on_initialize(self, config):
+        self.ros.advertise("left_over", String)
+        self.ros.advertise("/clock", String)
+
+
+class WrongName(flatland.ModelPlugin):
+    def on_initialize(self, config):
+        self.ros.subscribe("no name", String, print)
+
+
+class TakenService(flatland.ModelPlugin):
+    def on_initialize(self, config):
+        self.ros.advertise_service("/spawn_model", Trigger, print)
+"""
+NAMES = ("Talker", "Stove", "NeedsParam", "WrongType", "WrongName", "TakenService")
+
+
+@pytest.fixture(scope="module", autouse=True)
+def server(module_launcher: Any, write_world: Callable[..., Path]) -> Any:
+    files = {
+        name: "bodies: [{name: base, footprints: []}]\n"
+        f"plugins: [{{name: p, type: 'test::{name}'}}]\n"
+        for name in NAMES
+    }
+    world = write_world("[{name: first, model: Stove.model.yaml}]", **files)
+    (world.parent / "test_plugins_of_ros.py").write_text(PLUGINS)
+    classes = "".join(
+        f'<class name="test::{name}" type="test_plugins_of_ros.{name}" '
+        'base_class_type="flatland::ModelPlugin"/>'
+        for name in NAMES
+    )
+    manifest = world.parent / "manifest.xml"
+    manifest.write_text(f'<library path=".">{classes}</library>')
+    module_launcher.environment = {
+        **module_launcher.environment,
+        "FLATLAND_PLUGIN_PATH": str(manifest),
+    }
+    return module_launcher.server(world)
+
+
+@pytest.fixture
+def talker(ros: Any) -> Any:
+    """A model with a Talker, in its namespace, for one test."""
+    ros.master.setParam("/t1/town", "Flatville")
+    before = ros.registered()
+    answer = ros.spawn("Talker.model.yaml", "talker", "t1")
+    assert answer.success, answer.message
+    yield
+    ros.delete("talker")
+    assert ros.registered() == before
+
+
+def test_latched_message_from_the_start_and_parameter(ros: Any, talker: None) -> None:
+    del talker
+    message = ros.topic("/t1/hello", String).next()
+    assert message.data == "from Flatville"
+    assert message._connection_header["latching"] == "1"
+
+
+def test_callback_runs_in_the_thread_of_the_simulation(ros: Any, talker: None) -> None:
+    del talker
+    echo = ros.topic("/t1/echo", String)
+    ros.publisher("/t1/listen", String).publish(String("hi"))
+    assert echo.next().data == "hi True"
+
+
+def test_callback_that_raises_is_logged_and_called_again(
+    ros: Any, talker: None, server: Any
+) -> None:
+    del talker
+    echo = ros.topic("/t1/echo", String)
+    publisher = ros.publisher("/t1/listen", String)
+    publisher.publish(String("raise"))
+    publisher.publish(String("hi"))
+    assert echo.next().data == "hi True"
+    server.wait_for_line("ValueError: as asked for")
+
+
+def test_service_runs_in_the_thread_of_the_simulation(ros: Any, talker: None) -> None:
+    del talker
+    answer = ros.call("/t1/touch", Trigger)
+    assert (answer.success, answer.message) == (True, "talker")
+
+
+def test_service_that_raises_answers_with_the_error(ros: Any, talker: None) -> None:
+    del talker
+    import rospy
+
+    with pytest.raises(rospy.ServiceException, match="no such luck"):
+        ros.call("/fail", SetBool, True)
+
+
+def test_registered_adapter_carries_values_both_ways(ros: Any) -> None:
+    temperatures = ros.topic("/temperature", Float32)
+    assert temperatures.next().data == 20.0
+    ros.publisher("/target", Float32).publish(Float32(180.0))
+    temperatures.until(lambda message: message.data == 180.0)
+
+
+def test_output_without_an_adapter_is_warned_of(ros: Any, server: Any) -> None:
+    server.wait_for_line(r'\[WARN\].*output "/secret" is not connected to ROS: no adapter for Unk')
+    assert "/secret" not in ros.registered()["publishers"]
+
+
+@pytest.mark.parametrize(
+    ("model", "reason"),
+    [
+        ("NeedsParam", 'ROS parameter "/m/not_there" is not set'),
+        ("WrongType", 'publisher "/clock" has the type rosgraph_msgs/Clock already'),
+        ("WrongName", '"no name" is not a legal topic name'),
+        ("TakenService", 'service "/spawn_model" has the type flatland/SpawnModel already'),
+    ],
+)
+def test_plugin_that_fails_leaves_nothing(ros: Any, model: str, reason: str) -> None:
+    before = ros.registered()
+    answer = ros.spawn(f"{model}.model.yaml", "m", "m")
+    assert answer.success is False
+    assert answer.message.startswith(f'Flatland plugin: Model Plugin "p" type "test::{model}"')
+    assert reason in answer.message
+    assert ros.registered() == before
+
+
+def test_second_model_may_not_take_a_service(ros: Any, talker: None) -> None:
+    del talker
+    answer = ros.spawn("Talker.model.yaml", "second", "t2")
+    assert answer.success is False
+    assert 'service "/fail" exists already' in answer.message
+    assert "/t2/touch" not in ros.registered()["services"]
