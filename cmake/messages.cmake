@@ -10,7 +10,7 @@ set(FLATLAND_GENPY_INCLUDES
     -Igeometry_msgs:/usr/share/geometry_msgs/msg)
 
 # flatland_generate_messages(OUTPUT_DIR): fills OUTPUT_DIR/msg and OUTPUT_DIR/srv as part of `all`.
-# Sets FLATLAND_HAVE_MESSAGES in the caller.
+# Sets FLATLAND_GENERATED_MSG and FLATLAND_GENERATED_SRV, the files, in the caller; empty without genpy.
 function(flatland_generate_messages output_dir)
   foreach(needed ${FLATLAND_GENPY_PYTHON} ${FLATLAND_GENPY_DIR}/genmsg_py.py
           ${FLATLAND_GENPY_DIR}/gensrv_py.py /usr/share/std_msgs/msg /usr/share/geometry_msgs/msg)
@@ -18,7 +18,8 @@ function(flatland_generate_messages output_dir)
       message(WARNING
         "${needed} is missing: building without ROS messages, so without flatland.ros. "
         "On Debian: apt-get install python3-genpy ros-std-msgs ros-geometry-msgs")
-      set(FLATLAND_HAVE_MESSAGES FALSE PARENT_SCOPE)
+      set(FLATLAND_GENERATED_MSG PARENT_SCOPE)
+      set(FLATLAND_GENERATED_SRV PARENT_SCOPE)
       return()
     endif()
   endforeach()
@@ -27,14 +28,14 @@ function(flatland_generate_messages output_dir)
   foreach(kind msg srv)
     string(TOUPPER ${kind} upper)
     set(sources)
-    set(generated)
+    set(generated ${output_dir}/${kind}/__init__.py)
     foreach(file ${FLATLAND_${upper}_FILES})
       get_filename_component(name ${file} NAME_WE)
       list(APPEND sources ${PROJECT_SOURCE_DIR}/${kind}/${file})
       list(APPEND generated ${output_dir}/${kind}/_${name}.py)
     endforeach()
     add_custom_command(
-      OUTPUT ${generated} ${output_dir}/${kind}/__init__.py
+      OUTPUT ${generated}
       DEPENDS ${sources}
       COMMAND ${FLATLAND_GENPY_PYTHON} -E ${FLATLAND_GENPY_DIR}/gen${kind}_py.py ${sources}
               ${FLATLAND_GENPY_INCLUDES} -p flatland -o ${output_dir}/${kind}
@@ -42,8 +43,8 @@ function(flatland_generate_messages output_dir)
               -o ${output_dir}/${kind} --initpy
       COMMENT "Generating flatland.${kind}"
       VERBATIM)
-    list(APPEND outputs ${generated} ${output_dir}/${kind}/__init__.py)
+    list(APPEND outputs ${generated})
+    set(FLATLAND_GENERATED_${upper} ${generated} PARENT_SCOPE)
   endforeach()
   add_custom_target(flatland_messages ALL DEPENDS ${outputs})
-  set(FLATLAND_HAVE_MESSAGES TRUE PARENT_SCOPE)
 endfunction()

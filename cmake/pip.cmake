@@ -5,12 +5,8 @@ include(${CMAKE_CURRENT_LIST_DIR}/messages.cmake)
 set(FLATLAND_CORE_INSTALL_DIR ${SKBUILD_PLATLIB_DIR}/flatland)
 
 flatland_generate_messages(${PROJECT_BINARY_DIR}/messages/flatland)
-if(FLATLAND_HAVE_MESSAGES)
-  install(
-    DIRECTORY ${PROJECT_BINARY_DIR}/messages/flatland/msg ${PROJECT_BINARY_DIR}/messages/flatland/srv
-    DESTINATION ${SKBUILD_PLATLIB_DIR}/flatland COMPONENT flatland
-    FILES_MATCHING PATTERN "*.py")
-endif()
+install(FILES ${FLATLAND_GENERATED_MSG} DESTINATION ${SKBUILD_PLATLIB_DIR}/flatland/msg COMPONENT flatland)
+install(FILES ${FLATLAND_GENERATED_SRV} DESTINATION ${SKBUILD_PLATLIB_DIR}/flatland/srv COMPONENT flatland)
 
 include(${CMAKE_CURRENT_LIST_DIR}/ros_share.cmake)
 flatland_install_ros_share(${SKBUILD_DATA_DIR}/share/flatland)
