@@ -1,0 +1,258 @@
+"""Handles of things that are gone: an exception, never a crash."""
+
+from __future__ import annotations
+
+import gc
+import weakref
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from flatland.errors import StaleHandleError
+from flatland.physics import PhysicsBody, PhysicsFixture, PhysicsJoint, PhysicsWorld
+
+BODY_USES: list[Callable[[PhysicsBody], object]] = [
+    lambda b: b.pose,
+    lambda b: b.velocity,
+    lambda b: b.set_pose(0, 0, 0),
+    lambda b: b.set_velocity(0, 0, 0),
+    lambda b: b.apply_force((0, 0), (0, 0)),
+    lambda b: b.apply_torque(0),
+    lambda b: b.type,
+    lambda b: b.awake,
+    lambda b: setattr(b, "awake", True),
+    lambda b: b.mass,
+    lambda b: b.inertia,
+    lambda b: b.local_center,
+    lambda b: b.world_center,
+    lambda b: b.linear_damping,
+    lambda b: b.angular_damping,
+    lambda b: b.fixtures,
+    lambda b: b.joints,
+    lambda b: b.edges(),
+    lambda b: b.create_circle((0, 0), 1, density=1),
+    lambda b: b.create_polygon([(0, 0), (1, 0), (0, 1)], density=1),
+    lambda b: b.create_edges([[0, 0, 1, 1]]),
+    lambda b: b.destroy(),
+    lambda b: b.world.create_weld_joint(b, b, (0, 0), (0, 0)),
+]
+FIXTURE_USES: list[Callable[[PhysicsFixture], object]] = [
+    lambda f: f.body,
+    lambda f: f.shape,
+    lambda f: f.vertices,
+    lambda f: f.center,
+    lambda f: f.radius,
+    lambda f: f.density,
+    lambda f: f.friction,
+    lambda f: f.restitution,
+    lambda f: f.is_sensor,
+    lambda f: setattr(f, "is_sensor", True),
+    lambda f: f.category_bits,
+    lambda f: setattr(f, "category_bits", 1),
+    lambda f: f.mask_bits,
+    lambda f: setattr(f, "mask_bits", 1),
+]
+JOINT_USES: list[Callable[[PhysicsJoint], object]] = [
+    lambda j: j.type,
+    lambda j: j.body_a,
+    lambda j: j.body_b,
+    lambda j: j.anchors,
+    lambda j: j.collide_connected,
+    lambda j: j.limits,
+    lambda j: j.set_limits(0, 1),
+    lambda j: j.clear_limits(),
+    lambda j: j.reference_angle,
+    lambda j: j.frequency,
+    lambda j: j.damping,
+    lambda j: j.destroy(),
+]
+WORLD_USES: list[Callable[[PhysicsWorld], object]] = [
+    lambda w: w.step(0.01, 1, 1),
+    lambda w: w.create_body("static", (0, 0, 0)),
+    lambda w: w.ray_cast((0, 0), (1, 0)),
+    lambda w: w.cast_rays((0, 0, 0), [[1, 0]], 1),
+    lambda w: w.cast_rays_reference((0, 0, 0), [[1, 0]], 1),
+    lambda w: w.contacts(),
+    lambda w: w.take_contact_events(),
+    lambda w: setattr(w, "record_contacts", True),
+]
+
+
+def make_pair(world: PhysicsWorld) -> tuple[PhysicsBody, PhysicsBody, PhysicsFixture, PhysicsJoint]:
+    a, b = (world.create_body("dynamic", (x, 0, 0)) for x in (0, 3))
+    fixture = a.create_circle((0, 0), 1, density=1)
+    return a, b, fixture, world.create_revolute_joint(a, b, (0, 0), (0, 0))
+
+
+def test_a_destroyed_body_takes_fixtures_and_joints_along() -> None:
+    world = PhysicsWorld()
+    a, b, fixture, joint = make_pair(world)
+    a.create_edges([[0, 0, 1, 1]])
+    edge = a.fixtures[1]
+    a.destroy()
+    assert (a.alive, b.alive) == (False, True)
+    assert not any(handle.alive for handle in (fixture, edge, joint))
+    assert b.joints == []
+    for use in BODY_USES:
+        with pytest.raises(StaleHandleError, match="the body was destroyed"):
+            use(a)
+    for use_fixture in FIXTURE_USES:
+        with pytest.raises(StaleHandleError, match="the fixture was destroyed"):
+            use_fixture(fixture)
+    for use_joint in JOINT_USES:
+        with pytest.raises(StaleHandleError, match="the joint was destroyed"):
+            use_joint(joint)
+    world.step(0.01, 1, 1)
+    assert b.pose[0] == pytest.approx(3)
+    world.close()
+
+
+def test_all_handles_of_a_closed_world_are_stale() -> None:
+    world = PhysicsWorld()
+    a, b, fixture, joint = make_pair(world)
+    world.close()
+    world.close()
+    assert world.closed
+    assert not any(handle.alive for handle in (a, b, fixture, joint))
+    uses: list[tuple[Callable[..., object], object]] = [
+        *((use, world) for use in WORLD_USES),
+        *((use, a) for use in BODY_USES),
+        *((use, fixture) for use in FIXTURE_USES),
+        *((use, joint) for use in JOINT_USES),
+    ]
+    for use, subject in uses:
+        with pytest.raises(StaleHandleError, match="the world is closed"):
+            use(subject)
+
+
+def test_ids_are_not_used_again() -> None:
+    world = PhysicsWorld()
+    seen = set()
+    for _ in range(1000):
+        body = world.create_body("dynamic", (0, 0, 0))
+        fixture = body.create_circle((0, 0), 1, density=1)
+        assert not {body.id, fixture.id} & seen
+        seen |= {body.id, fixture.id}
+        body.destroy()
+        assert not body.alive
+    first = world.create_body("static", (0, 0, 0))
+    first.destroy()
+    second = world.create_body("static", (0, 0, 0))
+    with pytest.raises(StaleHandleError):
+        _ = first.pose
+    assert second.alive
+    world.close()
+
+
+def test_an_id_of_another_kind_finds_nothing() -> None:
+    world = PhysicsWorld()
+    body = world.create_body("static", (0, 0, 0))
+    fixture = body.create_circle((0, 0), 1, density=0)
+    assert not PhysicsBody(world, fixture.id).alive
+    assert not PhysicsFixture(world, body.id).alive
+    assert not PhysicsJoint(world, body.id).alive
+    assert not PhysicsBody(world, 0).alive
+    assert not PhysicsBody(world, 2**63 - 1).alive
+    world.close()
+
+
+def test_handles_compare_by_world_and_id() -> None:
+    worlds = PhysicsWorld(), PhysicsWorld()
+    bodies = [world.create_body("static", (0, 0, 0)) for world in worlds]
+    assert bodies[0].id == bodies[1].id
+    assert bodies[0] != bodies[1]
+    assert len(set(bodies)) == 2
+    fixture = bodies[0].create_circle((0, 0), 1, density=0)
+    assert bodies[0].fixtures[0] == fixture == bodies[0].fixture(fixture.id)
+    assert len({bodies[0].fixtures[0], fixture}) == 1
+    assert fixture.body == bodies[0]
+    assert fixture != fixture.id
+    for world in worlds:
+        world.close()
+
+
+def test_handles_keep_their_world_alive() -> None:
+    world = PhysicsWorld()
+    body = world.create_body("dynamic", (1, 2, 0))
+    fixture = body.create_circle((0, 0), 1, density=1)
+    del world, body
+    gc.collect()
+    assert fixture.body.pose == (1, 2, 0)
+    fixture.body.world.step(0.01, 1, 1)
+
+
+def test_results_outlive_the_world() -> None:
+    world = PhysicsWorld()
+    wall = world.create_body("static", (0, 0, 0))
+    wall.create_edges([[1, -1, 1, 1]])
+    disc = world.create_body("dynamic", (0.2, 0, 0))
+    disc.create_circle((0, 0), 1, density=1)
+    world.record_contacts = True
+    world.step(0.01, 1, 1)
+    events, contacts = world.take_contact_events(), world.contacts()
+    edges, vertices = wall.edges(), wall.fixtures[0].vertices
+    fractions, _ = world.cast_rays((-5, 0, 0), [[10, 0]], 0xFFFF)
+    hit = world.ray_cast((-5, 0), (5, 0))
+    world.close()
+    del world, wall, disc
+    gc.collect()
+    assert events[0].points.shape == contacts[0].points.shape == (1, 2)
+    assert hit is not None
+    assert fractions[0] == hit.fraction
+    assert edges.tolist() == [[1, -1, 1, 1]]
+    assert vertices.tolist() == [[1, -1], [1, 1]]
+    with pytest.raises(StaleHandleError):
+        _ = hit.fixture.shape
+
+
+def test_a_world_that_nobody_holds_is_freed() -> None:
+    class Tracked(PhysicsWorld):
+        """With room for a weak reference."""
+
+    world = Tracked()
+    world.create_body("static", (0, 0, 0)).create_edges(np.random.default_rng(1).random((1000, 4)))
+    reference = weakref.ref(world)
+    del world
+    assert reference() is None, "without help of the garbage collector"
+
+
+def test_many_bodies_come_and_go() -> None:
+    """Slots, contacts, joints and ray structures survive heavy use in random order."""
+    rng = np.random.default_rng(3)
+    world = PhysicsWorld()
+    world.record_contacts = True
+    bodies: list[PhysicsBody] = []
+    for _ in range(500):
+        if bodies and rng.random() < 0.45:
+            bodies.pop(rng.integers(len(bodies))).destroy()
+        else:
+            kind = rng.choice(["static", "kinematic", "dynamic"])
+            body = world.create_body(str(kind), (*rng.uniform(-8, 8, 2), 0))
+            body.create_circle((0, 0), 0.3, density=1)
+            if rng.random() < 0.3:
+                body.create_edges(rng.uniform(-1, 1, (5, 4)))
+            if bodies and rng.random() < 0.3:
+                other = bodies[rng.integers(len(bodies))]
+                world.create_weld_joint(body, other, (0, 0), (0, 0))
+            bodies.append(body)
+        if rng.random() < 0.2:
+            world.step(0.01, 2, 2)
+            fast, _ = world.cast_rays((0, 0, 0), rng.uniform(-9, 9, (20, 2)), 0xFFFF)
+            assert fast.shape == (20,)
+    assert all(body.alive for body in bodies)
+    ids = {body.id for body in bodies}
+    assert all({c.body_a, c.body_b} <= ids for c in world.contacts())
+    world.close()
+
+
+def test_a_large_map_that_never_stepped_goes_quickly() -> None:
+    """Box2D looks through all new fixtures for each one that is destroyed, unless helped."""
+    world = PhysicsWorld()
+    wall = world.create_body("static", (0, 0, 0))
+    rng = np.random.default_rng(1)
+    start = rng.uniform(0, 500, (60_000, 2))
+    wall.create_edges(np.hstack([start, start + 0.05]))
+    wall.destroy()
+    assert world.ray_cast((0, 0), (500, 500)) is None
+    world.close()

@@ -1,0 +1,260 @@
+"""Bodies and fixtures of the physics world."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+
+from flatland.physics import PhysicsBody, PhysicsWorld
+
+STEP = 0.01
+
+
+@pytest.fixture
+def world() -> Iterator[PhysicsWorld]:
+    world = PhysicsWorld()
+    yield world
+    world.close()
+
+
+def run(world: PhysicsWorld, steps: int) -> None:
+    for _ in range(steps):
+        world.step(STEP, 10, 10)
+
+
+def disc(world: PhysicsWorld, x: float = 0.0, y: float = 0.0, **options: float) -> PhysicsBody:
+    body = world.create_body("dynamic", (x, y, 0), **options)
+    body.create_circle((0, 0), 0.5, density=1.0)
+    return body
+
+
+def test_a_body_is_where_it_was_put(world: PhysicsWorld) -> None:
+    body = world.create_body("kinematic", (1, 2, 3), linear_damping=0.25, angular_damping=0.5)
+    assert body.pose == pytest.approx((1, 2, 3))
+    assert body.type == "kinematic"
+    assert (body.linear_damping, body.angular_damping) == (0.25, 0.5)
+    assert body.velocity == (0, 0, 0)
+    assert body.fixtures == []
+    body.set_pose(-4, 5, -6)
+    assert body.pose == pytest.approx((-4, 5, -6))
+    assert body.world is world
+
+
+def test_there_is_no_gravity(world: PhysicsWorld) -> None:
+    body = disc(world)
+    run(world, 100)
+    assert body.pose == (0, 0, 0)
+
+
+def test_mass_and_centre(world: PhysicsWorld) -> None:
+    body = world.create_body("dynamic", (1, 0, math.pi / 2))
+    body.create_polygon([(0, 0), (2, 0), (2, 1), (0, 1)], density=3)
+    assert body.mass == pytest.approx(6)
+    assert body.local_center == pytest.approx((1, 0.5))
+    assert body.world_center == pytest.approx((0.5, 1), abs=1e-6)
+    assert body.inertia == pytest.approx(6 / 3 * (2**2 + 1**2), rel=1e-5)
+    assert world.create_body("static", (0, 0, 0)).mass == 0
+
+
+@pytest.mark.parametrize("body_type", ["dynamic", "kinematic"])
+def test_velocity_is_that_of_the_origin(world: PhysicsWorld, body_type: str) -> None:
+    """The centre of mass lies beside the origin, yet the origin moves as it was told."""
+    body = world.create_body(body_type, (0, 0, 0.3))
+    body.create_circle((2, 0), 0.5, density=1)
+    body.set_velocity(0.5, -0.25, 2.0)
+    assert body.velocity == pytest.approx((0.5, -0.25, 2.0))
+    # One short step: what remains of the centripetal motion is of second order.
+    world.step(1e-4, 10, 10)
+    x, y, theta = body.pose
+    assert (x, y) == pytest.approx((0.5e-4, -0.25e-4), abs=1e-6)
+    assert theta == pytest.approx(0.3 + 2e-4)
+
+
+def test_velocity_of_the_origin_while_the_centre_coasts(world: PhysicsWorld) -> None:
+    body = world.create_body("dynamic", (0, 0, 0))
+    body.create_circle((1, 0), 0.5, density=1)
+    body.set_velocity(0, 0, math.pi)
+    # v_cm = omega x r = (0, pi); half a turn later the origin is on the centre's other side.
+    for _ in range(1000):
+        world.step(0.001, 10, 10)
+    assert body.pose == pytest.approx((2, math.pi, math.pi), abs=1e-3)
+    assert body.velocity == pytest.approx((0, 2 * math.pi, math.pi), abs=1e-2)
+
+
+def test_static_bodies_do_not_take_a_velocity(world: PhysicsWorld) -> None:
+    body = world.create_body("static", (0, 0, 0))
+    body.set_velocity(1, 1, 1)
+    run(world, 10)
+    assert body.pose == (0, 0, 0)
+    assert body.velocity == (0, 0, 0)
+
+
+def test_force_and_torque_act_for_one_step(world: PhysicsWorld) -> None:
+    body = disc(world)
+    mass, inertia = body.mass, body.inertia
+    body.apply_force((3, 0), (0, 0))
+    body.apply_torque(2)
+    run(world, 1)
+    assert body.velocity == pytest.approx((3 / mass * STEP, 0, 2 / inertia * STEP), rel=1e-5)
+    run(world, 1)
+    assert body.velocity == pytest.approx((3 / mass * STEP, 0, 2 / inertia * STEP), rel=1e-5)
+
+
+def test_a_force_beside_the_centre_turns(world: PhysicsWorld) -> None:
+    body = disc(world)
+    body.apply_force((0, 1), (0.5, 0))
+    run(world, 1)
+    assert body.velocity[2] == pytest.approx(0.5 / body.inertia * STEP, rel=1e-5)
+
+
+def test_damping_slows_down(world: PhysicsWorld) -> None:
+    body = disc(world, linear_damping=2.0, angular_damping=3.0)
+    body.set_velocity(1, 0, 1)
+    run(world, 1)
+    assert body.velocity == pytest.approx((1 / (1 + 2 * STEP), 0, 1 / (1 + 3 * STEP)))
+
+
+def test_bodies_fall_asleep_and_are_woken(world: PhysicsWorld) -> None:
+    body = disc(world)
+    run(world, 100)
+    assert not body.awake
+    body.set_pose(1, 0, 0)
+    assert body.awake
+    run(world, 100)
+    assert not body.awake
+    body.apply_force((1, 0), (1, 0))
+    assert body.awake
+    body.set_velocity(1, 0, 0)
+    body.awake = False
+    assert body.velocity == (0, 0, 0)
+    body.awake = True
+    assert body.awake
+
+
+def test_a_moved_body_meets_what_is_there(world: PhysicsWorld) -> None:
+    """Box2D alone would leave both asleep, one inside the other."""
+    mover, sleeper = disc(world), disc(world, 10)
+    run(world, 100)
+    assert not sleeper.awake
+    mover.set_pose(10.4, 0, 0)
+    run(world, 200)
+    assert np.hypot(*(np.array(mover.pose) - sleeper.pose)[:2]) == pytest.approx(1, abs=0.02)
+
+
+def test_a_static_body_that_is_moved_wakes_what_it_meets(world: PhysicsWorld) -> None:
+    sleeper = disc(world, 10)
+    box = world.create_body("static", (0, 0, 0))
+    box.create_polygon([(-1, -1), (1, -1), (1, 1), (-1, 1)], density=0)
+    run(world, 100)
+    assert not sleeper.awake
+    box.set_pose(8.6, 0, 0)
+    run(world, 200)
+    assert sleeper.pose[0] > 10.05
+
+
+def test_a_static_body_that_is_taken_away_wakes_what_leant_on_it(world: PhysicsWorld) -> None:
+    leaning = disc(world, 1.49)
+    wall = world.create_body("static", (0, 0, 0))
+    wall.create_polygon([(-1, -1), (1, -1), (1, 1), (-1, 1)], density=0)
+    run(world, 300)
+    assert not leaning.awake
+    wall.set_pose(-20, 0, 0)
+    assert leaning.awake
+
+
+def test_new_shapes_wake_what_they_meet(world: PhysicsWorld) -> None:
+    sleeper = disc(world)
+    run(world, 100)
+    world.create_body("static", (0, 0, 0)).create_edges([[0.4, -1, 0.4, 1]])
+    run(world, 200)
+    assert sleeper.pose[0] < -0.05
+
+
+@pytest.mark.parametrize("side", [-1, 1])
+@pytest.mark.parametrize("turned", [False, True])
+def test_edges_hold_from_both_sides(world: PhysicsWorld, side: int, turned: bool) -> None:
+    edge = [0, 5, 0, -5] if turned else [0, -5, 0, 5]
+    world.create_body("static", (0, 0, 0)).create_edges([edge])
+    body = disc(world, 2.0 * side)
+    body.set_velocity(-3 * side, 0, 0)
+    run(world, 300)
+    assert body.pose[0] * side == pytest.approx(0.5, abs=0.02)
+
+
+def test_fast_bodies_do_not_pass_through_walls(world: PhysicsWorld) -> None:
+    world.create_body("static", (0, 0, 0)).create_edges([[0, -5, 0, 5]])
+    body = disc(world, -2)
+    body.set_velocity(150, 0, 0)
+    run(world, 50)
+    assert body.pose[0] < 0
+
+
+def test_fixtures_tell_what_they_are(world: PhysicsWorld) -> None:
+    body = world.create_body("dynamic", (0, 0, 0))
+    circle = body.create_circle(
+        (1, 2),
+        0.5,
+        density=2,
+        friction=0.25,
+        restitution=0.75,
+        is_sensor=True,
+        category_bits=6,
+        mask_bits=9,
+    )
+    polygon = body.create_polygon([(0, 0), (3, 0), (0, 3)], density=1)
+    body.create_edges([[0, 0, 2, 4]], friction=0.5)
+    edge = body.fixtures[2]
+    assert body.fixtures == [circle, polygon, edge]
+    assert [fixture.shape for fixture in body.fixtures] == ["circle", "polygon", "edge"]
+    assert (circle.center, circle.radius, circle.vertices.shape) == ((1, 2), 0.5, (0, 2))
+    assert (circle.density, circle.friction, circle.restitution) == (2, 0.25, 0.75)
+    assert circle.is_sensor
+    assert (circle.category_bits, circle.mask_bits) == (6, 9)
+    assert polygon.center == pytest.approx((1, 1))
+    assert polygon.radius == 0
+    a, b, c = polygon.vertices
+    assert np.cross(b - a, c - a) > 0, "corners come counter-clockwise"
+    assert edge.vertices.tolist() == [[0, 0], [2, 4]]
+    assert (edge.center, edge.density, edge.friction) == ((1, 2), 0, 0.5)
+    assert edge.body == body
+    assert (polygon.category_bits, polygon.mask_bits) == (0xFFFF, 0xFFFF)
+
+
+def test_edges_come_back_as_they_went_in(world: PhysicsWorld) -> None:
+    body = world.create_body("static", (5, 5, 1))
+    edges = np.random.default_rng(1).uniform(-10, 10, (50, 4)).astype(np.float32)
+    body.create_circle((0, 0), 1, density=0)
+    assert body.create_edges(edges[:30]) == 30
+    assert body.create_edges(edges[30:]) == 20
+    assert body.edges().dtype == np.float32
+    np.testing.assert_array_equal(body.edges(), edges)
+
+
+@pytest.mark.parametrize("bits", [(1, 2), (2, 1), (0, 0xFFFF), (0xFFFF, 0)])
+def test_filters_let_bodies_pass(world: PhysicsWorld, bits: tuple[int, int]) -> None:
+    wall = world.create_body("static", (0, 0, 0))
+    wall.create_edges([[0, -5, 0, 5]], category_bits=1, mask_bits=1)
+    body = world.create_body("dynamic", (-2, 0, 0))
+    body.create_circle((0, 0), 0.5, density=1, category_bits=bits[0], mask_bits=bits[1])
+    body.set_velocity(3, 0, 0)
+    run(world, 200)
+    assert body.pose[0] > 2
+
+
+def test_filters_and_sensor_flags_change_for_bodies_at_rest(world: PhysicsWorld) -> None:
+    bodies = [disc(world), disc(world, 0.6)]
+    circle = bodies[0].fixtures[0]
+    circle.mask_bits = 0
+    run(world, 100)
+    assert bodies[1].pose == pytest.approx((0.6, 0, 0), abs=1e-5), "they do not collide"
+    circle.is_sensor = True
+    circle.mask_bits = 0xFFFF
+    run(world, 100)
+    assert bodies[1].pose == pytest.approx((0.6, 0, 0), abs=1e-5), "nor does a sensor"
+    assert not bodies[1].awake
+    circle.is_sensor = False
+    run(world, 200)
+    assert bodies[1].pose[0] - bodies[0].pose[0] == pytest.approx(1, abs=0.02)

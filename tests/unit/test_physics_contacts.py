@@ -1,0 +1,380 @@
+"""Contact events, live contacts and the pre-solve hook."""
+
+from __future__ import annotations
+
+import gc
+import weakref
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+import pytest
+
+from flatland.errors import StaleHandleError, WorldLockedError
+from flatland.physics import (
+    ContactEvent,
+    OldManifold,
+    PhysicsBody,
+    PhysicsWorld,
+    PreSolveContact,
+)
+
+STEP = 0.01
+
+
+@pytest.fixture
+def world() -> Iterator[PhysicsWorld]:
+    world = PhysicsWorld()
+    world.record_contacts = True
+    yield world
+    world.close()
+
+
+def add_wall(world: PhysicsWorld, x: float = 0.0) -> PhysicsBody:
+    wall = world.create_body("static", (x, 0, 0))
+    wall.create_edges([[0, -5, 0, 5]])
+    return wall
+
+
+def add_disc(world: PhysicsWorld, x: float, speed: float = 0.0, **options: Any) -> PhysicsBody:
+    body = world.create_body("dynamic", (x, 0, 0))
+    body.create_circle((0, 0), 0.5, **{"density": 1.0, **options})
+    body.set_velocity(speed, 0, 0)
+    return body
+
+
+def run_until(world: PhysicsWorld, kind: str) -> list[ContactEvent]:
+    """Steps until an event of a kind; returns the events of that step."""
+    for _ in range(1000):
+        world.step(STEP, 10, 10)
+        events = world.take_contact_events()
+        if any(event.kind == kind for event in events):
+            return events
+    raise AssertionError(f"no {kind} in 1000 steps")
+
+
+def test_a_bump_from_begin_to_end(world: PhysicsWorld) -> None:
+    wall = add_wall(world)
+    disc = add_disc(world, -2, speed=2)
+    begin, *rest = run_until(world, "begin")
+    assert begin.kind == "begin"
+    assert {begin.body_a, begin.body_b} == {wall.id, disc.id}
+    assert {begin.fixture_a, begin.fixture_b} == {wall.fixtures[0].id, disc.fixtures[0].id}
+    assert not begin.is_sensor
+    assert begin.points.shape == (1, 2)
+    np.testing.assert_allclose(begin.points, [[0, 0]], atol=0.03)
+    towards_b = 1.0 if begin.body_b == wall.id else -1.0
+    np.testing.assert_allclose(begin.normal, [towards_b, 0], atol=1e-6)
+    assert begin.normal_impulses.tolist() == [0]
+
+    # The wall takes all momentum of the disc, without friction.
+    solved = [e for e in rest if e.kind == "post_solve"] or run_until(world, "post_solve")
+    impulse = sum(float(e.normal_impulses.sum()) for e in solved)
+    assert impulse == pytest.approx(2 * disc.mass, rel=1e-3)
+    assert all(e.tangent_impulses.tolist() == [0] for e in solved)
+    assert {e.contact_id for e in solved} == {begin.contact_id}
+
+    disc.set_velocity(-1, 0, 0)
+    (end,) = [e for e in run_until(world, "end") if e.kind == "end"]
+    assert end.contact_id == begin.contact_id
+    assert end.points.shape == (0, 2)
+    assert end.normal.tolist() == [0, 0]
+    assert world.contacts() == []
+
+
+def test_friction_gives_a_tangent_impulse(world: PhysicsWorld) -> None:
+    wall = world.create_body("static", (0, 0, 0))
+    wall.create_edges([[0, -5, 0, 5]], friction=0.5)
+    disc = add_disc(world, -0.505, friction=0.5)
+    disc.set_velocity(2, 3, 0)
+    solved = [e for e in run_until(world, "post_solve") if e.kind == "post_solve"]
+    tangent = abs(sum(float(e.tangent_impulses.sum()) for e in solved))
+    normal = sum(float(e.normal_impulses.sum()) for e in solved)
+    assert tangent == pytest.approx(0.5 * normal, rel=1e-3)
+
+
+def test_a_face_that_meets_a_face_has_two_points(world: PhysicsWorld) -> None:
+    wall = add_wall(world)
+    box = world.create_body("dynamic", (-1.5, 0, 0))
+    box.create_polygon([(-1, -0.5), (1, -0.5), (1, 0.5), (-1, 0.5)], density=1)
+    box.set_velocity(1, 0, 0)
+    begin = run_until(world, "begin")[0]
+    assert sorted(begin.points[:, 1]) == pytest.approx([-0.5, 0.5], abs=1e-3)
+    assert begin.points.dtype == np.float64
+    assert {begin.body_a, begin.body_b} == {wall.id, box.id}
+    (contact,) = world.contacts()
+    assert contact.contact_id == begin.contact_id
+    assert sorted(contact.points[:, 1]) == pytest.approx([-0.5, 0.5], abs=1e-3)
+    assert (contact.body_a, contact.fixture_a) == (begin.body_a, begin.fixture_a)
+    assert (contact.body_b, contact.fixture_b) == (begin.body_b, begin.fixture_b)
+
+
+def test_sensors_begin_and_end_without_points(world: PhysicsWorld) -> None:
+    zone = world.create_body("static", (0, 0, 0))
+    zone.create_circle((0, 0), 1.0, density=0, is_sensor=True)
+    disc = add_disc(world, -3, speed=3)
+    (begin,) = run_until(world, "begin")
+    assert begin.is_sensor
+    assert begin.points.shape == (0, 2)
+    assert world.contacts()[0].is_sensor
+    (end,) = run_until(world, "end")
+    assert end.is_sensor
+    assert end.contact_id == begin.contact_id
+    assert disc.velocity == pytest.approx((3, 0, 0)), "a sensor does not push"
+
+
+def test_nothing_is_recorded_unless_asked_for(world: PhysicsWorld) -> None:
+    world.record_contacts = False
+    add_wall(world)
+    disc = add_disc(world, -1, speed=2)
+    for _ in range(100):
+        world.step(STEP, 10, 10)
+    assert world.take_contact_events() == []
+    (live,) = world.contacts()
+    # A contact that began unseen keeps its number when recording starts.
+    world.record_contacts = True
+    disc.set_velocity(-1, 0, 0)
+    events = run_until(world, "end")
+    assert {event.contact_id for event in events} == {live.contact_id}
+    assert "begin" not in {event.kind for event in events}
+
+
+def test_events_come_in_order_and_once(world: PhysicsWorld) -> None:
+    add_wall(world)
+    add_disc(world, -1, speed=2)
+    for _ in range(100):
+        world.step(STEP, 10, 10)
+    kinds = [event.kind for event in world.take_contact_events()]
+    assert kinds[0] == "begin"
+    assert set(kinds[1:]) == {"post_solve"}
+    assert world.take_contact_events() == []
+
+
+@pytest.mark.parametrize("which", ["wall", "disc"])
+def test_destroying_a_body_ends_its_contacts(world: PhysicsWorld, which: str) -> None:
+    bodies = {"wall": add_wall(world), "disc": add_disc(world, -1, speed=2)}
+    begin = run_until(world, "begin")[0]
+    bodies[which].destroy()
+    (end,) = world.take_contact_events()
+    assert end.kind == "end"
+    assert (end.contact_id, end.body_a, end.body_b) == (
+        begin.contact_id,
+        begin.body_a,
+        begin.body_b,
+    )
+    assert (end.fixture_a, end.fixture_b) == (begin.fixture_a, begin.fixture_b)
+    world.step(STEP, 10, 10)
+    assert world.take_contact_events() == []
+
+
+def test_moving_a_body_away_ends_its_contacts(world: PhysicsWorld) -> None:
+    add_wall(world)
+    disc = add_disc(world, -1, speed=2)
+    begin = run_until(world, "begin")[0]
+    disc.set_pose(-20, 0, 0)
+    (end,) = run_until(world, "end")
+    assert end.contact_id == begin.contact_id
+
+
+def test_each_contact_has_a_number_of_its_own(world: PhysicsWorld) -> None:
+    add_wall(world)
+    disc = add_disc(world, -1, speed=2)
+    numbers = []
+    for _ in range(3):
+        numbers.append(run_until(world, "begin")[0].contact_id)
+        disc.set_velocity(-2, 0, 0)
+        run_until(world, "end")
+        disc.set_velocity(2, 0, 0)
+    assert len(set(numbers)) == 3
+
+
+# -- pre_solve -----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("start", "passes"), [(-2, True), (2, False)])
+def test_a_gate_that_opens_in_one_direction(
+    world: PhysicsWorld, start: float, passes: bool
+) -> None:
+    gate = add_wall(world)
+    disc = add_disc(world, start, speed=-start)
+
+    def only_to_the_right(contact: PreSolveContact, _: OldManifold) -> None:
+        contact.enabled = disc.velocity[0] < 0
+
+    world.pre_solve = only_to_the_right
+    world.pre_solve_bodies = {gate.id}
+    for _ in range(300):
+        world.step(STEP, 10, 10)
+    assert (disc.pose[0] * start < 0) == passes
+    assert world.take_pre_solve_errors() == []
+
+
+def test_only_contacts_of_the_named_bodies_are_shown(world: PhysicsWorld) -> None:
+    near, far = add_disc(world, -1, speed=2), add_disc(world, 8, speed=2)
+    add_wall(world)
+    wall = add_wall(world, 9)
+    seen: list[tuple[int, int]] = []
+    world.pre_solve = lambda contact, _: seen.append((contact.body_a, contact.body_b))
+    world.pre_solve_bodies.add(far.id)
+    for _ in range(100):
+        world.step(STEP, 10, 10)
+    assert {frozenset(pair) for pair in seen} == {frozenset((wall.id, far.id))}
+    world.pre_solve_bodies = {near.id}
+    near.set_velocity(0.1, 0, 0)
+    seen.clear()
+    world.step(STEP, 10, 10)
+    assert near.id in seen[0]
+
+
+def test_what_pre_solve_sees(world: PhysicsWorld) -> None:
+    wall = world.create_body("static", (0, 0, 0))
+    wall.create_edges([[0, -5, 0, 5]], friction=0.25, restitution=0.5)
+    disc = add_disc(world, -1, speed=2, friction=1.0)
+    seen: list[dict[str, Any]] = []
+
+    def look(contact: PreSolveContact, old: OldManifold) -> None:
+        seen.append(
+            {
+                "id": contact.contact_id,
+                "fixtures": {contact.fixture_a, contact.fixture_b},
+                "points": contact.points,
+                "normal": contact.normal,
+                "mixed": (contact.enabled, contact.friction, contact.restitution),
+                "speed": contact.tangent_speed,
+                "old": (old.points, old.normal_impulses, old.tangent_impulses, old.kind),
+                "frame": (old.local_normal, old.local_point),
+                "pose": disc.pose,
+            }
+        )
+
+    world.pre_solve = look
+    world.pre_solve_bodies = {disc.id}
+    begin = run_until(world, "begin")[0]
+    first = seen[0]
+    assert first["id"] == begin.contact_id
+    assert first["fixtures"] == {wall.fixtures[0].id, disc.fixtures[0].id}
+    np.testing.assert_array_equal(first["points"], begin.points)
+    np.testing.assert_array_equal(first["normal"], begin.normal)
+    assert first["mixed"] == pytest.approx((True, 0.5, 0.5))
+    assert first["speed"] == 0
+    assert first["old"][0].shape == (0, 2)
+    assert first["pose"][0] == pytest.approx(-0.5, abs=0.05)
+    for _ in range(3):
+        disc.set_velocity(1, 0, 0)
+        world.step(STEP, 10, 10)
+    points, normal_impulses, tangent_impulses, kind = seen[-1]["old"]
+    assert points.shape == (1, 2)
+    assert normal_impulses.shape == tangent_impulses.shape == (1,)
+    assert kind in {"circles", "face_a", "face_b"}
+    assert seen[-1]["frame"][0].shape == seen[-1]["frame"][1].shape == (2,)
+
+
+def test_pre_solve_changes_how_contacts_are_solved(world: PhysicsWorld) -> None:
+    belt = add_wall(world)
+    disc = add_disc(world, -0.505, speed=0.5)
+
+    def drive(contact: PreSolveContact, _: OldManifold) -> None:
+        contact.friction = 5.0
+        contact.tangent_speed = 2.0
+        contact.restitution = 0.0
+        assert (contact.friction, contact.tangent_speed) == (5.0, 2.0)
+
+    world.pre_solve = drive
+    world.pre_solve_bodies = {belt.id}
+    world.step(STEP, 10, 10)
+    assert abs(disc.velocity[1]) > 0.01 or abs(disc.velocity[2]) > 0.01
+    assert world.take_pre_solve_errors() == []
+
+
+def test_bad_values_are_refused_in_pre_solve(world: PhysicsWorld) -> None:
+    wall = add_wall(world)
+    add_disc(world, -0.505, speed=2)
+    world.pre_solve_bodies = {wall.id}
+    for name, value in [("friction", -1), ("friction", float("nan")), ("restitution", -1)]:
+        world.pre_solve = lambda contact, _, n=name, v=value: setattr(contact, n, v)
+        world.step(STEP, 10, 10)
+        errors = world.take_pre_solve_errors()
+        assert errors
+        assert all(isinstance(error, ValueError) and name in str(error) for error in errors)
+
+
+def test_errors_in_pre_solve_are_kept(world: PhysicsWorld) -> None:
+    wall = add_wall(world)
+    disc = add_disc(world, -1, speed=2)
+
+    def fail(_contact: PreSolveContact, _old: OldManifold) -> None:
+        raise RuntimeError("broken gate")
+
+    world.pre_solve = fail
+    world.pre_solve_bodies = {wall.id}
+    run_until(world, "begin")
+    errors = world.take_pre_solve_errors()
+    assert [str(error) for error in errors] == ["broken gate"] * len(errors)
+    assert errors[0].__traceback__ is not None
+    assert world.take_pre_solve_errors() == []
+    for _ in range(20):
+        world.step(STEP, 10, 10)
+    assert disc.pose[0] < -0.45, "the contact is solved as if nobody had looked"
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        lambda world, disc: world.create_body("static", (0, 0, 0)),
+        lambda world, disc: disc.destroy(),
+        lambda world, disc: disc.set_pose(0, 0, 0),
+        lambda world, disc: disc.set_velocity(0, 0, 0),
+        lambda world, disc: disc.apply_torque(1),
+        lambda world, disc: disc.create_circle((0, 0), 1, density=1),
+        lambda world, disc: disc.create_edges([[0, 0, 1, 1]]),
+        lambda world, disc: setattr(disc, "awake", True),
+        lambda world, disc: setattr(disc.fixtures[0], "is_sensor", True),
+        lambda world, disc: setattr(disc.fixtures[0], "mask_bits", 0),
+        lambda world, disc: world.cast_rays((0, 0, 0), [[1, 0]], 0xFFFF),
+        lambda world, disc: world.step(0.01, 1, 1),
+        lambda world, disc: world.take_contact_events(),
+        lambda world, disc: setattr(world, "record_contacts", False),
+        lambda world, disc: world.close(),
+    ],
+)
+def test_pre_solve_may_not_change_the_world(world: PhysicsWorld, change: Any) -> None:
+    wall = add_wall(world)
+    disc = add_disc(world, -0.505, speed=2)
+    world.pre_solve = lambda *_: change(world, disc)
+    world.pre_solve_bodies = {wall.id}
+    world.step(STEP, 10, 10)
+    errors = world.take_pre_solve_errors()
+    assert errors
+    assert all(isinstance(error, WorldLockedError) for error in errors)
+    assert "the world is stepping" in str(errors[0])
+    world.pre_solve = None
+    world.step(STEP, 10, 10)
+
+
+def test_a_contact_is_stale_after_pre_solve(world: PhysicsWorld) -> None:
+    wall = add_wall(world)
+    add_disc(world, -0.505, speed=2)
+    kept: list[PreSolveContact] = []
+    world.pre_solve = lambda contact, _: kept.append(contact)
+    world.pre_solve_bodies = {wall.id}
+    world.step(STEP, 10, 10)
+    assert kept[0].points.shape == (1, 2)
+    with pytest.raises(StaleHandleError, match="only inside of the pre_solve call"):
+        kept[0].enabled = False
+
+
+def test_a_hook_that_holds_the_world_does_not_keep_it_alive() -> None:
+    class Owner:
+        def __init__(self) -> None:
+            self.physics = PhysicsWorld()
+            self.physics.pre_solve = self.hook
+
+        def hook(self, *_: object) -> None:
+            pass
+
+    owner = Owner()
+    reference = weakref.ref(owner)
+    owner.physics.step(STEP, 1, 1)
+    del owner
+    gc.collect()
+    assert reference() is None

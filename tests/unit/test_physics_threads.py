@@ -1,0 +1,211 @@
+"""Worlds in threads: independent of each other, locked while they step, and repeatable."""
+
+from __future__ import annotations
+
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+
+import numpy as np
+import pytest
+
+from flatland.errors import WorldLockedError
+from flatland.physics import OldManifold, PhysicsBody, PhysicsWorld, PreSolveContact
+
+
+def crowd(seed: int) -> tuple[PhysicsWorld, list[PhysicsBody]]:
+    """Bodies that bump into each other within four walls."""
+    rng = np.random.default_rng(seed)
+    world = PhysicsWorld()
+    world.record_contacts = True
+    wall = world.create_body("static", (0, 0, 0))
+    wall.create_edges([[-4, -4, 4, -4], [4, -4, 4, 4], [4, 4, -4, 4], [-4, 4, -4, -4]])
+    bodies = []
+    for _ in range(20):
+        body = world.create_body("dynamic", (*rng.uniform(-3, 3, 2), rng.uniform(-3, 3)))
+        if rng.random() < 0.5:
+            body.create_circle((0, 0), 0.3, density=1, restitution=0.9)
+        else:
+            body.create_polygon(rng.uniform(-0.4, 0.4, (6, 2)), density=1, friction=0.5)
+        body.set_velocity(*rng.uniform(-3, 3, 3))
+        bodies.append(body)
+    return world, bodies
+
+
+def history(seed: int, steps: int = 150) -> bytes:
+    """All that a run shows, as bytes."""
+    world, bodies = crowd(seed)
+    angles = np.linspace(-np.pi, np.pi, 90)
+    ends = 6 * np.stack([np.cos(angles), np.sin(angles)], 1).astype(np.float32)
+    seen = []
+    for _ in range(steps):
+        world.step(0.01, 8, 3)
+        seen.append(np.array([(*b.pose, *b.velocity) for b in bodies]).tobytes())
+        seen.append(b"".join(a.tobytes() for a in world.cast_rays(bodies[0].pose, ends, 0xFFFF, 2)))
+        for event in world.take_contact_events():
+            ids = (event.contact_id, event.fixture_a, event.fixture_b)
+            seen.append(f"{event.kind}{ids}".encode())
+            seen.append(event.points.tobytes() + event.normal_impulses.tobytes())
+    world.close()
+    return b"".join(seen)
+
+
+def test_two_runs_give_the_same_bytes() -> None:
+    assert history(1) == history(1)
+    assert history(1) != history(2)
+
+
+def test_worlds_in_parallel_threads_give_the_same_bytes_as_one_by_one() -> None:
+    seeds = range(8)
+    alone = [history(seed) for seed in seeds]
+    with ThreadPoolExecutor(4) as pool:
+        together = list(pool.map(history, seeds))
+    assert together == alone
+
+
+def test_worlds_made_at_once_in_many_threads() -> None:
+    """Box2D fills a table of its own at the first contact of a process."""
+    barrier = threading.Barrier(8)
+
+    def run(_: int) -> float:
+        barrier.wait()
+        world, bodies = crowd(5)
+        for _ in range(20):
+            world.step(0.01, 4, 2)
+        return bodies[0].pose[0]
+
+    with ThreadPoolExecutor(8) as pool:
+        assert len(set(pool.map(run, range(8)))) == 1
+
+
+class SlowStep:
+    """A world that stays in a step until it is told to go on.
+
+    The step itself runs without the GIL; it is held up in a pre-solve hook, which waits for an
+    event, so that other threads find the world stepping for as long as they like.
+    """
+
+    def __init__(self) -> None:
+        self.world = PhysicsWorld()
+        self.disc = self.world.create_body("dynamic", (0, 0, 0))
+        self.disc.create_circle((0, 0), 1, density=1)
+        self.wall = self.world.create_body("static", (0, 0, 0))
+        self.wall.create_edges([[0.5, -1, 0.5, 1]])
+        self.inside = threading.Event()
+        self.go_on = threading.Event()
+        self.world.pre_solve = self._hold
+        self.world.pre_solve_bodies = {self.disc.id}
+        self._thread = threading.Thread(target=self.world.step, args=(0.01, 5, 5))
+
+    def _hold(self, _contact: PreSolveContact, _old: OldManifold) -> None:
+        self.inside.set()
+        assert self.go_on.wait(60)
+
+    def __enter__(self) -> SlowStep:
+        self._thread.start()
+        assert self.inside.wait(60)
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.go_on.set()
+        self._thread.join()
+
+
+@pytest.fixture
+def slow() -> Iterator[SlowStep]:
+    with SlowStep() as slow:
+        yield slow
+
+
+@pytest.mark.parametrize(
+    "use",
+    [
+        lambda slow: slow.disc.pose,
+        lambda slow: slow.disc.velocity,
+        lambda slow: slow.disc.set_pose(0, 0, 0),
+        lambda slow: slow.disc.set_velocity(0, 0, 0),
+        lambda slow: slow.disc.fixtures,
+        lambda slow: slow.disc.create_circle((0, 0), 1, density=1),
+        lambda slow: slow.disc.create_edges([[0, 0, 1, 1]]),
+        lambda slow: slow.disc.destroy(),
+        lambda slow: slow.world.create_body("static", (0, 0, 0)),
+        lambda slow: slow.world.create_weld_joint(slow.disc, slow.wall, (0, 0), (0, 0)),
+        lambda slow: slow.world.step(0.01, 1, 1),
+        lambda slow: slow.world.ray_cast((0, 0), (1, 0)),
+        lambda slow: slow.world.cast_rays((0, 0, 0), [[1, 0]], 1),
+        lambda slow: slow.world.contacts(),
+        lambda slow: slow.world.take_contact_events(),
+        lambda slow: slow.world.close(),
+    ],
+)
+def test_a_stepping_world_is_locked_for_other_threads(
+    slow: SlowStep, use: Callable[[SlowStep], object]
+) -> None:
+    with pytest.raises(WorldLockedError, match="the world is stepping"):
+        use(slow)
+    slow.go_on.set()
+
+
+def test_other_worlds_go_on_while_one_steps(slow: SlowStep) -> None:
+    assert len(history(3, steps=5)) > 0
+
+
+def lets_others_run(work: Callable[[], object]) -> bool:
+    """Whether another Python thread gets to run while `work` does.
+
+    The interpreter switches threads only where one gives the GIL away, as the interval is so long.
+    """
+    ticks = 0
+    stop = threading.Event()
+
+    def tick() -> None:
+        nonlocal ticks
+        while not stop.is_set():
+            ticks += 1
+            time.sleep(0)
+
+    interval = sys.getswitchinterval()
+    sys.setswitchinterval(60)
+    thread = threading.Thread(target=tick)
+    try:
+        thread.start()
+        before = ticks
+        work()
+        after = ticks
+    finally:
+        sys.setswitchinterval(interval)
+        stop.set()
+        thread.join()
+    return after > before
+
+
+def test_long_calls_release_the_gil() -> None:
+    world = PhysicsWorld()
+    wall = world.create_body("static", (0, 0, 0))
+    rng = np.random.default_rng(1)
+    start = rng.uniform(0, 100, (30_000, 2))
+    edges = np.hstack([start, start + 0.5]).astype(np.float32)
+    ends = rng.uniform(-50, 50, (200_000, 2)).astype(np.float32)
+    assert lets_others_run(lambda: wall.create_edges(edges))
+    assert lets_others_run(lambda: world.step(0.01, 1, 1))
+    assert lets_others_run(lambda: world.cast_rays((50, 50, 0), ends, 0xFFFF))
+    assert lets_others_run(lambda: world.cast_rays_reference((50, 50, 0), ends[:20_000], 0xFFFF))
+    assert not lets_others_run(lambda: sum(range(1000))), "the test can tell"
+    world.close()
+
+
+def test_several_threads_cast_rays_in_one_world() -> None:
+    world, bodies = crowd(9)
+    rng = np.random.default_rng(1)
+    fans = [rng.uniform(-9, 9, (50 + i, 2)).astype(np.float32) for i in range(40)]
+    poses = [body.pose for body in bodies]
+    expected = [world.cast_rays_reference(pose, fan, 0xFFFF)[0] for pose in poses for fan in fans]
+    jobs = [(pose, fan) for pose in poses for fan in fans]
+    world.create_body("static", (0, 0, 0)).create_edges([[20, 20, 30, 30]])  # trees are made anew
+    with ThreadPoolExecutor(4) as pool:
+        got = list(pool.map(lambda job: world.cast_rays(job[0], job[1], 0xFFFF)[0], jobs))
+    for fast, slow in zip(got, expected, strict=True):
+        np.testing.assert_allclose(fast, slow, atol=1e-5)
+    world.close()

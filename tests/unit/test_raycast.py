@@ -1,0 +1,267 @@
+"""Single rays and scans against what geometry says."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+
+from flatland.physics import PhysicsWorld
+
+ALL = 0xFFFF
+
+
+@pytest.fixture
+def world() -> Iterator[PhysicsWorld]:
+    world = PhysicsWorld()
+    yield world
+    world.close()
+
+
+def fan(count: int, length: float, start: float = -math.pi, stop: float = math.pi) -> npt.NDArray:
+    angles = np.linspace(start, stop, count)
+    return (length * np.stack([np.cos(angles), np.sin(angles)], 1)).astype(np.float32)
+
+
+def add_room(world: PhysicsWorld, half: float = 5.0, **options: int) -> None:
+    h = half
+    edges = [[-h, -h, h, -h], [h, -h, h, h], [h, h, -h, h], [-h, h, -h, -h]]
+    world.create_body("static", (0, 0, 0)).create_edges(edges, **options)
+
+
+def test_a_single_ray(world: PhysicsWorld) -> None:
+    add_room(world, category_bits=4)
+    hit = world.ray_cast((0, 1), (10, 1))
+    assert hit is not None
+    assert hit.fraction == pytest.approx(0.5)
+    assert hit.point == pytest.approx((5, 1))
+    assert hit.normal == pytest.approx((-1, 0))
+    assert hit.category_bits == 4
+    assert hit.fixture.shape == "edge"
+    assert world.ray_cast((0, 1), (4.9, 1)) is None
+    assert world.ray_cast((0, 1), (10, 1), mask=0xFFFB) is None
+    assert world.ray_cast((1, 1), (1, 1)) is None, "no length"
+
+
+def test_a_scan_in_a_room(world: PhysicsWorld) -> None:
+    add_room(world)
+    x, y, theta = 1.0, -2.0, 0.7
+    ends = fan(720, 20)
+    fractions, reflect = world.cast_rays((x, y, theta), ends, ALL)
+    angles = np.linspace(-math.pi, math.pi, 720) + theta
+    with np.errstate(divide="ignore"):
+        to_x = np.where(np.cos(angles) > 0, 5 - x, -5 - x) / np.cos(angles)
+        to_y = np.where(np.sin(angles) > 0, 5 - y, -5 - y) / np.sin(angles)
+    np.testing.assert_allclose(fractions * 20, np.minimum(to_x, to_y), atol=1e-4)
+    assert fractions.dtype == np.float32
+    assert (reflect.dtype, reflect.any()) == (np.bool_, False)
+
+
+def test_misses_and_rays_without_length_are_nan(world: PhysicsWorld) -> None:
+    add_room(world)
+    ends = [[4.9, 0], [5, 0], [0, 0], [5.1, 0], [1e-30, 0]]
+    fractions, _ = world.cast_rays((0, 0, 0), ends, ALL)
+    np.testing.assert_allclose(fractions, [np.nan, 1, np.nan, 5 / 5.1, np.nan], rtol=1e-6)
+
+
+@pytest.mark.parametrize("count", [0, 1, 7, 8, 9, 1081])
+def test_any_number_of_rays(world: PhysicsWorld, count: int) -> None:
+    add_room(world)
+    world.create_body("dynamic", (2, 0, 0)).create_circle((0, 0), 0.5, density=1)
+    ends = fan(count, 20)
+    fractions, reflect = world.cast_rays((0, 0, 0.1), ends, ALL, 1)
+    assert fractions.shape == reflect.shape == (count,)
+    np.testing.assert_array_equal(fractions, world.cast_rays_reference((0, 0, 0.1), ends, ALL)[0])
+
+
+def test_the_order_of_rays_does_not_matter(world: PhysicsWorld) -> None:
+    """Clockwise, upside down, more than once round, shuffled: each ray gets its own answer."""
+    add_room(world)
+    world.create_body("dynamic", (2, 1, 0.3)).create_polygon([(0, 0), (1, 0), (0, 1)], density=1)
+    ends = fan(500, 20, -7, 7)
+    straight, _ = world.cast_rays((0, 0, 1), ends, ALL)
+    assert not np.isnan(straight).any()
+    order = np.random.default_rng(1).permutation(500)
+    for permutation in (slice(None, None, -1), order):
+        other, _ = world.cast_rays((0, 0, 1), ends[permutation], ALL)
+        np.testing.assert_array_equal(other, straight[permutation])
+
+
+def test_inputs_of_other_types(world: PhysicsWorld) -> None:
+    add_room(world)
+    ends = fan(20, 20)
+    expected, _ = world.cast_rays((0, 0, 0), ends, ALL)
+    for same in (ends.astype(np.float64), ends.tolist(), np.asfortranarray(ends), ends[::-1][::-1]):
+        np.testing.assert_array_equal(world.cast_rays((0, 0, 0), same, ALL)[0], expected)
+
+
+def test_only_categories_in_the_mask_count(world: PhysicsWorld) -> None:
+    for x, category in ((1, 1), (2, 2), (3, 4)):
+        wall = world.create_body("static", (x, 0, 0))
+        wall.create_edges([[0, -1, 0, 1]], category_bits=category)
+    world.create_body("dynamic", (4, 0, 0)).create_circle((0, 0), 0.5, density=1, category_bits=8)
+    seen = [world.cast_rays((0, 0, 0), [[10, 0]], mask)[0][0] for mask in (7, 6, 4, 8, 16, 0)]
+    np.testing.assert_allclose(seen, [0.1, 0.2, 0.3, 0.35, np.nan, np.nan], rtol=1e-5)
+
+
+def test_edges_of_one_body_in_two_categories(world: PhysicsWorld) -> None:
+    wall = world.create_body("static", (0, 0, 0))
+    wall.create_edges([[1, -1, 1, 1]], category_bits=1)
+    wall.create_edges([[2, -1, 2, 1]], category_bits=2)
+    assert world.cast_rays((0, 0, 0), [[10, 0]], 3)[0][0] == pytest.approx(0.1)
+    assert world.cast_rays((0, 0, 0), [[10, 0]], 2)[0][0] == pytest.approx(0.2)
+
+
+def test_sensors_are_not_seen(world: PhysicsWorld) -> None:
+    wall = world.create_body("static", (0, 0, 0))
+    wall.create_edges([[1, -1, 1, 1], [2, -1, 2, 1]])
+    ball = world.create_body("dynamic", (3, 0, 0)).create_circle((0, 0), 0.5, density=1)
+    wall.fixtures[0].is_sensor = True
+    assert world.cast_rays((0, 0, 0), [[10, 0]], ALL)[0][0] == pytest.approx(0.2)
+    wall.fixtures[1].is_sensor = True
+    assert world.cast_rays((0, 0, 0), [[10, 0]], ALL)[0][0] == pytest.approx(0.25)
+    ball.is_sensor = True
+    assert np.isnan(world.cast_rays((0, 0, 0), [[10, 0]], ALL)[0][0])
+    wall.fixtures[0].is_sensor = False
+    assert world.cast_rays((0, 0, 0), [[10, 0]], ALL)[0][0] == pytest.approx(0.1)
+    wall.fixtures[0].category_bits = 2
+    assert np.isnan(world.cast_rays((0, 0, 0), [[10, 0]], 1)[0][0])
+
+
+def test_what_a_ray_starts_in_is_not_hit(world: PhysicsWorld) -> None:
+    body = world.create_body("dynamic", (0, 0, 0))
+    body.create_circle((0, 0), 1, density=1)
+    body.create_polygon([(-2, -2), (2, -2), (2, 2), (-2, 2)], density=1)
+    world.create_body("static", (0, 0, 0)).create_circle((5, 0), 0.5, density=0)
+    fractions, _ = world.cast_rays((0.5, 0.1, 0), [[9, 0], [-9, 0]], ALL)
+    np.testing.assert_allclose(fractions * 9, [4.01, np.nan], atol=0.01)
+    # From outside both are.
+    assert world.cast_rays((-6, 0, 0), [[10, 0]], ALL)[0][0] == pytest.approx(0.4)
+
+
+def test_edges_are_hit_from_both_sides(world: PhysicsWorld) -> None:
+    wall = world.create_body("static", (0, 0, 0))
+    wall.create_edges([[1, -1, 1, 1], [-1, 1, -1, -1], [-1, -2, 1, -2]])
+    ends = [[9, 0], [-9, 0], [0, -9]]
+    np.testing.assert_allclose(world.cast_rays((0, 0, 0), ends, ALL)[0] * 9, [1, 1, 2], rtol=1e-6)
+    for start, end in (((5, 0), (-9, 0)), ((-5, 0), (9, 0)), ((0, -5), (0, 9))):
+        fractions, _ = world.cast_rays((*start, 0), [end], ALL)
+        assert fractions[0] * 9 == pytest.approx(3 if start[0] == 0 else 4)
+
+
+def test_scans_see_moved_bodies(world: PhysicsWorld) -> None:
+    """Walls and robots, moved by hand and by stepping."""
+    wall = world.create_body("static", (5, 0, 0))
+    wall.create_edges([[0, -1, 0, 1]])
+    ball = world.create_body("dynamic", (9, 0, 0))
+    ball.create_circle((0, 0), 0.5, density=1)
+    door = world.create_body("kinematic", (0, 20, 0))
+    door.create_edges([[-1, 0, 1, 0]])
+
+    def ranges() -> list[float]:
+        fractions, _ = world.cast_rays((0, 0, 0), [[20, 0], [0, 20], [-20, 0]], ALL)
+        return (20 * fractions.astype(float)).tolist()
+
+    assert ranges()[:2] == pytest.approx([5, 20])
+    wall.set_pose(7, 0, 0)
+    assert ranges()[0] == pytest.approx(7)
+    wall.set_pose(0, 4, math.pi / 2)
+    assert ranges()[:2] == pytest.approx([8.5, 4])
+    wall.set_pose(0, -50, 0)
+    ball.set_velocity(-2, 0, 0)
+    door.set_velocity(0, -3, 0)
+    for _ in range(100):
+        world.step(0.01, 5, 5)
+    assert ranges()[:2] == pytest.approx([6.5, 17], abs=1e-4)
+    ball.set_pose(-3, 0, 0)
+    assert ranges()[2] == pytest.approx(2.5)
+
+
+def test_scans_see_what_comes_and_goes(world: PhysicsWorld) -> None:
+    def range_ahead() -> float:
+        return float(world.cast_rays((0, 0, 0), [[20, 0]], ALL)[0][0] * 20)
+
+    far = world.create_body("static", (0, 0, 0))
+    far.create_edges([[9, -1, 9, 1]])
+    assert range_ahead() == pytest.approx(9)
+    near = world.create_body("static", (0, 0, 0))
+    near.create_edges([[4, -1, 4, 1]])
+    assert range_ahead() == pytest.approx(4)
+    far.create_edges([[2, -1, 2, 1]])
+    assert range_ahead() == pytest.approx(2)
+    far.destroy()
+    assert range_ahead() == pytest.approx(4)
+    ball = world.create_body("dynamic", (2, 0, 0))
+    ball.create_circle((0, 0), 0.5, density=1)
+    assert range_ahead() == pytest.approx(1.5)
+    ball.destroy()
+    near.destroy()
+    assert math.isnan(range_ahead())
+
+
+def test_no_ray_passes_where_edges_meet(world: PhysicsWorld) -> None:
+    """Rays straight at the corners of a ring of many edges, and as near beside them as can be."""
+    corners = 317
+    angles = np.linspace(0, 2 * math.pi, corners, endpoint=False)
+    ring = (7.3 * np.stack([np.cos(angles), np.sin(angles)], 1)).astype(np.float32)
+    edges = np.hstack([ring, np.roll(ring, -1, axis=0)])
+    world.create_body("static", (0, 0, 0)).create_edges(edges)
+    for origin in ((0, 0), (1.2345, -2.3456), (6.5, 1.1), (-0.001, 7.2)):
+        towards = (ring - np.float32(origin)) * np.float32(3)
+        ends = np.concatenate([towards, np.nextafter(towards, np.inf), np.nextafter(towards, 0)])
+        fractions, _ = world.cast_rays((*origin, 0), ends, ALL)
+        np.testing.assert_allclose(fractions, 1 / 3, rtol=1e-4)
+
+
+def test_reflection_is_that_of_the_nearest_hit(world: PhysicsWorld) -> None:
+    wall = world.create_body("static", (0, 0, 0))
+    wall.create_edges([[5, -1, 5, 1]], category_bits=1)
+    wall.create_edges([[9, -1, 9, 1], [-5, -1, -5, 1], [0, 5, 1, 5]], category_bits=2)
+    wall.create_edges([[-9, -1, -9, 1]], category_bits=1)
+    ends = [[20, 0], [-20, 0], [0.5, 20], [0, -20]]
+    fractions, reflect = world.cast_rays((0, 0, 0), ends, 3, 2)
+    np.testing.assert_allclose(fractions[:2] * 20, [5, 5], rtol=1e-6)
+    assert reflect.tolist() == [False, True, True, False]
+    # What the scan does not see does not reflect either.
+    assert world.cast_rays((0, 0, 0), ends, 1, 2)[1].tolist() == [False] * 4
+    assert world.cast_rays((0, 0, 0), ends, 3, 0)[1].tolist() == [False] * 4
+
+
+def test_of_several_fixtures_at_one_distance_any_may_reflect(world: PhysicsWorld) -> None:
+    """A layer drawn over another: the same wall, cut into other pieces."""
+    plain = world.create_body("static", (0, 0, 0))
+    plain.create_edges([[3, -5, 4, 5]], category_bits=1)
+    mirror = world.create_body("static", (0.5, 0.5, 0.5))
+    line = np.array([[3, -5], [4, 5]]) - 0.5
+    cut = line[0] + np.outer([0.4, 0.6], line[1] - line[0])
+    turn = np.array([[math.cos(0.5), -math.sin(0.5)], [math.sin(0.5), math.cos(0.5)]])
+    mirror.create_edges([(cut @ turn).ravel()], category_bits=2)
+    ends = fan(181, 20, -1, 1)
+    fractions, reflect = world.cast_rays((0, 0, 0), ends, 3, 2)
+    hits = fractions[:, None] * ends
+    np.testing.assert_array_equal(reflect, np.abs(hits[:, 1]) < 1)
+    np.testing.assert_array_equal(reflect, world.cast_rays_reference((0, 0, 0), ends, 3, 2)[1])
+
+
+def test_many_lasers_are_remembered_apart(world: PhysicsWorld) -> None:
+    """More fans than are kept sorted, in turns."""
+    add_room(world)
+    fans = [fan(30 + i, 20) for i in range(40)]
+    for _ in range(2):
+        for ends in fans:
+            np.testing.assert_array_equal(
+                world.cast_rays((1, 1, 1), ends, ALL)[0],
+                world.cast_rays_reference((1, 1, 1), ends, ALL)[0],
+            )
+
+
+def test_a_fan_that_is_written_to_is_another_fan(world: PhysicsWorld) -> None:
+    add_room(world)
+    ends = fan(8, 20)
+    world.cast_rays((0, 0, 0), ends, ALL)
+    ends *= np.float32(0.5)
+    fractions, _ = world.cast_rays((0, 0, 0), ends, ALL)
+    np.testing.assert_array_equal(fractions, world.cast_rays_reference((0, 0, 0), ends, ALL)[0])
