@@ -21,7 +21,7 @@ TIME_LIMIT = 1.0
 MEMORY_LIMIT = 16 * 1024 * 1024
 """Memory that an expression may use [bytes]."""
 _MAX_INPUT = 1024 * 1024  # pushed into the state outside of any protection, so far below the limit
-_MAX_RUNS = 1000
+_MAX_RUNS = 200
 
 # Debian's lupa has a single runtime, LuaJIT; the others have Lua 5.1 and more.
 _RUNTIMES = ("lupa.lua51", "lupa.luajit21", "lupa.luajit20", "lupa")
@@ -75,7 +75,10 @@ def _lua_value(name: str, value: object) -> object:
     if value is None or isinstance(value, bool):
         return value
     if isinstance(value, Real):
-        return float(value)
+        try:
+            return float(value)
+        except OverflowError:
+            raise EvalError(f'param "{name}" is too large for a Lua number') from None
     if isinstance(value, str):
         return value.encode(errors="replace")
     raise EvalError(
@@ -141,10 +144,11 @@ local error, getmetatable, ipairs, pairs, pcall, select, tonumber, tostring, typ
 local clock, getenv, sethook, memory_used = os.clock, os.getenv, debug.sethook, collectgarbage
 local loadstring, create, resume = loadstring, coroutine.create, coroutine.resume
 local byte, find, gsub, rep, sort = string.byte, string.find, string.gsub, string.rep, table.sort
-local concat = table.concat
+local concat, insert = table.concat, table.insert
 
 local known = {}  -- parameters: a table with the value, or with nothing for one that is unset
-for i = 6, select("#", ...), 2 do known[(select(i, ...))] = {(select(i + 1, ...))} end
+local given = {select(6, ...)}
+for i = 1, select("#", ...) - 5, 2 do known[given[i]] = {given[i + 1]} end
 
 if jit then jit.off() end  -- compiled code calls no hooks
 for _, name in ipairs{"execute", "exit", "remove", "rename", "tmpname", "setlocale"} do
@@ -249,6 +253,9 @@ local function guard(name, plain_allowed)
       for i = 1, many do steps = steps * (n + i) / i end
       limit(steps, "the pattern may take too long for a text of " .. n .. " characters")
     end
+    if name == "gsub" and (n + 1) * #text_of(third) > memory_limit then
+      error("not enough memory", 2)
+    end
     return run(text, pattern, third, plain)
   end
 end
@@ -259,6 +266,22 @@ function string.rep(text, count)
   if size == 0 then return "" end
   if (tonumber(count) or 0) * size > memory_limit then error("not enough memory", 2) end
   return rep(text, count)
+end
+local function is_index(number) return number > -1e9 and number < 1e9 end
+function _G.unpack(list, first, last)
+  first, last = tonumber(first) or 1, last == nil and #list or tonumber(last) or 0
+  -- Lua 5.1 counts with 32 bits here; where that overflows, it crashes
+  if not (is_index(first) and is_index(last) and last - first < 7000) then
+    error("too many results to unpack", 2)
+  end
+  return unpack(list, first, last)
+end
+function table.insert(list, ...)
+  local position = tonumber((...)) or 0
+  if select("#", ...) > 1 and not (position >= 0 and is_index(position)) then
+    error("position out of bounds", 2)
+  end
+  return insert(list, ...)
 end
 function table.sort(list, less)
   return sort(list, less or function(a, b) return a < b end)  -- a Lua function lets hooks in
@@ -286,17 +309,23 @@ bind("env", function(name)
 end)
 bind("param", function(name)
   if not known[name] then
-    wanted, stopped = name, "parameter"
+    wanted = name
+    stopped = "parameter"  -- a hook may come in between
     error(stopped, 0)
   end
   return known[name][1]
 end)
 
 local chunk, value = load_text(code, "=$eval")
-local ok = chunk ~= nil
-if ok then
+local ok = false
+if chunk then
+  -- a hook that comes right after the expression fails in `attempt`, not here
+  local function attempt()
+    ok, value = pcall(chunk)
+    sethook()
+  end
   sethook(check, "", interval)
-  ok, value = pcall(chunk)
+  pcall(attempt)
   sethook()
 end
 if wanted then return "param", wanted end

@@ -77,6 +77,10 @@ def _first(documents: list[Node], source: Source) -> Node:
     return documents[0]
 
 
+def _shorten(text: str) -> str:
+    return text if len(text) <= _MAX_SHOWN else text[:_MAX_SHOWN] + "..."
+
+
 _Chain = tuple[tuple[str, str], ...]
 """The files from the outermost to the innermost: real path, path for messages."""
 
@@ -134,8 +138,8 @@ class _Preprocessor:
         try:
             result = evaluate(expression, self._param)
         except EvalError as error:
-            shown = expression if len(expression) <= _MAX_SHOWN else expression[:_MAX_SHOWN] + "..."
-            raise self._error(node, f'Failed to evaluate "{shown}", {error}') from error
+            message = f'Failed to evaluate "{_shorten(expression)}", {_shorten(str(error))}'
+            raise self._error(node, message) from error
         for name in result.unset:
             _LOG.warning("%s is not set%s", name, node.source.place(node.line))
         return result.text

@@ -382,6 +382,9 @@ class YamlReader:
             self._check_kind("list")
             self._check_size(0, None, TUPLE_SIZES[kind])
             return tuple(item._convert("float") for item in self.items())
+        if kind not in CONVERSIONS:
+            known = sorted(k for k in (*CONVERSIONS, *TUPLE_SIZES) if isinstance(k, str))
+            raise ValueError(f"kind must be one of {known}, got {kind!r}")
         type_name, convert = CONVERSIONS[kind]
         try:
             return convert(self._node)
