@@ -257,11 +257,18 @@ class Ros:
         return self.call("/move_model", MoveModel, name, Pose2D(*pose))
 
     def registered(self, node: str = "/flatland_server") -> dict[str, set[str]]:
-        """What a node has registered with the master: publishers, subscribers, services."""
+        """What a node has registered with the master: publishers, subscribers, services.
+
+        Without the interactive markers, which every node has, a little after its start.
+        """
         state = self.master.getSystemState()
         kinds = ("publishers", "subscribers", "services")
         return {
-            kind: {name for name, nodes in entries if node in nodes}
+            kind: {
+                name
+                for name, nodes in entries
+                if node in nodes and "/interactive_model_markers/" not in name
+            }
             for kind, entries in zip(kinds, state, strict=True)
         }
 
