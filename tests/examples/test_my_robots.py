@@ -103,6 +103,7 @@ LISTEN = dedent(
 )
 
 
+@pytest.mark.timeout(240)
 def test_on_ros_it_only_has_to_stand_on_the_package_path(
     example, environment, tmp_path, start, run_command
 ):
