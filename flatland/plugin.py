@@ -1,6 +1,6 @@
 """Base classes of plugins: what a model or world plugin is, has and may do.
 
-A plugin declares its ports and hooks and knows no ROS. See `docs/plugins.md`.
+A plugin declares its ports and hooks and knows no ROS. See `docs/write_a_plugin.md`.
 """
 
 from __future__ import annotations

@@ -185,7 +185,9 @@ class PluginHost:
         self, raw: PreSolveContact, old_manifold: OldManifold, bodies: dict[int, Body]
     ) -> None:
         """Lets the plugins that ask for it change a contact; runs inside the physics step."""
-        body_a, body_b = bodies[raw.body_a], bodies[raw.body_b]
+        body_a, body_b = bodies.get(raw.body_a), bodies.get(raw.body_b)
+        if body_a is None or body_b is None:
+            return
         contact = MutableContact(
             raw,
             body_a,

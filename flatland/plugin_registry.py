@@ -177,7 +177,7 @@ class PluginRegistry:
         """
         for entry in read_manifest(path):
             known = self._classes.setdefault(entry.lookup_name, entry)
-            if known is not entry and known.manifest != entry.manifest:
+            if known is not entry and not Path(known.manifest).samefile(entry.manifest):
                 _LOG.warning(
                     'plugin "%s" of "%s" is hidden by that of "%s"',
                     entry.lookup_name,

@@ -16,6 +16,7 @@ from types import TracebackType
 from typing import Any, Final, TypeVar
 
 import numpy as np
+import numpy.typing as npt
 
 from flatland.body import Body
 from flatland.collision_filter import CollisionFilter
@@ -209,6 +210,10 @@ class World:
             self._physics.step(
                 timekeeper.step_size, self.velocity_iterations, self.position_iterations
             )
+            if self._physics.pre_solve is not None:
+                for error in self._physics.take_pre_solve_errors():
+                    # The host keeps what plugins raise; this is Control-C or the like.
+                    raise error
             if self._records_contacts:
                 self._dispatch_contacts()
             timekeeper.advance()
@@ -279,6 +284,9 @@ class World:
             future = self.post(action)
             future.add_done_callback(lambda done: _log_failure(what, done))
             return None
+        return self._run_between_steps(action)
+
+    def _run_between_steps(self, action: Callable[[], R]) -> R:
         if self._requests_thread == threading.get_ident():
             # Part of a request: those that came after it wait for their turn.
             return action()
@@ -293,6 +301,18 @@ class World:
                 finally:
                     self._lock.release()
         return future.result()  # type: ignore[no-any-return]
+
+    def between_steps(self, look: Callable[[], R]) -> R:
+        """Runs a function that only looks at the world, while no step is under way.
+
+        From any thread; in a plugin's hook, or between two steps, it runs at once.
+
+        Returns:
+            What the function returns; what it raises is raised.
+        """
+        if self._stepping_thread == threading.get_ident():
+            return look()
+        return self._run_between_steps(look)
 
     @contextmanager
     def initialized_by(self, thread: threading.Thread) -> Iterator[None]:
@@ -576,7 +596,9 @@ class World:
         """All pairs of fixtures that touch now."""
         found = []
         for info in self._physics.contacts():
-            body_a, body_b = self._bodies[info.body_a], self._bodies[info.body_b]
+            body_a, body_b = self._bodies.get(info.body_a), self._bodies.get(info.body_b)
+            if body_a is None or body_b is None:
+                continue  # A body that a plugin made in the physics world itself.
             found.append(
                 Contact(
                     info.contact_id,
@@ -605,6 +627,23 @@ class World:
 
     def _pre_solve(self, contact: Any, old_manifold: Any) -> None:
         self._host.pre_solve(contact, old_manifold, self._bodies)
+
+    # -- pictures --------------------------------------------------------------------------
+
+    def draw(self, **options: Any) -> npt.NDArray[np.uint8]:
+        """Draws the world as it is now; the same as `flatland.draw`, where the options are.
+
+        Returns:
+            Red, green and blue of each pixel, the top row first, shape (height, width, 3).
+
+        Raises:
+            FlatlandError: The world is closed, a layer is unknown, or matplotlib is missing.
+            ValueError: An option is out of its range.
+        """
+        # The simulation itself needs no drawing.
+        from flatland.drawing import draw
+
+        return draw(self, **options)
 
     # -- physics for plugins ---------------------------------------------------------------
 

@@ -438,7 +438,6 @@ def test_a_contact_kept_from_pre_solve_is_of_no_use_later(files, faults):
         kept[0].enabled = False
 
 
-@pytest.mark.xfail(reason="PluginHost.pre_solve and World.contacts look such a body up by [ ]")
 def test_bodies_that_the_world_does_not_know_of_are_no_fault(files, faults):
     """A plugin may make bodies of its own in the physics world; no hook hears of them."""
     world, plugin = acting(files)
@@ -452,7 +451,6 @@ def test_bodies_that_the_world_does_not_know_of_are_no_fault(files, faults):
     assert len(world.contacts) == 4
 
 
-@pytest.mark.xfail(reason="World does not take what PhysicsWorld.step keeps of pre_solve")
 def test_an_interrupt_in_pre_solve_ends_the_step_with_it(files, faults):
     """Control-C often lands in the hook, as the rest of a step runs no Python."""
     world, plugin = acting(files)
