@@ -93,10 +93,8 @@ class Simulation:
         Raises:
             ValueError: The rate is negative or not a number.
         """
-        if math.isnan(update_rate) or update_rate < 0:
-            raise ValueError(f"update_rate must not be negative, got {update_rate}")
         self.world = world
-        self._period = 0.0 if update_rate == 0 else 1.0 / update_rate
+        self._period = _period_of(update_rate)
         self._report = report
         self._report_period = report_period
         self._wake = threading.Event()
@@ -106,6 +104,17 @@ class Simulation:
     def stopped(self) -> bool:
         """Whether `stop` was called."""
         return self._stopped
+
+    def set_rate(self, update_rate: float) -> None:
+        """Changes the rate from the next step on; between two steps, or while nothing runs.
+
+        Args:
+            update_rate: Steps in a second of wall time [Hz]; 0 or inf for as many as possible.
+
+        Raises:
+            ValueError: The rate is negative or not a number.
+        """
+        self._period = _period_of(update_rate)
 
     def stop(self) -> None:
         """Makes `run` return after the step that it is in; safe from any thread."""
@@ -135,6 +144,12 @@ class Simulation:
         start = due = time.perf_counter()
         while not self._stopped and timekeeper.sim_time_ns < end_ns:
             begin = time.perf_counter()
+            if self._period != period:
+                # The rate was changed: what was due at the old one no longer matters.
+                period, due = self._period, begin
+                window = _Window(
+                    period or timekeeper.step_size, self._asked(), timekeeper.sim_time_ns
+                )
             world.step()
             end = time.perf_counter()
             window.add(end - begin)
@@ -146,15 +161,18 @@ class Simulation:
                 # Lost time is lost: at most one cycle is made up for.
                 if end - due > period:
                     due = end
-                self._wait_until(due)
+                self._wait_until(due, period)
             elif world.paused:
-                self._wait_until(end + _PAUSED_CYCLE)
+                self._wait_until(end + _PAUSED_CYCLE, period)
         steps = (timekeeper.sim_time_ns - start_ns) // timekeeper.step_size_ns
         return RunResult(steps, time.perf_counter() - start)
 
-    def _wait_until(self, due: float) -> None:
-        """Waits for a time of the wall clock and carries out what is asked for meanwhile."""
-        while not self._stopped:
+    def _wait_until(self, due: float, period: float) -> None:
+        """Waits for a time of the wall clock and carries out what is asked for meanwhile.
+
+        Returns at once when that changes the period.
+        """
+        while not self._stopped and self._period == period:
             left = due - time.perf_counter()
             if left <= 0:
                 return
@@ -172,6 +190,17 @@ class Simulation:
         advanced_ns = self.world.timekeeper.sim_time_ns - window.start_ns
         if self._report is not None and advanced_ns > 0:
             self._report(window.statistics(now, advanced_ns))
+
+
+def _period_of(update_rate: float) -> float:
+    """Returns the wall time between two steps [s], 0 for as little as possible.
+
+    Raises:
+        ValueError: The rate is negative or not a number.
+    """
+    if math.isnan(update_rate) or update_rate < 0:
+        raise ValueError(f"update_rate must not be negative, got {update_rate}")
+    return 0.0 if update_rate == 0 else 1.0 / update_rate
 
 
 class _Window:

@@ -1,8 +1,9 @@
-"""The node's services: spawn, delete and move models, pause and resume."""
+"""The node's services: models come, go and move; time stops, runs on, runs faster."""
 
 from __future__ import annotations
 
 import logging
+import math
 from collections.abc import Callable
 from typing import Any, Final
 
@@ -20,6 +21,9 @@ from flatland.srv import (
     MoveModel,
     MoveModelRequest,
     MoveModelResponse,
+    SetRate,
+    SetRateRequest,
+    SetRateResponse,
     SpawnModel,
     SpawnModelRequest,
     SpawnModelResponse,
@@ -54,6 +58,7 @@ class Services:
             ("spawn_model", SpawnModel, self._spawn_model),
             ("delete_model", DeleteModel, self._delete_model),
             ("move_model", MoveModel, self._move_model),
+            ("set_rate", SetRate, self._set_rate),
             ("pause", Empty, self._switch(world.pause)),
             ("resume", Empty, self._switch(world.resume)),
             ("toggle_pause", Empty, self._switch(world.toggle_pause)),
@@ -80,6 +85,18 @@ class Services:
         return MoveModelResponse(
             *self._carry_out(lambda: self._simulation.world.move_model(request.name, pose))
         )
+
+    def _set_rate(self, request: SetRateRequest) -> SetRateResponse:
+        rate = request.update_rate
+        if math.isnan(rate) or rate < 0:
+            return SetRateResponse(False, f"update_rate must not be negative, got {rate}")
+        done, message = self._carry_out(lambda: self._simulation.set_rate(rate))
+        if done:
+            # Who looks there is to find what holds now.
+            value = 0.0 if math.isinf(rate) else rate
+            self._registrar.submit(lambda: rospy.set_param("~update_rate", value))
+            self._registrar.flush(_REGISTRATION_PATIENCE)
+        return SetRateResponse(done, message)
 
     def _switch(self, action: Callable[[], None]) -> Callable[[Any], EmptyResponse]:
         def serve(_request: Any) -> EmptyResponse:

@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 import threading
+import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
+import rospy
 from geometry_msgs.msg import Pose2D
 from nav_msgs.msg import Odometry
 from rosgraph_msgs.msg import Clock
 from std_srvs.srv import Empty
 
-from flatland.srv import DeleteModel, MoveModel, SpawnModel
+from flatland.srv import DeleteModel, MoveModel, SetRate, SpawnModel
 
 NAN, INF = float("nan"), float("inf")
 ROBOT_PUBLISHERS = {"scan", "odometry/filtered", "odometry/ground_truth", "twist"}
@@ -223,3 +225,34 @@ def test_persistent_client_gets_all_answers(ros: Any) -> None:
         assert answer.success
     move.close()
     assert ros.move("first", (3, 3, 0)).success
+
+
+def test_set_rate(ros: Any) -> None:
+    clock = ros.topic("/clock", Clock)
+
+    def factor() -> float:
+        """How fast the simulated time passes, over half a second."""
+        clock.drop()
+        first, start = clock.next().clock.to_sec(), time.monotonic()
+        time.sleep(0.5)
+        clock.drop()
+        return float((clock.next().clock.to_sec() - first) / (time.monotonic() - start))
+
+    try:
+        for rate, least, most in ((20.0, 0.02, 0.25), (0.0, 2.0, INF), (INF, 2.0, INF)):
+            answer = ros.call("/set_rate", SetRate, rate)
+            assert (answer.success, answer.message) == (True, "")
+            assert rospy.get_param("/flatland_server/update_rate") == (0.0 if rate == INF else rate)
+            assert least < factor() < most
+    finally:
+        ros.call("/set_rate", SetRate, 200.0)
+
+
+@pytest.mark.parametrize("rate", [-1.0, NAN, -INF])
+def test_set_rate_refuses_what_is_no_rate(ros: Any, rate: float) -> None:
+    answer = ros.call("/set_rate", SetRate, rate)
+    assert (answer.success, answer.message) == (
+        False,
+        f"update_rate must not be negative, got {rate}",
+    )
+    assert rospy.get_param("/flatland_server/update_rate", 200.0) == 200.0

@@ -83,6 +83,28 @@ def test_is_never_faster_than_its_rate(world: flatland.World) -> None:
     assert result.wall_time >= 49 * 0.002
 
 
+def test_rate_changes_at_once(world: flatland.World, counter: Counter) -> None:
+    simulation = Simulation(world, 0.001)
+    with Running(simulation):
+        counter.wait_for(1)  # The next step would be due in a quarter of an hour.
+        simulation.post(lambda: simulation.set_rate(50)).result(PATIENCE)
+        counter.wait_for(12)
+        simulation.post(lambda: simulation.set_rate(math.inf)).result(PATIENCE)
+        counter.wait_for(400)
+    steps = counter.times
+    # At 50 Hz no cycle is made up for here but the first; as fast as possible it takes no time.
+    assert steps[11] - steps[2] >= 9 * 0.02 - 0.02
+    assert steps[399] - steps[20] < 379 * 0.02
+
+
+def test_bad_rate_changes_nothing(world: flatland.World) -> None:
+    simulation = Simulation(world, 500)
+    for rate in (-1.0, math.nan):
+        with pytest.raises(ValueError, match="update_rate must not be negative"):
+            simulation.set_rate(rate)
+    assert simulation.run(0.3).wall_time >= 29 * 0.002
+
+
 def test_late_loop_catches_up_with_one_cycle_at_most(
     world: flatland.World, counter: Counter
 ) -> None:
