@@ -6,6 +6,7 @@ and for how to write plugins. Nothing here needs ROS; the ROS node is `flatland.
 
 from flatland.body import Body
 from flatland.contact import Contact, ContactImpulse, ModelContact, MutableContact
+from flatland.drawing import draw
 from flatland.errors import (
     FlatlandError,
     MapFileError,
@@ -38,6 +39,8 @@ from flatland.values import (
 )
 from flatland.world import World, load_world
 from flatland.yaml_reader import YamlReader
+
+__version__ = "0.1.0"
 
 __all__ = [
     "Body",
@@ -75,5 +78,6 @@ __all__ = [
     "WorldPlugin",
     "YamlError",
     "YamlReader",
+    "draw",
     "load_world",
 ]
