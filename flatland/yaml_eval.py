@@ -116,11 +116,8 @@ def _state_factory() -> tuple[Callable[[], Any], int]:
     options = {"encoding": None, "register_eval": False, "attribute_filter": _refuse}
     more_options = {"register_builtins": False, "max_memory": MEMORY_LIMIT}
     for name in _RUNTIMES:
-        try:
-            runtime = importlib.import_module(name).LuaRuntime
-        except ImportError:
-            continue
-        if runtime().lua_version != (5, 1):
+        runtime = _find_runtime(name)
+        if runtime is None:
             continue
         try:
             runtime(**options, **more_options)
@@ -131,6 +128,15 @@ def _state_factory() -> tuple[Callable[[], Any], int]:
     raise EvalError("it needs the Python package lupa with Lua 5.1 or LuaJIT")
 
 
+def _find_runtime(name: str) -> Any:
+    """Returns the class of a Lua 5.1 by its module, None if there is none."""
+    try:
+        runtime = importlib.import_module(name).LuaRuntime
+    except ImportError:
+        return None
+    return runtime if runtime().lua_version == (5, 1) else None
+
+
 def _refuse(_object: object, name: object, _is_setting: bool) -> NoReturn:
     raise AttributeError(f"access to {name!r} is refused")
 
@@ -139,8 +145,8 @@ def _refuse(_object: object, name: object, _is_setting: bool) -> NoReturn:
 # expression can neither see nor change it, whatever it does to the globals.
 _SANDBOX = rb"""
 local code, spent, time_limit, memory_limit, interval = ...
-local error, getmetatable, ipairs, pairs, pcall, select, tonumber, tostring, type, unpack =
-  error, getmetatable, ipairs, pairs, pcall, select, tonumber, tostring, type, unpack
+local error, ipairs, pairs, pcall, select, tonumber, tostring, type, unpack =
+  error, ipairs, pairs, pcall, select, tonumber, tostring, type, unpack
 local clock, getenv, sethook, memory_used = os.clock, os.getenv, debug.sethook, collectgarbage
 local loadstring, create, resume = loadstring, coroutine.create, coroutine.resume
 local byte, find, gsub, rep, sort = string.byte, string.find, string.gsub, string.rep, table.sort

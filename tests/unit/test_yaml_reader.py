@@ -265,7 +265,7 @@ def test_wrong_type_of_an_item(file: Path) -> None:
 
 
 def test_keys_that_nobody_read(file: Path) -> None:
-    reader = read_file(file, "a: 1\nZ: 2\nb: 3\n")
+    reader = read_file(file, "a: 1\nb: 3\nZ: 2\n")
     reader.get("a", "int")
     assert failure(reader.ensure_accessed_all) == (
         f'Flatland YAML: Entry contains unrecognized entry(s) {{"Z", "b"}} [{file}:2]'
