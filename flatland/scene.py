@@ -12,21 +12,21 @@ import numpy as np
 from flatland.body import Body, Color
 from flatland.errors import WorldError
 from flatland.geometry import Pose, compose
-from flatland.plugins.laser import Laser
 from flatland.timekeeper import NANOSECONDS
 from flatland.values import DoubleArray, FloatArray, LaserScan
 
 if TYPE_CHECKING:
     from flatland.layer import Layer
     from flatland.model import Model
+    from flatland.plugins.laser import Laser
     from flatland.world import World
 
 Box = tuple[float, float, float, float]
 """(x_min, y_min, x_max, y_max)"""
 
 _CIRCLE_CORNERS = 64
-_TOLERANCE = 0.1
-"""How far a measured point may be from what is there [m], and as a share of its range."""
+_TOLERANCE, _TOLERANCE_SHARE = 0.05, 0.02
+"""How far a measured point may be from what is there [m], and more as a share of its range."""
 _FITTING_SHARE = 0.5
 
 
@@ -137,6 +137,9 @@ def look_at(world: World, layers: Iterable[str] | None, scans: bool) -> Scene:
     Raises:
         WorldError: The world is closed, or has no layer of a name.
     """
+    # Only who draws needs it: `import flatland` brings no plugin along.
+    from flatland.plugins.laser import Laser
+
     if world.closed:
         raise WorldError("the world is closed")
     names = [layer.name for layer in world.layers] if layers is None else layers
@@ -255,7 +258,7 @@ def _latest_scan(laser: Laser, world: World) -> tuple[Pose, FloatArray] | None:
     pose = (x - vx * age, y - vy * age, theta - omega * age)
     # It would not fit if the model was put elsewhere, or if this is a scan of another laser that
     # shares topic and frame.
-    if not _fits(scan.ranges, _cast(laser, world, pose), laser.range):
+    if not _fits(scan.ranges, _cast(laser, world, pose), laser):
         return None
     return pose, scan.ranges
 
@@ -273,8 +276,9 @@ def _emitted_scan(laser: Laser, world: World) -> LaserScan | None:
     return None
 
 
-def _fits(measured: FloatArray, seen: FloatArray, length: float) -> bool:
+def _fits(measured: FloatArray, seen: FloatArray, laser: Laser) -> bool:
     """Tells whether most ranges are about what is to be seen; a miss counts as the full length."""
+    length = laser.range
     measured, seen = (np.nan_to_num(r, nan=length, posinf=length) for r in (measured, seen))
-    is_near = np.abs(measured - seen) <= _TOLERANCE * (1 + seen)
-    return bool(is_near.mean() >= _FITTING_SHARE)
+    tolerance = _TOLERANCE + _TOLERANCE_SHARE * seen + 3 * laser._deviation
+    return bool((np.abs(measured - seen) <= tolerance).mean() >= _FITTING_SHARE)
