@@ -152,6 +152,28 @@ def test_edges_are_hit_from_both_sides(world: PhysicsWorld) -> None:
         assert fractions[0] * 9 == pytest.approx(3 if start[0] == 0 else 4)
 
 
+def test_the_ends_of_an_edge_belong_to_it(world: PhysicsWorld) -> None:
+    """Also those of edges that run either way, seen from either side."""
+    wall = world.create_body("static", (0, 0, 0))
+    wall.create_edges([[1, -1, 1, 1], [-1, -1, -1, 1]])
+    ends = [[2, 2], [2, -2], [-2, 2], [-2, -2]]
+    assert world.cast_rays((0, 0, 0), ends, ALL)[0].tolist() == [0.5] * 4
+    ends = np.nextafter(np.float32(ends), np.float32([[0, 9]]))
+    got = world.cast_rays((0, 0, 0), ends, ALL)[0]
+    assert np.isnan(got).tolist() == [True, False, True, False], "and nothing beyond them"
+
+
+@pytest.mark.parametrize("edge", [[-5, 0, 5, 0], [0, 3, 0, -3], [-2, -2, 2, 2], [0, 0, 2, 1]])
+def test_a_sensor_upon_an_edge_sees_nothing_else(world: PhysicsWorld, edge: list[float]) -> None:
+    add_room(world)
+    world.create_body("static", (0, 0, 0)).create_edges([edge])
+    ends = fan(1000, 20)
+    along = np.abs(np.cross(ends, np.subtract(edge[2:], edge[:2]))) < 1e-4
+    fractions, _ = world.cast_rays((0, 0, 0), ends, ALL)
+    assert along.sum() <= 2
+    assert (fractions[~along] == 0).all()
+
+
 def test_scans_see_moved_bodies(world: PhysicsWorld) -> None:
     """Walls and robots, moved by hand and by stepping."""
     wall = world.create_body("static", (5, 0, 0))
