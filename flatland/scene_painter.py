@@ -23,6 +23,7 @@ _BEAMS: Final = ("#e0392b", "#0f8b8d", "#8e44ad", "#d68910", "#2471a3", "#c2185b
 _FILLING: Final = 0.6  # opacity of a footprint, times its colour's own
 _HEADING: Final = 0.4  # length of the triangle that points ahead, of the body's breadth
 _BRIGHTEST: Final = 0.5  # luminance that still shows on the floor
+_WALL: Final = 1.44  # points: 2 pixels at 100 dpi, so that straight walls are crisp
 _SMALLEST: Final = 0.08  # inches; a model smaller than that is shown by a triangle of that size
 
 # From below to above; the grid is below them all.
@@ -54,7 +55,7 @@ def paint(scene: Scene, layout: Layout, dpi: float, names: bool) -> Figure:
         _paint_sweep(axes, sweep, _BEAMS[i % len(_BEAMS)])
     for walls in scene.walls:
         lines = LineCollection(
-            walls.edges, colors=[_shown(walls.color)], linewidths=1.2, capstyle="projecting"
+            walls.edges, colors=[_shown(walls.color)], linewidths=_WALL, capstyle="projecting"
         )
         _add(axes, lines, _WALLS)
     _paint_footprints(axes, scene)
@@ -95,16 +96,15 @@ def _stroke(color: Color) -> Color:
 # -- parts ---------------------------------------------------------------------------------
 
 
-def _paint_axes(axes: Any, has_axes: bool) -> None:
-    axes.grid(visible=has_axes, color=_GRID, linewidth=0.7, linestyle="-")
+def _paint_axes(axes: Any, visible: bool) -> None:
+    axes.grid(visible=True, color=_GRID, linewidth=0.7, linestyle="-")
     axes.set_axisbelow(True)
     axes.tick_params(color=_FRAME, labelcolor=_INK, labelsize=9, length=3, width=0.7)
     for spine in axes.spines.values():
-        spine.set(visible=has_axes, edgecolor=_FRAME, linewidth=0.8)
+        spine.set(visible=visible, edgecolor=_FRAME, linewidth=0.8)
     for axis, name in ((axes.xaxis, "x"), (axes.yaxis, "y")):
-        if not has_axes:
-            axis.set_visible(False)
         axis.set_label_text(f"{name} [m]", fontsize=10, color=_INK)
+        axis.set_visible(visible)  # ticks, labels and grid
 
 
 def _paint_sweep(axes: Any, sweep: Sweep, color: str) -> None:
