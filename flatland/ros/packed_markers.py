@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 import struct
+from collections.abc import Sequence
 from io import BytesIO
 from typing import Any, Final
 
@@ -114,6 +115,10 @@ class PackedMarkers(MarkerArray):  # type: ignore[misc]
         """Writes the message to a buffer; rospy calls it."""
         buff.write(self._data)
 
+    def write_markers(self, buff: Any) -> None:
+        """Writes the markers to a buffer, without their number."""
+        buff.write(memoryview(self._data)[_COUNT.size :])
+
     @property
     def markers(self) -> list[Marker]:
         """The markers as ROS has them, made anew at each use."""
@@ -146,6 +151,25 @@ class PackedMarkers(MarkerArray):  # type: ignore[misc]
         self._points.append((start + points_start, count))
         _COUNT.pack_into(self._data, 0, len(self))
         return number
+
+
+class JoinedMarkers(MarkerArray):  # type: ignore[misc]
+    """The markers of several PackedMarkers in one message; their namespaces must differ."""
+
+    def __init__(self, parts: Sequence[PackedMarkers]) -> None:
+        """Copies nothing yet: the parts must not change before the message is sent."""
+        self._parts = parts
+
+    def serialize(self, buff: Any) -> None:
+        """Writes the message to a buffer; rospy calls it."""
+        buff.write(_COUNT.pack(sum(map(len, self._parts))))
+        for part in self._parts:
+            part.write_markers(buff)
+
+    @property
+    def markers(self) -> list[Marker]:
+        """The markers as ROS has them, made anew at each use."""
+        return [marker for part in self._parts for marker in part.markers]
 
 
 def _packed(points: npt.NDArray[np.float64]) -> bytes:

@@ -1,4 +1,4 @@
-"""Starts what shows a world: interactive markers always, debug markers where they are wanted."""
+"""Starts what shows a world: interactive markers and pause always, debug markers where wanted."""
 
 from __future__ import annotations
 
@@ -52,7 +52,10 @@ class Visualization:
         try:
             if self._debug_rate is not None:
                 importlib.import_module("flatland.ros.debug_visualization")
+                importlib.import_module("flatland.ros.combined_markers")
                 self._start(self._start_debug_markers, "debug markers")
+            importlib.import_module("flatland.ros.pause_topic")
+            self._start(self._start_pause_topic, "the pause topic")
             importlib.import_module("flatland.ros.interactive_markers")
             self._start(self._start_interactive_markers, "interactive markers")
         except ImportError as error:
@@ -67,12 +70,18 @@ class Visualization:
         self._simulation.post(action).add_done_callback(report)
 
     def _start_debug_markers(self) -> None:
+        from flatland.ros.combined_markers import CombinedMarkers
         from flatland.ros.debug_visualization import DebugVisualization
 
         if not self._closed and self._debug_rate is not None:
-            self._parts.append(
-                DebugVisualization(self._registrar, self._simulation, self._debug_rate)
-            )
+            for part in (DebugVisualization, CombinedMarkers):
+                self._parts.append(part(self._registrar, self._simulation, self._debug_rate))
+
+    def _start_pause_topic(self) -> None:
+        from flatland.ros.pause_topic import PauseTopic
+
+        if not self._closed:
+            self._parts.append(PauseTopic(self._registrar, self._simulation))
 
     def _start_interactive_markers(self) -> None:
         from flatland.ros.interactive_markers import InteractiveMarkers
