@@ -236,7 +236,7 @@ struct DepthScanKernel {
         const Floats sigma = c * c - rr * b;
         const Floats root = simd::sqrt(simd::max(sigma, simd::all(0.0F)));
         const Floats a = -(c + root);
-        keep_hits(block, a / rr, (sigma >= 0.0F) & (rr >= b2_epsilon) & (a >= 0.0F) & (a <= rr));
+        keep_hits(block, a / rr, (sigma >= 0.0F) & (rr >= b2_epsilon) & (a <= rr));
       }
       return false;
     });

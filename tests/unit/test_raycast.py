@@ -142,6 +142,15 @@ def test_what_a_ray_starts_in_is_not_hit(world: PhysicsWorld) -> None:
     assert world.cast_rays((-6, 0, 0), [[10, 0]], ALL)[0][0] == pytest.approx(0.4)
 
 
+def test_rays_along_the_sides_of_a_box(world: PhysicsWorld) -> None:
+    body = world.create_body("dynamic", (5, 2, 0))
+    body.create_polygon([(-1, -1), (1, -1), (1, 1), (-1, 1)], density=1)
+    ends = [[20, 0], [20, 8], [10, 5], [0, 20]]
+    np.testing.assert_allclose(
+        world.cast_rays((0, 0, 0), ends, ALL)[0], [np.nan, 0.2, 0.4, np.nan], rtol=1e-5
+    )
+
+
 def test_edges_are_hit_from_both_sides(world: PhysicsWorld) -> None:
     wall = world.create_body("static", (0, 0, 0))
     wall.create_edges([[1, -1, 1, 1], [-1, 1, -1, -1], [-1, -2, 1, -2]])
