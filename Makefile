@@ -41,8 +41,9 @@ format: setup-dev  ## bring Python and C++ sources into shape
 	clang-format -i $(CPP_FILES)
 
 .PHONY: bench
-bench: setup-dev  ## measure speed, the ray casts against plain b2World::RayCast among it
-	@. ./setup.bash && python bench
+bench: setup-dev  ## measure speed into build/bench.json: make bench [BASELINE=file of an earlier run]
+	@. ./setup.bash && python bench --json build/bench.json \
+	  $(if $(BASELINE),--baseline "$(BASELINE)") $(ARGS)
 
 .PHONY: docs
 docs: setup  ## check that every link and picture of README.md and docs/ leads somewhere

@@ -1,0 +1,45 @@
+"""Measures flatland: `make bench`, or `python bench` in its environment.
+
+Prints one table; every figure is a ratio, or a multiple of U, one scan of 1081 beams by
+`b2World::RayCast` on the benchmark world in the same run.
+"""
+
+from __future__ import annotations
+
+import argparse
+import importlib
+import json
+from pathlib import Path
+
+from scans import yardstick
+from table import as_json, format_table
+
+# Each module has `rows(unit)`, which measures and returns its rows; unit is U in seconds.
+MODULES = ("scans",)
+
+
+def main() -> None:
+    """Measures, prints the table and writes JSON."""
+    parser = argparse.ArgumentParser(prog="bench", description=__doc__)
+    parser.add_argument("--json", type=Path, metavar="FILE", help="write the rows as JSON")
+    parser.add_argument("--baseline", type=Path, metavar="FILE", help="JSON of an earlier run")
+    parser.add_argument(
+        "--only", nargs="+", choices=MODULES, default=MODULES, metavar="GROUP", help="some groups"
+    )
+    options = parser.parse_args()
+    baseline = {}
+    if options.baseline is not None:
+        earlier = json.loads(options.baseline.read_text())
+        baseline = {row["name"]: row["value"] for row in earlier["rows"]}
+    unit = yardstick()
+    print(f"U = {unit * 1e3:.3f} ms\n")
+    rows = []
+    for name in options.only:
+        rows += importlib.import_module(name).rows(unit)
+    print(format_table(rows, baseline))
+    if options.json is not None:
+        options.json.write_text(json.dumps({"unit": unit, "rows": as_json(rows)}, indent=2))
+
+
+if __name__ == "__main__":
+    main()
