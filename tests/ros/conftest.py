@@ -315,7 +315,7 @@ def _overlay(checkout: Path, folder: Path) -> Path:
     """The package as an install would lay it out, with links into the source tree."""
     share = folder / "share" / "flatland"
     (share / "scripts").mkdir(parents=True)
-    for name in ("package.xml", "flatland_plugins.xml", "launch", "msg", "srv", "worlds"):
+    for name in ("package.xml", "flatland_plugins.xml", "launch", "msg", "rviz", "srv", "worlds"):
         (share / name).symlink_to(checkout / name)
     for script in (checkout / "scripts").iterdir():
         if script.is_file():

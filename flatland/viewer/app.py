@@ -1,0 +1,101 @@
+"""Starts the viewer: checks what it needs, makes the window, runs until it is closed."""
+
+from __future__ import annotations
+
+import ctypes
+import importlib
+import logging
+import os
+import signal
+import sys
+from typing import Final
+
+_LOG = logging.getLogger("flatland")
+NODE_NAME: Final = "flatland_viz"
+SERVER_NAME: Final = "flatland_server"
+
+
+def main() -> int:
+    """Runs the viewer.
+
+    Returns:
+        The exit code: 0 after the window was closed or a stop was asked for, 1 when the viewer
+        cannot start, for a reason that the log tells.
+    """
+    import rosgraph
+    import rospy
+
+    if not rosgraph.is_master_online():
+        # rospy would wait for it, without a window and without a word.
+        uri = rosgraph.get_master_uri()
+        print(f"flatland_viz: no ROS master at {uri}: start the simulator first", file=sys.stderr)
+        return 1
+    # Each viewer is a node of its own, unless it is given a name. The time comes from RViz.
+    rospy.init_node(NODE_NAME, anonymous=True, disable_signals=True, disable_rostime=True)
+    from flatland.ros.logs import log_to_ros
+
+    log_to_ros()
+    reason = _why_not()
+    if reason:
+        _LOG.critical("the viewer cannot start: %s. The simulator runs on without it", reason)
+        rospy.signal_shutdown("the viewer cannot start")
+        return 1
+    return _run()
+
+
+def _why_not() -> str:
+    """Returns what keeps the viewer from starting, empty when nothing does."""
+    # RViz draws through X11, also where the desktop itself is another one.
+    os.environ.setdefault("QT_QPA_PLATFORM", "xcb")
+    reason = _why_no_display()
+    if reason:
+        return reason
+    try:
+        importlib.import_module("PyQt5.QtWidgets")
+        importlib.import_module("rviz")
+    except ImportError as error:
+        return f"it needs PyQt5 and RViz's Python bindings (python3-pyqt5, python3-rviz): {error}"
+    return ""
+
+
+def _why_no_display() -> str:
+    """Tries the X server: Qt would abort the process without one."""
+    if os.environ["QT_QPA_PLATFORM"] != "xcb":
+        return ""
+    name = os.environ.get("DISPLAY", "")
+    if not name:
+        return "there is no display (DISPLAY is not set)"
+    try:
+        x11 = ctypes.CDLL("libX11.so.6")
+    except OSError as error:
+        return f"it needs an X11 client library: {error}"
+    x11.XOpenDisplay.restype = ctypes.c_void_p
+    x11.XCloseDisplay.argtypes = [ctypes.c_void_p]
+    display = x11.XOpenDisplay(None)
+    if not display:
+        return f"the display {name} cannot be opened"
+    x11.XCloseDisplay(display)
+    return ""
+
+
+def _run() -> int:
+    import rospy
+    from PyQt5.QtWidgets import QApplication
+
+    from flatland.viewer.ros_link import RosLink
+    from flatland.viewer.server import Server
+    from flatland.viewer.window import ViewerWindow
+
+    app = QApplication(["flatland"])
+    link = RosLink(Server(rospy.resolve_name(SERVER_NAME)))
+    window = ViewerWindow(link)
+    # After RViz, which brings signal handlers of its own. The status line's clock wakes Python
+    # often enough for them to run.
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, lambda *_: app.quit())
+    rospy.on_shutdown(app.quit)
+    window.show()
+    link.start()
+    app.exec_()
+    link.close()
+    return 0

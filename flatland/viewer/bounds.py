@@ -1,0 +1,57 @@
+"""How far the markers of a layer reach, so that the view can show all of it."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from flatland.geometry import rotate
+
+
+@dataclass(frozen=True, slots=True)
+class Bounds:
+    """A rectangle along the axes of the world frame [m]."""
+
+    x_min: float
+    y_min: float
+    x_max: float
+    y_max: float
+
+    @property
+    def center(self) -> tuple[float, float]:
+        """Its middle."""
+        return ((self.x_min + self.x_max) / 2, (self.y_min + self.y_max) / 2)
+
+    @property
+    def size(self) -> tuple[float, float]:
+        """Its extent along x and y."""
+        return (self.x_max - self.x_min, self.y_max - self.y_min)
+
+    def union(self, other: Bounds | None) -> Bounds:
+        """Returns the smallest rectangle around both."""
+        if other is None:
+            return self
+        return Bounds(
+            min(self.x_min, other.x_min),
+            min(self.y_min, other.y_min),
+            max(self.x_max, other.x_max),
+            max(self.y_max, other.y_max),
+        )
+
+
+def bounds_of(markers: Any) -> Bounds | None:
+    """Returns the rectangle around all points of a MarkerArray, None when it has none."""
+    whole: Bounds | None = None
+    for marker in markers.markers:
+        if not marker.points:
+            continue
+        points = np.array([(point.x, point.y) for point in marker.points])
+        yaw = 2 * math.atan2(marker.pose.orientation.z, marker.pose.orientation.w)
+        c, s = rotate((1.0, 0.0), yaw)
+        x = marker.pose.position.x + c * points[:, 0] - s * points[:, 1]
+        y = marker.pose.position.y + s * points[:, 0] + c * points[:, 1]
+        whole = Bounds(float(x.min()), float(y.min()), float(x.max()), float(y.max())).union(whole)
+    return whole

@@ -1,0 +1,62 @@
+"""What shows where a model will stand: its outline, and an arrow for its heading."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any, Final
+
+from geometry_msgs.msg import Point, Pose, Quaternion
+from std_msgs.msg import ColorRGBA
+from visualization_msgs.msg import Marker, MarkerArray
+
+from flatland import geometry
+from flatland.viewer.outline import Outline, reach
+
+_LINE_WIDTH: Final = 0.04  # m
+_ARROW_HEIGHT: Final = 0.3  # m above the floor: over everything that is drawn on it
+_ARROW_COLOR: Final = (1.0, 0.85, 0.1, 1.0)
+
+
+def preview_markers(outlines: Sequence[Outline], frame: str) -> list[Any]:
+    """Makes the markers of a model at the origin; `at_pose` brings them to their place.
+
+    Args:
+        outlines: Of the model's bodies.
+        frame: The world frame.
+    """
+    markers = []
+    for number, outline in enumerate(outlines):
+        marker = _marker(number, Marker.LINE_LIST, (*outline.color[:3], 1.0), frame)
+        marker.scale.x = _LINE_WIDTH
+        marker.points = [Point(x, y, 0.1) for x, y in outline.segments.tolist()]
+        markers.append(marker)
+    length = max(1.0, 1.5 * reach(outlines))
+    arrow = _marker(len(markers), Marker.ARROW, _ARROW_COLOR, frame)
+    arrow.points = [Point(0, 0, _ARROW_HEIGHT), Point(length, 0, _ARROW_HEIGHT)]
+    arrow.scale.x, arrow.scale.y, arrow.scale.z = 0.05 * length, 0.15 * length, 0.2 * length
+    return [*markers, arrow]
+
+
+def at_pose(markers: Sequence[Any], pose: geometry.Pose) -> Any:
+    """Returns the markers as a MarkerArray at a pose in the world frame."""
+    x, y, theta = pose
+    for marker in markers:
+        marker.pose = Pose(
+            Point(x, y, 0.0), Quaternion(0.0, 0.0, math.sin(theta / 2), math.cos(theta / 2))
+        )
+    return MarkerArray(list(markers))
+
+
+def no_markers() -> Any:
+    """Returns the MarkerArray that takes all others away."""
+    return MarkerArray([Marker(action=Marker.DELETEALL)])
+
+
+def _marker(number: int, kind: int, color: tuple[float, ...], frame: str) -> Any:
+    # Stamp 0: the latest transform will do, also while the simulated time stands still.
+    marker = Marker(ns="preview", id=number, type=kind, action=Marker.ADD)
+    marker.header.frame_id = frame
+    marker.color = ColorRGBA(*color)
+    marker.pose.orientation.w = 1.0
+    return marker
