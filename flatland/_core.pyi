@@ -174,7 +174,10 @@ class PreSolveContact:
     def normal(self) -> _Doubles: ...
 
 class OldManifold:
-    """Contact points of the step before, in the frames of the two bodies."""
+    """Contact points of the step before, in the frames of the two bodies.
+
+    `kind` is `circles`, `face_a`, `face_b`, or `none` when there were no points.
+    """
 
     @property
     def kind(self) -> str: ...

@@ -51,9 +51,13 @@ class PreSolveContact {
 
 // The manifold of the step before, in the frames of the two bodies.
 struct OldManifold {
-  b2Manifold manifold;
+  // Box2D does not fill in a manifold without points.
+  explicit OldManifold(const b2Manifold& given)
+      : manifold(given.pointCount > 0 ? given : b2Manifold{}) {}
 
   std::size_t count() const { return static_cast<std::size_t>(manifold.pointCount); }
+
+  b2Manifold manifold;
 };
 
 class PythonHook final : public PreSolveHook {
@@ -69,7 +73,7 @@ class PythonHook final : public PreSolveHook {
     try {
       const auto shown = std::make_shared<PreSolveContact>(contact, row);
       try {
-        callback_(shown, OldManifold{old_manifold});
+        callback_(shown, OldManifold(old_manifold));
       } catch (py::error_already_set& error) {
         keep(error);
       }
@@ -168,6 +172,7 @@ void bind_pre_solve_contact(py::module_& module) {
 void bind_old_manifold(py::module_& module) {
   py::class_<OldManifold> manifold(module, "OldManifold");
   manifold.def_property_readonly("kind", [](const OldManifold& self) {
+    if (self.count() == 0) return "none";
     if (self.manifold.type == b2Manifold::e_circles) return "circles";
     return self.manifold.type == b2Manifold::e_faceA ? "face_a" : "face_b";
   });

@@ -171,7 +171,8 @@ void World::destroy_body(Id id) {
 }
 
 void World::destroy_joint(Id id) {
-  engine_->DestroyJoint(change_joint(id));
+  b2Joint* joint = change_joint(id);
+  engine_->DestroyJoint(joint);
   joints_.erase(id);
 }
 

@@ -257,7 +257,8 @@ def test_what_pre_solve_sees(world: PhysicsWorld) -> None:
     np.testing.assert_array_equal(first["normal"], begin.normal)
     assert first["mixed"] == pytest.approx((True, 0.5, 0.5))
     assert first["speed"] == 0
-    assert first["old"][0].shape == (0, 2)
+    assert (first["old"][0].shape, first["old"][3]) == ((0, 2), "none")
+    assert first["frame"][0].tolist() == first["frame"][1].tolist() == [0, 0]
     assert first["pose"][0] == pytest.approx(-0.5, abs=0.05)
     for _ in range(3):
         disc.set_velocity(1, 0, 0)
