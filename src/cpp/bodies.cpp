@@ -6,6 +6,7 @@
 #include <string>
 #include <utility>
 
+#include "broad_phase.h"
 #include "errors.h"
 #include "shapes.h"
 
@@ -141,11 +142,16 @@ std::size_t create_edges(World& world, Id body_id, const float* edges, std::size
   const World::ExclusiveUse use(world, "is making edges");
   auto* body = const_cast<b2Body*>(world.read_body(body_id));
   world.reserve_fixtures(count);
+  const int32 waiting_before = waiting_fixtures(world.engine());
   std::size_t made = 0;
   for (std::size_t i = 0; i < count; ++i) {
     if (!make_edge(edges + 4 * i, &shape)) continue;
     world.add_fixture(body, definition);
     ++made;
+  }
+  constexpr std::size_t kManyEdges = 10000;
+  if (made >= kManyEdges && body->GetType() == b2_staticBody) {
+    world.skip_static_fixtures(waiting_before);
   }
   if (made > 0) wake(world, body);
   return made;

@@ -7,6 +7,7 @@
 #include <new>
 #include <stdexcept>
 
+#include "broad_phase.h"
 #include "errors.h"
 
 namespace flatland {
@@ -71,7 +72,6 @@ void World::step(double dt, int velocity_iterations, int position_iterations, Pr
   contacts_.hook = hook;
   engine_->Step(static_cast<float>(dt), velocity_iterations, position_iterations);
   contacts_.hook = nullptr;
-  fixtures_since_step_ = 0;
   if (contacts_.take_failure()) throw std::bad_alloc();
 }
 
@@ -141,8 +141,11 @@ Id World::add_fixture(b2Body* body, const b2FixtureDef& definition) {
   const Id id = fixtures_.insert(fixture);
   fixture->GetUserData().pointer = id;
   rays_.add(fixture);
-  ++fixtures_since_step_;
   return id;
+}
+
+void World::skip_static_fixtures(int32 waiting_before) {
+  flatland::skip_static_fixtures(*engine_, waiting_before);
 }
 
 Id World::add_joint(const b2JointDef& definition, float frequency, float damping_ratio) {
@@ -160,10 +163,9 @@ void World::destroy_body(Id id) {
   // Box2D looks through all fixtures that moved or came since the last search for pairs, for each
   // fixture that is destroyed: hours for a large map that goes again before the first step. A
   // search empties that list.
-  constexpr std::size_t kManyFixtures = 2000;
-  if (fixtures_since_step_ > kManyFixtures) {
+  constexpr int32 kManyFixtures = 2000;
+  if (waiting_fixtures(*engine_) > kManyFixtures) {
     const_cast<b2ContactManager&>(engine_->GetContactManager()).FindNewContacts();
-    fixtures_since_step_ = 0;
   }
   rays_.remove_body(body);
   engine_->DestroyBody(body);  // says goodbye to its fixtures and joints, and ends its contacts

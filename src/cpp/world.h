@@ -62,7 +62,9 @@ class World final : private b2DestructionListener {
   // Creation from checked definitions, and destruction. A body takes its fixtures and joints along.
   Id add_body(const b2BodyDef& definition);
   Id add_fixture(b2Body* body, const b2FixtureDef& definition);
+  // Before and after many fixtures are added to one static body; see broad_phase.h.
   void reserve_fixtures(std::size_t more) { fixtures_.reserve(more); }
+  void skip_static_fixtures(int32 waiting_before);
   Id add_joint(const b2JointDef& definition, float frequency, float damping_ratio);
   void destroy_body(Id id);
   void destroy_joint(Id id);
@@ -114,7 +116,6 @@ class World final : private b2DestructionListener {
   SlotMap<JointRecord, IdKind::kJoint> joints_;
   ContactRecorder contacts_;
   RayScene rays_;
-  std::size_t fixtures_since_step_ = 0;
 
   std::atomic<int> users_{0};  // kExclusive, or how many threads cast rays
   std::atomic<std::thread::id> owner_{};

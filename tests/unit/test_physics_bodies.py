@@ -59,6 +59,24 @@ def test_mass_and_centre(world: PhysicsWorld) -> None:
     assert world.create_body("static", (0, 0, 0)).mass == 0
 
 
+def test_walls_of_a_large_map_hold_what_came_before_and_after(world: PhysicsWorld) -> None:
+    """Maps of many edges take a short cut past Box2D's search for pairs."""
+    before, resting = disc(world, -2, 0), disc(world, -0.4, 5)
+    world.step(STEP, 10, 10)
+    resting.awake = False
+    wall = world.create_body("static", (0, 0, 0))
+    y = np.linspace(-10, 10, 20_001)
+    x = np.zeros(20_000)
+    assert wall.create_edges(np.stack([x, y[:-1], x, y[1:]], 1)) == 20_000
+    after = disc(world, 2, 0)
+    for body in (before, after):
+        body.set_velocity(-2 * np.sign(body.pose[0]), 0, 0)
+    run(world, 200)
+    assert before.pose[0] == pytest.approx(-0.5, abs=0.06)
+    assert after.pose[0] == pytest.approx(0.5, abs=0.06)
+    assert resting.pose[0] < -0.48, "pushed out of the wall that came upon it"
+
+
 @pytest.mark.parametrize("body_type", ["dynamic", "kinematic"])
 def test_velocity_is_that_of_the_origin(world: PhysicsWorld, body_type: str) -> None:
     """The centre of mass lies beside the origin, yet the origin moves as it was told."""
