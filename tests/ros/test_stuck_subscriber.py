@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import socket
 import struct
 from collections.abc import Callable, Iterator
@@ -14,7 +15,6 @@ import pytest
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import LaserScan
 from std_srvs.srv import Empty
-import itertools
 
 BEAMS = """
 bodies: [{name: base, footprints: [{type: circle, radius: 0.2, density: 1}]}]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Callable
 from pathlib import Path
@@ -16,7 +17,6 @@ from std_msgs.msg import Bool
 from tf2_msgs.msg import TFMessage
 
 from flatland.msg import Collisions
-import itertools
 
 ROBOT = """
 bodies:

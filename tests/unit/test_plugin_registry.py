@@ -206,7 +206,7 @@ def test_a_broken_package_does_not_hide_the_others(package, files, monkeypatch):
     monkeypatch.setenv("ROS_PACKAGE_PATH", f"{files.folder / 'other'}:{files.folder}")
     registry = PluginRegistry()
     assert registry.find(f"{name}::Good").manifest == manifest
-    with pytest.raises(PluginError, match='not read: package "other" cannot be read: .*email'):
+    with pytest.raises(PluginError, match=r'not read: package "other" cannot be read: .*email'):
         registry.find("other::Good")
 
 
