@@ -63,7 +63,7 @@ def _make_parser() -> argparse.ArgumentParser:
     show.add_argument("--steps", type=_count, default=0, help="steps before the picture (0)")
     show.add_argument("--seed", type=_count, help="of all noise; without, another one each time")
     show.add_argument("--size", type=_size, metavar="WxH", help="of the picture, in pixels")
-    show.add_argument("--dpi", type=_dpi, default=100.0, help="pixels an inch of letters (100)")
+    show.add_argument("--dpi", type=float, default=100.0, help="pixels an inch of letters (100)")
     show.add_argument(
         "--view",
         type=float,
@@ -123,13 +123,6 @@ def _size(text: str) -> tuple[int, int]:
     if not found:
         raise argparse.ArgumentTypeError(f"must be WIDTHxHEIGHT, as in 1200x800, got {text!r}")
     return int(found[1]), int(found[2])
-
-
-def _dpi(text: str) -> float:
-    try:
-        return float(text)
-    except ValueError:
-        raise argparse.ArgumentTypeError(f"must be a number, got {text!r}") from None
 
 
 def _parameter(text: str) -> tuple[str, object]:

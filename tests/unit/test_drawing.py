@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 import flatland
-from flatland import drawing
+from flatland import drawing, scene
 
 ROOM = ["##########", *["#........#"] * 8, "##########"]  # 1 m cells: walls at x, y = 1 and 9
 FLOOR = (251, 251, 249)
@@ -248,9 +248,16 @@ def test_drawing_wants_no_output(files):
 
 
 class TestThreads:
-    def test_a_running_world_may_be_drawn_from_other_threads(self, files):
+    def test_a_running_world_may_be_drawn_from_other_threads(self, files, monkeypatch):
         world = room_world(files, body() + laser())
         world.output("/scan")
+        inside_a_step: list[bool] = []
+
+        def look_at(*arguments: Any) -> Any:
+            inside_a_step.append(world._stepping_thread is not None)
+            return scene.look_at(*arguments)
+
+        monkeypatch.setattr(drawing, "look_at", look_at)
         pictures: list[Any] = []
         failures: list[BaseException] = []
 
@@ -267,6 +274,7 @@ class TestThreads:
             world.step(10)
         assert not failures
         assert len(pictures) == 6
+        assert inside_a_step == [False] * 6
         # The robot stands still, and its laser has no noise.
         assert all((picture == pictures[0]).all() for picture in pictures)
 
@@ -288,7 +296,9 @@ class TestPicture:
 
     @pytest.mark.parametrize("size", [(300, 200), (29, 57), (333, 1001)])
     def test_size_is_exact(self, files, size):
-        assert room_world(files).draw(size=size, dpi=20).shape == (size[1], size[0], 3)
+        world = room_world(files)
+        assert world.draw(size=size, axes=False).shape == (size[1], size[0], 3)
+        assert world.draw(size=size, dpi=20).shape == (size[1], size[0], 3)
 
     def test_size_without_one_follows_the_view(self, files):
         world = room_world(files)

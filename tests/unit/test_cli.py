@@ -1,0 +1,223 @@
+"""The command `flatland`."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import tomllib
+import xml.etree.ElementTree as ElementTree
+from pathlib import Path
+from typing import Any
+
+import cv2
+import pytest
+
+import flatland
+from flatland import cli
+
+MODEL = """
+bodies:
+- name: base
+  footprints:
+  - type: circle
+    radius: $eval param("/radius", 0.5)
+    density: 1
+- {name: arm, footprints: []}
+joints: [{type: weld, name: j, bodies: [{name: base, anchor: [0, 0]}, {name: arm, anchor: [0, 0]}]}]
+plugins:
+- {type: Laser, name: eye, body: base, range: 9, angle: {min: 0, max: 6, increment: 0.01}}
+- {type: Tween, name: tween, body: base, mode: once, duration: 1, delta: [3, 0, 0]}
+"""
+
+
+@pytest.fixture
+def world_file(files: Any) -> str:
+    """A room with a robot at (3, 5) that a tween takes to (6, 5) in a second."""
+    files.write_map("room", ["##########", *["#........#"] * 8, "##########"])
+    files.write("robot.model.yaml", MODEL)
+    return files.write(
+        "world.yaml",
+        """
+        properties: {}
+        layers: [{name: [walls, 3d], map: room.yaml, color: [1, 0, 0, 1]}, {name: empty}]
+        models: [{name: robot, model: robot.model.yaml, pose: [3, 5, 0]}]
+        """,
+    )
+
+
+def run(*arguments: str | Path, **options: Any) -> subprocess.CompletedProcess[str]:
+    """Runs the command as a process of its own."""
+    command = [sys.executable, "-W", "error", "-m", "flatland", *map(str, arguments)]
+    return subprocess.run(command, capture_output=True, text=True, timeout=60, **options)
+
+
+def main(*arguments: str | Path) -> int:
+    """Runs the command in this process and returns its exit code."""
+    return cli.main([str(argument) for argument in arguments])
+
+
+def drawn(world_file: str, *, steps: int = 0, **options: Any) -> Any:
+    """What `flatland show` is to draw."""
+    load = {key: options.pop(key) for key in ("params", "simplify_map") if key in options}
+    with flatland.World.from_yaml(world_file, seed=1, **load) as world:
+        world.step(steps)
+        return world.draw(**options)
+
+
+def is_picture(path: Path, expected: Any) -> bool:
+    pixels = cv2.imread(str(path))[:, :, ::-1]
+    return pixels.shape == expected.shape and bool((pixels == expected).all())
+
+
+class TestShow:
+    def test_draws_the_world(self, world_file, tmp_path):
+        path = tmp_path / "picture.png"
+        done = run("show", world_file, "-o", path, cwd=tmp_path.parent)
+        assert (done.returncode, done.stdout) == (0, ""), done.stderr
+        assert done.stderr == ""
+        assert is_picture(path, drawn(world_file))
+
+    @pytest.mark.parametrize(
+        ("arguments", "options"),
+        [
+            (["--steps", "200"], {"steps": 200}),
+            (["--size", "400x300"], {"size": (400, 300)}),
+            (["--dpi", "50"], {"dpi": 50}),
+            (["--view", "-1", "2", "5", "6"], {"view": (-1, 2, 5, 6)}),
+            (["--layer", "empty"], {"layers": ["empty"]}),
+            (["--layer", "empty", "--layer", "3d"], {"layers": ["3d"]}),
+            (["--names"], {"names": True}),
+            (["--no-scans"], {"scans": False}),
+            (["--no-axes"], {"axes": False}),
+            (["--param", "/radius=1.5"], {"params": {"/radius": 1.5}}),
+        ],
+    )
+    def test_options(self, world_file, tmp_path, arguments, options):
+        path = tmp_path / "picture.png"
+        assert main("show", world_file, "-o", path, *arguments) == 0
+        assert is_picture(path, drawn(world_file, **options))
+        if arguments[-1] != "3d":
+            assert not is_picture(path, drawn(world_file))
+
+    def test_seed_makes_noise_repeatable(self, world_file, tmp_path):
+        model = tmp_path / "robot.model.yaml"
+        laser = "range: 9, always_publish: true, noise_std_dev: 0.05"
+        model.write_text(model.read_text().replace("range: 9", laser))
+        paths = [tmp_path / name for name in ("a.png", "b.png", "c.png")]
+        for path, seed in zip(paths, "112", strict=True):
+            assert main("show", world_file, "-o", path, "--steps", "3", "--seed", seed) == 0
+        a, b, c = (path.read_bytes() for path in paths)
+        assert a == b != c
+
+    def test_a_picture_that_is_there_is_overwritten(self, world_file, tmp_path):
+        path = tmp_path / "picture.png"
+        path.write_text("old")
+        assert main("show", world_file, "-o", path) == 0
+        assert is_picture(path, drawn(world_file))
+
+    @pytest.mark.parametrize(
+        ("arguments", "message"),
+        [
+            ([], "-o/--output"),
+            (["-o", "a.gif"], "must end with one of .png, .pdf, .svg, got 'a.gif'"),
+            (["-o", "a.png", "--size", "12"], "must be WIDTHxHEIGHT"),
+            (["-o", "a.png", "--size", "20x20"], "leaves no room beside the axes"),
+            (["-o", "a.png", "--steps", "-1"], "must be a whole number"),
+            (["-o", "a.png", "--param", "radius"], "must be NAME=VALUE"),
+            (["-o", "a.png", "--param", "/radius=[1"], "the value is no YAML"),
+            (["-o", "a.png", "--view", "1", "0", "0", "1"], "x_min < x_max"),
+            (["-o", "a.png", "--simplify-map", "3"], "invalid choice"),
+        ],
+    )
+    def test_wrong_arguments_exit_with_2(
+        self, world_file, capsys, monkeypatch, tmp_path, arguments, message
+    ):
+        monkeypatch.chdir(tmp_path)
+        with pytest.raises(SystemExit) as caught:
+            main("show", world_file, *arguments)
+        assert caught.value.code == 2
+        assert message in capsys.readouterr().err
+        assert not (tmp_path / "a.png").exists()
+
+    def test_wrong_files_exit_with_1_and_say_why_in_one_line(self, world_file, tmp_path):
+        done = run("show", "nowhere.yaml", "-o", "a.png", cwd=tmp_path)
+        assert done.returncode == 1
+        path = tmp_path / "nowhere.yaml"
+        assert done.stderr == f'flatland: Flatland YAML: File does not exist, path="{path}"\n'
+
+    def test_a_picture_that_cannot_be_written(self, world_file, tmp_path, capsys):
+        assert main("show", world_file, "-o", tmp_path / "no" / "a.png") == 1
+        (line,) = capsys.readouterr().err.splitlines()
+        assert line.startswith("flatland: ")
+        assert "No such file or directory" in line
+
+    def test_a_layer_that_is_not_there(self, world_file, tmp_path, capsys):
+        assert main("show", world_file, "-o", tmp_path / "a.png", "--layer", "roof") == 1
+        (line,) = capsys.readouterr().err.splitlines()
+        assert line == 'flatland: Flatland World: layer with name "roof" does not exist'
+
+
+class TestCheck:
+    def test_says_what_is_in_the_world(self, world_file, capsys):
+        assert main("check", world_file) == 0
+        assert capsys.readouterr().out.splitlines() == [
+            f"{world_file}: no errors",
+            "layer walls, 3d: 8 edges",
+            "layer empty: 0 edges",
+            "model robot: 2 bodies, 1 joint; plugins: eye (Laser), tween (Tween)",
+        ]
+
+    def test_world_plugins(self, world_file, files, capsys):
+        crates = "{type: RandomWall, name: crates, layer: walls, robot_name: robot}"
+        path = files.write("more.yaml", f"{Path(world_file).read_text()}plugins: [{crates}]")
+        assert main("check", path) == 0
+        assert "world; plugins: crates (RandomWall)" in capsys.readouterr().out
+
+    def test_simplify_map(self, files, capsys):
+        """A round column has stairs of pixels; simplified it has few edges."""
+        rows = ["".join(".#"[x * x + y * y < 300] for x in range(-20, 20)) for y in range(-20, 20)]
+        files.write_map("column", rows)
+        path = files.write("world.yaml", "{properties: {}, layers: [{name: a, map: column.yaml}]}")
+        counts = []
+        for simplify in "01":
+            assert main("check", path, "--simplify-map", simplify) == 0
+            counts.append(int(capsys.readouterr().out.split()[-2]))
+        assert counts[1] < counts[0] / 2
+
+    def test_param(self, world_file, capsys):
+        assert main("check", world_file, "--param", "/radius=-1") == 1
+        assert main("check", world_file, "--param", "/radius=-1", "--param", "/radius=2") == 0
+
+    def test_says_what_is_wrong(self, files):
+        path = files.write("world.yaml", "properties: {}\nlayers: [{name: a, colour: red}]\n")
+        done = run("check", path)
+        assert (done.returncode, done.stdout) == (1, "")
+        (line,) = done.stderr.splitlines()
+        assert line.startswith("flatland: Flatland YAML: ")
+        assert '"colour"' in line
+
+
+def test_version_is_that_of_the_packages(checkout):
+    project = tomllib.loads((checkout / "pyproject.toml").read_text())["project"]
+    package = ElementTree.parse(checkout / "package.xml").getroot()
+    assert flatland.__version__ == project["version"] == package.findtext("version")
+    assert project["scripts"]["flatland"] == "flatland.cli:main"
+    done = run("--version")
+    assert (done.returncode, done.stdout) == (0, f"flatland {flatland.__version__}\n")
+
+
+def test_without_a_command_it_says_which_there_are(capsys):
+    with pytest.raises(SystemExit) as caught:
+        main()
+    assert caught.value.code == 2
+    with pytest.raises(SystemExit):
+        main("--help")
+    text = capsys.readouterr().out
+    assert "show" in text
+    assert "check" in text
+
+
+def test_values_of_parameters_are_yaml():
+    values = {"1": 1, "0.5": 0.5, "true": True, "a b": "a b", "": "", "a=b": "a=b"}
+    for text, value in values.items():
+        assert cli._parameter(f"/x={text}") == ("/x", value)
