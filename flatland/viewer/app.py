@@ -52,7 +52,8 @@ def _why_not() -> str:
         return reason
     try:
         importlib.import_module("PyQt5.QtWidgets")
-        importlib.import_module("rviz")
+        # Not just rviz: a folder of that name is enough for that.
+        importlib.import_module("rviz.librviz_sip")
     except ImportError as error:
         return f"it needs PyQt5 and RViz's Python bindings (python3-pyqt5, python3-rviz): {error}"
     return ""

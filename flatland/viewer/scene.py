@@ -7,11 +7,12 @@ from pathlib import Path
 from typing import Any, Final
 
 from PyQt5.QtCore import QPoint
-from PyQt5.QtWidgets import QMainWindow, QToolBar, QWidget
-from rviz import bindings as rviz
+from PyQt5.QtGui import QKeySequence
+from PyQt5.QtWidgets import QAction, QMainWindow, QToolBar, QWidget
 
 from flatland.geometry import Vector2, rotate
 from flatland.viewer.bounds import Bounds
+from rviz import bindings as rviz
 
 WORLD_FRAME: Final = "map"
 _MARGIN: Final = 1.06  # of the view, around what it is to show
@@ -65,6 +66,9 @@ class Scene:
         self.widget.setHideButtonVisibility(False)
         for bar in self.widget.findChildren(QToolBar):
             bar.hide()
+        # Keys of menus that nobody sees: saving and loading configurations, quitting.
+        for action in self.widget.findChildren(QAction):
+            action.setShortcut(QKeySequence())
         self.panel = _find_panel(self.widget)
         self._manager: Any = self.widget.getManager()
         self._tools: Any = self._manager.getToolManager()

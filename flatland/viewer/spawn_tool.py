@@ -65,7 +65,8 @@ class SpawnTool(QObject):
             return bool(event.buttons() & Qt.MouseButton.LeftButton)
         if event.button() != Qt.MouseButton.LeftButton:
             return False
-        if kind == QEvent.Type.MouseButtonPress:
+        # A double click is two clicks: the model keeps its heading.
+        if kind in (QEvent.Type.MouseButtonPress, QEvent.Type.MouseButtonDblClick):
             self._click(event)
         return True
 

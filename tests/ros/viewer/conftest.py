@@ -1,0 +1,208 @@
+"""A screen without a monitor, a viewer to ask, and pictures to look for colours in."""
+
+from __future__ import annotations
+
+import importlib.util
+import json
+import shutil
+import socket
+import sys
+import time
+from collections.abc import Callable, Iterator, Mapping
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import cv2
+import numpy as np
+import pytest
+
+PATIENCE = 30.0  # s; only a test that fails waits that long
+BACKGROUND = (48, 48, 48)
+
+MAGENTA = (255, 0, 255)  # the walls
+BLUE = (0, 0, 255)  # the robot
+RED = (255, 70, 70)  # the first laser
+BODY = "name: base, color: [0, 0, 1, 1], footprints: [{type: circle, radius: 0.4, density: 1}]"
+ROBOT = f"""
+bodies: [{{{BODY}}}]
+plugins:
+  - {{type: DiffDrive, name: drive, body: base, pub_rate: 50, odom_frame_id: map}}
+  - {{type: Laser, name: laser, body: base, range: 20, update_rate: 10,
+     angle: {{min: -3.1, max: 3.1, increment: 0.1}}}}
+"""
+CRATE = """
+bodies:
+  - name: box
+    color: [0, 1, 1, 1]
+    footprints: [{type: polygon, density: 1, points: [[-0.5, -0.25], [0.5, -0.25], [0.5, 0.25],
+                  [-0.5, 0.25]]}]
+"""
+
+
+def _load(path: Path) -> ModuleType:
+    spec = importlib.util.spec_from_file_location(path.stem, path)
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+@pytest.fixture(scope="session")
+def screen(checkout: Path) -> Iterator[Any]:
+    """A virtual screen; skips the test where one cannot be had."""
+    virtual_screen = _load(checkout / "tools" / "virtual_screen.py")
+    missing = virtual_screen.missing_programs()
+    if shutil.which("rviz") is None:
+        missing.append("rviz")
+    for module in ("PyQt5.QtWidgets", "rviz.librviz_sip"):
+        try:
+            importlib.import_module(module)
+        except ImportError:
+            missing.append(f"Python's {module}")
+    if missing:
+        pytest.skip(f"not installed: {', '.join(missing)} (make setup-dev installs them)")
+    screen = virtual_screen.VirtualScreen()
+    yield screen
+    screen.close()
+
+
+@pytest.fixture(scope="module")
+def drawing_launcher(module_launcher: Any, screen: Any) -> Any:
+    """Starts programs that draw on the screen and end with the last test of the file."""
+    module_launcher.environment = {**module_launcher.environment, **screen.environment}
+    return module_launcher
+
+
+@pytest.fixture(scope="session")
+def room(write_world: Callable[..., Path]) -> Path:
+    """A magenta room of 10 m by 10 m with a blue robot at (-2, 1)."""
+    path = write_world(
+        "[{name: robot, model: robot.model.yaml, pose: [-2, 1, 0]}]", robot=ROBOT, crate=CRATE
+    )
+    path.write_text(path.read_text().replace("map: map.yaml", "map: map.yaml, color: [1, 0, 1, 1]"))
+    return path
+
+
+@pytest.fixture(scope="module")
+def room_server(drawing_launcher: Any, room: Path) -> Any:
+    """A simulator of the room, with markers."""
+    return drawing_launcher.server(room, show_viz=True)
+
+
+class Viewer:
+    """A running viewer, asked by lines and driven by mouse and keys."""
+
+    def __init__(self, launcher: Any, screen: Any, folder: Path) -> None:
+        script = Path(__file__).parent / "inspected_viewer.py"
+        path = str(folder / "viewer")
+        self.screen = screen
+        self.process = launcher.program(sys.executable, str(script), path)
+        self.process.wait_for_line("the window is up", PATIENCE)
+        connection = socket.socket(socket.AF_UNIX)
+        connection.settimeout(PATIENCE)
+        connection.connect(path)
+        self._stream = connection.makefile("rw")
+        connection.close()
+
+    def close(self) -> None:
+        """Asks nothing more."""
+        self._stream.close()
+
+    def widgets(self, name: str) -> list[dict[str, Any]]:
+        """All widgets of a name or class that can be seen."""
+        print(name, file=self._stream, flush=True)
+        return list(json.loads(self._stream.readline()))
+
+    def widget(self, name: str) -> dict[str, Any]:
+        """The one widget of a name or class, waited for."""
+        end = time.monotonic() + PATIENCE
+        while time.monotonic() < end:
+            found = self.widgets(name)
+            if len(found) == 1:
+                return found[0]
+            time.sleep(0.05)
+        pytest.fail(f"no single widget {name} but {found}")
+
+    def until(self, name: str, accept: Callable[[dict[str, Any]], bool]) -> dict[str, Any]:
+        """Waits until a widget is as wanted."""
+        end = time.monotonic() + PATIENCE
+        while not accept(widget := self.widget(name)):
+            assert time.monotonic() < end, widget
+            time.sleep(0.02)
+        return widget
+
+    def click(self, name: str) -> None:
+        """Clicks on a widget."""
+        widget = self.widget(name)
+        self.screen.click(widget["x"] + widget["width"] / 2, widget["y"] + widget["height"] / 2)
+
+
+@pytest.fixture(scope="module")
+def viewer(
+    room_server: Any, drawing_launcher: Any, screen: Any, tmp_path_factory: pytest.TempPathFactory
+) -> Iterator[Viewer]:
+    """A viewer of the room, which ends with the last test of the file."""
+    viewer = Viewer(drawing_launcher, screen, tmp_path_factory.mktemp("socket"))
+    yield viewer
+    viewer.close()
+
+
+class Picture:
+    """What a screen shows, in metres: the walls of the room say where and how large it is."""
+
+    def __init__(self, image: Any, area: Mapping[str, int] | None = None) -> None:
+        left, top = (area["x"], area["y"]) if area else (0, 0)
+        bottom, right = (top + area["height"], left + area["width"]) if area else image.shape[:2]
+        self.image = np.full_like(image, 0)
+        self.image[top:bottom, left:right] = image[top:bottom, left:right]
+        rows, columns = np.nonzero(self.mask(MAGENTA))
+        assert len(columns) > 50, "no room to be seen"
+        left, right, top, bottom = columns.min(), columns.max(), rows.min(), rows.max()
+        self.pixels_per_metre = (right - left) / 10.0
+        self.center = ((left + right) / 2.0, (top + bottom) / 2.0)
+        assert (bottom - top) / 10.0 == pytest.approx(self.pixels_per_metre, abs=0.2)
+
+    def mask(self, color: tuple[int, int, int]) -> Any:
+        """Where the picture has a colour, or nearly so."""
+        difference = np.abs(self.image.astype(int) - color).max(axis=2)
+        return difference < 40
+
+    def at(self, x: float, y: float) -> tuple[float, float]:
+        """The pixel of a place in the room [m]."""
+        return (
+            self.center[0] + x * self.pixels_per_metre,
+            self.center[1] - y * self.pixels_per_metre,
+        )
+
+    def places(self, color: tuple[int, int, int]) -> Any:
+        """Where in the room [m] a colour is, shape (n, 2)."""
+        rows, columns = np.nonzero(self.mask(color))
+        x = (columns - self.center[0]) / self.pixels_per_metre
+        y = (self.center[1] - rows) / self.pixels_per_metre
+        return np.column_stack([x, y])
+
+
+@pytest.fixture
+def look(screen: Any, tmp_path: Path) -> Callable[..., Picture]:
+    """Takes pictures until one is as wanted, and gives that one."""
+
+    def look(accept: Callable[[Picture], Any], area: Mapping[str, int] | None = None) -> Picture:
+        end = time.monotonic() + PATIENCE
+        while True:
+            image = screen.picture()
+            reason = "it is not as wanted"
+            try:
+                picture = Picture(image, area)
+                if accept(picture):
+                    return picture
+            except AssertionError as error:
+                reason = str(error)
+            if time.monotonic() > end:
+                path = tmp_path / "screen.png"
+                cv2.imwrite(str(path), image[:, :, ::-1])
+                pytest.fail(f"the picture {path}: {reason}")
+            time.sleep(0.1)
+
+    return look

@@ -1,0 +1,82 @@
+"""The viewer, with an ear for questions: which widgets there are, where, and what they say.
+
+It listens on the socket whose path is the first argument. Each line is the name of a widget, or
+the class of one; the answer is a line of JSON. Nothing of the viewer is replaced, and it is
+driven through the X server.
+"""
+
+from __future__ import annotations
+
+import json
+import socket
+import sys
+import threading
+from typing import Any
+
+from PyQt5.QtCore import QObject, QPoint, pyqtSignal
+from PyQt5.QtWidgets import QApplication, QWidget
+
+from flatland.viewer.app import main
+
+
+class Inspector(QObject):
+    """Answers in the window's thread."""
+
+    asked = pyqtSignal(str)
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.asked.connect(self.answer)
+        threading.Thread(target=self.listen, daemon=True).start()
+
+    def listen(self) -> None:
+        with socket.socket(socket.AF_UNIX) as server:
+            server.bind(sys.argv[1])
+            server.listen()
+            print("the window is up", flush=True)
+            connection, _ = server.accept()
+        self.stream = connection.makefile("rw")
+        for line in self.stream:
+            self.asked.emit(line.strip())
+
+    def answer(self, name: str) -> None:
+        print(json.dumps([describe(widget) for widget in find(name)]), file=self.stream, flush=True)
+
+
+def find(name: str) -> list[QWidget]:
+    """All widgets of a name or a class that can be seen."""
+    return [
+        widget
+        for widget in QApplication.allWidgets()
+        if widget.isVisible() and name in (widget.objectName(), widget.metaObject().className())
+    ]
+
+
+def describe(widget: Any) -> dict[str, Any]:
+    corner = widget.mapToGlobal(QPoint(0, 0))
+    return {
+        "x": corner.x(),
+        "y": corner.y(),
+        "width": widget.width(),
+        "height": widget.height(),
+        "text": widget.text() if hasattr(widget, "text") else "",
+        "value": widget.value() if hasattr(widget, "value") else None,
+        "enabled": widget.isEnabled(),
+        "checked": widget.isChecked() if hasattr(widget, "isChecked") else None,
+        "title": widget.windowTitle(),
+    }
+
+
+class InspectedApplication(QApplication):
+    """Starts the inspector with the event loop."""
+
+    def exec_(self) -> int:
+        self.inspector = Inspector()
+        return int(super().exec_())
+
+
+if __name__ == "__main__":
+    import PyQt5.QtWidgets
+
+    PyQt5.QtWidgets.QApplication = InspectedApplication
+    sys.exit(main())

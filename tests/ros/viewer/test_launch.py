@@ -1,0 +1,121 @@
+"""What server.launch starts to show the simulator, and what happens where it cannot."""
+
+from __future__ import annotations
+
+import contextlib
+import signal
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import rosgraph
+import rosnode
+from rosgraph_msgs.msg import Clock
+
+BLUE, CYAN, RED = (0, 0, 255), (0, 255, 255), (255, 70, 70)
+# What RViz's panels leave for the picture; one of the tools has a magenta arrow.
+RVIZ_PANEL = {"x": 366, "y": 64, "width": 816, "height": 636}
+
+
+@pytest.fixture(autouse=True)
+def clean_parameters() -> Iterator[None]:
+    """Leaves no parameters of one launch to the next server."""
+    yield
+    with contextlib.suppress(rosgraph.MasterException):
+        rosgraph.Master("/flatland_tests").deleteParam("/flatland_server")
+
+
+@pytest.fixture
+def on_screen(launcher: Any, screen: Any) -> Any:
+    """Starts programs that draw on the screen and end with the test."""
+    launcher.environment = {**launcher.environment, **screen.environment}
+    return launcher
+
+
+def nodes() -> list[str]:
+    return [name.split("_1")[0] for name in rosnode.get_node_names()]
+
+
+def test_rviz_shows_all_without_being_touched(
+    on_screen: Any, ros: Any, room: Path, look: Callable[..., Any]
+) -> None:
+    launch = on_screen.launch("flatland", "server.launch", f"world_path:={room}", "use_rviz:=true")
+    launch.wait_for_line("started with pid")
+    picture = look(lambda picture: len(picture.places(RED)) > 30, RVIZ_PANEL)
+    assert "/rviz" in nodes()
+    assert "/flatland_viz" not in nodes()
+    # From above, with the scan on the walls and the robot at its pose.
+    scan = picture.places(RED)
+    assert (np.abs(np.abs(scan).max(axis=1) - 5.0) < 0.15).mean() > 0.9
+    x, y = picture.at(4, 4)
+    assert np.abs(picture.image[int(y) - 4, int(x) - 4].astype(int) - 48).max() < 40
+    blue = picture.places(BLUE)
+    assert len(blue[np.hypot(blue[:, 0] + 2, blue[:, 1] - 1) < 0.45]) > 10
+    # Models that come and go do so in the picture.
+    assert ros.spawn(room.parent / "crate.model.yaml", "crate", "", (2, -2, 0)).success
+    picture = look(lambda picture: len(picture.places(CYAN)) > 10, RVIZ_PANEL)
+    assert picture.places(CYAN).mean(axis=0) == pytest.approx((2, -2), abs=0.2)
+    assert ros.delete("crate").success
+    look(lambda picture: not len(picture.places(CYAN)), RVIZ_PANEL)
+    assert launch.stop() == 0
+
+
+def test_the_viewer_comes_with_the_simulator_and_may_go_alone(
+    on_screen: Any, ros: Any, room: Path, screen: Any, look: Callable[..., Any]
+) -> None:
+    launch = on_screen.launch("flatland", "server.launch", f"world_path:={room}")
+    look(lambda picture: len(picture.places(BLUE)) > 10)
+    assert "/flatland_viz" in nodes()
+    screen.click(600, 600)  # There is no window manager to give the window the keys.
+    screen.key("ctrl+q")
+    launch.wait_for_line(r"flatland_viz-\d+. process has finished cleanly")
+    clock = ros.topic("/clock", Clock)
+    assert clock.take(20)
+    assert launch.stop() == 0
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_the_viewer_ends_when_asked_to(
+    on_screen: Any, ros: Any, room_of_its_own: Any, look: Callable[..., Any], number: signal.Signals
+) -> None:
+    viewer = on_screen.program("rosrun", "flatland", "flatland_viz")
+    look(lambda picture: len(picture.places(BLUE)) > 10)
+    viewer.send(number)
+    assert viewer.wait() == 0
+    assert "Traceback" not in viewer.output
+    assert room_of_its_own.running
+
+
+@pytest.fixture
+def room_of_its_own(on_screen: Any, room: Path) -> Any:
+    return on_screen.server(room, show_viz=True)
+
+
+def test_no_display_is_no_failure_of_the_simulator(launcher: Any, ros: Any, room: Path) -> None:
+    launcher.environment = {k: v for k, v in launcher.environment.items() if k != "DISPLAY"}
+    launch = launcher.launch("flatland", "server.launch", f"world_path:={room}")
+    launch.wait_for_line(r"the viewer cannot start: there is no display \(DISPLAY is not set\)")
+    launch.wait_for_line(r"flatland_viz-\d+. process has died")
+    assert ros.topic("/clock", Clock).take(20)
+    assert launch.stop() == 0
+
+
+def test_reasons_not_to_start(
+    launcher: Any, ros_environment: dict[str, str], screen: Any, tmp_path: Path
+) -> None:
+    def complaint(**environment: str) -> str:
+        viewer = launcher.program("rosrun", "flatland", "flatland_viz", **environment)
+        assert viewer.wait() == 1
+        assert "Traceback" not in viewer.output
+        return str(viewer.output)
+
+    assert "the display :4711 cannot be opened" in complaint(DISPLAY=":4711")
+    nobody = complaint(ROS_MASTER_URI="http://127.0.0.1:1", DISPLAY=screen.display)
+    assert "no ROS master at http://127.0.0.1:1" in nobody
+    # A package without the bindings, in front of the real one.
+    (tmp_path / "rviz").mkdir()
+    (tmp_path / "rviz" / "__init__.py").touch()
+    path = f"{tmp_path}:{launcher.environment.get('PYTHONPATH', '')}"
+    assert "python3-rviz" in complaint(PYTHONPATH=path, DISPLAY=screen.display)

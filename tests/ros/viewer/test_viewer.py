@@ -1,0 +1,262 @@
+"""The viewer against a running simulator: what it shows, and what mouse and keys do."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import rospy
+from nav_msgs.msg import Odometry
+from std_msgs.msg import Bool
+from std_srvs.srv import Empty
+from visualization_msgs.msg import MarkerArray
+
+from flatland.msg import DebugTopicList
+from flatland.srv import SetRate
+
+DEBUG = "/flatland_server/debug"
+BLUE, CYAN, RED, LIGHT_BLUE, YELLOW = (
+    *((0, 0, 255), (0, 255, 255), (255, 70, 70)),
+    *((80, 200, 255), (255, 217, 26)),
+)
+START = (-2.0, 1.0)
+SLOW_MOTION = {f"real-time factor {factor}" for factor in ("0.04", "0.05", "0.06")}
+
+
+@pytest.fixture
+def panel(viewer: Any) -> Any:
+    """Where the picture is on the screen."""
+    return viewer.widget("rviz::RenderPanel")
+
+
+@pytest.fixture
+def spawned(ros: Any) -> Any:
+    """Deletes what a test spawned; gives what is known of models."""
+    listed = ros.topic(f"{DEBUG}/topics", DebugTopicList)
+
+    def until(name: str) -> None:
+        listed.until(lambda message: f"model/{name}" in message.topics)
+
+    yield until
+    ros.call("/resume", Empty)
+    topics = ros.topic(f"{DEBUG}/topics", DebugTopicList).next().topics
+    for topic in topics:
+        if topic.startswith("model/") and topic != "model/robot":
+            ros.delete(topic.removeprefix("model/"))
+
+
+def choose(viewer: Any, screen: Any, path: Path, *, number: bool = False) -> None:
+    """Answers the dialog of the spawn tool."""
+    viewer.click("spawn")
+    field = viewer.widget("path")
+    screen.click(field["x"] + 20, field["y"] + field["height"] / 2)
+    screen.key("ctrl+a")
+    screen.type(str(path))
+    viewer.until("path", lambda widget: widget["text"] == str(path))
+    if viewer.widget("number")["checked"] != number:
+        box = viewer.widget("number")
+        screen.click(box["x"] + 8, box["y"] + box["height"] / 2)
+        viewer.until("number", lambda widget: widget["checked"] == number)
+    screen.key("Return")
+
+
+def near(places: Any, x: float, y: float, distance: float) -> Any:
+    """Those of some places that are near one."""
+    return places[np.hypot(places[:, 0] - x, places[:, 1] - y) < distance]
+
+
+def test_shows_walls_robot_and_scan(look: Callable[..., Any], viewer: Any, panel: Any) -> None:
+    picture = look(lambda picture: len(picture.places(RED)) > 30, panel)
+    # The whole room is in view, as large as fits.
+    assert picture.pixels_per_metre * 10 == pytest.approx(panel["height"] / 1.06, abs=8)
+    assert picture.center == pytest.approx(
+        (panel["x"] + panel["width"] / 2, panel["y"] + panel["height"] / 2), abs=2
+    )
+    scan = picture.places(RED)
+    distance_to_wall = np.abs(np.abs(scan).max(axis=1) - 5.0)
+    assert (distance_to_wall < 0.1).mean() > 0.9
+    assert len(set(np.sign(scan[:, 0]))) == len(set(np.sign(scan[:, 1]))) == 2
+
+
+def test_shows_the_robot_at_its_pose(
+    look: Callable[..., Any], viewer: Any, screen: Any, panel: Any
+) -> None:
+    # Without the handle, which lies on the robot.
+    viewer.click("move_camera")
+    picture = look(lambda picture: len(near(picture.places(BLUE), *START, 0.5)) > 200, panel)
+    robot = picture.places(BLUE)
+    assert robot.mean(axis=0) == pytest.approx(START, abs=0.05)
+    assert np.hypot(*(robot - START).T).max() == pytest.approx(0.4, abs=0.08)
+    viewer.click("interact")
+
+
+def test_time_runs_and_stands_still(ros: Any, viewer: Any, screen: Any) -> None:
+    paused = ros.topic("/flatland_server/paused", Bool)
+    assert viewer.widget("toggle_pause")["text"] == "Pause"
+    viewer.until("factor", lambda widget: widget["text"].startswith("real-time factor 1.0"))
+    viewer.click("toggle_pause")
+    assert paused.until(lambda message: message.data)
+    viewer.until("toggle_pause", lambda widget: widget["text"] == "Resume")
+    viewer.until("factor", lambda widget: widget["text"] == "paused")
+    still = viewer.widget("time")["text"]
+    screen.key("space")
+    assert paused.until(lambda message: not message.data)
+    viewer.until("toggle_pause", lambda widget: widget["text"] == "Pause")
+    viewer.until("time", lambda widget: widget["text"] != still)
+    # Somebody else pauses.
+    ros.call("/pause", Empty)
+    viewer.until("toggle_pause", lambda widget: widget["text"] == "Resume")
+    ros.call("/resume", Empty)
+
+
+def test_slider_sets_the_rate(
+    ros: Any, viewer: Any, screen: Any, eventually: Callable[..., Any]
+) -> None:
+    def asked(rate: float) -> bool:
+        return bool(rospy.get_param("/flatland_server/update_rate", 200.0) == rate)
+
+    assert viewer.widget("rate")["text"] == "200 Hz (x1)"
+    viewer.click("rate_slider")
+    screen.key("Home")
+    eventually("slow motion", lambda: asked(10.0))
+    assert viewer.widget("rate")["text"] == "10 Hz (x0.05)"
+    viewer.until("factor", lambda widget: widget["text"] in SLOW_MOTION)
+    screen.key("End")
+    eventually("no limit", lambda: asked(0.0))
+    assert viewer.widget("rate")["text"] == "as fast as possible"
+    # What others set is shown as well.
+    assert ros.call("/set_rate", SetRate, 200.0).success
+    viewer.until("rate", lambda widget: widget["text"] == "200 Hz (x1)")
+
+
+def test_spawns_by_two_clicks(
+    ros: Any,
+    look: Callable[..., Any],
+    viewer: Any,
+    screen: Any,
+    panel: Any,
+    room: Path,
+    spawned: Callable[[str], None],
+) -> None:
+    picture = look(lambda picture: True, panel)
+    choose(viewer, screen, room.parent / "crate.model.yaml")
+    x, y = picture.at(2, -1)
+    screen.move(x, y)
+    # The outline follows the mouse, an arrow tells the heading.
+    preview = look(lambda picture: len(near(picture.places(CYAN), 2, -1, 0.7)) > 50, panel)
+    assert near(preview.places(YELLOW), 2.5, -1, 0.6).size
+    assert not near(preview.places(YELLOW), 1.4, -1, 0.3).size
+    screen.click(x, y)
+    screen.move(*picture.at(2, 2))
+    look(lambda picture: near(picture.places(YELLOW), 2, -0.4, 0.2).size, panel)
+    screen.click(*picture.at(2, 2))
+    spawned("crate_model")
+    marker = ros.topic(f"{DEBUG}/model/crate_model", MarkerArray).next().markers[0]
+    assert (marker.pose.position.x, marker.pose.position.y) == pytest.approx((2, -1), abs=0.05)
+    yaw = 2 * math.atan2(marker.pose.orientation.z, marker.pose.orientation.w)
+    assert yaw == pytest.approx(math.pi / 2, abs=0.05)
+    # It is shown where it is, and the preview is gone.
+    shown = look(
+        lambda picture: len(picture.places(CYAN)) > 50 and not len(picture.places(YELLOW)), panel
+    )
+    crate = shown.places(CYAN)
+    assert crate.max(axis=0) == pytest.approx((2.25, -0.5), abs=0.07)
+    assert crate.min(axis=0) == pytest.approx((1.75, -1.5), abs=0.07)
+    # A deleted model is gone from the picture, too.
+    assert ros.delete("crate_model").success
+    look(lambda picture: not len(picture.places(CYAN)), panel)
+
+
+def test_name_is_the_namespace_and_takes_a_number(
+    ros: Any,
+    look: Callable[..., Any],
+    viewer: Any,
+    screen: Any,
+    panel: Any,
+    room: Path,
+    spawned: Callable[[str], None],
+) -> None:
+    picture = look(lambda picture: True, panel)
+    for count, x in ((1, 0.0), (2, 3.0)):
+        choose(viewer, screen, room.parent / "robot.model.yaml", number=True)
+        screen.move(*picture.at(x, -3))
+        look(lambda picture, x=x: len(near(picture.places(YELLOW), x + 0.5, -3, 0.6)), panel)
+        screen.click(*picture.at(x, -3))
+        screen.click(*picture.at(x, -3))
+        spawned(f"robot_model{count}")
+    assert {"/robot_model1/scan", "/robot_model2/scan"} <= ros.registered()["publishers"]
+    # Each laser has a colour of its own.
+    seen = look(lambda picture: len(picture.places(LIGHT_BLUE)) > 30, panel)
+    assert len(seen.places(RED)) > 30
+
+
+def test_escape_cancels(
+    look: Callable[..., Any], viewer: Any, screen: Any, panel: Any, room: Path
+) -> None:
+    picture = look(lambda picture: True, panel)
+    choose(viewer, screen, room.parent / "crate.model.yaml")
+    screen.click(*picture.at(2, -1))
+    look(lambda picture: len(picture.places(YELLOW)), panel)
+    screen.key("Escape")
+    look(lambda picture: not len(picture.places(YELLOW)), panel)
+    assert viewer.widget("interact")["checked"]
+    assert not viewer.widget("spawn")["checked"]
+    # In the dialog, too.
+    viewer.click("spawn")
+    viewer.widget("path")
+    screen.key("Escape")
+    viewer.until("interact", lambda widget: widget["checked"])
+    assert not viewer.widgets("path")
+
+
+def test_failures_are_told_in_dialogs(
+    look: Callable[..., Any], viewer: Any, screen: Any, panel: Any, room: Path, spawned: Any
+) -> None:
+    choose(viewer, screen, room.parent / "nothing.yaml")
+    label = viewer.widget("qt_msgbox_label")
+    assert label["text"].startswith("Flatland YAML: ")
+    assert "nothing.yaml" in label["text"]
+    screen.key("Return")
+    # The simulator refuses: there is a robot already.
+    renamed = room.parent / "robot.yaml"
+    renamed.write_text((room.parent / "robot.model.yaml").read_text())
+    picture = look(lambda picture: True, panel)
+    choose(viewer, screen, renamed)
+    screen.move(*picture.at(2, 2))
+    look(lambda picture: len(picture.places(YELLOW)), panel)
+    screen.click(*picture.at(2, 2))
+    screen.click(*picture.at(2, 2))
+    label = viewer.until("qt_msgbox_label", lambda widget: "nothing.yaml" not in widget["text"])
+    assert label["text"] == 'Flatland YAML: Model with name "robot" already exists'
+    screen.key("Return")
+
+
+def test_dragged_robot_moves(
+    ros: Any, look: Callable[..., Any], viewer: Any, screen: Any, panel: Any
+) -> None:
+    truth = ros.topic("/odometry/ground_truth", Odometry)
+    paused = ros.topic("/flatland_server/paused", Bool)
+    picture = look(lambda picture: True, panel)
+    screen.move(*picture.at(*START))
+    screen.press()
+    for step in range(1, 11):
+        screen.move(*picture.at(START[0] + 0.3 * step, START[1] - 0.2 * step))
+    assert paused.until(lambda message: message.data)
+    screen.release()
+    assert paused.until(lambda message: not message.data)
+    truth.drop()
+    moved = truth.until(lambda message: message.pose.pose.position.x > 0.5)
+    position = moved.pose.pose.position
+    assert (position.x, position.y) == pytest.approx((1, -1), abs=0.1)
+    assert ros.move("robot", (*START, 0.0)).success
+
+
+def test_ends_alone(viewer: Any, screen: Any, room_server: Any) -> None:
+    screen.key("ctrl+q")
+    assert viewer.process.wait() == 0
+    assert "Traceback" not in viewer.process.output
+    assert room_server.running

@@ -1,0 +1,108 @@
+"""A screen without a monitor: Xvfb with software OpenGL, its pictures, its mouse and its keys."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import struct
+import subprocess
+
+import numpy as np
+import numpy.typing as npt
+
+PROGRAMS = ("Xvfb", "xwd", "xdotool")
+
+Image = npt.NDArray[np.uint8]
+
+
+def missing_programs() -> list[str]:
+    """Returns those of the needed programs that are not installed."""
+    return [program for program in PROGRAMS if shutil.which(program) is None]
+
+
+class VirtualScreen:
+    """An X server of its own, with a number that was free."""
+
+    def __init__(self, width: int = 1280, height: int = 800) -> None:
+        """Starts the server; `close` ends it."""
+        reading, writing = os.pipe()
+        options = ["-screen", "0", f"{width}x{height}x24", "-nolisten", "tcp", "-noreset"]
+        self._server = subprocess.Popen(  # noqa: S603 - our own words
+            [PROGRAMS[0], "-displayfd", str(writing), *options],
+            pass_fds=[writing],
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+        )
+        os.close(writing)
+        with os.fdopen(reading) as pipe:
+            number = pipe.readline().strip()
+        if not number:
+            raise RuntimeError(f"Xvfb did not start, exit code {self._server.wait()}")
+        self.display = f":{number}"
+
+    @property
+    def environment(self) -> dict[str, str]:
+        """What programs need to draw here."""
+        return {
+            "DISPLAY": self.display,
+            "LIBGL_ALWAYS_SOFTWARE": "1",
+            "QT_X11_NO_MITSHM": "1",
+            "QT_QPA_PLATFORM": "xcb",
+            "QT_SCALE_FACTOR": "1",
+        }
+
+    def close(self) -> None:
+        """Ends the server, and so all that still draws on it."""
+        self._server.terminate()
+        self._server.wait()
+
+    def picture(self) -> Image:
+        """Returns what the screen shows: red, green, blue; shape (height, width, 3)."""
+        try:
+            data = self._run("xwd", "-root", "-silent")
+        except subprocess.CalledProcessError:
+            # A window went while xwd looked at it.
+            data = self._run("xwd", "-root", "-silent")
+        header = struct.unpack(">25I", data[:100])
+        size, width, height, pixel_bits, row_bytes, colors = (
+            header[index] for index in (0, 4, 5, 11, 12, 19)
+        )
+        pixel_bytes = pixel_bits // 8
+        rows = np.frombuffer(data, np.uint8, offset=size + 12 * colors, count=row_bytes * height)
+        pixels = rows.reshape(height, row_bytes)[:, : width * pixel_bytes]
+        image: Image = pixels.reshape(height, width, pixel_bytes)[:, :, 2::-1].copy()
+        return image
+
+    # -- mouse and keys --------------------------------------------------------------------
+
+    def move(self, x: float, y: float) -> None:
+        """Moves the mouse to a pixel."""
+        self._run("xdotool", "mousemove", str(round(x)), str(round(y)))
+
+    def click(self, x: float, y: float, button: int = 1) -> None:
+        """Clicks at a pixel."""
+        self.move(x, y)
+        self._run("xdotool", "click", str(button))
+
+    def press(self) -> None:
+        """Presses the left button and holds it."""
+        self._run("xdotool", "mousedown", "1")
+
+    def release(self) -> None:
+        """Lets go of the left button."""
+        self._run("xdotool", "mouseup", "1")
+
+    def key(self, *keys: str) -> None:
+        """Strikes keys, such as `Escape` or `ctrl+q`."""
+        self._run("xdotool", "key", *keys)
+
+    def type(self, text: str) -> None:
+        """Types a text."""
+        self._run("xdotool", "type", "--delay", "1", text)
+
+    def _run(self, *command: str) -> bytes:
+        """Runs a program on the screen and returns what it printed."""
+        environment = {**os.environ, "DISPLAY": self.display}
+        return subprocess.run(  # noqa: S603 - our own words
+            command, env=environment, check=True, capture_output=True, timeout=20
+        ).stdout
