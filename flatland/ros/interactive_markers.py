@@ -105,8 +105,8 @@ class InteractiveMarkers(WorldObserver):
         """Acts on feedback, between two steps."""
         try:
             self._handle(feedback, now)
-        except FlatlandError as error:
-            _LOG.warning("%s", error)
+        except (FlatlandError, ValueError) as error:
+            _LOG.warning('interactive marker "%s": %s', feedback.marker_name, error)
         except Exception:
             _LOG.exception("feedback of an interactive marker failed in an unforeseen way")
 
