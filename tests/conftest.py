@@ -6,6 +6,16 @@ import os
 from pathlib import Path
 
 import pytest
+from hypothesis import HealthCheck, settings
+
+# How fast a loaded machine is says nothing about the code; CI draws the same examples every time.
+settings.register_profile(
+    "flatland",
+    deadline=None,
+    derandomize=bool(os.environ.get("CI")),
+    suppress_health_check=[HealthCheck.too_slow],
+)
+settings.load_profile("flatland")
 
 _CHECKOUT = Path(__file__).resolve().parent.parent
 
