@@ -94,7 +94,8 @@ def outline(footprint: Footprint) -> Points:
         strip = closed_strip(footprint.center + footprint.radius * corners)
     else:
         strip = closed_strip(footprint.vertices)
-    return np.stack((strip[:-1], strip[1:]), axis=1).reshape(-1, 3)
+    lines: Points = np.stack((strip[:-1], strip[1:]), axis=1)
+    return lines.reshape(-1, 3)
 
 
 def joint_points(

@@ -1,0 +1,116 @@
+"""Ticks of wall time in the thread that steps the world."""
+
+from __future__ import annotations
+
+import queue
+import threading
+import time
+from collections.abc import Callable, Iterator
+from concurrent.futures import Future
+from typing import Any
+
+import pytest
+
+from flatland.ros.ticker import Ticker
+
+PATIENCE = 10.0  # s
+RATE = 50.0  # Hz
+
+
+class Loop:
+    """Stands for the thread that steps the world: runs what is posted when it is told to."""
+
+    def __init__(self) -> None:
+        self.ticks: list[float] = []
+        self._actions: queue.Queue[Callable[[], object]] = queue.Queue()
+
+    def post(self, action: Callable[[], object]) -> Future[Any]:
+        self._actions.put(action)
+        return Future()
+
+    def run_next(self, timeout: float = PATIENCE) -> None:
+        self._actions.get(timeout=timeout)()
+
+    def idle(self, seconds: float) -> bool:
+        """Whether nothing is posted for some time."""
+        try:
+            self._actions.put(self._actions.get(timeout=seconds))
+        except queue.Empty:
+            return True
+        return False
+
+
+@pytest.fixture
+def loop() -> Loop:
+    return Loop()
+
+
+@pytest.fixture
+def ticker(loop: Loop) -> Iterator[Ticker]:
+    ticker = Ticker("test-ticker", RATE, loop.post, loop.ticks.append)
+    yield ticker
+    ticker.close()
+
+
+def test_starts_asleep(loop: Loop, ticker: Ticker) -> None:
+    assert loop.idle(3 / RATE)
+
+
+def test_ticks_are_a_period_apart_at_least(loop: Loop, ticker: Ticker) -> None:
+    ticker.wake()
+    for _ in range(10):
+        loop.run_next()
+    gaps = [b - a for a, b in zip(loop.ticks, loop.ticks[1:], strict=False)]
+    assert min(gaps) >= 1 / RATE
+
+
+def test_none_is_queued_while_another_waits(loop: Loop, ticker: Ticker) -> None:
+    ticker.wake()
+    loop.run_next()
+    time.sleep(20 / RATE)  # The loop is busy for many periods: one tick waits, the rest is lost.
+    loop.run_next()
+    loop.run_next()
+    assert loop.ticks[2] - loop.ticks[1] > 5 / RATE
+
+
+def test_rests_and_wakes(loop: Loop, ticker: Ticker) -> None:
+    ticker.wake()
+    loop.run_next()
+    ticker.rest()
+    assert loop.idle(3 / RATE)
+    ticker.wake()
+    loop.run_next()
+    assert len(loop.ticks) == 2
+
+
+def test_close_ends_the_thread_whatever_it_waits_for(loop: Loop) -> None:
+    for wake in (False, True):
+        ticker = Ticker(f"closing-{wake}", RATE, loop.post, loop.ticks.append)
+        if wake:
+            ticker.wake()
+        ticker.close()
+        (thread,) = [t for t in threading.enumerate() if t.name == f"closing-{wake}"] or [None]
+        if thread is not None:
+            thread.join(PATIENCE)
+            assert not thread.is_alive()
+
+
+def test_tick_that_was_posted_before_the_end_does_nothing(loop: Loop, ticker: Ticker) -> None:
+    ticker.wake()
+    while loop.idle(0.01):
+        pass
+    ticker.close()
+    loop.run_next()
+    assert loop.ticks == []
+
+
+def test_tick_that_raises_is_not_the_last(loop: Loop) -> None:
+    def fail(_now: float) -> None:
+        raise ValueError("as asked for")
+
+    ticker = Ticker("failing", RATE, loop.post, fail)
+    ticker.wake()
+    for _ in range(2):
+        with pytest.raises(ValueError, match="as asked for"):
+            loop.run_next()
+    ticker.close()
