@@ -50,12 +50,13 @@ def test_node_in_a_group(
     registered = ros.registered("/robots/sim")
     assert registered["services"] >= {
         f"/robots/{name}"
-        for name in ("spawn_model", "delete_model", "move_model", "pause", "resume", "toggle_pause")
+        for name in ("spawn_model", "delete_model", "move_model", "set_rate", "toggle_pause")
     }
     assert registered["publishers"] == {
         "/clock",
         "/tf",
         "/rosout",
+        "/robots/sim/paused",
         "/robots/laser",  # remapped
         "/robots/odometry/filtered",
         "/robots/odometry/ground_truth",

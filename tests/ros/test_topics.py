@@ -72,12 +72,14 @@ TOPICS = {
     "/odometry/filtered": "nav_msgs/Odometry",
     "/odometry/ground_truth": "nav_msgs/Odometry",
     "/rosout": "rosgraph_msgs/Log",
+    "/flatland_server/paused": "std_msgs/Bool",
 }
 COMMANDS = {"/r1/cmd_vel": "geometry_msgs/Twist", "/cmd_vel": "geometry_msgs/Twist"}
 SERVICES = {
     "/spawn_model",
     "/delete_model",
     "/move_model",
+    "/set_rate",
     "/pause",
     "/resume",
     "/toggle_pause",
@@ -137,7 +139,7 @@ def test_rates_hold_in_simulated_time(
     assert steps == [round(period * 1e9)] * 7
 
 
-def test_no_topic_is_latched(ros: Any) -> None:
+def test_no_topic_of_a_plugin_is_latched(ros: Any) -> None:
     scan = ros.topic("/r1/scan", LaserScan).next()
     assert scan._connection_header["latching"] == "0"
     assert scan._connection_header["callerid"] == "/flatland_server"
