@@ -259,16 +259,14 @@ class Ros:
     def registered(self, node: str = "/flatland_server") -> dict[str, set[str]]:
         """What a node has registered with the master: publishers, subscribers, services.
 
-        Without the interactive markers, which every node has, a little after its start.
+        Without the interactive markers and the pause, which every node has, a little after its
+        start.
         """
+        late = re.compile(rf"/interactive_model_markers/|^{node}/paused$")
         state = self.master.getSystemState()
         kinds = ("publishers", "subscribers", "services")
         return {
-            kind: {
-                name
-                for name, nodes in entries
-                if node in nodes and "/interactive_model_markers/" not in name
-            }
+            kind: {name for name, nodes in entries if node in nodes and not late.search(name)}
             for kind, entries in zip(kinds, state, strict=True)
         }
 

@@ -56,7 +56,6 @@ def test_node_in_a_group(
         "/clock",
         "/tf",
         "/rosout",
-        "/robots/sim/paused",
         "/robots/laser",  # remapped
         "/robots/odometry/filtered",
         "/robots/odometry/ground_truth",

@@ -72,7 +72,6 @@ TOPICS = {
     "/odometry/filtered": "nav_msgs/Odometry",
     "/odometry/ground_truth": "nav_msgs/Odometry",
     "/rosout": "rosgraph_msgs/Log",
-    "/flatland_server/paused": "std_msgs/Bool",
 }
 COMMANDS = {"/r1/cmd_vel": "geometry_msgs/Twist", "/cmd_vel": "geometry_msgs/Twist"}
 SERVICES = {
