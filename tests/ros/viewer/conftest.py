@@ -18,11 +18,8 @@ import numpy as np
 import pytest
 
 PATIENCE = 30.0  # s; only a test that fails waits that long
-BACKGROUND = (48, 48, 48)
-
 MAGENTA = (255, 0, 255)  # the walls
-BLUE = (0, 0, 255)  # the robot
-RED = (255, 70, 70)  # the first laser
+_LEAST_STRENGTH = 70  # of 255
 BODY = "name: base, color: [0, 0, 1, 1], footprints: [{type: circle, radius: 0.4, density: 1}]"
 ROBOT = f"""
 bodies: [{{{BODY}}}]
@@ -149,6 +146,13 @@ def viewer(
     viewer.close()
 
 
+def _hue(colors: Any) -> tuple[Any, Any]:
+    """The hues of colours, and how much of them there is beside grey."""
+    colored = colors - colors.min(axis=-1, keepdims=True).astype(float)
+    strength = colored.max(axis=-1)
+    return colored / np.maximum(strength, 1.0)[..., None], strength
+
+
 class Picture:
     """What a screen shows, in metres: the walls of the room say where and how large it is."""
 
@@ -165,9 +169,10 @@ class Picture:
         assert (bottom - top) / 10.0 == pytest.approx(self.pixels_per_metre, abs=0.2)
 
     def mask(self, color: tuple[int, int, int]) -> Any:
-        """Where the picture has a colour, or nearly so."""
-        difference = np.abs(self.image.astype(int) - color).max(axis=2)
-        return difference < 40
+        """Where the picture has the hue of a colour; thin lines mix with what is below."""
+        wanted, strength = _hue(np.array(color))
+        found, strength = _hue(self.image)
+        return (strength > _LEAST_STRENGTH) & (np.abs(found - wanted).max(axis=-1) < 0.15)
 
     def at(self, x: float, y: float) -> tuple[float, float]:
         """The pixel of a place in the room [m]."""
@@ -182,6 +187,11 @@ class Picture:
         x = (columns - self.center[0]) / self.pixels_per_metre
         y = (self.center[1] - rows) / self.pixels_per_metre
         return np.column_stack([x, y])
+
+    def near(self, color: tuple[int, int, int], x: float, y: float, distance: float) -> Any:
+        """Where in the room [m] a colour is, near a place."""
+        places = self.places(color)
+        return places[np.hypot(places[:, 0] - x, places[:, 1] - y) < distance]
 
 
 @pytest.fixture

@@ -64,11 +64,6 @@ def choose(viewer: Any, screen: Any, path: Path, *, number: bool = False) -> Non
     screen.key("Return")
 
 
-def near(places: Any, x: float, y: float, distance: float) -> Any:
-    """Those of some places that are near one."""
-    return places[np.hypot(places[:, 0] - x, places[:, 1] - y) < distance]
-
-
 def test_shows_walls_robot_and_scan(look: Callable[..., Any], viewer: Any, panel: Any) -> None:
     picture = look(lambda picture: len(picture.places(RED)) > 30, panel)
     # The whole room is in view, as large as fits.
@@ -87,7 +82,7 @@ def test_shows_the_robot_at_its_pose(
 ) -> None:
     # Without the handle, which lies on the robot.
     viewer.click("move_camera")
-    picture = look(lambda picture: len(near(picture.places(BLUE), *START, 0.5)) > 200, panel)
+    picture = look(lambda picture: len(picture.near(BLUE, *START, 0.5)) > 200, panel)
     robot = picture.places(BLUE)
     assert robot.mean(axis=0) == pytest.approx(START, abs=0.05)
     assert np.hypot(*(robot - START).T).max() == pytest.approx(0.4, abs=0.08)
@@ -147,12 +142,12 @@ def test_spawns_by_two_clicks(
     x, y = picture.at(2, -1)
     screen.move(x, y)
     # The outline follows the mouse, an arrow tells the heading.
-    preview = look(lambda picture: len(near(picture.places(CYAN), 2, -1, 0.7)) > 50, panel)
-    assert near(preview.places(YELLOW), 2.5, -1, 0.6).size
-    assert not near(preview.places(YELLOW), 1.4, -1, 0.3).size
+    preview = look(lambda picture: len(picture.near(CYAN, 2, -1, 0.7)) > 50, panel)
+    assert preview.near(YELLOW, 2.5, -1, 0.6).size
+    assert not preview.near(YELLOW, 1.4, -1, 0.3).size
     screen.click(x, y)
     screen.move(*picture.at(2, 2))
-    look(lambda picture: near(picture.places(YELLOW), 2, -0.4, 0.2).size, panel)
+    look(lambda picture: picture.near(YELLOW, 2, -0.4, 0.2).size, panel)
     screen.click(*picture.at(2, 2))
     spawned("crate_model")
     marker = ros.topic(f"{DEBUG}/model/crate_model", MarkerArray).next().markers[0]
@@ -161,14 +156,17 @@ def test_spawns_by_two_clicks(
     assert yaw == pytest.approx(math.pi / 2, abs=0.05)
     # It is shown where it is, and the preview is gone.
     shown = look(
-        lambda picture: len(picture.places(CYAN)) > 50 and not len(picture.places(YELLOW)), panel
+        lambda picture: (
+            len(picture.near(CYAN, 2, -1, 0.8)) > 50 and not len(picture.places(YELLOW))
+        ),
+        panel,
     )
-    crate = shown.places(CYAN)
+    crate = shown.near(CYAN, 2, -1, 0.8)
     assert crate.max(axis=0) == pytest.approx((2.25, -0.5), abs=0.07)
     assert crate.min(axis=0) == pytest.approx((1.75, -1.5), abs=0.07)
     # A deleted model is gone from the picture, too.
     assert ros.delete("crate_model").success
-    look(lambda picture: not len(picture.places(CYAN)), panel)
+    look(lambda picture: not len(picture.near(CYAN, 2, -1, 0.8)), panel)
 
 
 def test_name_is_the_namespace_and_takes_a_number(
@@ -184,7 +182,7 @@ def test_name_is_the_namespace_and_takes_a_number(
     for count, x in ((1, 0.0), (2, 3.0)):
         choose(viewer, screen, room.parent / "robot.model.yaml", number=True)
         screen.move(*picture.at(x, -3))
-        look(lambda picture, x=x: len(near(picture.places(YELLOW), x + 0.5, -3, 0.6)), panel)
+        look(lambda picture, x=x: len(picture.near(YELLOW, x + 0.5, -3, 0.6)), panel)
         screen.click(*picture.at(x, -3))
         screen.click(*picture.at(x, -3))
         spawned(f"robot_model{count}")

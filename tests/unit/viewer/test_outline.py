@@ -1,0 +1,83 @@
+"""Outlines of models that are not spawned yet, and how far markers reach."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+import flatland
+from flatland.viewer.bounds import Bounds, bounds_of
+from flatland.viewer.outline import reach, read_outline
+
+MODEL = """
+bodies:
+  - name: base
+    pose: [1, 0, '$eval param("turn", 0)']
+    color: [0.25, 0.5, 0.75, 0.5]
+    footprints:
+      - {type: polygon, density: 1, layers: [nowhere], points: [[0, 0], [2, 0], [2, 1]]}
+  - {name: empty, footprints: []}
+  - name: wheel
+    footprints: [{type: circle, density: 1, center: [0, 1], radius: 0.5}]
+plugins: [{name: p, type: NoSuchPlugin}]
+"""
+
+
+@pytest.fixture
+def model(tmp_path: Path) -> str:
+    path = tmp_path / "model.yaml"
+    path.write_text(MODEL)
+    return str(path)
+
+
+def test_outline_of_each_body(model: str) -> None:
+    base, wheel = read_outline(model)
+    assert base.color == (0.25, 0.5, 0.75, 0.5)
+    sides = {tuple(map(tuple, side)) for side in base.segments.reshape(-1, 2, 2).tolist()}
+    assert sides == {((1, 0), (3, 0)), ((3, 0), (3, 1)), ((3, 1), (1, 0))}
+    assert np.hypot(*(wheel.segments - (0, 1)).T) == pytest.approx(0.5)
+    assert len(wheel.segments) == 64
+    assert reach([base, wheel]) == pytest.approx(math.sqrt(10))
+    assert reach([]) == 0.0
+
+
+def test_outline_asks_for_parameters(model: str) -> None:
+    base, _ = read_outline(model, {"turn": math.pi / 2}.get)
+    assert base.segments.min(axis=0) == pytest.approx((0, 0), abs=1e-6)
+    assert base.segments.max(axis=0) == pytest.approx((1, 2), abs=1e-6)
+
+
+def test_bad_model_is_told(tmp_path: Path) -> None:
+    with pytest.raises(flatland.YamlError, match=r"missing\.yaml"):
+        read_outline(str(tmp_path / "missing.yaml"))
+    path = tmp_path / "bad.yaml"
+    path.write_text("bodies: [{name: b, footprints: [{type: square}]}]\n")
+    with pytest.raises(flatland.YamlError, match="support footprints are"):
+        read_outline(str(path))
+
+
+def marker(points: list[tuple[float, float]], x: float = 0, y: float = 0, yaw: float = 0) -> object:
+    return SimpleNamespace(
+        points=[SimpleNamespace(x=x, y=y, z=0.0) for x, y in points],
+        pose=SimpleNamespace(
+            position=SimpleNamespace(x=x, y=y),
+            orientation=SimpleNamespace(z=math.sin(yaw / 2), w=math.cos(yaw / 2)),
+        ),
+    )
+
+
+def test_bounds_hold_all_markers_at_their_poses() -> None:
+    markers = [marker([]), marker([(0, 0), (2, 1)], 10, 20, math.pi / 2), marker([(11, 30)])]
+    bounds = bounds_of(SimpleNamespace(markers=markers))
+    assert bounds is not None
+    corners = (bounds.x_min, bounds.y_min, bounds.x_max, bounds.y_max)
+    assert corners == pytest.approx((9, 20, 11, 30))
+    assert bounds.center == pytest.approx((10, 25))
+    assert bounds.size == pytest.approx((2, 10))
+    assert bounds_of(SimpleNamespace(markers=markers[:1])) is None
+    assert bounds.union(Bounds(0, 0, 1, 1)) == Bounds(0, 0, bounds.x_max, bounds.y_max)
+    assert bounds.union(None) is bounds
