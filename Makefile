@@ -60,7 +60,7 @@ sanitize: setup-dev  ## run the unit tests with address and undefined-behaviour 
 	@cmake --preset sanitize >build/sanitize.log || { cat build/sanitize.log; exit 1; }
 	cmake --build build/sanitize
 	. ./setup.bash && LD_PRELOAD="$$(g++ -print-file-name=libasan.so) $$(g++ -print-file-name=libubsan.so)" \
-	  ASAN_OPTIONS=detect_leaks=0 UBSAN_OPTIONS=print_stacktrace=1 PYTHONPATH="$$PWD/build/sanitize/python:$$PYTHONPATH" \
+	  ASAN_OPTIONS=detect_leaks=0:quarantine_size_mb=16 UBSAN_OPTIONS=print_stacktrace=1 PYTHONPATH="$$PWD/build/sanitize/python:$$PYTHONPATH" \
 	  pytest tests/unit $(ARGS)
 
 .PHONY: clean
