@@ -6,6 +6,7 @@ import math
 import threading
 import time
 from collections.abc import Iterator
+from pathlib import Path
 
 import pytest
 
@@ -141,6 +142,27 @@ def test_requests_run_in_order_in_the_loops_thread(world: flatland.World) -> Non
         assert all(future.done() for future in futures)
     assert seen == list(range(50))
     assert ident == running.thread.ident
+
+
+def test_models_come_and_go_in_the_order_of_the_requests(
+    world: flatland.World, tmp_path: Path
+) -> None:
+    path = tmp_path / "ball.yaml"
+    path.write_text("bodies: [{name: b, footprints: []}]\n")
+    simulation = Simulation(world, 0)
+    # All wait for the first step: a later one must not overtake an earlier one.
+    futures = [
+        simulation.post(action)
+        for _ in range(5)
+        for action in (
+            lambda: world.spawn_model(path, "ball"),
+            lambda: world.move_model("ball", (1, 2, 0)),
+            lambda: world.delete_model("ball"),
+        )
+    ]
+    simulation.run(0.01)
+    assert [future.exception(PATIENCE) for future in futures] == [None] * 15
+    assert world.models == []
 
 
 def test_request_does_not_wait_for_a_slow_cycle(world: flatland.World, counter: Counter) -> None:
