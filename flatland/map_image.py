@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import importlib
 import mmap
+import re
 import struct
 from pathlib import Path
+from typing import Any
 
-import cv2
 import numpy as np
 import numpy.typing as npt
 
@@ -20,6 +22,12 @@ Edges = npt.NDArray[np.float32]
 _FEWEST_LOOP_POINTS = 5
 _TOLERANCE_PIXELS = 1.0
 _OPENING_KERNEL = (7, 7)
+# Grey of 8 bits, as map_server and drawing programs write it: there is nothing to convert, and
+# Pillow is loaded in a tenth of the time and memory that OpenCV takes.
+_GREY_PNG = re.compile(rb"\x89PNG\r\n\x1a\n\0\0\0\rIHDR(?P<width>.{4})(?P<height>.{4})\x08\0", re.S)
+_GREY_PGM = re.compile(rb"P5\s(?:#[^\n]*\n|\s)*(\d+)\s+(?:#[^\n]*\n\s*)*(\d+)\s+255\s")
+_HEADER_SIZE = 512
+_MOST_PIXELS_OF_PILLOW = 80_000_000  # of more it warns
 
 
 def read_grey_image(path: str) -> GreyImage:
@@ -36,7 +44,13 @@ def read_grey_image(path: str) -> GreyImage:
     """
     # OpenCV would print a warning of its own for a file that it cannot open.
     with Path(path).open("rb") as file:
-        is_tiff = file.read(4) in (b"II*\0", b"MM\0*")
+        header = file.read(_HEADER_SIZE)
+    if _is_plain_grey(header):
+        plain = _read_plain_grey(path)
+        if plain is not None:
+            return plain
+    cv2 = _opencv()
+    is_tiff = header[:4] in (b"II*\0", b"MM\0*")
     try:
         image = _decode_tiff(path) if is_tiff else cv2.imread(path, cv2.IMREAD_GRAYSCALE)
     except cv2.error as error:
@@ -47,12 +61,40 @@ def read_grey_image(path: str) -> GreyImage:
     return grey
 
 
+def _opencv() -> Any:
+    """Loads OpenCV, which most maps do without, as it makes the start of a program slower."""
+    return importlib.import_module("cv2")
+
+
+def _is_plain_grey(header: bytes) -> bool:
+    """Tells whether a file's beginning is that of an image whose bytes are the grey values."""
+    png = _GREY_PNG.match(header)
+    if png:
+        width, height = (int.from_bytes(png[key], "big") for key in ("width", "height"))
+    else:
+        pgm = _GREY_PGM.match(header)
+        if not pgm:
+            return False
+        width, height = int(pgm[1]), int(pgm[2])
+    return 0 < width * height <= _MOST_PIXELS_OF_PILLOW
+
+
+def _read_plain_grey(path: str) -> GreyImage | None:
+    """Reads 8-bit grey by Pillow; None where that is missing or refuses the file."""
+    try:
+        with importlib.import_module("PIL.Image").open(path) as image:
+            return np.array(image) if image.mode == "L" else None
+    except (ImportError, OSError, SyntaxError, ValueError):
+        return None  # OpenCV has the last word on broken files.
+
+
 def _decode_tiff(path: str) -> npt.NDArray[np.uint8] | None:
     """Decodes a TIFF whose alpha channel, if it has one, is told to mean nothing.
 
     libtiff would otherwise multiply the colours by an alpha that is not already in them, and a
     transparent white pixel would become black.
     """
+    cv2 = _opencv()
     with (
         Path(path).open("rb") as file,
         mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_COPY) as data,
@@ -91,8 +133,9 @@ def threshold_in_place(image: GreyImage, occupied_thresh: float) -> GreyImage:
     Returns:
         The same array.
     """
-    table = (np.arange(256) / 255.0 >= occupied_thresh).astype(np.uint8)
-    cv2.LUT(image, table, dst=image)
+    # Of the 256 values that there are, the least that is on; 256 where none is.
+    least = int(np.searchsorted(np.arange(256) / 255.0, occupied_thresh))
+    np.greater_equal(image, least, out=image.view(np.bool_))
     return image
 
 
@@ -115,6 +158,7 @@ def image_edges(mask: GreyImage, resolution: float, simplify: int) -> tuple[Edge
     if simplify == 0:
         return exact, len(exact)
     if simplify == 2:
+        cv2 = _opencv()
         kernel = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, _OPENING_KERNEL)
         mask = cv2.morphologyEx(mask, cv2.MORPH_OPEN, kernel)
     return _simplified_edges(mask, resolution), len(exact)
@@ -134,5 +178,6 @@ def _simplified_edges(mask: GreyImage, resolution: float) -> Edges:
 def _simplified_loop(loop: npt.NDArray[np.int32]) -> npt.NDArray[np.int32]:
     if len(loop) < _FEWEST_LOOP_POINTS:
         return loop
+    cv2 = _opencv()
     kept: npt.NDArray[np.int32] = cv2.approxPolyDP(loop, _TOLERANCE_PIXELS, closed=True)[:, 0]
     return loop if len(kept) < _FEWEST_LOOP_POINTS else kept

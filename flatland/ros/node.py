@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any, Final
 
 from flatland.errors import FlatlandError
 from flatland.ros.parameters import NodeParameters, ParameterError, read_parameters
-from flatland.ros.preload import preload_opencv
 from flatland.ros.shutdown import StopSignals
 
 if TYPE_CHECKING:
@@ -47,7 +46,6 @@ class ServerNode:
         """Runs until the node is asked to stop, and returns the exit code."""
         # Before anything that takes time: a signal must find someone who hears it.
         StopSignals(self._stop, lambda: _leave_ros("signal"))
-        preload_opencv()
         import rospy
 
         if not self._wait_for_master():

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import struct
+import subprocess
+import sys
 import zlib
 from pathlib import Path
 
@@ -242,3 +244,61 @@ def test_a_map_that_is_all_on_has_no_edges(simplify: int) -> None:
     assert edges.shape == (0, 4)
     assert edges.dtype == np.float32
     assert exact == 0
+
+
+class TestPlainGrey:
+    """8-bit grey PNG and PGM files are read without OpenCV."""
+
+    @pytest.fixture
+    def pixels(self) -> npt.NDArray[np.uint8]:
+        return np.random.default_rng(1).integers(0, 256, (37, 53), np.uint8)
+
+    @pytest.mark.parametrize("suffix", ["png", "pgm"])
+    def test_needs_no_opencv(
+        self, tmp_path: Path, pixels: npt.NDArray[np.uint8], suffix: str
+    ) -> None:
+        pytest.importorskip("PIL")
+        path = tmp_path / f"map.{suffix}"
+        cv2.imwrite(str(path), pixels)
+        script = (
+            "import sys; from flatland.map_image import read_grey_image, threshold_in_place;"
+            "image = read_grey_image(sys.argv[1]); print(int(image.sum()));"
+            "print(int(threshold_in_place(image, 0.65).sum())); print('cv2' in sys.modules)"
+        )
+        result = subprocess.run(
+            [sys.executable, "-c", script, str(path)], capture_output=True, text=True, check=True
+        )
+        on = (pixels / 255.0 >= 0.65).sum()
+        assert result.stdout.split() == [str(pixels.sum()), str(on), "False"]
+
+    def test_header_as_map_server_writes_it(
+        self, tmp_path: Path, pixels: npt.NDArray[np.uint8]
+    ) -> None:
+        path = tmp_path / "map.pgm"
+        header = b"P5\n# CREATOR: map_saver.cpp 0.050 m/pix\n53 37\n255\n"
+        path.write_bytes(header + pixels.tobytes())
+        np.testing.assert_array_equal(read_grey_image(str(path)), pixels)
+
+    def test_grey_of_another_depth_is_left_to_opencv(self, tmp_path: Path) -> None:
+        path = tmp_path / "map.pgm"
+        path.write_bytes(b"P5\n2 1\n100\n" + bytes([50, 100]))
+        expected = cv2.imread(str(path), cv2.IMREAD_GRAYSCALE)
+        np.testing.assert_array_equal(read_grey_image(str(path)), expected)
+
+    @pytest.mark.parametrize("suffix", ["png", "pgm"])
+    def test_cut_short_it_is_an_error(
+        self, tmp_path: Path, pixels: npt.NDArray[np.uint8], suffix: str
+    ) -> None:
+        path = tmp_path / f"map.{suffix}"
+        cv2.imwrite(str(path), pixels)
+        path.write_bytes(path.read_bytes()[:60])
+        with pytest.raises(OSError, match="cannot read"):
+            read_grey_image(str(path))
+
+    def test_without_pillow_opencv_reads_it(
+        self, tmp_path: Path, pixels: npt.NDArray[np.uint8], monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        path = tmp_path / "map.png"
+        cv2.imwrite(str(path), pixels)
+        monkeypatch.setitem(sys.modules, "PIL.Image", None)
+        np.testing.assert_array_equal(read_grey_image(str(path)), pixels)
