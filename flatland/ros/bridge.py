@@ -9,18 +9,17 @@ from typing import Any
 
 import rospy
 from rosgraph_msgs.msg import Clock
-from rospy.rostime import _set_rostime
+from rospy import rostime
 from tf2_msgs.msg import TFMessage
 
 from flatland.observer import WorldObserver
 from flatland.plugin import FlatlandPlugin
 from flatland.ports import Command, Output
-from flatland.ros.adapters import find_adapter, transform
+from flatland.ros.adapters import convert, find_adapter, transform
 from flatland.ros.plugin_ros import PluginRos
 from flatland.ros.publisher import Publisher
 from flatland.ros.registrar import Registrar
 from flatland.ros.subscriber import Subscriber
-from flatland.timekeeper import NANOSECONDS
 from flatland.values import Transform
 from flatland.world import World
 
@@ -50,7 +49,7 @@ class Bridge(WorldObserver):
         self._clock = Publisher(registrar, "/clock", Clock)
         self._clock_message = Clock()
         self._tf = Publisher(registrar, "/tf", TFMessage, queue_size=TF_QUEUE_SIZE)
-        _set_rostime(rospy.Time(0))
+        _set_ros_time(rospy.Time(0))
 
     def close(self) -> None:
         """Leaves topics alone from now on: rospy ends all of them at once at shutdown."""
@@ -60,8 +59,8 @@ class Bridge(WorldObserver):
 
     def time_advanced(self, time_ns: int) -> None:
         """Publishes `/clock`."""
-        time = rospy.Time(*divmod(time_ns, NANOSECONDS))
-        _set_rostime(time)
+        time = convert.time(time_ns, rospy.Time)
+        _set_ros_time(time)
         if self._clock.connected:
             self._clock_message.clock = time
             self._clock.publish(self._clock_message)
@@ -145,3 +144,15 @@ class Bridge(WorldObserver):
         if self._world is None:
             raise RuntimeError("the bridge has not seen a world yet")
         return self._world.post(action)
+
+
+def _set_ros_time(time: rospy.Time) -> None:
+    """Sets what `rospy.get_rostime` returns, and wakes who waits for it.
+
+    As rospy does it when a `/clock` arrives, but without a copy and a deprecation warning that
+    nobody sees: both cost more than a step of the physics.
+    """
+    rostime._rostime_current = time
+    changed = rostime.get_rostime_cond()
+    with changed:
+        changed.notify_all()

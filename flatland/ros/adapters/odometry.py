@@ -9,12 +9,20 @@ from flatland.values import Odometry
 
 def to_message(value: Odometry) -> OdometryMessage:
     """Makes a message from a value."""
-    return OdometryMessage(
+    make = convert.make
+    return make(
+        OdometryMessage,
         convert.header(value.stamp, value.frame_id),
         value.child_frame_id,
-        PoseWithCovariance(convert.pose(*value.pose), convert.covariance(value.pose_covariance)),
-        TwistWithCovariance(
-            convert.twist(*value.twist), convert.covariance(value.twist_covariance)
+        make(
+            PoseWithCovariance,
+            convert.pose(*value.pose),
+            convert.covariance(value.pose_covariance),
+        ),
+        make(
+            TwistWithCovariance,
+            convert.twist(*value.twist),
+            convert.covariance(value.twist_covariance),
         ),
     )
 

@@ -9,10 +9,16 @@ from flatland.values import Transform
 
 def to_message(value: Transform) -> TransformStamped:
     """Makes a message from a value."""
-    return TransformStamped(
+    make = convert.make
+    return make(
+        TransformStamped,
         convert.header(value.stamp, value.parent),
         value.child,
-        TransformMessage(Vector3(value.x, value.y, 0.0), convert.quaternion(value.yaw, value.roll)),
+        make(
+            TransformMessage,
+            make(Vector3, value.x, value.y, 0.0),
+            convert.quaternion(value.yaw, value.roll),
+        ),
     )
 
 
