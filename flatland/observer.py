@@ -46,6 +46,11 @@ class WorldObserver:
     def time_advanced(self, time_ns: int) -> None:
         """The simulated time [ns] moved on; after-step hooks have not run yet."""
 
+    @property
+    def wants_transforms(self) -> bool:
+        """Whether `transforms_sent` is worth a call in this step."""
+        return True
+
     def transforms_sent(self, transforms: Sequence[Transform]) -> None:
         """All transforms of one step."""
 

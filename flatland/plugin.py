@@ -13,7 +13,6 @@ import numpy as np
 from flatland.contact import Contact, ContactImpulse, ModelContact, MutableContact
 from flatland.errors import PluginError
 from flatland.ports import Command, Output, resolve_topic
-from flatland.values import Transform
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -146,9 +145,10 @@ class FlatlandPlugin:
         """
         if self._detached:
             return
-        self._sent.add((parent, child))
-        stamp = self.world.timekeeper.sim_time_ns
-        self.world.post_transform(Transform(stamp, parent, child, x, y, yaw, roll))
+        frames = (parent, child)
+        self._sent.add(frames)
+        world = self.world
+        world.post_transform(frames, (world.timekeeper.sim_time_ns, x, y, yaw, roll))
 
     def on_initialize(self, config: YamlReader) -> None:
         """Reads the parameters and gets ready; called once.

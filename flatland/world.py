@@ -13,7 +13,7 @@ from concurrent.futures import Future
 from contextlib import contextmanager
 from pathlib import Path
 from types import TracebackType
-from typing import Any, Final, TypeVar
+from typing import Any, Final, TypeAlias, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -41,6 +41,8 @@ PLUGIN_TIMEOUT: Final = 60.0
 _LOCK_PATIENCE: Final = 0.005  # s that a waiting thread sleeps before it looks again
 
 R = TypeVar("R")
+FramePair: TypeAlias = tuple[str, str]
+TransformFields: TypeAlias = tuple[int, float, float, float, float]
 
 
 class World:
@@ -54,7 +56,6 @@ class World:
         collision_filter: Layer names and their bits.
         layers: In the order of the file.
         ports: All outputs and commands by resolved topic.
-        transforms: The latest transform of each (parent, child).
         velocity_iterations: Of Box2D's solver.
         position_iterations: Of Box2D's solver.
         seed: From which all random numbers come.
@@ -103,14 +104,15 @@ class World:
         self.position_iterations = position_iterations
         self.layers: list[Layer] = []
         self.ports = PortRegistry()
-        self.transforms: dict[tuple[str, str], Transform] = {}
         self._base_dir = Path(base_dir).absolute()
         self._models: dict[str, Model] = {}
         self._physics = PhysicsWorld()
         self._registry = PluginRegistry()
         self._host = PluginHost()
         self._bodies: dict[int, Body] = {}
-        self._pending_transforms: dict[tuple[str, str], Transform] = {}
+        # What transforms are made of: most are never looked at.
+        self._transforms: dict[FramePair, TransformFields] = {}
+        self._pending_transforms: dict[FramePair, TransformFields] = {}
         self._observers: list[WorldObserver] = []
         self._lock = threading.RLock()
         self._requests: deque[Callable[[], None]] = deque()
@@ -572,22 +574,42 @@ class World:
         self.ports.command_opened.append(observer.command_opened)
         self.ports.command_closed.append(observer.command_closed)
 
-    def post_transform(self, transform: Transform) -> None:
-        """Takes a transform that goes out with the others of this step."""
-        self._pending_transforms[transform.parent, transform.child] = transform
+    @property
+    def transforms(self) -> dict[FramePair, Transform]:
+        """The latest transform of each (parent, child)."""
+        return {
+            frames: Transform(fields[0], *frames, *fields[1:])
+            for frames, fields in self._transforms.items()
+        }
 
-    def forget_transforms(self, keys: Iterable[tuple[str, str]]) -> None:
+    def post_transform(self, frames: FramePair, fields: TransformFields) -> None:
+        """Takes a transform that goes out with the others of this step; for plugins.
+
+        Args:
+            frames: (parent, child).
+            fields: (stamp, x, y, yaw, roll), as in `Transform`.
+        """
+        self._pending_transforms[frames] = fields
+
+    def forget_transforms(self, keys: Iterable[FramePair]) -> None:
         """Drops transforms whose sender is gone."""
         for key in keys:
-            self.transforms.pop(key, None)
+            self._transforms.pop(key, None)
             self._pending_transforms.pop(key, None)
 
     def _flush_transforms(self) -> None:
-        self.transforms.update(self._pending_transforms)
-        batch = list(self._pending_transforms.values())
-        self._pending_transforms.clear()
+        pending = self._pending_transforms
+        self._transforms.update(pending)
+        batch: list[Transform] | None = None
         for observer in self._observers:
-            observer.transforms_sent(batch)
+            if observer.wants_transforms:
+                if batch is None:
+                    batch = [
+                        Transform(fields[0], *frames, *fields[1:])
+                        for frames, fields in pending.items()
+                    ]
+                observer.transforms_sent(batch)
+        pending.clear()
 
     # -- contacts --------------------------------------------------------------------------
 

@@ -65,10 +65,14 @@ class Bridge(WorldObserver):
             self._clock_message.clock = time
             self._clock.publish(self._clock_message)
 
+    @property
+    def wants_transforms(self) -> bool:
+        """Whether anybody subscribes to `/tf`."""
+        return self._tf.connected
+
     def transforms_sent(self, transforms: Sequence[Transform]) -> None:
         """Publishes all transforms of a step in one `/tf` message."""
-        if self._tf.connected:
-            self._tf.publish(TFMessage([transform.to_message(each) for each in transforms]))
+        self._tf.publish(TFMessage([transform.to_message(each) for each in transforms]))
 
     # -- ports -----------------------------------------------------------------------------
 

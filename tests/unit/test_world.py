@@ -9,6 +9,7 @@ import pytest
 
 import flatland
 from flatland import ModelPlugin, WorldError, YamlError
+from flatland.observer import WorldObserver
 from flatland.world import World
 
 TWO_BODIES = """
@@ -457,3 +458,38 @@ def test_a_world_can_be_made_without_a_file(tmp_path):
         assert world.time == pytest.approx(0.015)
     with pytest.raises(ValueError, match="seed must not be negative"):
         World(seed=-1)
+
+
+def test_transforms_go_only_to_observers_that_want_them(files):
+    class Observer(WorldObserver):
+        def __init__(self, wants):
+            self.wants = wants
+            self.batches = []
+
+        @property
+        def wants_transforms(self):
+            return self.wants
+
+        def transforms_sent(self, transforms):
+            self.batches.append(list(transforms))
+
+    files.write(
+        "robot.model.yaml",
+        """
+        bodies: [{name: base, footprints: [{type: circle, radius: 0.2, density: 1}]}]
+        plugins: [{type: DiffDrive, name: drive, body: base}]
+        """,
+    )
+    eager, idle = Observer(True), Observer(False)
+    world = files.load(
+        """
+        properties: {}
+        layers: [{name: 2d}]
+        models: [{name: r1, model: robot.model.yaml}]
+        """,
+        observers=[eager, idle],
+    )
+    world.step(2)
+    assert idle.batches == []
+    assert [[each.stamp for each in batch] for batch in eager.batches] == [[0], [5_000_000]]
+    assert world.transforms == {("odom", "base"): eager.batches[-1][0]}
