@@ -19,7 +19,7 @@ import pytest
 
 PATIENCE = 30.0  # s; only a test that fails waits that long
 MAGENTA = (255, 0, 255)  # the walls
-_LEAST_STRENGTH = 70  # of 255
+_LEAST_STRENGTH = 45  # of 255
 BODY = "name: base, color: [0, 0, 1, 1], footprints: [{type: circle, radius: 0.4, density: 1}]"
 ROBOT = f"""
 bodies: [{{{BODY}}}]
