@@ -1,0 +1,95 @@
+"""Worlds of robots with a differential drive and a laser, written into a temporary folder."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import cv2
+import numpy as np
+import yaml
+
+import flatland
+
+from scenes import benchmark_world_path  # isort: skip
+
+CLEARANCE = 0.5  # m from the walls, at least
+SPACING = 0.9  # m between two robots, at least
+MOST = 100  # robots
+
+ROBOT = """
+bodies:
+  - name: base
+    footprints: [{{type: circle, radius: 0.2, density: 50}}]
+plugins:
+  - {{type: DiffDrive, name: drive, body: base, pub_rate: 50}}
+  - {{type: Laser, name: laser, body: base, range: 20, update_rate: 10,
+     always_publish: {scans}, noise_std_dev: 0.01,
+     angle: {{min: -3.141592653589793, max: 3.13, increment: 0.017453292519943295}}}}
+"""
+
+
+def free_places(world_path: Path, count: int) -> list[tuple[float, float]]:
+    """Returns where robots can stand on the first layer of a world, connected to its first model.
+
+    Args:
+        world_path: A world whose first layer is an image.
+        count: How many places.
+    """
+    world = yaml.safe_load(world_path.read_text())
+    map_path = world_path.parent / world["layers"][0]["map"]
+    entry = yaml.safe_load(map_path.read_text())
+    image = cv2.imread(str(map_path.parent / entry["image"]), cv2.IMREAD_GRAYSCALE)
+    resolution, (left, bottom, _) = entry["resolution"], entry["origin"]
+    is_free = (image > 255 * (1 - entry["free_thresh"])).astype(np.uint8)
+    has_room = cv2.distanceTransform(is_free, cv2.DIST_L2, 5) * resolution > CLEARANCE
+    _, labels = cv2.connectedComponents(has_room.astype(np.uint8))
+    x, y, _ = world["models"][0]["pose"]
+    rows = len(image)
+    home = labels[rows - 1 - int((y - bottom) / resolution), int((x - left) / resolution)]
+    candidates = np.argwhere(labels == home)
+    np.random.default_rng(3).shuffle(candidates)
+    found: list[tuple[float, float]] = []
+    for row, column in candidates:
+        x, y = left + (column + 0.5) * resolution, bottom + (rows - row - 0.5) * resolution
+        if all((x - a) ** 2 + (y - b) ** 2 > SPACING**2 for a, b in found):
+            found.append((float(x), float(y)))
+            if len(found) == count:
+                return found
+    raise ValueError(f"{world_path} has room for {len(found)} robots, not {count}")
+
+
+@contextmanager
+def crowd(which: slice, *, scans: bool) -> Iterator[flatland.World]:
+    """A world of robots that drive in circles on the map of the benchmark world.
+
+    Args:
+        which: Of the `MOST` places that there are, so that few robots see what many see.
+        scans: Whether their lasers scan with nobody listening.
+    """
+    base = benchmark_world_path()
+    places = free_places(base, MOST)[which]
+    world = yaml.safe_load(base.read_text())
+    for layer in world["layers"]:
+        layer["map"] = str(base.parent / layer["map"])
+    world["models"] = [
+        {
+            "name": f"robot{index}",
+            "namespace": f"robot{index}",
+            "model": "robot.model.yaml",
+            "pose": [*place, float(index)],
+        }
+        for index, place in enumerate(places)
+    ]
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        (folder / "robot.model.yaml").write_text(ROBOT.format(scans=str(scans).lower()))
+        (folder / "world.yaml").write_text(yaml.safe_dump(world))
+        with flatland.World.from_yaml(folder / "world.yaml", seed=1) as loaded:
+            for index in range(len(places)):
+                turn = flatland.Twist(linear_x=0.2, angular_z=1.0 if index % 2 else -1.0)
+                loaded.command(f"/robot{index}/cmd_vel").set(turn)
+            loaded.step(200)
+            yield loaded

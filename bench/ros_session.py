@@ -1,0 +1,191 @@
+"""A ROS master of our own on a free port, and programs that run beside it."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import re
+import select
+import signal
+import socket
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Iterator, Mapping
+from pathlib import Path
+
+import flatland
+
+CHECKOUT = Path(__file__).resolve().parent.parent
+PATIENCE = 60.0  # s that anything may take
+
+_TICKS = os.sysconf("SC_CLK_TCK")
+
+
+class Program:
+    """A running program and what it prints."""
+
+    def __init__(self, command: list[str], environment: Mapping[str, str]) -> None:
+        """Starts it in a process group of its own."""
+        self.started = time.monotonic()
+        self._text = ""
+        self._popen = subprocess.Popen(
+            command,
+            env=environment,
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            start_new_session=True,
+        )
+
+    @property
+    def pid(self) -> int:
+        """Its process id."""
+        return self._popen.pid
+
+    def wait_for(self, pattern: str, timeout: float = PATIENCE) -> re.Match[str]:
+        """Reads what it prints until a pattern is there.
+
+        Raises:
+            RuntimeError: It ended, or took too long.
+        """
+        end = time.monotonic() + timeout
+        stream = self._popen.stdout
+        assert stream is not None
+        while True:
+            match = re.search(pattern, self._text)
+            if match:
+                return match
+            left = end - time.monotonic()
+            ready = left > 0 and select.select([stream], [], [], left)[0]
+            data = os.read(stream.fileno(), 65536) if ready else b""
+            if not data:
+                raise RuntimeError(f"no {pattern!r} in what {self._popen.args} said:\n{self._text}")
+            self._text += data.decode(errors="replace")
+
+    def stop(self) -> None:
+        """Asks it to end, and makes it end when it does not; its children with it."""
+        if self._popen.poll() is None:
+            self._popen.send_signal(signal.SIGINT)
+            with contextlib.suppress(subprocess.TimeoutExpired):
+                self._popen.wait(10)
+        with contextlib.suppress(ProcessLookupError):
+            os.killpg(self._popen.pid, signal.SIGKILL)
+        self._popen.wait()
+        if self._popen.stdout is not None:
+            self._popen.stdout.close()
+
+
+class RosSession:
+    """A running ROS master and the environment of its nodes."""
+
+    def __init__(self, environment: dict[str, str]) -> None:
+        """Knows how programs are started; see `ros_session`."""
+        self.environment = environment
+        self._programs: list[Program] = []
+
+    def start(self, *command: str) -> Program:
+        """Starts a program that ends with the session."""
+        program = Program(list(command), self.environment)
+        self._programs.append(program)
+        return program
+
+    def launch(self, launch_file: str, **arguments: object) -> Program:
+        """Starts one of flatland's launch files."""
+        given = [f"{name}:={value}" for name, value in arguments.items()]
+        return self.start("roslaunch", "flatland", launch_file, *given)
+
+    def server(self, **parameters: object) -> Program:
+        """Starts the node alone, as rosrun would, with private parameters."""
+        given = [f"_{name}:={value}" for name, value in parameters.items()]
+        script = CHECKOUT / "scripts" / "flatland_server"
+        return self.start(sys.executable, str(script), *given)
+
+    def stop(self, program: Program) -> None:
+        """Ends a program."""
+        program.stop()
+        self._programs.remove(program)
+
+    def close(self) -> None:
+        """Ends all that still runs, the latest first."""
+        while self._programs:
+            self._programs.pop().stop()
+
+
+@contextlib.contextmanager
+def ros_session() -> Iterator[RosSession]:
+    """Starts a ROS master; ends it and all nodes in the end."""
+    with tempfile.TemporaryDirectory() as folder:
+        session = RosSession(_environment(Path(folder)))
+        try:
+            port = session.environment["ROS_MASTER_URI"].rsplit(":", 1)[1]
+            session.start("roscore", "-p", port).wait_for("started core service")
+            yield session
+        finally:
+            session.close()
+
+
+def _environment(folder: Path) -> dict[str, str]:
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        port = probe.getsockname()[1]
+    environment = {
+        **os.environ,
+        "ROS_MASTER_URI": f"http://127.0.0.1:{port}",
+        "ROS_IP": "127.0.0.1",
+        "ROS_HOME": str(folder),
+        "ROS_LOG_DIR": str(folder / "log"),
+        "ROS_ETC_DIR": os.environ.get("ROS_ETC_DIR", "/etc/ros"),
+        "ROS_VERSION": "1",
+        "ROS_PYTHON_VERSION": "3",
+        "ROS_DISTRO": os.environ.get("ROS_DISTRO", "Debian"),
+        "PYTHONUNBUFFERED": "1",
+    }
+    environment.pop("ROS_HOSTNAME", None)
+    package = Path(flatland.__file__).resolve().parent.parent
+    if (package / "launch").is_dir():
+        # A source tree with the extension built into it: laid out as an install would be.
+        environment["PYTHONPATH"] = f"{package}:{os.environ.get('PYTHONPATH', '')}"
+        environment["ROS_PACKAGE_PATH"] = f"{_overlay(package, folder)}:/usr/share"
+    elif "ROS_PACKAGE_PATH" not in environment:
+        environment["ROS_PACKAGE_PATH"] = f"{sys.prefix}/share:/usr/share"
+    return environment
+
+
+def _overlay(package: Path, folder: Path) -> Path:
+    share = folder / "share" / "flatland"
+    (share / "scripts").mkdir(parents=True)
+    for name in ("package.xml", "flatland_plugins.xml", "launch", "msg", "srv", "worlds"):
+        (share / name).symlink_to(package / name)
+    starter = share / "scripts" / "flatland_server"
+    script = package / "scripts" / "flatland_server"
+    starter.write_text(f'#!/bin/sh\nexec "{sys.executable}" "{script}" "$@"\n')
+    starter.chmod(0o755)
+    return share.parent
+
+
+def wait_until(what: str, condition: Callable[[], bool], timeout: float = PATIENCE) -> None:
+    """Waits until a condition holds.
+
+    Raises:
+        RuntimeError: It does not.
+    """
+    end = time.monotonic() + timeout
+    while not condition():
+        if time.monotonic() > end:
+            raise RuntimeError(f"{what} did not come true in {timeout:g} s")
+        time.sleep(0.005)
+
+
+def processor_time(pid: int) -> float:
+    """Returns the processor time that a process used so far, all threads [s]."""
+    fields = Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()
+    return (int(fields[11]) + int(fields[12])) / _TICKS
+
+
+def peak_memory(pid: int) -> float:
+    """Returns the most memory that a process held so far [MB]."""
+    status = Path(f"/proc/{pid}/status").read_text()
+    match = re.search(r"VmHWM:\s+(\d+) kB", status)
+    return int(match[1]) / 1024 if match else 0.0
