@@ -16,7 +16,7 @@ from flatland.drawing import save
 _CHECKOUT = Path(__file__).resolve().parent.parent
 
 # Model file, pose (x, y [m], yaw [rad]).
-_THINGS = [
+THINGS = [
     ("chair", (-0.6, -5.2, 0.0)),
     ("chair", (1.6, -5.9, 2.0)),
     ("box", (3.6, -5.0, 0.4)),
@@ -30,7 +30,7 @@ _THINGS = [
 def office() -> World:
     """Loads the office, puts some things into it and lets both robots drive for some seconds."""
     world = World.from_yaml(_CHECKOUT / "worlds" / "office" / "world.yaml", seed=1)
-    for number, (kind, pose) in enumerate(_THINGS, start=1):
+    for number, (kind, pose) in enumerate(THINGS, start=1):
         world.spawn_model(f"{kind}.model.yaml", f"{kind}_{number}", pose=pose)
     for topic in ("/scan", "/tricycle/scan"):
         world.output(topic)  # so that there are scans, with their noise

@@ -84,13 +84,13 @@ class VirtualScreen:
         self.move(x, y)
         self._run("xdotool", "click", str(button))
 
-    def press(self) -> None:
-        """Presses the left button and holds it."""
-        self._run("xdotool", "mousedown", "1")
+    def press(self, button: int = 1) -> None:
+        """Presses a button and holds it."""
+        self._run("xdotool", "mousedown", str(button))
 
-    def release(self) -> None:
-        """Lets go of the left button."""
-        self._run("xdotool", "mouseup", "1")
+    def release(self, button: int = 1) -> None:
+        """Lets go of a button."""
+        self._run("xdotool", "mouseup", str(button))
 
     def key(self, *keys: str) -> None:
         """Strikes keys, such as `Escape` or `ctrl+q`."""

@@ -1,0 +1,176 @@
+"""Makes the pictures of README.md and docs/viewer.md: the viewer and RViz on a virtual screen.
+
+Usage: show_pictures.py [FOLDER]   (docs/images; pictures that are there are overwritten)
+
+To be run in flatland's environment (setup.bash). Nothing else of ROS needs to run.
+"""
+
+from __future__ import annotations
+
+import os
+import signal
+import socket
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import cv2
+from draw_pictures import THINGS
+from virtual_screen import VirtualScreen, missing_programs
+
+_CHECKOUT = Path(__file__).resolve().parent.parent
+_OFFICE = _CHECKOUT / "worlds" / "office"
+_SIZE = (1200, 780)
+_PATIENCE = 60.0  # s
+_SETTLING = 1.5  # s that RViz gets to draw what it has just been told
+
+
+def main(arguments: list[str]) -> int:
+    """Makes all pictures."""
+    missing = missing_programs()
+    if missing:
+        print(f"not installed: {', '.join(missing)} (make setup-dev installs them)")
+        return 1
+    folder = Path(arguments[0]) if arguments else _CHECKOUT / "docs" / "images"
+    folder.mkdir(parents=True, exist_ok=True)
+    screen = VirtualScreen(*_SIZE)
+    try:
+        with _simulator(screen) as environment:
+            _furnish()
+            _drive(3.0)
+            _picture_of_viewer(screen, folder / "viewer.png")
+            _picture_of_rviz(screen, environment, folder / "rviz.png")
+    finally:
+        screen.close()
+    return 0
+
+
+@contextmanager
+def _simulator(screen: VirtualScreen) -> Iterator[dict[str, str]]:
+    """Runs the office with the viewer, on a ROS master of its own."""
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        port = probe.getsockname()[1]
+    os.environ.update(ROS_MASTER_URI=f"http://127.0.0.1:{port}", ROS_IP="127.0.0.1")
+    environment = {**os.environ, **screen.environment}
+    command = ["roslaunch", "-p", str(port), "flatland", "server.launch", "seed:=1"]
+    with _running(command, environment):
+        import rosgraph
+        import rospy
+
+        _wait("ROS master", rosgraph.is_master_online)
+        rospy.init_node("pictures", disable_rostime=True, disable_signals=True)
+        yield environment
+        rospy.signal_shutdown("all pictures are made")
+
+
+@contextmanager
+def _running(command: list[str], environment: dict[str, str]) -> Iterator[None]:
+    log = subprocess.DEVNULL
+    process = subprocess.Popen(command, env=environment, stdout=log, stderr=log)  # noqa: S603
+    try:
+        yield
+    finally:
+        process.send_signal(signal.SIGINT)
+        process.wait()
+
+
+def _wait(what: str, condition: Callable[[], Any]) -> None:
+    end = time.monotonic() + _PATIENCE
+    while not condition():
+        if time.monotonic() > end:
+            raise TimeoutError(f"{what} did not come in {_PATIENCE} s")
+        time.sleep(0.1)
+
+
+def _furnish() -> None:
+    """Puts some things into the office."""
+    import rospy
+    from geometry_msgs.msg import Pose2D
+
+    from flatland.srv import SpawnModel
+
+    rospy.wait_for_service("/spawn_model", _PATIENCE)
+    spawn = rospy.ServiceProxy("/spawn_model", SpawnModel)
+    for number, (kind, pose) in enumerate(THINGS, start=1):
+        answer = spawn(str(_OFFICE / f"{kind}.model.yaml"), f"{kind}_{number}", "", Pose2D(*pose))
+        if not answer.success:
+            raise RuntimeError(answer.message)
+
+
+def _drive(seconds: float) -> None:
+    """Lets both robots drive a curve."""
+    import rospy
+    from geometry_msgs.msg import Twist
+
+    robots = {
+        rospy.Publisher("/cmd_vel", Twist, queue_size=1): (0.4, 0.12),
+        rospy.Publisher("/tricycle/cmd_vel", Twist, queue_size=1): (0.7, 0.03),
+    }
+    for robot, (speed, turn) in robots.items():
+        _wait("robot", robot.get_num_connections)
+        command = Twist()
+        command.linear.x, command.angular.z = speed, turn
+        robot.publish(command)
+    time.sleep(seconds)
+    for robot in robots:
+        robot.publish(Twist())
+
+
+def _picture_of_viewer(screen: VirtualScreen, path: Path) -> None:
+    """Places a model in the viewer; the picture is taken before it is there."""
+    _wait("picture of the office", lambda: (screen.picture().max(axis=2) > 150).mean() > 0.02)
+    width, height = _SIZE
+    for _ in range(4):
+        screen.click(width / 2, height / 2, button=4)
+    _drag(screen, (width / 2 - 60, height / 2), (width / 2 + 60, height / 2))
+    screen.key("s")
+    time.sleep(_SETTLING)
+    screen.type(str(_OFFICE / "tricycle.model.yaml"))
+    screen.key("Return")
+    time.sleep(_SETTLING)
+    screen.click(0.62 * width, 0.7 * height)
+    screen.move(0.68 * width, 0.66 * height)
+    time.sleep(_SETTLING)
+    _save(screen, path)
+    screen.key("Escape", "ctrl+q")
+
+
+def _picture_of_rviz(screen: VirtualScreen, environment: dict[str, str], path: Path) -> None:
+    """Shows a part of the office in RViz, with what the robots have driven."""
+    text = (_CHECKOUT / "rviz" / "flatland.rviz").read_text()
+    text = text.replace("Scale: 14\n      X: 0\n", "Scale: 34\n      X: -3\n")
+    text = text.replace("Height: 800", f"Height: {_SIZE[1]}")
+    with tempfile.TemporaryDirectory() as folder:
+        config = Path(folder) / "picture.rviz"
+        config.write_text(text)
+        with _running(["rviz", "-d", str(config)], environment):
+            _wait("picture of RViz", lambda: (screen.picture()[100:600, 400:1100] > 0).all())
+            time.sleep(2 * _SETTLING)
+            _drive(5.0)
+            time.sleep(_SETTLING)
+            _save(screen, path)
+
+
+def _drag(screen: VirtualScreen, start: tuple[float, float], end: tuple[float, float]) -> None:
+    """Moves the camera with the middle button."""
+    screen.move(*start)
+    screen.press(2)
+    for step in range(1, 5):
+        screen.move(*(a + (b - a) * step / 4 for a, b in zip(start, end, strict=True)))
+    screen.release(2)
+
+
+def _save(screen: VirtualScreen, path: Path) -> None:
+    image = screen.picture()[:, :, ::-1]
+    cv2.imwrite(str(path), image, [cv2.IMWRITE_PNG_COMPRESSION, 9])
+    print(f"{path}: {path.stat().st_size // 1000} kB")
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))
