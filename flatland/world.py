@@ -114,6 +114,8 @@ class World:
         self._transforms: dict[FramePair, TransformFields] = {}
         self._pending_transforms: dict[FramePair, TransformFields] = {}
         self._observers: list[WorldObserver] = []
+        self._time_observers: list[WorldObserver] = []
+        self._transform_observers: list[WorldObserver] = []
         self._lock = threading.RLock()
         self._requests: deque[Callable[[], None]] = deque()
         self._stepping_thread: int | None = None
@@ -219,7 +221,7 @@ class World:
             if self._records_contacts:
                 self._dispatch_contacts()
             timekeeper.advance()
-            for observer in self._observers:
+            for observer in self._time_observers:
                 observer.time_advanced(timekeeper.sim_time_ns)
             self._host.after_physics_step(timekeeper)
             if self._pending_transforms:
@@ -569,6 +571,12 @@ class World:
     def add_observer(self, observer: WorldObserver) -> None:
         """Tells an observer of all that happens from now on."""
         self._observers.append(observer)
+        # Called in every step, so only those that have more than the empty hook.
+        kind = type(observer)
+        if kind.time_advanced is not WorldObserver.time_advanced:
+            self._time_observers.append(observer)
+        if kind.transforms_sent is not WorldObserver.transforms_sent:
+            self._transform_observers.append(observer)
         self.ports.output_opened.append(observer.output_opened)
         self.ports.output_closed.append(observer.output_closed)
         self.ports.command_opened.append(observer.command_opened)
@@ -601,7 +609,7 @@ class World:
         pending = self._pending_transforms
         self._transforms.update(pending)
         batch: list[Transform] | None = None
-        for observer in self._observers:
+        for observer in self._transform_observers:
             if observer.wants_transforms:
                 if batch is None:
                     batch = [
