@@ -354,6 +354,15 @@ def ros(ros_master: dict[str, str]) -> Iterator[Ros]:
     ros.close()
 
 
+@pytest.fixture(scope="module")
+def module_ros(ros_master: dict[str, str]) -> Iterator[Ros]:
+    """The same for all tests of a file."""
+    del ros_master
+    ros = Ros()
+    yield ros
+    ros.close()
+
+
 @pytest.fixture(scope="session")
 def server_path(ros_environment: dict[str, str]) -> str:
     """The program that roslaunch would start as flatland_server."""
@@ -443,7 +452,9 @@ def module_launcher(ros_master: dict[str, str], server_path: str) -> Iterator[La
 def write_world(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., Path]:
     """Writes a world with a room of 10 m by 10 m: models as YAML, and further files by name."""
 
-    def write(models: str = "[]", plugins: str = "[]", **files: str) -> Path:
+    def write(
+        models: str = "[]", plugins: str = "[]", layers: str = f"[{LAYER}]", **files: str
+    ) -> Path:
         folder = tmp_path_factory.mktemp("world")
         (folder / "map.yaml").write_text(MAP)
         (folder / "walls.dat").write_text(WALLS)
@@ -452,7 +463,7 @@ def write_world(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., Path]
             (folder / f"{name}.model.yaml").write_text(text)
         path = folder / "world.yaml"
         path.write_text(
-            f"properties: {{}}\nlayers: [{LAYER}]\nmodels: {models}\nplugins: {plugins}\n"
+            f"properties: {{}}\nlayers: {layers}\nmodels: {models}\nplugins: {plugins}\n"
         )
         return path
 

@@ -1,0 +1,609 @@
+"""What each included plugin sends: fields, frames, stamps, rates and covariances on the wire.
+
+One server and one recording serve all tests. While it is made, the robot `r1` drives in a circle,
+the tricycle `t1` too, and `p1` pushes against a wall.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Callable, Iterable
+from pathlib import Path
+from typing import Any
+
+import pytest
+from geometry_msgs.msg import Twist, TwistWithCovarianceStamped, Vector3
+from nav_msgs.msg import Odometry
+from sensor_msgs.msg import Imu, LaserScan, NavSatFix
+from std_msgs.msg import Bool
+from tf2_msgs.msg import TFMessage
+
+from flatland.msg import Collisions
+
+STEP = 5_000_000  # ns
+LENGTH = 1_500_000_000  # ns of simulated time that are recorded
+REF_LAT, REF_LON = 43.5, -80.5
+
+LIGHT = "[{type: circle, radius: 0.01, density: 1, layers: []}]"
+ROBOT = f"""
+bodies:
+  - {{name: base, footprints: [{{type: circle, radius: 0.2, density: 1}}]}}
+  - {{name: mast, pose: [0.1, 0, 0.5], footprints: {LIGHT}}}
+  - {{name: flag, footprints: {LIGHT}}}
+joints:
+  - {{name: m, type: weld, angle: 0.5,
+     bodies: [{{name: base, anchor: [0.1, 0]}}, {{name: mast, anchor: [0, 0]}}]}}
+  - {{name: f, type: weld,
+     bodies: [{{name: base, anchor: [0, 0]}}, {{name: flag, anchor: [0, 0]}}]}}
+plugins:
+  - {{type: DiffDrive, name: drive, body: base, odom_frame_id: here, ground_truth_frame_id: world,
+     odom_pose_noise: [0.01, 0.02, 0.03], odom_twist_noise: [0.04, 0.05, 0.06],
+     odom_pose_covariance: {list(range(36))}}}
+  - {{type: Laser, name: front, body: base, range: 20, update_rate: 25, origin: [0.1, 0.05, 0.2],
+     angle: {{min: 0.5, max: -0.5, increment: -0.5}}, upside_down: true}}
+  - {{type: ModelTfPublisher, name: tf, publish_tf_world: true, update_rate: 40, exclude: [flag]}}
+  - {{type: Gps, name: gps, body: base, ref_lat: {REF_LAT}, ref_lon: {REF_LON},
+     origin: [0.3, 0, 0]}}
+  - {{type: Imu, name: imu, body: base, update_rate: 20, orientation_noise: [0.1, 0.2, 0.3],
+     angular_velocity_noise: [0.4, 0.5, 0.6], linear_acceleration_noise: [0.7, 0.8, 0.9],
+     linear_acceleration_covariance: [1, 2, 3, 4, 5, 6, 7, 8, 9]}}
+"""
+TRICYCLE = f"""
+bodies:
+  - {{name: base, footprints: [{{type: circle, radius: 0.2, density: 1}}]}}
+  - {{name: front, footprints: {LIGHT}}}
+  - {{name: left, pose: [-0.4, 0.2, 0], footprints: {LIGHT}}}
+  - {{name: right, pose: [-0.4, -0.2, 0], footprints: {LIGHT}}}
+joints:
+  - {{name: f, type: revolute,
+     bodies: [{{name: base, anchor: [0, 0]}}, {{name: front, anchor: [0, 0]}}]}}
+  - {{name: l, type: weld,
+     bodies: [{{name: base, anchor: [-0.4, 0.2]}}, {{name: left, anchor: [0, 0]}}]}}
+  - {{name: r, type: weld,
+     bodies: [{{name: base, anchor: [-0.4, -0.2]}}, {{name: right, anchor: [0, 0]}}]}}
+plugins:
+  - {{type: TricycleDrive, name: drive, body: base, front_wheel_joint: f, rear_left_wheel_joint: l,
+     rear_right_wheel_joint: r, pub_rate: 50, odom_pose_noise: [1.0e-6, 1.0e-6, 1.0e-6],
+     odom_twist_covariance: [1, 0, 0, 0, 0, 0, 0, 2, 0, 0, 0, 0, 0, 0, 3, 0, 0, 0,
+                             0, 0, 0, 4, 0, 0, 0, 0, 0, 0, 5, 0, 0, 0, 0, 0, 0, 6]}}
+"""
+PUSHER = """
+bodies:
+  - {name: base, footprints: [{type: circle, radius: 0.2, density: 10}]}
+  - {name: feeler, footprints: [{type: circle, radius: 0.3, density: 1.0e-6, sensor: true}]}
+joints:
+  - {name: f, type: weld,
+     bodies: [{name: base, anchor: [0, 0]}, {name: feeler, anchor: [0, 0]}]}
+plugins:
+  - {type: DiffDrive, name: drive, body: base, pub_rate: 0, enable_odom_tf_pub: false}
+  - {type: Bumper, name: eager, update_rate: 10}
+  - {type: Bumper, name: calm, update_rate: 10, publish_all_collisions: false, topic: calm,
+     world_frame_id: world, exclude: [feeler]}
+"""
+# Its arm touches a post all the time, which must not switch the sensor of the plate.
+PLATE = """
+bodies:
+  - {name: plate, footprints: [{type: circle, radius: 0.3, density: 1, sensor: true}]}
+  - {name: arm, pose: [0, 1, 0],
+     footprints: [{type: circle, radius: 0.3, density: 1, sensor: true}]}
+plugins:
+  - {type: BoolSensor, name: switch, update_rate: 20}
+  - {type: BoolSensor, name: other, update_rate: 20, topic: arm, body: arm}
+"""
+POST = "bodies: [{name: post, type: static, footprints: [{type: circle, radius: 0.1, density: 0}]}]"
+DOOR = """
+bodies:
+  - {name: leaf, type: kinematic, footprints: [{type: circle, radius: 0.1, density: 0}]}
+plugins:
+  - {type: Tween, name: opener, body: leaf, delta: [0.5, 0, 0], duration: 0.1, mode: trigger,
+     trigger_topic: open}
+  - {type: ModelTfPublisher, name: tf, publish_tf_world: true}
+"""
+TOWER = """
+bodies: [{name: base, type: static, footprints: []}]
+plugins:
+  - {type: Laser, name: lidar, body: base, range: 8.5, topic: mirror_scan, frame: /lidar,
+     update_rate: 50, angle: {min: -1.5, max: 1.5, increment: 1.5}, no_hit: inf,
+     broadcast_tf: false}
+"""
+MIRROR = """
+bodies:
+  - {name: glass, type: static,
+     footprints: [{type: circle, radius: 0.1, density: 0, layers: [reflectance]}]}
+"""
+MODELS = """
+  - {name: robot, model: robot.model.yaml, namespace: r1, pose: [1, 2, 0.3]}
+  - {name: wheels, model: tricycle.model.yaml, namespace: t1, pose: [-2.5, -2, 0]}
+  - {name: pusher, model: pusher.model.yaml, namespace: p1, pose: [4.5, 0, 0]}
+  - {name: plate, model: plate.model.yaml, namespace: s1, pose: [-2, 2, 0]}
+  - {name: post, model: post.model.yaml, pose: [-2, 3, 0]}
+  - {name: guest, model: ball.model.yaml, pose: [-4, 4, 0]}
+  - {name: door, model: door.model.yaml, namespace: d1, pose: [2, -4, 0]}
+  - {name: tower, model: tower.model.yaml, pose: [-4, 0, 0]}
+  - {name: mirror, model: mirror.model.yaml, pose: [-3, 0, 0]}
+"""
+LAYERS = "[{name: 2d, map: map.yaml}, {name: reflectance}]"
+
+# Topic: type, and the period in simulated time [ns].
+HEARD: dict[str, tuple[type[Any], int]] = {
+    "/r1/odometry/ground_truth": (Odometry, STEP),
+    "/r1/odometry/filtered": (Odometry, STEP),
+    "/r1/twist": (TwistWithCovarianceStamped, STEP),
+    "/r1/scan": (LaserScan, 40_000_000),
+    "/r1/gps/fix": (NavSatFix, 100_000_000),
+    "/r1/imu/filtered": (Imu, 50_000_000),
+    "/r1/imu/ground_truth": (Imu, 50_000_000),
+    "/t1/odometry/ground_truth": (Odometry, 20_000_000),
+    "/t1/odometry/filtered": (Odometry, 20_000_000),
+    "/p1/collisions": (Collisions, STEP),
+    "/p1/calm": (Collisions, 100_000_000),
+    "/mirror_scan": (LaserScan, 20_000_000),
+}
+# Parent and child: the period.
+TRANSFORMS = {
+    ("here", "r1_base"): STEP,
+    ("r1_base", "r1_front"): 40_000_000,
+    ("r1_base", "r1_mast"): 25_000_000,
+    ("map", "r1_base"): 25_000_000,
+    ("r1_base", "r1_gps"): 100_000_000,
+    ("r1_base", "r1_imu"): 50_000_000,
+    ("map", "d1_leaf"): STEP,
+}
+SPEED, TURN = 0.2, 0.5
+WHEEL_SPEED, STEERING = 0.3, 0.4
+PUSH = 0.5
+
+Stamped = dict[int, Any]
+
+
+@pytest.fixture(scope="module", autouse=True)
+def server(module_launcher: Any, write_world: Callable[..., Path]) -> Any:
+    """One server for all tests of this file."""
+    world = write_world(
+        MODELS,
+        layers=LAYERS,
+        robot=ROBOT,
+        tricycle=TRICYCLE,
+        pusher=PUSHER,
+        plate=PLATE,
+        post=POST,
+        door=DOOR,
+        tower=TOWER,
+        mirror=MIRROR,
+    )
+    return module_launcher.server(world, seed=7)
+
+
+def stamp(message: Any) -> int:
+    if isinstance(message, TFMessage):
+        message = message.transforms[0]
+    nanoseconds: int = message.header.stamp.to_nsec()
+    return nanoseconds
+
+
+def drive(ros: Any, topic: str, linear: float, angular: float) -> None:
+    ros.publisher(topic, Twist).publish(Twist(Vector3(linear, 0, 0), Vector3(0, 0, angular)))
+
+
+@pytest.fixture(scope="module")
+def recording(module_ros: Any, server: Any) -> dict[str, Stamped]:
+    """All that came in the same part of simulated time, by topic and stamp."""
+    ros = module_ros
+    topics = {name: ros.topic(name, kind) for name, (kind, _) in HEARD.items()}
+    topics["/tf"] = ros.topic("/tf", TFMessage)
+    drive(ros, "/r1/cmd_vel", SPEED, TURN)
+    drive(ros, "/t1/cmd_vel", WHEEL_SPEED, STEERING)
+    drive(ros, "/p1/cmd_vel", PUSH, 0)
+    # The last thing to happen: the pusher gets to the wall, and the solver holds it there.
+    first = topics["/p1/collisions"].until(
+        lambda message: any(len(each.magnitude_forces) for each in message.collisions)
+    )
+    topics["/t1/odometry/ground_truth"].until(lambda message: message.twist.twist.angular.z > 0)
+    start = stamp(first) + 200_000_000
+    end = start + LENGTH
+    recorded: dict[str, Stamped] = {}
+    for name, topic in topics.items():
+        messages = [topic.until(lambda message: stamp(message) >= start)]
+        while stamp(messages[-1]) <= end:
+            messages.append(topic.next())
+        recorded[name] = {stamp(message): message for message in messages}
+        topic.close()
+    return recorded
+
+
+def sorted_values(stamped: Stamped) -> list[Any]:
+    return [message for _, message in sorted(stamped.items())]
+
+
+def yaw(rotation: Any) -> float:
+    assert (rotation.x, rotation.y) == (0, 0)
+    return 2 * math.atan2(rotation.z, rotation.w)
+
+
+def pose(message: Odometry) -> tuple[float, float, float]:
+    position = message.pose.pose.position
+    assert position.z == 0
+    return (position.x, position.y, yaw(message.pose.pose.orientation))
+
+
+def same_angle(value: float, expected: float, tolerance: float = 1e-9) -> bool:
+    return abs(math.remainder(value - expected, math.tau)) <= tolerance
+
+
+def variance(values: Iterable[float]) -> float:
+    """About 0, as of noise."""
+    squares = [value**2 for value in values]
+    return sum(squares) / len(squares)
+
+
+def assert_period(times: list[int], period: int) -> None:
+    steps = [after - before for before, after in itertools.pairwise(sorted(times))]
+    assert all(time % period == 0 for time in times)
+    if period == STEP:
+        # Who is slow to read may miss some of what comes in every step.
+        assert steps.count(STEP) > 0.6 * LENGTH / STEP
+    else:
+        assert set(steps) == {period}
+        assert len(times) >= LENGTH // period
+
+
+@pytest.mark.parametrize("topic", HEARD)
+def test_rate_type_and_latching(recording: dict[str, Stamped], topic: str) -> None:
+    kind, period = HEARD[topic]
+    assert_period(list(recording[topic]), period)
+    for message in recording[topic].values():
+        header = message._connection_header
+        assert (header["type"], header["latching"]) == (kind._type, "0")
+        assert (header["md5sum"], header["topic"]) == (kind._md5sum, topic)
+
+
+@pytest.mark.parametrize("pair", TRANSFORMS, ids="-".join)
+def test_rate_of_transforms(recording: dict[str, Stamped], pair: tuple[str, str]) -> None:
+    assert_period(list(transforms(recording, *pair)), TRANSFORMS[pair])
+
+
+def test_no_other_transforms(recording: dict[str, Stamped]) -> None:
+    # None of the tricycle, of excluded bodies, or of who has them switched off.
+    sent = {
+        (each.header.frame_id, each.child_frame_id)
+        for message in recording["/tf"].values()
+        for each in message.transforms
+    }
+    assert sent == set(TRANSFORMS)
+
+
+def transforms(recording: dict[str, Stamped], parent: str, child: str) -> Stamped:
+    return {
+        each.header.stamp.to_nsec(): each.transform
+        for message in recording["/tf"].values()
+        for each in message.transforms
+        if (each.header.frame_id, each.child_frame_id) == (parent, child)
+    }
+
+
+def together(first: Stamped, second: Stamped) -> list[tuple[Any, Any]]:
+    """What has the same stamp in two recordings: most of the shorter one."""
+    pairs = [(first[time], second[time]) for time in sorted(first.keys() & second.keys())]
+    assert len(pairs) > 0.6 * min(len(first), len(second))
+    return pairs
+
+
+def is_constant(values: Iterable[Any]) -> bool:
+    values = list(values)
+    return all(value == values[0] for value in values)
+
+
+# -- DiffDrive --------------------------------------------------------------------------------
+
+
+def test_diff_drive_ground_truth(recording: dict[str, Stamped]) -> None:
+    for truth in recording["/r1/odometry/ground_truth"].values():
+        assert (truth.header.frame_id, truth.child_frame_id) == ("world", "r1_base")
+        twist = truth.twist.twist
+        # In the body's frame (REP 105), although the robot looks elsewhere by now.
+        assert (twist.linear.x, twist.angular.z) == pytest.approx((SPEED, TURN), abs=1e-6)
+        assert twist.linear.y == pytest.approx(0, abs=1e-6)
+        assert (twist.linear.z, twist.angular.x, twist.angular.y) == (0, 0, 0)
+        assert not any(truth.pose.covariance)
+        assert not any(truth.twist.covariance)
+
+
+def test_diff_drive_pose_follows_the_stamps(recording: dict[str, Stamped]) -> None:
+    truths = recording["/r1/odometry/ground_truth"]
+    first, last = min(truths), max(truths)
+    (x0, y0, yaw0), (x1, y1, yaw1) = pose(truths[first]), pose(truths[last])
+    turned = TURN * (last - first) * 1e-9
+    assert same_angle(yaw1 - yaw0, turned, 1e-4)
+    chord = 2 * SPEED / TURN * math.sin(turned / 2)
+    assert math.hypot(x1 - x0, y1 - y0) == pytest.approx(chord, abs=1e-3)
+
+
+def test_diff_drive_odometry_is_the_truth_with_noise(recording: dict[str, Stamped]) -> None:
+    pairs = together(recording["/r1/odometry/filtered"], recording["/r1/odometry/ground_truth"])
+    expected = [0.0] * 36
+    expected[0], expected[7], expected[35] = 0.04, 0.05, 0.06
+    errors: list[tuple[float, ...]] = []
+    for odometry, truth in pairs:
+        assert (odometry.header.frame_id, odometry.child_frame_id) == ("here", "r1_base")
+        assert list(odometry.pose.covariance) == list(range(36))  # row by row, as configured
+        assert list(odometry.twist.covariance) == expected  # from the noise
+        noisy, exact = pose(odometry), pose(truth)
+        got, true = odometry.twist.twist, truth.twist.twist
+        errors.append(
+            (
+                noisy[0] - exact[0],
+                noisy[1] - exact[1],
+                math.remainder(noisy[2] - exact[2], math.tau),
+                got.linear.x - true.linear.x,
+                got.linear.y - true.linear.y,
+                got.angular.z - true.angular.z,
+            )
+        )
+    variances = [variance(column) for column in zip(*errors, strict=True)]
+    assert variances == pytest.approx([0.01, 0.02, 0.03, 0.04, 0.05, 0.06], rel=0.4)
+
+
+def test_diff_drive_transform_repeats_the_noisy_odometry(recording: dict[str, Stamped]) -> None:
+    sent = transforms(recording, "here", "r1_base")
+    for transform, odometry in together(sent, recording["/r1/odometry/filtered"]):
+        moved = transform.translation
+        assert (moved.x, moved.y, moved.z) == (*pose(odometry)[:2], 0)
+        assert transform.rotation == odometry.pose.pose.orientation
+
+
+def test_diff_drive_twist_has_noise_of_its_own(recording: dict[str, Stamped]) -> None:
+    pairs = together(recording["/r1/twist"], recording["/r1/odometry/filtered"])
+    forward, turn = [], []
+    for measured, odometry in pairs:
+        assert measured.header.frame_id == "r1_base"
+        twist = measured.twist.twist
+        assert (twist.linear.y, twist.linear.z, twist.angular.x, twist.angular.y) == (0, 0, 0, 0)
+        assert measured.twist.covariance == odometry.twist.covariance
+        assert twist.linear.x != odometry.twist.twist.linear.x
+        forward.append(twist.linear.x - SPEED)
+        turn.append(twist.angular.z - TURN)
+    assert variance(forward) == pytest.approx(0.04, rel=0.4)
+    assert variance(turn) == pytest.approx(0.06, rel=0.4)
+
+
+# -- TricycleDrive ----------------------------------------------------------------------------
+
+
+def test_tricycle_drive(recording: dict[str, Stamped], ros: Any) -> None:
+    published = {name for name in ros.registered()["publishers"] if name.startswith("/t1/")}
+    assert published == {"/t1/odometry/filtered", "/t1/odometry/ground_truth"}  # no twist topic
+    truths, odometries = (
+        recording[f"/t1/odometry/{name}"] for name in ("ground_truth", "filtered")
+    )
+    speed = WHEEL_SPEED * math.cos(STEERING)
+    rate = WHEEL_SPEED * math.sin(STEERING) / 0.4
+    for odometry, truth in together(odometries, truths):
+        assert (truth.header.frame_id, truth.child_frame_id) == ("map", "t1_base")
+        # Unlike the reference, which has the ground truth's frame here.
+        assert (odometry.header.frame_id, odometry.child_frame_id) == ("odom", "t1_base")
+        assert pose(odometry) == pytest.approx(pose(truth), abs=0.01)
+        assert pose(odometry) != pose(truth)
+        heading, twist = pose(truth)[2], truth.twist.twist
+        # In the world's frame: the rear centre moves along the heading, the origin turns round it.
+        c, s = math.cos(heading), math.sin(heading)
+        expected = (c * speed - s * rate * 0.4, s * speed + c * rate * 0.4, rate)
+        got = (twist.linear.x, twist.linear.y, twist.angular.z)
+        # The pose is that after the step which the velocity was set for.
+        assert got == pytest.approx(expected, abs=2 * rate * 0.005 * WHEEL_SPEED)
+        assert odometry.twist.twist == twist
+        assert not any(truth.pose.covariance)
+        assert not any(truth.twist.covariance)
+        diagonal = [odometry.twist.covariance[7 * i] for i in range(6)]
+        assert diagonal == [1, 2, 3, 4, 5, 6]
+        assert [odometry.pose.covariance[7 * i] for i in range(6)] == [1e-6, 1e-6, 0, 0, 0, 1e-6]
+
+
+# -- Laser ------------------------------------------------------------------------------------
+
+
+def test_laser_scan_is_that_of_its_stamp(recording: dict[str, Stamped]) -> None:
+    for scan, truth in together(recording["/r1/scan"], recording["/r1/odometry/ground_truth"]):
+        assert scan.header.frame_id == "r1_front"
+        got = (scan.angle_min, scan.angle_max, scan.angle_increment, scan.range_max)
+        assert got == pytest.approx((0.5, -0.5, -0.5, 20))
+        assert (scan.time_increment, scan.scan_time, scan.range_min) == (0, 0, 0)
+        x, y, heading = pose(truth)
+        c, s = math.cos(heading), math.sin(heading)
+        x, y = x + 0.1 * c - 0.05 * s, y + 0.1 * s + 0.05 * c
+        # Upside down, so the first beam, at 0.5, looks to the right.
+        expected = [distance_to_wall(x, y, heading + 0.2 + angle) for angle in (-0.5, 0.0, 0.5)]
+        assert list(scan.ranges) == pytest.approx(expected, abs=1e-4)
+        assert list(scan.intensities) == [0, 0, 0]
+
+
+def distance_to_wall(x: float, y: float, angle: float) -> float:
+    c, s = math.cos(angle), math.sin(angle)
+    return min((math.copysign(5, c) - x) / c, (math.copysign(5, s) - y) / s)
+
+
+def test_laser_transform_is_rolled_over(recording: dict[str, Stamped]) -> None:
+    sent = transforms(recording, "r1_base", "r1_front")
+    assert is_constant(sent.values())
+    transform = next(iter(sent.values()))
+    moved, turned = transform.translation, transform.rotation
+    assert (moved.x, moved.y, moved.z) == (0.1, 0.05, 0)
+    got = (turned.x, turned.y, turned.z, turned.w)
+    assert got == pytest.approx((math.cos(0.1), math.sin(0.1), 0, 0), abs=1e-9)
+
+
+def test_laser_intensities_no_hit_and_global_frame(recording: dict[str, Stamped]) -> None:
+    for scan in recording["/mirror_scan"].values():
+        assert scan.header.frame_id == "lidar"
+        assert scan.ranges[1] == pytest.approx(0.9, abs=1e-4)
+        side = 5 / math.sin(1.5)
+        assert (scan.ranges[0], scan.ranges[2]) == pytest.approx((side, side), abs=1e-3)
+        assert list(scan.intensities) == [0, 255, 0]
+
+
+# -- ModelTfPublisher -------------------------------------------------------------------------
+
+
+def test_model_tf_publisher(recording: dict[str, Stamped]) -> None:
+    for transform in transforms(recording, "r1_base", "r1_mast").values():
+        moved = transform.translation
+        assert (moved.x, moved.y, moved.z) == pytest.approx((0.1, 0, 0), abs=1e-3)
+        assert same_angle(yaw(transform.rotation), 0.5, 1e-3)
+    sent = transforms(recording, "map", "r1_base")
+    for transform, truth in together(sent, recording["/r1/odometry/ground_truth"]):
+        moved = transform.translation
+        assert (moved.x, moved.y, yaw(transform.rotation)) == pytest.approx(pose(truth), abs=1e-9)
+
+
+# -- Gps --------------------------------------------------------------------------------------
+
+
+def test_gps_is_that_of_its_stamp(recording: dict[str, Stamped]) -> None:
+    # Near the reference point: metres over the radii of curvature of WGS84.
+    latitude = math.radians(REF_LAT)
+    w = 1 - 0.0066943799831668 * math.sin(latitude) ** 2
+    north_radius = 6378137 * (1 - 0.0066943799831668) / w**1.5
+    east_radius = 6378137 / math.sqrt(w) * math.cos(latitude)
+    for fix, truth in together(recording["/r1/gps/fix"], recording["/r1/odometry/ground_truth"]):
+        assert fix.header.frame_id == "r1_gps"
+        x, y, heading = pose(truth)
+        x, y = x + 0.3 * math.cos(heading), y + 0.3 * math.sin(heading)
+        assert fix.latitude == pytest.approx(REF_LAT + math.degrees(y / north_radius), abs=1e-9)
+        assert fix.longitude == pytest.approx(REF_LON + math.degrees(x / east_radius), abs=1e-9)
+        assert fix.altitude == 0
+        assert (fix.status.status, fix.status.service) == (0, 1)  # a fix, by GPS
+        assert (fix.position_covariance_type, any(fix.position_covariance)) == (0, False)
+    for transform in transforms(recording, "r1_base", "r1_gps").values():
+        moved = transform.translation
+        assert (moved.x, moved.y, yaw(transform.rotation)) == (0.3, 0, 0)
+
+
+# -- Imu --------------------------------------------------------------------------------------
+
+
+def test_imu_ground_truth_is_that_of_its_stamp(recording: dict[str, Stamped]) -> None:
+    interval = 0.05
+    turned = TURN * interval
+    # Mean acceleration in a circle to the left, seen from the pose after the last step, whose
+    # velocity was along the heading before it.
+    size, angle = 2 * SPEED * math.sin(turned / 2) / interval, turned / 2 + TURN * STEP * 1e-9
+    expected = (size * math.sin(angle), size * math.cos(angle))
+    truths = recording["/r1/imu/ground_truth"]
+    for imu, truth in together(truths, recording["/r1/odometry/ground_truth"]):
+        assert imu.header.frame_id == "r1_imu"
+        # After the step that ends at its stamp, where the next one begins.
+        assert same_angle(yaw(imu.orientation), pose(truth)[2])
+        rate, acceleration = imu.angular_velocity, imu.linear_acceleration
+        assert (rate.x, rate.y) == (0, 0)
+        assert rate.z == pytest.approx(TURN, abs=1e-4)
+        assert (acceleration.x, acceleration.y) == pytest.approx(expected, abs=1e-4)
+        assert acceleration.z == 0
+        assert not any(imu.orientation_covariance)
+        assert not any(imu.angular_velocity_covariance)
+        assert not any(imu.linear_acceleration_covariance)
+
+
+def test_imu_with_noise(recording: dict[str, Stamped]) -> None:
+    pairs = together(recording["/r1/imu/filtered"], recording["/r1/imu/ground_truth"])
+    errors: list[tuple[float, ...]] = []
+    for imu, truth in pairs:
+        assert imu.header.frame_id == "r1_imu"
+        assert list(imu.orientation_covariance) == [0.1, 0, 0, 0, 0.2, 0, 0, 0, 0.3]
+        assert list(imu.angular_velocity_covariance) == [0.4, 0, 0, 0, 0.5, 0, 0, 0, 0.6]
+        assert list(imu.linear_acceleration_covariance) == list(range(1, 10))
+        got, true = imu.linear_acceleration, truth.linear_acceleration
+        assert (imu.angular_velocity.x, imu.angular_velocity.y, got.z) == (0, 0, 0)
+        errors.append(
+            (
+                math.remainder(yaw(imu.orientation) - yaw(truth.orientation), math.tau),
+                imu.angular_velocity.z - truth.angular_velocity.z,
+                got.x - true.x,
+                got.y - true.y,
+            )
+        )
+    # Some thirty messages say little about a variance, but they tell it from its root.
+    variances = [variance(column) for column in zip(*errors, strict=True)]
+    for value, expected in zip(variances, [0.3, 0.6, 0.7, 0.8], strict=True):
+        assert 0.3 * expected < value < 3 * expected
+
+
+def test_imu_transform(recording: dict[str, Stamped]) -> None:
+    sent = transforms(recording, "r1_base", "r1_imu")
+    assert sent.keys() >= {
+        time for time in recording["/r1/imu/ground_truth"] if time in recording["/tf"]
+    }
+    for transform in sent.values():
+        assert (transform.translation.x, transform.translation.y) == (0, 0)
+        assert yaw(transform.rotation) == 0
+
+
+# -- Bumper -----------------------------------------------------------------------------------
+
+
+def test_bumper_reports_contacts_with_forces(recording: dict[str, Stamped]) -> None:
+    # The drive gives it its speed back in each step, and the wall takes all of it.
+    force = 10 * math.pi * 0.2**2 * PUSH / 0.005
+    for message in recording["/p1/collisions"].values():
+        assert message.header.frame_id == "map"
+        by_body = {each.body_A: each for each in message.collisions}
+        assert by_body.keys() == {"base", "feeler"}
+        for each in message.collisions:
+            assert (each.entity_A, each.entity_B, each.body_B) == ("pusher", "2d", "2d")
+        feeler, base = by_body["feeler"], by_body["base"]
+        assert (feeler.magnitude_forces, feeler.contact_positions) == ((), [])
+        assert feeler.contact_normals == []
+        assert list(base.magnitude_forces) == pytest.approx([force], rel=0.02)
+        (position,), (normal,) = base.contact_positions, base.contact_normals
+        assert (position.x, position.y) == pytest.approx((5, 0), abs=0.02)
+        assert (normal.x, normal.y) == pytest.approx((1, 0), abs=1e-4)
+
+
+def test_bumper_at_its_rate_without_excluded_bodies(recording: dict[str, Stamped]) -> None:
+    for message in recording["/p1/calm"].values():
+        assert message.header.frame_id == "world"
+        assert [each.body_A for each in message.collisions] == ["base"]
+
+
+# -- what answers to the test -----------------------------------------------------------------
+
+
+def test_bool_sensor_switches(ros: Any) -> None:
+    # Unlike the reference, the namespace is there once, and the arm's contact does not count.
+    topic, arm = ros.topic("/s1/bool_sensor", Bool), ros.topic("/s1/arm", Bool)
+    assert topic.next().data is False
+    assert arm.next().data is True
+    assert ros.types()["/s1/bool_sensor"] == "std_msgs/Bool"
+    assert ros.move("guest", (-2.1, 1.9, 0)).success
+    topic.until(lambda message: message.data)
+    assert ros.move("guest", (-4, 4, 0)).success
+    topic.until(lambda message: not message.data)
+    assert arm.next().data is True
+    assert topic.next()._connection_header["latching"] == "0"
+
+
+def test_tween_moves_while_it_is_triggered(ros: Any) -> None:
+    def position(message: TFMessage) -> float:
+        by_child = {each.child_frame_id: each.transform for each in message.transforms}
+        return by_child["d1_leaf"].translation.x if "d1_leaf" in by_child else math.nan
+
+    tf = ros.topic("/tf", TFMessage)
+    trigger = ros.publisher("/d1/open", Bool)
+    assert ros.types()["/d1/open"] == "std_msgs/Bool"
+    tf.until(lambda message: position(message) == pytest.approx(2.0, abs=1e-6))
+    trigger.publish(Bool(True))
+    tf.until(lambda message: position(message) == pytest.approx(2.5, abs=1e-6))
+    trigger.publish(Bool(False))
+    tf.until(lambda message: position(message) == pytest.approx(2.0, abs=1e-6))
+
+
+def test_bumper_without_contacts_comes_at_its_rate(ros: Any) -> None:
+    drive(ros, "/p1/cmd_vel", 0, 0)
+    assert ros.move("pusher", (3, 0, 0)).success
+    topic = ros.topic("/p1/collisions", Collisions)
+    topic.until(lambda message: not message.collisions)
+    # The first ones may still have been due to contacts.
+    topic.until(lambda message: stamp(message) % 100_000_000 == 0)
+    messages = topic.take(5)
+    assert all(message.collisions == [] for message in messages)
+    steps = [after - before for before, after in itertools.pairwise(map(stamp, messages))]
+    assert steps == [100_000_000] * 4
