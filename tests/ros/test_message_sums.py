@@ -1,0 +1,89 @@
+"""The MD5 sums by which ROS tells types apart are those of the reference's fields.
+
+The expected sums are worked out here from field lists alone, by the rule that ROS has: the fields
+one a line, without comments and with single spaces; a field of another message type as the sum of
+that type and the field's name, without brackets; a service is its request's text followed by its
+response's.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import subprocess
+
+import pytest
+
+import flatland.msg
+import flatland.srv
+
+# ROS's own types, as the messages of `std_msgs` and `geometry_msgs` have them.
+FIELDS = {
+    "Header": "uint32 seq, time stamp, string frame_id",
+    "Pose2D": "float64 x, float64 y, float64 theta",
+    "Vector2": "float64 x, float64 y",
+    "Collision": "string entity_A, string body_A, string entity_B, string body_B, "
+    "float64[] magnitude_forces, Vector2[] contact_positions, Vector2[] contact_normals",
+    "Collisions": "Header header, Collision[] collisions",
+    "DebugTopicList": "string[] topics",
+}
+ANSWER = "bool success, string message"
+REQUESTS = {
+    "SpawnModel": "string yaml_path, string name, string ns, Pose2D pose",
+    "DeleteModel": "string name",
+    "MoveModel": "string name, Pose2D pose",
+}
+# What `rosmsg md5` and `rossrv md5` say of the reference's `flatland_msgs`, where that is known.
+OF_THE_REFERENCE = {
+    "SpawnModel": "952237af09cbedc354d376afc6d2fc71",
+    "DeleteModel": "d82dc6474dd88dad5e1615ab1b2ca74c",
+    "MoveModel": "47b5f16cf15e326c7400f4504d3a0f75",
+    "DebugTopicList": "b0eef9a05d4e829092fc2f2c3c2aad3d",
+}
+MESSAGES = ("Vector2", "Collision", "Collisions", "DebugTopicList")
+
+
+def text_of(fields: str) -> str:
+    lines = []
+    for field in fields.split(", "):
+        kind, name = field.split(" ")
+        bare = kind.removesuffix("[]")
+        lines.append(f"{sum_of(text_of(FIELDS[bare]))} {name}" if bare in FIELDS else field)
+    return "\n".join(lines)
+
+
+def sum_of(text: str) -> str:
+    return hashlib.md5(text.encode()).hexdigest()
+
+
+def expected_sum(name: str) -> str:
+    if name in REQUESTS:
+        return sum_of(text_of(REQUESTS[name]) + text_of(ANSWER))
+    return sum_of(text_of(FIELDS[name]))
+
+
+@pytest.mark.parametrize("name", OF_THE_REFERENCE)
+def test_field_lists_are_those_of_the_reference(name: str) -> None:
+    assert expected_sum(name) == OF_THE_REFERENCE[name]
+
+
+@pytest.mark.parametrize("name", [*MESSAGES, *REQUESTS])
+def test_classes_have_the_sums(name: str) -> None:
+    package = flatland.msg if name in MESSAGES else flatland.srv
+    assert getattr(package, name)._md5sum == expected_sum(name)
+
+
+@pytest.mark.parametrize(
+    ("tool", "names"), [("rosmsg", MESSAGES), ("rossrv", tuple(REQUESTS))], ids=["msg", "srv"]
+)
+def test_tools_say_the_sums(
+    ros_environment: dict[str, str], tool: str, names: tuple[str, ...]
+) -> None:
+    for name in names:
+        done = subprocess.run(
+            [tool, "md5", f"flatland/{name}"],
+            env=ros_environment,
+            capture_output=True,
+            text=True,
+            check=True,
+        )
+        assert done.stdout.split() == [expected_sum(name)], done.stderr
