@@ -1,0 +1,90 @@
+"""The reference's own worlds load unchanged and run for a minute without a word of complaint.
+
+None of them is rejected by the reference, so there is no exception to make.
+"""
+
+from __future__ import annotations
+
+import logging
+import math
+from collections import Counter
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import flatland
+
+RATE = 200  # steps in a second of simulated time
+DURATION = 60  # s of simulated time
+SECONDS_PER_COMMAND = 5  # s of simulated time that a command stays
+
+# World: the outputs that it has, and how many values each gives in a minute.
+WORLDS: dict[str, dict[str, int]] = {
+    "benchmark_world": {
+        "/odometry/ground_truth": DURATION * RATE,
+        "/odometry/filtered": DURATION * RATE,
+        "/scan": DURATION * 40,
+    },
+    "conestogo_office_test": {
+        "/odometry/ground_truth": DURATION * RATE,
+        "/odometry/filtered": DURATION * RATE,
+        "/scan": DURATION * 40,
+        "/detector_out": DURATION * 10,
+    },
+    "simple_test_A": {},
+}
+
+
+@pytest.fixture
+def silence(caplog: pytest.LogCaptureFixture) -> Any:
+    """Fails the test for warnings in the log; pytest itself raises those of Python."""
+    caplog.set_level(logging.WARNING)
+    yield
+    assert [record.getMessage() for record in caplog.get_records("call")] == []
+
+
+def test_these_are_all_worlds(shared_dir: Path) -> None:
+    assert {path.parent.name for path in (shared_dir / "worlds").rglob("world.yaml")} == set(WORLDS)
+
+
+@pytest.mark.parametrize("name", WORLDS)
+@pytest.mark.usefixtures("silence")
+def test_world_runs_for_a_minute(shared_dir: Path, name: str) -> None:
+    path = shared_dir / "worlds" / name / "world.yaml"
+    counts: Counter[str] = Counter()
+    with flatland.World.from_yaml(path, seed=1) as world:
+        for topic in world.ports.outputs:
+            world.output(topic).subscribe(lambda _value, topic=topic: counts.update([topic]))
+        start = {model.name: model.pose for model in world.models}
+        # Forward and to either side, and now and then into a wall.
+        for i in range(0, DURATION, SECONDS_PER_COMMAND):
+            for topic in world.ports.commands:
+                world.command(topic).set(flatland.Twist(0.8, 0.0, 0.4 * (-1) ** i))
+            world.step(SECONDS_PER_COMMAND * RATE)
+            for model in world.models:
+                for body in model.bodies:
+                    assert all(map(math.isfinite, (*body.pose, *body.velocity))), body.name
+        assert world.time == pytest.approx(DURATION)
+        assert counts == WORLDS[name]
+        assert not any(
+            world._host.is_disabled(plugin) for model in world.models for plugin in model.plugins
+        )
+        if world.ports.commands:
+            moved = math.dist(world.model("cleaner1").pose[:2], start["cleaner1"][:2])
+            assert moved > 1
+
+
+@pytest.mark.parametrize("name", WORLDS)
+@pytest.mark.usefixtures("silence")
+def test_all_model_files_of_the_world_can_be_spawned(shared_dir: Path, name: str) -> None:
+    folder = shared_dir / "worlds" / name
+    with flatland.World.from_yaml(folder / "world.yaml", seed=1) as world:
+        files = sorted(folder.glob("*.model.yaml"))
+        assert files
+        for i, path in enumerate(files):
+            world.spawn_model(path.name, f"spawned{i}", f"s{i}", (1.0, 2.0, 0.5))
+        for topic in world.ports.outputs:
+            world.output(topic)
+        world.step(RATE)
+        assert all(world.output(topic).latest is not None for topic in world.ports.outputs)
