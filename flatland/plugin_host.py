@@ -72,7 +72,8 @@ def initialize(plugin: FlatlandPlugin, config: YamlReader, timeout: float | None
     worker = threading.Thread(target=run, name=f"on_initialize of {plugin.name}", daemon=True)
     worker.start()
     with plugin.world.initialized_by(worker):
-        worker.join(timeout)
+        # Python refuses to wait longer than some centuries.
+        worker.join(min(timeout, threading.TIMEOUT_MAX))
     if worker.is_alive():
         # Ends a loop in Python; what blocks in C stays behind as a daemon thread.
         ctypes.pythonapi.PyThreadState_SetAsyncExc(

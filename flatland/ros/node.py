@@ -149,6 +149,7 @@ def _load(parameters: NodeParameters, bridge: Any) -> World:
         simplify_map=parameters.simplify_map,
         step_size=parameters.step_size,
         observers=[bridge],
+        plugin_timeout=parameters.plugin_timeout,
     )
     _LOG.info(
         'loaded "%s" in %.2f s: %d layers, %d models',

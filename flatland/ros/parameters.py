@@ -32,6 +32,8 @@ class NodeParameters:
         seed: Makes all noise repeatable; None draws one.
         benchmark_duration: Simulated time after which the node ends and says how fast it was
             [s]; None runs for ever.
+        plugin_timeout: Wall time that a plugin may take to start [s]; None for as long as it
+            likes.
     """
 
     world_path: str
@@ -42,6 +44,7 @@ class NodeParameters:
     simplify_map: int
     seed: int | None
     benchmark_duration: float | None
+    plugin_timeout: float | None
 
 
 def read_parameters(get: ParameterSource) -> NodeParameters:
@@ -63,6 +66,7 @@ def read_parameters(get: ParameterSource) -> NodeParameters:
         simplify_map=reader.choice("simplify_map", 0, _SIMPLIFICATIONS),
         seed=reader.natural("seed"),
         benchmark_duration=reader.optional_positive("benchmark_duration"),
+        plugin_timeout=reader.timeout("plugin_timeout", 60.0),
     )
 
 
@@ -103,6 +107,13 @@ class _Reader:
 
     def optional_positive(self, name: str) -> float | None:
         return None if self._get(name) is None else self.positive(name, 0.0)
+
+    def timeout(self, name: str, default: float) -> float | None:
+        wanted = "a positive number of seconds (inf: no limit)"
+        seconds = self._number(name, default, wanted)
+        if seconds <= 0:
+            raise _bad(name, wanted, seconds)
+        return None if math.isinf(seconds) else seconds
 
     def boolean(self, name: str, default: bool) -> bool:
         value = self._get(name)

@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import pytest
+from rosgraph_msgs.msg import Clock
 
 from flatland.ros.parameters import NodeParameters, ParameterError, read_parameters
+from flatland.world import PLUGIN_TIMEOUT
 
 
 def read(**given: Any) -> NodeParameters:
@@ -24,6 +28,7 @@ def test_defaults() -> None:
         simplify_map=0,
         seed=None,
         benchmark_duration=None,
+        plugin_timeout=PLUGIN_TIMEOUT,
     )
 
 
@@ -46,6 +51,10 @@ def test_defaults() -> None:
         ("seed", 0, 0),
         ("seed", "12345678901", 12345678901),  # too great for XML-RPC
         ("benchmark_duration", 2.5, 2.5),
+        ("plugin_timeout", 2, 2.0),
+        ("plugin_timeout", "0.5", 0.5),
+        ("plugin_timeout", math.inf, None),
+        ("plugin_timeout", "inf", None),
     ],
 )
 def test_accepted(name: str, value: object, expected: object) -> None:
@@ -54,7 +63,9 @@ def test_accepted(name: str, value: object, expected: object) -> None:
     assert type(got) is type(expected)
 
 
-@pytest.mark.parametrize("name", ["update_rate", "step_size", "viz_pub_rate", "benchmark_duration"])
+@pytest.mark.parametrize(
+    "name", ["update_rate", "step_size", "viz_pub_rate", "benchmark_duration", "plugin_timeout"]
+)
 @pytest.mark.parametrize("value", [math.nan, "nan", -1, -1e-300, "fast", "", True, [1], {"a": 1}])
 def test_refused_numbers(name: str, value: object) -> None:
     with pytest.raises(ParameterError) as error:
@@ -72,6 +83,7 @@ def test_refused_numbers(name: str, value: object) -> None:
         ("step_size", 10**400),
         ("viz_pub_rate", 0),
         ("benchmark_duration", 0),
+        ("plugin_timeout", 0),
         ("show_viz", 1),
         ("show_viz", "yes"),
         ("simplify_map", 3),
@@ -95,3 +107,76 @@ def test_refused_values(name: str, value: object) -> None:
 def test_world_path_is_required(path: str | None) -> None:
     with pytest.raises(ParameterError, match=r"^No world_path parameter given!$"):
         read(world_path=path)
+
+
+# -- plugin_timeout in the real node ----------------------------------------------------------
+
+STUCK = """
+import threading
+import flatland
+
+class Stuck(flatland.ModelPlugin):
+    def on_initialize(self, config):
+        self.output("early", bool)
+        threading.Event().wait()
+"""
+STUCK_MANIFEST = """
+<library path=".">
+  <class name="stuck::Stuck" type="stuck_plugin.Stuck" base_class_type="flatland::ModelPlugin"/>
+</library>
+"""
+STUCK_MODEL = """
+bodies: [{name: base, footprints: []}]
+plugins: [{name: plug, type: "stuck::Stuck"}]
+"""
+GIVEN_UP = (
+    'Flatland plugin: Model Plugin "plug" type "stuck::Stuck" model "stuck": '
+    "on_initialize did not return within 0.25 s"
+)
+
+
+@pytest.fixture
+def stuck_world(write_world: Callable[..., Path], launcher: Any) -> Callable[[str], Path]:
+    """Writes a world whose folder has a model that does not start."""
+
+    def write(models: str) -> Path:
+        world = write_world(models, stuck=STUCK_MODEL)
+        (world.parent / "stuck_plugin.py").write_text(STUCK)
+        manifest = world.parent / "manifest.xml"
+        manifest.write_text(STUCK_MANIFEST)
+        launcher.environment = {**launcher.environment, "FLATLAND_PLUGIN_PATH": str(manifest)}
+        return world
+
+    return write
+
+
+@pytest.mark.parametrize("file", ["server.launch", "benchmark.launch"])
+def test_world_with_a_plugin_that_never_starts_is_given_up(
+    launcher: Any, stuck_world: Callable[[str], Path], file: str
+) -> None:
+    world = stuck_world("[{name: stuck, model: stuck.model.yaml}]")
+    arguments = [f"world_path:={world}", "plugin_timeout:=0.25"]
+    if file == "server.launch":
+        arguments.append("show_viz:=false")
+    process = launcher.launch("flatland", file, *arguments)
+    line = process.wait_for_line(r"\[FATAL\]").string
+    assert line.endswith(GIVEN_UP)
+    process.wait_for_line("process has died .*exit code 1")
+    process.wait()
+
+
+def test_spawned_plugin_that_never_starts_is_given_up(
+    launcher: Any, ros: Any, stuck_world: Callable[[str], Path]
+) -> None:
+    world = stuck_world("[{name: robot, model: robot.model.yaml}]")
+    process = launcher.server(world, plugin_timeout=0.25)
+    before = ros.registered()
+    answer = ros.spawn("stuck.model.yaml", "stuck")
+    assert (answer.success, answer.message) == (False, GIVEN_UP)
+    assert ros.registered() == before
+    # The simulation goes on, and so do its services.
+    clock = ros.topic("/clock", Clock)
+    now = clock.next().clock
+    clock.until(lambda message: message.clock > now)
+    assert ros.spawn("ball.model.yaml", "stuck").success
+    assert process.running

@@ -285,6 +285,13 @@ def test_only_with_a_limit_a_plugin_starts_in_a_thread_of_its_own(files, faults)
     assert free is threading.current_thread()
 
 
+def test_a_limit_may_be_as_long_as_one_likes(files, faults):
+    robot(files, 'name: here, type: "faults::Here"')
+    text = "{properties: {}, layers: [], models: [{name: r, model: robot.model.yaml}]}"
+    for timeout in (1e300, float("inf")):
+        assert files.load(text, plugin_timeout=timeout).model("r").plugin("here").thread
+
+
 @pytest.mark.parametrize("timeout", [0, -1, float("nan")])
 def test_a_limit_must_be_positive(files, timeout):
     with pytest.raises(ValueError, match=r"plugin_timeout must be positive \[s\] or None, got"):
