@@ -15,7 +15,7 @@ from scans import yardstick
 from table import as_json, format_table
 
 # Each module has `rows(unit)`, which measures and returns its rows; unit is U in seconds.
-MODULES = ("scans", "steps", "node", "large_map", "markers")
+MODULES = ("scans", "steps", "plugin_steps", "node", "large_map", "markers")
 
 
 def main() -> None:

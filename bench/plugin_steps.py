@@ -1,0 +1,167 @@
+"""What one step costs with each included plugin alone, as a multiple of an empty Box2D step.
+
+The robot is on the benchmark's map and turns, so that Box2D never lets it sleep. All plugins work
+in every step, whatever their default rate.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import tempfile
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+import flatland
+from flatland.observer import WorldObserver
+from flatland.plugin_registry import INCLUDED_PACKAGE, PluginRegistry
+
+from scenes import BEAMS, RANGE, benchmark_world_path  # isort: skip
+from table import Row
+from timing import best_pair
+
+STEPS = 200  # in one measurement
+SECONDS = 0.4  # for each pair of measurements
+TURN = 0.5  # rad/s
+BASE = {"name": "base", "footprints": [{"type": "circle", "radius": 0.2, "density": 50}]}
+WHEELS = {"front": (0.0, 0.0), "left": (-0.4, 0.2), "right": (-0.4, -0.2)}
+# What a plugin needs beyond its type and the body.
+PARAMETERS: dict[str, dict[str, Any]] = {
+    "Laser": {
+        "body": "base",
+        "range": RANGE,
+        "angle": {"min": -2.356194490192345, "max": 2.3562, "increment": 4.71238898038469 / 1080},
+    },
+    "DiffDrive": {"body": "base"},
+    "TricycleDrive": {
+        "body": "base",
+        "front_wheel_joint": "front",
+        "rear_left_wheel_joint": "left",
+        "rear_right_wheel_joint": "right",
+    },
+    "ModelTfPublisher": {"publish_tf_world": True},
+    "Bumper": {},
+    "BoolSensor": {},
+    "Gps": {"body": "base", "update_rate": float("inf")},
+    "Imu": {"body": "base"},
+    "Tween": {"body": "base", "delta": [0.5, 0.2, 0.1]},
+    "RandomWall": {"layer": "2d", "robot_name": "robot", "num_of_walls": 5, "wall_wall_dist": 0.1},
+    "DummyModelPlugin": {
+        "dummy_param_float": 0.123456,
+        "dummy_param_string": "dummy_test_123456",
+        "dummy_param_int": 123456,
+    },
+    "DummyWorldPlugin": {},
+}
+NOTES = {
+    "Laser": f"{BEAMS} beams",
+    "TricycleDrive": "4 bodies, 3 joints",
+    "ModelTfPublisher": "4 bodies, 3 joints",
+    "Bumper": "touching a post",
+    "BoolSensor": "touching a post",
+}
+
+
+class TransformListener(WorldObserver):
+    """Takes all transforms, as a ROS node with a TF listener makes the bridge do."""
+
+    def transforms_sent(self, transforms: Sequence[flatland.Transform]) -> None:
+        self.last = transforms
+
+
+def _wheels() -> tuple[list[Any], list[Any]]:
+    """Bodies and joints of a tricycle's wheels."""
+    bodies, joints = [], []
+    shape = {"type": "circle", "radius": 0.05, "density": 1, "layers": []}
+    for name, (x, y) in WHEELS.items():
+        bodies.append({"name": name, "pose": [x, y, 0.0], "footprints": [shape]})
+        ends = [{"name": "base", "anchor": [x, y]}, {"name": name, "anchor": [0.0, 0.0]}]
+        kind = "revolute" if name == "front" else "weld"
+        joints.append({"name": name, "type": kind, "bodies": ends})
+    return bodies, joints
+
+
+def _model(plugin: str | None) -> dict[str, Any]:
+    bodies, joints = [BASE], []
+    if plugin in ("TricycleDrive", "ModelTfPublisher"):
+        wheels, joints = _wheels()
+        bodies = [BASE, *wheels]
+    elif plugin in ("Bumper", "BoolSensor"):
+        # It overlaps a little: there is a contact in every step.
+        post = {"type": "circle", "radius": 0.1, "center": [0.295, 0], "density": 0}
+        bodies = [BASE, {"name": "post", "type": "static", "footprints": [post]}]
+    return {"bodies": bodies, "joints": joints}
+
+
+@contextlib.contextmanager
+def world_with(plugin: str | None, observers: Sequence[WorldObserver] = ()) -> Iterator[Any]:
+    """A world with one robot, and one plugin or none."""
+    base = benchmark_world_path()
+    given = yaml.safe_load(base.read_text())
+    layer = {**given["layers"][0], "name": "2d"}
+    layer["map"] = str(base.parent / layer["map"])
+    model, plugins = _model(plugin), []
+    if plugin is not None:
+        entry = {"name": "plugin", "type": plugin, **PARAMETERS[plugin]}
+        kind = PluginRegistry().find(plugin).base_class_type
+        (plugins if kind == "flatland::WorldPlugin" else model.setdefault("plugins", [])).append(
+            entry
+        )
+    robot = {"name": "robot", "model": "robot.yaml", "pose": given["models"][0]["pose"]}
+    world = {"properties": {}, "layers": [layer], "models": [robot], "plugins": plugins}
+    with tempfile.TemporaryDirectory() as folder:
+        (Path(folder) / "robot.yaml").write_text(yaml.safe_dump(model))
+        (Path(folder) / "world.yaml").write_text(yaml.safe_dump(world))
+        path = Path(folder) / "world.yaml"
+        with flatland.World.from_yaml(path, seed=1, observers=observers) as loaded:
+            loaded.model("robot").body("base").set_velocity(0.0, 0.0, TURN)
+            for topic in loaded.ports.commands:
+                loaded.command(topic).set(flatland.Twist(0.1, 0.0, TURN))
+            loaded.step(100)
+            yield loaded
+
+
+def _stepper(world: flatland.World, listens: bool) -> Callable[[], None]:
+    outputs = [world.output(topic) for topic in world.ports.outputs] if listens else []
+
+    def run() -> None:
+        for _ in range(STEPS):
+            world.step()
+            for output in outputs:
+                _ = output.latest
+
+    return run
+
+
+def rows(unit: float) -> list[Row]:
+    """Measures the step with each plugin of the manifest, alone and listened to."""
+    included = [name for name in PluginRegistry().classes if name.startswith(INCLUDED_PACKAGE)]
+    found = []
+    with world_with(None) as empty:
+        physics, dt = empty.physics, empty.timekeeper.step_size
+
+        def empty_steps() -> None:
+            for _ in range(STEPS):
+                physics.step(dt, empty.velocity_iterations, empty.position_iterations)
+
+        def row(name: str, action: Callable[[], None], note: str = "") -> None:
+            box2d, whole = best_pair(empty_steps, action, SECONDS)
+            text = f"{whole / STEPS * 1e6:.1f} µs"
+            found.append(
+                Row(name, whole / box2d, "empty steps", note=f"{text}, {note}" if note else text)
+            )
+
+        box2d, _ = best_pair(empty_steps, empty_steps, SECONDS)
+        microseconds = f"{box2d / STEPS * 1e6:.1f} µs"
+        found.append(
+            Row("empty Box2D step, one body", box2d / STEPS / unit, "U", note=microseconds)
+        )
+        row("step without a plugin", _stepper(empty, listens=False))
+        for name in (full.partition("::")[2] for full in included):
+            for listens in (False, True):
+                who = "listened to" if listens else "nobody listening"
+                with world_with(name, [TransformListener()] if listens else []) as world:
+                    row(f"step with {name}, {who}", _stepper(world, listens), NOTES.get(name, ""))
+    return found
