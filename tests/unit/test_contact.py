@@ -1,0 +1,284 @@
+"""Contacts as plugins get them: who hears what, in which order, and what `pre_solve` may change."""
+
+from __future__ import annotations
+
+import sys
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+import flatland
+from flatland import Contact, ContactImpulse, ModelPlugin, MutableContact, WorldPlugin
+
+DT = 0.005
+DISC = "bodies: [{name: base, footprints: [{type: circle, radius: 0.2, density: 10, friction: 1}]}]"
+SLAB = """
+bodies:
+  - name: slab
+    type: static
+    footprints:
+      - {type: polygon, density: 1, friction: 1, points: [[0, -9], [1, -9], [1, 9], [0, 9]]}
+"""
+MANIFEST = """
+<library>
+  <class name="ear::Ear" type="ears_for_tests.Ear" base_class_type="flatland::ModelPlugin"/>
+  <class name="ear::WorldEar" type="ears_for_tests.WorldEar"
+         base_class_type="flatland::WorldPlugin"/>
+  <class name="ear::Hand" type="ears_for_tests.Hand" base_class_type="flatland::ModelPlugin"/>
+</library>
+"""
+
+
+class _Listener:
+    """Notes the contact hooks with what they were given."""
+
+    heard: list[tuple[str, Contact, ContactImpulse | None]]
+
+    def on_initialize(self, config: Any) -> None:
+        self.heard = []
+
+    def begin_contact(self, contact: Contact) -> None:
+        self.heard.append(("begin", contact, None))
+
+    def end_contact(self, contact: Contact) -> None:
+        self.heard.append(("end", contact, None))
+
+    def post_solve(self, contact: Contact, impulse: ContactImpulse) -> None:
+        self.heard.append(("post_solve", contact, impulse))
+
+    def hooks(self) -> list[str]:
+        return [hook for hook, _, _ in self.heard]
+
+
+class Ear(_Listener, ModelPlugin):
+    pass
+
+
+class WorldEar(_Listener, WorldPlugin):
+    pass
+
+
+class Hand(ModelPlugin):
+    """Does in `pre_solve` what the test says, and keeps what it saw."""
+
+    def on_initialize(self, config: Any) -> None:
+        self.change: dict[str, Any] = {}
+        self.seen: list[Any] = []
+
+    def pre_solve(self, contact: MutableContact, old_manifold: Any) -> None:
+        mine = self.filter_contact(contact)
+        self.seen.append((mine, contact.points, contact.normal, len(old_manifold.points)))
+        for name, value in self.change.items():
+            setattr(contact, name, value)
+            assert getattr(contact, name) == value
+
+
+@pytest.fixture
+def bench(files: Any, monkeypatch: pytest.MonkeyPatch) -> Any:
+    """Writes models with the plugins above, and loads a world with a slab at x = 0.199."""
+    monkeypatch.setenv("FLATLAND_PLUGIN_PATH", files.write("ears.xml", MANIFEST))
+    module = SimpleNamespace(Ear=Ear, WorldEar=WorldEar, Hand=Hand)
+    monkeypatch.setitem(sys.modules, "ears_for_tests", module)  # type: ignore[arg-type]
+    for name in ("Ear", "Hand"):
+        files.write(f"{name}.yaml", f"{DISC}\nplugins: [{{name: p, type: 'ear::{name}'}}]\n")
+    files.write("disc.yaml", DISC)
+    files.write("slab.yaml", SLAB)
+
+    def load(models: str, plugins: str = "[]", layers: str = "[]") -> flatland.World:
+        world: flatland.World = files.load(
+            f"properties: {{}}\nlayers: {layers}\nmodels:\n{models}\nplugins: {plugins}\n"
+        )
+        return world
+
+    return SimpleNamespace(load=load, files=files)
+
+
+ROBOT = "  - {name: robot, model: Ear.yaml}"
+WALL = "  - {name: wall, model: slab.yaml, pose: [0.199, 0, 0]}"
+
+
+def ear(world: flatland.World, model: str = "robot") -> Any:
+    return world.model(model).plugin("p")
+
+
+def test_events_come_in_order_with_the_points_of_that_moment(bench: Any) -> None:
+    world = bench.load(f"{ROBOT}\n{WALL}")
+    base = world.model("robot").body("base")
+    base.set_velocity(0.4, 0.3, 0.0)
+    world.step()
+    assert ear(world).hooks() == ["begin", "post_solve"]
+    (_, begun, _), (_, solved, impulse) = ear(world).heard
+    assert begun.contact_id == solved.contact_id
+    assert {begun.body_a.name, begun.body_b.name} == {"base", "slab"}
+    assert begun.points == pytest.approx(np.array([[0.2, 0.0]]), abs=0.01)
+    outward = 1.0 if begun.body_a is base else -1.0
+    assert begun.normal == pytest.approx(np.array([outward, 0.0]), abs=1e-4)
+    assert begun.is_sensor is False
+    # All of its momentum towards the wall; along it no more than friction can take.
+    mass = base.mass
+    assert impulse.normal_impulses == pytest.approx([0.4 * mass], rel=1e-3)
+    assert abs(impulse.tangent_impulses[0]) == pytest.approx(0.1 * mass, rel=0.05)
+    world.step()
+    assert ear(world).hooks()[2:] == ["post_solve"]
+    world.move_model("robot", (-5, 0, 0))
+    world.step()
+    assert ear(world).hooks()[3:] == ["end"]
+    assert ear(world).heard[3][1].contact_id == begun.contact_id
+
+
+def test_end_is_heard_when_the_other_one_is_deleted(bench: Any) -> None:
+    world = bench.load(f"{ROBOT}\n{WALL}")
+    world.step()
+    world.delete_model("wall")
+    hook, contact, _ = ear(world).heard[-1]
+    assert hook == "end"
+    # Who it was can still be told.
+    assert {contact.body_a.entity.name, contact.body_b.entity.name} == {"robot", "wall"}
+
+
+def test_contacts_of_strangers_are_heard_by_all(bench: Any) -> None:
+    world = bench.load(
+        "  - {name: far, model: Ear.yaml, pose: [50, 0, 0]}\n"
+        f"  - {{name: disc, model: disc.yaml}}\n{WALL}",
+        "[{name: p, type: 'ear::WorldEar'}]",
+    )
+    world.step()
+    [everywhere] = world.plugins
+    for listener in (ear(world, "far"), everywhere):
+        assert listener.hooks() == ["begin", "post_solve"]
+    contact = ear(world, "far").heard[0][1]
+    # Yet they are none of the model's.
+    assert ear(world, "far").filter_contact(contact) is None
+
+
+@pytest.mark.parametrize("side", ["a", "b"])
+def test_filter_puts_the_model_on_the_near_side(bench: Any, side: str) -> None:
+    # Box2D puts polygons before circles.
+    robot_is_a = side == "a"
+    if robot_is_a:
+        square = DISC.replace("circle, radius: 0.2", "polygon, points: [[-1, -1], [1, -1], [0, 1]]")
+        bench.files.write("Ear.yaml", f"{square}\nplugins: [{{name: p, type: 'ear::Ear'}}]\n")
+        other = "  - {name: wall, model: disc.yaml, pose: [0, -1.15, 0]}"
+    else:
+        other = WALL
+    world = bench.load(f"{ROBOT}\n{other}")
+    world.step()
+    contact = ear(world).heard[0][1]
+    mine = ear(world).filter_contact(contact)
+    base, theirs = world.model("robot").bodies[0], world.model("wall").bodies[0]
+    assert (mine.other_entity, mine.is_a) == (world.model("wall"), robot_is_a)
+    assert (mine.this_body, mine.other_body) == (base, theirs)
+    assert (mine.this_fixture, mine.other_fixture) == (base.fixtures[0], theirs.fixtures[0])
+    assert (contact.body_a is base) is robot_is_a
+
+
+def test_the_other_side_may_be_a_layer_by_its_first_name(bench: Any) -> None:
+    path = bench.files.write_map("room", ["...", ".#.", "..."], origin="[0.2, -1.5, 0]")
+    world = bench.load(
+        "  - {name: robot, model: Ear.yaml, pose: [1.01, 0, 0]}",
+        layers=f"[{{name: [walls, floor], map: {path}}}]",
+    )
+    world.step()
+    mine = ear(world).filter_contact(ear(world).heard[0][1])
+    assert mine.other_entity is world.layer("floor")
+    assert mine.other_entity.name == "walls"
+    assert mine.other_fixture.shape == "edge"
+
+
+def test_sensors_begin_and_end_but_are_not_solved(bench: Any) -> None:
+    bench.files.write("disc.yaml", DISC.replace("density: 10", "density: 10, sensor: true"))
+    world = bench.load(f"{ROBOT}\n  - {{name: pad, model: disc.yaml, pose: [0.3, 0, 0]}}")
+    world.step(2)
+    world.move_model("pad", (5, 0, 0))
+    world.step()
+    assert ear(world).hooks() == ["begin", "end"]
+    contact = ear(world).heard[0][1]
+    assert contact.is_sensor is True
+    assert contact.points.shape == (0, 2)
+
+
+class TestPreSolve:
+    """A disc with a plugin is pushed against the slab, and along it."""
+
+    def push(self, bench: Any, **change: Any) -> tuple[flatland.World, Any]:
+        world = bench.load(f"  - {{name: robot, model: Hand.yaml}}\n{WALL}")
+        plugin = ear(world)
+        plugin.change = change
+        world.model("robot").body("base").set_velocity(0.4, 0.1, 0.0)
+        world.step()
+        return world, plugin
+
+    def velocity(self, bench: Any, **change: Any) -> tuple[float, float, float]:
+        world, plugin = self.push(bench, **change)
+        assert plugin.seen
+        velocity: tuple[float, float, float] = world.model("robot").body("base").velocity
+        return velocity
+
+    def test_it_sees_the_contact_about_to_be_solved(self, bench: Any) -> None:
+        world, plugin = self.push(bench)
+        mine, points, normal, old_points = plugin.seen[0]
+        assert mine.other_entity is world.model("wall")
+        assert points == pytest.approx(np.array([[0.2, 0.0]]), abs=0.01)
+        outward = 1.0 if mine.is_a else -1.0
+        assert normal == pytest.approx(np.array([outward, 0.0]), abs=1e-4)
+        assert old_points == 0
+        world.step()
+        assert plugin.seen[-1][3] == 1
+
+    def test_left_alone_the_wall_stops_and_brakes(self, bench: Any) -> None:
+        vx, vy, omega = self.velocity(bench)
+        assert vx == pytest.approx(0.0, abs=1e-4)
+        assert vy < 0.09
+        assert omega != 0
+
+    def test_a_disabled_contact_lets_pass(self, bench: Any) -> None:
+        assert self.velocity(bench, enabled=False) == pytest.approx((0.4, 0.1, 0.0), abs=1e-5)
+
+    def test_disabling_holds_for_one_step(self, bench: Any) -> None:
+        world, plugin = self.push(bench, enabled=False)
+        plugin.change = {}
+        world.step()
+        assert world.model("robot").body("base").velocity[0] == pytest.approx(0.0, abs=1e-4)
+
+    def test_friction(self, bench: Any) -> None:
+        vx, vy, omega = self.velocity(bench, friction=0.0)
+        assert vx == pytest.approx(0.0, abs=1e-4)
+        assert (vy, omega) == pytest.approx((0.1, 0.0), abs=1e-5)
+
+    def test_restitution(self, bench: Any) -> None:
+        # Box2D gives back only what was faster than 1 m/s.
+        world = bench.load(f"  - {{name: robot, model: Hand.yaml}}\n{WALL}")
+        ear(world).change = {"restitution": 0.5}
+        world.model("robot").body("base").set_velocity(4.0, 0.0, 0.0)
+        world.step()
+        assert world.model("robot").body("base").velocity[0] == pytest.approx(-2.0, rel=1e-2)
+
+    @pytest.mark.parametrize("speed", [1.5, -1.5])
+    def test_tangent_speed_is_that_of_a_belt(self, bench: Any, speed: float) -> None:
+        _, without, _ = self.velocity(bench)
+        _, along, _ = self.velocity(bench, tangent_speed=speed)
+        assert abs(along - without) > 0.05
+        _, back, _ = self.velocity(bench, tangent_speed=-speed)
+        assert (along - without) * (back - without) < 0
+
+
+def test_a_plugin_that_does_not_change_contacts_is_not_asked(bench: Any) -> None:
+    world = bench.load(f"{ROBOT}\n{WALL}")
+    world.step()
+    assert world.physics.pre_solve is None
+    world.spawn_model("Hand.yaml", "hand", pose=(40, 0, 0))
+    assert world.physics.pre_solve is not None
+    world.delete_model("hand")
+    assert world.physics.pre_solve is None
+
+
+def test_without_listeners_nothing_is_recorded(bench: Any) -> None:
+    world = bench.load(f"  - {{name: disc, model: disc.yaml}}\n{WALL}")
+    world.step()
+    assert world.physics.record_contacts is False
+    world.spawn_model("Ear.yaml", "robot", pose=(40, 0, 0))
+    assert world.physics.record_contacts is True
+    world.delete_model("robot")
+    assert world.physics.record_contacts is False
