@@ -49,6 +49,10 @@ bench: setup-dev  ## measure speed into build/bench.json: make bench [BASELINE=f
 docs: setup  ## check that every link and picture of README.md and docs/ leads somewhere
 	@$(PYTHON) tools/check_links.py README.md docs
 
+.PHONY: pictures
+pictures: setup-dev  ## make the pictures of README.md and docs/ anew, on a virtual screen
+	@. ./setup.bash && python tools/draw_pictures.py && python tools/show_pictures.py
+
 .PHONY: dev
 dev:  ## build the extension and the messages into the source tree (PYTHONPATH=. then runs it)
 	@mkdir -p build

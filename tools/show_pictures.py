@@ -1,4 +1,4 @@
-"""Makes the pictures of README.md and docs/viewer.md: the viewer and RViz on a virtual screen.
+"""Makes the pictures of README.md and docs/ of the viewer and of RViz, on a virtual screen.
 
 Usage: show_pictures.py [FOLDER]   (docs/images; pictures that are there are overwritten)
 
@@ -20,12 +20,20 @@ from pathlib import Path
 from typing import Any
 
 import cv2
+import numpy as np
 from draw_pictures import THINGS
-from virtual_screen import VirtualScreen, missing_programs
+from virtual_screen import Image, VirtualScreen, missing_programs
 
 _CHECKOUT = Path(__file__).resolve().parent.parent
 _OFFICE = _CHECKOUT / "worlds" / "office"
-_SIZE = (1200, 780)
+_SIZE = (1200, 800)  # of the viewer, and of RViz by its configuration
+_ARROW = (255, 217, 26)  # colour of the viewer's arrow for the heading
+_FROM_ABOVE = "{Class: rviz/TopDownOrtho, Scale: 34, X: -3, Y: 0.3, Angle: 0}"
+_IN_3D = (
+    "{Class: rviz/Orbit, Distance: 24, Focal Point: {X: -1.5, Y: -1, Z: 0}, Pitch: 0.85, Yaw: 4.4}"
+)
+_SPAWN_BUTTON = (525, 20)  # pixels in the viewer
+_FIRST_FIELD = 24  # pixels below the top of its dialog
 _PATIENCE = 60.0  # s
 _SETTLING = 1.5  # s that RViz gets to draw what it has just been told
 
@@ -44,7 +52,8 @@ def main(arguments: list[str]) -> int:
             _furnish()
             _drive(3.0)
             _picture_of_viewer(screen, folder / "viewer.png")
-            _picture_of_rviz(screen, environment, folder / "rviz.png")
+            _picture_of_rviz(screen, environment, _FROM_ABOVE, folder / "rviz.png")
+            _picture_of_rviz(screen, environment, _IN_3D, folder / "walls.png")
     finally:
         screen.close()
     return 0
@@ -127,34 +136,45 @@ def _picture_of_viewer(screen: VirtualScreen, path: Path) -> None:
     _wait("picture of the office", lambda: (screen.picture().max(axis=2) > 150).mean() > 0.02)
     width, height = _SIZE
     for _ in range(4):
-        screen.click(width / 2, height / 2, button=4)
-    _drag(screen, (width / 2 - 60, height / 2), (width / 2 + 60, height / 2))
-    screen.key("s")
-    time.sleep(_SETTLING)
+        screen.click(0.5 * width, 0.5 * height, button=4)
+    _drag(screen, (0.5 * width, 0.5 * height), (0.58 * width, 0.5 * height))
+    screen.click(*_SPAWN_BUTTON)
+    _wait("dialog", lambda: screen.area_of("Spawn model"))
+    left, top, width_of_dialog, _ = screen.area_of("Spawn model")
+    screen.click(left + width_of_dialog / 2, top + _FIRST_FIELD)
+    screen.key("ctrl+a")
     screen.type(str(_OFFICE / "tricycle.model.yaml"))
     screen.key("Return")
-    time.sleep(_SETTLING)
-    screen.click(0.62 * width, 0.7 * height)
-    screen.move(0.68 * width, 0.66 * height)
+    screen.move(0.88 * width, 0.8 * height)
+    _wait("preview", lambda: _has_color(screen.picture(), _ARROW))
+    screen.click(0.875 * width, 0.72 * height)
+    screen.move(0.94 * width, 0.712 * height)
     time.sleep(_SETTLING)
     _save(screen, path)
     screen.key("Escape", "ctrl+q")
 
 
-def _picture_of_rviz(screen: VirtualScreen, environment: dict[str, str], path: Path) -> None:
+def _picture_of_rviz(
+    screen: VirtualScreen, environment: dict[str, str], view: str, path: Path
+) -> None:
     """Shows a part of the office in RViz, with what the robots have driven."""
     text = (_CHECKOUT / "rviz" / "flatland.rviz").read_text()
-    text = text.replace("Scale: 14\n      X: 0\n", "Scale: 34\n      X: -3\n")
-    text = text.replace("Height: 800", f"Height: {_SIZE[1]}")
+    before, rest = text.split("    Current:\n")
+    after = rest[rest.index("    Saved:\n") :]
     with tempfile.TemporaryDirectory() as folder:
         config = Path(folder) / "picture.rviz"
-        config.write_text(text)
+        config.write_text(f"{before}    Current: {view}\n{after}")
         with _running(["rviz", "-d", str(config)], environment):
             _wait("picture of RViz", lambda: (screen.picture()[100:600, 400:1100] > 0).all())
             time.sleep(2 * _SETTLING)
-            _drive(5.0)
+            _drive(4.0)
             time.sleep(_SETTLING)
             _save(screen, path)
+
+
+def _has_color(image: Image, color: tuple[int, int, int]) -> bool:
+    """Tells whether a colour, or nearly that, has been drawn."""
+    return bool((np.abs(image.astype(int) - color).max(axis=2) < 25).sum() > 20)
 
 
 def _drag(screen: VirtualScreen, start: tuple[float, float], end: tuple[float, float]) -> None:

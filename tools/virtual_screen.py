@@ -73,6 +73,17 @@ class VirtualScreen:
         image: Image = pixels.reshape(height, width, pixel_bytes)[:, :, 2::-1].copy()
         return image
 
+    def area_of(self, title: str) -> tuple[int, int, int, int] | None:
+        """Returns left, top, width and height of the window of that title; None if it is not up."""
+        search = ("search", "--onlyvisible", "--name", f"^{title}$")
+        try:
+            answer = self._run("xdotool", *search, "getwindowgeometry", "--shell").decode()
+        except subprocess.CalledProcessError:
+            return None
+        fields = dict(line.split("=") for line in answer.split())
+        left, top, width, height = (int(fields[key]) for key in ("X", "Y", "WIDTH", "HEIGHT"))
+        return left, top, width, height
+
     # -- mouse and keys --------------------------------------------------------------------
 
     def move(self, x: float, y: float) -> None:

@@ -21,7 +21,7 @@ from flatland.ros.packed_markers import FRAME
 HANDLE_SIZE: Final = (0.5, 0.5, 0.05)  # m
 HANDLE_COLOR: Final = (0.0, 1.0, 0.0, 0.5)
 NAME_OFFSET: Final = 0.5  # m
-NAME_HEIGHT: Final = 0.3  # m
+NAME_HEIGHT: Final = 0.4  # m
 NAME_COLOR: Final = (1.0, 1.0, 1.0, 1.0)
 LINE_WIDTH: Final = 0.03  # m
 SMALLEST_RING: Final = 1.0  # m
