@@ -88,11 +88,19 @@ class WrongName(flatland.ModelPlugin):
         self.ros.subscribe("no name", String, print)
 
 
+class Faulty(flatland.ModelPlugin):
+    def before_physics_step(self, timekeeper):
+        raise RuntimeError("no more")
+
+    def on_shutdown(self):
+        raise RuntimeError("will not go")
+
+
 class TakenService(flatland.ModelPlugin):
     def on_initialize(self, config):
         self.ros.advertise_service("/spawn_model", Trigger, print)
 """
-NAMES = ("Talker", "Stove", "NeedsParam", "WrongType", "WrongName", "TakenService")
+NAMES = ("Talker", "Stove", "NeedsParam", "WrongType", "WrongName", "Faulty", "TakenService")
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -206,3 +214,16 @@ def test_second_model_may_not_take_a_service(ros: Any, talker: None) -> None:
     assert answer.success is False
     assert 'service "/fail" exists already' in answer.message
     assert "/t2/touch" not in ros.registered()["services"]
+
+
+def test_plugin_that_raises_is_disabled_and_the_node_goes_on(ros: Any, server: Any) -> None:
+    assert ros.spawn("Faulty.model.yaml", "m").success
+    place = 'Model Plugin "p" type "test::Faulty" model "m"'
+    server.wait_for_line(rf"\[ERROR\].*{place}: before_physics_step raised$")
+    server.wait_for_line("RuntimeError: no more")
+    server.wait_for_line(rf"\[ERROR\].*{place}: before_physics_step raised 3 times in a row, the")
+    # The others work as before.
+    assert ros.topic("/temperature", Float32).next()
+    assert ros.delete("m").success
+    server.wait_for_line(rf"\[ERROR\].*{place}: on_shutdown raised$")
+    assert server.running
