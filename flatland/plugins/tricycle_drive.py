@@ -44,7 +44,6 @@ class TricycleGeometry:
         Raises:
             YamlError: A joint does not exist, is of the wrong kind or not where it must be.
         """
-        self._body = body
         front = _WheelJoint(config, "front_wheel_joint", model)
         rear_left = _WheelJoint(config, "rear_left_wheel_joint", model)
         rear_right = _WheelJoint(config, "rear_right_wheel_joint", model)

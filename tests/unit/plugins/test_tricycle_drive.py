@@ -102,19 +102,19 @@ class TestMotion:
     def test_rear_centre_moves_along_the_heading(self, trike: Any) -> None:
         # A slanted axle whose middle is the foot of the perpendicular from the origin.
         line = joints(
-            left=joint("left_j", "weld", "left", "[-0.88, 0.7]"),
-            right=joint("right_j", "weld", "right", "[-1.12, -0.1]"),
+            left=joint("left_j", "weld", "left", "[-1.76, 1.4]"),
+            right=joint("right_j", "weld", "right", "[-2.24, -0.2]"),
         )
         world = trike(pose=(0.0, 0.0, 0.7), joints=line)
         command(world, 0.6, 0.5)
         geometry = plugin(world).geometry
-        assert geometry.rear_center == pytest.approx((-1.0, 0.3), abs=1e-6)
-        assert geometry.wheelbase == pytest.approx(math.hypot(1.0, 0.3), abs=1e-6)
+        assert geometry.rear_center == pytest.approx((-2.0, 0.6), abs=1e-6)
+        assert geometry.wheelbase == pytest.approx(math.hypot(2.0, 0.6), abs=1e-6)
         plugin(world).before_physics_step(world.timekeeper)
         vx, vy, omega = base(world).velocity
-        assert omega == pytest.approx(0.6 * math.sin(0.5) / math.hypot(1.0, 0.3), abs=1e-5)
+        assert omega == pytest.approx(0.6 * math.sin(0.5) / math.hypot(2.0, 0.6), abs=1e-5)
         c, s = math.cos(0.7), math.sin(0.7)
-        rx, ry = -c * 1.0 - s * 0.3, -s * 1.0 + c * 0.3
+        rx, ry = -c * 2.0 - s * 0.6, -s * 2.0 + c * 0.6
         rear = (vx - omega * ry, vy + omega * rx)
         forward = 0.6 * math.cos(0.5)
         assert rear == pytest.approx((forward * c, forward * s), abs=1e-5)
