@@ -28,7 +28,8 @@ BeamFan::BeamFan(const float* ends, std::size_t count) : ends_(ends, ends + 2 * 
   const auto angle_less = [&](std::uint32_t a, std::uint32_t b) { return angles[a] < angles[b]; };
   std::stable_sort(order_.begin(), order_.end(), angle_less);
 
-  const std::size_t padded = (order_.size() + kBlock - 1) / kBlock * kBlock;
+  // So that as many may be read or written from any ray on.
+  const std::size_t padded = order_.size() + kPadding;
   x_.assign(padded, 0.0F);
   y_.assign(padded, 0.0F);
   length_.assign(padded, 0.0F);

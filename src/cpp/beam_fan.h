@@ -13,15 +13,14 @@ namespace flatland {
 // simd.h), with a table that finds the rays between two angles. Never changes.
 class BeamFan {
  public:
-  // Rays are worked on in blocks of that many.
-  static constexpr std::size_t kBlock = 8;
+  // So many rays of no length come behind the others.
+  static constexpr std::size_t kPadding = 7;
 
   BeamFan(const float* ends, std::size_t count);
 
   bool has_ends(const float* ends, std::size_t count) const;
 
-  // Rays that have a length; the sorted arrays have `padded_count` entries, a multiple of kBlock,
-  // the last ones being rays of no length.
+  // Rays that have a length; the sorted arrays have `padded_count` entries.
   std::size_t count() const { return order_.size(); }
   std::size_t padded_count() const { return x_.size(); }
   const float* x() const { return x_.data(); }

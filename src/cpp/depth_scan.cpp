@@ -18,7 +18,7 @@ using simd::kWidth;
 
 namespace {
 
-static_assert(BeamFan::kBlock == kWidth, "a block of rays fills a vector");
+static_assert(BeamFan::kPadding + 1 == kWidth, "a vector may begin at any ray");
 
 // Rays by their number in the fan, which goes on beyond the full circle in both directions.
 struct Interval {
@@ -94,82 +94,77 @@ struct DepthScanKernel {
     const Floats distance = simd::sqrt(away_x * away_x + away_y * away_y);
     const Floats size = (x1 - x0) + (y1 - y0);
 
-    const Floats from = angle_in_sensor(x0, y0);
-    const Floats to_1 = simd::wrap_difference(angle_in_sensor(x1, y0) - from);
-    const Floats to_2 = simd::wrap_difference(angle_in_sensor(x1, y1) - from);
-    const Floats to_3 = simd::wrap_difference(angle_in_sensor(x0, y1) - from);
-    const Floats low = simd::min(simd::min(to_1, to_2), simd::min(to_3, zero));
-    const Floats high = simd::max(simd::max(to_1, to_2), simd::max(to_3, zero));
+    // Of the corners only the two at which the box ends to the right and to the left matter.
+    const Ints is_right = x0 > 0.0F, is_left = x1 < 0.0F;
+    const Ints is_above = y0 > 0.0F, is_below = y1 < 0.0F;
+    const Floats near_x = is_right ? x0 : x1;
+    const Floats near_y = is_above ? y0 : y1;
+    const Floats low_x = is_above ? x1 : (is_below ? x0 : near_x);
+    const Floats high_x = is_above ? x0 : (is_below ? x1 : near_x);
+    const Floats low_y = is_right ? y0 : (is_left ? y1 : near_y);
+    const Floats high_y = is_right ? y1 : (is_left ? y0 : near_y);
+    const Floats from = angle_in_sensor(low_x, low_y);
+    const Floats turn = simd::wrap_difference(angle_in_sensor(high_x, high_y) - from);
     const Ints is_near = distance <= kTouching * size;
-    // Not `high - low > 2`, so that NaN counts as all around.
-    const Ints is_beside = high - low <= 2.0F;
-    find_rays(from + low, from + high, is_near | ~is_beside, out);
+    // Written so that NaN counts as all around.
+    const Ints is_beside = simd::abs(turn) <= 2.0F - kTouching;
+    find_rays(from + simd::min(turn, zero), from + simd::max(turn, zero), is_near | ~is_beside,
+              out);
     simd::store(out.distance, distance * kBoxRounding);
   }
 
-  // Farthest distance that a ray of a block still reaches.
-  FLATLAND_INLINE float reach(std::size_t block) const {
-    if (scan.reach_is_old_[block] != 0) {
-      const Floats far =
-          simd::load(&scan.fractions_[block * kWidth]) * simd::load(fan.length() + block * kWidth);
-      scan.reach_[block] = simd::largest(far);
-      scan.reach_is_old_[block] = 0;
-    }
-    return scan.reach_[block];
-  }
-
-  // Calls visit(first block, end block) for the one or two runs of blocks that hold these rays.
-  // It stops when visit returns true, and returns whether it did.
+  // Calls visit(ray) for every eighth of these rays, such that it and the seven after it hold them
+  // all; there is always room for so many. It stops when visit returns true, and returns whether
+  // it did.
   template <typename Visit>
-  FLATLAND_INLINE bool any_blocks(Interval rays, Visit&& visit) const {
-    if (rays.begin >= rays.end) return false;
+  FLATLAND_INLINE bool any_rays(Interval rays, Visit&& visit) const {
     const std::int32_t count = ray_count();
-    const auto block_of = [](std::int32_t ray) { return static_cast<std::size_t>(ray) / kWidth; };
-    if (rays.end - rays.begin >= count) return visit(0, block_of(count - 1) + 1);
-    if (rays.begin < 0) {
+    if (rays.end - rays.begin >= count) {
+      rays = {0, count};
+    } else if (rays.begin < 0) {
       rays.begin += count;
       rays.end += count;
     } else if (rays.begin >= count) {
       rays.begin -= count;
       rays.end -= count;
     }
-    if (rays.end <= count) return visit(block_of(rays.begin), block_of(rays.end - 1) + 1);
-    return visit(block_of(rays.begin), block_of(count - 1) + 1) ||
-           visit(0, block_of(rays.end - count - 1) + 1);
+    const auto visit_run = [&](std::int32_t begin, std::int32_t end) {
+      for (std::int32_t ray = begin; ray < end; ray += kWidth) {
+        if (visit(static_cast<std::size_t>(ray), end - ray)) return true;
+      }
+      return false;
+    };
+    if (visit_run(rays.begin, std::min(rays.end, count))) return true;
+    return rays.end > count && visit_run(0, rays.end - count);
   }
 
   // Whether something at a distance can be seen by one of these rays.
   FLATLAND_INLINE bool is_visible(Interval rays, float distance) const {
-    return any_blocks(rays, [&](std::size_t begin, std::size_t end) {
-      for (std::size_t block = begin; block < end; ++block) {
-        if (distance <= reach(block)) return true;
-      }
-      return false;
+    return any_rays(rays, [&](std::size_t ray, std::int32_t left) {
+      return simd::any((simd::load(&scan.reach_[ray]) >= distance) & simd::first_places(left));
     });
   }
 
-  // Keeps the nearer hits of a block. Written so that NaN is no hit.
-  FLATLAND_INLINE void keep_hits(std::size_t block, Floats fraction, Ints is_hit) const {
-    float* fractions = &scan.fractions_[block * kWidth];
-    const Floats before = simd::load(fractions);
+  // Keeps the nearer hits of eight rays. Written so that NaN is no hit.
+  FLATLAND_INLINE void keep_hits(std::size_t ray, Floats fraction, Ints is_hit) const {
+    const Floats before = simd::load(&scan.fractions_[ray]);
     is_hit &= (fraction >= 0.0F) & (fraction < before);
-    simd::store(fractions, is_hit ? fraction : before);
-    scan.reach_is_old_[block] = 1;
+    const Floats after = is_hit ? fraction : before;
+    simd::store(&scan.fractions_[ray], after);
+    simd::store(&scan.reach_[ray], after * simd::load(fan.length() + ray));
   }
 
   FLATLAND_INLINE void draw_edge(b2Vec2 a, b2Vec2 b, b2Vec2 normal, float numerator,
                                  Interval rays) const {
-    any_blocks(rays, [&](std::size_t begin, std::size_t end) {
-      for (std::size_t block = begin; block < end; ++block) {
-        const Floats d_x = simd::load(&scan.d_x_[block * kWidth]);
-        const Floats d_y = simd::load(&scan.d_y_[block * kWidth]);
-        const Floats side_a = d_x * a.y - d_y * a.x;
-        const Floats side_b = d_x * b.y - d_y * b.x;
-        const Ints is_crossed =
-            (simd::min(side_a, side_b) <= 0.0F) & (simd::max(side_a, side_b) >= 0.0F);
-        const Floats denominator = normal.x * d_x + normal.y * d_y;
-        keep_hits(block, numerator / denominator, is_crossed & (denominator != 0.0F));
-      }
+    any_rays(rays, [&](std::size_t ray, std::int32_t) {
+      const Floats d_x = simd::load(&scan.d_x_[ray]);
+      const Floats d_y = simd::load(&scan.d_y_[ray]);
+      const Floats side_a = d_x * a.y - d_y * a.x;
+      const Floats side_b = d_x * b.y - d_y * b.x;
+      const Ints is_crossed =
+          (simd::min(side_a, side_b) <= 0.0F) & (simd::max(side_a, side_b) >= 0.0F);
+      const Floats denominator = normal.x * d_x + normal.y * d_y;
+      keep_hits(ray, numerator / denominator, is_crossed & (denominator != 0.0F));
       return false;
     });
   }
@@ -187,7 +182,7 @@ struct DepthScanKernel {
     Candidates rays;
     find_rays(from + simd::min(turn, zero), from + simd::max(turn, zero), ~is_beside, rays);
     for (std::uint32_t i = 0; i < leaf.count; ++i) {
-      if (!masks.pass(leaf.category_bits[i])) continue;
+      if (!masks.pass(leaf.category_bits[i]) && !masks.pass(leaf.twin_bits[i])) continue;
       draw_edge({a_x[i], a_y[i]}, {b_x[i], b_y[i]}, {leaf.normal_x[i], leaf.normal_y[i]},
                 numerator[i], {rays.begin[i], rays.end[i]});
     }
@@ -227,17 +222,15 @@ struct DepthScanKernel {
     const b2Vec2 position = body.p + b2Mul(body.q, circle.m_p);
     const b2Vec2 s = scan.pose_.p - position;
     const float b = b2Dot(s, s) - circle.m_radius * circle.m_radius;
-    any_blocks(rays, [&](std::size_t begin, std::size_t end) {
-      for (std::size_t block = begin; block < end; ++block) {
-        const Floats r_x = simd::load(&scan.end_x_[block * kWidth]) - scan.pose_.p.x;
-        const Floats r_y = simd::load(&scan.end_y_[block * kWidth]) - scan.pose_.p.y;
-        const Floats c = s.x * r_x + s.y * r_y;
-        const Floats rr = r_x * r_x + r_y * r_y;
-        const Floats sigma = c * c - rr * b;
-        const Floats root = simd::sqrt(simd::max(sigma, simd::all(0.0F)));
-        const Floats a = -(c + root);
-        keep_hits(block, a / rr, (sigma >= 0.0F) & (rr >= b2_epsilon) & (a <= rr));
-      }
+    any_rays(rays, [&](std::size_t ray, std::int32_t) {
+      const Floats r_x = simd::load(&scan.end_x_[ray]) - scan.pose_.p.x;
+      const Floats r_y = simd::load(&scan.end_y_[ray]) - scan.pose_.p.y;
+      const Floats c = s.x * r_x + s.y * r_y;
+      const Floats rr = r_x * r_x + r_y * r_y;
+      const Floats sigma = c * c - rr * b;
+      const Floats root = simd::sqrt(simd::max(sigma, simd::all(0.0F)));
+      const Floats a = -(c + root);
+      keep_hits(ray, a / rr, (sigma >= 0.0F) & (rr >= b2_epsilon) & (a <= rr));
       return false;
     });
   }
@@ -245,30 +238,28 @@ struct DepthScanKernel {
   FLATLAND_INLINE void draw_polygon(const b2PolygonShape& polygon, const b2Transform& body,
                                     Interval rays) const {
     const b2Vec2 p1 = b2MulT(body.q, scan.pose_.p - body.p);
-    any_blocks(rays, [&](std::size_t begin, std::size_t end) {
-      for (std::size_t block = begin; block < end; ++block) {
-        const Floats world_x = simd::load(&scan.end_x_[block * kWidth]) - body.p.x;
-        const Floats world_y = simd::load(&scan.end_y_[block * kWidth]) - body.p.y;
-        const Floats d_x = (body.q.c * world_x + body.q.s * world_y) - p1.x;
-        const Floats d_y = (-body.q.s * world_x + body.q.c * world_y) - p1.y;
-        Floats lower = simd::all(0.0F);
-        Floats upper = simd::all(1.0F);
-        Ints enters = {};
-        Ints misses = {};
-        for (int32 i = 0; i < polygon.m_count; ++i) {
-          const b2Vec2 normal = polygon.m_normals[i];
-          const float numerator = b2Dot(normal, polygon.m_vertices[i] - p1);
-          const Floats denominator = normal.x * d_x + normal.y * d_y;
-          const Floats fraction = numerator / denominator;
-          const Ints goes_in = (denominator < 0.0F) & (numerator < lower * denominator);
-          const Ints goes_out = (denominator > 0.0F) & (numerator < upper * denominator);
-          if (numerator < 0.0F) misses |= denominator == 0.0F;
-          lower = goes_in ? fraction : lower;
-          upper = goes_out ? fraction : upper;
-          enters |= goes_in;
-        }
-        keep_hits(block, lower, enters & ~misses & (lower <= upper));
+    any_rays(rays, [&](std::size_t ray, std::int32_t) {
+      const Floats world_x = simd::load(&scan.end_x_[ray]) - body.p.x;
+      const Floats world_y = simd::load(&scan.end_y_[ray]) - body.p.y;
+      const Floats d_x = (body.q.c * world_x + body.q.s * world_y) - p1.x;
+      const Floats d_y = (-body.q.s * world_x + body.q.c * world_y) - p1.y;
+      Floats lower = simd::all(0.0F);
+      Floats upper = simd::all(1.0F);
+      Ints enters = {};
+      Ints misses = {};
+      for (int32 i = 0; i < polygon.m_count; ++i) {
+        const b2Vec2 normal = polygon.m_normals[i];
+        const float numerator = b2Dot(normal, polygon.m_vertices[i] - p1);
+        const Floats denominator = normal.x * d_x + normal.y * d_y;
+        const Floats fraction = numerator / denominator;
+        const Ints goes_in = (denominator < 0.0F) & (numerator < lower * denominator);
+        const Ints goes_out = (denominator > 0.0F) & (numerator < upper * denominator);
+        if (numerator < 0.0F) misses |= denominator == 0.0F;
+        lower = goes_in ? fraction : lower;
+        upper = goes_out ? fraction : upper;
+        enters |= goes_in;
       }
+      keep_hits(ray, lower, enters & ~misses & (lower <= upper));
       return false;
     });
   }
@@ -354,8 +345,7 @@ DepthScan::DepthScan(const BeamFan& fan, const b2Transform& pose)
       d_x_(fan.padded_count()),
       d_y_(fan.padded_count()),
       fractions_(fan.padded_count(), free_fraction()),
-      reach_(fan.padded_count() / kWidth),
-      reach_is_old_(fan.padded_count() / kWidth, 1) {
+      reach_(fan.length(), fan.length() + fan.padded_count()) {
   for (std::size_t i = 0; i < end_x_.size(); ++i) {
     end_x_[i] = (pose.q.c * fan.x()[i] - pose.q.s * fan.y()[i]) + pose.p.x;
     end_y_[i] = (pose.q.s * fan.x()[i] + pose.q.c * fan.y()[i]) + pose.p.y;
@@ -364,7 +354,7 @@ DepthScan::DepthScan(const BeamFan& fan, const b2Transform& pose)
 
 void DepthScan::set_limits(const std::vector<float>& fractions) {
   fractions_ = fractions;
-  std::fill(reach_is_old_.begin(), reach_is_old_.end(), std::uint8_t{1});
+  for (std::size_t i = 0; i < reach_.size(); ++i) reach_[i] = fractions[i] * fan_.length()[i];
 }
 
 void DepthScan::draw(const EdgeTree& tree, const b2Transform& body, RayMasks masks) {

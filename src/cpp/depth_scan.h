@@ -60,10 +60,7 @@ class DepthScan {
   b2Transform frame_;
   bool has_frame_ = false;
   std::vector<float> fractions_;
-  // Farthest distance [m] that a ray of each block of rays still reaches, and whether that has to
-  // be found out anew.
-  std::vector<float> reach_;
-  std::vector<std::uint8_t> reach_is_old_;
+  std::vector<float> reach_;  // how far each ray still gets [m]
 };
 
 }  // namespace flatland

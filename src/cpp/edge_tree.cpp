@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <tuple>
 
 namespace flatland {
 namespace {
@@ -34,6 +35,10 @@ Box box_of(const TreeEdge& edge) {
   box.add(edge.x1, edge.y1);
   box.add(edge.x2, edge.y2);
   return box;
+}
+
+std::uint16_t all_bits(const TreeEdge& edge) {
+  return static_cast<std::uint16_t>(edge.category_bits | edge.twin_bits);
 }
 
 float middle_x(const TreeEdge& edge) { return 0.5F * (edge.x1 + edge.x2); }
@@ -88,7 +93,7 @@ class EdgeTreeBuilder {
     std::uint16_t bits = 0;
     for (std::size_t e = range.begin; e < range.end; ++e) {
       box.add(box_of(edges_[e]));
-      bits = static_cast<std::uint16_t>(bits | edges_[e].category_bits);
+      bits = static_cast<std::uint16_t>(bits | all_bits(edges_[e]));
     }
     node.min_x[i] = box.min_x;
     node.min_y[i] = box.min_y;
@@ -125,6 +130,7 @@ class EdgeTreeBuilder {
       leaf.normal_x[i] = normal.x;
       leaf.normal_y[i] = normal.y;
       leaf.category_bits[i] = edge.category_bits;
+      leaf.twin_bits[i] = edge.twin_bits;
     }
     tree_.leaves_.push_back(leaf);
     return EdgeTree::kLeafBit | static_cast<std::uint32_t>(tree_.leaves_.size() - 1);
@@ -201,9 +207,33 @@ class EdgeTreeBuilder {
   std::vector<TreeEdge>& edges_;
 };
 
+void merge_twins(std::vector<TreeEdge>& edges) {
+  const auto place = [](const TreeEdge& e) { return std::tie(e.x1, e.y1, e.x2, e.y2); };
+  const auto is_before = [&](const TreeEdge& a, const TreeEdge& b) {
+    return std::tuple_cat(place(a), std::tie(a.category_bits)) <
+           std::tuple_cat(place(b), std::tie(b.category_bits));
+  };
+  std::sort(edges.begin(), edges.end(), is_before);
+  std::size_t kept = 0;
+  for (const TreeEdge& edge : edges) {
+    TreeEdge* last = kept == 0 ? nullptr : &edges[kept - 1];
+    if (last != nullptr && place(*last) == place(edge)) {
+      if (edge.category_bits == last->category_bits || edge.category_bits == last->twin_bits) {
+        continue;
+      }
+      if (last->twin_bits == 0) {
+        last->twin_bits = edge.category_bits;
+        continue;
+      }
+    }
+    edges[kept++] = edge;
+  }
+  edges.resize(kept);
+}
+
 EdgeTree::EdgeTree(std::vector<TreeEdge> edges) {
   for (const TreeEdge& edge : edges) {
-    category_bits_ = static_cast<std::uint16_t>(category_bits_ | edge.category_bits);
+    category_bits_ = static_cast<std::uint16_t>(category_bits_ | all_bits(edge));
   }
   if (!edges.empty()) EdgeTreeBuilder(*this, edges).build();
 }

@@ -1,5 +1,5 @@
-// The edges of one body in a bounding-volume tree for ray casting. Built once, never changed, in
-// the body's own frame and without any pointer into a world, so that worlds may share it.
+// The edges of bodies with a common frame in a bounding-volume tree for ray casting. Built once,
+// never changed, in that frame and without any pointer into a world, so that worlds may share it.
 #pragma once
 
 #include <array>
@@ -13,7 +13,12 @@ namespace flatland {
 struct TreeEdge {
   float x1, y1, x2, y2;
   std::uint16_t category_bits;
+  std::uint16_t twin_bits = 0;  // categories of another edge at the same place, 0 for none
 };
+
+// Drops edges that repeat another one in place and category, and puts two that differ in their
+// category only into one: two layers of a world often share most of their walls.
+void merge_twins(std::vector<TreeEdge>& edges);
 
 class EdgeTree {
  public:
@@ -25,7 +30,7 @@ class EdgeTree {
   struct Leaf {
     float x1[kFanOut], y1[kFanOut], x2[kFanOut], y2[kFanOut];
     float normal_x[kFanOut], normal_y[kFanOut];  // as Box2D computes it
-    std::uint16_t category_bits[kFanOut];
+    std::uint16_t category_bits[kFanOut], twin_bits[kFanOut];
     std::uint32_t count;
   };
 

@@ -73,8 +73,8 @@ void cast_rays_reference(const b2World& world, const ScanRequest& request,
 namespace {
 
 void draw_all(DepthScan& scan, RayScene& scene, RayMasks masks) {
-  for (const EdgeBody& edges : scene.edge_bodies()) {
-    scan.draw(*edges.tree, edges.body->GetTransform(), masks);
+  for (const EdgeGroup& edges : scene.edge_groups()) {
+    scan.draw(*edges.tree, edges.bodies.front()->GetTransform(), masks);
   }
   scan.draw(scene.solids(), masks);
 }

@@ -24,6 +24,11 @@ FLATLAND_INLINE void store(float* p, Floats v) { *reinterpret_cast<Floats*>(p) =
 FLATLAND_INLINE void store(std::int32_t* p, Ints v) { *reinterpret_cast<Ints*>(p) = v; }
 FLATLAND_INLINE Floats all(float x) { return Floats{x, x, x, x, x, x, x, x}; }
 
+// Which places are among the first `count`.
+FLATLAND_INLINE Ints first_places(std::int32_t count) {
+  return Ints{0, 1, 2, 3, 4, 5, 6, 7} < count;
+}
+
 FLATLAND_INLINE Floats min(Floats a, Floats b) { return a < b ? a : b; }
 FLATLAND_INLINE Floats max(Floats a, Floats b) { return a > b ? a : b; }
 FLATLAND_INLINE Floats abs(Floats a) { return a < 0.0F ? -a : a; }
@@ -35,9 +40,11 @@ FLATLAND_INLINE Floats sqrt(Floats a) {
   return root;
 }
 
-FLATLAND_INLINE float largest(Floats v) {
-  const auto max1 = [](float a, float b) { return a > b ? a : b; };
-  return max1(max1(max1(v[0], v[1]), max1(v[2], v[3])), max1(max1(v[4], v[5]), max1(v[6], v[7])));
+// Whether any is true.
+FLATLAND_INLINE bool any(Ints v) {
+  using Longs = std::int64_t __attribute__((vector_size(32)));
+  const auto pairs = reinterpret_cast<Longs>(v);
+  return ((pairs[0] | pairs[1]) | (pairs[2] | pairs[3])) != 0;
 }
 
 // Greatest whole number that is not above each; of numbers that fit 31 bits.

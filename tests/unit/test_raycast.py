@@ -277,6 +277,45 @@ def test_of_several_fixtures_at_one_distance_any_may_reflect(world: PhysicsWorld
     np.testing.assert_array_equal(reflect, world.cast_rays_reference((0, 0, 0), ends, 3, 2)[1])
 
 
+@pytest.mark.parametrize("mask", range(1, 8))
+@pytest.mark.parametrize("reflect_mask", [0, 1, 2, 3, 4])
+def test_layers_that_share_walls_count_each(
+    world: PhysicsWorld, mask: int, reflect_mask: int
+) -> None:
+    for category in (1, 2, 4, 2):
+        add_room(world, category_bits=category)
+    pose, ends = (1, 2, 0.3), fan(100, 20)
+    fractions, reflect = world.cast_rays(pose, ends, mask, reflect_mask)
+    assert not np.isnan(fractions).any()
+    assert reflect.all() == reflect.any() == bool(mask & reflect_mask)
+
+
+def test_one_of_the_layers_at_one_place_moves_changes_and_goes(world: PhysicsWorld) -> None:
+    wall = [[1, -1, 1, 1]]
+    bodies = [world.create_body("static", (0, 0, 0)) for _ in range(3)]
+    for body in bodies:
+        body.create_edges(wall)
+
+    def distance(mask: int = ALL) -> float:
+        return float(world.cast_rays((0, 0, 0), [[10, 0]], mask)[0][0] * 10)
+
+    assert distance() == pytest.approx(1)
+    bodies[1].set_pose(-0.5, 0, 0)
+    assert distance() == pytest.approx(0.5)
+    bodies[1].set_pose(0, 0, 0)
+    assert distance() == pytest.approx(1)
+    bodies[0].create_edges([[0.25, -1, 0.25, 1]])
+    assert distance() == pytest.approx(0.25)
+    bodies[0].destroy()
+    assert distance() == pytest.approx(1)
+    bodies[2].fixtures[0].category_bits = 8
+    assert distance(mask=8) == pytest.approx(1)
+    bodies[1].destroy()
+    assert distance(mask=1) != distance(mask=1), "NaN"
+    bodies[2].destroy()
+    assert distance() != distance(), "NaN"
+
+
 def test_many_lasers_are_remembered_apart(world: PhysicsWorld) -> None:
     """More fans than are kept sorted, in turns."""
     add_room(world)

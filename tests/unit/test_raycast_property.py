@@ -80,6 +80,18 @@ def add_edges(scene: Scene, make_edges: EdgeMaker, body_type: str, turn: float) 
     body.create_edges(edges[half:], category_bits=int(rng.integers(1, 8)))
 
 
+def add_twin(scene: Scene) -> None:
+    """Repeats some edges of a body in another one at the same place, as a second layer does."""
+    rng = scene.rng
+    original = scene.bodies[rng.integers(len(scene.bodies))]
+    edges = original.edges()
+    x, y, theta = original.pose
+    body = scene.add_body(original.type, (x, y), theta)
+    for _ in range(rng.integers(1, 4)):
+        repeated = edges[rng.random(len(edges)) < 0.7]
+        body.create_edges(repeated, category_bits=int(rng.integers(0, 8)))
+
+
 def add_solid(scene: Scene, body_type: str) -> None:
     rng = scene.rng
     body = scene.add_body(body_type, scene.point(), rng.uniform(-4, 4))
@@ -111,6 +123,9 @@ def scenes(draw: st.DrawFn) -> Scene:
     scene = Scene(PhysicsWorld(), size, rng.uniform(-1, 1, 2) * distance, rng)
     for kind in draw(st.lists(st.sampled_from([scattered, polyline, pixels, slivers]), max_size=3)):
         add_edges(scene, kind, draw(body_types), draw(ANGLES))
+    if scene.bodies:
+        for _ in range(draw(st.integers(0, 2))):
+            add_twin(scene)
     for body_type in draw(st.lists(body_types, max_size=10)):
         add_solid(scene, body_type)
     return scene
@@ -184,6 +199,9 @@ def test_scans_are_those_of_box2d(data: st.DataObject) -> None:
     scene = data.draw(scenes())
     world = scene.world
     for _ in range(3):
+        if scene.bodies and data.draw(st.booleans()):
+            body = scene.bodies[scene.rng.integers(len(scene.bodies))]
+            body.set_pose(*scene.point(), data.draw(ANGLES))
         ends = data.draw(fans())
         pose = data.draw(sensor_poses(scene))
         mask, reflect_mask = data.draw(MASKS), data.draw(MASKS)
