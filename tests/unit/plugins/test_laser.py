@@ -93,6 +93,7 @@ class TestRanges:
             ("{min: 0, max: 1, increment: 0.4}", 4),
             ("{min: 0, max: 0.5, increment: 0.2}", 4),
             ("{min: 2, max: 2, increment: 1}", 1),
+            ("{min: 2, max: 2, increment: -1}", 1),
             ("{min: 1.5, max: -1.5, increment: -0.02}", 151),
         ],
     )
@@ -168,6 +169,11 @@ class TestNoHit:
         ranges = eye(walls.load(laser(extra))).compute_ranges()
         np.testing.assert_array_equal(ranges, np.full(4, value, np.float32))
 
+    @pytest.mark.parametrize("length", [0.5, 1e6])
+    def test_shortest_and_longest_beams(self, walls: Walls, length: float) -> None:
+        plugin = laser("no_hit: range").replace("range: 20", f"range: {length}")
+        assert eye(walls.load(plugin)).compute_ranges().tolist() == [length] * 4
+
     def test_wall_beyond_the_range_is_no_hit(self, walls: Walls) -> None:
         walls.files.write_map("room", ROOM)
         plugin = laser().replace("range: 20", "range: 4")
@@ -239,6 +245,12 @@ class TestIntensities:
         plugin = self.load(walls, "4 -1 4 1", "4 -1 4 1")
         plugin.compute_ranges()
         assert plugin.intensities[0] == 255.0
+
+    def test_the_layer_may_be_the_first(self, walls: Walls) -> None:
+        layers = f"[{{name: reflectance, map: {walls.segments('near', '2 -1 2 1')}}}]"
+        plugin = eye(walls.load(laser(), layers=layers))
+        plugin.compute_ranges()
+        assert plugin.intensities.tolist() == [255.0, 0.0, 0.0, 0.0]
 
     def test_layer_that_the_laser_does_not_see(self, walls: Walls) -> None:
         plugin = self.load(walls, "-2 -1 -2 1", "4 -1 4 1", "[plain]")
