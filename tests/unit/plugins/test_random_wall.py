@@ -85,17 +85,17 @@ def test_double_wall(plugin_world: Any, files: Any) -> None:
     )
 
 
-@pytest.mark.parametrize(("x", "y"), [(0, 0), (-7, 5)])
+@pytest.mark.parametrize(("x", "y"), [(0, 0), (7, -5)])
 def test_slanted_edges_get_their_distance(plugin_world: Any, files: Any, x: int, y: int) -> None:
     # [fix] The reference moves them along x and along y at once, too far and slanting.
     layers = lines(files, f"{x} {y} {x + 4} {y + 3}")
     world = plugin_world(
-        pose=(x, y + 3, 0),
+        pose=(x + 1.82, y + 1.74, 0),  # 0.3 m to its left
         layers=layers,
         world_plugins=wall("num_of_walls: 1, wall_wall_dist: 0.5"),
     )
-    expected = np.array([(-0.3, 0.4, 3.7, 3.4), (0, 0, -0.3, 0.4), (4, 3, 3.7, 3.4)])
-    assert edge_set(world.layer("2d").edges[1:]) == edge_set(expected + [x, y, x, y])
+    expected = [(-0.3, 0.4, 3.7, 3.4), (0, 0, -0.3, 0.4), (4, 3, 3.7, 3.4)]
+    assert edge_set(world.layer("2d").edges[1:]) == edge_set(np.add(expected, [x, y, x, y]))
 
 
 def test_robot_is_looked_for_in_the_layers_frame(plugin_world: Any, files: Any) -> None:
