@@ -107,6 +107,11 @@ class VirtualScreen:
         """Strikes keys, such as `Escape` or `ctrl+q`."""
         self._run("xdotool", "key", *keys)
 
+    def resize(self, title: str, width: int, height: int) -> None:
+        """Gives the windows of that title another size."""
+        search = ("search", "--onlyvisible", "--name", f"^{title}$")
+        self._run("xdotool", *search, "windowsize", "%@", str(width), str(height))
+
     def type(self, text: str) -> None:
         """Types a text."""
         self._run("xdotool", "type", "--delay", "1", text)

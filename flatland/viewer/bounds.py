@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Collection
 from dataclasses import dataclass
 from typing import Any
 
@@ -30,21 +31,10 @@ class Bounds:
         """Its extent along x and y."""
         return (self.x_max - self.x_min, self.y_max - self.y_min)
 
-    def union(self, other: Bounds | None) -> Bounds:
-        """Returns the smallest rectangle around both."""
-        if other is None:
-            return self
-        return Bounds(
-            min(self.x_min, other.x_min),
-            min(self.y_min, other.y_min),
-            max(self.x_max, other.x_max),
-            max(self.y_max, other.y_max),
-        )
-
 
 def bounds_of(markers: Any) -> Bounds | None:
     """Returns the rectangle around all points of a MarkerArray, None when it has none."""
-    whole: Bounds | None = None
+    parts = []
     for marker in markers.markers:
         if not marker.points:
             continue
@@ -53,5 +43,15 @@ def bounds_of(markers: Any) -> Bounds | None:
         c, s = rotate((1.0, 0.0), yaw)
         x = marker.pose.position.x + c * points[:, 0] - s * points[:, 1]
         y = marker.pose.position.y + s * points[:, 0] + c * points[:, 1]
-        whole = Bounds(float(x.min()), float(y.min()), float(x.max()), float(y.max())).union(whole)
-    return whole
+        parts.append(Bounds(float(x.min()), float(y.min()), float(x.max()), float(y.max())))
+    return union(parts) if parts else None
+
+
+def union(parts: Collection[Bounds]) -> Bounds:
+    """Returns the smallest rectangle around others, of which there must be one at least."""
+    return Bounds(
+        min(part.x_min for part in parts),
+        min(part.y_min for part in parts),
+        max(part.x_max for part in parts),
+        max(part.y_max for part in parts),
+    )

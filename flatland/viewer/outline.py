@@ -45,12 +45,15 @@ class _AnyLayer(CollisionFilter):
         return ALL_LAYERS
 
 
-def read_outline(path: str, params: Callable[[str], object] | None = None) -> list[Outline]:
+def read_outline(
+    path: str, params: Callable[[str], object] | None = None, *, name: str = "preview"
+) -> list[Outline]:
     """Reads the outlines of a model's bodies, its first body at the origin as when spawned there.
 
     Args:
         path: The model file.
         params: What `param()` in the file answers from.
+        name: Of the model, for what is said of mistakes in the file.
 
     Raises:
         YamlError: The file cannot be read, or its bodies or joints are wrong.
@@ -58,7 +61,7 @@ def read_outline(path: str, params: Callable[[str], object] | None = None) -> li
     with World(seed=0) as world:
         physics = PhysicsWorld()
         try:
-            model = Model(world, "preview", "", path)
+            model = Model(world, name, "", path)
             reader = YamlReader.from_file(path, params)
             ModelLoader(physics, _AnyLayer(), model, reader).load_bodies_and_joints(IDENTITY)
             return [Outline(body.color, _segments(body)) for body in model.bodies if body.fixtures]

@@ -34,7 +34,7 @@ class RosLink(QObject):
     """
 
     debug_topics = pyqtSignal(list)  # names of marker topics, all that there are now
-    layer_bounds = pyqtSignal(str, object)  # debug topic of a layer, its Bounds
+    layer_bounds = pyqtSignal(str, object)  # debug topic of a layer, its Bounds or None
     paused = pyqtSignal(bool)
     state = pyqtSignal(object)  # ServerState
     _answered = pyqtSignal(object, object)  # function, its argument
@@ -44,7 +44,8 @@ class RosLink(QObject):
         super().__init__()
         self.server = server
         self._closed = threading.Event()
-        self._measured: set[str] = set()
+        self._measured: dict[str, Any] = {}  # subscribers by the topic of their layer
+        self._measured_lock = threading.Lock()
         self._answered.connect(lambda function, argument: function(argument))
 
     def start(self) -> None:
@@ -125,25 +126,24 @@ class RosLink(QObject):
         rospy.Subscriber(self.server.resolve("~paused"), Bool, lambda m: self.paused.emit(m.data))
 
     def _hear_topics(self, message: Any) -> None:
+        topics = set(message.topics)
         self.debug_topics.emit(list(message.topics))
-        for topic in message.topics:
-            # The walls in 3-D stand on the edges of the layer.
-            if topic.startswith("layer/") and not topic.endswith("_3d"):
-                self._measure(topic)
+        # The walls in 3-D stand on the edges of the layer.
+        walls = {f"{topic}_3d" for topic in topics}
+        layers = {topic for topic in topics - walls if topic.startswith("layer/")}
+        with self._measured_lock:
+            for topic in self._measured.keys() - layers:
+                self.in_background(self._measured.pop(topic).unregister)
+            for topic in layers - self._measured.keys():
+                self._measured[topic] = self._measure(topic)
 
-    def _measure(self, topic: str) -> None:
-        """Finds out, once, how far a layer reaches."""
-        if topic in self._measured:
-            return
-        self._measured.add(topic)
+    def _measure(self, topic: str) -> Any:
+        """Finds out how far a layer reaches, now and when it has changed."""
 
         def hear(message: Any) -> None:
-            bounds = bounds_of(message)
-            if bounds is not None:
-                self.layer_bounds.emit(topic, bounds)
-                self.in_background(subscriber.unregister)
+            self.layer_bounds.emit(topic, bounds_of(message))
 
-        subscriber = rospy.Subscriber(self.server.debug_topic(topic), MarkerArray, hear)
+        return rospy.Subscriber(self.server.debug_topic(topic), MarkerArray, hear)
 
     def _watch(self) -> None:
         """Looks again and again at what the simulator has registered, which nobody tells."""

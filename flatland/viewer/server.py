@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import socket
 from dataclasses import dataclass
 from typing import Any, Final
+from urllib.parse import urlsplit
 
 import rosgraph
 import rospy
@@ -11,6 +13,7 @@ import rospy
 from flatland.ros.parameters import ParameterError, read_parameters
 
 _LASER_TYPE: Final = "sensor_msgs/LaserScan"
+_PATIENCE: Final = 1.0  # s
 
 
 @dataclass(frozen=True, slots=True)
@@ -18,7 +21,7 @@ class ServerState:
     """What the master says of the simulator.
 
     Attributes:
-        running: Whether it is registered.
+        running: Whether it is registered, and there.
         lasers: Topics of its laser scans, sorted.
         update_rate: Steps in a second of wall time that it is asked for [Hz], 0 for as many as
             possible.
@@ -60,6 +63,9 @@ class Server:
             publishers, _, services = self._master.getSystemState()
             if not any(self.node in nodes for _, nodes in (*publishers, *services)):
                 return ServerState(running=False)
+            # The master knows nothing of one that was killed.
+            uri = urlsplit(self._master.lookupNode(self.node))
+            socket.create_connection((uri.hostname, uri.port), _PATIENCE).close()
             types = dict(self._master.getTopicTypes())
             private = self._parameters()
         except (rosgraph.MasterException, OSError):

@@ -30,11 +30,13 @@ class SpawnChoice:
     Attributes:
         path: The model file.
         name: Of the model, and of its namespace.
+        base: The name without its number.
         number: Whether the name was to end with a running number.
     """
 
     path: str = ""
     name: str = ""
+    base: str = ""
     number: bool = False
 
 
@@ -51,12 +53,12 @@ class SpawnDialog(QDialog):
         Args:
             parent: The window.
             last: What was chosen the last time.
-            folder: Where to look for model files first.
+            folder: Of the world file: where relative paths start, and the search at first.
             taken: Names that models have already.
         """
         super().__init__(parent)
         self.setWindowTitle("Spawn model")
-        self._folder = str(Path(last.path).parent) if last.path else folder
+        self._folder = folder
         self._taken = taken
         self.path = QLineEdit(last.path)
         self.path.setObjectName("path")
@@ -68,16 +70,19 @@ class SpawnDialog(QDialog):
         self.number.setObjectName("number")
         self.number.setToolTip("append a running number to the name")
         self.number.setChecked(last.number)
+        self._base = last.base
         self.buttons = QDialogButtonBox()
         self.buttons.addButton(QDialogButtonBox.StandardButton.Ok)
         self.buttons.addButton(QDialogButtonBox.StandardButton.Cancel)
         self._lay_out()
         self.path.textChanged.connect(self._suggest_name)
-        self.number.toggled.connect(self._suggest_name)
+        self.number.toggled.connect(self._show_name)
+        self.name.textEdited.connect(self._take_name)
+        self.name.editingFinished.connect(self._show_name)
         self.name.textChanged.connect(self._check)
         self.buttons.accepted.connect(self._accept)
         self.buttons.rejected.connect(self.reject)
-        self._suggest_name()
+        self._show_name()
         self._check()
 
     def _lay_out(self) -> None:
@@ -103,7 +108,15 @@ class SpawnDialog(QDialog):
             self.path.setText(path)
 
     def _suggest_name(self) -> None:
-        name = model_name(self.path.text())
+        self._base = model_name(self.path.text())
+        self._show_name()
+
+    def _take_name(self, name: str) -> None:
+        """Keeps what the user wrote."""
+        self._base = name.strip()
+
+    def _show_name(self) -> None:
+        name = self._base
         if name and self.number.isChecked():
             name = numbered(name, self._taken)
         self.name.setText(name)
@@ -114,8 +127,9 @@ class SpawnDialog(QDialog):
 
     def _accept(self) -> None:
         choice = SpawnChoice(
-            str(Path(self.path.text().strip()).expanduser().absolute()),
+            str(Path(self._folder, Path(self.path.text().strip()).expanduser()).absolute()),
             self.name.text().strip(),
+            self._base,
             self.number.isChecked(),
         )
         self.accept()

@@ -85,7 +85,9 @@ class Status(QStatusBar):
         simulated = self._simulated_time()
         factor = self._factor.add(simulated, time.monotonic())
         self.time.setText(f"time {simulated:.2f} s")
-        if self._paused:
+        if not self._state.running:
+            self.factor.setText("")
+        elif self._paused:
             self.factor.setText("paused")
         else:
             self.factor.setText("" if factor is None else f"real-time factor {factor:.2f}")

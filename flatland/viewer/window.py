@@ -23,7 +23,7 @@ from std_srvs.srv import Empty
 from visualization_msgs.msg import MarkerArray
 
 from flatland.srv import SetRate, SpawnModel
-from flatland.viewer.bounds import Bounds
+from flatland.viewer.bounds import Bounds, union
 from flatland.viewer.outline import Outline, read_outline
 from flatland.viewer.placement import Stage
 from flatland.viewer.ros_link import RosLink
@@ -61,7 +61,7 @@ class ViewerWindow(QMainWindow):
         self._preview = rospy.Publisher("~preview", MarkerArray, queue_size=2, latch=True)
         self.spawn_tool = SpawnTool(self.scene, self._preview.publish)
         self._models: set[str] = set()
-        self._bounds: Bounds | None = None
+        self._bounds: dict[str, Bounds] = {}  # by the topic of their layer
         self._lasers: set[str] = set()
         self._folder = ""
         self._choice = SpawnChoice()
@@ -156,11 +156,21 @@ class ViewerWindow(QMainWindow):
         self._models = {
             topic.removeprefix("model/") for topic in topics if topic.startswith("model/")
         }
+        left = {topic: bounds for topic, bounds in self._bounds.items() if topic in topics}
+        if self._bounds and not left:
+            self._fits = True  # It is another world.
+        self._bounds = left
 
-    def _show_bounds(self, _layer: str, bounds: Bounds) -> None:
-        self._bounds = bounds.union(self._bounds)
-        if self._fits:
-            self.scene.fit(self._bounds)
+    def _show_bounds(self, layer: str, bounds: Bounds | None) -> None:
+        self._bounds.pop(layer, None)
+        if bounds is not None:
+            self._bounds[layer] = bounds
+        self._fit()
+
+    def _fit(self) -> None:
+        """Shows all layers, unless the user has moved the camera."""
+        if self._fits and self._bounds:
+            self.scene.fit(union(self._bounds.values()))
 
     def _show_paused(self, paused: bool) -> None:
         icon, text = (_Icon.SP_MediaPause, "Pause")
@@ -173,6 +183,8 @@ class ViewerWindow(QMainWindow):
 
     def _show_state(self, state: ServerState) -> None:
         self.status.show_state(state)
+        if not state.running:
+            self._show_paused(False)
         self._folder = os.path.dirname(state.world_path)  # noqa: PTH120 - "" stays ""
         wanted = set(state.lasers)
         for topic in self._lasers - wanted:
@@ -193,13 +205,14 @@ class ViewerWindow(QMainWindow):
 
     def _show_whole_world(self) -> None:
         self._fits = True
-        if self._bounds is not None:
-            self.scene.fit(self._bounds)
+        self._fit()
 
     def eventFilter(self, _watched: QObject, event: QEvent) -> bool:  # noqa: N802 - Qt's name
         """Notes that the user took the camera, and keeps keys from RViz."""
         if event.type() in (QEvent.Type.MouseButtonPress, QEvent.Type.Wheel):
             self._fits = False
+        elif event.type() == QEvent.Type.Resize:
+            self._fit()
         # RViz's keys change its tools, and the tool bar would not know.
         return bool(event.type() == QEvent.Type.KeyPress)
 
@@ -270,7 +283,9 @@ class ViewerWindow(QMainWindow):
             self._complain("Spawn model", reason)
 
         self._link.in_background(
-            lambda: read_outline(choice.path, self._link.parameter), self._place_model, fail
+            lambda: read_outline(choice.path, self._link.parameter, name=choice.name),
+            self._place_model,
+            fail,
         )
 
     def _place_model(self, outlines: list[Outline]) -> None:

@@ -72,6 +72,13 @@ def drawing_launcher(module_launcher: Any, screen: Any) -> Any:
     return module_launcher
 
 
+@pytest.fixture
+def on_screen(launcher: Any, screen: Any) -> Any:
+    """Starts programs that draw on the screen and end with the test."""
+    launcher.environment = {**launcher.environment, **screen.environment}
+    return launcher
+
+
 @pytest.fixture(scope="session")
 def room(write_world: Callable[..., Path]) -> Path:
     """A magenta room of 10 m by 10 m with a blue robot at (-2, 1)."""
@@ -134,6 +141,14 @@ class Viewer:
         """Clicks on a widget."""
         widget = self.widget(name)
         self.screen.click(widget["x"] + widget["width"] / 2, widget["y"] + widget["height"] / 2)
+
+
+@pytest.fixture
+def early_viewer(on_screen: Any, screen: Any, tmp_path: Path) -> Iterator[Viewer]:
+    """A viewer that nobody has started a simulator for, and which ends with the test."""
+    viewer = Viewer(on_screen, screen, tmp_path)
+    yield viewer
+    viewer.close()
 
 
 @pytest.fixture(scope="module")

@@ -27,13 +27,6 @@ def clean_parameters() -> Iterator[None]:
         rosgraph.Master("/flatland_tests").deleteParam("/flatland_server")
 
 
-@pytest.fixture
-def on_screen(launcher: Any, screen: Any) -> Any:
-    """Starts programs that draw on the screen and end with the test."""
-    launcher.environment = {**launcher.environment, **screen.environment}
-    return launcher
-
-
 def nodes() -> list[str]:
     return [name.split("_1")[0] for name in rosnode.get_node_names()]
 

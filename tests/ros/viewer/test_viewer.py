@@ -19,8 +19,8 @@ from flatland.msg import DebugTopicList
 from flatland.srv import SetRate
 
 DEBUG = "/flatland_server/debug"
-BLUE, CYAN, RED, LIGHT_BLUE, YELLOW = (
-    *((0, 0, 255), (0, 255, 255), (255, 70, 70)),
+BLUE, CYAN, RED, GREEN, LIGHT_BLUE, YELLOW = (
+    *((0, 0, 255), (0, 255, 255), (255, 70, 70), (0, 255, 0)),
     *((80, 200, 255), (255, 217, 26)),
 )
 START = (-2.0, 1.0)
@@ -49,7 +49,7 @@ def spawned(ros: Any) -> Any:
             ros.delete(topic.removeprefix("model/"))
 
 
-def choose(viewer: Any, screen: Any, path: Path, *, number: bool = False) -> None:
+def choose(viewer: Any, screen: Any, path: Path, *, name: str = "", number: bool = False) -> None:
     """Answers the dialog of the spawn tool."""
     viewer.click("spawn")
     field = viewer.widget("path")
@@ -57,6 +57,12 @@ def choose(viewer: Any, screen: Any, path: Path, *, number: bool = False) -> Non
     screen.key("ctrl+a")
     screen.type(str(path))
     viewer.until("path", lambda widget: widget["text"] == str(path))
+    if name:
+        field = viewer.widget("name")
+        screen.click(field["x"] + 20, field["y"] + field["height"] / 2)
+        screen.key("ctrl+a")
+        screen.type(name)
+        viewer.until("name", lambda widget: widget["text"] == name)
     if viewer.widget("number")["checked"] != number:
         box = viewer.widget("number")
         screen.click(box["x"] + 8, box["y"] + box["height"] / 2)
@@ -190,6 +196,89 @@ def test_name_is_the_namespace_and_takes_a_number(
     # Each laser has a colour of its own.
     seen = look(lambda picture: len(picture.places(LIGHT_BLUE)) > 30, panel)
     assert len(seen.places(RED)) > 30
+
+
+def test_relative_path_and_name_of_ones_own(
+    ros: Any,
+    look: Callable[..., Any],
+    viewer: Any,
+    screen: Any,
+    panel: Any,
+    spawned: Callable[[str], None],
+) -> None:
+    picture = look(lambda picture: True, panel)
+    # From the folder of the world file, as in spawn_model.
+    choose(viewer, screen, Path("crate.model.yaml"), name="parcel", number=True)
+    screen.move(*picture.at(2, 2))
+    look(lambda picture: len(picture.places(YELLOW)), panel)
+    screen.click(*picture.at(2, 2))
+    screen.click(*picture.at(2, 2))
+    spawned("parcel1")
+    # The next one needs no more than to be asked for.
+    viewer.click("spawn")
+    viewer.until("name", lambda widget: widget["text"] == "parcel2")
+    box = viewer.widget("number")
+    screen.click(box["x"] + 8, box["y"] + box["height"] / 2)
+    viewer.until("name", lambda widget: widget["text"] == "parcel")
+    screen.key("Escape")
+    viewer.until("interact", lambda widget: widget["checked"])
+
+
+def test_menu_deletes_a_model(
+    ros: Any,
+    look: Callable[..., Any],
+    viewer: Any,
+    screen: Any,
+    panel: Any,
+    eventually: Callable[..., Any],
+) -> None:
+    topics = ros.topic(f"{DEBUG}/topics", DebugTopicList)
+    assert ros.spawn("crate.model.yaml", "crate", "", (2, -2, 0)).success
+    picture = look(lambda picture: len(picture.near(GREEN, 2, -2, 0.4)) > 50, panel)
+
+    def menu() -> Any:
+        # RViz looks what is below the mouse once a picture, and misses a click that is too short.
+        screen.move(*picture.at(2.1, -2))
+        screen.move(*picture.at(2, -2))
+        look(lambda picture: True, panel)
+        screen.press(3)
+        look(lambda picture: True, panel)
+        screen.release(3)
+        look(lambda picture: True, panel)
+        return viewer.widgets("QMenu")
+
+    (area,) = eventually("menu", menu)
+    screen.click(area["x"] + 30, area["y"] + area["height"] / 2)
+    topics.until(lambda message: "model/crate" not in message.topics)
+    look(lambda picture: not len(picture.near(CYAN, 2, -2, 0.8)), panel)
+
+
+def test_view_fits_the_window_until_the_camera_is_moved(
+    look: Callable[..., Any], viewer: Any, screen: Any, panel: Any
+) -> None:
+    def resize(width: int, height: int) -> Any:
+        screen.resize("flatland", width, height)
+        # The tool bar and the status line keep their heights.
+        below = height - 800 + panel["height"]
+        return viewer.until(
+            "rviz::RenderPanel",
+            lambda widget: (widget["width"], widget["height"]) == (width, below),
+        )
+
+    def fits(area: Any) -> Callable[[Any], bool]:
+        wanted = area["height"] / 10.6
+        return lambda picture: abs(picture.pixels_per_metre - wanted) < 0.8
+
+    viewer.click("whole_world")
+    look(fits(panel), panel)
+    small = resize(1000, 500)
+    picture = look(fits(small), small)
+    screen.click(*picture.at(3, 3), button=5)
+    zoomed = look(lambda seen: seen.pixels_per_metre < 0.98 * picture.pixels_per_metre, small)
+    area = resize(1200, 800)
+    look(lambda seen: abs(seen.pixels_per_metre - zoomed.pixels_per_metre) < 0.2, area)
+    viewer.click("whole_world")
+    look(fits(area), area)
 
 
 def test_escape_cancels(

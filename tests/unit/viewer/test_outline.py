@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import flatland
-from flatland.viewer.bounds import Bounds, bounds_of
+from flatland.viewer.bounds import Bounds, bounds_of, union
 from flatland.viewer.outline import reach, read_outline
 
 MODEL = """
@@ -56,8 +56,8 @@ def test_bad_model_is_told(tmp_path: Path) -> None:
         read_outline(str(tmp_path / "missing.yaml"))
     path = tmp_path / "bad.yaml"
     path.write_text("bodies: [{name: b, footprints: [{type: square}]}]\n")
-    with pytest.raises(flatland.YamlError, match="support footprints are"):
-        read_outline(str(path))
+    with pytest.raises(flatland.YamlError, match=r'model "crate".*support footprints are'):
+        read_outline(str(path), name="crate")
 
 
 def marker(points: list[tuple[float, float]], x: float = 0, y: float = 0, yaw: float = 0) -> object:
@@ -79,5 +79,4 @@ def test_bounds_hold_all_markers_at_their_poses() -> None:
     assert bounds.center == pytest.approx((10, 25))
     assert bounds.size == pytest.approx((2, 10))
     assert bounds_of(SimpleNamespace(markers=markers[:1])) is None
-    assert bounds.union(Bounds(0, 0, 1, 1)) == Bounds(0, 0, bounds.x_max, bounds.y_max)
-    assert bounds.union(None) is bounds
+    assert union([bounds, Bounds(0, 0, 1, 1)]) == Bounds(0, 0, bounds.x_max, bounds.y_max)

@@ -1,0 +1,66 @@
+"""A viewer that is there before the simulator, and stays when that is gone."""
+
+from __future__ import annotations
+
+import signal
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+from std_srvs.srv import Empty
+
+BLUE, RED = (0, 0, 255), (255, 70, 70)
+
+
+@pytest.fixture
+def elsewhere(room: Path) -> Path:
+    """The room and the robot far from the origin, on a layer of another name."""
+    (room.parent / "far.yaml").write_text(
+        "type: line_segments\ndata: walls.dat\nscale: 1.0\norigin: [70, -40, 0]\n"
+    )
+    path = room.parent / "elsewhere.yaml"
+    text = room.read_text().replace("name: 2d, map: map.yaml", "name: far, map: far.yaml")
+    assert "far.yaml" in text
+    path.write_text(text.replace("pose: [-2, 1, 0]", "pose: [68, -39, 0]"))
+    return path
+
+
+def test_simulators_come_and_go(
+    ros: Any, early_viewer: Any, on_screen: Any, room: Path, elsewhere: Path, look: Any
+) -> None:
+    viewer = early_viewer
+    area = viewer.widget("rviz::RenderPanel")
+
+    def waits() -> None:
+        viewer.until("rate", lambda widget: widget["text"] == "waiting for the simulator")
+        viewer.until("factor", lambda widget: widget["text"] == "")
+        viewer.until("toggle_pause", lambda widget: widget["text"] == "Pause")
+        assert not viewer.widget("rate_slider")["enabled"]
+
+    def shows_room_and_robot(place: Callable[[Any], Any]) -> None:
+        viewer.until("rate", lambda widget: widget["text"] == "200 Hz (x1)")
+        picture = look(place, area)
+        assert picture.pixels_per_metre * 10 == pytest.approx(area["height"] / 1.06, abs=8)
+        look(lambda picture: len(picture.places(RED)) > 30, area)
+
+    def robot_is_there(picture: Any) -> bool:
+        return len(picture.near(BLUE, -2, 1, 0.6)) > 10
+
+    waits()
+    first = on_screen.server(room, show_viz=True)
+    shows_room_and_robot(robot_is_there)
+    ros.call("/pause", Empty)
+    viewer.until("toggle_pause", lambda widget: widget["text"] == "Resume")
+    # It ends without a word, so that the master still knows it.
+    first.send(signal.SIGKILL)
+    first.wait()
+    waits()
+    viewer.click("toggle_pause")
+    complaint = viewer.widget("qt_msgbox_label")
+    assert "service" in complaint["text"]
+    viewer.screen.key("Return")
+    # The next one shows another world; nothing of the first one is left.
+    on_screen.server(elsewhere, show_viz=True)
+    shows_room_and_robot(robot_is_there)
+    assert viewer.process.running
