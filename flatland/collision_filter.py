@@ -35,9 +35,11 @@ class CollisionFilter:
             YamlError: A name is taken, or there would be more than 16; nothing is registered then.
         """
         names = list(names)
-        for index, name in enumerate(names):
-            if name in self._ids or name in names[:index]:
+        taken = set(self._ids)
+        for name in names:
+            if name in taken:
                 raise YamlError(f'Layer with name "{name}" already exists')
+            taken.add(name)
         if len(self._ids) + len(names) > MAX_LAYERS:
             raise YamlError(
                 f"Unable to add {len(names)} additional layer(s) {{{', '.join(names)}}}, "

@@ -30,6 +30,10 @@ class YamlError(FlatlandError):
     prefix = "Flatland YAML: "
 
 
+class UnreadableFileError(YamlError):
+    """A YAML file that is not there or cannot be read; who names the file may add where."""
+
+
 class PluginError(FlatlandError):
     """A plugin that cannot be found, made or initialised."""
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import math
 from pathlib import Path
 
@@ -9,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from flatland.errors import MapFileError
+from flatland.regular_file import open_regular
 
 _COLUMNS = 4
 
@@ -28,7 +30,7 @@ def read_line_segments(path: str) -> npt.NDArray[np.float64]:
         OSError: The file cannot be read.
         MapFileError: A line has fewer than four numbers, or one is NaN or infinite.
     """
-    with Path(path).open(encoding="utf-8-sig", errors="replace") as file:
+    with io.TextIOWrapper(open_regular(path), encoding="utf-8-sig", errors="replace") as file:
         numbered = [
             (number, line)
             for number, line in enumerate(file, start=1)

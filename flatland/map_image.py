@@ -13,6 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from flatland.bitmap import boundary_edges, boundary_loops
+from flatland.regular_file import open_regular
 
 GreyImage = npt.NDArray[np.uint8]
 Edges = npt.NDArray[np.float32]
@@ -43,7 +44,7 @@ def read_grey_image(path: str) -> GreyImage:
         OSError: There is no such file, or it is not an image.
     """
     # OpenCV would print a warning of its own for a file that it cannot open.
-    with Path(path).open("rb") as file:
+    with open_regular(path) as file:
         header = file.read(_HEADER_SIZE)
     if _is_plain_grey(header):
         plain = _read_plain_grey(path)

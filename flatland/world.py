@@ -34,6 +34,7 @@ from flatland.plugin_registry import PluginRegistry
 from flatland.ports import CommandTopic, Output, PortRegistry, is_legal_namespace
 from flatland.timekeeper import Timekeeper
 from flatland.values import Transform
+from flatland.yaml_node import Source
 from flatland.yaml_reader import YamlReader
 
 _LOG = logging.getLogger("flatland")
@@ -405,7 +406,7 @@ class World:
     def _spawn(self, path: str, name: str, namespace: str, pose: Sequence[float]) -> Model:
         self._check_open()
         checked_pose = self._check_spawn(path, name, namespace, pose)
-        path = str(self._base_dir / Path(path).expanduser())
+        path = Source("", str(self._base_dir)).resolve(path)
         reader = YamlReader.from_file(path, self.params)
         model = Model(self, name, namespace, path)
         loader = ModelLoader(self._physics, self.collision_filter, model, reader)
@@ -444,10 +445,9 @@ class World:
         self._check_open()
         model = self._find_model(name, "move")
         try:
-            checked_pose = finite_pose(pose)
+            model.set_pose(*finite_pose(pose))
         except ValueError as error:
             raise WorldError(f'failed to move model "{name}", {error}') from None
-        model.set_pose(*checked_pose)
         for observer in self._observers:
             observer.model_moved(model)
 
@@ -719,9 +719,10 @@ class World:
             for model in reversed(self.models):
                 self._delete(model.name)
             self._closed = True
-            self._requests.clear()
             self._bodies.clear()
             self._physics.close()
+            # Someone may wait for what was asked for meanwhile: it fails, as the world is closed.
+            self.process_requests()
 
 
 def _log_failure(what: str, done: Future[Any]) -> None:

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import logging
+import math
 import os
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
-from flatland.errors import WorldError, YamlError
+from flatland.errors import UnreadableFileError, WorldError, YamlError
 from flatland.layer import Layer
 from flatland.map_file import load_map
 from flatland.world import World
+from flatland.yaml_node import Source
 from flatland.yaml_reader import YamlReader
 
 _LOG = logging.getLogger("flatland")
@@ -31,7 +33,7 @@ def load_world(
     """Makes a world from a file; see `World.from_yaml`, where the options are explained."""
     if simplify_map not in SIMPLIFICATIONS:
         raise ValueError(f"simplify_map must be 0, 1 or 2, got {simplify_map!r}")
-    file = Path(path).expanduser().absolute()
+    file = Path(Source("", str(Path.cwd())).resolve(os.fspath(path)))
     reader = YamlReader.from_file(file, params)
     properties = reader.subnode("properties", "map")
     iterations = [
@@ -78,6 +80,10 @@ def _load_layer(world: World, entry: YamlReader, simplify_map: int) -> None:
     reader = entry.with_location(f'layer "{names[0]}"')
     map_path: str = reader.get("map", "string", "")
     color = reader.get("color", "color", LAYER_COLOR)
+    if not all(math.isfinite(number) for number in color):
+        raise reader.subnode("color").error(
+            f'Invalid "color" in layer "{names[0]}", must be finite, got {list(color)}'
+        )
     properties = reader.optional_subnode("properties", "map")
     reader.ensure_accessed_all()
     try:
@@ -88,19 +94,27 @@ def _load_layer(world: World, entry: YamlReader, simplify_map: int) -> None:
     if not map_path:
         layer = Layer(world.physics, names, bits, color, properties.plain() or {})
     else:
-        layer_map = load_map(
-            reader.resolve_path(map_path), names[0], simplify=simplify_map, params=world.params
-        )
-        layer = Layer(
-            world.physics,
-            names,
-            bits,
-            color,
-            properties.plain() or {},
-            origin=layer_map.origin,
-            edges=layer_map.edges,
-            exact_edge_count=layer_map.exact_edge_count,
-        )
+        try:
+            layer_map = load_map(
+                reader.resolve_path(map_path), names[0], simplify=simplify_map, params=world.params
+            )
+        except UnreadableFileError as error:
+            raise reader.subnode("map").error(error.message) from error
+        try:
+            layer = Layer(
+                world.physics,
+                names,
+                bits,
+                color,
+                properties.plain() or {},
+                origin=layer_map.origin,
+                edges=layer_map.edges,
+                exact_edge_count=layer_map.exact_edge_count,
+            )
+        except ValueError as error:  # finite, but beyond what the physics can hold
+            raise YamlError(
+                f'Invalid map in layer "{names[0]}", {error} [{layer_map.path}]'
+            ) from error
     world.add_layer(layer)
 
 
@@ -119,6 +133,8 @@ def _load_models(world: World, reader: YamlReader) -> None:
         except WorldError as error:
             # The request itself is wrong, and it stands in this file.
             raise model_reader.error(error.message) from None
+        except UnreadableFileError as error:
+            raise model_reader.subnode("model").error(error.message) from error
 
 
 def _load_world_plugin(world: World, entry: YamlReader, world_config: YamlReader) -> None:

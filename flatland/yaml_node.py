@@ -8,14 +8,14 @@ entries that are not written in it.
 from __future__ import annotations
 
 import re
-import stat
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import NoReturn
 
 import yaml
 
-from flatland.errors import YamlError
+from flatland.errors import UnreadableFileError, YamlError
+from flatland.regular_file import open_regular
 
 MAX_NESTING = 100
 _MAX_FILE_BYTES = 64 * 1024 * 1024
@@ -127,17 +127,16 @@ def parse_documents(text: str, source: Source) -> list[Node]:
 
 def _read(path: str) -> bytes:
     try:
-        # Anything but a plain file may block for ever (a pipe) or never end (a device).
-        if not stat.S_ISREG(Path(path).stat().st_mode):
-            raise YamlError(f'Failed to read file, path="{path}", it is not a regular file')
-        with Path(path).open("rb") as file:
+        with open_regular(path) as file:
             content = file.read(_MAX_FILE_BYTES + 1)
-    except (FileNotFoundError, NotADirectoryError, ValueError):
-        raise YamlError(f'File does not exist, path="{path}"') from None
+    except (FileNotFoundError, NotADirectoryError):
+        raise UnreadableFileError(f'File does not exist, path="{path}"') from None
     except OSError as error:
-        raise YamlError(f'Failed to read file, path="{path}", {error.strerror}') from error
+        raise UnreadableFileError(
+            f'Failed to read file, path="{path}", {error.strerror}'
+        ) from error
     if len(content) > _MAX_FILE_BYTES:
-        raise YamlError(f'Failed to read file, path="{path}", it has more than 64 MiB')
+        raise UnreadableFileError(f'Failed to read file, path="{path}", it has more than 64 MiB')
     return content
 
 

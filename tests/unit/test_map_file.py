@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 import math
+import os
 import re
 from collections.abc import Callable
 from pathlib import Path
@@ -259,6 +260,27 @@ def test_unreadable_image(write: Write, tmp_path: Path, image: str) -> None:
     full = tmp_path if image == "." else tmp_path / image
     text = f'Failed to load "{full}" in layer "Walls"'
     fails(path, YamlError, text + place(path, 1))
+
+
+@pytest.mark.parametrize("kind", ["pipe", "device", "zero byte"])
+def test_an_image_that_is_no_regular_file(write: Write, tmp_path: Path, kind: str) -> None:
+    """A pipe would keep the simulator for ever."""
+    os.mkfifo(tmp_path / "pipe")
+    image = {"pipe": "pipe", "device": "/dev/zero", "zero byte": '"map\\0.png"'}[kind]
+    path = write(IMAGE_MAP.replace("map.png", image))
+    with pytest.raises(YamlError, match=r'Failed to load ".*" in layer "Walls"') as caught:
+        load_map(path, "Walls")
+    assert str(caught.value).endswith(place(path, 1))
+
+
+@pytest.mark.parametrize("kind", ["pipe", "device", "zero byte"])
+def test_data_that_is_no_regular_file(write: Write, tmp_path: Path, kind: str) -> None:
+    os.mkfifo(tmp_path / "pipe")
+    data = {"pipe": "pipe", "device": "/dev/zero", "zero byte": '"lines\\0.dat"'}[kind]
+    path = write(LINE_MAP.replace("lines.dat", data))
+    with pytest.raises(MapFileError, match=r'Failed to load ".*"') as caught:
+        load_map(path, "Walls")
+    assert str(caught.value).endswith(place(path, 2))
 
 
 def test_missing_data_file(write: Write, tmp_path: Path) -> None:

@@ -187,6 +187,35 @@ def test_poses_that_are_none_are_refused(files, pose):
             model.bodies[0].set_velocity(*pose)
 
 
+@pytest.mark.parametrize("pose", [(1e30, 0, 0), (0, -1e10, 0), (0, 0, 1e300)])
+def test_poses_beyond_what_the_physics_holds_are_refused(files, pose):
+    world = files.load("{properties: {}, layers: []}")
+    model = world.spawn_model("minimal.model.yaml", "m", pose=(1, 2, 3))
+    with pytest.raises(WorldError, match=r'failed to move model "m", pose .*must be finite and'):
+        world.move_model("m", pose)
+    with pytest.raises(YamlError, match=r'model "n" body "base", pose .*must be finite and within'):
+        world.spawn_model("minimal.model.yaml", "n", pose=pose)
+    assert model.pose == pytest.approx((1, 2, 3))
+    assert world.models == [model]
+
+
+@pytest.mark.parametrize("path", ["~no-such-user/m.yaml", "a\0b", "x" * 5000, "/dev/zero", "."])
+def test_spawns_from_what_is_no_file(files, path):
+    world = files.load("{properties: {}, layers: []}")
+    with pytest.raises(YamlError, match=r"File does not exist|Failed to read file"):
+        world.spawn_model(path, "m")
+    assert world.models == []
+
+
+def test_who_waits_for_a_world_that_closes_is_told(files):
+    """A request that came while the world closed was dropped, and its thread waited for ever."""
+    world = files.load("{properties: {}, layers: []}")
+    future = world.post(lambda: world.spawn_model("minimal.model.yaml", "m"))
+    world.close()
+    with pytest.raises(WorldError, match="the world is closed"):
+        future.result(timeout=0)
+
+
 def test_unknown_names(files):
     world = files.load("{properties: {}, layers: []}")
     with pytest.raises(WorldError) as caught:
@@ -338,7 +367,9 @@ def test_other_threads_may_ask_while_the_world_steps(files):
                 name = f"m{index}"
                 world.spawn_model("minimal.model.yaml", name, pose=(index, 0, 0))
                 world.move_model(name, (index, turn, 0))
-                assert world.model(name).pose[1] == pytest.approx(turn)
+                # A look at a body in the middle of a physics step is refused.
+                pose = world.between_steps(lambda: world.model(name).pose)  # noqa: B023
+                assert pose[1] == pytest.approx(turn)
                 world.delete_model(name)
             with pytest.raises(WorldError):
                 world.delete_model(f"nobody{index}")

@@ -11,6 +11,7 @@ import pytest
 import flatland
 from flatland import FlatlandError, YamlError
 
+FIFTEEN = ", ".join(f"l{i}" for i in range(15))
 SEVENTEEN = ", ".join(f"l{i}" for i in range(17))
 
 ERRORS = {
@@ -55,9 +56,17 @@ ERRORS = {
         f"Unable to add 17 additional layer(s) {{{SEVENTEEN}}}, current layers count is 0, max "
         "allowed is 16",
     ),
+    "too many layers beside others": (
+        f"{{properties: {{}}, layers: [{{name: [{FIFTEEN}]}}, {{name: [a, b]}}]}}",
+        "Unable to add 2 additional layer(s) {a, b}, current layers count is 15, max allowed is 16",
+    ),
     "layer color": (
         "{properties: {}, layers: [{name: L, color: [1, 1]}]}",
         'Entry "color" must have size of exactly 4 (in layer "l")',
+    ),
+    "layer color nan": (
+        "{properties: {}, layers: [{name: L, color: [1, .nan, 1, 1]}]}",
+        'Invalid "color" in layer "L", must be finite, got [1.0, nan, 1.0, 1.0]',
     ),
     "unknown layer key": (
         "{properties: {}, layers: [{name: L, colour: red}]}",
@@ -66,6 +75,10 @@ ERRORS = {
     "map not there": (
         "{properties: {}, layers: [{name: L, map: nowhere.yaml}]}",
         'File does not exist, path="',
+    ),
+    "map is a folder": (
+        "{properties: {}, layers: [{name: L, map: .}]}",
+        "it is not a regular file [",
     ),
     "model without name": (
         "{properties: {}, layers: [], models: [{model: minimal.model.yaml}]}",
@@ -78,6 +91,14 @@ ERRORS = {
     "model file not there": (
         "{properties: {}, layers: [], models: [{name: M, model: nowhere.yaml}]}",
         'File does not exist, path="',
+    ),
+    "model file of nobody": (
+        "{properties: {}, layers: [], models: [{name: M, model: ~no-such-user/m.yaml}]}",
+        "/~no-such-user/m.yaml",
+    ),
+    "model file is a folder": (
+        '{properties: {}, layers: [], models: [{name: M, model: ""}]}',
+        "it is not a regular file [",
     ),
     "model twice": (
         "{properties: {}, layers: [], models: [{name: M, model: minimal.model.yaml}, "
@@ -117,8 +138,8 @@ def test_error_text(files, case):
         files.load(world)
     assert str(caught.value).startswith("Flatland YAML: ")
     assert text in str(caught.value)
-    if not text.startswith("File does not exist"):
-        assert "world.yaml:" in str(caught.value)
+    # The place follows the text, also where the fault is that a file it names is not there.
+    assert "world.yaml:" in str(caught.value)
 
 
 def test_missing_world_file(tmp_path):
@@ -126,6 +147,34 @@ def test_missing_world_file(tmp_path):
     with pytest.raises(YamlError) as caught:
         flatland.World.from_yaml(path)
     assert str(caught.value).startswith(f'Flatland YAML: File does not exist, path="{path}"')
+
+
+def test_world_file_of_nobody():
+    with pytest.raises(
+        YamlError, match=r'File does not exist, path=".*/~no-such-user/world\.yaml"'
+    ):
+        flatland.World.from_yaml("~no-such-user/world.yaml")
+
+
+@pytest.mark.parametrize(
+    ("keys", "text"),
+    [
+        ({"origin": "[1e30, 0, 0]"}, "pose must be finite and within"),
+        ({"origin": "[0, 0, 1e30]"}, "pose angle must be finite and within"),
+        ({"resolution": 1e30}, r"edges\[0, 0\] must be finite and within"),
+    ],
+)
+def test_map_beyond_what_the_physics_holds(files, keys, text):
+    files.write_map("map", ["   ", " # ", "   "], **keys)
+    with pytest.raises(YamlError, match=rf'Invalid map in layer "L", {text} .* \[.*map\.yaml\]$'):
+        files.load("{properties: {}, layers: [{name: L, map: map.yaml}]}")
+
+
+def test_very_many_layer_names_are_refused_at_once(files):
+    """Each name was compared with all before it, which took minutes."""
+    names = [f"l{i}" for i in range(100_000)]
+    with pytest.raises(YamlError, match="Unable to add 100000 additional"):
+        files.load(f"{{properties: {{}}, layers: [{{name: [{', '.join(names)}]}}]}}")
 
 
 def test_world_plugin_errors_name_the_plugin(files):

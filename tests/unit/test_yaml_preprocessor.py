@@ -151,6 +151,12 @@ def test_errors_of_expressions(files: Files, text: str, expression: str, why: st
     assert message.endswith(f"{why} [{files.path('main')}:2]")
 
 
+def test_an_endless_expression_is_stopped(files: Files) -> None:
+    message = files.failure("a: 1\nx: $eval while true do end return 1\n")
+    assert 'Failed to evaluate "while true do end return 1", ' in message
+    assert message.endswith(f" [{files.path('main')}:2]")
+
+
 def test_long_expressions_and_messages_are_shown_in_part(files: Files) -> None:
     message = files.failure(f"x: $eval {'y' * 1000}.z")
     assert f'Failed to evaluate "{"y" * 500}...", ' in message
