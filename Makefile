@@ -41,8 +41,8 @@ format: setup-dev  ## bring Python and C++ sources into shape
 	clang-format -i $(CPP_FILES)
 
 .PHONY: bench
-bench: setup-dev  ## measure speed into build/bench.json: make bench [BASELINE=file of an earlier run]
-	@. ./setup.bash && python bench --json build/bench.json \
+bench: setup-dev  ## measure speed into build/bench.json, .png: make bench [BASELINE=earlier.json]
+	@. ./setup.bash && python bench --json build/bench.json --plot build/bench.png \
 	  $(if $(BASELINE),--baseline "$(BASELINE)") $(ARGS)
 
 .PHONY: docs

@@ -1,0 +1,108 @@
+"""How cost grows with beams, edges, robots and map size: curves for docs/performance.md."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Sequence
+from pathlib import Path
+
+import flatland
+from flatland.bitmap import boundary_edges
+from flatland.physics import PhysicsWorld
+
+from crowd import MOST, crowd  # isort: skip
+from curves import Curve, Panel
+from large_map import load, write_world
+from scans import add_crowd
+from scenes import beam_ends, benchmark_world_path, ranges_pixels, scan_pose, world_of_edges
+from steps import PERIOD, step_time
+from timing import best_of
+
+ALL = 0xFFFF
+BEAM_COUNTS = (8, 30, 100, 300, 1081, 3000, 10_000)
+BOX_COUNTS = (250, 1000, 4000, 15_000, 60_000, 250_000)
+MOVING_COUNTS = (1, 10, 30, 100, 300, 1000)
+ROBOT_COUNTS = (1, 2, 5, 10, 20, 50, MOST)
+SIDES = (1000, 2000, 4000, 10_000)
+SCAN, LOOP = "flatland", "b2World::RayCast"
+
+
+def panels() -> list[Panel]:
+    """Measures all curves."""
+    return [_beams(), _edges(), _moving(), _robots(), _loading()]
+
+
+def _compare(
+    physics: PhysicsWorld, pose: tuple[float, float, float], beams: int
+) -> tuple[float, float]:
+    """Returns the times [µs] of one scan by the batch call and by `b2World::RayCast`."""
+    ends = beam_ends(beams)
+    batch = best_of(lambda: physics.cast_rays(pose, ends, ALL), 0.2)
+    loop = best_of(lambda: physics.cast_rays_reference(pose, ends, ALL), 0.2, 3)
+    return 1e6 * batch, 1e6 * loop
+
+
+def _scan_panel(
+    title: str, x_label: str, x: Sequence[float], pairs: list[Sequence[float]]
+) -> Panel:
+    batch, loop = zip(*pairs, strict=True)
+    curves = [Curve(SCAN, list(x), list(batch)), Curve(LOOP, list(x), list(loop))]
+    return Panel(title, x_label, "time of a scan [µs]", curves)
+
+
+def _beams() -> Panel:
+    with flatland.World.from_yaml(benchmark_world_path(), seed=1) as world:
+        world.step()
+        pose = scan_pose(world)
+        pairs = [_compare(world.physics, pose, count) for count in BEAM_COUNTS]
+    return _scan_panel("A scan of the benchmark world", "beams", BEAM_COUNTS, pairs)
+
+
+def _edges() -> Panel:
+    counts, pairs = [], []
+    for boxes in BOX_COUNTS:
+        # As many boxes to the area each time: what grows is what lies behind what is seen.
+        side = int(4000 * (boxes / 60_000) ** 0.5)
+        edges = boundary_edges(ranges_pixels(side, boxes), 0.05)
+        physics = world_of_edges(edges)
+        middle = 0.025 * side
+        pairs.append(_compare(physics, (middle, middle, 0.0), 1081))
+        counts.append(len(edges))
+        physics.close()
+    return _scan_panel("1081 beams, larger and larger maps", "edges", counts, pairs)
+
+
+def _moving() -> Panel:
+    pairs = []
+    for count in MOVING_COUNTS:
+        with flatland.World.from_yaml(benchmark_world_path(), seed=1) as world:
+            add_crowd(world, count)
+            world.physics.step(1e-6, 1, 1)
+            pairs.append(_compare(world.physics, scan_pose(world), 1081))
+    title = "1081 beams, moving things of two shapes around"
+    return _scan_panel(title, "things", MOVING_COUNTS, pairs)
+
+
+def _robots() -> Panel:
+    curves = []
+    for label, scans in (("with 360-beam laser at 10 Hz", True), ("nobody wants the laser", False)):
+        times = []
+        for count in ROBOT_COUNTS:
+            with crowd(slice(count), scans=scans) as world:
+                times.append(1e6 * step_time(world, 10 * PERIOD, 0.5))
+        curves.append(Curve(label, list(ROBOT_COUNTS), times))
+    return Panel(
+        "A step of robots with a differential drive", "robots", "time of a step [µs]", curves
+    )
+
+
+def _loading() -> Panel:
+    times, peaks, pixels = [], [], []
+    for side in SIDES:
+        with tempfile.TemporaryDirectory() as folder:
+            loading, _, peak, _ = load(write_world(Path(folder), side))
+        pixels.append(side**2 / 1e6)
+        times.append(loading)
+        peaks.append(peak / 1000)
+    curves = [Curve("time [s]", pixels, times), Curve("peak memory [GB]", pixels, peaks)]
+    return Panel("Loading a world", "million pixels of the map", "", curves)
