@@ -119,6 +119,7 @@ def _load_layer(world: World, entry: YamlReader, simplify_map: int) -> None:
 
 
 def _load_models(world: World, reader: YamlReader) -> None:
+    names: set[str] = set()
     for entry in reader.optional_subnode("models", "list").items():
         name = entry.get("name", "string")
         model_reader = entry.with_location(f'model "{name}"')
@@ -126,8 +127,9 @@ def _load_models(world: World, reader: YamlReader) -> None:
         namespace = model_reader.get("namespace", "string", "")
         path = model_reader.resolve_path(model_reader.get("model", "string"))
         model_reader.ensure_accessed_all()
-        if any(model.name == name for model in world.models):
+        if name in names:
             raise model_reader.error(f'Model with name "{name}" already exists')
+        names.add(name)
         try:
             world.spawn_model(path, name, namespace, pose)
         except WorldError as error:
