@@ -83,6 +83,7 @@ def assert_stops(process: Any, number: signal.Signals) -> None:
         ("seed", "-1"),
         ("seed", "lucky"),
         ("benchmark_duration", "0"),
+        ("plugin_timeout", "0"),
     ],
 )
 def test_bad_parameter_is_named_in_one_fatal_line(
@@ -236,6 +237,7 @@ def test_server_launch_sets_all_parameters(launcher: Any, ros: Any, world: Path)
         "viz_pub_rate:=15",
         "simplify_map:=1",
         "seed:=7",
+        "plugin_timeout:=30",
     )
     times = [message.clock.to_nsec() for message in ros.topic("/clock", Clock).take(20)]
     assert {time % 10_000_000 for time in times} == {0}
@@ -248,6 +250,7 @@ def test_server_launch_sets_all_parameters(launcher: Any, ros: Any, world: Path)
         "viz_pub_rate": 15,
         "simplify_map": 1,
         "seed": 7,
+        "plugin_timeout": 30,
     }
     assert ros.master.getParam("/use_sim_time") is True
     process.wait_for_line("real-time factor asked inf")
