@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -64,13 +65,16 @@ class BeamAngles:
         count = math.floor((maximum - minimum) / increment + 0.5) + 1
         return cls(minimum, maximum, increment, count)
 
+    @functools.lru_cache(maxsize=16)  # noqa: B019 - the same for a fleet of robots of one kind
     def end_points(self, length: float, upside_down: bool) -> FloatArray:
-        """Returns where beams of a length end, sensor frame [m], shape (count, 2)."""
+        """Returns where beams of a length end, sensor frame [m], shape (count, 2), read-only."""
         angles = self.minimum + self.increment * np.arange(self.count, dtype=np.float64)
         if upside_down:
             angles = -angles
         ends = length * np.stack([np.cos(angles), np.sin(angles)], axis=1)
-        return np.ascontiguousarray(ends, dtype=np.float32)
+        points = np.ascontiguousarray(ends, dtype=np.float32)
+        points.flags.writeable = False
+        return points
 
 
 class Laser(ModelPlugin):
@@ -98,6 +102,7 @@ class Laser(ModelPlugin):
         self.origin = read_pose(config, "origin")
         self.timer = UpdateTimer(read_rate(config))
         self.always_publish: bool = config.get("always_publish", "bool", False)
+        self._length = np.float32(self.range)
         self._deviation = np.float32(self._read_deviation(config))
         self._no_hit = self._read_no_hit(config)
         self._mask = self._read_mask(config)
@@ -180,11 +185,12 @@ class Laser(ModelPlugin):
         fractions, reflects = self.world.physics.cast_rays(
             compose(self.body.physics.pose, self.origin), self._ends, self._mask, self._reflect_mask
         )
-        ranges = fractions * np.float32(self.range)
+        ranges = fractions * self._length
         if self._deviation:
             # A miss is NaN and stays so.
             noise = self.rng.standard_normal(ranges.shape, dtype=np.float32)
-            ranges += noise * self._deviation
+            noise *= self._deviation
+            ranges += noise
         if not math.isnan(self._no_hit):
             ranges[np.isnan(fractions)] = self._no_hit
         if self._reflect_mask:
