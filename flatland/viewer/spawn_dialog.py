@@ -87,6 +87,7 @@ class SpawnDialog(QDialog):
 
     def _lay_out(self) -> None:
         browse = QPushButton("Choose …")
+        browse.setObjectName("browse")
         browse.clicked.connect(self._browse)
         file_row, name_row = QHBoxLayout(), QHBoxLayout()
         file_row.addWidget(self.path)

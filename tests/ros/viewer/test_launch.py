@@ -31,6 +31,11 @@ def nodes() -> list[str]:
     return [name.split("_1")[0] for name in rosnode.get_node_names()]
 
 
+def subscriptions(node: str) -> set[str]:
+    _, subscribers, _ = rosgraph.Master("/flatland_tests").getSystemState()
+    return {topic for topic, names in subscribers if node in names}
+
+
 def test_rviz_shows_all_without_being_touched(
     on_screen: Any, ros: Any, room: Path, screen: Any, look: Callable[..., Any]
 ) -> None:
@@ -39,6 +44,10 @@ def test_rviz_shows_all_without_being_touched(
     picture = look(lambda picture: len(picture.places(RED)) > 30, RVIZ_PANEL)
     assert "/rviz" in nodes()
     assert "/flatland_viz" not in nodes()
+    assert subscriptions("/rviz") >= {
+        *("/tf", "/scan", "/odometry/filtered", "/interactive_model_markers/update"),
+        *(f"/flatland_server/debug/all_{kind}" for kind in ("layers", "layers_3d", "models")),
+    }
     # From above, with the scan on the walls and the robot at its pose.
     scan = picture.places(RED)
     assert (np.abs(np.abs(scan).max(axis=1) - 5.0) < 0.15).mean() > 0.9

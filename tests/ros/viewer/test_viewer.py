@@ -81,14 +81,24 @@ def test_shows_walls_robot_and_scan(look: Callable[..., Any], viewer: Any, panel
     distance_to_wall = np.abs(np.abs(scan).max(axis=1) - 5.0)
     assert (distance_to_wall < 0.1).mean() > 0.9
     assert len(set(np.sign(scan[:, 0]))) == len(set(np.sign(scan[:, 1]))) == 2
+    # The ground is dark grey, with a faint line each metre.
+    (left, row), (right, _) = picture.at(0.5, 3.5), picture.at(4.5, 3.5)
+    ground = picture.image[int(row), int(left) : int(right)].max(axis=1).astype(int)
+    assert np.median(ground) == 48
+    assert set(ground) <= set(range(48, 80))
+    lines = np.flatnonzero(np.diff((ground > 50).astype(int)) > 0)
+    assert len(lines) == 4
+    assert np.diff(lines) == pytest.approx(picture.pixels_per_metre, abs=1.5)
 
 
 def test_shows_the_robot_at_its_pose(
     look: Callable[..., Any], viewer: Any, screen: Any, panel: Any
 ) -> None:
-    # Without the handle, which lies on the robot.
+    # The handle lies on it, but for the tool that moves the camera.
+    look(lambda picture: not len(picture.near(BLUE, *START, 0.15)), panel)
     viewer.click("move_camera")
     picture = look(lambda picture: len(picture.near(BLUE, *START, 0.5)) > 200, panel)
+    assert len(picture.near(BLUE, *START, 0.15)) > 20
     robot = picture.places(BLUE)
     assert robot.mean(axis=0) == pytest.approx(START, abs=0.05)
     assert np.hypot(*(robot - START).T).max() == pytest.approx(0.4, abs=0.08)
@@ -220,6 +230,23 @@ def test_relative_path_and_name_of_ones_own(
     box = viewer.widget("number")
     screen.click(box["x"] + 8, box["y"] + box["height"] / 2)
     viewer.until("name", lambda widget: widget["text"] == "parcel")
+    screen.key("Escape")
+    viewer.until("interact", lambda widget: widget["checked"])
+
+
+def test_model_files_can_be_looked_for(viewer: Any, screen: Any, room: Path) -> None:
+    path = str(room.parent / "crate.model.yaml")
+    viewer.click("spawn")
+    viewer.click("browse")
+    viewer.widget("QFileDialog")
+    field = viewer.widget("fileNameEdit")
+    screen.click(field["x"] + 20, field["y"] + field["height"] / 2)
+    screen.key("ctrl+a")
+    screen.type(path)
+    viewer.until("fileNameEdit", lambda widget: widget["text"] == path)
+    screen.key("Return")
+    viewer.until("path", lambda widget: widget["text"] == path)
+    viewer.click("path")  # Without a window manager a dialog has the keys when it was clicked on.
     screen.key("Escape")
     viewer.until("interact", lambda widget: widget["checked"])
 
