@@ -56,9 +56,10 @@ std::size_t py_create_edges(World& world, Id body, const Array<float>& edges, do
       options_of(0.0, friction, restitution, false, category_bits, mask_bits);
   // A copy, as the caller may write to the array while the GIL is free.
   const std::vector<float> rows(edges.data(), edges.data() + edges.size());
-  // Safe without the GIL: the call holds the world for this thread and touches no Python object.
-  const py::gil_scoped_release unlocked;
-  return create_edges(world, body, rows.data(), rows.size() / 4, options);
+  // Safe without the GIL: the world is held for this thread, and no Python object is touched.
+  World::ExclusiveUse use(world, "is making edges");
+  return without_gil(
+      use, [&] { return create_edges(world, body, rows.data(), rows.size() / 4, options); });
 }
 
 template <typename Scalar, std::size_t kWidth>

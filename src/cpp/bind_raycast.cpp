@@ -42,13 +42,10 @@ py::tuple scan(World& world, const PyPose& pose, const Ends& ends, std::int64_t 
   py::array_t<float> fractions(ends.shape(0));
   py::array_t<bool> reflect(ends.shape(0));
   const ScanResult result{fractions.mutable_data(), reflect.mutable_data()};
-  {
-    // Safe without the GIL: `use` keeps the world from changing, nobody else has the results yet,
-    // and `ends` keeps its memory; whoever writes to it meanwhile gets the ranges of a mixture.
-    const World::SharedUse use(world);
-    const py::gil_scoped_release unlocked;
-    cast(request, result);
-  }
+  // Safe without the GIL: `use` keeps the world from changing, nobody else has the results yet, and
+  // `ends` keeps its memory; whoever writes to it meanwhile gets the ranges of a mixture.
+  World::SharedUse use(world);
+  without_gil(use, [&] { cast(request, result); });
   return py::make_tuple(std::move(fractions), std::move(reflect));
 }
 

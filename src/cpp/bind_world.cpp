@@ -12,10 +12,10 @@ WorldClass bind_world(py::module_& module) {
   world.def(
       "step",
       [](World& self, double dt, int velocity_iterations, int position_iterations) {
-        // Safe without the GIL: the step holds the world for this thread, and touches no Python
+        // Safe without the GIL: the world is held for this thread, and the step touches no Python
         // object as there is no hook.
-        const py::gil_scoped_release unlocked;
-        self.step(dt, velocity_iterations, position_iterations, nullptr);
+        World::ExclusiveUse use(self, World::kStepping);
+        without_gil(use, [&] { self.step(dt, velocity_iterations, position_iterations, nullptr); });
       },
       py::arg("dt"), py::arg("velocity_iterations"), py::arg("position_iterations"));
   world.def("destroy_body", &World::destroy_body, py::arg("body"));

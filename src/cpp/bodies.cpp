@@ -139,7 +139,6 @@ std::size_t create_edges(World& world, Id body_id, const float* edges, std::size
   check_all_finite(edges, 4 * count, 4, "edges");
   b2EdgeShape shape;
   const b2FixtureDef definition = checked_definition(shape, options);
-  const World::ExclusiveUse use(world, "is making edges");
   auto* body = const_cast<b2Body*>(world.read_body(body_id));
   world.reserve_fixtures(count);
   const int32 waiting_before = waiting_fixtures(world.engine());

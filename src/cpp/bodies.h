@@ -41,7 +41,7 @@ Id create_circle(World& world, Id body, double x, double y, double radius,
 Id create_polygon(World& world, Id body, const std::vector<b2Vec2>& points,
                   const FixtureOptions& options);
 // Makes one fixture for each row (x1, y1, x2, y2) that is not too short to have a direction, and
-// returns how many. May run in any thread that nobody else disturbs: it holds the world.
+// returns how many. The caller holds the world exclusively.
 std::size_t create_edges(World& world, Id body, const float* edges, std::size_t count,
                          const FixtureOptions& options);
 

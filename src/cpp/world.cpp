@@ -68,7 +68,6 @@ void World::step(double dt, int velocity_iterations, int position_iterations, Pr
                                   std::to_string(iterations));
     }
   }
-  const ExclusiveUse use(*this, "is stepping");
   contacts_.hook = hook;
   engine_->Step(static_cast<float>(dt), velocity_iterations, position_iterations);
   contacts_.hook = nullptr;
@@ -117,14 +116,20 @@ void World::check_readable() const {
 }
 
 void World::check_changeable() const {
-  if (users_.load() != 0) throw_locked();
+  wait_for_readers();
+  if (users_.load() == kExclusive) throw_locked();
   if (closed()) throw StaleHandleError("the world is closed");
+}
+
+void World::wait_for_readers() const {
+  // A scan takes microseconds: less than it takes to sleep and to be woken.
+  while (users_.load() > 0) std::this_thread::yield();
 }
 
 void World::throw_locked() const {
   const char* activity = activity_.load();
   throw WorldLockedError(std::string("the world ") +
-                         (activity == nullptr ? "is casting rays" : activity) +
+                         (activity == nullptr ? "is in use" : activity) +
                          ": nothing may be created, destroyed or changed now");
 }
 
@@ -201,36 +206,43 @@ void World::fixture_changed(const b2Fixture* fixture) {
   wake_neighbours(body);
 }
 
-World::ExclusiveUse::ExclusiveUse(World& world, const char* activity) : world_(world) {
-  int nobody = 0;
-  if (!world_.users_.compare_exchange_strong(nobody, kExclusive)) world_.throw_locked();
-  world_.activity_ = activity;
-  world_.owner_ = std::this_thread::get_id();
-  if (world_.closed()) {
-    world_.activity_ = nullptr;
-    world_.owner_ = std::thread::id();
-    world_.users_ = 0;
+World::ExclusiveUse::ExclusiveUse(World& world, const char* activity) : world_(&world) {
+  int users = 0;
+  while (!world.users_.compare_exchange_weak(users, kExclusive)) {
+    if (users == kExclusive) world.throw_locked();
+    world.wait_for_readers();
+    users = 0;
+  }
+  world.activity_ = activity;
+  world.owner_ = std::this_thread::get_id();
+  if (world.closed()) {
+    end();
     throw StaleHandleError("the world is closed");
   }
 }
 
-World::ExclusiveUse::~ExclusiveUse() {
-  world_.activity_ = nullptr;
-  world_.owner_ = std::thread::id();
-  world_.users_ = 0;
+void World::ExclusiveUse::end() {
+  if (world_ == nullptr) return;
+  world_->activity_ = nullptr;
+  world_->owner_ = std::thread::id();
+  world_->users_ = 0;
+  world_ = nullptr;
 }
 
-World::SharedUse::SharedUse(World& world) : world_(world) {
-  int users = world_.users_.load();
+World::SharedUse::SharedUse(World& world) : world_(&world) {
+  int users = world.users_.load();
   do {
-    if (users == kExclusive) world_.throw_locked();
-  } while (!world_.users_.compare_exchange_weak(users, users + 1));
-  if (world_.closed()) {
-    --world_.users_;
+    if (users == kExclusive) world.throw_locked();
+  } while (!world.users_.compare_exchange_weak(users, users + 1));
+  if (world.closed()) {
+    end();
     throw StaleHandleError("the world is closed");
   }
 }
 
-World::SharedUse::~SharedUse() { --world_.users_; }
+void World::SharedUse::end() {
+  if (world_ != nullptr) --world_->users_;
+  world_ = nullptr;
+}
 
 }  // namespace flatland

@@ -40,7 +40,7 @@ class World final : private b2DestructionListener {
   void close();
   bool closed() const { return engine_ == nullptr; }
 
-  // Advances by dt > 0 seconds. The hook may be null.
+  // Advances by dt > 0 seconds. The hook may be null. The caller holds the world exclusively.
   void step(double dt, int velocity_iterations, int position_iterations, PreSolveHook* hook);
 
   // Objects by id. Each throws StaleHandleError when the object or the world is gone, and
@@ -79,34 +79,42 @@ class World final : private b2DestructionListener {
   const ContactRecorder& contacts() const { return contacts_; }
   RayScene& rays() { return rays_; }
 
-  // Holds the world for one thread that changes it; made only where it can be changed.
+  static constexpr const char* kStepping = "is stepping";
+
+  // Holds the world for one thread that changes it for longer, without the GIL; made only where it
+  // can be changed. Both kinds of use begin with the GIL, since short changes do not hold the world
+  // and are kept apart by the GIL alone.
   class ExclusiveUse {
    public:
     ExclusiveUse(World& world, const char* activity);
-    ~ExclusiveUse();
+    ~ExclusiveUse() { end(); }
+    void end();
     ExclusiveUse(const ExclusiveUse&) = delete;
     ExclusiveUse& operator=(const ExclusiveUse&) = delete;
 
    private:
-    World& world_;
+    World* world_;
   };
 
-  // Holds the world as it is, for threads that only read.
+  // Holds the world as it is, for threads that only read. Who wants to change it waits for them,
+  // with the GIL: a use must end before it is asked for again.
   class SharedUse {
    public:
     explicit SharedUse(World& world);
-    ~SharedUse();
+    ~SharedUse() { end(); }
+    void end();
     SharedUse(const SharedUse&) = delete;
     SharedUse& operator=(const SharedUse&) = delete;
 
    private:
-    World& world_;
+    World* world_;
   };
 
  private:
   void SayGoodbye(b2Joint* joint) override;
   void SayGoodbye(b2Fixture* fixture) override;
   [[noreturn]] void throw_locked() const;
+  void wait_for_readers() const;
 
   static constexpr int kExclusive = -1;
 

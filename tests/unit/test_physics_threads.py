@@ -148,6 +148,43 @@ def test_a_stepping_world_is_locked_for_other_threads(
     slow.go_on.set()
 
 
+def test_changes_wait_for_the_rays_of_other_threads() -> None:
+    world = PhysicsWorld()
+    disc = world.create_body("dynamic", (0, 0, 0))
+    disc.create_circle((0, 0), 0.5, density=1)
+    angles = np.linspace(0, 6, 50_000)
+    ends = 10 * np.stack([np.cos(angles), np.sin(angles)], 1)
+    scans = 0
+    stop = threading.Event()
+
+    def scan() -> None:
+        nonlocal scans
+        while not stop.wait(1e-4):
+            try:
+                world.cast_rays((3, 0, 0), ends, 1)
+                scans += 1
+            except WorldLockedError:
+                continue  # The world was stepping.
+
+    threads = [threading.Thread(target=scan) for _ in range(2)]
+    for thread in threads:
+        thread.start()
+    try:
+        changes = 0
+        while scans < 200:
+            disc.set_velocity(1, 0, 0)
+            world.step(0.001, 8, 3)
+            disc.create_circle((0, 0), 0.1, density=1)
+            world.create_body("static", (0, 0, 0)).destroy()
+            changes += 1
+    finally:
+        stop.set()
+        for thread in threads:
+            thread.join()
+    assert len(disc.fixtures) == changes + 1
+    world.close()
+
+
 def test_other_worlds_go_on_while_one_steps(slow: SlowStep) -> None:
     assert len(history(3, steps=5)) > 0
 
