@@ -13,6 +13,7 @@ from typing import Final
 _LOG = logging.getLogger("flatland")
 NODE_NAME: Final = "flatland_viz"
 SERVER_NAME: Final = "flatland_server"
+_STOP_SIGNALS: Final = (signal.SIGINT, signal.SIGTERM)
 
 
 def main() -> int:
@@ -22,6 +23,9 @@ def main() -> int:
         The exit code: 0 after the window was closed or a stop was asked for, 1 when the viewer
         cannot start, for a reason that the log tells.
     """
+    # Told to stop while it starts, as when the simulator fails, it says nothing.
+    for number in _STOP_SIGNALS:
+        signal.signal(number, lambda *_: sys.exit(0))
     import rosgraph
     import rospy
 
@@ -81,22 +85,30 @@ def _why_no_display() -> str:
 
 def _run() -> int:
     import rospy
+    from PyQt5.QtCore import QTimer
     from PyQt5.QtWidgets import QApplication
 
     from flatland.viewer.ros_link import RosLink
     from flatland.viewer.server import Server
     from flatland.viewer.window import ViewerWindow
 
+    # RViz must not be left half made, and it brings signal handlers of its own.
+    signal.pthread_sigmask(signal.SIG_BLOCK, _STOP_SIGNALS)
     app = QApplication(["flatland"])
     link = RosLink(Server(rospy.resolve_name(SERVER_NAME)))
     window = ViewerWindow(link)
-    # After RViz, which brings signal handlers of its own. The status line's clock wakes Python
-    # often enough for them to run.
-    for number in (signal.SIGINT, signal.SIGTERM):
+    # The status line's clock wakes Python often enough for handlers to run.
+    for number in _STOP_SIGNALS:
         signal.signal(number, lambda *_: app.quit())
     rospy.on_shutdown(app.quit)
     window.show()
     link.start()
+    # Once the application runs: it does not hear of a stop before.
+    QTimer.singleShot(0, _take_signals)
     app.exec_()
     link.close()
     return 0
+
+
+def _take_signals() -> None:
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, _STOP_SIGNALS)

@@ -96,6 +96,24 @@ def test_the_viewer_ends_when_asked_to(
     assert room_of_its_own.running
 
 
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_the_viewer_ends_when_asked_to_while_it_starts(
+    on_screen: Any, number: signal.Signals
+) -> None:
+    viewer = on_screen.program("rosrun", "flatland", "flatland_viz", XDG_RUNTIME_DIR="")
+    viewer.wait_for_line("XDG_RUNTIME_DIR not set")  # Qt says so just before RViz is made.
+    viewer.send(number)
+    assert viewer.wait() == 0
+    assert "Traceback" not in viewer.output
+
+
+def test_a_simulator_that_fails_has_the_last_word(on_screen: Any) -> None:
+    launch = on_screen.launch("flatland", "server.launch", "world_path:=/no/such/world.yaml")
+    launch.wait_for_line("FATAL.*no/such/world.yaml")
+    launch.wait()
+    assert "Traceback" not in launch.output
+
+
 @pytest.fixture
 def room_of_its_own(on_screen: Any, room: Path) -> Any:
     return on_screen.server(room, show_viz=True)
