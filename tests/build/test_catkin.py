@@ -86,6 +86,41 @@ def test_roslaunch_reads_the_launch_files(space, launch_file):
     assert nodes.strip()
 
 
+def test_each_script_is_a_program(space, checkout):
+    programs = space.folder / "lib" / "flatland"
+    scripts = {path.name for path in (checkout / "scripts").iterdir() if path.is_file()}
+    assert scripts <= {path.name for path in programs.iterdir() if os.access(path, os.X_OK)}
+    assert "MAP_YAML" in space.run(programs / "map_to_lines.py", "--help")
+    # Port 1 is nobody's.
+    viewer = subprocess.run(
+        [programs / "flatland_viz"],
+        env={**space.environment, "ROS_MASTER_URI": "http://127.0.0.1:1"},
+        cwd=space.scratch,
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+        timeout=60,
+    )
+    assert viewer.returncode == 1
+    assert viewer.stdout.startswith("flatland_viz: no ROS master at http://127.0.0.1:1")
+
+
+def test_rosrun_finds_the_programs(make_space):
+    """Of the devel space, too, but for a checkout with `.venv`: there rosrun asks which one."""
+    assert "MAP_YAML" in make_space("install").run(
+        "rosrun", "flatland", "map_to_lines.py", "--help"
+    )
+
+
+def test_bundled_worlds_and_the_command(space):
+    share = Path(space.run("rospack", "find", "flatland").strip())
+    for world in sorted((share / "worlds").glob("*/world.yaml")):
+        told = space.run("/usr/bin/python3", "-m", "flatland", "check", world)
+        assert "no errors" in told
+    assert (share / "rviz" / "flatland.rviz").is_file()
+
+
 def test_the_node_runs(space, world_file):
     """The server comes up from the space, ticks, and ends with roslaunch."""
     with socket.socket() as free:
