@@ -23,10 +23,10 @@ def missing_programs() -> list[str]:
 class VirtualScreen:
     """An X server of its own, with a number that was free."""
 
-    def __init__(self, width: int = 1280, height: int = 800) -> None:
-        """Starts the server; `close` ends it."""
+    def __init__(self, width: int = 1280, height: int = 800, *more: str) -> None:
+        """Starts the server, with more options for it; `close` ends it."""
         reading, writing = os.pipe()
-        options = ["-screen", "0", f"{width}x{height}x24", "-nolisten", "tcp", "-noreset"]
+        options = ["-screen", "0", f"{width}x{height}x24", "-nolisten", "tcp", "-noreset", *more]
         self._server = subprocess.Popen(  # noqa: S603 - our own words
             [PROGRAMS[0], "-displayfd", str(writing), *options],
             pass_fds=[writing],

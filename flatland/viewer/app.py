@@ -64,7 +64,7 @@ def _why_not() -> str:
 
 
 def _why_no_display() -> str:
-    """Tries the X server: Qt would abort the process without one."""
+    """Tries the X server: Qt and RViz would abort the process without one, and without OpenGL."""
     if os.environ["QT_QPA_PLATFORM"] != "xcb":
         return ""
     name = os.environ.get("DISPLAY", "")
@@ -79,8 +79,10 @@ def _why_no_display() -> str:
     display = x11.XOpenDisplay(None)
     if not display:
         return f"the display {name} cannot be opened"
+    numbers = (ctypes.byref(ctypes.c_int()) for _ in range(3))
+    draws = x11.XQueryExtension(ctypes.c_void_p(display), b"GLX", *numbers)
     x11.XCloseDisplay(display)
-    return ""
+    return "" if draws else f"the display {name} has no OpenGL (its extension GLX)"
 
 
 def _run() -> int:

@@ -140,6 +140,12 @@ def test_reasons_not_to_start(
     assert "the display :4711 cannot be opened" in complaint(DISPLAY=":4711")
     nobody = complaint(ROS_MASTER_URI="http://127.0.0.1:1", DISPLAY=screen.display)
     assert "no ROS master at http://127.0.0.1:1" in nobody
+    blind = type(screen)(640, 480, "-extension", "GLX")
+    try:
+        reason = f"the display {blind.display} has no OpenGL"
+        assert reason in complaint(DISPLAY=blind.display)
+    finally:
+        blind.close()
     # A package without the bindings, in front of the real one.
     (tmp_path / "rviz").mkdir()
     (tmp_path / "rviz" / "__init__.py").touch()
