@@ -486,3 +486,21 @@ def test_at_most_30_updates_a_second_however_fast_the_world_runs(
             times.append(time.monotonic())
     rate = len(times) / (times[-1] - start)
     assert 5 < rate < 31
+
+
+def test_no_updates_are_made_when_nobody_listens(
+    ros: Any, launcher: Any, write_world: Callable[..., Path]
+) -> None:
+    models = "[{name: shuttle, model: shuttle.model.yaml}, {name: rob, model: driver.model.yaml}]"
+    launcher.server(write_world(models, shuttle=SHUTTLE, driver=DRIVER), "__ns:=/alone")
+
+    def next_number() -> int:
+        update = ros.topic(f"/alone{SERVER}/update", InteractiveMarkerUpdate)
+        number = update.until(lambda message: message.poses).seq_num
+        update.close()
+        return int(number)
+
+    before = next_number()
+    ros.topic("/alone/odometry/ground_truth", Odometry).take(100)  # 2 s
+    # 60 with somebody there; some may be made while one comes or goes.
+    assert next_number() - before < 20
