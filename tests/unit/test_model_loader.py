@@ -157,6 +157,28 @@ ERRORS = {
         joint("type: weld, bodies: [{name: base}, {name: wheel, anchor: [0, 0]}]"),
         'Entry "anchor" does not exist (in model "robot" joint "j" "bodies" index=0)',
     ),
+    "infinite anchor": (
+        joint(f"type: weld, {ENDS.replace('[0, 0]', '[.inf, 0]', 1)}"),
+        'Invalid "anchor" in model "robot" joint "J" "bodies" index=0, must be finite, got inf, 0',
+    ),
+    "joint color size": (
+        joint(f"type: weld, {ENDS}, color: [1, 1, 1]"),
+        'Entry "color" must have size of exactly 4 (in model "robot" joint "j")',
+    ),
+    "angle nan": (
+        joint(f"type: weld, {ENDS}, angle: .nan"),
+        'Invalid "angle" in model "robot" joint "J", must be finite, got nan',
+    ),
+    "limit nan": (
+        joint(f"type: revolute, {ENDS}, limits: [.nan, 1]"),
+        'Invalid "limits" in model "robot" joint "J", must be finite, got nan, 1.0',
+    ),
+    "negative joint damping": (joint(f"type: weld, {ENDS}, damping: -1"), 'Invalid "damping"'),
+    "negative restitution": (
+        body(footprint="type: circle, radius: 1, density: 1, restitution: -0.1"),
+        'Invalid "restitution"',
+    ),
+    "body color nan": (body(", color: [1, 1, 1, .nan]"), 'Invalid "color" in model "robot" body'),
     "joint twice": (
         f"bodies: {TWO_BODIES}\n"
         f"joints: [{{name: J, type: weld, {ENDS}}}, {{name: J, type: weld, {ENDS}}}]",
@@ -283,9 +305,10 @@ joints:
      bodies: [{{name: wheel, anchor: [0.1, 0.2]}}, {{name: base, anchor: [0.3, 0.4]}}]}}
   - {{name: free, type: revolute, {ENDS}}}
   - {{name: fixed, type: weld, angle: 0.3, frequency: 5, damping: 0.7, {ENDS}}}
+  - {{name: rigid, type: weld, {ENDS}}}
 """
     )
-    turn, free, fixed = world.model("robot").joints
+    turn, free, fixed, rigid = world.model("robot").joints
     assert (turn.name, turn.type, turn.color) == ("turn", "revolute", (1, 0, 0, 1))
     assert [end.name for end in turn.bodies] == ["wheel", "base"]
     assert turn.anchors.ravel() == pytest.approx([0.1, 0.2, 0.3, 0.4])
@@ -298,6 +321,8 @@ joints:
     assert fixed.reference_angle == pytest.approx(0.3)
     assert fixed.frequency == pytest.approx(5)
     assert fixed.damping == pytest.approx(0.7)
+    assert (rigid.reference_angle, rigid.frequency, rigid.damping) == (0, 0, 0)
+    assert (rigid.collide_connected, rigid.color) == (False, (1, 1, 1, 0.5))
 
 
 def test_disabled_entries_are_skipped_and_logged(files, caplog):

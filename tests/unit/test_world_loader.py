@@ -185,12 +185,14 @@ def test_world_plugin_errors_name_the_plugin(files):
     )
 
 
-def test_world_plugin_same_name_other_type_is_allowed(files):
+def test_world_plugin_same_name_other_type_is_allowed(files, caplog):
+    caplog.set_level(logging.INFO, "flatland")
     world = files.load(
         "{properties: {}, layers: [], plugins: [{name: W, type: DummyWorldPlugin}, "
         "{name: V, type: DummyWorldPlugin}, {name: X, type: Nothing, enabled: false}]}"
     )
     assert [plugin.name for plugin in world.plugins] == ["W", "V"]
+    assert 'world plugin "X" is disabled' in caplog.text
 
 
 def test_defaults(empty_world):
