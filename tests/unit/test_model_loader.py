@@ -55,16 +55,24 @@ ERRORS = {
         body(", pose: [1, 2]"),
         'Entry "pose" must have size of exactly 3 (in model "robot" body "base")',
     ),
-    "body pose nan": (body(", pose: [1, 2, .nan]"), "must be finite"),
+    "body pose nan": (
+        body(", pose: [1, 2, .nan]"),
+        'Invalid "pose" in model "robot" body "base", must be finite, got 1.0, 2.0, nan',
+    ),
     "body color size": (
         body(", color: [1, 2, 3]"),
         'Entry "color" must have size of exactly 4 (in model "robot" body "base")',
     ),
     "negative damping": (
         body(", linear_damping: -1"),
-        'Invalid "linear_damping" in model "robot" body "base", must be finite and not negative',
+        'Invalid "linear_damping" in model "robot" body "base", must be finite and not '
+        "negative, got -1.0",
     ),
-    "nan damping": (body(", angular_damping: .nan"), 'Invalid "angular_damping"'),
+    "nan damping": (
+        body(", angular_damping: .nan"),
+        'Invalid "angular_damping" in model "robot" body "base", must be finite and not '
+        "negative, got nan",
+    ),
     "unknown body key": (
         body(", colour: [1, 1, 1, 1]"),
         'Entry body "base" contains unrecognized entry(s) {"colour"} (in model "robot")',
@@ -79,7 +87,7 @@ ERRORS = {
     ),
     "negative density": (
         body(footprint="type: circle, radius: 1, density: -1"),
-        'Invalid "density"',
+        f'Invalid "density" in {FOOTPRINT}, must be finite and not negative, got -1.0',
     ),
     "density no number": (
         body(footprint="type: circle, radius: 1, density: heavy"),
@@ -87,11 +95,11 @@ ERRORS = {
     ),
     "negative friction": (
         body(footprint="type: circle, radius: 1, density: 1, friction: -0.1"),
-        'Invalid "friction"',
+        f'Invalid "friction" in {FOOTPRINT}, must be finite and not negative, got -0.1',
     ),
     "negative radius": (
         body(footprint="type: circle, radius: -1, density: 1"),
-        'Invalid "radius"',
+        f'Invalid "radius" in {FOOTPRINT}, must be finite and not negative, got -1.0',
     ),
     "circle without radius": (
         body(footprint="type: circle, density: 1"),
@@ -99,7 +107,7 @@ ERRORS = {
     ),
     "infinite center": (
         body(footprint="type: circle, density: 1, radius: 1, center: [.inf, 0]"),
-        'Invalid "center"',
+        f'Invalid "center" in {FOOTPRINT}, must be finite, got inf, 0.0',
     ),
     "unknown footprint layer": (
         body(footprint="type: circle, radius: 1, density: 1, layers: [2d, a, b]"),
@@ -119,23 +127,25 @@ ERRORS = {
     ),
     "point of three": (
         body(footprint="type: polygon, density: 1, points: [[0, 0], [1, 0], [1, 1, 1]]"),
-        "Error converting entry",
+        f'Error converting entry index=2 to vector (in {FOOTPRINT} "points")',
     ),
     "polygon without area": (
         body(footprint="type: polygon, density: 1, points: [[0, 0], [1, 0], [2, 0]]"),
-        f"Invalid entry in {FOOTPRINT}, ",
+        f"Invalid entry in {FOOTPRINT}, a polygon must have an area, but its points lie on a line",
     ),
     "polygon of one point": (
         body(footprint="type: polygon, density: 1, points: [[1, 1], [1, 1], [1, 1]]"),
-        f"Invalid entry in {FOOTPRINT}, ",
+        f"Invalid entry in {FOOTPRINT}, a polygon must have at least 3 points that are "
+        "2.5 mm or more from each other, got 1",
     ),
     "polygon with nan": (
         body(footprint="type: polygon, density: 1, points: [[0, 0], [1, .nan], [2, 0]]"),
-        'Invalid "points"',
+        f'Invalid "points" in {FOOTPRINT}, must be finite, got 1.0, nan',
     ),
     "unknown footprint key": (
         body(footprint="type: circle, radius: 1, density: 1, points: []"),
-        'contains unrecognized entry(s) {"points"}',
+        'Entry index=0 contains unrecognized entry(s) {"points"} (in model "robot" body '
+        '"base" "footprints")',
     ),
     "joint type": (
         joint(f"type: rope, {ENDS}"),
@@ -151,7 +161,7 @@ ERRORS = {
     ),
     "joint to itself": (
         joint("type: weld, bodies: [{name: base, anchor: [0, 0]}, {name: base, anchor: [0, 0]}]"),
-        'Invalid entry in model "robot" joint "J", ',
+        'Invalid entry in model "robot" joint "J", a joint must connect two different bodies',
     ),
     "joint without anchor": (
         joint("type: weld, bodies: [{name: base}, {name: wheel, anchor: [0, 0]}]"),
@@ -159,7 +169,8 @@ ERRORS = {
     ),
     "infinite anchor": (
         joint(f"type: weld, {ENDS.replace('[0, 0]', '[.inf, 0]', 1)}"),
-        'Invalid "anchor" in model "robot" joint "J" "bodies" index=0, must be finite, got inf, 0',
+        'Invalid "anchor" in model "robot" joint "J" "bodies" index=0, must be finite, '
+        "got inf, 0.0",
     ),
     "joint color size": (
         joint(f"type: weld, {ENDS}, color: [1, 1, 1]"),
@@ -173,12 +184,18 @@ ERRORS = {
         joint(f"type: revolute, {ENDS}, limits: [.nan, 1]"),
         'Invalid "limits" in model "robot" joint "J", must be finite, got nan, 1.0',
     ),
-    "negative joint damping": (joint(f"type: weld, {ENDS}, damping: -1"), 'Invalid "damping"'),
+    "negative joint damping": (
+        joint(f"type: weld, {ENDS}, damping: -1"),
+        'Invalid "damping" in model "robot" joint "J", must be finite and not negative, got -1.0',
+    ),
     "negative restitution": (
         body(footprint="type: circle, radius: 1, density: 1, restitution: -0.1"),
-        'Invalid "restitution"',
+        f'Invalid "restitution" in {FOOTPRINT}, must be finite and not negative, got -0.1',
     ),
-    "body color nan": (body(", color: [1, 1, 1, .nan]"), 'Invalid "color" in model "robot" body'),
+    "body color nan": (
+        body(", color: [1, 1, 1, .nan]"),
+        'Invalid "color" in model "robot" body "base", must be finite, got 1.0, 1.0, 1.0, nan',
+    ),
     "joint twice": (
         f"bodies: {TWO_BODIES}\n"
         f"joints: [{{name: J, type: weld, {ENDS}}}, {{name: J, type: weld, {ENDS}}}]",
@@ -186,7 +203,8 @@ ERRORS = {
     ),
     "limits upside down": (
         joint(f"type: revolute, {ENDS}, limits: [1, -1]"),
-        'Invalid "limits" in model "robot" joint "J"',
+        'Invalid "limits" in model "robot" joint "J", the lower limit 1.0 must not be '
+        "above the upper limit -1.0",
     ),
     "limits of one": (
         joint(f"type: revolute, {ENDS}, limits: [1]"),
@@ -198,12 +216,15 @@ ERRORS = {
     ),
     "angle on a revolute": (
         joint(f"type: revolute, {ENDS}, angle: 1, frequency: 2"),
-        'contains unrecognized entry(s) {"angle", "frequency"}',
+        'Entry joint "j" contains unrecognized entry(s) {"angle", "frequency"} (in model "robot")',
     ),
-    "negative frequency": (joint(f"type: weld, {ENDS}, frequency: -1"), 'Invalid "frequency"'),
+    "negative frequency": (
+        joint(f"type: weld, {ENDS}, frequency: -1"),
+        'Invalid "frequency" in model "robot" joint "J", must be finite and not negative, got -1.0',
+    ),
     "unknown end key": (
         joint("type: weld, bodies: [{name: base, anchor: [0, 0], x: 1}, {name: wheel}]"),
-        'contains unrecognized entry(s) {"x"}',
+        'Entry index=0 contains unrecognized entry(s) {"x"} (in model "robot" joint "j" "bodies")',
     ),
     "joint to a disabled body": (
         f"bodies: [{BODY}, {{name: wheel, footprints: [], enabled: false}}]\n"
@@ -231,10 +252,9 @@ def test_error_text(files, case):
     model, text = ERRORS[case]
     with pytest.raises(YamlError) as caught:
         files.load_model(model)
-    assert str(caught.value).startswith("Flatland YAML: ")
-    assert text in str(caught.value)
     # The place follows the text, so that the user finds the line.
-    assert "robot.model.yaml:" in str(caught.value)
+    place = f" [{files.folder}/robot.model.yaml:"
+    assert str(caught.value).startswith(f"Flatland YAML: {text}{place}")
 
 
 def test_all_entries_of_a_body(files):

@@ -74,11 +74,11 @@ ERRORS = {
     ),
     "map not there": (
         "{properties: {}, layers: [{name: L, map: nowhere.yaml}]}",
-        'File does not exist, path="',
+        'File does not exist, path="FOLDER/nowhere.yaml"',
     ),
     "map is a folder": (
         "{properties: {}, layers: [{name: L, map: .}]}",
-        "it is not a regular file [",
+        'Failed to read file, path="FOLDER", it is not a regular file',
     ),
     "model without name": (
         "{properties: {}, layers: [], models: [{model: minimal.model.yaml}]}",
@@ -90,15 +90,15 @@ ERRORS = {
     ),
     "model file not there": (
         "{properties: {}, layers: [], models: [{name: M, model: nowhere.yaml}]}",
-        'File does not exist, path="',
+        'File does not exist, path="FOLDER/nowhere.yaml"',
     ),
     "model file of nobody": (
         "{properties: {}, layers: [], models: [{name: M, model: ~no-such-user/m.yaml}]}",
-        "/~no-such-user/m.yaml",
+        'File does not exist, path="FOLDER/~no-such-user/m.yaml"',
     ),
     "model file is a folder": (
         '{properties: {}, layers: [], models: [{name: M, model: ""}]}',
-        "it is not a regular file [",
+        'Failed to read file, path="FOLDER", it is not a regular file',
     ),
     "model twice": (
         "{properties: {}, layers: [], models: [{name: M, model: minimal.model.yaml}, "
@@ -112,12 +112,13 @@ ERRORS = {
     "model pose nan": (
         "{properties: {}, layers: [], "
         "models: [{name: M, model: minimal.model.yaml, pose: [.nan, 0, 0]}]}",
-        "pose must be finite",
+        'failed to spawn model "M", pose must be finite, got (nan, 0.0, 0.0)',
     ),
     "model namespace": (
         "{properties: {}, layers: [], "
         "models: [{name: M, model: minimal.model.yaml, namespace: my robot}]}",
-        'namespace "my robot" is not a legal ROS name',
+        'failed to spawn model "M", namespace "my robot" is not a legal ROS name: it '
+        'must start with a letter and hold only letters, digits, "_" and "/"',
     ),
     "unknown model key": (
         "{properties: {}, layers: [], models: [{name: M, model: minimal.model.yaml, x: 1}]}",
@@ -136,10 +137,10 @@ def test_error_text(files, case):
     world, text = ERRORS[case]
     with pytest.raises(YamlError) as caught:
         files.load(world)
-    assert str(caught.value).startswith("Flatland YAML: ")
-    assert text in str(caught.value)
     # The place follows the text, also where the fault is that a file it names is not there.
-    assert "world.yaml:" in str(caught.value)
+    place = f" [{files.folder}/world.yaml:"
+    text = text.replace("FOLDER", str(files.folder))
+    assert str(caught.value).startswith(f"Flatland YAML: {text}{place}")
 
 
 def test_missing_world_file(tmp_path):
@@ -218,7 +219,7 @@ def test_layers(files):
         layers:
           - {name: 2d, map: map.yaml, color: [1, 0, 0, 0.5],
              properties: {debug: {min_z: 0.5, max_z: 2}}}
-          - name: [a, b]
+          - {name: [a, b], properties: {floor: 2}}
           - {name: [1, 2]}
         models: []
         """
@@ -238,6 +239,7 @@ def test_layers(files):
     )
     assert set(map(tuple, ordered.tolist())) == expected
     assert aliases.names == ["a", "b"]
+    assert (aliases.properties, numbers.properties) == ({"floor": "2"}, {})
     assert aliases.edges.shape == (0, 4)
     assert aliases.color == (1, 1, 1, 1)
     assert numbers.names == ["1", "2"]
