@@ -98,6 +98,13 @@ def test_spawn_takes_an_absolute_path(ros: Any, world: Path) -> None:
         ("unplugged.model.yaml", "m", "", (0, 0, 0), "Flatland plugin: "),
         ("spaced.model.yaml", "m", "", (0, 0, 0), '"my topic" is not a legal topic name'),
         ("missing/ünïcode.yaml", "ñ", "", (0, 0, 0), "ünïcode"),
+        ("ball.model.yaml", "m", "", (1e300, 0, 0), "must be finite and within"),
+        ("ball.model.yaml", "m", "", (0, 0, -1e300), "must be finite and within"),
+        ("~no-such-user/m.yaml", "m", "", (0, 0, 0), "~no-such-user/m.yaml"),
+        ("/dev/zero", "m", "", (0, 0, 0), "it is not a regular file"),
+        ("x" * 100_000, "m", "", (0, 0, 0), "File name too long"),
+        ("a\0b", "m", "", (0, 0, 0), "Flatland YAML: File does not exist"),
+        ("ball.model.yaml", "m", "a" + "/" * 9, (0, 0, 0), "not a legal ROS name"),
     ],
 )
 def test_refused_spawn_says_why_and_leaves_nothing(
@@ -125,11 +132,21 @@ def test_delete_and_move_of_an_unknown_model(ros: Any) -> None:
     )
 
 
-def test_move_to_a_pose_that_is_none(ros: Any) -> None:
+@pytest.mark.parametrize("name", ["a b", "ä☃", "new\nline", "/", "~", "$(x)", "a\0b", "n" * 9999])
+def test_a_name_may_be_any_text(ros: Any, name: str) -> None:
+    assert ros.spawn("ball.model.yaml", name).success
+    assert "already exists" in ros.spawn("ball.model.yaml", name).message
+    assert ros.move(name, (1, 1, 0)).success
+    assert ros.delete(name).success
+    assert not ros.delete(name).success
+
+
+@pytest.mark.parametrize("y", [NAN, -INF, 1e300])
+def test_move_to_a_pose_that_is_none(ros: Any, y: float) -> None:
     odometry = truth(ros, "first")
-    answer = ros.move("first", (0, NAN, 0))
+    answer = ros.move("first", (0, y, 0))
     assert answer.success is False
-    assert "pose must be finite" in answer.message
+    assert answer.message.startswith('Flatland World: failed to move model "first", pose must be')
     odometry.drop()
     assert odometry.next().pose.pose.position.x == pytest.approx(3, abs=1e-5)
 
