@@ -20,6 +20,7 @@ _LOG = logging.getLogger("flatland")
 
 NODE_NAME: Final = "flatland_server"
 _MASTER_PERIOD: Final = 0.2  # s between two attempts to reach the ROS master
+_MASTER_PATIENCE: Final = 1.0  # s without one until the node says that it waits
 _UNREGISTERING: Final = 0.5  # s that saying good-bye to the ROS master may take
 
 
@@ -48,8 +49,12 @@ class ServerNode:
         StopSignals(self._stop, lambda: _leave_ros("signal"))
         import rospy
 
-        if not self._wait_for_master():
-            return 0
+        try:
+            if not self._wait_for_master():
+                return 0
+        except ValueError as error:
+            _LOG.critical("%s (from ROS_MASTER_URI)", error)
+            return 1
         try:
             # Without rostime: rospy would subscribe to our own clock. The bridge sets its time.
             rospy.init_node(NODE_NAME, disable_signals=True, disable_rostime=True)
@@ -76,17 +81,27 @@ class ServerNode:
         return code
 
     def _wait_for_master(self) -> bool:
-        """Waits until a ROS master answers; returns False when the node is stopped first."""
+        """Waits until a ROS master answers; returns False when the node is stopped first.
+
+        Raises:
+            ValueError: The address of the master is none.
+        """
         import rosgraph
 
-        waiting = False
-        while not rosgraph.is_master_online():
-            if not waiting:
-                # To standard error: rospy's logs begin with a master.
-                _LOG.warning("waiting for the ROS master at %s", rosgraph.get_master_uri())
-                waiting = True
-            if self._stopping.wait(_MASTER_PERIOD):
-                return False
+        # To standard error: rospy's logs begin with a master. By the clock, since a program that
+        # is no master may take our question and never answer.
+        uri = rosgraph.get_master_uri()
+        notice = threading.Timer(
+            _MASTER_PATIENCE, lambda: _LOG.warning("waiting for the ROS master at %s", uri)
+        )
+        notice.daemon = True
+        notice.start()
+        try:
+            while not rosgraph.is_master_online():
+                if self._stopping.wait(_MASTER_PERIOD):
+                    return False
+        finally:
+            notice.cancel()
         return True
 
     def _stop(self) -> None:

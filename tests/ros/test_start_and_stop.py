@@ -204,6 +204,24 @@ def test_node_waits_for_a_master_and_can_be_stopped_meanwhile(launcher: Any, wor
     assert time.monotonic() - start < STOP_TIME
 
 
+def test_node_says_that_it_waits_for_who_never_answers(launcher: Any, world: Path) -> None:
+    """Something else has the master's port, takes what it is sent, and keeps silent."""
+    with socket.create_server(("127.0.0.1", 0)) as silent:
+        uri = f"http://127.0.0.1:{silent.getsockname()[1]}"
+        launcher.environment = {**launcher.environment, "ROS_MASTER_URI": uri}
+        process = launcher.start(world_path=world)
+        process.wait_for_line(f"waiting for the ROS master at {uri}")
+        assert_stops(process, signal.SIGINT)
+
+
+@pytest.mark.parametrize("uri", ["nonsense", "http://", ""])
+def test_node_names_an_address_that_is_none(launcher: Any, world: Path, uri: str) -> None:
+    launcher.environment = {**launcher.environment, "ROS_MASTER_URI": uri}
+    process = launcher.start(world_path=world)
+    assert process.wait() == 1
+    assert process.output.strip() == f"invalid master URI: {uri} (from ROS_MASTER_URI)"
+
+
 def test_node_outlives_its_master(launcher: Any, world: Path, eventually: Any) -> None:
     port = free_port()
     uri = f"http://127.0.0.1:{port}"
