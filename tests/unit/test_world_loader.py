@@ -167,7 +167,7 @@ def test_world_file_of_nobody():
 )
 def test_map_beyond_what_the_physics_holds(files, keys, text):
     files.write_map("map", ["   ", " # ", "   "], **keys)
-    with pytest.raises(YamlError, match=rf'Invalid map in layer "L", {text} .* \[.*map\.yaml\]$'):
+    with pytest.raises(YamlError, match=rf'Invalid map in layer "L", {text} .* \[/.*map\.yaml\]$'):
         files.load("{properties: {}, layers: [{name: L, map: map.yaml}]}")
 
 
