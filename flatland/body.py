@@ -97,7 +97,7 @@ class Body:
 
     @property
     def mass(self) -> float:
-        """Mass [kg], 0 for a body that is not dynamic."""
+        """Mass [kg]; 1 for a dynamic body whose footprints have none, 0 if it is not dynamic."""
         return self.physics.mass
 
     @property

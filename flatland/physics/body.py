@@ -113,7 +113,7 @@ class PhysicsBody(Handle):
 
     @property
     def mass(self) -> float:
-        """Mass [kg]; 0 for bodies that are not dynamic."""
+        """Mass [kg]; 1 for a dynamic body whose fixtures have none, 0 if it is not dynamic."""
         return self._core.mass(self.id)
 
     @property

@@ -28,6 +28,17 @@ void fill_contact_table() {
   });
 }
 
+// A dynamic body without mass weighs 1 kg and cannot be turned by forces, as it was in Box2D up to
+// 2.3. Box2D 2.4 makes nothing move it: a robot with such a body welded to it would stand still.
+void give_mass(b2Body* body) {
+  if (body->GetType() != b2_dynamicBody || body->GetMass() > 0.0F) return;
+  b2MassData data;
+  data.mass = 1.0F;
+  data.center.SetZero();
+  data.I = 0.0F;
+  body->SetMassData(&data);
+}
+
 class WakeDynamicBodies final : public b2QueryCallback {
  public:
   bool ReportFixture(b2Fixture* fixture) override {
@@ -136,6 +147,7 @@ void World::throw_locked() const {
 Id World::add_body(const b2BodyDef& definition) {
   check_changeable();
   b2Body* body = engine_->CreateBody(&definition);
+  give_mass(body);
   const Id id = bodies_.insert(body);
   body->GetUserData().pointer = id;
   return id;
@@ -143,6 +155,7 @@ Id World::add_body(const b2BodyDef& definition) {
 
 Id World::add_fixture(b2Body* body, const b2FixtureDef& definition) {
   b2Fixture* fixture = body->CreateFixture(&definition);
+  give_mass(body);
   const Id id = fixtures_.insert(fixture);
   fixture->GetUserData().pointer = id;
   rays_.add(fixture);

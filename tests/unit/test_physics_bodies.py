@@ -57,6 +57,24 @@ def test_mass_and_centre(world: PhysicsWorld) -> None:
     assert body.world_center == pytest.approx((0.5, 1), abs=1e-6)
     assert body.inertia == pytest.approx(6 / 3 * (2**2 + 1**2), rel=1e-5)
     assert world.create_body("static", (0, 0, 0)).mass == 0
+    assert world.create_body("kinematic", (0, 0, 0)).mass == 0
+
+
+def test_a_dynamic_body_without_mass_weighs_one_kilogram(world: PhysicsWorld) -> None:
+    """Box2D's rule up to 2.3, by which the reference computes; 2.4 would let nothing move it."""
+    body = world.create_body("dynamic", (1, 0, math.pi / 2))
+    assert (body.mass, body.inertia, body.local_center) == (1, 0, (0, 0))
+    body.create_circle((0.5, 0.5), 0.3, density=0)
+    assert (body.mass, body.inertia, body.local_center) == (1, 0, (0, 0))
+    body.apply_force((3, 0), (1, 0.4))
+    body.apply_torque(2)
+    world.step(STEP, 10, 10)
+    assert body.velocity == pytest.approx((3 * STEP, 0, 0), rel=1e-5)
+    body.create_polygon([(0, 0), (2, 0), (2, 1), (0, 1)], density=3)
+    assert body.mass == pytest.approx(6)
+    assert body.local_center == pytest.approx((1, 0.5))
+    body.create_circle((0, 0), 0.3, density=0)
+    assert body.mass == pytest.approx(6)
 
 
 def test_walls_of_a_large_map_hold_what_came_before_and_after(world: PhysicsWorld) -> None:

@@ -96,6 +96,22 @@ def test_a_rigid_weld_moves_as_one(world: PhysicsWorld) -> None:
     assert np.hypot(*(np.array(a.pose) - b.pose)[:2]) == pytest.approx(1, abs=0.01)
 
 
+@pytest.mark.parametrize("frequency", [0, 10])
+def test_a_welded_body_without_mass_is_carried_along(
+    world: PhysicsWorld, frequency: float
+) -> None:
+    """Wheels and sensors of density 0 are welded to the reference's own robots."""
+    robot = box(world)
+    wheel = world.create_body("dynamic", (1, 0, 0))
+    wheel.create_circle((0, 0), 0.2, density=0)
+    world.create_weld_joint(robot, wheel, (1, 0), (0, 0), frequency=frequency, damping=0.5)
+    for _ in range(200):
+        robot.set_velocity(0.5, 0, 0)
+        world.step(0.01, 10, 10)
+    assert robot.pose == pytest.approx((1, 0, 0), abs=0.02)
+    assert wheel.pose == pytest.approx((2, 0, 0), abs=0.02)
+
+
 def test_a_weld_holds_its_reference_angle(world: PhysicsWorld) -> None:
     a = box(world, 0, "static")
     b = world.create_body("dynamic", (0, 5, 0.5))

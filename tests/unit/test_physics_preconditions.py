@@ -232,25 +232,27 @@ def test_the_inertia_must_not_vanish_beside_that_about_the_origin(world: Physics
         body.create_circle((10000, 0), 0.01, density=1)
     with refused("the mass of a body must be 0 or from 1e-20 to 1e15 kg"):
         body.create_circle((0, 0), 1e6, density=1e9)
-    assert body.mass == 0
+    assert body.mass == 1
     assert body.fixtures == []
     # A static body has no mass that could go wrong.
     world.create_body("static", (0, 0, 0)).create_circle((10000, 0), 0.01, density=1)
 
 
 def test_circles_without_radius_are_points(world: PhysicsWorld) -> None:
-    """Such a footprint is allowed: it has no mass, so nothing stops it, nor upsets the solver."""
+    """Such a footprint is allowed: it adds no mass, walls stop it, and the solver is not upset."""
     wall = world.create_body("static", (0, 0, 0))
     wall.create_edges([[1, -1, 1, 1]])
     wall.create_circle((1.5, 0), 0, density=1)
-    bodies = [world.create_body("dynamic", (0, 0, 0)) for _ in range(2)]
+    bodies = [world.create_body("dynamic", (x, 0, 0)) for x in (0, 0, 1.2)]
     for body in bodies:
         body.create_circle((0, 0), 0, density=1)
-        assert body.mass == 0
+        assert (body.mass, body.inertia) == (1, 0)
         body.set_velocity(1, 0, 0)
     for _ in range(300):
         world.step(0.01, 10, 10)
-    assert [body.pose for body in bodies] == [pytest.approx((3, 0, 0), abs=0.1)] * 2
+    assert [body.pose for body in bodies] == [pytest.approx((1, 0, 0), abs=0.1)] * 2 + [
+        pytest.approx((1.2 + 3, 0, 0), abs=0.1)
+    ]
 
 
 def test_forces_beyond_what_the_mass_can_take(world: PhysicsWorld) -> None:
