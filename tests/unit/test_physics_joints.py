@@ -97,9 +97,7 @@ def test_a_rigid_weld_moves_as_one(world: PhysicsWorld) -> None:
 
 
 @pytest.mark.parametrize("frequency", [0, 10])
-def test_a_welded_body_without_mass_is_carried_along(
-    world: PhysicsWorld, frequency: float
-) -> None:
+def test_a_welded_body_without_mass_is_carried_along(world: PhysicsWorld, frequency: float) -> None:
     """Wheels and sensors of density 0 are welded to the reference's own robots."""
     robot = box(world)
     wheel = world.create_body("dynamic", (1, 0, 0))
