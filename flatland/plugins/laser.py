@@ -129,8 +129,10 @@ class Laser(ModelPlugin):
     @staticmethod
     def _read_deviation(config: YamlReader) -> float:
         deviation = read_not_negative(config, "noise_std_dev", 0.0)
-        if math.isinf(deviation):
-            raise at_key(config, "noise_std_dev").error('Invalid "noise_std_dev", must be finite')
+        if deviation > MAX_RANGE:
+            raise at_key(config, "noise_std_dev").error(
+                f'Invalid "noise_std_dev", must be at most {MAX_RANGE:g} m, got {deviation}'
+            )
         return deviation
 
     def _read_no_hit(self, config: YamlReader) -> float:

@@ -21,6 +21,8 @@ if TYPE_CHECKING:
 
 Triple = tuple[float, float, float]
 
+MAX_COORDINATE = 1e8  # m, rad; added to a pose it stays within what the physics takes, 1e9
+
 
 def at_key(config: YamlReader, key: str) -> YamlReader:
     """Returns the place of a key for an error about it; the map's when the key is missing."""
@@ -105,11 +107,13 @@ def read_pose(config: YamlReader, key: str, default: Pose = IDENTITY) -> Pose:
     """Reads a pose (x, y, theta) of finite numbers.
 
     Raises:
-        YamlError: It is no pose, or a number is infinite or NaN.
+        YamlError: It is no pose, or a number is infinite, NaN or beyond `MAX_COORDINATE`.
     """
     pose: Pose = config.get(key, "pose", default)
-    if not all(map(math.isfinite, pose)):
-        raise at_key(config, key).error(f'Invalid "{key}", must be finite, got {list(pose)}')
+    if not all(abs(number) <= MAX_COORDINATE for number in pose):
+        raise at_key(config, key).error(
+            f'Invalid "{key}", must be finite and within +-{MAX_COORDINATE:g}, got {list(pose)}'
+        )
     return pose
 
 

@@ -78,7 +78,7 @@ class Tween(ModelPlugin):
 
     def before_physics_step(self, timekeeper: Timekeeper) -> None:
         """Moves the body on."""
-        self._advance(timekeeper.step_size / self._duration)
+        self._advance(min(timekeeper.step_size / self._duration, 1.0))
         eased = self._ease(float(self._progress))
         start, delta = self._start, self._delta
         self._pose = (

@@ -29,7 +29,12 @@ def main() -> int:
     import rosgraph
     import rospy
 
-    if not rosgraph.is_master_online():
+    try:
+        online = rosgraph.is_master_online()
+    except ValueError as error:
+        print(f"flatland_viz: {error} (from ROS_MASTER_URI)", file=sys.stderr)
+        return 1
+    if not online:
         # rospy would wait for it, without a window and without a word.
         uri = rosgraph.get_master_uri()
         print(f"flatland_viz: no ROS master at {uri}: start the simulator first", file=sys.stderr)

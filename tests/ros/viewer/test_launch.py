@@ -140,6 +140,8 @@ def test_reasons_not_to_start(
     assert "the display :4711 cannot be opened" in complaint(DISPLAY=":4711")
     nobody = complaint(ROS_MASTER_URI="http://127.0.0.1:1", DISPLAY=screen.display)
     assert "no ROS master at http://127.0.0.1:1" in nobody
+    nonsense = complaint(ROS_MASTER_URI="nonsense", DISPLAY=screen.display)
+    assert "invalid master URI: nonsense (from ROS_MASTER_URI)" in nonsense
     blind = type(screen)(640, 480, "-extension", "GLX")
     try:
         reason = f"the display {blind.display} has no OpenGL"

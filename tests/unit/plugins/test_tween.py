@@ -158,6 +158,12 @@ def test_ends_are_exact_and_at_most_a_step_late(
     assert all(0.0 <= x <= 1.0 for x in found)
 
 
+@pytest.mark.parametrize("duration", ["0.004", "1e-300", "5e-324"])
+def test_ways_shorter_than_a_step_take_one(plugin_world: Any, duration: str) -> None:
+    world = plugin_world(tween(f"delta: [1, 0, 0], duration: {duration}"))
+    assert xs(world, 4) == [1.0, 0.0, 1.0, 0.0]
+
+
 def test_slow_way_back_ends_at_the_start(plugin_world: Any) -> None:
     # Here a step is so small that 0.001 of the way is 20 of them.
     world = plugin_world(tween("delta: [1, 0, 0], duration: 100"), step_size=0.005)
@@ -288,6 +294,7 @@ def test_moved_model_comes_back(plugin_world: Any) -> None:
         ("body: base, duration: .inf", 'Invalid "duration", must be finite'),
         ("body: base, delta: [1, 2]", 'Entry "delta" must have size of exactly 3'),
         ("body: base, delta: [1, .nan, 0]", 'Invalid "delta", must be finite'),
+        ("body: base, delta: [1, 0, -1e30]", 'Invalid "delta", must be finite and within +-1e+08'),
         ("body: base, rate: 3", 'unrecognized entry(s) {"rate"}'),
     ],
 )
