@@ -9,8 +9,10 @@ import numpy as np
 import numpy.typing as npt
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from flatland.body import Body, Entity
-    from flatland.physics import PhysicsFixture, PreSolveContact
+    from flatland.physics import ContactEvent, ContactInfo, PhysicsFixture, PreSolveContact
 
 DoubleArray = npt.NDArray[np.float64]
 
@@ -38,6 +40,33 @@ class Contact:
     points: DoubleArray
     normal: DoubleArray
     is_sensor: bool
+
+    @classmethod
+    def between(
+        cls, bodies: Mapping[int, Body], info: ContactInfo | ContactEvent
+    ) -> Contact | None:
+        """Finds the bodies that the physics engine speaks of.
+
+        Args:
+            bodies: The bodies of the world by the id of their physics body.
+            info: What the physics engine reports.
+
+        Returns:
+            None when a plugin made one of the bodies in the physics world itself.
+        """
+        body_a, body_b = bodies.get(info.body_a), bodies.get(info.body_b)
+        if body_a is None or body_b is None:
+            return None
+        return cls(
+            info.contact_id,
+            body_a,
+            body_b,
+            body_a.physics.fixture(info.fixture_a),
+            body_b.physics.fixture(info.fixture_b),
+            info.points,
+            info.normal,
+            info.is_sensor,
+        )
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -163,19 +163,9 @@ class PluginHost:
             hook = _EVENT_HOOKS[event.kind]
             if not self._hooks[hook]:
                 continue
-            body_a, body_b = bodies.get(event.body_a), bodies.get(event.body_b)
-            if body_a is None or body_b is None:
+            contact = Contact.between(bodies, event)
+            if contact is None:
                 continue
-            contact = Contact(
-                event.contact_id,
-                body_a,
-                body_b,
-                body_a.physics.fixture(event.fixture_a),
-                body_b.physics.fixture(event.fixture_b),
-                event.points,
-                event.normal,
-                event.is_sensor,
-            )
             if hook == "post_solve":
                 impulse = ContactImpulse(event.normal_impulses, event.tangent_impulses)
                 self._run(hook, contact, impulse)

@@ -624,24 +624,8 @@ class World:
     @property
     def contacts(self) -> list[Contact]:
         """All pairs of fixtures that touch now."""
-        found = []
-        for info in self._physics.contacts():
-            body_a, body_b = self._bodies.get(info.body_a), self._bodies.get(info.body_b)
-            if body_a is None or body_b is None:
-                continue  # A body that a plugin made in the physics world itself.
-            found.append(
-                Contact(
-                    info.contact_id,
-                    body_a,
-                    body_b,
-                    body_a.physics.fixture(info.fixture_a),
-                    body_b.physics.fixture(info.fixture_b),
-                    info.points,
-                    info.normal,
-                    info.is_sensor,
-                )
-            )
-        return found
+        found = (Contact.between(self._bodies, info) for info in self._physics.contacts())
+        return [contact for contact in found if contact is not None]
 
     def _dispatch_contacts(self) -> None:
         self._host.dispatch_contacts(self._physics.take_contact_events(), self._bodies)
