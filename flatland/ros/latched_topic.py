@@ -106,8 +106,10 @@ class LatchedTopic(Publisher):
         # be an old one for those who come later.
         impl.add_headers({"latching": "1"})
         impl.is_latch = False
-        impl.add_subscriber_listener(self._reception)
         super()._take_over(impl)
+        # Behind the listener that sets `connected`: a change after a newcomer was served would
+        # else find nobody to tell.
+        impl.add_subscriber_listener(self._reception)
 
     def _end(self) -> None:
         publisher = self._publisher

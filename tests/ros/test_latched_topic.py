@@ -125,6 +125,20 @@ def test_something_else_is_told(
     late.wait_for_line("data: 77")
 
 
+def test_who_has_the_state_is_told_of_what_comes_next(
+    topic: LatchedTopic, echo: Callable[..., Any]
+) -> None:
+    connected_when_made = []
+
+    def make() -> Int32:
+        connected_when_made.append(topic.connected)
+        return Int32(4)
+
+    topic.replace(make)
+    echo().wait_for_line("data: 4")
+    assert connected_when_made == [True]
+
+
 def test_second_topic_of_the_name_serves_those_who_are_there(
     topic: LatchedTopic, registrar: Registrar, state: State, echo: Callable[..., Any]
 ) -> None:
