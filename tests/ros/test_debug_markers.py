@@ -58,7 +58,7 @@ class Grow(flatland.WorldPlugin):
     def touch_up(self, request):
         body = self.world.model("arm").body("nothing")
         body.color = (1.0, 1.0, 0.0, 1.0)
-        body.physics.create_edges(np.array([[0, 0, 0, 2]], np.float32))
+        body.physics.create_edges(np.array([[9, 9, 9, 11]], np.float32))
         return TriggerResponse(True, "")
 """
 MANIFEST = """
@@ -281,7 +281,7 @@ def test_new_footprints_and_colors_show(ros: Any, arm: None) -> None:
     markers = topic.until(lambda message: len(message.markers) == 5).markers
     edge = markers[2]
     assert edge.type == Marker.LINE_LIST
-    assert points(edge) == [[0, 0, 0], [0, 2, 0]]
+    assert points(edge) == [[9, 9, 0], [9, 11, 0]]  # where it touches nothing
     assert scale(edge)[0] == 0.03
     assert color(edge) == (1, 1, 0, 1)
     assert pose(edge) == pytest.approx((3, 1, math.pi / 2), abs=1e-6)
