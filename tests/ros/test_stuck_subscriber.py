@@ -95,9 +95,9 @@ def test_slow_reader_gets_whole_messages_and_the_newest_at_last(
 ) -> None:
     clock = ros.topic("/clock", Clock)
     first = clock.next().clock.to_sec()
-    clock.until(lambda message: message.clock.to_sec() > first + 500 * 0.005)
+    later = clock.until(lambda message: message.clock.to_sec() > first + 500 * 0.005)
     ros.call("/pause", Empty)
-    last = clock.rest()[-1].clock.to_nsec()
+    last = [later, *clock.rest(1.0)][-1].clock.to_nsec()
     stamps = []
     while not stamps or stamps[-1] < last - 5_000_000:
         scan = LaserScan()
