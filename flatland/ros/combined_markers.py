@@ -119,11 +119,9 @@ class CombinedMarkers(WorldObserver):
     def _time_ns(self) -> int:
         return self._world.timekeeper.sim_time_ns
 
-    def _tick(self, _now: float) -> None:
-        if self._all_models.connected:
-            self._all_models.send()
-        else:
-            self._ticker.rest()
+    def _tick(self, _now: float) -> bool:
+        self._all_models.send()
+        return self._all_models.connected
 
 
 def _deletion() -> PackedMarkers:

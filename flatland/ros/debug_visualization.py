@@ -171,16 +171,13 @@ class DebugVisualization(WorldObserver):
         layers = [entry for entries in self._layers.values() for entry in entries]
         return DebugTopicList([entry.name for entry in (*layers, *self._models.values())])
 
-    def _tick(self, now: float) -> None:
+    def _tick(self, now: float) -> bool:
         """Sends the models that somebody watches, and ends the topics of those that are gone."""
-        self._ticker.rest()
         for name in [name for name, (_topic, due) in self._ending.items() if due <= now]:
             self._ending.pop(name)[0].close()
         for entry in self._models.values():
             entry.topic.send()
-        # Looked at after the rest: a subscriber that came meanwhile has woken us itself.
-        if self._ending or any(entry.topic.connected for entry in self._models.values()):
-            self._ticker.wake()
+        return bool(self._ending) or any(entry.topic.connected for entry in self._models.values())
 
 
 def _deletion(time_ns: int) -> PackedMarkers:

@@ -166,9 +166,8 @@ class InteractiveMarkers(WorldObserver):
         """Makes the next update hold a marker's pose: its client may show another one."""
         self._shown[name] = (math.inf, math.inf, 0.0)
 
-    def _tick(self, now: float) -> None:
+    def _tick(self, now: float) -> bool:
         """Ends silent drags and tells the clients of what has moved."""
-        self._ticker.rest()
         for name in self._drags.end_silent(now):
             self._forget_shown(name)
         if self._server.connected:
@@ -176,9 +175,7 @@ class InteractiveMarkers(WorldObserver):
             if now >= self._keep_alive_due:
                 self._keep_alive_due = now + KEEP_ALIVE_PERIOD
                 self._server.keep_alive()
-        # Looked at after the rest: a client that came meanwhile has woken us itself.
-        if self._drags or self._server.connected:
-            self._ticker.wake()
+        return bool(self._drags) or self._server.connected
 
     def _send_changes(self) -> None:
         for name, shown in self._shown.items():

@@ -44,9 +44,8 @@ class PauseTopic:
         """Looks no more."""
         self._ticker.close()
 
-    def _tick(self, _now: float) -> None:
-        if not self._topic.connected:
-            self._ticker.rest()
-        elif self._world.paused != self._sent:
+    def _tick(self, _now: float) -> bool:
+        if self._world.paused != self._sent:
             self._sent = self._world.paused
             self._topic.send()
+        return self._topic.connected

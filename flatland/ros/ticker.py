@@ -23,7 +23,7 @@ class Ticker:
         name: str,
         rate: float,
         post: Callable[[Callable[[], object]], Future[Any]],
-        tick: Callable[[float], None],
+        tick: Callable[[float], bool],
     ) -> None:
         """Starts asleep.
 
@@ -32,7 +32,7 @@ class Ticker:
             rate: Ticks in a second of wall time [Hz].
             post: Runs an action between two steps.
             tick: Called between two steps, with the time of `time.monotonic` at which it was
-                due; what it raises must not matter.
+                due; tells whether to tick on. What it raises must not matter.
         """
         self._period = max(_SHORTEST_PERIOD, 1.0 / rate)
         self._post = post
@@ -45,10 +45,6 @@ class Ticker:
         """Ticks from now on, the first time at once; safe from any thread."""
         self._awake.set()
 
-    def rest(self) -> None:
-        """Stops to tick until `wake`."""
-        self._awake.clear()
-
     def close(self) -> None:
         """Ends for good."""
         self._closed.set()
@@ -60,8 +56,6 @@ class Ticker:
             self._awake.wait()
             if self._closed.wait(max(0.0, due - time.monotonic())):
                 return
-            if not self._awake.is_set():
-                continue
             now = time.monotonic()
             due = now + self._period
             done = threading.Event()
@@ -71,8 +65,13 @@ class Ticker:
                     return
 
     def _tick_once(self, now: float, done: threading.Event) -> None:
+        # Asleep already when the tick looks whether there is still something to do: what comes
+        # after that look wakes it again.
+        self._awake.clear()
+        goes_on = True
         try:
-            if not self._closed.is_set():
-                self._tick(now)
+            goes_on = not self._closed.is_set() and self._tick(now)
         finally:
+            if goes_on or self._closed.is_set():
+                self._awake.set()
             done.set()

@@ -22,11 +22,16 @@ class Loop:
 
     def __init__(self) -> None:
         self.ticks: list[float] = []
+        self.goes_on = True
         self._actions: queue.Queue[Callable[[], object]] = queue.Queue()
 
     def post(self, action: Callable[[], object]) -> Future[Any]:
         self._actions.put(action)
         return Future()
+
+    def tick(self, now: float) -> bool:
+        self.ticks.append(now)
+        return self.goes_on
 
     def run_next(self, timeout: float = PATIENCE) -> None:
         self._actions.get(timeout=timeout)()
@@ -47,7 +52,7 @@ def loop() -> Loop:
 
 @pytest.fixture
 def ticker(loop: Loop) -> Iterator[Ticker]:
-    ticker = Ticker("test-ticker", RATE, loop.post, loop.ticks.append)
+    ticker = Ticker("test-ticker", RATE, loop.post, loop.tick)
     yield ticker
     ticker.close()
 
@@ -74,18 +79,33 @@ def test_none_is_queued_while_another_waits(loop: Loop, ticker: Ticker) -> None:
 
 
 def test_rests_and_wakes(loop: Loop, ticker: Ticker) -> None:
+    loop.goes_on = False
     ticker.wake()
     loop.run_next()
-    ticker.rest()
     assert loop.idle(3 / RATE)
     ticker.wake()
     loop.run_next()
     assert len(loop.ticks) == 2
 
 
+def test_what_comes_during_the_last_tick_wakes_it_again(loop: Loop) -> None:
+    """Such as a subscriber, right after the tick found that there is none."""
+
+    def tick(_now: float) -> bool:
+        goes_on = False
+        ticker.wake()
+        return goes_on
+
+    ticker = Ticker("woken", RATE, loop.post, tick)
+    ticker.wake()
+    for _ in range(3):
+        loop.run_next()
+    ticker.close()
+
+
 def test_close_ends_the_thread_whatever_it_waits_for(loop: Loop) -> None:
     for wake in (False, True):
-        ticker = Ticker(f"closing-{wake}", RATE, loop.post, loop.ticks.append)
+        ticker = Ticker(f"closing-{wake}", RATE, loop.post, loop.tick)
         if wake:
             ticker.wake()
         ticker.close()
@@ -105,7 +125,7 @@ def test_tick_that_was_posted_before_the_end_does_nothing(loop: Loop, ticker: Ti
 
 
 def test_tick_that_raises_is_not_the_last(loop: Loop) -> None:
-    def fail(_now: float) -> None:
+    def fail(_now: float) -> bool:
         raise ValueError("as asked for")
 
     ticker = Ticker("failing", RATE, loop.post, fail)
