@@ -136,6 +136,8 @@ class _Reader:
 
     def natural(self, name: str) -> int | None:
         wanted = "an integer that is not negative"
+        if self._get(name) == "":
+            return None  # a launch argument that was left empty
         value = self._integer(name, wanted)
         if value is not None and value < 0:
             raise _bad(name, wanted, value)

@@ -103,6 +103,10 @@ def test_refused_values(name: str, value: object) -> None:
         read(**{name: value})
 
 
+def test_empty_seed_is_none() -> None:
+    assert read(seed="").seed is None
+
+
 @pytest.mark.parametrize("path", [None, ""])
 def test_world_path_is_required(path: str | None) -> None:
     with pytest.raises(ParameterError, match=r"^No world_path parameter given!$"):

@@ -276,6 +276,19 @@ def test_server_launch_sets_all_parameters(launcher: Any, ros: Any, world: Path)
     assert process.stop() == 0
 
 
+@pytest.mark.parametrize(
+    ("file", "node"),
+    [("server.launch", "flatland_server"), ("benchmark.launch", "flatland_benchmark")],
+)
+def test_launch_without_a_seed_forgets_that_of_the_last_launch(
+    launcher: Any, ros: Any, world: Path, file: str, node: str
+) -> None:
+    ros.master.setParam(f"/{node}/seed", 5)  # as the last launch left it on the master
+    shown = ["show_viz:=false"] if file == "server.launch" else ["benchmark_duration:=1"]
+    process = launcher.launch("flatland", file, f"world_path:={world}", *shown)
+    process.wait_for_line(r"seed \d+ drawn at random")
+
+
 def free_port() -> int:
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
