@@ -490,7 +490,7 @@ class World:
     def _start_model_plugin(self, model: Model, entry: YamlReader) -> None:
         name, type_name = entry.get("name", "string"), entry.get("type", "string")
         what = f'Model Plugin "{name}" type "{type_name}" model "{model.name}"'
-        plugin = self._make_plugin(type_name, ModelPlugin, what)
+        plugin = self._make_plugin(type_name, ModelPlugin, what, entry)
         plugin.model = model
         place = (f'model "{model.name}"', f'plugin "{name}"')
         self._start(plugin, name, type_name, model.namespace, entry, place)
@@ -510,15 +510,15 @@ class World:
                     f'Invalid "world plugins" with name "{name}", type "{type_name}" already exists'
                 )
         what = f'World Plugin "{name}" type "{type_name}"'
-        plugin = self._make_plugin(type_name, WorldPlugin, what)
+        plugin = self._make_plugin(type_name, WorldPlugin, what, entry)
         plugin.world_config = world_config
         self._start(plugin, name, type_name, "", entry, ("", f'world_plugin "{name}"'))
 
-    def _make_plugin(self, type_name: str, base: type[Any], what: str) -> Any:
+    def _make_plugin(self, type_name: str, base: type[Any], what: str, entry: YamlReader) -> Any:
         try:
             return self._registry.make(type_name, base)
         except PluginError as error:
-            raise PluginError(f"{what}: {error.message}") from error
+            raise PluginError(entry.error(f"{what}: {error.message}").message) from error
 
     def _start(
         self,
@@ -544,7 +544,10 @@ class World:
             text = error.message if isinstance(error, PluginError) else str(error)
             if not isinstance(error, FlatlandError) and not text:
                 text = type(error).__name__
-            raise PluginError(f"{describe(plugin)}: {text}") from error
+            text = f"{describe(plugin)}: {text}"
+            if not isinstance(error, YamlError):  # which names a place of its own
+                text = entry.error(text).message
+            raise PluginError(text) from error
         self._host.add(plugin)
         self._update_contact_recording()
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import gc
 import logging
+import re
 
 import numpy as np
 import pytest
@@ -184,6 +185,7 @@ def test_world_plugin_errors_name_the_plugin(files):
     assert str(caught.value).startswith(
         'Flatland plugin: World Plugin "W" type "Nothing": no plugin "flatland_plugins::Nothing"'
     )
+    assert re.search(r" \[.*world\.yaml:1\]$", str(caught.value))
 
 
 def test_world_plugin_same_name_other_type_is_allowed(files, caplog):

@@ -445,4 +445,6 @@ class TestErrors:
         ],
     )
     def test_other_parameters(self, plugin_world: Any, extra: str, message: str) -> None:
-        assert message in plugin_world.error(laser(extra))
+        text = plugin_world.error(laser(extra))
+        assert message in text
+        assert "robot.model.yaml:" in text
