@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
+import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -233,6 +234,20 @@ def test_tf_sends_all_transforms_of_a_step_in_one_message(ros: Any) -> None:
 
 def test_node_does_not_listen_to_its_own_clock(ros: Any) -> None:
     assert "/clock" not in ros.registered()["subscribers"]
+
+
+def test_ros_time_of_the_node_is_the_simulated_time(ros: Any, server: Any, eventually: Any) -> None:
+    clock = ros.topic("/clock", Clock)
+    before = clock.next().clock.to_sec()
+    seen = server.output.count("cycle use")
+    eventually("a report", lambda: server.output.count("cycle use") > seen)
+    clock.drop()
+    after = clock.next().clock.to_sec()
+    # rospy's log lines show its time behind that of the wall clock.
+    report = [line for line in server.output.splitlines() if "cycle use" in line][seen]
+    match = re.match(r"\[INFO\] \[[\d.]+, ([\d.]+)\]: ", report)
+    assert match is not None, report
+    assert before < float(match[1]) <= after
 
 
 def test_server_logs_how_its_cycles_are_used(server: Any) -> None:

@@ -79,6 +79,35 @@ def probe(files, monkeypatch, request):
     return Probe
 
 
+@pytest.mark.parametrize("with_pre_solve", [False, True])
+@pytest.mark.parametrize(
+    ("iterations", "parted"),
+    [
+        # Each position iteration takes away a fifth of the overlap beyond 5 mm; the eighth finds
+        # less than 15 mm of overlap, which is good enough for Box2D.
+        ("velocity_iterations: 10, position_iterations: 1", 0.2 * 0.045),
+        ("velocity_iterations: 1, position_iterations: 10", (1 - 0.8**8) * 0.045),
+    ],
+)
+def test_the_solver_does_the_iterations_of_the_file(files, iterations, parted, with_pre_solve):
+    world = files.load(
+        f"""
+        properties: {{{iterations}}}
+        layers: []
+        models:
+          - {{name: a, model: minimal.model.yaml}}
+          - {{name: b, model: minimal.model.yaml, pose: [0.35, 0, 0]}}
+        """
+    )
+    bodies = [model.bodies[0] for model in world.models]
+    if with_pre_solve:
+        world.physics.pre_solve = lambda contact, old_manifold: None
+        world.physics.pre_solve_bodies = {body.physics.id for body in bodies}
+    world.step()
+    a, b = bodies
+    assert b.pose[0] - a.pose[0] - 0.35 == pytest.approx(parted, abs=1e-4)
+
+
 def test_time_is_exact_after_many_steps(files):
     world = files.load("{properties: {}, layers: []}", step_size=0.001)
     world.step(12345)
