@@ -28,7 +28,9 @@ PICTURE_FORMATS: Final = (".png", ".pdf", ".svg")
 _LONGEST_SIDE: Final = 20_000  # pixels; matplotlib ends at 65 536
 _ROOM: Final = (13.0, 9.0)  # inches that a picture without a size may take
 _NARROWEST: Final = 2.0  # inches that it takes at least
-_MARGINS: Final = (0.62, 0.48, 0.2, 0.2)  # inches left, below, right and above, with axes
+_MARGINS: Final = (0.62, 0.48, 0.24, 0.2)  # inches left, below, right and above, with axes
+_CHARACTERS: Final = 4  # of a number at the y axis, that the left margin has room for
+_CHARACTER: Final = 0.09  # inches for each one more
 _PADDING: Final = 0.02  # of the longer side of what is there
 _FARTHEST, _NEAREST = 1e9, 1e-3  # m; coordinates, and sides of a view
 _EMPTY_VIEW: Final = (-5.0, -5.0, 5.0, 5.0)  # m
@@ -73,7 +75,7 @@ def draw(
 
     Raises:
         FlatlandError: The world is closed, a layer is unknown, or matplotlib is missing.
-        ValueError: `size`, `dpi` or `view` is out of its range.
+        ValueError: `size`, `dpi`, `view` or `layers` is not as it must be.
     """
     figure = make_figure(
         world,
@@ -121,13 +123,15 @@ def make_figure(
 
     Raises:
         FlatlandError: The world is closed, a layer is unknown, or matplotlib is missing.
-        ValueError: `size`, `dpi` or `view` is out of its range.
+        ValueError: `size`, `dpi`, `view` or `layers` is not as it must be.
     """
     check_matplotlib()
     from flatland.scene_painter import paint
 
     if not (math.isfinite(dpi) and 10 <= dpi <= 2400):
         raise ValueError(f"dpi must be from 10 to 2400, got {dpi}")
+    if isinstance(layers, str):
+        raise ValueError(f"layers must be a list of names, got {layers!r}")
     wanted = None if view is None else _checked_view(view)
     scene = world.between_steps(lambda: look_at(world, layers, scans))
     layout = Layout.make(size, dpi, wanted or _whole(scene), axes)
@@ -229,7 +233,17 @@ class Layout:
         Raises:
             ValueError: The size is out of its range, or too small for the axes.
         """
+        layout = cls._make(size, dpi, view, axes, 0.0)
+        more = _longest_number(layout.view[1], layout.view[3]) - _CHARACTERS
+        return cls._make(size, dpi, view, axes, more * _CHARACTER) if axes and more > 0 else layout
+
+    @classmethod
+    def _make(
+        cls, size: tuple[int, int] | None, dpi: float, view: Box, axes: bool, more_left: float
+    ) -> Layout:
+        """Lays a picture out with some inches more at the left."""
         left, below, right, above = (round(m * dpi) if axes else 0 for m in _MARGINS)
+        left += round(more_left * dpi)
         x_min, y_min, x_max, y_max = view
         width, height = x_max - x_min, y_max - y_min
         if size is None:
@@ -251,6 +265,13 @@ class Layout:
     def scale(self) -> float:
         """Pixels a metre."""
         return self.frame[2] / (self.view[2] - self.view[0])
+
+
+def _longest_number(low: float, high: float) -> int:
+    """Returns how many characters the numbers at an axis have at most [m]."""
+    # matplotlib makes 10 steps at most, of 1, 2, 2.5, 5 times a power of ten.
+    decimals = min(max(0, 1 - math.floor(math.log10((high - low) / 10))), 4)
+    return max(len(f"{number:.{decimals}f}") for number in (low, high))
 
 
 def _checked_size(size: tuple[int, int]) -> tuple[int, int]:

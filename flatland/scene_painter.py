@@ -162,7 +162,8 @@ def _paint_headings(axes: Any, scene: Scene, smallest: float) -> None:
 
 def _arrow(middle: Pose, length: float) -> DoubleArray:
     """Returns the corners of a triangle that points ahead, shape (3, 2)."""
-    corners = [(0.6, 0.0), (-0.4, 0.5), (-0.4, -0.5)]
+    # Longer than wide: which corner is the foremost one is to be seen at any heading.
+    corners = [(0.6, 0.0), (-0.4, 0.3), (-0.4, -0.3)]
     return np.array([compose(middle, (length * x, length * y, 0.0))[:2] for x, y in corners])
 
 

@@ -149,9 +149,11 @@ class TestModels:
         ahead = marks @ (np.cos(heading), np.sin(heading))
         aside = marks @ (-np.sin(heading), np.cos(heading))
         # Broad at the back and pointed at the front, whose corner is 60 % of the length ahead.
-        assert ahead.max() == pytest.approx(0.6 * 0.4 * 1.6, abs=0.04)
+        assert ahead.max() == pytest.approx(0.6 * 0.4 * 1.6, abs=0.06)
         assert ahead.min() == pytest.approx(-0.4 * 0.4 * 1.6, abs=0.04)
         assert np.ptp(aside[ahead < -0.1]) > 3 * np.ptp(aside[ahead > 0.25])
+        # Longer than wide, or each corner could be the foremost one.
+        assert np.ptp(aside) < 0.8 * np.ptp(ahead)
 
     def test_walls_show_through(self, files):
         world = room_world(files, body())
@@ -326,6 +328,30 @@ class TestPicture:
         assert (axes.get_xlabel(), axes.get_ylabel()) == ("x [m]", "y [m]")
         assert "4" in [label.get_text() for label in axes.get_xticklabels()]
 
+    @pytest.mark.parametrize(
+        "view",
+        [
+            (0, 0, 10, 10),
+            (100, 200, 100.9, 200.9),
+            (-101, -201, -100.5, -200.5),
+            (0, -12_000, 9_000, 9_000),
+            (0, 0, 0.1, 0.1),
+            (12_345, 12_345, 12_346, 12_346),
+            (-1e9, -1e9, 1e9, 1e9),
+            (0, -1, 50, 1),
+        ],
+    )
+    @pytest.mark.parametrize("size", [None, (800, 500), (300, 900)])
+    def test_nothing_beside_the_axes_is_cut_off(self, empty_world, view, size):
+        figure = drawing.make_figure(empty_world, view=view, size=size)
+        figure.canvas.draw()
+        labels = figure.axes[0].get_tightbbox(figure.canvas.get_renderer())
+        width, height = figure.canvas.get_width_height()
+        assert labels.x0 >= 0
+        assert labels.y0 >= 0
+        assert labels.x1 <= width
+        assert labels.y1 <= height
+
     def test_an_empty_world_can_be_drawn(self, empty_world):
         assert empty_world.draw().shape[2] == 3
 
@@ -352,6 +378,7 @@ class TestPicture:
             ({"view": (0, 0, 1, float("nan"))}, "view must be within"),
             ({"view": (1, 0, 0, 1)}, "x_min < x_max"),
             ({"view": (0, 0, 1, float("inf"))}, "view must be within"),
+            ({"layers": "walls"}, "layers must be a list of names, got 'walls'"),
         ],
     )
     def test_options_are_checked(self, empty_world, options, message):
