@@ -9,6 +9,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import cv2
+import numpy as np
 import pytest
 from rosgraph_msgs.msg import Clock
 from std_srvs.srv import Empty
@@ -274,6 +276,39 @@ def test_server_launch_sets_all_parameters(launcher: Any, ros: Any, world: Path)
     process.wait_for_line("real-time factor asked inf")
     assert "drawn at random" not in process.output
     assert process.stop() == 0
+
+
+@pytest.mark.parametrize(
+    ("private", "global_", "simplified"),
+    [(None, None, False), (1, None, True), (None, 1, True), (0, 1, False)],
+)
+def test_map_is_simplified_by_a_private_or_global_parameter(
+    launcher: Any,
+    ros: Any,
+    tmp_path: Path,
+    private: int | None,
+    global_: int | None,
+    simplified: bool,
+) -> None:
+    disc = np.full((60, 60), 255, np.uint8)
+    cv2.circle(disc, (30, 30), 25, 0, thickness=-1)
+    cv2.imwrite(str(tmp_path / "disc.png"), disc)
+    (tmp_path / "disc.yaml").write_text(
+        "{image: disc.png, resolution: 0.1, origin: [0, 0, 0], occupied_thresh: 0.65}"
+    )
+    world = tmp_path / "world.yaml"
+    world.write_text("{properties: {}, layers: [{name: disc, map: disc.yaml}]}")
+    if global_ is not None:
+        ros.master.setParam("/simplify_map", global_)
+    try:
+        given = {} if private is None else {"simplify_map": private}
+        process = launcher.start(world_path=world, **given)
+        line = process.wait_for_line('Layer "disc": ').string
+        process.wait_for_line("loaded")
+    finally:
+        if global_ is not None:
+            ros.master.deleteParam("/simplify_map")
+    assert ("simplified (exact: " in line) is simplified
 
 
 @pytest.mark.parametrize(
