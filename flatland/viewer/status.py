@@ -16,6 +16,7 @@ from flatland.viewer.server import ServerState
 _LOOK_EVERY: Final = 100  # ms between two looks at the simulated time
 _SETTLED_AFTER: Final = 200  # ms without a move of the slider before its rate is asked for
 _MESSAGE_STAYS: Final = 8000  # ms
+_WAITING: Final = "waiting for the simulator"
 
 
 class Status(QStatusBar):
@@ -35,8 +36,11 @@ class Status(QStatusBar):
         self._state = ServerState(running=False)
         self._paused = False
         self.time = _label("time", "simulated time")
-        self.factor = _label("factor", "simulated time over wall time")
-        self.rate = _label("rate", "steps in a second, and how much faster than real time that is")
+        self.factor = _label("factor", "simulated time over wall time", "real-time factor 000.00")
+        # The slider is not to move under the mouse when the text beside it gets longer.
+        self.rate = _label(
+            "rate", "steps in a second, and how much faster than real time that is", _WAITING
+        )
         self.slider = QSlider(Qt.Orientation.Horizontal)
         self.slider.setObjectName("rate_slider")
         self.slider.setToolTip("how fast the simulated time is to pass")
@@ -60,7 +64,7 @@ class Status(QStatusBar):
         self._state = state
         self.slider.setEnabled(state.running)
         if not state.running:
-            self.rate.setText("waiting for the simulator")
+            self.rate.setText(_WAITING)
             return
         if self._settled.isActive() or self.slider.isSliderDown():
             return  # What the user is about to ask for counts.
@@ -101,8 +105,11 @@ class Status(QStatusBar):
         self.rate_wanted.emit(rate_scale.rate_at(self.slider.value(), self._state.step_size))
 
 
-def _label(name: str, tip: str) -> QLabel:
-    label = QLabel()
+def _label(name: str, tip: str, widest: str = "") -> QLabel:
+    """Makes a label that has room for its widest text from the beginning."""
+    label = QLabel(widest)
+    label.setMinimumWidth(label.sizeHint().width())
+    label.clear()
     label.setObjectName(name)
     label.setToolTip(tip)
     return label

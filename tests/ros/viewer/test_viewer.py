@@ -130,7 +130,8 @@ def test_slider_sets_the_rate(
     def asked(rate: float) -> bool:
         return bool(rospy.get_param("/flatland_server/update_rate", 200.0) == rate)
 
-    assert viewer.widget("rate")["text"] == "200 Hz (x1)"
+    viewer.until("rate", lambda widget: widget["text"] == "200 Hz (x1)")
+    slider = viewer.widget("rate_slider")
     viewer.click("rate_slider")
     screen.key("Home")
     eventually("slow motion", lambda: asked(10.0))
@@ -139,6 +140,8 @@ def test_slider_sets_the_rate(
     screen.key("End")
     eventually("no limit", lambda: asked(0.0))
     assert viewer.widget("rate")["text"] == "as fast as possible"
+    # It stays where the mouse is, however long the text beside it.
+    assert viewer.widget("rate_slider")["x"] == slider["x"]
     # What others set is shown as well.
     assert ros.call("/set_rate", SetRate, 200.0).success
     viewer.until("rate", lambda widget: widget["text"] == "200 Hz (x1)")
