@@ -6,7 +6,7 @@ NANOSECONDS = 1_000_000_000
 
 
 # What Box2D's solver can be asked for [s].
-_LEAST_STEP, _GREATEST_STEP = 1e-6, 1000.0
+LEAST_STEP, GREATEST_STEP = 1e-6, 1000.0
 
 
 class Timekeeper:
@@ -30,9 +30,9 @@ class Timekeeper:
         Raises:
             ValueError: The step size is out of its range or not a number.
         """
-        if not _LEAST_STEP <= step_size <= _GREATEST_STEP:
+        if not LEAST_STEP <= step_size <= GREATEST_STEP:
             raise ValueError(
-                f"step_size must be from {_LEAST_STEP:g} to {_GREATEST_STEP:g} s, got {step_size}"
+                f"step_size must be from {LEAST_STEP:g} to {GREATEST_STEP:g} s, got {step_size}"
             )
         self.step_size_ns = round(step_size * NANOSECONDS)
         self.step_size = self.step_size_ns / NANOSECONDS

@@ -6,11 +6,12 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from flatland.timekeeper import GREATEST_STEP, LEAST_STEP
+
 ParameterSource = Callable[[str], object]
 """Gives the value of a parameter, None where it is not set."""
 
 NO_WORLD_PATH = "No world_path parameter given!"
-_MIN_STEP_SIZE = 1e-9  # s, the resolution of the simulated time
 _SIMPLIFICATIONS = (0, 1, 2)
 
 
@@ -92,9 +93,9 @@ class _Reader:
         return 0.0 if math.isinf(rate) else rate
 
     def step_size(self, name: str, default: float) -> float:
-        wanted = "a positive number of seconds, at least 1e-9"
+        wanted = f"a number of seconds from {LEAST_STEP:g} to {GREATEST_STEP:g}"
         size = self._number(name, default, wanted)
-        if math.isinf(size) or size < _MIN_STEP_SIZE:
+        if not LEAST_STEP <= size <= GREATEST_STEP:
             raise _bad(name, wanted, size)
         return size
 

@@ -77,6 +77,7 @@ def assert_stops(process: Any, number: signal.Signals) -> None:
         ("update_rate", ".nan"),
         ("step_size", "0"),
         ("step_size", ".inf"),
+        ("step_size", "5000"),  # beyond what the physics takes
         ("show_viz", "maybe"),
         ("viz_pub_rate", "0"),
         ("viz_pub_rate", "[1, 2]"),
