@@ -13,6 +13,7 @@ from typing import Final
 _LOG = logging.getLogger("flatland")
 NODE_NAME: Final = "flatland_viz"
 SERVER_NAME: Final = "flatland_server"
+_USE_SIM_TIME: Final = "/use_sim_time"
 _STOP_SIGNALS: Final = (signal.SIGINT, signal.SIGTERM)
 
 
@@ -49,6 +50,10 @@ def main() -> int:
         _LOG.critical("the viewer cannot start: %s. The simulator runs on without it", reason)
         rospy.signal_shutdown("the viewer cannot start")
         return 1
+    if not rospy.has_param(_USE_SIM_TIME):
+        # RViz looks only once, now: server.launch may come later.
+        rospy.set_param(_USE_SIM_TIME, True)
+        _LOG.info("%s is set to true, as server.launch does", _USE_SIM_TIME)
     return _run()
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import signal
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -26,9 +26,24 @@ def elsewhere(room: Path) -> Path:
     return path
 
 
+@pytest.fixture
+def bare_master(ros: Any) -> Iterator[None]:
+    """A master that nobody has told of simulated time."""
+    ros.master.deleteParam("/use_sim_time")
+    yield
+    ros.master.setParam("/use_sim_time", True)
+
+
 def test_simulators_come_and_go(
-    ros: Any, early_viewer: Any, on_screen: Any, room: Path, elsewhere: Path, look: Any
+    ros: Any,
+    bare_master: None,
+    early_viewer: Any,
+    on_screen: Any,
+    room: Path,
+    elsewhere: Path,
+    look: Any,
 ) -> None:
+    del bare_master
     viewer = early_viewer
     area = viewer.widget("rviz::RenderPanel")
 
@@ -38,8 +53,12 @@ def test_simulators_come_and_go(
         viewer.until("toggle_pause", lambda widget: widget["text"] == "Pause")
         assert not viewer.widget("rate_slider")["enabled"]
 
+    def tells_simulated_time(widget: dict[str, Any]) -> bool:
+        return 0.0 < float(widget["text"].split()[1]) < 100.0
+
     def shows_room_and_robot(place: Callable[[Any], Any]) -> None:
         viewer.until("rate", lambda widget: widget["text"] == "200 Hz (x1)")
+        viewer.until("time", tells_simulated_time)
         picture = look(place, area)
         assert picture.pixels_per_metre * 10 == pytest.approx(area["height"] / 1.06, abs=8)
         look(lambda picture: len(picture.places(RED)) > 30, area)
