@@ -1,4 +1,4 @@
-"""How far the markers of a layer reach, so that the view can show all of it."""
+"""How far the markers of layers and models reach, so that the view can show all of them."""
 
 from __future__ import annotations
 
@@ -31,9 +31,15 @@ class Bounds:
         """Its extent along x and y."""
         return (self.x_max - self.x_min, self.y_max - self.y_min)
 
+    def grown(self, margin: float) -> Bounds:
+        """Returns the rectangle with a margin around it [m]."""
+        return Bounds(
+            self.x_min - margin, self.y_min - margin, self.x_max + margin, self.y_max + margin
+        )
+
 
 def bounds_of(markers: Any) -> Bounds | None:
-    """Returns the rectangle around all points of a MarkerArray, None when it has none."""
+    """Returns the rectangle around all that a MarkerArray shows, None when it has none."""
     parts = []
     for marker in markers.markers:
         if not marker.points:
@@ -43,7 +49,9 @@ def bounds_of(markers: Any) -> Bounds | None:
         c, s = rotate((1.0, 0.0), yaw)
         x = marker.pose.position.x + c * points[:, 0] - s * points[:, 1]
         y = marker.pose.position.y + s * points[:, 0] + c * points[:, 1]
-        parts.append(Bounds(float(x.min()), float(y.min()), float(x.max()), float(y.max())))
+        part = Bounds(float(x.min()), float(y.min()), float(x.max()), float(y.max()))
+        # A circle is a sphere, of which the marker has the middle alone.
+        parts.append(part.grown(marker.scale.x / 2 if marker.type == marker.SPHERE_LIST else 0.0))
     return union(parts) if parts else None
 
 

@@ -21,6 +21,7 @@ from flatland.viewer.bounds import bounds_of
 from flatland.viewer.server import Server, ServerState
 
 _LOG = logging.getLogger("flatland")
+_PATIENCE: Final = 5.0  # s for a message that is there
 _LOOK_EVERY: Final = 1.0  # s between two looks at what the simulator has registered
 
 
@@ -35,6 +36,7 @@ class RosLink(QObject):
 
     debug_topics = pyqtSignal(list)  # names of marker topics, all that there are now
     layer_bounds = pyqtSignal(str, object)  # debug topic of a layer, its Bounds or None
+    model_bounds = pyqtSignal(object)  # Bounds of all models or None
     paused = pyqtSignal(bool)
     state = pyqtSignal(object)  # ServerState
     _answered = pyqtSignal(object, object)  # function, its argument
@@ -119,6 +121,15 @@ class RosLink(QObject):
     def parameter(self, name: str) -> object:
         """Returns a parameter as the simulator's YAML files see it; not for the window's thread."""
         return rospy.get_param(self.server.resolve(name), None)
+
+    def measure_models(self) -> None:
+        """Finds out how far the models reach now; the answer is `model_bounds`."""
+        topic = self.server.debug_topic("all_models")
+        self.in_background(
+            lambda: bounds_of(rospy.wait_for_message(topic, MarkerArray, _PATIENCE)),
+            self.model_bounds.emit,
+            lambda _reason: None,  # The simulator has gone meanwhile.
+        )
 
     def _subscribe(self) -> None:
         debug_topics = self.server.resolve("~debug/topics")

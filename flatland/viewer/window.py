@@ -7,7 +7,7 @@ import os
 from typing import Any, Final
 
 import rospy
-from PyQt5.QtCore import QEvent, QObject, Qt
+from PyQt5.QtCore import QEvent, QObject, Qt, QTimer
 from PyQt5.QtGui import QIcon, QKeySequence
 from PyQt5.QtWidgets import (
     QAction,
@@ -40,6 +40,8 @@ _HINTS: Final = {
     Stage.PLACE: "Click where the model is to stand. Escape cancels.",
     Stage.TURN: "Move the mouse to turn the model, click to spawn it. Escape cancels.",
 }
+_SETTLED_AFTER: Final = 200  # ms after models came or went
+_SPACE: Final = 3.0  # m around models in a world without walls
 _CAMERA_HINT: Final = "Left button: turn. Middle button, or Shift and left: move. Wheel: zoom."
 
 
@@ -62,12 +64,18 @@ class ViewerWindow(QMainWindow):
         self.spawn_tool = SpawnTool(self.scene, self._preview.publish)
         self._models: set[str] = set()
         self._bounds: dict[str, Bounds] = {}  # by the topic of their layer
+        self._model_bounds: Bounds | None = None
         self._lasers: set[str] = set()
         self._folder = ""
         self._choice = SpawnChoice()
         self._dialog: SpawnDialog | None = None
         # Until the user moves the camera it follows what there is to see.
         self._fits = True
+        # Many may come at once.
+        self._models_changed = QTimer(self)
+        self._models_changed.setSingleShot(True)
+        self._models_changed.setInterval(_SETTLED_AFTER)
+        self._models_changed.timeout.connect(link.measure_models)
         self._make_actions()
         self.setCentralWidget(self.scene.widget)
         self.setStatusBar(self.status)
@@ -91,7 +99,7 @@ class ViewerWindow(QMainWindow):
         self.move_camera.setToolTip(f"hide the handles (M). {_CAMERA_HINT}")
         self.move_camera.setShortcut("M")
         self.whole_world = QAction(style.standardIcon(_Icon.SP_DesktopIcon), "Whole world", self)
-        self.whole_world.setToolTip("show all layers (F)")
+        self.whole_world.setToolTip("show all layers and models (F)")
         self.whole_world.setShortcut("F")
         self.toggle_pause = QAction(self)
         self.toggle_pause.setShortcut("Space")
@@ -125,6 +133,7 @@ class ViewerWindow(QMainWindow):
         link = self._link
         link.debug_topics.connect(self._show_topics)
         link.layer_bounds.connect(self._show_bounds)
+        link.model_bounds.connect(self._show_model_bounds)
         link.paused.connect(self._show_paused)
         link.state.connect(self._show_state)
         self.interact.triggered.connect(self._use_tool)
@@ -159,7 +168,9 @@ class ViewerWindow(QMainWindow):
         left = {topic: bounds for topic, bounds in self._bounds.items() if topic in topics}
         if self._bounds and not left:
             self._fits = True  # It is another world.
+            self._model_bounds = None
         self._bounds = left
+        self._models_changed.start()
 
     def _show_bounds(self, layer: str, bounds: Bounds | None) -> None:
         self._bounds.pop(layer, None)
@@ -167,10 +178,18 @@ class ViewerWindow(QMainWindow):
             self._bounds[layer] = bounds
         self._fit()
 
+    def _show_model_bounds(self, bounds: Bounds | None) -> None:
+        self._model_bounds = bounds
+        self._fit()
+
     def _fit(self) -> None:
-        """Shows all layers, unless the user has moved the camera."""
-        if self._fits and self._bounds:
-            self.scene.fit(union(self._bounds.values()))
+        """Shows all layers and models, unless the user has moved the camera."""
+        parts = list(self._bounds.values())
+        if self._model_bounds is not None:
+            # Without walls, there is some space to drive in.
+            parts.append(self._model_bounds.grown(0.0 if parts else _SPACE))
+        if self._fits and parts:
+            self.scene.fit(union(parts))
 
     def _show_paused(self, paused: bool) -> None:
         icon, text = (_Icon.SP_MediaPause, "Pause")
@@ -206,6 +225,7 @@ class ViewerWindow(QMainWindow):
     def _show_whole_world(self) -> None:
         self._fits = True
         self._fit()
+        self._link.measure_models()
 
     def eventFilter(self, _watched: QObject, event: QEvent) -> bool:  # noqa: N802 - Qt's name
         """Notes that the user took the camera, and keeps keys from RViz."""

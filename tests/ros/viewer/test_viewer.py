@@ -311,6 +311,27 @@ def test_view_fits_the_window_until_the_camera_is_moved(
     look(fits(area), area)
 
 
+def test_view_holds_models_outside_the_walls(
+    ros: Any, look: Callable[..., Any], viewer: Any, screen: Any, panel: Any, spawned: Any
+) -> None:
+    def shows(metres: float, pixels: int) -> Callable[[Any], bool]:
+        wanted = pixels / (1.06 * metres)
+        return lambda picture: abs(picture.pixels_per_metre - wanted) < 0.5
+
+    viewer.click("whole_world")
+    look(shows(10.0, panel["height"]), panel)
+    # From the wall at x = -5 to the end of the crate.
+    assert ros.spawn("crate.model.yaml", "far", "", (20, 0, 0)).success
+    spawned("far")
+    picture = look(shows(25.5, panel["width"]), panel)
+    assert len(picture.near(CYAN, 20, 0, 0.7)) > 10
+    assert ros.move("far", (25, 0, 0)).success
+    screen.key("f")
+    look(shows(30.5, panel["width"]), panel)
+    assert ros.delete("far").success
+    look(shows(10.0, panel["height"]), panel)
+
+
 def test_escape_cancels(
     look: Callable[..., Any], viewer: Any, screen: Any, panel: Any, room: Path
 ) -> None:

@@ -1,0 +1,48 @@
+"""How far markers reach."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import pytest
+from geometry_msgs.msg import Point, Pose, Quaternion, Vector3
+from visualization_msgs.msg import Marker, MarkerArray
+
+from flatland.viewer.bounds import Bounds, bounds_of
+
+
+def marker(kind: int, points: list[tuple[float, float]], size: float = 0.03) -> Any:
+    """A marker at (10, 20), turned by a quarter."""
+    turned = Quaternion(0, 0, math.sqrt(0.5), math.sqrt(0.5))
+    return Marker(
+        type=kind,
+        pose=Pose(Point(10, 20, 0), turned),
+        scale=Vector3(size, size, size),
+        points=[Point(x, y, 0) for x, y in points],
+    )
+
+
+def numbers(bounds: Bounds | None) -> Any:
+    assert bounds is not None
+    return pytest.approx((bounds.x_min, bounds.y_min, bounds.x_max, bounds.y_max))
+
+
+def test_points_are_turned_and_moved() -> None:
+    lines = marker(Marker.LINE_LIST, [(0, 0), (2, 0), (2, 1), (0, 1)])
+    assert numbers(bounds_of(MarkerArray([lines]))) == (9, 20, 10, 22)
+
+
+def test_a_circle_has_an_extent() -> None:
+    circle = marker(Marker.SPHERE_LIST, [(1, 0)], size=4.0)
+    assert numbers(bounds_of(MarkerArray([circle]))) == (8, 19, 12, 23)
+    lines = marker(Marker.LINE_LIST, [(0, 5), (0, -5)])
+    assert numbers(bounds_of(MarkerArray([circle, lines]))) == (5, 19, 15, 23)
+
+
+def test_no_points_no_bounds() -> None:
+    assert bounds_of(MarkerArray([marker(Marker.LINE_LIST, [])])) is None
+
+
+def test_grown() -> None:
+    assert Bounds(0, 1, 2, 3).grown(0.5) == Bounds(-0.5, 0.5, 2.5, 3.5)
