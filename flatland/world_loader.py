@@ -50,6 +50,7 @@ def load_world(
     )
     world.path = str(file)
     try:
+        # Relative paths start from the world file's folder, also those in files that it includes.
         for entry in reader.subnode("layers", "list").items():
             _load_layer(world, entry, simplify_map)
         _load_models(world, reader)
@@ -96,7 +97,10 @@ def _load_layer(world: World, entry: YamlReader, simplify_map: int) -> None:
     else:
         try:
             layer_map = load_map(
-                reader.resolve_path(map_path), names[0], simplify=simplify_map, params=world.params
+                Source.of_file(world.path).resolve(map_path),
+                names[0],
+                simplify=simplify_map,
+                params=world.params,
             )
         except UnreadableFileError as error:
             raise reader.subnode("map").error(error.message) from error
@@ -125,7 +129,7 @@ def _load_models(world: World, reader: YamlReader) -> None:
         model_reader = entry.with_location(f'model "{name}"')
         pose = model_reader.get("pose", "pose", (0.0, 0.0, 0.0))
         namespace = model_reader.get("namespace", "string", "")
-        path = model_reader.resolve_path(model_reader.get("model", "string"))
+        path = model_reader.get("model", "string")
         model_reader.ensure_accessed_all()
         if name in names:
             raise model_reader.error(f'Model with name "{name}" already exists')

@@ -98,8 +98,12 @@ ERRORS = {
         'File does not exist, path="FOLDER/~no-such-user/m.yaml"',
     ),
     "model file is a folder": (
-        '{properties: {}, layers: [], models: [{name: M, model: ""}]}',
+        "{properties: {}, layers: [], models: [{name: M, model: .}]}",
         'Failed to read file, path="FOLDER", it is not a regular file',
+    ),
+    "model path empty": (
+        '{properties: {}, layers: [], models: [{name: M, model: ""}]}',
+        'failed to spawn model "M", the path must not be empty',
     ),
     "model twice": (
         "{properties: {}, layers: [], models: [{name: M, model: minimal.model.yaml}, "
@@ -170,6 +174,23 @@ def test_map_beyond_what_the_physics_holds(files, keys, text):
     files.write_map("map", ["   ", " # ", "   "], **keys)
     with pytest.raises(YamlError, match=rf'Invalid map in layer "L", {text} .* \[/.*map\.yaml\]$'):
         files.load("{properties: {}, layers: [{name: L, map: map.yaml}]}")
+
+
+def test_paths_in_included_files_start_from_the_world_files_folder(files, monkeypatch):
+    monkeypatch.chdir("/")
+    files.write_map("map", ["###", "#.#", "###"])
+    files.write("common/layers.yaml", "[{name: walls, map: map.yaml}]")
+    files.write("common/models.yaml", "{name: m, model: minimal.model.yaml}")
+    world = files.load(
+        """
+        properties: {}
+        layers: $include common/layers.yaml
+        models:
+          - $[include] common/models.yaml
+        """
+    )
+    assert len(world.layer("walls").edges) == 4 * 2
+    assert world.model("m").path == str(files.folder / "minimal.model.yaml")
 
 
 def test_very_many_layer_names_are_refused_at_once(files):
