@@ -325,6 +325,15 @@ def test_launch_without_a_seed_forgets_that_of_the_last_launch(
     process.wait_for_line(r"seed \d+ drawn at random")
 
 
+@pytest.mark.parametrize("file", ["server.launch", "benchmark.launch"])
+def test_launch_files_require_no_argument(launcher: Any, ros: Any, file: str) -> None:
+    del ros
+    process = launcher.launch("flatland", file, "--ros-args")
+    assert process.wait() == 0
+    process.wait_for_line("seed .default")
+    assert "Required" not in process.output
+
+
 def free_port() -> int:
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
