@@ -209,6 +209,12 @@ def test_name_is_the_namespace_and_takes_a_number(
     # Each laser has a colour of its own.
     seen = look(lambda picture: len(picture.places(LIGHT_BLUE)) > 30, panel)
     assert len(seen.places(RED)) > 30
+    # Its points go with it.
+    assert ros.delete("robot_model1").success
+    look(
+        lambda picture: not (np.abs(picture.places(LIGHT_BLUE)).max(axis=1) > 4.8).any(),
+        panel,
+    )
 
 
 def test_relative_path_and_name_of_ones_own(
@@ -330,6 +336,35 @@ def test_view_holds_models_outside_the_walls(
     look(shows(30.5, panel["width"]), panel)
     assert ros.delete("far").success
     look(shows(10.0, panel["height"]), panel)
+
+
+def test_model_is_below_the_mouse_in_a_turned_view(
+    look: Callable[..., Any], viewer: Any, screen: Any, panel: Any, room: Path
+) -> None:
+    viewer.click("whole_world")
+    x, y = panel["x"] + panel["width"] / 2, panel["y"] + panel["height"] / 2
+    for _ in range(4):
+        screen.click(x, y, button=5)
+    straight = look(lambda picture: picture.pixels_per_metre * 10 < 0.8 * panel["height"], panel)
+    screen.move(x + 150, y + 100)
+    screen.press()
+    for step in range(1, 6):
+        screen.move(x + 150 + 20 * step, y + 100)
+    screen.release()
+    # A square that stands on a corner takes more space.
+    look(lambda picture: picture.pixels_per_metre > 1.2 * straight.pixels_per_metre, panel)
+    choose(viewer, screen, room.parent / "crate.model.yaml")
+    for mouse in ((x + 120, y + 60), (x - 40, y + 130)):
+        screen.move(*mouse)
+
+        def is_below_the_mouse(picture: Any, mouse: tuple[float, float] = mouse) -> bool:
+            rows, columns = np.nonzero(picture.mask(CYAN))
+            return len(rows) > 30 and math.dist((columns.mean(), rows.mean()), mouse) < 6
+
+        look(is_below_the_mouse, panel)
+    screen.key("Escape")
+    viewer.click("whole_world")
+    look(lambda picture: abs(picture.pixels_per_metre * 10.6 - panel["height"]) < 8, panel)
 
 
 def test_escape_cancels(
