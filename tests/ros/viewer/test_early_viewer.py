@@ -56,11 +56,13 @@ def test_simulators_come_and_go(
     def tells_simulated_time(widget: dict[str, Any]) -> bool:
         return 0.0 < float(widget["text"].split()[1]) < 100.0
 
+    def fits(picture: Any) -> bool:
+        return bool(picture.pixels_per_metre * 10 == pytest.approx(area["height"] / 1.06, abs=8))
+
     def shows_room_and_robot(place: Callable[[Any], Any]) -> None:
         viewer.until("rate", lambda widget: widget["text"] == "200 Hz (x1)")
         viewer.until("time", tells_simulated_time)
-        picture = look(place, area)
-        assert picture.pixels_per_metre * 10 == pytest.approx(area["height"] / 1.06, abs=8)
+        look(lambda picture: place(picture) and fits(picture), area)
         look(lambda picture: len(picture.places(RED)) > 30, area)
 
     def robot_is_there(picture: Any) -> bool:
