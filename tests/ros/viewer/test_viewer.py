@@ -164,6 +164,8 @@ def test_spawns_by_two_clicks(
     preview = look(lambda picture: len(picture.near(CYAN, 2, -1, 0.7)) > 50, panel)
     assert preview.near(YELLOW, 2.5, -1, 0.6).size
     assert not preview.near(YELLOW, 1.4, -1, 0.3).size
+    # No handle is in the way of the mouse.
+    look(lambda picture: len(picture.near(BLUE, *START, 0.15)) > 20, panel)
     screen.click(x, y)
     screen.move(*picture.at(2, 2))
     look(lambda picture: picture.near(YELLOW, 2, -0.4, 0.2).size, panel)
@@ -372,8 +374,17 @@ def test_escape_cancels(
 ) -> None:
     picture = look(lambda picture: True, panel)
     choose(viewer, screen, room.parent / "crate.model.yaml")
-    screen.click(*picture.at(2, -1))
+    x, y = picture.at(2, -1)
+    screen.click(x, y)
     look(lambda picture: len(picture.places(YELLOW)), panel)
+    # The camera can still be moved.
+    screen.press(2)
+    for step in range(1, 6):
+        screen.move(x + 20 * step, y)
+    screen.release(2)
+    look(lambda seen: abs(seen.center[0] - picture.center[0] - 100) < 8, panel)
+    viewer.click("whole_world")
+    look(lambda seen: abs(seen.center[0] - picture.center[0]) < 2, panel)
     screen.key("Escape")
     look(lambda picture: not len(picture.places(YELLOW)), panel)
     assert viewer.widget("interact")["checked"]
