@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 import rosgraph
 import rosnode
+import yaml
 from rosgraph_msgs.msg import Clock
 
 BLUE, CYAN, RED = (0, 0, 255), (0, 255, 255), (255, 70, 70)
@@ -68,6 +69,19 @@ def test_rviz_shows_all_without_being_touched(
     assert ros.delete("crate").success
     look(lambda picture: not len(picture.near(CYAN, 2, -2, 0.7)), RVIZ_PANEL)
     assert launch.stop() == 0
+
+
+def test_nothing_is_switched_off_in_rviz(ros: Any, checkout: Path) -> None:
+    del ros
+    config = yaml.safe_load((checkout / "rviz" / "flatland.rviz").read_text())
+    displays = list(config["Visualization Manager"]["Displays"])
+    for group in displays:
+        displays += group.get("Displays", [])
+    kinds = [display["Class"].removeprefix("rviz/") for display in displays]
+    for kind, least in {"MarkerArray": 3, "LaserScan": 2, "Odometry": 2, "TF": 1}.items():
+        assert kinds.count(kind) >= least, kind
+    for display in displays:
+        assert (display["Enabled"], display["Value"]) == (True, True), display["Name"]
 
 
 def test_the_viewer_comes_with_the_simulator_and_may_go_alone(
