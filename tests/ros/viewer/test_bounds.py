@@ -9,7 +9,7 @@ import pytest
 from geometry_msgs.msg import Point, Pose, Quaternion, Vector3
 from visualization_msgs.msg import Marker, MarkerArray
 
-from flatland.viewer.bounds import Bounds, bounds_of
+from flatland.viewer.bounds import Bounds, bounds_of, union
 
 
 def marker(kind: int, points: list[tuple[float, float]], size: float = 0.03) -> Any:
@@ -38,6 +38,16 @@ def test_a_circle_has_an_extent() -> None:
     assert numbers(bounds_of(MarkerArray([circle]))) == (8, 19, 12, 23)
     lines = marker(Marker.LINE_LIST, [(0, 5), (0, -5)])
     assert numbers(bounds_of(MarkerArray([circle, lines]))) == (5, 19, 15, 23)
+
+
+def test_bounds_hold_all_markers() -> None:
+    markers = [marker(Marker.LINE_LIST, points) for points in ([], [(0, 0), (2, 1)], [(10, -1)])]
+    bounds = bounds_of(MarkerArray(markers))
+    assert numbers(bounds) == (9, 20, 11, 30)
+    assert bounds is not None
+    assert bounds.center == pytest.approx((10, 25))
+    assert bounds.size == pytest.approx((2, 10))
+    assert union([bounds, Bounds(0, 0, 1, 1)]) == Bounds(0, 0, bounds.x_max, bounds.y_max)
 
 
 def test_no_points_no_bounds() -> None:

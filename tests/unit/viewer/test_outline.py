@@ -1,16 +1,14 @@
-"""Outlines of models that are not spawned yet, and how far markers reach."""
+"""Outlines of models that are not spawned yet."""
 
 from __future__ import annotations
 
 import math
 from pathlib import Path
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 import flatland
-from flatland.viewer.bounds import Bounds, bounds_of, union
 from flatland.viewer.outline import reach, read_outline
 
 MODEL = """
@@ -58,25 +56,3 @@ def test_bad_model_is_told(tmp_path: Path) -> None:
     path.write_text("bodies: [{name: b, footprints: [{type: square}]}]\n")
     with pytest.raises(flatland.YamlError, match=r'model "crate".*support footprints are'):
         read_outline(str(path), name="crate")
-
-
-def marker(points: list[tuple[float, float]], x: float = 0, y: float = 0, yaw: float = 0) -> object:
-    return SimpleNamespace(
-        points=[SimpleNamespace(x=x, y=y, z=0.0) for x, y in points],
-        pose=SimpleNamespace(
-            position=SimpleNamespace(x=x, y=y),
-            orientation=SimpleNamespace(z=math.sin(yaw / 2), w=math.cos(yaw / 2)),
-        ),
-    )
-
-
-def test_bounds_hold_all_markers_at_their_poses() -> None:
-    markers = [marker([]), marker([(0, 0), (2, 1)], 10, 20, math.pi / 2), marker([(11, 30)])]
-    bounds = bounds_of(SimpleNamespace(markers=markers))
-    assert bounds is not None
-    corners = (bounds.x_min, bounds.y_min, bounds.x_max, bounds.y_max)
-    assert corners == pytest.approx((9, 20, 11, 30))
-    assert bounds.center == pytest.approx((10, 25))
-    assert bounds.size == pytest.approx((2, 10))
-    assert bounds_of(SimpleNamespace(markers=markers[:1])) is None
-    assert union([bounds, Bounds(0, 0, 1, 1)]) == Bounds(0, 0, bounds.x_max, bounds.y_max)
