@@ -84,7 +84,7 @@ class World:
             step_size: Simulated time of one step [s].
             velocity_iterations: Of Box2D's solver.
             position_iterations: Of Box2D's solver.
-            base_dir: Folder that relative model paths start from.
+            base_dir: Folder that relative paths of models and maps start from.
             observers: Told of all that happens, from the start.
             plugin_timeout: Wall time [s] that `on_initialize` of a plugin may take; None for as
                 long as it likes, in the thread that loads.
@@ -105,7 +105,7 @@ class World:
         self.position_iterations = position_iterations
         self.layers: list[Layer] = []
         self.ports = PortRegistry()
-        self._base_dir = Path(base_dir).absolute()
+        self._files = Source("", str(Path(base_dir).absolute()))
         self._models: dict[str, Model] = {}
         self._physics = PhysicsWorld()
         self._registry = PluginRegistry()
@@ -357,6 +357,15 @@ class World:
                 return layer
         raise WorldError(f'layer with name "{name}" does not exist')
 
+    def resolve_path(self, path: str) -> str:
+        """Makes the path of a model or map absolute.
+
+        Args:
+            path: An absolute one, one that starts with `~`, or one relative to the folder of the
+                world file, also where it stands in a file that this one includes.
+        """
+        return self._files.resolve(path)
+
     def spawn_model(
         self,
         yaml_path: str | os.PathLike[str],
@@ -406,7 +415,7 @@ class World:
     def _spawn(self, path: str, name: str, namespace: str, pose: Sequence[float]) -> Model:
         self._check_open()
         checked_pose = self._check_spawn(path, name, namespace, pose)
-        path = Source("", str(self._base_dir)).resolve(path)
+        path = self.resolve_path(path)
         reader = YamlReader.from_file(path, self.params)
         model = Model(self, name, namespace, path)
         loader = ModelLoader(self._physics, self.collision_filter, model, reader)

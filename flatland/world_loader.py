@@ -50,7 +50,6 @@ def load_world(
     )
     world.path = str(file)
     try:
-        # Relative paths start from the world file's folder, also those in files that it includes.
         for entry in reader.subnode("layers", "list").items():
             _load_layer(world, entry, simplify_map)
         _load_models(world, reader)
@@ -97,7 +96,7 @@ def _load_layer(world: World, entry: YamlReader, simplify_map: int) -> None:
     else:
         try:
             layer_map = load_map(
-                Source.of_file(world.path).resolve(map_path),
+                world.resolve_path(map_path),
                 names[0],
                 simplify=simplify_map,
                 params=world.params,
