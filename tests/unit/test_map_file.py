@@ -262,25 +262,31 @@ def test_unreadable_image(write: Write, tmp_path: Path, image: str) -> None:
     fails(path, YamlError, text + place(path, 1))
 
 
-@pytest.mark.parametrize("kind", ["pipe", "device", "zero byte"])
-def test_an_image_that_is_no_regular_file(write: Write, tmp_path: Path, kind: str) -> None:
+@pytest.mark.parametrize("file", ["pipe", "/dev/zero", '"zero\\0byte"'])
+@pytest.mark.parametrize(
+    ("text", "name", "error", "message", "line"),
+    [
+        (IMAGE_MAP, "map.png", YamlError, r'Failed to load ".*" in layer "Walls"', 1),
+        (LINE_MAP, "lines.dat", MapFileError, r'Failed to load ".*"', 2),
+    ],
+    ids=["image", "data"],
+)
+def test_what_is_no_regular_file(
+    write: Write,
+    tmp_path: Path,
+    text: str,
+    name: str,
+    error: type[Exception],
+    message: str,
+    line: int,
+    file: str,
+) -> None:
     """A pipe would keep the simulator for ever."""
     os.mkfifo(tmp_path / "pipe")
-    image = {"pipe": "pipe", "device": "/dev/zero", "zero byte": '"map\\0.png"'}[kind]
-    path = write(IMAGE_MAP.replace("map.png", image))
-    with pytest.raises(YamlError, match=r'Failed to load ".*" in layer "Walls"') as caught:
+    path = write(text.replace(name, file))
+    with pytest.raises(error, match=message) as caught:
         load_map(path, "Walls")
-    assert str(caught.value).endswith(place(path, 1))
-
-
-@pytest.mark.parametrize("kind", ["pipe", "device", "zero byte"])
-def test_data_that_is_no_regular_file(write: Write, tmp_path: Path, kind: str) -> None:
-    os.mkfifo(tmp_path / "pipe")
-    data = {"pipe": "pipe", "device": "/dev/zero", "zero byte": '"lines\\0.dat"'}[kind]
-    path = write(LINE_MAP.replace("lines.dat", data))
-    with pytest.raises(MapFileError, match=r'Failed to load ".*"') as caught:
-        load_map(path, "Walls")
-    assert str(caught.value).endswith(place(path, 2))
+    assert str(caught.value).endswith(place(path, line))
 
 
 def test_missing_data_file(write: Write, tmp_path: Path) -> None:
