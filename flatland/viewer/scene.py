@@ -6,7 +6,7 @@ import tempfile
 from pathlib import Path
 from typing import Any, Final
 
-from PyQt5.QtCore import QPoint
+from PyQt5.QtCore import QPoint, QTimer
 from PyQt5.QtGui import QKeySequence
 from PyQt5.QtWidgets import QAction, QMainWindow, QToolBar, QWidget
 
@@ -21,6 +21,7 @@ _LASER_COLORS: Final = (
     *("255; 120; 255", "255; 150; 80", "160; 160; 255", "80; 255; 220"),
 )
 _LASER_PIXELS: Final = 3
+_LOOK_EVERY: Final = 100  # ms between two looks at whether RViz has begun anew
 _CONFIG: Final = f"""
 Panels: []
 Visualization Manager:
@@ -74,7 +75,12 @@ class Scene:
         self._tools: Any = self._manager.getToolManager()
         self._root: Any = self._manager.getRootDisplayGroup()
         self._displays: dict[str, Any] = {}
+        self._marker_topics: set[str] = set()
         self._lasers_seen: dict[str, str] = {}
+        self._age = 0.0  # s of wall time since RViz began
+        self._watch = QTimer(self.widget)
+        self._watch.timeout.connect(self._look_for_reset)
+        self._watch.start(_LOOK_EVERY)
 
     # -- time ------------------------------------------------------------------------------
 
@@ -95,6 +101,7 @@ class Scene:
     def add_markers(self, topic: str, name: str) -> None:
         """Shows a MarkerArray topic."""
         self._add("rviz/MarkerArray", topic, name, {"Marker Topic": topic, "Queue Size": 10})
+        self._marker_topics.add(topic)
 
     def add_interactive_markers(self, topic: str, name: str) -> None:
         """Shows interactive markers by their update topic."""
@@ -119,6 +126,7 @@ class Scene:
     def remove(self, topic: str) -> None:
         """Takes away the display of a topic."""
         display = self._displays.pop(topic)
+        self._marker_topics.discard(topic)
         self._root.takeDisplay(display)
         display.deleteLater()
 
@@ -134,6 +142,20 @@ class Scene:
         # Only now, so that it subscribes once and to the right topic.
         display.setEnabled(True)
         self._displays[topic] = display
+
+    def _look_for_reset(self) -> None:
+        """Gets those markers again that RViz forgot.
+
+        When the time goes back, as it does with the next simulator, RViz clears all displays. A
+        marker of a latched topic that came before the new time did would not come again.
+        """
+        age = self._manager.getWallClockElapsed()
+        if age < self._age:
+            for topic in self._marker_topics:
+                # A new subscriber gets the latched message.
+                self._displays[topic].setEnabled(False)
+                self._displays[topic].setEnabled(True)
+        self._age = age
 
     # -- tools -----------------------------------------------------------------------------
 

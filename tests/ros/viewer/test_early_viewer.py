@@ -8,6 +8,8 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+import rospy
+from rosgraph_msgs.msg import Clock
 from std_srvs.srv import Empty
 
 BLUE, RED = (0, 0, 255), (255, 70, 70)
@@ -85,3 +87,26 @@ def test_simulators_come_and_go(
     on_screen.server(elsewhere, show_viz=True)
     shows_room_and_robot(robot_is_there)
     assert viewer.process.running
+
+
+@pytest.fixture
+def other_clock() -> Iterator[rospy.Publisher]:
+    """Tells the time beside the simulator."""
+    publisher = rospy.Publisher("/clock", Clock, queue_size=1, latch=True)
+    yield publisher
+    publisher.unregister()
+
+
+def test_walls_stay_when_the_time_goes_back(
+    ros: Any, other_clock: rospy.Publisher, early_viewer: Any, on_screen: Any, room: Path, look: Any
+) -> None:
+    viewer = early_viewer
+    area = viewer.widget("rviz::RenderPanel")
+    on_screen.server(room, show_viz=True)
+    look(lambda picture: len(picture.places(RED)) > 30, area)
+    ros.call("/pause", Empty)
+    viewer.until("toggle_pause", lambda widget: widget["text"] == "Resume")
+    other_clock.publish(Clock(rospy.Time(nsecs=1)))
+    viewer.until("time", lambda widget: widget["text"] == "time 0.00 s")
+    # RViz forgets all that it has shown: the scans do not come again in the pause, the walls do.
+    look(lambda picture: len(picture.places(RED)) == 0, area)
