@@ -29,13 +29,13 @@ class PauseTopic:
             simulation: Whose world to look at.
         """
         self._world = simulation.world
-        self._sent: bool | None = None
+        self._sent: bool | None = None  # what all subscribers know, None if they differ
         self._ticker = Ticker("flatland-paused", RATE, simulation.post, self._tick)
         self._topic = LatchedTopic(
             registrar,
             TOPIC,
             Bool,
-            lambda: Bool(self._world.paused),
+            self._message,
             simulation.post,
             on_connection=lambda _connected: self._ticker.wake(),
         )
@@ -44,8 +44,14 @@ class PauseTopic:
         """Looks no more."""
         self._ticker.close()
 
+    def _message(self) -> Bool:
+        if self._world.paused != self._sent:
+            # For a newcomer alone, before the others hear of it.
+            self._sent = None
+        return Bool(self._world.paused)
+
     def _tick(self, _now: float) -> bool:
         if self._world.paused != self._sent:
-            self._sent = self._world.paused
             self._topic.send()
+            self._sent = self._world.paused
         return self._topic.connected

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -78,3 +79,35 @@ def test_pause_is_told(ros: Any) -> None:
     assert paused.until(lambda message: not message.data)
     # A state that lasts is told once.
     assert paused.rest() == []
+
+
+HASTY = """
+import queue
+import rospy
+from std_msgs.msg import Bool
+from std_srvs.srv import Empty
+
+rospy.init_node("hasty", disable_rostime=True)
+pause, resume = rospy.ServiceProxy("/pause", Empty), rospy.ServiceProxy("/resume", Empty)
+for _ in range(10):
+    heard = queue.Queue()
+    # All others were told of the pause, and are not yet told of its end.
+    resume()
+    subscriber = rospy.Subscriber("/flatland_server/paused", Bool, lambda m: heard.put(m.data))
+    while heard.get():
+        pass
+    pause()
+    while not heard.get(timeout=10):
+        pass
+    subscriber.unregister()
+resume()
+"""
+
+
+def test_newcomer_hears_of_a_pause_right_after_its_first_message(ros: Any, launcher: Any) -> None:
+    """What it was told at first is news to it alone, and the pause is back before all are told."""
+    paused = ros.topic("/flatland_server/paused", Bool)
+    assert paused.next().data is False
+    # Subscribers in one process share one connection.
+    hasty = launcher.program(sys.executable, "-c", HASTY)
+    assert hasty.wait() == 0, hasty.output
