@@ -6,7 +6,7 @@ of its class, so that logs and service answers tell at a glance where the fault 
 
 from __future__ import annotations
 
-from typing import ClassVar
+from typing import ClassVar, Final
 
 
 class FlatlandError(Exception):
@@ -62,3 +62,7 @@ class StaleHandleError(PhysicsError):
 
 class WorldLockedError(PhysicsError):
     """The world is stepping: nothing may be created, destroyed or moved now."""
+
+
+PLUGIN_FAULTS: Final = (Exception, SystemExit)
+"""What a plugin's code may raise without ending the simulator; `sys.exit` is the plugin's end."""

@@ -10,7 +10,7 @@ from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any
 
 from flatland.contact import Contact, ContactImpulse, MutableContact
-from flatland.errors import PluginError
+from flatland.errors import PLUGIN_FAULTS, PluginError
 from flatland.plugin import FlatlandPlugin, ModelPlugin, WorldPlugin
 
 if TYPE_CHECKING:
@@ -194,7 +194,7 @@ class PluginHost:
         for plugin in reversed(plugins):
             try:
                 plugin.on_shutdown()
-            except Exception:
+            except PLUGIN_FAULTS:
                 _LOG.exception("%s: on_shutdown raised", describe(plugin))
             self.release(plugin)
 
@@ -203,7 +203,7 @@ class PluginHost:
         try:
             if plugin.ros is not None:
                 plugin.ros.close()
-        except Exception:
+        except PLUGIN_FAULTS:
             _LOG.exception("%s: its ROS connections could not be closed", describe(plugin))
         plugin._detach()
 
@@ -214,7 +214,7 @@ class PluginHost:
                 method(*arguments)
                 if faults:
                     faults.pop((plugin, hook), None)
-            except Exception:
+            except PLUGIN_FAULTS:
                 self._fault(plugin, hook)
 
     def _fault(self, plugin: FlatlandPlugin, hook: str) -> None:

@@ -18,7 +18,7 @@ import xml.etree.ElementTree as ElementTree
 from dataclasses import dataclass
 from pathlib import Path
 
-from flatland.errors import PluginError
+from flatland.errors import PLUGIN_FAULTS, PluginError
 from flatland.plugin import FlatlandPlugin, ModelPlugin, WorldPlugin
 
 _LOG = logging.getLogger("flatland")
@@ -228,7 +228,7 @@ class PluginRegistry:
             )
         try:
             return plugin_class()
-        except Exception as error:
+        except PLUGIN_FAULTS as error:
             raise PluginError(
                 f'class "{entry.class_path}" cannot be made: {type(error).__name__}: {error}'
             ) from error
@@ -259,7 +259,7 @@ def _load_class(entry: PluginClass) -> type[FlatlandPlugin]:
             importlib.invalidate_caches()
         try:
             module = importlib.import_module(module_name)
-        except Exception as error:
+        except PLUGIN_FAULTS as error:
             raise PluginError(
                 f'module "{module_name}" of plugin "{entry.lookup_name}" (manifest '
                 f'"{entry.manifest}") cannot be imported: {type(error).__name__}: {error}'

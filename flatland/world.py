@@ -21,7 +21,7 @@ import numpy.typing as npt
 from flatland.body import Body
 from flatland.collision_filter import CollisionFilter
 from flatland.contact import Contact
-from flatland.errors import FlatlandError, PluginError, WorldError, YamlError
+from flatland.errors import PLUGIN_FAULTS, FlatlandError, PluginError, WorldError, YamlError
 from flatland.geometry import Pose, finite_pose
 from flatland.layer import Layer
 from flatland.model import Model
@@ -548,11 +548,11 @@ class World:
             for observer in self._observers:
                 plugin.ros = plugin.ros or observer.plugin_ros(plugin)
             initialize(plugin, config, self._plugin_timeout)
-        except Exception as error:
+        except PLUGIN_FAULTS as error:
             self._host.release(plugin)
             text = error.message if isinstance(error, PluginError) else str(error)
-            if not isinstance(error, FlatlandError) and not text:
-                text = type(error).__name__
+            if isinstance(error, SystemExit) or not (isinstance(error, FlatlandError) or text):
+                text = f"{type(error).__name__} {text}".strip()
             text = f"{describe(plugin)}: {text}"
             if not isinstance(error, YamlError):  # which names a place of its own
                 text = entry.error(text).message

@@ -9,7 +9,7 @@ from typing import Any, Final
 
 import rospy
 
-from flatland.errors import PluginError
+from flatland.errors import PLUGIN_FAULTS, PluginError
 from flatland.plugin import FlatlandPlugin
 from flatland.ports import resolve_topic
 from flatland.ros.publisher import Publisher
@@ -89,7 +89,7 @@ class PluginRos:
             if not self._closed:
                 try:
                     callback(message)
-                except Exception:
+                except PLUGIN_FAULTS:
                     _LOG.exception("plugin %r: callback of %s raised", self._plugin.name, topic)
 
         subscriber = Subscriber(
@@ -119,7 +119,10 @@ class PluginRos:
         def run(request: Any) -> Any:
             if self._closed:
                 raise rospy.ServiceException(f"service {name} is gone with its model")
-            return handler(request)
+            try:
+                return handler(request)
+            except SystemExit as error:
+                raise rospy.ServiceException(f"service {name} ended with {error!r}") from error
 
         service = Service(
             self._registrar,
@@ -155,7 +158,7 @@ class PluginRos:
             if not self._shutting_down():
                 try:
                     close()
-                except Exception:
+                except PLUGIN_FAULTS:
                     _LOG.exception("plugin %r: a connection did not close", self._plugin.name)
 
     def _resolve(self, name: str) -> str:

@@ -11,6 +11,7 @@ from std_msgs.msg import Float32, String
 from std_srvs.srv import SetBool, Trigger
 
 PLUGINS = """
+import sys
 import threading
 from dataclasses import dataclass
 
@@ -51,6 +52,8 @@ class Talker(flatland.ModelPlugin):
     def on_message(self, message):
         if message.data == "raise":
             raise ValueError("as asked for")
+        if message.data == "exit":
+            sys.exit("as asked for")
         same = threading.get_ident() == self.thread
         self.echo.publish(String(f"{message.data} {same}"))
 
@@ -58,7 +61,9 @@ class Talker(flatland.ModelPlugin):
         return TriggerResponse(threading.get_ident() == self.thread, self.model.name)
 
     def on_fail(self, request):
-        raise RuntimeError("no such luck")
+        if request.data:
+            raise RuntimeError("no such luck")
+        sys.exit("no such luck either")
 
 
 class Stove(flatland.ModelPlugin):
@@ -91,6 +96,9 @@ class WrongName(flatland.ModelPlugin):
 class Faulty(flatland.ModelPlugin):
     def before_physics_step(self, timekeeper):
         raise RuntimeError("no more")
+
+    def after_physics_step(self, timekeeper):
+        sys.exit("no more of this either")
 
     def on_shutdown(self):
         raise RuntimeError("will not go")
@@ -158,10 +166,11 @@ def test_callback_that_raises_is_logged_and_called_again(
     del talker
     echo = ros.topic("/t1/echo", String)
     publisher = ros.publisher("/t1/listen", String)
-    publisher.publish(String("raise"))
-    publisher.publish(String("hi"))
-    assert echo.next().data == "hi True"
-    server.wait_for_line("ValueError: as asked for")
+    for word, kind in (("raise", "ValueError"), ("exit", "SystemExit")):
+        publisher.publish(String(word))
+        publisher.publish(String("hi"))
+        assert echo.next().data == "hi True"
+        server.wait_for_line(f"{kind}: as asked for")
 
 
 def test_service_runs_in_the_thread_of_the_simulation(ros: Any, talker: None) -> None:
@@ -176,6 +185,8 @@ def test_service_that_raises_answers_with_the_error(ros: Any, talker: None) -> N
 
     with pytest.raises(rospy.ServiceException, match="no such luck"):
         ros.call("/fail", SetBool, True)
+    with pytest.raises(rospy.ServiceException, match=r"SystemExit.*no such luck either"):
+        ros.call("/fail", SetBool, False)
 
 
 def test_registered_adapter_carries_values_both_ways(ros: Any) -> None:

@@ -24,6 +24,7 @@ HOOKS = [
     "end_contact",
 ]
 PLUGINS = '''
+import sys
 import threading
 
 from flatland import ModelPlugin, WorldPlugin
@@ -31,6 +32,7 @@ from flatland import ModelPlugin, WorldPlugin
 HOOKS = {hooks}
 woken = threading.Event()
 started = []
+quits_when_made = False
 
 
 class _Faulty:
@@ -54,6 +56,26 @@ class Model(_Faulty, ModelPlugin):
 
 class World(_Faulty, WorldPlugin):
     pass
+
+
+class Quitter(ModelPlugin):
+    """Takes itself for the program, in the hook that its parameter names."""
+
+    def __init__(self):
+        super().__init__()
+        self.calls = 0
+        if quits_when_made:
+            sys.exit(3)
+
+    def on_initialize(self, config):
+        hook = config.get("hook", "string")
+        if hook == "on_initialize":
+            sys.exit("no engine")
+        setattr(self, hook, self.quit)
+
+    def quit(self, *arguments):
+        self.calls += 1
+        sys.exit(f"fault {{self.calls}}")
 
 
 class Witness(ModelPlugin):
@@ -127,6 +149,8 @@ def faults(files, monkeypatch, request, caplog):
         for name in re.findall(r"^class ([A-Z]\w*)", PLUGINS, re.MULTILINE)
     ]
     entries.append(ENTRY.format(name="NoModule", type=f"{module}.nowhere.X", base="Model"))
+    files.write(f"src/{module}_quits.py", "import sys\nsys.exit('no licence')\n")
+    entries.append(ENTRY.format(name="Quits", type=f"{module}_quits.X", base="Model"))
     entries.append(ENTRY.format(name="Mislabelled", type=f"{module}.World", base="Model"))
     manifest = files.write("faults.xml", '<library path="src">' + "".join(entries) + "</library>")
     broken = files.write("broken.xml", "<library>\n  <class name=>\n</library>")
@@ -202,6 +226,32 @@ def test_a_hook_that_always_raises_is_called_three_times(files, faults, caplog, 
     world.spawn_model("minimal.model.yaml", "new", pose=(0, 9, 0))
     world.delete_model("robot")
     world.step()
+
+
+@pytest.mark.parametrize("hook", [*HOOKS, "on_shutdown"])
+def test_a_plugin_that_exits_does_not_end_the_program(files, faults, caplog, hook):
+    world = crowded(files, f'name: bad, type: "faults::Quitter", hook: {hook}')
+    bad = world.model("robot").plugin("bad")
+    live_through_it(world)
+    assert bad.calls == (0 if hook == "on_shutdown" else 3)
+    assert all(count > 3 for count in witness(world).values())
+    world.delete_model("robot")
+    assert f'model "robot": {hook} raised' in caplog.text
+    assert "SystemExit: fault 1" in caplog.text
+
+
+@pytest.mark.parametrize("timeout", [None, 10])
+def test_a_plugin_that_exits_at_the_start_takes_only_its_model_along(files, faults, timeout):
+    world = crowded(files, plugin_timeout=timeout)
+    entry = 'name: bad, type: "faults::Quitter", hook: on_initialize'
+    robot(files, WITNESS, entry, name="bad.yaml")
+    with pytest.raises(PluginError, match=r'model "second": SystemExit no engine \['):
+        world.spawn_model("bad.yaml", "second")
+    importlib.import_module(faults.module).quits_when_made = True
+    with pytest.raises(PluginError, match=r'Quitter" cannot be made: SystemExit: 3 \['):
+        world.spawn_model("bad.yaml", "second")
+    live_through_it(world)
+    assert all(count > 3 for count in witness(world).values())
 
 
 def test_a_plugin_that_raises_at_the_start_takes_only_its_model_along(files, faults):
@@ -309,6 +359,9 @@ def test_a_limit_must_be_positive(files, timeout):
          'module "{module}.nowhere" of plugin "faults::NoModule" (manifest "{manifest}") cannot be '
          "imported: ModuleNotFoundError: No module named '{module}.nowhere'; '{module}' is not a "
          "package"),
+        ("faults::Quits",
+         'module "{module}_quits" of plugin "faults::Quits" (manifest "{manifest}") cannot be '
+         "imported: SystemExit: no licence"),
         ("faults::World",
          'class "{module}.World" of plugin "faults::World" must be a flatland::ModelPlugin here, '
          "it is a flatland::WorldPlugin"),
