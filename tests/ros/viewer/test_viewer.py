@@ -97,8 +97,8 @@ def test_shows_the_robot_at_its_pose(
     # The handle lies on it, but for the tool that moves the camera.
     look(lambda picture: not len(picture.near(BLUE, *START, 0.15)), panel)
     viewer.click("move_camera")
-    picture = look(lambda picture: len(picture.near(BLUE, *START, 0.5)) > 200, panel)
-    assert len(picture.near(BLUE, *START, 0.15)) > 20
+    picture = look(lambda picture: len(picture.near(BLUE, *START, 0.15)) > 20, panel)
+    assert len(picture.near(BLUE, *START, 0.5)) > 200
     robot = picture.places(BLUE)
     assert robot.mean(axis=0) == pytest.approx(START, abs=0.05)
     assert np.hypot(*(robot - START).T).max() == pytest.approx(0.4, abs=0.08)
