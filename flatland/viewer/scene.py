@@ -21,6 +21,7 @@ _LASER_COLORS: Final = (
     *("255; 120; 255", "255; 150; 80", "160; 160; 255", "80; 255; 220"),
 )
 _LASER_PIXELS: Final = 3
+_MARKERS: Final = "rviz/MarkerArray"
 _LOOK_EVERY: Final = 100  # ms between two looks at whether RViz has begun anew
 _CONFIG: Final = f"""
 Panels: []
@@ -75,7 +76,6 @@ class Scene:
         self._tools: Any = self._manager.getToolManager()
         self._root: Any = self._manager.getRootDisplayGroup()
         self._displays: dict[str, Any] = {}
-        self._marker_topics: set[str] = set()
         self._lasers_seen: dict[str, str] = {}
         self._age = 0.0  # s of wall time since RViz began
         self._watch = QTimer(self.widget)
@@ -100,8 +100,7 @@ class Scene:
 
     def add_markers(self, topic: str, name: str) -> None:
         """Shows a MarkerArray topic."""
-        self._add("rviz/MarkerArray", topic, name, {"Marker Topic": topic, "Queue Size": 10})
-        self._marker_topics.add(topic)
+        self._add(_MARKERS, topic, name, {"Marker Topic": topic, "Queue Size": 10})
 
     def add_interactive_markers(self, topic: str, name: str) -> None:
         """Shows interactive markers by their update topic."""
@@ -126,7 +125,6 @@ class Scene:
     def remove(self, topic: str) -> None:
         """Takes away the display of a topic."""
         display = self._displays.pop(topic)
-        self._marker_topics.discard(topic)
         self._root.takeDisplay(display)
         display.deleteLater()
 
@@ -151,10 +149,11 @@ class Scene:
         """
         age = self._manager.getWallClockElapsed()
         if age < self._age:
-            for topic in self._marker_topics:
-                # A new subscriber gets the latched message.
-                self._displays[topic].setEnabled(False)
-                self._displays[topic].setEnabled(True)
+            for display in self._displays.values():
+                if display.getClassId() == _MARKERS:
+                    # A new subscriber gets the latched message.
+                    display.setEnabled(False)
+                    display.setEnabled(True)
         self._age = age
 
     # -- tools -----------------------------------------------------------------------------

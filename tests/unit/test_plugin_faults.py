@@ -38,16 +38,18 @@ quits_when_made = False
 class _Faulty:
     """Raises in the hook that its parameter names, and counts how often."""
 
+    start_fault, fault = ValueError, RuntimeError
+
     def on_initialize(self, config):
         self.calls = 0
         hook = config.get("hook", "string")
         if hook == "on_initialize":
-            raise ValueError("no engine")
+            raise self.start_fault("no engine")
         setattr(self, hook, self.fail)
 
     def fail(self, *arguments):
         self.calls += 1
-        raise RuntimeError(f"fault {{self.calls}}")
+        raise self.fault(f"fault {{self.calls}}")
 
 
 class Model(_Faulty, ModelPlugin):
@@ -58,24 +60,15 @@ class World(_Faulty, WorldPlugin):
     pass
 
 
-class Quitter(ModelPlugin):
-    """Takes itself for the program, in the hook that its parameter names."""
+class Quitter(_Faulty, ModelPlugin):
+    """Takes itself for the program: what it raises is that of `sys.exit`."""
+
+    start_fault = fault = SystemExit
 
     def __init__(self):
         super().__init__()
-        self.calls = 0
         if quits_when_made:
             sys.exit(3)
-
-    def on_initialize(self, config):
-        hook = config.get("hook", "string")
-        if hook == "on_initialize":
-            sys.exit("no engine")
-        setattr(self, hook, self.quit)
-
-    def quit(self, *arguments):
-        self.calls += 1
-        sys.exit(f"fault {{self.calls}}")
 
 
 class Witness(ModelPlugin):
