@@ -7,8 +7,8 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import flatland
-from flatland.bitmap import boundary_edges
 from flatland.physics import PhysicsWorld
+from flatland.physics.boundaries import boundary_edges
 
 from crowd import MOST, crowd  # isort: skip
 from curves import Curve, Panel

@@ -6,7 +6,7 @@ from io import BytesIO
 
 import numpy as np
 
-from flatland.layer import Layer
+from flatland.entities.layer import Layer
 from flatland.physics import PhysicsWorld
 from flatland.ros.layer_markers import LayerMarkers
 

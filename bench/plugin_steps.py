@@ -15,8 +15,8 @@ from typing import Any
 import yaml
 
 import flatland
-from flatland.observer import WorldObserver
-from flatland.plugin_registry import INCLUDED_PACKAGE, PluginRegistry
+from flatland.plugin_api.registry import INCLUDED_PACKAGE, PluginRegistry
+from flatland.runtime.observer import WorldObserver
 
 from scenes import BEAMS, RANGE, benchmark_world_path  # isort: skip
 from table import Row

@@ -7,8 +7,8 @@ import math
 import numpy as np
 
 import flatland
-from flatland.bitmap import boundary_edges
 from flatland.physics import PhysicsWorld
+from flatland.physics.boundaries import boundary_edges
 
 from scenes import (  # isort: skip
     BEAMS,

@@ -4,9 +4,13 @@ Make a world with `World.from_yaml`, step it with `World.step`; see `docs/` for 
 and for how to write plugins. Nothing here needs ROS; the ROS node is `flatland.ros`.
 """
 
-from flatland.body import Body
-from flatland.contact import Contact, ContactImpulse, ModelContact, MutableContact
+from flatland.config.reader import YamlReader
 from flatland.drawing import draw
+from flatland.entities.body import Body
+from flatland.entities.contact import Contact, ContactImpulse, ModelContact, MutableContact
+from flatland.entities.joint import Joint
+from flatland.entities.layer import Layer
+from flatland.entities.model import Model
 from flatland.errors import (
     FlatlandError,
     MapFileError,
@@ -17,14 +21,11 @@ from flatland.errors import (
     WorldLockedError,
     YamlError,
 )
-from flatland.joint import Joint
-from flatland.layer import Layer
-from flatland.model import Model
-from flatland.observer import WorldObserver
-from flatland.plugin import ModelPlugin, WorldPlugin
-from flatland.plugins.dynamics_limits import DynamicsLimits
-from flatland.plugins.update_timer import UpdateTimer
-from flatland.ports import Command, Output
+from flatland.plugin_api.dynamics_limits import DynamicsLimits
+from flatland.plugin_api.plugin import ModelPlugin, WorldPlugin
+from flatland.plugin_api.ports import Command, Output
+from flatland.plugin_api.update_timer import UpdateTimer
+from flatland.runtime.observer import WorldObserver
 from flatland.timekeeper import Timekeeper
 from flatland.values import (
     Collision,
@@ -38,7 +39,6 @@ from flatland.values import (
     TwistWithCovariance,
 )
 from flatland.world import World, load_world
-from flatland.yaml_reader import YamlReader
 
 __version__ = "0.1.0"
 

@@ -1,4 +1,4 @@
-"""The extension: Box2D behind handles, for flatland.physics; maps for flatland.bitmap."""
+"""The extension: Box2D behind handles for flatland.physics, and the boundaries of maps."""
 
 from collections.abc import Callable
 
@@ -192,7 +192,7 @@ class OldManifold:
     @property
     def tangent_impulses(self) -> _Doubles: ...
 
-# --- map_edges.cpp: from a bitmap to its boundary (flatland.bitmap documents them) ---
+# --- map_edges.cpp: from a bitmap to its boundary (flatland.physics.boundaries documents them) ---
 
 def boundary_edges(
     mask: npt.NDArray[np.bool_] | npt.NDArray[np.uint8], resolution: float

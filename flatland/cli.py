@@ -13,9 +13,9 @@ import yaml
 import flatland
 from flatland.drawing import PICTURE_FORMATS, check_matplotlib, save
 from flatland.errors import FlatlandError
-from flatland.plugin import FlatlandPlugin
+from flatland.loading.world_loader import SIMPLIFICATIONS
+from flatland.plugin_api.plugin import FlatlandPlugin
 from flatland.world import World
-from flatland.world_loader import SIMPLIFICATIONS
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

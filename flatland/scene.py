@@ -9,15 +9,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from flatland.body import Body, Color
+from flatland.entities.body import Body, Color
 from flatland.errors import WorldError
-from flatland.geometry import Pose, compose
+from flatland.geometry import DoubleArray, FloatArray, Pose, compose
 from flatland.timekeeper import NANOSECONDS
-from flatland.values import DoubleArray, FloatArray, LaserScan
+from flatland.values import LaserScan
 
 if TYPE_CHECKING:
-    from flatland.layer import Layer
-    from flatland.model import Model
+    from flatland.entities.layer import Layer
+    from flatland.entities.model import Model
     from flatland.plugins.laser import Laser
     from flatland.world import World
 

@@ -10,10 +10,9 @@ from matplotlib.collections import Collection, LineCollection, PolyCollection
 from matplotlib.figure import Figure
 from matplotlib.patheffects import withStroke
 
-from flatland.body import Color
-from flatland.geometry import Pose, compose
+from flatland.entities.body import Color
+from flatland.geometry import DoubleArray, Pose, compose
 from flatland.scene import Scene, Sweep
-from flatland.values import DoubleArray
 
 if TYPE_CHECKING:
     from flatland.drawing import Layout

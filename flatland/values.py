@@ -9,12 +9,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
-import numpy.typing as npt
 
-from flatland.geometry import Pose, Vector2
-
-FloatArray = npt.NDArray[np.float32]
-DoubleArray = npt.NDArray[np.float64]
+from flatland.geometry import DoubleArray, FloatArray, Pose, Vector2
 
 
 def _zeros(*shape: int) -> DoubleArray:

@@ -18,24 +18,24 @@ from typing import Any, Final, TypeAlias, TypeVar
 import numpy as np
 import numpy.typing as npt
 
-from flatland.body import Body
-from flatland.collision_filter import CollisionFilter
-from flatland.contact import Contact
+from flatland.config.node import Source
+from flatland.config.reader import YamlReader
+from flatland.entities.body import Body
+from flatland.entities.collision_filter import CollisionFilter
+from flatland.entities.contact import Contact
+from flatland.entities.layer import Layer
+from flatland.entities.model import Model
 from flatland.errors import PLUGIN_FAULTS, FlatlandError, PluginError, WorldError, YamlError
 from flatland.geometry import Pose, finite_pose
-from flatland.layer import Layer
-from flatland.model import Model
-from flatland.model_loader import ModelLoader
-from flatland.observer import WorldObserver
+from flatland.loading.model_loader import ModelLoader
 from flatland.physics import PhysicsWorld
-from flatland.plugin import FlatlandPlugin, ModelPlugin, WorldPlugin
-from flatland.plugin_host import PluginHost, describe, initialize
-from flatland.plugin_registry import PluginRegistry
-from flatland.ports import CommandTopic, Output, PortRegistry, is_legal_namespace
+from flatland.plugin_api.plugin import FlatlandPlugin, ModelPlugin, WorldPlugin
+from flatland.plugin_api.ports import CommandTopic, Output, PortRegistry, is_legal_namespace
+from flatland.plugin_api.registry import PluginRegistry
+from flatland.runtime.observer import WorldObserver
+from flatland.runtime.plugin_host import PluginHost, describe, initialize
 from flatland.timekeeper import Timekeeper
 from flatland.values import Transform
-from flatland.yaml_node import Source
-from flatland.yaml_reader import YamlReader
 
 _LOG = logging.getLogger("flatland")
 PLUGIN_TIMEOUT: Final = 60.0
@@ -156,7 +156,7 @@ class World:
             ValueError: An argument is out of its range.
         """
         # The loader knows the world, not the other way round; it is needed only here.
-        from flatland.world_loader import load_world
+        from flatland.loading.world_loader import load_world
 
         return load_world(
             cls,

@@ -10,11 +10,11 @@ be finite and within +-1e9. Box2D computes in single precision.
 """
 
 from flatland._core import OldManifold, PreSolveContact
+from flatland.geometry import Pose
 from flatland.physics.body import PhysicsBody
 from flatland.physics.contact import ContactEvent, ContactInfo
 from flatland.physics.fixture import PhysicsFixture
 from flatland.physics.joint import PhysicsJoint
-from flatland.physics.types import Pose
 from flatland.physics.world import PhysicsWorld, RayHit
 
 __all__ = [

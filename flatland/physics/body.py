@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING
 
 import numpy.typing as npt
 
+from flatland.geometry import FloatArray, Pose, Vector2
+from flatland.physics.fixture import ALL_BITS
 from flatland.physics.handle import Handle
-from flatland.physics.types import ALL_BITS, FloatArray, Pose, Vector2
 
 if TYPE_CHECKING:
     from flatland.physics.fixture import PhysicsFixture

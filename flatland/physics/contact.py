@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final, Literal
 
-from flatland.physics.types import DoubleArray
+from flatland.geometry import DoubleArray
 
 if TYPE_CHECKING:
     from flatland._core import _ContactColumns

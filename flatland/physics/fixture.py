@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
+from flatland.geometry import DoubleArray, Vector2
 from flatland.physics.handle import Handle
-from flatland.physics.types import DoubleArray, Vector2
 
 if TYPE_CHECKING:
     from flatland.physics.body import PhysicsBody
+
+ALL_BITS: Final = 0xFFFF
 
 
 class PhysicsFixture(Handle):

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from flatland.geometry import DoubleArray
 from flatland.physics.handle import Handle
-from flatland.physics.types import DoubleArray
 
 if TYPE_CHECKING:
     from flatland.physics.body import PhysicsBody

@@ -8,11 +8,11 @@ from dataclasses import dataclass
 import numpy.typing as npt
 
 from flatland import _core
+from flatland.geometry import BoolArray, FloatArray, Pose, Vector2
 from flatland.physics.body import PhysicsBody
 from flatland.physics.contact import ContactEvent, ContactInfo, to_events, to_infos
-from flatland.physics.fixture import PhysicsFixture
+from flatland.physics.fixture import ALL_BITS, PhysicsFixture
 from flatland.physics.joint import PhysicsJoint
-from flatland.physics.types import ALL_BITS, BoolArray, FloatArray, Pose, Vector2
 
 PreSolveHook = Callable[[_core.PreSolveContact, _core.OldManifold], object]
 

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from flatland.plugin import ModelPlugin
-from flatland.plugins.parameters import read_body_or_first, read_rate
-from flatland.plugins.update_timer import UpdateTimer
+from flatland.plugin_api.parameters import read_body_or_first, read_rate
+from flatland.plugin_api.plugin import ModelPlugin
+from flatland.plugin_api.update_timer import UpdateTimer
 
 if TYPE_CHECKING:
-    from flatland.contact import Contact
+    from flatland.config.reader import YamlReader
+    from flatland.entities.contact import Contact
     from flatland.timekeeper import Timekeeper
-    from flatland.yaml_reader import YamlReader
 
 
 class BoolSensor(ModelPlugin):

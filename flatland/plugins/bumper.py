@@ -7,15 +7,16 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from flatland.plugin import ModelPlugin
-from flatland.plugins.parameters import read_bodies, read_rate
-from flatland.plugins.update_timer import UpdateTimer
-from flatland.values import Collision, Collisions, DoubleArray
+from flatland.geometry import DoubleArray
+from flatland.plugin_api.parameters import read_bodies, read_rate
+from flatland.plugin_api.plugin import ModelPlugin
+from flatland.plugin_api.update_timer import UpdateTimer
+from flatland.values import Collision, Collisions
 
 if TYPE_CHECKING:
-    from flatland.contact import Contact, ContactImpulse
+    from flatland.config.reader import YamlReader
+    from flatland.entities.contact import Contact, ContactImpulse
     from flatland.timekeeper import Timekeeper
-    from flatland.yaml_reader import YamlReader
 
 _NO_FORCES = np.zeros(0)
 _NO_POINTS = np.zeros((0, 2))

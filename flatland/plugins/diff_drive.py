@@ -5,19 +5,18 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from flatland.plugin import ModelPlugin
-from flatland.plugins.dynamics_limits import DynamicsLimits
-from flatland.plugins.odometry import Odometer
-from flatland.plugins.parameters import read_body, read_rate
-from flatland.plugins.twist_command import open_twist_command
-from flatland.plugins.update_timer import UpdateTimer
+from flatland.plugin_api.drive import Odometer, open_twist_command
+from flatland.plugin_api.dynamics_limits import DynamicsLimits
+from flatland.plugin_api.parameters import read_body, read_rate
+from flatland.plugin_api.plugin import ModelPlugin
+from flatland.plugin_api.update_timer import UpdateTimer
 from flatland.values import TwistWithCovariance
 
 if TYPE_CHECKING:
+    from flatland.config.reader import YamlReader
     from flatland.geometry import Pose
-    from flatland.ports import Output
+    from flatland.plugin_api.ports import Output
     from flatland.timekeeper import Timekeeper
-    from flatland.yaml_reader import YamlReader
 
 
 class DiffDrive(ModelPlugin):

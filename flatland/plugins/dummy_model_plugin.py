@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from flatland.plugin import ModelPlugin
-from flatland.plugins.parameters import at_key
+from flatland.plugin_api.parameters import at_key
+from flatland.plugin_api.plugin import ModelPlugin
 
 if TYPE_CHECKING:
-    from flatland.yaml_reader import YamlReader
+    from flatland.config.reader import YamlReader
 
 
 class DummyModelPlugin(ModelPlugin):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from flatland.plugin import WorldPlugin
+from flatland.plugin_api.plugin import WorldPlugin
 
 
 class DummyWorldPlugin(WorldPlugin):

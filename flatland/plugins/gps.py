@@ -5,15 +5,15 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from flatland.geometry import compose
-from flatland.plugin import ModelPlugin
-from flatland.plugins.geodesy import TangentPlane
-from flatland.plugins.parameters import at_key, read_body, read_finite, read_pose, read_rate
-from flatland.plugins.update_timer import UpdateTimer
+from flatland.plugin_api.parameters import at_key, read_body, read_finite, read_pose, read_rate
+from flatland.plugin_api.plugin import ModelPlugin
+from flatland.plugin_api.update_timer import UpdateTimer
+from flatland.plugins._geodesy import TangentPlane
 from flatland.values import NavSatFix
 
 if TYPE_CHECKING:
+    from flatland.config.reader import YamlReader
     from flatland.timekeeper import Timekeeper
-    from flatland.yaml_reader import YamlReader
 
 _DEFAULT_RATE = 10.0  # Hz
 

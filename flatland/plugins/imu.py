@@ -5,24 +5,24 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from flatland.geometry import Vector2, rotate
-from flatland.plugin import ModelPlugin
-from flatland.plugins.gaussian_noise import GaussianNoise
-from flatland.plugins.parameters import (
+from flatland.plugin_api.noise import GaussianNoise
+from flatland.plugin_api.parameters import (
     at_key,
     read_body,
     read_covariance,
     read_rate,
     read_variances,
 )
-from flatland.plugins.update_timer import UpdateTimer
+from flatland.plugin_api.plugin import ModelPlugin
+from flatland.plugin_api.update_timer import UpdateTimer
 from flatland.timekeeper import NANOSECONDS
 from flatland.values import Imu as ImuValue
 
 if TYPE_CHECKING:
+    from flatland.config.reader import YamlReader
     from flatland.geometry import Pose
-    from flatland.ports import Output
+    from flatland.plugin_api.ports import Output
     from flatland.timekeeper import Timekeeper
-    from flatland.yaml_reader import YamlReader
 
 
 class Imu(ModelPlugin):

@@ -9,15 +9,21 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from flatland.geometry import compose
-from flatland.plugin import ModelPlugin
-from flatland.plugins.parameters import at_key, read_body, read_not_negative, read_pose, read_rate
-from flatland.plugins.update_timer import UpdateTimer
-from flatland.values import FloatArray, LaserScan
+from flatland.geometry import FloatArray, compose
+from flatland.plugin_api.parameters import (
+    at_key,
+    read_body,
+    read_not_negative,
+    read_pose,
+    read_rate,
+)
+from flatland.plugin_api.plugin import ModelPlugin
+from flatland.plugin_api.update_timer import UpdateTimer
+from flatland.values import LaserScan
 
 if TYPE_CHECKING:
+    from flatland.config.reader import YamlReader
     from flatland.timekeeper import Timekeeper
-    from flatland.yaml_reader import YamlReader
 
 MAX_BEAMS = 1_000_000
 MAX_RANGE = 1e6  # m; a single-precision number has steps of 6 cm there

@@ -5,13 +5,13 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from flatland.plugin import ModelPlugin
-from flatland.plugins.parameters import read_bodies, read_body_or_first, read_rate
-from flatland.plugins.update_timer import UpdateTimer
+from flatland.plugin_api.parameters import read_bodies, read_body_or_first, read_rate
+from flatland.plugin_api.plugin import ModelPlugin
+from flatland.plugin_api.update_timer import UpdateTimer
 
 if TYPE_CHECKING:
+    from flatland.config.reader import YamlReader
     from flatland.timekeeper import Timekeeper
-    from flatland.yaml_reader import YamlReader
 
 
 class ModelTfPublisher(ModelPlugin):

@@ -7,14 +7,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from flatland.errors import PluginError, WorldError
-from flatland.geometry import IDENTITY, Pose, compose, invert
-from flatland.plugin import WorldPlugin
-from flatland.plugins.parameters import at_key, read_finite
-from flatland.values import DoubleArray
+from flatland.geometry import IDENTITY, DoubleArray, Pose, compose, invert
+from flatland.plugin_api.parameters import at_key, read_finite
+from flatland.plugin_api.plugin import WorldPlugin
 
 if TYPE_CHECKING:
-    from flatland.layer import Layer
-    from flatland.yaml_reader import YamlReader
+    from flatland.config.reader import YamlReader
+    from flatland.entities.layer import Layer
 
 # A robot nearer than this to the line of a wall stands on no side of it [m].
 _ON_THE_LINE = 1e-5

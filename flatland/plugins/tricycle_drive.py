@@ -5,20 +5,19 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from flatland.plugin import ModelPlugin
-from flatland.plugins.dynamics_limits import DynamicsLimits
-from flatland.plugins.odometry import Odometer
-from flatland.plugins.parameters import at_key, read_body, read_not_negative, read_rate
-from flatland.plugins.twist_command import open_twist_command
-from flatland.plugins.update_timer import UpdateTimer
+from flatland.plugin_api.drive import Odometer, open_twist_command
+from flatland.plugin_api.dynamics_limits import DynamicsLimits
+from flatland.plugin_api.parameters import at_key, read_body, read_not_negative, read_rate
+from flatland.plugin_api.plugin import ModelPlugin
+from flatland.plugin_api.update_timer import UpdateTimer
 
 if TYPE_CHECKING:
-    from flatland.body import Body
+    from flatland.config.reader import YamlReader
+    from flatland.entities.body import Body
+    from flatland.entities.joint import Joint
+    from flatland.entities.model import Model
     from flatland.geometry import Vector2
-    from flatland.joint import Joint
-    from flatland.model import Model
     from flatland.timekeeper import Timekeeper
-    from flatland.yaml_reader import YamlReader
 
 _TOLERANCE = 1e-5  # m, within which anchors are where they must be
 

@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from flatland.geometry import Pose
-from flatland.plugin import ModelPlugin
-from flatland.plugins.easing import EASINGS
-from flatland.plugins.parameters import at_key, read_body, read_finite, read_pose
+from flatland.plugin_api.parameters import at_key, read_body, read_finite, read_pose
+from flatland.plugin_api.plugin import ModelPlugin
+from flatland.plugins._easing import EASINGS
 
 if TYPE_CHECKING:
-    from flatland.ports import Command
+    from flatland.config.reader import YamlReader
+    from flatland.plugin_api.ports import Command
     from flatland.timekeeper import Timekeeper
-    from flatland.yaml_reader import YamlReader
 
 _LOG = logging.getLogger("flatland")
 

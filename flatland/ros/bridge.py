@@ -12,14 +12,14 @@ from rosgraph_msgs.msg import Clock
 from rospy import rostime
 from tf2_msgs.msg import TFMessage
 
-from flatland.observer import WorldObserver
-from flatland.plugin import FlatlandPlugin
-from flatland.ports import Command, Output
+from flatland.plugin_api.plugin import FlatlandPlugin
+from flatland.plugin_api.ports import Command, Output
 from flatland.ros.adapters import convert, find_adapter, transform
 from flatland.ros.plugin_ros import PluginRos
 from flatland.ros.publisher import Publisher
 from flatland.ros.registrar import Registrar
 from flatland.ros.subscriber import Subscriber
+from flatland.runtime.observer import WorldObserver
 from flatland.values import Transform
 from flatland.world import World
 

@@ -13,15 +13,15 @@ from typing import Final
 
 from visualization_msgs.msg import MarkerArray
 
-from flatland.layer import Layer
-from flatland.model import Model
-from flatland.observer import WorldObserver
+from flatland.entities.layer import Layer
+from flatland.entities.model import Model
 from flatland.ros.latched_topic import LatchedTopic
 from flatland.ros.layer_markers import LayerMarkers
 from flatland.ros.model_markers import ModelMarkers
 from flatland.ros.packed_markers import JoinedMarkers, PackedMarkers
 from flatland.ros.registrar import Registrar
 from flatland.ros.ticker import Ticker
+from flatland.runtime.observer import WorldObserver
 from flatland.simulation import Simulation
 
 LAYERS: Final = "~debug/all_layers"

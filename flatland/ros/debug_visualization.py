@@ -10,11 +10,10 @@ from typing import Any, Final
 
 from visualization_msgs.msg import MarkerArray
 
+from flatland.entities.layer import Layer
+from flatland.entities.model import Model
 from flatland.errors import FlatlandError
-from flatland.layer import Layer
-from flatland.model import Model
 from flatland.msg import DebugTopicList
-from flatland.observer import WorldObserver
 from flatland.ros.latched_topic import LatchedTopic
 from flatland.ros.layer_markers import LayerMarkers
 from flatland.ros.model_markers import ModelMarkers
@@ -22,6 +21,7 @@ from flatland.ros.names import UniqueNames, legal_name
 from flatland.ros.packed_markers import PackedMarkers
 from flatland.ros.registrar import Registrar
 from flatland.ros.ticker import Ticker
+from flatland.runtime.observer import WorldObserver
 from flatland.simulation import Simulation
 
 _LOG = logging.getLogger("flatland")

@@ -9,10 +9,9 @@ from typing import Final
 from interactive_markers.menu_handler import MenuHandler
 from visualization_msgs.msg import InteractiveMarkerFeedback
 
+from flatland.entities.model import Model
 from flatland.errors import FlatlandError
 from flatland.geometry import Pose, wrap_angle
-from flatland.model import Model
-from flatland.observer import WorldObserver
 from flatland.ros.drag import Drags
 from flatland.ros.marker_server import MarkerServer
 from flatland.ros.model_handle import model_handle, planar_pose, pose_message
@@ -20,6 +19,7 @@ from flatland.ros.names import UniqueNames, sendable_text
 from flatland.ros.packed_markers import FRAME
 from flatland.ros.registrar import Registrar
 from flatland.ros.ticker import Ticker
+from flatland.runtime.observer import WorldObserver
 from flatland.simulation import Simulation
 
 _LOG = logging.getLogger("flatland")

@@ -11,9 +11,9 @@ from geometry_msgs.msg import Pose as PoseMessage
 from std_msgs.msg import ColorRGBA
 from visualization_msgs.msg import InteractiveMarker, InteractiveMarkerControl, Marker
 
-from flatland.body import Body
+from flatland.entities.body import Body
+from flatland.entities.model import Model
 from flatland.geometry import Pose, compose, invert
-from flatland.model import Model
 from flatland.ros.adapters import convert
 from flatland.ros.marker_geometry import Points, outline
 from flatland.ros.packed_markers import FRAME

@@ -6,9 +6,9 @@ from typing import Final
 
 from visualization_msgs.msg import Marker
 
-from flatland.body import Body, Color
-from flatland.joint import Joint
-from flatland.model import Model
+from flatland.entities.body import Body, Color
+from flatland.entities.joint import Joint
+from flatland.entities.model import Model
 from flatland.ros.marker_geometry import (
     CIRCLE_HEIGHT,
     Footprint,

@@ -10,8 +10,8 @@ from typing import Any, Final
 import rospy
 
 from flatland.errors import PLUGIN_FAULTS, PluginError
-from flatland.plugin import FlatlandPlugin
-from flatland.ports import resolve_topic
+from flatland.plugin_api.plugin import FlatlandPlugin
+from flatland.plugin_api.ports import resolve_topic
 from flatland.ros.publisher import Publisher
 from flatland.ros.registrar import Registrar
 from flatland.ros.service import Service, wait_for

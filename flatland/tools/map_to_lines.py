@@ -16,11 +16,11 @@ import cv2
 import numpy as np
 import yaml
 
+from flatland.config.reader import YamlReader
 from flatland.errors import FlatlandError, MapFileError
-from flatland.geometry import Pose
-from flatland.map_image import GreyImage, read_grey_image, threshold_in_place
-from flatland.tools.wall_segments import DoubleArray, find_wall_segments
-from flatland.yaml_reader import YamlReader
+from flatland.geometry import DoubleArray, Pose
+from flatland.maps.map_image import GreyImage, read_grey_image, threshold_in_place
+from flatland.tools.wall_segments import find_wall_segments
 
 IMAGE_SCALES = {"low": 1.05, "med": 1.5, "high": 2.0}
 

@@ -12,8 +12,9 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
+from flatland.geometry import DoubleArray
+
 Mask = npt.NDArray[np.bool_]
-DoubleArray = npt.NDArray[np.float64]
 
 # Parameters of the line segment detector; the image scale is the caller's choice.
 _SIGMA_SCALE = 1.0

@@ -9,14 +9,14 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
-from flatland.body import Body, Color
-from flatland.collision_filter import ALL_LAYERS, CollisionFilter
+from flatland.config.reader import YamlReader
+from flatland.entities.body import Body, Color
+from flatland.entities.collision_filter import ALL_LAYERS, CollisionFilter
+from flatland.entities.model import Model
 from flatland.geometry import IDENTITY, rotate
-from flatland.model import Model
-from flatland.model_loader import ModelLoader
+from flatland.loading.model_loader import ModelLoader
 from flatland.physics import PhysicsFixture, PhysicsWorld
 from flatland.world import World
-from flatland.yaml_reader import YamlReader
 
 _CIRCLE_POINTS: Final = 32
 FloatArray = npt.NDArray[np.float64]

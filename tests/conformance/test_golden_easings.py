@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 import flatland
-from flatland.plugins.easing import EASINGS
+from flatland.plugins._easing import EASINGS
 
 TOLERANCE = 1e-4  # m, of a way of 1 m
 

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from flatland.map_file import load_map
+from flatland.maps.map_file import load_map
 
 
 def undirected(edges: npt.ArrayLike) -> npt.NDArray[np.float64]:

@@ -9,7 +9,7 @@ import pytest
 
 import flatland
 from flatland import ModelPlugin, WorldError, YamlError
-from flatland.observer import WorldObserver
+from flatland.runtime.observer import WorldObserver
 from flatland.world import World
 
 TWO_BODIES = """

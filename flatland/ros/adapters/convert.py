@@ -10,8 +10,8 @@ from genpy import Time
 from geometry_msgs.msg import Point, Pose, Quaternion, Twist, Vector3
 from std_msgs.msg import Header
 
+from flatland.geometry import DoubleArray
 from flatland.timekeeper import NANOSECONDS
-from flatland.values import DoubleArray
 
 
 def make(message_type: type[Any], *fields: Any) -> Any:

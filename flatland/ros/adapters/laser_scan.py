@@ -5,8 +5,9 @@ from typing import Any
 import numpy as np
 from sensor_msgs.msg import LaserScan as LaserScanMessage
 
+from flatland.geometry import FloatArray
 from flatland.ros.adapters import convert, register_adapter
-from flatland.values import FloatArray, LaserScan
+from flatland.values import LaserScan
 
 
 class PackedLaserScan(LaserScanMessage):  # type: ignore[misc]

@@ -391,7 +391,7 @@ class TestBadCommands:
         self, plugin_world: Any, caplog: pytest.LogCaptureFixture, monkeypatch: Any
     ) -> None:
         now = [100.0]
-        monkeypatch.setattr("flatland.plugins.twist_command.time.monotonic", lambda: now[0])
+        monkeypatch.setattr("flatland.plugin_api.drive.time.monotonic", lambda: now[0])
         world = plugin_world(drive())
 
         def warnings_of_ten_bad_commands() -> int:

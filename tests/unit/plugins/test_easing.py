@@ -6,7 +6,7 @@ import math
 
 import pytest
 
-from flatland.plugins.easing import EASINGS
+from flatland.plugins._easing import EASINGS
 
 FAMILIES = (
     "quadratic",

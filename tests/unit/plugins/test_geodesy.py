@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from flatland.plugins.geodesy import TangentPlane, geodetic_from_ecef
+from flatland.plugins._geodesy import TangentPlane, geodetic_from_ecef
 
 A = 6378137.0
 E2 = 0.0066943799831668

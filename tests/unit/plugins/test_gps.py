@@ -10,7 +10,7 @@ import pytest
 
 import flatland
 from flatland import NavSatFix
-from flatland.plugins.geodesy import TangentPlane
+from flatland.plugins._geodesy import TangentPlane
 
 GPS = "[{type: Gps, name: antenna, body: base}]"
 DEGREE = math.radians(1.0)

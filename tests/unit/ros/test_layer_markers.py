@@ -12,7 +12,7 @@ import pytest
 
 pytest.importorskip("visualization_msgs", reason="ROS is not installed")
 
-from flatland.layer import Layer
+from flatland.entities.layer import Layer
 from flatland.physics import PhysicsWorld
 from flatland.ros.layer_markers import LayerMarkers
 

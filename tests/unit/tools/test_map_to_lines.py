@@ -14,8 +14,8 @@ import numpy as np
 import pytest
 import yaml
 
-from flatland.line_segments import read_line_segments
-from flatland.map_file import load_map
+from flatland.maps.line_segments import read_line_segments
+from flatland.maps.map_file import load_map
 from flatland.tools.map_to_lines import main
 
 ROWS, COLUMNS = 100, 150

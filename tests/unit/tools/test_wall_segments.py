@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from flatland.bitmap import boundary_edges
+from flatland.physics.boundaries import boundary_edges
 from flatland.tools.wall_segments import WallBoundary, find_wall_segments
 
 SCALES = [1.05, 1.5, 2.0]

@@ -1,0 +1,1 @@
+"""World, model and map files: YAML with includes, `$eval` and typed values."""

@@ -1,0 +1,183 @@
+"""Replaces `$eval` and `$include` in a tree of YAML nodes, before anything reads it."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable, Mapping
+from pathlib import Path
+
+from flatland.config.lua import EvalError, evaluate
+from flatland.config.node import (
+    MAX_NESTING,
+    ListNode,
+    Node,
+    NullNode,
+    ScalarNode,
+    Source,
+    load_documents,
+    parse_documents,
+)
+from flatland.errors import YamlError
+
+_LOG = logging.getLogger("flatland")
+_EVAL = "$eval"
+_INCLUDE = "$include"
+_INCLUDE_ALL = "$[include]"
+_MAX_INCLUDES = 10_000  # of one file; files that include each other twice would never end
+_MAX_SHOWN = 500
+
+ParamLookup = Callable[[str], object]
+Params = Mapping[str, object] | ParamLookup | None
+
+
+def preprocess_file(path: str, params: Params = None) -> Node:
+    """Loads a file and preprocesses its first document.
+
+    Args:
+        path: The file.
+        params: What `param(NAME)` answers: values by name, or a function of the name that
+            returns None for one that is not set.
+
+    Returns:
+        The root, a null node for a file without a document.
+
+    Raises:
+        YamlError: The file cannot be read, is not YAML, or its preprocessing fails.
+    """
+    root = _first(load_documents(path), Source.of_file(path))
+    return _Preprocessor(params).expand(root, ((_identity(path), path),), 0)
+
+
+def preprocess_text(text: str, base_dir: str, params: Params = None) -> Node:
+    """Parses a text and preprocesses its first document.
+
+    Args:
+        text: The YAML text.
+        base_dir: Folder that relative paths start from.
+        params: As for `preprocess_file`.
+
+    Raises:
+        YamlError: The text is not YAML, or its preprocessing fails.
+    """
+    source = Source("", str(Path.cwd() / base_dir))
+    root = _first(parse_documents(text, source), source)
+    return _Preprocessor(params).expand(root, (), 0)
+
+
+def _identity(path: str) -> str:
+    return str(Path(path).resolve())
+
+
+def _first(documents: list[Node], source: Source) -> Node:
+    if not documents:
+        return NullNode(source, 1)
+    if len(documents) > 1:
+        second = source.place(documents[1].line)
+        _LOG.warning("Only the first of %d YAML documents is used%s", len(documents), second)
+    return documents[0]
+
+
+def _shorten(text: str) -> str:
+    return text if len(text) <= _MAX_SHOWN else text[:_MAX_SHOWN] + "..."
+
+
+_Chain = tuple[tuple[str, str], ...]
+"""The files from the outermost to the innermost: real path, path for messages."""
+
+
+class _Preprocessor:
+    """One run over a file and all that it includes."""
+
+    def __init__(self, params: Params) -> None:
+        self._params = params
+        self._includes = 0
+        # An alias is the same node as its anchor, so that it is expanded once. The nodes are
+        # kept: an id is only good while its object lives.
+        self._done: dict[int, tuple[Node, Node]] = {}
+
+    def expand(self, node: Node, chain: _Chain, depth: int) -> Node:
+        """Expands a node in place where it can, and returns what takes its place."""
+        if isinstance(node, NullNode):
+            return node
+        done = self._done.get(id(node))
+        if done is not None:
+            return done[1]
+        if depth > MAX_NESTING:
+            raise self._error(node, f"Nested deeper than {MAX_NESTING} levels")
+        result: Node = node
+        if isinstance(node, ScalarNode):
+            result = self._expand_scalar(node, chain, depth)
+        elif isinstance(node, ListNode):
+            node.items = self._expand_items(node.items, chain, depth)
+        else:
+            for key, value in node.entries.items():
+                node.entries[key] = self.expand(value, chain, depth + 1)
+        self._done[id(node)] = (node, result)
+        return result
+
+    def _expand_items(self, items: list[Node], chain: _Chain, depth: int) -> list[Node]:
+        expanded: list[Node] = []
+        for item in items:
+            if isinstance(item, ScalarNode) and item.text.startswith(_INCLUDE_ALL):
+                expanded += self._include(item, _INCLUDE_ALL, chain, depth + 1)
+            else:
+                expanded.append(self.expand(item, chain, depth + 1))
+        return expanded
+
+    def _expand_scalar(self, node: ScalarNode, chain: _Chain, depth: int) -> Node:
+        if node.text.startswith(_EVAL):
+            return ScalarNode(node.source, node.line, self._evaluate(node))
+        if node.text.startswith(_INCLUDE):
+            return self._include(node, _INCLUDE, chain, depth)[0]
+        if node.text.startswith(_INCLUDE_ALL):
+            raise self._error(node, f"{_INCLUDE_ALL} must be an item of a list")
+        return node
+
+    def _evaluate(self, node: ScalarNode) -> str:
+        expression = node.text[len(_EVAL) :].strip(" \t\r\n\f\v")
+        try:
+            result = evaluate(expression, self._param)
+        except EvalError as error:
+            message = f'Failed to evaluate "{_shorten(expression)}", {_shorten(str(error))}'
+            raise self._error(node, message) from error
+        for name in result.unset:
+            _LOG.warning("%s is not set%s", name, node.source.place(node.line))
+        return result.text
+
+    def _param(self, name: str) -> object:
+        if self._params is None:
+            return None
+        if isinstance(self._params, Mapping):
+            return self._params.get(name)
+        return self._params(name)
+
+    def _include(self, node: ScalarNode, marker: str, chain: _Chain, depth: int) -> list[Node]:
+        written = node.text[len(marker) :].strip()
+        path = node.source.resolve(written)
+        try:
+            exists = bool(written) and Path(path).exists()
+        except (OSError, ValueError):
+            exists = False
+        if not exists:
+            raise self._error(
+                node, f"File specified in {marker} does not exist, path={path}, include={written}"
+            )
+        self._includes += 1
+        if self._includes > _MAX_INCLUDES:
+            raise self._error(node, f"More than {_MAX_INCLUDES} files are included")
+        identity = _identity(path)
+        if any(identity == other for other, _ in chain):
+            files = " -> ".join([*(shown for _, shown in chain), path])
+            raise self._error(node, f"File includes itself, {files}")
+        try:
+            documents = load_documents(path)
+        except YamlError as error:
+            raise self._error(node, error.message) from error
+        if marker == _INCLUDE:
+            documents = [_first(documents, Source.of_file(path))]
+        chain = (*chain, (identity, path))
+        return [self.expand(document, chain, depth) for document in documents]
+
+    @staticmethod
+    def _error(node: Node, message: str) -> YamlError:
+        return YamlError(message + node.source.place(node.line))

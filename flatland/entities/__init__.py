@@ -1,0 +1,1 @@
+"""What a world is made of: layers, models, bodies, joints and contacts."""

@@ -1,0 +1,1 @@
+"""Loaders that build a world or a model from its YAML file."""

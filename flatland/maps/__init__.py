@@ -1,0 +1,1 @@
+"""Map files and map images, converted to the edges of a layer."""

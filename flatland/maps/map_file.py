@@ -1,0 +1,164 @@
+"""Map files: the geometry of a layer, from an image or from line segments."""
+
+from __future__ import annotations
+
+import logging
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from flatland.config.reader import YamlReader
+from flatland.errors import MapFileError
+from flatland.geometry import Pose
+from flatland.maps.line_segments import read_line_segments
+from flatland.maps.map_image import image_edges, read_grey_image, threshold_in_place
+
+_LOG = logging.getLogger("flatland")
+
+# What map_server and its relatives read or write beside the keys that count here.
+_IGNORED_IMAGE_KEYS = ("negate", "free_thresh", "mode", "frame_id")
+
+
+@dataclass(frozen=True, eq=False)
+class LayerMap:
+    """Static geometry of one layer.
+
+    Attributes:
+        origin: Pose of the layer's body in the world frame [m, m, rad].
+        edges: Edges (x1, y1, x2, y2) in the frame of the layer's body [m], shape (n, 4).
+        exact_edge_count: How many edges there are without simplification.
+        path: The map file.
+    """
+
+    origin: Pose
+    edges: npt.NDArray[np.float32]
+    exact_edge_count: int
+    path: str
+
+
+def load_map(
+    path: str,
+    layer_name: str,
+    *,
+    simplify: int = 0,
+    params: Mapping[str, object] | Callable[[str], object] | None = None,
+) -> LayerMap:
+    """Reads a map file and what it names.
+
+    Args:
+        path: Map file (YAML).
+        layer_name: The layer's first name, for errors and the log.
+        simplify: 0 exact boundary of the image; 1 boundary simplified within a pixel; 2 the same
+            after small features of the free space were removed. Line segments stay as they are.
+        params: What `param()` in the map file answers from.
+
+    Returns:
+        The layer's geometry.
+
+    Raises:
+        ValueError: `simplify` is none of 0, 1, 2.
+        YamlError: The map file is wrong, or its image cannot be read.
+        MapFileError: The data file of line segments cannot be read.
+    """
+    if simplify not in (0, 1, 2):
+        raise ValueError(f"simplify must be 0, 1 or 2, got {simplify!r}")
+    reader = YamlReader.from_file(path, params).with_location(f'layer "{layer_name}"')
+    map_type: str | None = reader.get("type", "string", None)
+    if map_type is None:
+        layer_map = _load_image(reader, layer_name, simplify)
+    elif map_type == "line_segments":
+        layer_map = _load_line_segments(reader, layer_name)
+    else:
+        raise reader.subnode("type").error(
+            f'Invalid "type" in layer "{layer_name}", must be line_segments or be left out (image)'
+        )
+    edge_count = len(layer_map.edges)
+    if edge_count == layer_map.exact_edge_count:
+        _LOG.info('Layer "%s": %d edges from %s', layer_name, edge_count, path)
+    else:
+        _LOG.info(
+            'Layer "%s": %d edges from %s, simplified (exact: %d)',
+            layer_name,
+            edge_count,
+            path,
+            layer_map.exact_edge_count,
+        )
+    return layer_map
+
+
+def _load_image(reader: YamlReader, layer_name: str, simplify: int) -> LayerMap:
+    reader = reader.without("type", *_IGNORED_IMAGE_KEYS)
+    image_path = reader.resolve_path(reader.get("image", "string"))
+    resolution = _finite(reader, layer_name, "resolution")
+    origin = _finite_origin(reader, layer_name)
+    occupied_thresh = _finite(reader, layer_name, "occupied_thresh")
+    reader.ensure_accessed_all()
+    if resolution <= 0:
+        raise _invalid(reader, layer_name, "resolution", f"must be positive, got {resolution}")
+    if not 0 <= occupied_thresh <= 1:
+        _LOG.warning(
+            'Layer "%s": "occupied_thresh" is %g, but pixels have values from 0 to 1',
+            layer_name,
+            occupied_thresh,
+        )
+    try:
+        image = read_grey_image(image_path)
+    except OSError as error:
+        node = reader.subnode("image")
+        raise node.error(f'Failed to load "{image_path}" in layer "{layer_name}"') from error
+    try:
+        mask = threshold_in_place(image, occupied_thresh)
+        edges, exact_edge_count = image_edges(mask, resolution, simplify)
+    except ValueError as error:
+        raise _invalid(reader, layer_name, "resolution", str(error)) from error
+    return LayerMap(origin, edges, exact_edge_count, reader.path)
+
+
+def _load_line_segments(reader: YamlReader, layer_name: str) -> LayerMap:
+    reader = reader.without("type")
+    data_path = reader.resolve_path(reader.get("data", "string"))
+    scale = _finite(reader, layer_name, "scale")
+    origin = _finite_origin(reader, layer_name)
+    reader.ensure_accessed_all()
+    if scale == 0:
+        raise _invalid(reader, layer_name, "scale", "must not be 0")
+    try:
+        segments = read_line_segments(data_path)
+    except OSError as error:
+        place = reader.subnode("data").error(f'Failed to load "{data_path}"')
+        raise MapFileError(place.message) from error
+    with np.errstate(over="ignore"):
+        edges = (segments * scale).astype(np.float32)
+    if not np.isfinite(edges).all():
+        raise _invalid(reader, layer_name, "scale", "a coordinate does not fit a 32-bit float")
+    has_length = (edges[:, :2] != edges[:, 2:]).any(axis=1)
+    if not has_length.all():
+        _LOG.warning(
+            'Layer "%s": %d line segments of length 0 in %s are left out',
+            layer_name,
+            np.count_nonzero(~has_length),
+            data_path,
+        )
+        edges = edges[has_length]
+    return LayerMap(origin, edges, len(edges), reader.path)
+
+
+def _finite(reader: YamlReader, layer_name: str, key: str) -> float:
+    value: float = reader.get(key, "float")
+    if not math.isfinite(value):
+        raise _invalid(reader, layer_name, key, f"must be finite, got {value}")
+    return value
+
+
+def _finite_origin(reader: YamlReader, layer_name: str) -> Pose:
+    origin: Pose = reader.get("origin", "pose")
+    if not all(math.isfinite(value) for value in origin):
+        raise _invalid(reader, layer_name, "origin", f"must be finite, got {list(origin)}")
+    return origin
+
+
+def _invalid(reader: YamlReader, layer_name: str, key: str, why: str) -> Exception:
+    return reader.subnode(key).error(f'Invalid "{key}" in layer "{layer_name}", {why}')

@@ -1,0 +1,184 @@
+"""Images of maps: from a file to the edges of a layer."""
+
+from __future__ import annotations
+
+import importlib
+import mmap
+import re
+import struct
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from flatland.physics.boundaries import boundary_edges, boundary_loops
+from flatland.regular_file import open_regular
+
+GreyImage = npt.NDArray[np.uint8]
+Edges = npt.NDArray[np.float32]
+
+# A loop that simplification would leave with no more points than this stays exact: a pillar or a
+# table leg is a rectangle already, and would lose its corners or vanish.
+_FEWEST_LOOP_POINTS = 5
+_TOLERANCE_PIXELS = 1.0
+_OPENING_KERNEL = (7, 7)
+# Grey of 8 bits, as map_server and drawing programs write it: there is nothing to convert, and
+# Pillow is loaded in a tenth of the time and memory that OpenCV takes.
+_GREY_PNG = re.compile(rb"\x89PNG\r\n\x1a\n\0\0\0\rIHDR(?P<width>.{4})(?P<height>.{4})\x08\0", re.S)
+_GREY_PGM = re.compile(rb"P5\s(?:#[^\n]*\n|\s)*(\d+)\s+(?:#[^\n]*\n\s*)*(\d+)\s+255\s")
+_HEADER_SIZE = 512
+_MOST_PIXELS_OF_PILLOW = 80_000_000  # of more it warns
+
+
+def read_grey_image(path: str) -> GreyImage:
+    """Reads an image as 8-bit grey; an alpha channel is dropped, not blended.
+
+    Args:
+        path: PNG, PGM, JPEG, BMP, TIFF or whatever else OpenCV reads.
+
+    Returns:
+        Pixels, the top row first, shape (rows, columns).
+
+    Raises:
+        OSError: There is no such file, or it is not an image.
+    """
+    # OpenCV would print a warning of its own for a file that it cannot open.
+    with open_regular(path) as file:
+        header = file.read(_HEADER_SIZE)
+    if _is_plain_grey(header):
+        plain = _read_plain_grey(path)
+        if plain is not None:
+            return plain
+    cv2 = _opencv()
+    is_tiff = header[:4] in (b"II*\0", b"MM\0*")
+    try:
+        image = _decode_tiff(path) if is_tiff else cv2.imread(path, cv2.IMREAD_GRAYSCALE)
+    except cv2.error as error:
+        raise OSError(f"OpenCV cannot read {path}: {error}") from error
+    if image is None:
+        raise OSError(f"OpenCV cannot read {path} as an image")
+    grey: GreyImage = image
+    return grey
+
+
+def _opencv() -> Any:
+    """Loads OpenCV, which most maps do without, as it makes the start of a program slower."""
+    return importlib.import_module("cv2")
+
+
+def _is_plain_grey(header: bytes) -> bool:
+    """Tells whether a file's beginning is that of an image whose bytes are the grey values."""
+    png = _GREY_PNG.match(header)
+    if png:
+        width, height = (int.from_bytes(png[key], "big") for key in ("width", "height"))
+    else:
+        pgm = _GREY_PGM.match(header)
+        if not pgm:
+            return False
+        width, height = int(pgm[1]), int(pgm[2])
+    return 0 < width * height <= _MOST_PIXELS_OF_PILLOW
+
+
+def _read_plain_grey(path: str) -> GreyImage | None:
+    """Reads 8-bit grey by Pillow; None where that is missing or refuses the file."""
+    try:
+        with importlib.import_module("PIL.Image").open(path) as image:
+            return np.array(image) if image.mode == "L" else None
+    except (ImportError, OSError, SyntaxError, ValueError):
+        return None  # OpenCV has the last word on broken files.
+
+
+def _decode_tiff(path: str) -> npt.NDArray[np.uint8] | None:
+    """Decodes a TIFF whose alpha channel, if it has one, is told to mean nothing.
+
+    libtiff would otherwise multiply the colours by an alpha that is not already in them, and a
+    transparent white pixel would become black.
+    """
+    cv2 = _opencv()
+    with (
+        Path(path).open("rb") as file,
+        mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_COPY) as data,
+    ):
+        _forget_tiff_alpha(data)
+        buffer = np.frombuffer(data, np.uint8)
+        try:
+            image: npt.NDArray[np.uint8] | None = cv2.imdecode(buffer, cv2.IMREAD_GRAYSCALE)
+        finally:
+            del buffer  # or the map could not be closed
+    return image
+
+
+def _forget_tiff_alpha(data: mmap.mmap) -> None:
+    """Changes the first page's ExtraSamples from unassociated alpha to unspecified."""
+    extra_samples_tag, short_type, unassociated, unspecified = 338, 3, 2, 0
+    order = "<" if data[:2] == b"II" else ">"
+    entry = struct.Struct(order + "HHIH2x")
+    try:
+        (directory,) = struct.unpack_from(order + "I", data, 4)
+        (count,) = struct.unpack_from(order + "H", data, directory)
+        for offset in range(directory + 2, directory + 2 + count * entry.size, entry.size):
+            if entry.unpack_from(data, offset) == (extra_samples_tag, short_type, 1, unassociated):
+                entry.pack_into(data, offset, extra_samples_tag, short_type, 1, unspecified)
+    except struct.error:
+        return  # a broken file: the decoder refuses it
+
+
+def threshold_in_place(image: GreyImage, occupied_thresh: float) -> GreyImage:
+    """Turns grey into on (1) where value / 255 >= `occupied_thresh`, else off (0).
+
+    Args:
+        image: Grey pixels; overwritten, since a large map should not be in memory twice.
+        occupied_thresh: Threshold, 0 to 1.
+
+    Returns:
+        The same array.
+    """
+    # Of the 256 values that there are, the least that is on; 256 where none is.
+    least = int(np.searchsorted(np.arange(256) / 255.0, occupied_thresh))
+    np.greater_equal(image, least, out=image.view(np.bool_))
+    return image
+
+
+def image_edges(mask: GreyImage, resolution: float, simplify: int) -> tuple[Edges, int]:
+    """Finds the edges of a layer.
+
+    Args:
+        mask: On (1) and off (0) pixels, the top row first, shape (rows, columns).
+        resolution: Size of a pixel [m].
+        simplify: 0 exact; 1 simplified boundary loops; 2 the on pixels are opened before.
+
+    Returns:
+        Edges (x1, y1, x2, y2) [m], origin at the image's lower left corner, shape (n, 4); and how
+        many there are without simplification.
+
+    Raises:
+        ValueError: The map's size in metres does not fit a 32-bit float.
+    """
+    exact = boundary_edges(mask, resolution)
+    if simplify == 0:
+        return exact, len(exact)
+    if simplify == 2:
+        cv2 = _opencv()
+        kernel = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, _OPENING_KERNEL)
+        mask = cv2.morphologyEx(mask, cv2.MORPH_OPEN, kernel)
+    return _simplified_edges(mask, resolution), len(exact)
+
+
+def _simplified_edges(mask: GreyImage, resolution: float) -> Edges:
+    loops = [_simplified_loop(loop) for loop in boundary_loops(mask)]
+    if not loops:
+        return np.empty((0, 4), np.float32)
+    points = np.concatenate(loops)
+    ends = np.cumsum([len(loop) for loop in loops])
+    successor = np.arange(1, len(points) + 1)
+    successor[ends - 1] = np.concatenate(([0], ends[:-1]))
+    return (np.hstack((points, points[successor])) * resolution).astype(np.float32)
+
+
+def _simplified_loop(loop: npt.NDArray[np.int32]) -> npt.NDArray[np.int32]:
+    if len(loop) < _FEWEST_LOOP_POINTS:
+        return loop
+    cv2 = _opencv()
+    kept: npt.NDArray[np.int32] = cv2.approxPolyDP(loop, _TOLERANCE_PIXELS, closed=True)[:, 0]
+    return loop if len(kept) < _FEWEST_LOOP_POINTS else kept

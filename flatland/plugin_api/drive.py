@@ -1,0 +1,180 @@
+"""What the drives share: the velocity command, ground truth and odometry."""
+
+from __future__ import annotations
+
+import logging
+import math
+import time
+from typing import TYPE_CHECKING
+
+from flatland.geometry import Pose
+from flatland.plugin_api.noise import GaussianNoise
+from flatland.plugin_api.parameters import planar_diagonal, read_covariance, read_variances
+from flatland.values import Odometry, Twist
+
+if TYPE_CHECKING:
+    from flatland.config.reader import YamlReader
+    from flatland.entities.body import Body
+    from flatland.plugin_api.plugin import ModelPlugin
+    from flatland.plugin_api.ports import Command, Output
+
+_LOG = logging.getLogger("flatland")
+
+WARNING_PERIOD = 1.0  # s of wall time between two warnings of one drive
+# No robot gets there, and what a drive makes of it stays within the bounds of the physics.
+MAX_COMMAND = 1e6
+
+
+class TwistGuard:
+    """Refuses commands that are no numbers, so that the last good one stays."""
+
+    def __init__(self, owner: str) -> None:
+        """Names the drive in its warnings.
+
+        Args:
+            owner: For the log, such as `plugin "drive" of model "robot"`.
+        """
+        self._owner = owner
+        self._last_warning = -math.inf
+
+    def __call__(self, twist: Twist) -> bool:
+        """Tells whether a command may be followed; warns when not, at most once a second."""
+        if (
+            abs(twist.linear_x) <= MAX_COMMAND
+            and abs(twist.linear_y) <= MAX_COMMAND
+            and abs(twist.angular_z) <= MAX_COMMAND
+        ):
+            return True
+        now = time.monotonic()
+        if now - self._last_warning >= WARNING_PERIOD:
+            self._last_warning = now
+            _LOG.warning(
+                "%s: %s is not finite or beyond all bounds, the last good command stays",
+                self._owner,
+                twist,
+            )
+        return False
+
+
+def open_twist_command(plugin: ModelPlugin, topic: str) -> Command[Twist]:
+    """Declares the velocity command of a drive.
+
+    Unlike the reference: a NaN or infinite command is refused, it would stay in the physics.
+
+    Args:
+        plugin: The drive.
+        topic: Under the model's namespace, global with a leading `/`.
+    """
+    guard = TwistGuard(f'plugin "{plugin.name}" of model "{plugin.model.name}"')
+    return plugin.command(topic, Twist, accept=guard)
+
+
+class Odometer:
+    """Reads the parameters of odometry and reports a body's motion as ground truth and odometry.
+
+    Attributes:
+        frame_id: Frame of the odometry's pose, as written.
+        child_frame_id: Frame of the body.
+        twist_covariance: Reported with the twist, shape (6, 6).
+        twist_noise: Of vx, vy and the yaw rate.
+    """
+
+    def __init__(
+        self,
+        plugin: ModelPlugin,
+        config: YamlReader,
+        body: Body,
+        *,
+        twist_in_local_frame: bool,
+        publish: bool = True,
+    ) -> None:
+        """Reads the parameters and declares the outputs.
+
+        Args:
+            plugin: The drive.
+            config: Its parameters.
+            body: Whose origin is reported.
+            twist_in_local_frame: Default of the parameter of that name.
+            publish: Whether there are outputs; the parameters are checked in any case.
+
+        Raises:
+            YamlError: A parameter is wrong.
+            PluginError: A topic is no legal name.
+        """
+        truth_topic = config.get("ground_truth_pub", "string", "odometry/ground_truth")
+        odometry_topic = config.get("odom_pub", "string", "odometry/filtered")
+        self.frame_id: str = config.get("odom_frame_id", "string", "odom")
+        self._truth_frame_id: str = config.get("ground_truth_frame_id", "string", "map")
+        self._local: bool = config.get("twist_in_local_frame", "bool", twist_in_local_frame)
+        pose_variances = read_variances(config, "odom_pose_noise")
+        twist_variances = read_variances(config, "odom_twist_noise")
+        self._pose_covariance = read_covariance(
+            config, "odom_pose_covariance", planar_diagonal(pose_variances)
+        )
+        self.twist_covariance = read_covariance(
+            config, "odom_twist_covariance", planar_diagonal(twist_variances)
+        )
+        self._pose_noise = GaussianNoise(plugin.rng, pose_variances)
+        self.twist_noise = GaussianNoise(plugin.rng, twist_variances)
+        self.child_frame_id = plugin.model.frame(body.name)
+        self._truth: Output[Odometry] | None = None
+        self._odometry: Output[Odometry] | None = None
+        if publish:
+            self._truth = plugin.output(truth_topic, Odometry)
+            self._odometry = plugin.output(odometry_topic, Odometry)
+
+    @property
+    def wanted(self) -> bool:
+        """Whether anybody listens to the ground truth or the odometry."""
+        truth, odometry = self._truth, self._odometry
+        return (truth is not None and truth.wanted) or (odometry is not None and odometry.wanted)
+
+    def report(self, stamp: int, pose: Pose, velocity: Pose) -> Pose:
+        """Emits the ground truth and the odometry, each if somebody listens.
+
+        Args:
+            stamp: Simulated time [ns].
+            pose: (x, y, yaw) of the body's origin in the world frame.
+            velocity: (vx, vy, omega) of the body's origin in the world frame.
+
+        Returns:
+            The pose with the noise that the odometry has it with.
+        """
+        noisy_pose = self._noisy(pose, self._pose_noise)
+        truth, odometry = self._truth, self._odometry
+        if truth is None or odometry is None or not (truth.wanted or odometry.wanted):
+            return noisy_pose
+        twist = to_local(velocity, pose[2]) if self._local else velocity
+        child = self.child_frame_id
+        if truth.wanted:
+            truth.emit(Odometry(stamp, self._truth_frame_id, child, pose, twist))
+        if odometry.wanted:
+            odometry.emit(
+                Odometry(
+                    stamp,
+                    self.frame_id,
+                    child,
+                    noisy_pose,
+                    self._noisy(twist, self.twist_noise),
+                    self._pose_covariance,
+                    self.twist_covariance,
+                )
+            )
+        return noisy_pose
+
+    @staticmethod
+    def _noisy(values: Pose, noise: GaussianNoise) -> Pose:
+        if not noise:
+            return values
+        return (
+            values[0] + noise.sample(0),
+            values[1] + noise.sample(1),
+            values[2] + noise.sample(2),
+        )
+
+
+def to_local(velocity: Pose, yaw: float) -> Pose:
+    """Expresses a velocity given in the world frame in the frame of a body that has this yaw."""
+    vx, vy, omega = velocity
+    c, s = math.cos(yaw), math.sin(yaw)
+    return (c * vx + s * vy, c * vy - s * vx, omega)

@@ -1,0 +1,103 @@
+"""Limits of a velocity and of its change."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+from flatland.plugin_api.parameters import read_not_negative
+
+if TYPE_CHECKING:
+    from flatland.config.reader import YamlReader
+
+
+class DynamicsLimits:
+    """Follows a velocity command as fast as the limits allow; 0 stands for no limit.
+
+    Units are [m/s] and [m/s²], or [rad/s] and [rad/s²].
+
+    Attributes:
+        velocity_limit: Greatest speed.
+        acceleration_limit: Greatest change of velocity away from zero, per second.
+        deceleration_limit: Greatest change of velocity towards zero, per second.
+    """
+
+    __slots__ = ("acceleration_limit", "deceleration_limit", "velocity_limit")
+
+    def __init__(
+        self,
+        velocity_limit: float = 0.0,
+        acceleration_limit: float = 0.0,
+        deceleration_limit: float | None = None,
+    ) -> None:
+        """Sets the limits, 0 or infinity for none.
+
+        Args:
+            velocity_limit: Greatest speed.
+            acceleration_limit: Greatest change of velocity away from zero, per second.
+            deceleration_limit: The same towards zero; None for the acceleration limit.
+
+        Raises:
+            ValueError: A limit is negative or NaN.
+        """
+        if deceleration_limit is None:
+            deceleration_limit = acceleration_limit
+        self.velocity_limit = _checked("velocity_limit", velocity_limit)
+        self.acceleration_limit = _checked("acceleration_limit", acceleration_limit)
+        self.deceleration_limit = _checked("deceleration_limit", deceleration_limit)
+
+    @classmethod
+    def from_config(cls, reader: YamlReader) -> DynamicsLimits:
+        """Reads the limits from a map, which may be missing.
+
+        Args:
+            reader: Over the map, as `optional_subnode` gives it.
+
+        Raises:
+            YamlError: A limit is negative or no number, or there is an unknown key.
+        """
+        if reader.is_null:
+            return cls()
+        velocity = read_not_negative(reader, "velocity_limit", 0.0)
+        acceleration = read_not_negative(reader, "acceleration_limit", 0.0)
+        deceleration = read_not_negative(reader, "deceleration_limit", acceleration)
+        reader.ensure_accessed_all()
+        return cls(velocity, acceleration, deceleration)
+
+    def limit(self, v: float, target: float, dt: float) -> float:
+        """Returns the velocity after one step towards a target.
+
+        Args:
+            v: Present velocity.
+            target: Velocity asked for.
+            dt: Size of the step [s].
+        """
+        top = self.velocity_limit
+        if top:
+            target = min(max(target, -top), top)
+        if target == v:
+            return target
+        acceleration, deceleration = self.acceleration_limit, self.deceleration_limit
+        if v * target < 0:
+            change = self._crossing_change(abs(v), dt)
+        elif abs(target) > abs(v):
+            change = acceleration * dt if acceleration else math.inf
+        else:
+            change = deceleration * dt if deceleration else math.inf
+        return v + min(max(target - v, -change), change)
+
+    def _crossing_change(self, speed: float, dt: float) -> float:
+        """Returns how much a velocity may change in a step that is to turn its sign."""
+        acceleration, deceleration = self.acceleration_limit, self.deceleration_limit
+        if deceleration and speed > deceleration * dt:
+            return deceleration * dt
+        if not acceleration:
+            return math.inf
+        time_to_zero = speed / deceleration if deceleration else 0.0
+        return speed + acceleration * (dt - time_to_zero)
+
+
+def _checked(name: str, limit: float) -> float:
+    if not limit >= 0:
+        raise ValueError(f"{name} must not be negative or NaN, got {limit}")
+    return 0.0 if math.isinf(limit) else float(limit)

@@ -1,0 +1,233 @@
+"""Base classes of plugins: what a model or world plugin is, has and may do.
+
+A plugin declares its ports and hooks and knows no ROS. See `docs/write_a_plugin.md`.
+"""
+
+from __future__ import annotations
+
+import builtins
+from typing import TYPE_CHECKING, Any, ClassVar, TypeVar
+
+import numpy as np
+
+from flatland.entities.contact import Contact, ContactImpulse, ModelContact, MutableContact
+from flatland.errors import PluginError
+from flatland.plugin_api.ports import Command, Output, resolve_topic
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from flatland.config.reader import YamlReader
+    from flatland.entities.model import Model
+    from flatland.physics import OldManifold
+    from flatland.timekeeper import Timekeeper
+    from flatland.world import World
+
+T = TypeVar("T")
+
+
+class FlatlandPlugin:
+    """What model and world plugins share: a name, ports, random numbers and hooks that do nothing.
+
+    A subclass overrides the hooks that it needs; one that it leaves alone costs nothing. It needs
+    no `__init__`: all of the attributes below are there when `on_initialize` runs.
+
+    Attributes:
+        name: As in the YAML file.
+        type: As in the YAML file.
+        world: The world that it acts in.
+        namespace: Under which relative topics and frames live, may be empty.
+        rng: Source of all its random numbers, seeded from the world's seed and its names.
+        ros: Gives access to ROS (topics, services, parameters), None without ROS.
+    """
+
+    base_class_type: ClassVar[str] = ""
+
+    name: str
+    type: str
+    world: World
+    namespace: str
+    rng: np.random.Generator
+    ros: Any
+
+    _outputs: list[Output[Any]]
+    _commands: list[Command[Any]]
+    _sent: set[tuple[str, str]]
+    _detached: bool
+
+    def _attach(
+        self, world: World, name: str, type_name: str, namespace: str, rng: np.random.Generator
+    ) -> None:
+        """Gives the plugin its place in a world; called once, before `on_initialize`."""
+        self.world = world
+        self.name = name
+        self.type = type_name
+        self.namespace = namespace
+        self.rng = rng
+        self.ros = None
+        self._outputs = []
+        self._commands = []
+        self._sent = set()
+        self._detached = False
+
+    def _detach(self) -> None:
+        """Closes every port and forgets every transform, also what the plugin forgot itself."""
+        self._detached = True
+        for output in self._outputs:
+            self.world.ports.close_output(output)
+        for command in self._commands:
+            self.world.ports.close_command(command)
+        self._outputs.clear()
+        self._commands.clear()
+        self.world.forget_transforms(self._sent)
+        self._sent.clear()
+
+    def output(self, topic: str, value_type: builtins.type[T]) -> Output[T]:
+        """Declares a stream of values.
+
+        Args:
+            topic: Under the model's namespace, global with a leading `/`.
+            value_type: Type of the values.
+
+        Raises:
+            PluginError: The topic is no legal name, or carries another type.
+        """
+        output = self.world.ports.open_output(self._resolve(topic), value_type)
+        self._outputs.append(output)
+        return output
+
+    def command(
+        self,
+        topic: str,
+        value_type: builtins.type[T],
+        default: T | None = None,
+        accept: Callable[[T], bool] | None = None,
+    ) -> Command[T]:
+        """Declares a value that comes from outside.
+
+        Args:
+            topic: Under the model's namespace, global with a leading `/`.
+            value_type: Type of the values.
+            default: Value before the first comes; `value_type()` when left out.
+            accept: Asked with each value; one that it refuses leaves the last good one.
+
+        Raises:
+            PluginError: The topic is no legal name, or carries another type.
+        """
+        initial = value_type() if default is None else default
+        command = self.world.ports.open_command(self._resolve(topic), value_type, initial, accept)
+        self._commands.append(command)
+        return command
+
+    def _resolve(self, topic: str) -> str:
+        if self._detached:
+            raise PluginError(f'plugin "{self.name}" has ended and can open no "{topic}"')
+        try:
+            return resolve_topic(topic, self.namespace)
+        except ValueError as error:
+            raise PluginError(str(error)) from None
+
+    def send_transform(
+        self, parent: str, child: str, x: float, y: float, yaw: float, roll: float = 0.0
+    ) -> None:
+        """Hands over the pose of frame `child` in frame `parent`, stamped with the present time.
+
+        All transforms of a step go out together. Frame ids are used as they are: pass frames of
+        a model through `Model.frame` first.
+
+        Args:
+            parent: Frame id.
+            child: Frame id.
+            x: [m].
+            y: [m].
+            yaw: [rad].
+            roll: [rad].
+        """
+        if self._detached:
+            return
+        frames = (parent, child)
+        self._sent.add(frames)
+        world = self.world
+        world.post_transform(frames, (world.timekeeper.sim_time_ns, x, y, yaw, roll))
+
+    def on_initialize(self, config: YamlReader) -> None:
+        """Reads the parameters and gets ready; called once.
+
+        Args:
+            config: The plugin's entry without `name`, `type` and `enabled`. Keys that are left
+                unread when this returns are an error.
+
+        Raises:
+            Exception: Whatever it raises makes loading the model or world fail.
+        """
+
+    def before_physics_step(self, timekeeper: Timekeeper) -> None:
+        """Acts before each physics step, at time t."""
+
+    def after_physics_step(self, timekeeper: Timekeeper) -> None:
+        """Acts after each physics step, at time t + dt."""
+
+    def begin_contact(self, contact: Contact) -> None:
+        """Hears that two fixtures began to touch; called right after the physics step."""
+
+    def end_contact(self, contact: Contact) -> None:
+        """Hears that two fixtures touch no more, or that one of them is gone."""
+
+    def pre_solve(self, contact: MutableContact, old_manifold: OldManifold) -> None:
+        """Changes a contact inside the physics step; may not create, destroy or move anything."""
+
+    def post_solve(self, contact: Contact, impulse: ContactImpulse) -> None:
+        """Hears of the impulses that the solver applied to a contact in the step."""
+
+    def on_shutdown(self) -> None:
+        """Releases what the plugin holds; called once, when its model goes or the world ends."""
+
+
+class ModelPlugin(FlatlandPlugin):
+    """A plugin of one model.
+
+    Attributes:
+        model: The model.
+    """
+
+    base_class_type = "flatland::ModelPlugin"
+
+    model: Model
+
+    def filter_contact(self, contact: Contact | MutableContact) -> ModelContact | None:
+        """Turns a contact so that this model is on the near side.
+
+        Returns:
+            None when this plugin's model is not involved.
+        """
+        if contact.body_a.entity is self.model:
+            return ModelContact(
+                contact.body_b.entity,
+                contact.body_a,
+                contact.body_b,
+                contact.fixture_a,
+                contact.fixture_b,
+                True,
+            )
+        if contact.body_b.entity is self.model:
+            return ModelContact(
+                contact.body_a.entity,
+                contact.body_b,
+                contact.body_a,
+                contact.fixture_b,
+                contact.fixture_a,
+                False,
+            )
+        return None
+
+
+class WorldPlugin(FlatlandPlugin):
+    """A plugin of the world.
+
+    Attributes:
+        world_config: Reader over the whole world file.
+    """
+
+    base_class_type = "flatland::WorldPlugin"
+
+    world_config: YamlReader

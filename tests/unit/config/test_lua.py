@@ -1,0 +1,418 @@
+"""The sandbox of `$eval`: what an expression cannot reach, and that it always ends."""
+
+from __future__ import annotations
+
+import gc
+import json
+import os
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import pytest
+
+from flatland.config import lua
+from flatland.config.lua import EvalError, evaluate
+
+
+def run(code: str, params: dict[str, object] | None = None) -> str:
+    return evaluate(code, (params or {}).get).text
+
+
+def failure(code: str) -> str:
+    with pytest.raises(EvalError) as caught:
+        run(code)
+    return str(caught.value)
+
+
+@pytest.fixture(params=[name for name in lua._RUNTIMES if lua._find_runtime(name)])
+def runtime(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> Iterator[str]:
+    """Each Lua that lupa may bring, the first being the one that is used where there are all."""
+    monkeypatch.setattr(lua, "_RUNTIMES", (request.param,))
+    lua._state_factory.cache_clear()
+    yield request.param
+    lua._state_factory.cache_clear()
+
+
+REMOVED = [
+    "os.execute", "os.exit", "os.remove", "os.rename", "os.tmpname", "os.setlocale", "io",
+    "package", "require", "module", "dofile", "loadfile", "debug", "python", "newproxy", "jit",
+    "ffi", "_G.io", "_G['python']", "getfenv(0).io", "getfenv(print).os.execute", "string.gfind",
+    "getmetatable(env)", "getmetatable(param)", "getmetatable(print)", "rawget(_G, 'debug')",
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("name", REMOVED)
+def test_what_is_removed(runtime: str, name: str) -> None:
+    assert run(f"return type({name})") == "nil", runtime
+
+
+@pytest.mark.parametrize(
+    "name",
+    ["math.sin", "string.format", "table.concat", "os.time", "os.clock", "os.date", "os.getenv",
+     "pairs", "ipairs", "pcall", "xpcall", "load", "loadstring", "setmetatable", "unpack",
+     "coroutine.create", "tonumber", "env", "param"],
+)  # fmt: skip
+def test_what_stays(runtime: str, name: str) -> None:
+    assert run(f"return type({name})") == "function", runtime
+
+
+def test_nothing_of_python_is_anywhere(runtime: str) -> None:
+    """Walks all that an expression can reach: tables, metatables, environments."""
+    walk = r"""
+        local seen, found = {}, {}
+        local function visit(path, value)
+          local kind = type(value)
+          if kind == "userdata" or kind == "cdata" then found[#found + 1] = path end
+          if seen[value] or (kind ~= "table" and kind ~= "function") then return end
+          seen[value] = true
+          local meta = getmetatable(value)
+          if meta then visit(path .. ".meta", meta) end
+          if kind == "function" then
+            local ok, environment = pcall(getfenv, value)
+            if ok then visit(path .. ".env", environment) end
+          else
+            for k, v in pairs(value) do visit(path .. "." .. tostring(k), v) end
+          end
+        end
+        visit("_G", _G)
+        visit("string", getmetatable(""))
+        for level = 0, 20 do
+          local ok, environment = pcall(getfenv, level)
+          if ok then visit("level" .. level, environment) end
+        end
+        return table.concat(found, " ")
+    """
+    assert run(walk, {"a": 1}) == "", runtime
+
+
+@pytest.mark.parametrize(
+    "code",
+    [
+        "return loadstring('return io')()",
+        "text = 'return io' return load(function() local s = text; text = nil; return s end)()",
+        "return setfenv(loadstring('return io'), getfenv(0))()",
+        "return coroutine.wrap(function() return io or debug or python end)()",
+        "return select(2, pcall(function() return os.execute end))",
+        "local t = setmetatable({}, {__index = _G}) return t.io",
+    ],
+)
+def test_loaded_code_is_in_the_sandbox_too(runtime: str, code: str) -> None:
+    assert run(code) == "", runtime
+
+
+@pytest.mark.parametrize(
+    "code", ["return 1 + 1", "local a = 3; return a", "return ('a'):upper() == 'A' and 2"]
+)
+def test_load_and_loadstring_work(runtime: str, code: str) -> None:
+    direct = run(code)
+    assert run(f'return loadstring("{code}")()') == direct, runtime
+    pieces = "local i = 0 return load(function() i = i + 1 return ({[1]=%s})[i] end)()"
+    assert run(pieces % f'"{code}"') == direct
+
+
+def test_errors_of_loaded_text(runtime: str) -> None:
+    assert "near" in run("return select(2, loadstring('return +'))"), runtime
+    assert "near" in run("return select(2, load(function() return nil end)) or 'near'")
+
+
+def test_binary_chunks_are_refused(runtime: str) -> None:
+    for loader in (
+        "loadstring(chunk)",
+        "load(function() local c = chunk chunk = nil return c end)",
+    ):
+        code = f"chunk = string.dump(function() return 1 end) return select(2, {loader})"
+        assert run(code) == "binary chunks are refused", runtime
+    assert "binary chunks are refused" in failure("\x1bLua return ")
+
+
+def test_guards_cannot_be_changed(runtime: str) -> None:
+    code = """
+        local setfenv, pcall, type = setfenv, pcall, type
+        for _, library in ipairs{_G, string, table, coroutine} do
+          for _, value in pairs(library) do
+            if type(value) == "function" then pcall(setfenv, value, {}) end
+          end
+        end
+        getmetatable("").__tostring = function() return "" end
+        getmetatable("").__len = function() return 0 end
+        tostring, type, error, select, pcall = nil, nil, nil, nil, nil
+        return ("x"):rep(1e6):find(("x*"):rep(40) .. "y")
+    """
+    assert "may take too long" in failure(code), runtime
+
+
+def test_the_result_does_not_depend_on_metatables(runtime: str) -> None:
+    code = "getmetatable('').__tostring = function() return {} end return 'a'"
+    assert run(code) == "a", runtime
+
+
+ENDLESS = {
+    "loop": "while true do end return 1",
+    "goto loop": "repeat until false return 1",
+    "loop in pcall": "return pcall(function() while true do end end)",
+    "pcall in a loop": "while true do pcall(function() while true do end end) end return 1",
+    "nested pcall": "return pcall(pcall, pcall, function() while true do end end)",
+    "xpcall": "return xpcall(function() while true do end end, function() while true do end end)",
+    "loop in a handler": "return xpcall(function() error() end, function() while true do end end)",
+    "coroutine": "return coroutine.wrap(function() while true do end end)()",
+    "resume in a loop": """while true do
+        coroutine.resume(coroutine.create(function() while true do end end)) end return 1""",
+    "coroutine in coroutine": """return coroutine.wrap(function()
+        return coroutine.wrap(function() while true do end end)() end)()""",
+    "yields": """local c = coroutine.wrap(function() while true do coroutine.yield() end end)
+        while true do c() end return 1""",
+    "metamethod": "return setmetatable({}, {__index = function() while true do end end}).x",
+    "concat": "return setmetatable({}, {__concat = function() while true do end end}) .. ''",
+    "sort": "return table.sort({1, 2, 3}, function() while true do end end)",
+    "gsub": "return ('x'):gsub('x', function() while true do end end)",
+    "loaded": "return loadstring('while true do end')()",
+    "reader": "return load(function() return ' ' end)",
+    "collector": "while true do collectgarbage() end return 1",
+    "stopped collector": "collectgarbage('stop') while true do end return 1",
+    "strings": "local s = ('x'):rep(4e6) while true do pcall(string.upper, s) end return 1",
+    "patterns": "while true do pcall(string.find, ('x'):rep(600), 'x*x*y') end return 1",
+}
+
+
+@pytest.mark.parametrize("code", ENDLESS.values(), ids=ENDLESS)
+def test_endless_work_is_stopped(runtime: str, code: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(lua, "TIME_LIMIT", 0.05)
+    start = time.process_time()
+    assert failure(code) in ("it runs for more than 0.05 s", "not enough memory"), runtime
+    assert time.process_time() - start < 3
+
+
+def test_an_endless_loop_may_take_about_a_second() -> None:
+    start = time.process_time()
+    assert failure("while true do end return 1") == "it runs for more than 1 s"
+    assert 0.9 < time.process_time() - start < 2
+
+
+def test_parameters_do_not_start_the_time_anew(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(lua, "TIME_LIMIT", 0.2)
+    code = """
+        local stop = os.clock() + 0.05
+        while os.clock() < stop do end
+        for i = 1, 100 do param("p" .. i) end
+        return 1
+    """
+    start = time.process_time()
+    assert "it runs for more than 0.2 s" in failure(code)
+    assert time.process_time() - start < 2
+
+
+HUGE = {
+    "table": "local t = {} while true do t[#t + 1] = {} end return 1",
+    "string": "local s = 'x' while true do s = s .. s end return 1",
+    "rep": "return #string.rep('x', 1e9)",
+    "rep method": "return #('x'):rep(1e9)",
+    "rep of rep": "return #('x'):rep(1e6):rep(1e6)",
+    "concat": """local t = {} for i = 1, 1000 do t[i] = ('x'):rep(1e5) end
+        while true do t[1] = table.concat(t) end return 1""",
+    "gsub": "return #('x'):rep(4000):gsub('x', ('y'):rep(1e5))",
+    "in pcall": """while true do
+        pcall(function() local s = 'x' while true do s = s .. s end end) end return 1""",
+    "format": "local s = ('x'):rep(1e6) while true do s = ('%s%s%s'):format(s, s, s) end return 1",
+    "closures": "local t = {} while true do t[#t + 1] = function() return t end end return 1",
+    "coroutines": """local t = {} while true do
+        t[#t + 1] = coroutine.create(function() end) end return 1""",
+}
+
+
+MEASURE = """
+import json, resource, sys
+from flatland.config import lua
+
+runtime, huge = json.loads(sys.stdin.read())
+lua._RUNTIMES = (runtime,)
+lua.TIME_LIMIT = 0.5
+peak = lambda: resource.getrusage(resource.RUSAGE_SELF).ru_maxrss // 1024
+before = peak()
+for code in huge:
+    try:
+        answer = lua.evaluate(code, lambda name: None)
+    except lua.EvalError as error:
+        answer = error
+    print(answer, flush=True)
+print(peak() - before)
+"""
+
+
+def test_memory_is_bounded(runtime: str) -> None:
+    """In a process of its own: Lua may abort the process where memory ends outside of a call."""
+    folders = [str(Path(lua.__file__).parents[2]), os.environ.get("PYTHONPATH", "")]
+    done = subprocess.run(
+        [sys.executable, "-c", MEASURE],
+        input=json.dumps([runtime, list(HUGE.values())]),
+        env={**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, folders))},
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=100,
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+    *answers, grown = done.stdout.splitlines()
+    assert len(answers) == len(HUGE)
+    for name, answer in zip(HUGE, answers, strict=True):
+        assert answer.endswith(("not enough memory", "it runs for more than 0.5 s")), (name, answer)
+    # An old lupa or LuaJIT takes no bound; it is looked after between instructions.
+    bounded = "max_memory" in lua._state_factory()[0].keywords  # type: ignore[attr-defined]
+    assert int(grown) < (80 if bounded else 600)  # MiB
+
+
+def test_deep_recursion_is_an_error(runtime: str) -> None:
+    assert "stack overflow" in failure("local function f() return 1 + f() end return f()"), runtime
+    assert failure("local t = setmetatable({}, {__index = function(t, k) "
+                                 "return t[k .. 'x'] end}) return t.x")  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("text", "pattern"),
+    [
+        ("('x'):rep(5e4)", "'x*y'"),
+        ("('x'):rep(1e3)", "'x*x*x*y'"),
+        ("('x'):rep(40)", "('x?'):rep(40) .. ('x'):rep(40)"),
+        ("('('):rep(1e5)", "'%b()'"),
+        ("('x'):rep(1e3)", "'(x*)(x*)%1%2y'"),
+        ("('x'):rep(1e3)", "'[x]*[%]x]*[^]y]*[]x]*z'"),
+        ("('x'):rep(1e3)", "'.-.-.-.-y'"),
+    ],
+)
+def test_patterns_that_never_end_are_refused(runtime: str, text: str, pattern: str) -> None:
+    for call in ("find({0}, {1})", "match({0}, {1})", "gsub({0}, {1}, '')", "gmatch({0}, {1})()"):
+        code = "return string." + call.format(text, pattern)
+        assert "may take too long for a text of" in failure(code), (runtime, code)
+
+
+def test_long_patterns_are_refused(runtime: str) -> None:
+    assert "more than 1000 characters" in failure("('x'):find(('x?'):rep(1e5))"), runtime
+    assert "the text to find is too long" in failure(
+        "('x'):rep(2e6):find(('x'):rep(1e6) .. 'y', 1, true)"
+    )
+
+
+@pytest.mark.parametrize(
+    ("code", "result"),
+    [
+        ("('key = value'):match('^%s*(%S+)%s*=%s*(%S+)%s*$')", "key"),
+        ("('a,b,c'):gsub(',', ';')", "a;b;c"),
+        ("('a,b,c'):gsub(',', ';', 1)", "a;b,c"),
+        ("('abc'):gsub('%w', {a = 1})", "1bc"),
+        ("('a.b'):find('.', 1, true)", "2"),
+        ("('aXb'):find('%u', 2)", "2"),
+        ("('x'):rep(10000):gsub('x', '')", ""),
+        ("('x'):rep(3):gsub('x', function(x) return x .. 'y' end)", "xyxyxy"),
+        ("('a b c'):gmatch('%a+')()", "a"),
+        ("('f(a(b)c)'):match('%b()')", "(a(b)c)"),
+        ("(12345):rep(2)", None),
+        ("string.rep(12, 2)", "1212"),
+        ("string.find(123, 2)", "2"),
+        ("('x'):rep(0) .. ('x'):rep(-1) .. (''):rep(1e18)", ""),
+        ("(function(t) table.sort(t) return table.concat(t) end)({3, 1, 2})", "123"),
+        ("(function(t) table.sort(t, function(a, b) return a > b end) return t[1] end)({1, 3})", "3"),  # noqa: E501
+        ("(function(t) table.insert(t, 4) table.insert(t, 1, 5) return t[1] end)({6})", "5"),
+        ("select('#', unpack({1, nil, 3}, 1, 3))", "3"),
+        ("select('#', unpack({}))", "0"),
+        ("table.concat({unpack({'a', 'b', 'c'}, 2)})", "bc"),
+        ("select('#', xpcall(function() return 1, 2 end, print))", "3"),
+        ("select(2, xpcall(function() error('a', 0) end, function(e) return e .. 'b' end))", "ab"),
+        ("select(2, pcall(error, 'a'))", "a"),
+        ("coroutine.wrap(function(a) local b = coroutine.yield(a) return b end)(5)", "5"),
+        ("select(2, pcall(coroutine.wrap(function() error('a', 0) end)))", "a"),
+        ("coroutine.status(coroutine.create(function() end))", "suspended"),
+        ("select('#', coroutine.resume(coroutine.create(function() return nil, nil end)))", "3"),
+    ],
+)  # fmt: skip
+def test_guarded_functions_work_as_ever(runtime: str, code: str, result: str | None) -> None:
+    if result is None:
+        assert "number" in failure(code), runtime
+    else:
+        assert run("return " + code) == result, runtime
+
+
+@pytest.mark.parametrize(
+    ("code", "why"),
+    [
+        ("unpack({}, -2^31, 2^31 - 2)", "too many results to unpack"),
+        ("unpack({}, 2^31, -2^53)", "too many results to unpack"),
+        ("unpack({}, 1, 1e5)", "too many results to unpack"),
+        ("unpack({}, 0/0)", "too many results to unpack"),
+        ("table.insert({}, -2^31 + 5, 1)", "position out of bounds"),
+        ("table.insert({}, 2^31, 1)", "position out of bounds"),
+        ("table.insert({}, 0/0, 1)", "position out of bounds"),
+    ],
+)
+def test_indices_that_overflow_are_refused(runtime: str, code: str, why: str) -> None:
+    """Lua 5.1 crashes on some of them, or counts for minutes."""
+    assert why in failure(code), runtime
+
+
+def test_large_inputs_are_refused_before_lua_sees_them() -> None:
+    assert "more than 1048576 bytes" in failure("-- " + "x" * 2_000_000)
+    with pytest.raises(EvalError, match="more than 1048576 bytes"):
+        run("#param('a')", {"a": "x" * 2_000_000})
+    assert run("#param('a')", {"a": "x" * 500_000}) == "500000"
+
+
+def test_many_parameters_are_refused() -> None:
+    with pytest.raises(EvalError, match="asks for more than 200 parameters"):
+        run("for i = 1, 1e6 do param('p' .. i) end return 1", {})
+
+
+def test_unset_names_are_told_once_and_not_without_end() -> None:
+    assert evaluate("env('NO_A') or env('NO_A') or env('NO_B')", lambda _: None).unset == (
+        'env "NO_A"',
+        'env "NO_B"',
+    )
+    many = evaluate("for i = 1, 1e4 do env('NO_' .. i) end return 1", lambda _: None)
+    assert len(many.unset) == 20
+
+
+def test_a_failing_lookup_comes_through() -> None:
+    def broken(_: str) -> object:
+        raise ConnectionError("no master")
+
+    with pytest.raises(ConnectionError, match="no master"):
+        evaluate("pcall(param, 'a') and 1", broken)
+
+
+def test_odd_values_of_parameters() -> None:
+    assert run("param('a')", {"a": "ü\0x"}) == "ü\0x"
+    assert run("#param('a')", {"a": "\ud800"}) == "1"
+    assert run("param('ü')", {"ü": 10**15}) == "1e+15"
+    with pytest.raises(EvalError, match='param "a" is too large'):
+        run("param('a')", {"a": 10**400})
+
+
+def test_a_package_without_lua(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(lua, "_RUNTIMES", ("no_such_module",))
+    lua._state_factory.cache_clear()
+    try:
+        assert failure("1") == "it needs the Python package lupa with Lua 5.1 or LuaJIT"
+    finally:
+        lua._state_factory.cache_clear()
+
+
+def test_threads_evaluate_side_by_side() -> None:
+    codes = [f"param('a') * {number}" for number in range(100)]
+    with ThreadPoolExecutor(4) as pool:
+        results = list(pool.map(lambda code: run(code, {"a": 2}), codes))
+    assert results == [str(2 * number) for number in range(100)]
+
+
+def test_states_are_released() -> None:
+    def resident() -> int:
+        return int(Path("/proc/self/statm").read_text().split()[1]) * 4096
+
+    for _ in range(100):
+        run("#('x'):rep(1e5)")
+    gc.collect()
+    before = resident()
+    for _ in range(200):
+        run("#('x'):rep(1e6)")
+    gc.collect()
+    assert resident() - before < 50e6

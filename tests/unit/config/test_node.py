@@ -1,0 +1,290 @@
+"""Loading files to trees: what a scalar, a null and a place is, and which files are refused."""
+
+from __future__ import annotations
+
+import os
+import stat
+import time
+from pathlib import Path
+
+import pytest
+
+from flatland.config.node import (
+    MAX_NESTING,
+    ListNode,
+    MapNode,
+    Node,
+    NullNode,
+    ScalarNode,
+    Source,
+    load_documents,
+    parse_documents,
+)
+from flatland.errors import YamlError
+
+
+def parse(text: str) -> list[Node]:
+    return parse_documents(text, Source("w.yaml", "/folder"))
+
+
+def parse_map(text: str) -> MapNode:
+    (root,) = parse(text)
+    assert isinstance(root, MapNode)
+    return root
+
+
+def failure(text: str) -> str:
+    with pytest.raises(YamlError) as caught:
+        parse(text)
+    return str(caught.value)
+
+
+@pytest.mark.parametrize("text", ["123", "true", "1.50", "2001-01-01", "0x10", "-1", "a b", "a:b"])
+def test_scalars_stay_text(text: str) -> None:
+    node = parse_map(f"key: {text}").entries["key"]
+    assert isinstance(node, ScalarNode)
+    assert node.text == text
+
+
+@pytest.mark.parametrize("text", ["", "~", "null", "Null", "NULL", "!!null", "# nothing"])
+def test_empty_plain_values_are_null(text: str) -> None:
+    assert isinstance(parse_map(f"key: {text}").entries["key"], NullNode)
+
+
+@pytest.mark.parametrize("text", ['""', "''", "'~'", '"null"', "nULL", "!!str ~", "!!str"])
+def test_quoted_or_tagged_values_are_no_null(text: str) -> None:
+    assert isinstance(parse_map(f"key: {text}").entries["key"], ScalarNode)
+
+
+def test_keys_stay_text_whatever_they_look_like() -> None:
+    assert list(parse_map("1: a\n~: b\ntrue: c\n? null\n: d\n").entries) == [
+        "1",
+        "~",
+        "true",
+        "null",
+    ]
+
+
+def test_every_node_knows_its_line() -> None:
+    root = parse_map(
+        "# comment\na: 1\nb:\n  - x\n  -\n    c: |\n      two\n      lines\nd:\ne: {f:\n 2}\n"
+    )
+    items = root.entries["b"]
+    assert isinstance(items, ListNode)
+    inner = items.items[1]
+    assert isinstance(inner, MapNode)
+    assert root.entries["a"].line == 2
+    assert (items.line, items.items[0].line, inner.line) == (4, 4, 6)
+    assert inner.entries["c"].line == 6
+    assert root.entries["d"].line == 9
+    flow = root.entries["e"]
+    assert isinstance(flow, MapNode)
+    assert (flow.line, flow.entries["f"].line) == (10, 11)
+    assert root.key_lines == {"a": 2, "b": 3, "d": 9, "e": 10}
+
+
+def test_an_alias_is_the_node_of_its_anchor() -> None:
+    root = parse_map("a: &x {b: 1}\nc: *x\nd: [*x, &y 5, *y]\n")
+    assert root.entries["c"] is root.entries["a"]
+    items = root.entries["d"]
+    assert isinstance(items, ListNode)
+    assert items.items[0] is root.entries["a"]
+    assert items.items[1] is items.items[2]
+
+
+def test_an_alias_can_be_a_key() -> None:
+    assert list(parse_map("a: &x b\n*x : 1\n").entries) == ["a", "b"]
+
+
+def test_the_last_anchor_of_a_name_counts() -> None:
+    root = parse_map("a: &x 1\nb: &x 2\nc: *x\n")
+    assert root.entries["c"] is root.entries["b"]
+
+
+def test_merge_keys_are_plain_keys_as_in_the_reference() -> None:
+    root = parse_map("a: &x {b: 1}\nc:\n  <<: *x\n  d: 2\n")
+    merged = root.entries["c"]
+    assert isinstance(merged, MapNode)
+    assert list(merged.entries) == ["<<", "d"]
+
+
+def test_documents_come_in_order_and_anchors_end_with_theirs() -> None:
+    first, second, third = parse("a: &x 1\n---\n[2]\n---\n")
+    assert isinstance(first, MapNode)
+    assert isinstance(second, ListNode)
+    assert isinstance(third, NullNode)
+    assert 'line 3 col 1, no anchor "x" before its alias' in failure("a: &x 1\n---\n*x\n")
+
+
+@pytest.mark.parametrize("text", ["", "# only a comment\n", "\n\n", "\ufeff"])
+def test_a_text_without_documents(text: str) -> None:
+    assert parse(text) == []
+
+
+@pytest.mark.parametrize(
+    ("text", "where", "why"),
+    [
+        ("a: [1, 2\nb: 3\n", "line 2 col 2", "did not find expected ',' or ']'"),
+        ("a: b: c\n", "line 1 col 5", "mapping values are not allowed in this context"),
+        ("a: 1\n b: 2\n", "line 2 col 3", "mapping values are not allowed in this context"),
+        ("a: 'x\ny: 3", "line 2 col 5", "found unexpected end of stream"),
+        ("a:\n\t- 1\n", "line 2 col 1", "found character that cannot start any token"),
+        ("%YAML 3.0\n---\na", "line 1 col 1", "found incompatible YAML document"),
+        ("a: *b\n", "line 1 col 4", 'no anchor "b" before its alias'),
+        (
+            "a: 1\nb:\n  c: 1\n  d: 2\n  c: 3\n",
+            "line 5 col 3",
+            'duplicate key "c", first used in line 3',
+        ),
+        ("{a: 1, 'a': 2}", "line 1 col 8", 'duplicate key "a", first used in line 1'),
+        ("? [a, b]\n: c\n", "line 1 col 3", "a key must be a scalar"),
+        ("a: &x [1, *x]\n", "line 1 col 11", 'alias "x" stands inside its own anchor'),
+        ("a: &x\n  b: {c: *x}\n", "line 2 col 10", 'alias "x" stands inside its own anchor'),
+        ("a: 1\nb: '\x07'\n", "line 2 col 5", "character U+0007 is not allowed"),
+        ("a: \ud800", "line 1 col 4", "character U+D800 is not allowed"),
+    ],
+)
+def test_what_is_not_yaml_is_named_with_its_place(text: str, where: str, why: str) -> None:
+    assert failure(text) == f'Flatland YAML: Malformatted file, path="w.yaml", {where}, {why}'
+
+
+@pytest.mark.parametrize("opening", ["[", "- ", "? ", "{a: "])
+def test_deep_nesting_is_refused_at_once(opening: str) -> None:
+    start = time.process_time()
+    message = failure(opening * 50_000)
+    assert f"nested deeper than {MAX_NESTING} levels" in message or "scalar" in message
+    assert time.process_time() - start < 1
+
+
+def test_the_deepest_nesting_allowed() -> None:
+    assert parse("[" * MAX_NESTING + "]" * MAX_NESTING)
+    assert "nested deeper" in failure("[" * (MAX_NESTING + 1) + "]" * (MAX_NESTING + 1))
+
+
+def test_levels_that_come_by_aliases_count_too() -> None:
+    lines = ["a0: &a0 []"] + [f"a{i}: &a{i} [*a{i - 1}]" for i in range(1, 200)]
+    assert parse("\n".join(lines[: MAX_NESTING - 1]))
+    assert "nested deeper" in failure("\n".join(lines))
+
+
+def test_aliases_that_multiply_cost_nothing() -> None:
+    lines = ["a0: &a0 [x, x]"] + [f"a{i}: &a{i} [*a{i - 1}, *a{i - 1}]" for i in range(1, 60)]
+    start = time.process_time()
+    assert len(parse_map("\n".join(lines)).entries) == 60
+    assert time.process_time() - start < 1
+
+
+def test_a_file_gives_its_path_and_folder(tmp_path: Path) -> None:
+    file = tmp_path / "w.yaml"
+    file.write_text("a: 1\n")
+    (root,) = load_documents(str(file))
+    assert root.source == Source(str(file), str(tmp_path))
+
+
+def test_a_relative_path_is_kept_for_messages(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "sub").mkdir()
+    (tmp_path / "sub" / "w.yaml").write_text("a: 1\n")
+    (root,) = load_documents("sub/w.yaml")
+    assert root.source == Source("sub/w.yaml", str(tmp_path / "sub"))
+
+
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "utf-16"])
+def test_encodings(tmp_path: Path, encoding: str) -> None:
+    file = tmp_path / "w.yaml"
+    file.write_bytes("name: Rübe 🐢\n".encode(encoding))
+    (root,) = load_documents(str(file))
+    assert isinstance(root, MapNode)
+    node = root.entries["name"]
+    assert isinstance(node, ScalarNode)
+    assert node.text == "Rübe 🐢"
+
+
+def test_windows_line_ends(tmp_path: Path) -> None:
+    file = tmp_path / "w.yaml"
+    file.write_bytes(b"a: 1\r\nb: x\r\nc: \xff\r\n")
+    assert "line 3 col 4, byte 0xff is not UTF-8 text" in file_failure(file)
+    file.write_bytes(b"a: 1\r\nb: x\r\n")
+    (root,) = load_documents(str(file))
+    assert isinstance(root, MapNode)
+    assert root.entries["b"].line == 2
+
+
+def file_failure(path: Path | str) -> str:
+    with pytest.raises(YamlError) as caught:
+        load_documents(str(path))
+    return str(caught.value)
+
+
+def test_a_file_that_is_no_text(tmp_path: Path) -> None:
+    file = tmp_path / "w.yaml"
+    file.write_bytes("ä: 1\nb: ".encode() + b"\xe4\n")
+    assert file_failure(file) == (
+        f'Flatland YAML: Malformatted file, path="{file}", line 2 col 4, '
+        "byte 0xe4 is not UTF-8 text"
+    )
+    file.write_bytes(b"\xff\xfea")
+    assert "byte 0x61 is not UTF-16 text" in file_failure(file)
+
+
+def test_a_file_that_is_not_there(tmp_path: Path) -> None:
+    for path in (tmp_path / "no.yaml", tmp_path / "no" / "no.yaml", f"{tmp_path}/a\0b"):
+        assert file_failure(path) == f'Flatland YAML: File does not exist, path="{path}"'
+    (tmp_path / "file").touch()
+    assert "File does not exist" in file_failure(tmp_path / "file" / "w.yaml")
+
+
+def test_a_path_that_is_no_file(tmp_path: Path) -> None:
+    assert file_failure(tmp_path) == (
+        f'Flatland YAML: Failed to read file, path="{tmp_path}", it is not a regular file'
+    )
+    os.mkfifo(tmp_path / "pipe")
+    assert "not a regular file" in file_failure(tmp_path / "pipe")
+    assert "not a regular file" in file_failure("/dev/zero")
+
+
+def test_a_file_that_may_not_be_read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    file = tmp_path / "w.yaml"
+    file.write_text("a: 1\n")
+    if os.geteuid() == 0:  # root may read all
+
+        def refuse(*_: object) -> None:
+            raise PermissionError(13, "Permission denied")
+
+        monkeypatch.setattr(Path, "open", refuse)
+    else:
+        file.chmod(stat.S_IWUSR)
+    assert file_failure(file) == (
+        f'Flatland YAML: Failed to read file, path="{file}", Permission denied'
+    )
+
+
+@pytest.mark.parametrize(
+    ("path", "resolved"),
+    [
+        ("a.yaml", "/folder/a.yaml"),
+        ("../a", "/folder/../a"),
+        ("/x/a", "/x/a"),
+        ("~/a", "/home/me/a"),
+    ],
+)
+def test_paths_start_in_the_folder(
+    path: str, resolved: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("HOME", "/home/me")
+    assert Source("w.yaml", "/folder").resolve(path) == resolved
+
+
+def test_the_home_of_nobody_stays_as_it_is() -> None:
+    assert (
+        Source("", "/folder").resolve("~nobody-of-that-name/a") == "/folder/~nobody-of-that-name/a"
+    )
+
+
+def test_places() -> None:
+    assert Source("w.yaml", "/").place(3) == " [w.yaml:3]"
+    assert Source("w.yaml", "/").place(None) == " [w.yaml]"
+    assert Source("", "/").place(3) == " [line 3]"
+    assert Source("", "/").place(None) == ""

@@ -1,0 +1,500 @@
+"""Typed reading: every conversion, every error text with its place, and the record of keys."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from flatland.config.reader import YamlReader
+from flatland.errors import FlatlandError, YamlError
+
+
+def read(text: str) -> YamlReader:
+    return YamlReader.from_string(text)
+
+
+@pytest.fixture
+def file(tmp_path: Path) -> Path:
+    return tmp_path / "w.yaml"
+
+
+def read_file(file: Path, text: str) -> YamlReader:
+    file.write_text(text)
+    return YamlReader.from_file(file)
+
+
+def failure(action: Any, *arguments: Any, **options: Any) -> str:
+    with pytest.raises(YamlError) as caught:
+        action(*arguments, **options)
+    assert isinstance(caught.value, FlatlandError)
+    return str(caught.value)
+
+
+FLOATS = {
+    "1": 1.0,
+    "-2.5": -2.5,
+    "+3": 3.0,
+    ".5": 0.5,
+    "-.5": -0.5,
+    "5.": 5.0,
+    "5e-2": 0.05,
+    "0.05e0": 0.05,
+    "1e5": 1e5,
+    "1E+5": 1e5,
+    "007": 7.0,
+    "1e-400": 0.0,
+    '"5"': 5.0,
+    **dict.fromkeys((".inf", ".Inf", ".INF", "+.inf", "+.Inf", "+.INF", "inf"), math.inf),
+    **dict.fromkeys(("-.inf", "-.Inf", "-.INF", "-inf"), -math.inf),
+}
+NO_FLOATS = [
+    "abc", "1.2.3", "1,5", "1e", "e5", ".", "'-'", "0x10", "1_000", '"5 "', '" 5"', "''", "1e400",
+    "-1e400", ".iNF", ".infinity", "infinity", "Inf", "INF", "+inf", "NaN", "+.nan", "-nan", "true",
+    "٣", "[1]", "{a: 1}",
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("text", "value"), FLOATS.items())
+def test_floats(text: str, value: float) -> None:
+    assert read(f"x: {text}").get("x", "float") == value
+    assert read(f"x: {text}").get("x", float) == value
+
+
+@pytest.mark.parametrize("text", [".nan", ".NaN", ".NAN", "nan"])
+def test_not_a_number_is_a_float(text: str) -> None:
+    assert math.isnan(read(f"x: {text}").get("x", "float"))
+
+
+@pytest.mark.parametrize("text", NO_FLOATS)
+def test_what_is_no_float(text: str) -> None:
+    message = failure(read(f"x: {text}").get, "x", "float")
+    assert message == 'Flatland YAML: Error converting entry "x" to float [line 1]'
+
+
+@pytest.mark.parametrize(
+    ("text", "value"),
+    {
+        "0": 0, "-0": 0, "10": 10, "-10": -10, "+10": 10, "0x1f": 31, "-0x1F": -31,
+        "0o17": 15, "017": 15, "-017": -15, "00": 0, '"7"': 7, "2147483647": 2**31 - 1,
+        "-2147483648": -(2**31), "0x7fffffff": 2**31 - 1,
+    }.items(),
+)  # fmt: skip
+def test_ints(text: str, value: int) -> None:
+    assert read(f"x: {text}").get("x", "int") == value
+    assert type(read(f"x: {text}").get("x", int)) is int
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "10.0", "1e3", "abc", "08", "0o8", "0x", "0X1F", "0xg", "0b1", "1_000", "''", '"1 "', "--1",
+        "true", ".inf", "2147483648", "-2147483649", "0x80000000", "0o40000000000", "9" * 5000,
+        "[1]", "[]",
+    ],
+)  # fmt: skip
+def test_what_is_no_int(text: str) -> None:
+    message = failure(read(f"x: {text}").get, "x", "int")
+    assert message == 'Flatland YAML: Error converting entry "x" to int [line 1]'
+
+
+@pytest.mark.parametrize("word", ["true", "yes", "on", "y", "false", "no", "off", "n"])
+def test_bools_in_three_cases_only(word: str) -> None:
+    value = word in ("true", "yes", "on", "y")
+    for text in (word, word.capitalize(), word.upper(), f'"{word}"'):
+        assert read(f"x: {text}").get("x", "bool") is value
+        assert read(f"x: {text}").get("x", bool) is value
+    odd = word[0] + word[1:].upper()
+    if len(word) > 1:
+        message = failure(read(f"x: {odd}").get, "x", "bool")
+        assert message == 'Flatland YAML: Error converting entry "x" to bool [line 1]'
+
+
+@pytest.mark.parametrize("text", ["1", "0", "t", "''", "truee", "[true]", "{}"])
+def test_what_is_no_bool(text: str) -> None:
+    assert 'Error converting entry "x" to bool' in failure(read(f"x: {text}").get, "x", "bool")
+
+
+@pytest.mark.parametrize(
+    ("text", "value"),
+    [("123", "123"), ("true", "true"), ("''", ""), ("1.50", "1.50"), ("'~'", "~"), ("a b", "a b")],
+)
+def test_any_scalar_is_a_string(text: str, value: str) -> None:
+    assert read(f"x: {text}").get("x", "string") == value
+    assert read(f"x: {text}").get("x", str) == value
+
+
+@pytest.mark.parametrize("text", ["[a]", "{a: 1}", "", "~"])
+def test_what_is_no_string(text: str) -> None:
+    message = failure(read(f"x: {text}").get, "x", "string")
+    assert message == 'Flatland YAML: Error converting entry "x" to string [line 1]'
+
+
+def test_vectors() -> None:
+    assert read("x: [1, -2.5]").get("x", "vector") == (1.0, -2.5)
+    for text in ("[1]", "[1, 2, 3]", "[]", "[1, a]", "[1, [2]]", "[1, ]", "[1, ~]", "5", "{a: 1}"):
+        message = failure(read(f"x: {text}").get, "x", "vector")
+        assert message == 'Flatland YAML: Error converting entry "x" to vector [line 1]', text
+
+
+@pytest.mark.parametrize(("kind", "size"), [("pose", 3), ("color", 4)])
+def test_poses_and_colors(kind: Any, size: int) -> None:
+    numbers = [0.5 * number for number in range(5)]
+    assert read(f"x: {numbers[:size]}").get("x", kind) == tuple(numbers[:size])
+    for count in (0, size - 1, size + 1):
+        message = failure(read(f"x: {[1.0] * count}").get, "x", kind)
+        assert message == (f'Flatland YAML: Entry "x" must have size of exactly {size} [line 1]')
+    message = failure(read("x: 5").get, "x", kind)
+    assert message == 'Flatland YAML: Entry "x" must be a list [line 1]'
+    message = failure(read(f"x: {['a'] * size}").get, "x", kind)
+    assert message == ('Flatland YAML: Error converting entry index=0 to float (in "x") [line 1]')
+
+
+def test_an_unknown_kind_is_the_programmers_mistake() -> None:
+    with pytest.raises(ValueError, match=r"kind must be one of .*'pose'.*, got 'double'"):
+        read("x: 1").get("x", "double")  # type: ignore[call-overload]
+
+
+# The texts, each with the place behind it.
+
+
+def test_missing_required_key(file: Path) -> None:
+    reader = read_file(file, "# first\na: 1\n")
+    assert failure(reader.get, "Key", "float") == (
+        f'Flatland YAML: Entry "Key" does not exist [{file}:2]'
+    )
+    body = reader.with_location('model "M"', 'body "B"')
+    for action in (body.subnode, lambda key: body.get_list(key, "int")):
+        assert failure(action, "Key") == (
+            f'Flatland YAML: Entry "Key" does not exist (in model "m" body "b") [{file}:2]'
+        )
+
+
+def test_missing_list_item(file: Path) -> None:
+    items = read_file(file, "a:\n  - 1\n").subnode("a")
+    for index in (1, -1):
+        assert failure(items.get, index, "int") == (
+            f'Flatland YAML: Entry index={index} does not exist (in "a") [{file}:2]'
+        )
+    assert items.get(0, "int") == 1
+    assert items.get(1, "int", 7) == 7
+
+
+@pytest.mark.parametrize(
+    ("kind", "text"), [("map", "[1]"), ("map", "x"), ("map", ""), ("map", "~")]
+)
+def test_must_be_a_map(file: Path, kind: Any, text: str) -> None:
+    reader = read_file(file, f"other: 1\nKey: {text}\n").with_location('layer "L"')
+    assert failure(reader.subnode, "Key", kind) == (
+        f'Flatland YAML: Entry "Key" must be a map (in layer "l") [{file}:2]'
+    )
+
+
+@pytest.mark.parametrize("text", ["{a: 1}", "x", ""])
+def test_must_be_a_list(file: Path, text: str) -> None:
+    reader = read_file(file, f"Key: {text}\n")
+    for action in (lambda: reader.subnode("Key", "list"), lambda: reader.get_list("Key", "int")):
+        assert failure(action) == f'Flatland YAML: Entry "Key" must be a list [{file}:1]'
+
+
+def test_items_must_be_of_a_kind(file: Path) -> None:
+    items = read_file(file, "a:\n  - []\n  - {}\n").subnode("a")
+    assert failure(items.subnode, 0, "map") == (
+        f'Flatland YAML: Entry index=0 must be a map (in "a") [{file}:2]'
+    )
+    assert failure(items.subnode, 1, "list") == (
+        f'Flatland YAML: Entry index=1 must be a list (in "a") [{file}:3]'
+    )
+
+
+def test_a_file_must_be_a_map(file: Path) -> None:
+    reader = read_file(file, "- 1\n")
+    assert failure(reader.get, "a", "int") == f"Flatland YAML: Entry must be a map [{file}:1]"
+    assert failure(reader.keys) == f"Flatland YAML: Entry must be a map [{file}:1]"
+    assert failure(reader.without, "a") == f"Flatland YAML: Entry must be a map [{file}:1]"
+    reader = read_file(file, "a: 1\n")
+    assert failure(reader.get, 0, "int") == f"Flatland YAML: Entry must be a list [{file}:1]"
+    assert failure(list, reader.items()) == f"Flatland YAML: Entry must be a list [{file}:1]"
+
+
+@pytest.mark.parametrize(
+    ("sizes", "wanted"),
+    [
+        ({"size": 2}, "of exactly 2"),
+        ({"min_size": 4, "max_size": 4}, "of exactly 4"),
+        ({"min_size": 4}, ">= 4"),
+        ({"max_size": 2}, "<= 2"),
+        ({"min_size": 4, "max_size": 8}, ">= 4"),
+    ],
+)
+def test_sizes_of_lists(file: Path, sizes: dict[str, int], wanted: str) -> None:
+    body = read_file(file, "\nPoints: [1, 2, 3]\n").with_location('model "M"', 'body "B"')
+    assert failure(body.get_list, "Points", "int", **sizes) == (
+        f'Flatland YAML: Entry "points" must have size {wanted} (in model "m" body "b") [{file}:2]'
+    )
+
+
+def test_lists_of_a_right_size() -> None:
+    reader = read("a: [1, 2, 3]\nb: [[1, 2], [3, 4]]\nc: []\nd: [x, 1]\ne: [[1, 2, 3]]\nf: [on]\n")
+    for sizes in ({"size": 3}, {"min_size": 3}, {"max_size": 3}, {"min_size": 1, "max_size": 5}):
+        assert reader.get_list("a", "float", **sizes) == [1.0, 2.0, 3.0]  # type: ignore[call-overload]
+    assert reader.get_list("b", "vector") == [(1.0, 2.0), (3.0, 4.0)]
+    assert reader.get_list("c", "int") == []
+    assert reader.get_list("d", str) == ["x", "1"]
+    assert reader.get_list("e", "pose") == [(1.0, 2.0, 3.0)]  # type: ignore[call-overload]
+    assert reader.get_list("f", bool) == [True]
+    assert reader.get_list("no", "int", [7]) == [7]
+    assert reader.get_list("no", "int", None) is None
+
+
+@pytest.mark.parametrize("kind", ["bool", "int", "float", "string", "vector"])
+def test_wrong_type(file: Path, kind: Any) -> None:
+    body = read_file(file, "a: 1\nKEY: {}\n").with_location('model "M"', 'body "B"')
+    assert failure(body.get, "KEY", kind) == (
+        f'Flatland YAML: Error converting entry "key" to {kind} (in model "m" body "b") [{file}:2]'
+    )
+
+
+def test_wrong_type_of_an_item(file: Path) -> None:
+    reader = read_file(file, "Origin: [1,\n  2, x]\n").with_location('model "M"')
+    message = f'Error converting entry index=2 to float (in model "m" "origin") [{file}:2]'
+    assert failure(reader.get, "Origin", "pose") == "Flatland YAML: " + message
+    assert failure(reader.get_list, "Origin", "float") == "Flatland YAML: " + message
+
+
+def test_keys_that_nobody_read(file: Path) -> None:
+    reader = read_file(file, "a: 1\nb: 3\nZ: 2\n")
+    reader.get("a", "int")
+    assert failure(reader.ensure_accessed_all) == (
+        f'Flatland YAML: Entry contains unrecognized entry(s) {{"Z", "b"}} [{file}:2]'
+    )
+    body = reader.with_location('model "M"', 'body "B"')
+    assert failure(body.ensure_accessed_all) == (
+        'Flatland YAML: Entry body "b" contains unrecognized entry(s) {"Z", "b"} '
+        f'(in model "m") [{file}:2]'
+    )
+    reader.optional_subnode("Z")
+    reader.get("b", "int", 0)
+    body.ensure_accessed_all()
+
+
+def test_a_plugin_config_by_its_place(file: Path) -> None:
+    reader = read_file(file, "plugins:\n  - type: X\n    angle: {min: 1,\n      mix: 2}\n")
+    plugin = reader.subnode("plugins", "list").subnode(0, "map")
+    angle = plugin.with_location('model "M"', 'plugin "P"').subnode("angle", "map")
+    angle.get("min", "float")
+    assert failure(angle.ensure_accessed_all) == (
+        'Flatland YAML: Entry "angle" contains unrecognized entry(s) {"mix"} '
+        f'(in model "m" plugin "p") [{file}:4]'
+    )
+
+
+def test_only_maps_have_unknown_keys() -> None:
+    read("[1, 2]").ensure_accessed_all()
+    read("x").ensure_accessed_all()
+    read("").ensure_accessed_all()
+
+
+def test_file_not_there(file: Path) -> None:
+    assert failure(YamlReader.from_file, file) == (
+        f'Flatland YAML: File does not exist, path="{file}"'
+    )
+
+
+def test_not_yaml(file: Path) -> None:
+    assert failure(read_file, file, "a: 1\nb: [\n") == (
+        f'Flatland YAML: Malformatted file, path="{file}", line 3 col 1, '
+        "did not find expected node content"
+    )
+
+
+def test_duplicate_keys(file: Path) -> None:
+    assert failure(read_file, file, "a: 1\nb: 2\na: 3\n") == (
+        f'Flatland YAML: Malformatted file, path="{file}", line 3 col 1, '
+        'duplicate key "a", first used in line 1'
+    )
+
+
+# How readers open each other.
+
+
+def test_locations_build_up() -> None:
+    text = "bodies: [{footprints: [{}, {type: circle, center: [x, 0]}]}]"
+    body = read(text).subnode("bodies").subnode(0).with_location('model "turtlebot"', 'body "base"')
+    footprints = body.subnode("footprints", "list")
+    assert (footprints.location, footprints.name) == (
+        'model "turtlebot" body "base"',
+        '"footprints"',
+    )
+    second = footprints.subnode(1, "map")
+    assert (second.location, second.name) == (
+        'model "turtlebot" body "base" "footprints"',
+        "index=1",
+    )
+    assert failure(second.get, "radius", "float") == (
+        'Flatland YAML: Entry "radius" does not exist '
+        '(in model "turtlebot" body "base" "footprints" index=1) [line 1]'
+    )
+    assert 'entry "center" to vector (in model "turtlebot" body "base" "footprints" index=1)' in (
+        failure(second.get, "center", "vector")
+    )
+
+
+def test_what_a_reader_is() -> None:
+    reader = read("a: {}\nb: []\nc: x\nd:\n")
+    kinds = [
+        (r.is_map, r.is_list, r.is_scalar, r.is_null) for r in map(reader.subnode, reader.keys())
+    ]
+    assert kinds == [tuple(i == j for j in range(4)) for i in range(4)]
+    assert [len(reader.subnode(key)) for key in "abcd"] == [0, 0, 0, 0]
+    assert len(reader) == 4
+    assert reader.keys() == ["a", "b", "c", "d"]
+    assert "a" in reader
+    assert "d" in reader
+    assert "e" not in reader
+    assert "a" not in reader.subnode("c")
+
+
+def test_items_of_a_list() -> None:
+    items = list(read("a: [x, {b: 1}, [2]]").subnode("a").items())
+    assert [item.name for item in items] == ["index=0", "index=1", "index=2"]
+    assert [item.location for item in items] == ['"a"'] * 3
+    assert items[0].value("string") == "x"
+    assert items[1].get("b", "int") == 1
+    assert items[2].get(0, "float") == 2.0
+
+
+def test_a_node_as_a_value(file: Path) -> None:
+    reader = read_file(file, "[5, true, [1, 2], [1, 2, 3], [0, 0, 0, 1]]")
+    assert reader.subnode(0).value("int") == 5
+    assert reader.subnode(0).value(float) == 5.0
+    assert reader.subnode(1).value("bool") is True
+    assert reader.subnode(2).value("vector") == (1.0, 2.0)
+    assert reader.subnode(3).value("pose") == (1.0, 2.0, 3.0)
+    assert reader.subnode(4).value("color") == (0.0, 0.0, 0.0, 1.0)
+    assert failure(reader.value, "string") == (
+        f"Flatland YAML: Error converting entry to string [{file}:1]"
+    )
+
+
+@pytest.mark.parametrize("text", ["{}", "x:", "x: ~", "x: null"])
+def test_defaults_for_what_is_missing_or_empty(text: str) -> None:
+    reader = read(text)
+    assert reader.get("x", "float", 2.5) == 2.5
+    assert reader.get("x", "pose", None) is None
+    assert reader.get_list("x", "string", ["all"]) == ["all"]
+    for kind in ("any", "map", "list"):
+        node = reader.optional_subnode("x", kind)  # type: ignore[arg-type]
+        assert node.is_null
+        assert (node.name, len(node), list(node.items()), node.keys()) == ('"x"', 0, [], [])
+        node.ensure_accessed_all()
+        assert node.get("y", "int", 3) == 3
+        assert node.optional_subnode("y").is_null
+        assert failure(node.get, "y", "int") == (
+            'Flatland YAML: Entry "y" does not exist (in "x") [line 1]'
+        )
+    reader.ensure_accessed_all()
+
+
+def test_an_optional_entry_must_be_right_if_it_is_there() -> None:
+    reader = read("a: x\nb: {}\n")
+    assert '"a" must be a map' in failure(reader.optional_subnode, "a", "map")
+    assert '"b" must be a list' in failure(reader.optional_subnode, "b", "list")
+    assert 'entry "a" to float' in failure(reader.get, "a", "float", 1.0)
+    assert '"b" must be a list' in failure(reader.get_list, "b", "float", [])
+    assert reader.optional_subnode("b", "map").is_map
+
+
+def test_an_empty_text_is_null() -> None:
+    for text in ("", "# nothing\n", "---\n", "~\n"):
+        assert read(text).is_null
+
+
+def test_the_record_of_keys_is_shared_by_place_only() -> None:
+    reader = read("a: 1\nb: 2\nname: n\n")
+    placed = reader.with_location("x")
+    placed.get("a", "int")
+    reader.get("name", "string")
+    assert '{"b"}' in failure(placed.ensure_accessed_all)
+    rest = reader.without("name", "type")
+    assert rest.keys() == ["a", "b"]
+    assert "name" not in rest
+    assert '{"a", "b"}' in failure(rest.ensure_accessed_all)
+    rest.get("b", "int")
+    assert failure(rest.ensure_accessed_all) == (
+        'Flatland YAML: Entry contains unrecognized entry(s) {"a"} [line 1]'
+    )
+    assert '{"b"}' in failure(reader.ensure_accessed_all)
+    assert reader.keys() == ["a", "b", "name"]
+
+
+def test_without_keeps_the_place() -> None:
+    rest = read("\na: 1\nc: 2\n").with_location('model "M"', 'plugin "P"').without("a")
+    assert (rest.location, rest.name, rest.line) == ('model "M"', 'plugin "P"', 2)
+    assert "[line 3]" in failure(rest.ensure_accessed_all)
+
+
+def test_each_opening_of_an_entry_has_its_own_record() -> None:
+    reader = read("a: {b: 1}")
+    reader.subnode("a").get("b", "int")
+    assert '{"b"}' in failure(reader.subnode("a").ensure_accessed_all)
+
+
+def test_errors_of_others_get_the_place(file: Path) -> None:
+    entry = read_file(file, "a: 1\nb: 2\n").subnode("b")
+    error = entry.error("Invalid something")
+    assert isinstance(error, YamlError)
+    assert str(error) == f"Flatland YAML: Invalid something [{file}:2]"
+    assert str(read("a: 1").error("Invalid")) == "Flatland YAML: Invalid [line 1]"
+
+
+def test_path_and_line(file: Path) -> None:
+    reader = read_file(file, "a: 1\nb:\n  c: 2\n")
+    assert (reader.path, reader.line) == (str(file), 1)
+    assert (reader.subnode("b").subnode("c").path, reader.subnode("b").subnode("c").line) == (
+        str(file),
+        3,
+    )
+    assert read("a: 1").path == ""
+    assert str(file) in repr(reader)
+
+
+def test_paths_start_in_the_folder_of_the_file(
+    file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    reader = read_file(file, "a: 1\n")
+    assert reader.resolve_path("map.yaml") == str(tmp_path / "map.yaml")
+    assert reader.resolve_path("/maps/map.yaml") == "/maps/map.yaml"
+    monkeypatch.setenv("HOME", "/home/me")
+    assert reader.resolve_path("~/map.yaml") == "/home/me/map.yaml"
+    monkeypatch.chdir(tmp_path)
+    assert YamlReader.from_file("w.yaml").resolve_path("m") == str(tmp_path / "m")
+    assert YamlReader.from_string("a: 1", base_dir="x").resolve_path("m") == str(tmp_path / "x/m")
+
+
+def test_a_node_kept_as_plain_data() -> None:
+    reader = read("a: &x [1, ~, {b: on}]\nc: *x\nd: ''\n")
+    shared = ["1", None, {"b": "on"}]
+    assert reader.plain() == {"a": shared, "c": shared, "d": ""}
+    assert reader.optional_subnode("no").plain() is None
+
+
+def test_aliases_are_read_like_what_they_name() -> None:
+    reader = read("a: &x {pose: [1, 2, 3]}\nb: *x\n")
+    assert reader.subnode("b").get("pose", "pose") == (1.0, 2.0, 3.0)
+    assert 'unrecognized entry(s) {"<<"}' in failure(
+        read("a: &x {b: 1}\nc: {<<: *x}\n").subnode("c").ensure_accessed_all
+    )
+
+
+def test_the_reference_world(shared_dir: Path) -> None:
+    reader = YamlReader.from_file(shared_dir / "worlds" / "simple_test_A" / "world.yaml")
+    properties = reader.subnode("properties", "map")
+    assert properties.get("velocity_iterations", "int", 10) == 11
+    layers = list(reader.subnode("layers", "list").items())
+    assert layers[1].get_list("name", "string") == ["3d", "4d", "5d"]
+    assert layers[0].get("color", "color") == (0.0, 1.0, 0.0, 0.675)
+    poses = [m.get("pose", "pose", (0.0, 0.0, 0.0)) for m in reader.subnode("models").items()]
+    assert poses[1] == (3.0, 4.5, 3.14159)

@@ -1,0 +1,241 @@
+"""Manifests, the look-up of plugin classes, and the error of each thing that can be wrong."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+
+import pytest
+
+from flatland import ModelPlugin, PluginError, WorldPlugin
+from flatland.plugin_api.registry import PluginRegistry, read_manifest
+
+MANIFEST = """
+<library path="src">
+  <class name="{package}::Good" type="{package}.things.Good"
+         base_class_type="flatland::ModelPlugin">
+    <description> Does   good </description>
+  </class>
+  <class type="{package}.things.World" base_class_type="flatland::WorldPlugin"/>
+  <class name="{package}::NoModule" type="{package}.nowhere.X"
+         base_class_type="flatland::ModelPlugin"/>
+  <class name="{package}::NoClass" type="{package}.things.Absent"
+         base_class_type="flatland::ModelPlugin"/>
+  <class name="{package}::NoPlugin" type="{package}.things.Plain"
+         base_class_type="flatland::ModelPlugin"/>
+  <class name="{package}::Wrong" type="{package}.things.World"
+         base_class_type="flatland::ModelPlugin"/>
+  <class name="{package}::Broken" type="{package}.broken.X"
+         base_class_type="flatland::ModelPlugin"/>
+  <class name="{package}::Shy" type="{package}.things.Shy"
+         base_class_type="flatland::ModelPlugin"/>
+</library>
+"""
+
+THINGS = """
+import flatland
+
+class Good(flatland.ModelPlugin):
+    pass
+
+class World(flatland.WorldPlugin):
+    pass
+
+class Plain:
+    pass
+
+class Shy(flatland.ModelPlugin):
+    def __init__(self):
+        raise RuntimeError("not today")
+"""
+
+
+@pytest.fixture
+def package(files, request, monkeypatch):
+    """A plugin package on disk, under a name of its own; gives its name and manifest."""
+    name = f"robots_{abs(hash(request.node.nodeid))}"
+    files.write(f"src/{name}/__init__.py", "")
+    files.write(f"src/{name}/things.py", THINGS)
+    files.write(f"src/{name}/broken.py", "import no_such_module_anywhere")
+    manifest = files.write("plugins.xml", MANIFEST.format(package=name))
+    monkeypatch.setenv("FLATLAND_PLUGIN_PATH", manifest)
+    monkeypatch.delenv("ROS_PACKAGE_PATH", raising=False)
+    monkeypatch.setattr(sys, "path", list(sys.path))
+    yield name, manifest
+    for module in [module for module in sys.modules if module.startswith(name)]:
+        del sys.modules[module]
+
+
+def test_included_plugins_need_no_prefix():
+    registry = PluginRegistry()
+    assert registry.find("Laser").class_path == "flatland.plugins.laser.Laser"
+    assert registry.find("flatland_plugins::Laser") is registry.find("Laser")
+
+
+def test_every_included_class_can_be_made():
+    registry = PluginRegistry()
+    entries = [e for n, e in registry.classes.items() if n.startswith("flatland_plugins::")]
+    assert len(entries) >= 6
+    for entry in entries:
+        base = ModelPlugin if entry.base_class_type == "flatland::ModelPlugin" else WorldPlugin
+        assert isinstance(registry.make(entry.lookup_name, base), base)
+        assert entry.description
+
+
+def test_a_class_is_imported_only_when_it_is_made(package):
+    name, manifest = package
+    registry = PluginRegistry()
+    entry = registry.find(f"{name}::Good")
+    assert (entry.manifest, entry.description) == (manifest, "Does good")
+    assert f"{name}.things" not in sys.modules
+    plugin = registry.make(f"{name}::Good", ModelPlugin)
+    assert type(plugin).__module__ == f"{name}.things"
+
+
+def test_the_name_defaults_to_the_type(package):
+    name, _ = package
+    assert isinstance(PluginRegistry().make(f"{name}.things.World", WorldPlugin), WorldPlugin)
+
+
+@pytest.mark.parametrize(
+    ("which", "text"),
+    [
+        ("NoModule", r'module "{0}.nowhere" of plugin "{0}::NoModule" .* cannot be imported: '
+         r"ModuleNotFoundError: No module named '{0}.nowhere'"),
+        ("Broken", r"cannot be imported: ModuleNotFoundError: No module named 'no_such_module"),
+        ("NoClass", r'module "{0}.things" .* has no class "Absent"'),
+        ("NoPlugin", r'"{0}.things.Plain" of plugin "{0}::NoPlugin" must be a class derived from '
+         "flatland::ModelPlugin"),
+        ("Wrong", r'class "{0}.things.World" of plugin "{0}::Wrong" must be a '
+         r"flatland::ModelPlugin here, it is a flatland::WorldPlugin \(manifest .* calls it "
+         r"flatland::ModelPlugin\)"),
+        ("Shy", r'class "{0}.things.Shy" cannot be made: RuntimeError: not today'),
+    ],
+)  # fmt: skip
+def test_what_is_wrong_is_said(package, which, text):
+    name, _ = package
+    with pytest.raises(PluginError, match=text.format(name)):
+        PluginRegistry().make(f"{name}::{which}", ModelPlugin)
+
+
+def test_a_model_plugin_is_no_world_plugin(package):
+    name, _ = package
+    with pytest.raises(
+        PluginError, match="must be a flatland::WorldPlugin here, it is a flatland::"
+    ):
+        PluginRegistry().make(f"{name}::Good", WorldPlugin)
+
+
+def test_unknown_names_list_the_nearest_first(package):
+    with pytest.raises(PluginError) as caught:
+        PluginRegistry().find("Lasser")
+    assert 'no plugin "flatland_plugins::Lasser", known are: flatland_plugins::Laser, ' in str(
+        caught.value
+    )
+
+
+@pytest.mark.parametrize(
+    ("content", "text"),
+    [
+        ("<library", 'manifest "{0}" is not XML, line 1 col 0, unclosed token'),
+        ("", 'manifest "{0}" is not XML, line 1 col 0, '),
+        ("<a/>", 'manifest "{0}" must hold <library> or <class_libraries>, got <a>'),
+        ('<library><class name="X" base_class_type="flatland::ModelPlugin"/></library>',
+         'manifest "{0}", class "X": type must be the dotted path of a Python class, got ""'),
+        ('<library><class name="X" type="a.b" base_class_type="Y"/></library>',
+         'manifest "{0}", class "X": base_class_type must be flatland::ModelPlugin or '
+         'flatland::WorldPlugin, got "Y"'),
+    ],
+)  # fmt: skip
+def test_broken_manifests(files, monkeypatch, content, text):
+    path = files.write("m.xml", content)
+    with pytest.raises(PluginError) as caught:
+        read_manifest(path)
+    assert text.format(path) in str(caught.value)
+    # The others go on, and whoever asks in vain is told of it.
+    monkeypatch.setenv("FLATLAND_PLUGIN_PATH", f"{path}:/nowhere/else.xml")
+    registry = PluginRegistry()
+    assert registry.find("Laser")
+    with pytest.raises(PluginError) as caught:
+        registry.find("my::Plugin")
+    assert f"; not read: {text.format(path)}" in str(caught.value)
+    assert 'manifest "/nowhere/else.xml" cannot be read: No such file or directory' in str(
+        caught.value
+    )
+
+
+def test_several_libraries_in_one_manifest(files):
+    path = files.write(
+        "m.xml",
+        """
+        <class_libraries>
+          <library><class type="a.B" base_class_type="flatland::ModelPlugin"/></library>
+          <library path="x"><class type="c.D" base_class_type="flatland::WorldPlugin"/></library>
+        </class_libraries>
+        """,
+    )
+    first, second = read_manifest(path)
+    assert (first.class_path, first.import_path) == ("a.B", None)
+    assert (second.class_path, second.import_path) == ("c.D", str(files.folder / "x"))
+
+
+PACKAGE = """
+<package format="2">
+  <name>{name}</name><version>0.0.1</version><description>x</description>
+  <maintainer email="{email}">a</maintainer><license>BSD</license>
+  <export><flatland plugin="${{prefix}}/plugins.xml"/></export>
+</package>
+"""
+
+
+def test_packages_on_the_ros_package_path_are_found(package, files, monkeypatch):
+    name, manifest = package
+    files.write("package.xml", PACKAGE.format(name=name, email="a@example.org"))
+    monkeypatch.delenv("FLATLAND_PLUGIN_PATH")
+    with pytest.raises(PluginError):
+        PluginRegistry().find(f"{name}::Good")
+    monkeypatch.setenv("ROS_PACKAGE_PATH", str(files.folder))
+    assert PluginRegistry().find(f"{name}::Good").manifest == manifest
+
+
+def test_a_broken_package_does_not_hide_the_others(package, files, monkeypatch):
+    name, manifest = package
+    files.write("package.xml", PACKAGE.format(name=name, email="a@example.org"))
+    files.write("other/package.xml", PACKAGE.format(name="other", email="nobody"))
+    monkeypatch.delenv("FLATLAND_PLUGIN_PATH")
+    monkeypatch.setenv("ROS_PACKAGE_PATH", f"{files.folder / 'other'}:{files.folder}")
+    registry = PluginRegistry()
+    assert registry.find(f"{name}::Good").manifest == manifest
+    with pytest.raises(PluginError, match=r'not read: package "other" cannot be read: .*email'):
+        registry.find("other::Good")
+
+
+def test_python_distributions_are_found(package, files, monkeypatch):
+    name, _ = package
+    files.write(f"src/{name}/flatland_plugins.xml", MANIFEST.format(package=name))
+    files.write(
+        f"src/{name}-1.0.dist-info/entry_points.txt", f"[flatland.plugins]\nrobots = {name}\n"
+    )
+    files.write(f"src/{name}-1.0.dist-info/METADATA", f"Name: {name}\nVersion: 1.0\n")
+    monkeypatch.delenv("FLATLAND_PLUGIN_PATH")
+    monkeypatch.syspath_prepend(str(files.folder / "src"))
+    found = PluginRegistry().find(f"{name}::Good")
+    assert found.manifest == str(files.folder / "src" / name / "flatland_plugins.xml")
+
+
+def test_a_hidden_class_is_warned_of(package, files, monkeypatch, caplog):
+    name, manifest = package
+    other = files.write("other.xml", MANIFEST.format(package=name))
+    monkeypatch.setenv("FLATLAND_PLUGIN_PATH", f"{manifest}:{other}")
+    assert PluginRegistry().find(f"{name}::Good").manifest == manifest
+    assert f'plugin "{name}::Good" of "{other}" is hidden by that of "{manifest}"' in caplog.text
+
+
+def test_finding_imports_no_plugin():
+    code = (
+        "import sys, flatland.plugin_api.registry as r;"
+        "r.PluginRegistry().classes;"
+        "print([m for m in sys.modules if m == 'flatland.plugins.laser'])"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "[]"
