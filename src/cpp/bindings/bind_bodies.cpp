@@ -1,0 +1,78 @@
+#include <pybind11/numpy.h>
+#include <pybind11/stl.h>
+
+#include <string>
+#include <tuple>
+
+#include "bindings/bindings.h"
+#include "world/bodies.h"
+
+namespace py = pybind11;
+
+namespace flatland {
+namespace {
+
+using PyTriple = std::tuple<double, double, double>;
+using PyPair = std::tuple<double, double>;
+
+PyTriple to_python(const Triple& t) { return {t[0], t[1], t[2]}; }
+PyPair to_python(const b2Vec2& v) { return {static_cast<double>(v.x), static_cast<double>(v.y)}; }
+
+b2BodyType body_type(const std::string& name) {
+  if (name == "static") return b2_staticBody;
+  if (name == "kinematic") return b2_kinematicBody;
+  if (name == "dynamic") return b2_dynamicBody;
+  throw py::value_error("body_type must be one of: static, kinematic, dynamic, got \"" + name +
+                        "\"");
+}
+
+const char* type_name(b2BodyType type) {
+  if (type == b2_staticBody) return "static";
+  return type == b2_kinematicBody ? "kinematic" : "dynamic";
+}
+
+}  // namespace
+
+void bind_bodies(WorldClass& world) {
+  world.def(
+      "create_body",
+      [](World& self, const std::string& type, double x, double y, double theta,
+         double linear_damping, double angular_damping) {
+        return create_body(self, body_type(type), {x, y, theta}, linear_damping, angular_damping);
+      },
+      py::arg("body_type"), py::arg("x"), py::arg("y"), py::arg("theta"), py::arg("linear_damping"),
+      py::arg("angular_damping"));
+  world.def("pose", [](const World& self, Id body) { return to_python(pose_of(self, body)); });
+  world.def("set_pose", [](World& self, Id body, double x, double y, double theta) {
+    set_pose(self, body, {x, y, theta});
+  });
+  world.def("velocity",
+            [](const World& self, Id body) { return to_python(velocity_of(self, body)); });
+  world.def("set_velocity", [](World& self, Id body, double vx, double vy, double omega) {
+    set_velocity(self, body, {vx, vy, omega});
+  });
+  world.def("apply_force", &apply_force);
+  world.def("apply_torque", &apply_torque);
+  world.def("body_type",
+            [](const World& self, Id body) { return type_name(self.read_body(body)->GetType()); });
+  world.def("awake", [](const World& self, Id body) { return self.read_body(body)->IsAwake(); });
+  world.def("set_awake",
+            [](World& self, Id body, bool awake) { self.change_body(body)->SetAwake(awake); });
+  world.def("mass", [](const World& self, Id body) { return self.read_body(body)->GetMass(); });
+  world.def("inertia",
+            [](const World& self, Id body) { return self.read_body(body)->GetInertia(); });
+  world.def("local_center", [](const World& self, Id body) {
+    return to_python(self.read_body(body)->GetLocalCenter());
+  });
+  world.def("world_center", [](const World& self, Id body) {
+    return to_python(self.read_body(body)->GetWorldCenter());
+  });
+  world.def("linear_damping",
+            [](const World& self, Id body) { return self.read_body(body)->GetLinearDamping(); });
+  world.def("angular_damping",
+            [](const World& self, Id body) { return self.read_body(body)->GetAngularDamping(); });
+  world.def("fixtures", &fixtures_of);
+  world.def("joints", &joints_of);
+}
+
+}  // namespace flatland

@@ -1,0 +1,128 @@
+#include "rays/ray_scene.h"
+
+#include <box2d/b2_body.h>
+#include <box2d/b2_edge_shape.h>
+#include <box2d/b2_fixture.h>
+
+#include <algorithm>
+#include <utility>
+
+namespace flatland {
+namespace {
+
+void collect_edges(const b2Body& body, std::vector<TreeEdge>& edges) {
+  for (const b2Fixture* f = body.GetFixtureList(); f != nullptr; f = f->GetNext()) {
+    if (f->GetType() != b2Shape::e_edge || f->IsSensor()) continue;
+    const auto* edge = static_cast<const b2EdgeShape*>(f->GetShape());
+    edges.push_back({edge->m_vertex1.x, edge->m_vertex1.y, edge->m_vertex2.x, edge->m_vertex2.y,
+                     f->GetFilterData().categoryBits});
+  }
+}
+
+std::shared_ptr<const EdgeTree> make_tree(const std::vector<const b2Body*>& bodies) {
+  std::vector<TreeEdge> edges;
+  for (const b2Body* body : bodies) collect_edges(*body, edges);
+  if (bodies.size() > 1) merge_twins(edges);
+  return std::make_shared<const EdgeTree>(std::move(edges));
+}
+
+bool is_same(const b2Transform& a, const b2Transform& b) {
+  return a.p == b.p && a.q.s == b.q.s && a.q.c == b.q.c;
+}
+
+}  // namespace
+
+void RayScene::add(b2Fixture* fixture) {
+  if (fixture->GetType() != b2Shape::e_edge) {
+    solids_.push_back(fixture);
+    return;
+  }
+  if (EdgeBody* known = find(fixture->GetBody())) {
+    known->is_changed = true;
+  } else {
+    edge_bodies_.push_back({fixture->GetBody(), true, false});
+  }
+  is_grouped_ = false;
+}
+
+void RayScene::remove_body(const b2Body* body) {
+  const auto has_solid = [body](const b2Fixture* fixture) { return fixture->GetBody() == body; };
+  solids_.erase(std::remove_if(solids_.begin(), solids_.end(), has_solid), solids_.end());
+  const auto is_it = [body](const EdgeBody& candidate) { return candidate.body == body; };
+  const auto rest = std::remove_if(edge_bodies_.begin(), edge_bodies_.end(), is_it);
+  if (rest != edge_bodies_.end()) is_grouped_ = false;
+  edge_bodies_.erase(rest, edge_bodies_.end());
+}
+
+void RayScene::changed(const b2Fixture* fixture) {
+  if (fixture->GetType() != b2Shape::e_edge) return;
+  if (EdgeBody* known = find(fixture->GetBody())) known->is_changed = true;
+  is_grouped_ = false;
+}
+
+void RayScene::clear() {
+  solids_.clear();
+  edge_bodies_.clear();
+  edge_groups_.clear();
+  is_grouped_ = true;
+}
+
+const std::vector<EdgeGroup>& RayScene::edge_groups() {
+  const std::lock_guard<std::mutex> lock(groups_mutex_);
+  if (is_grouped_) find_moved_bodies();
+  if (!is_grouped_) make_groups();
+  return edge_groups_;
+}
+
+void RayScene::find_moved_bodies() {
+  for (const EdgeGroup& group : edge_groups_) {
+    if (group.bodies.size() == 1) continue;
+    for (const b2Body* body : group.bodies) {
+      if (is_same(body->GetTransform(), group.pose)) continue;
+      find(body)->is_alone = true;
+      is_grouped_ = false;
+    }
+  }
+}
+
+void RayScene::make_groups() {
+  std::vector<EdgeGroup> groups;
+  for (const EdgeBody& each : edge_bodies_) {
+    const b2Transform& pose = each.body->GetTransform();
+    const bool may_join = each.body->GetType() == b2_staticBody && !each.is_alone;
+    const auto takes_it = [&](const EdgeGroup& group) {
+      const b2Body* first = group.bodies.front();
+      return is_same(group.pose, pose) && first->GetType() == b2_staticBody &&
+             !find(first)->is_alone;
+    };
+    const auto group =
+        may_join ? std::find_if(groups.begin(), groups.end(), takes_it) : groups.end();
+    if (group == groups.end()) {
+      groups.push_back({{each.body}, pose, nullptr});
+    } else {
+      group->bodies.push_back(each.body);
+    }
+  }
+  for (EdgeGroup& group : groups) {
+    const auto is_it = [&](const EdgeGroup& old) { return old.bodies == group.bodies; };
+    const auto known = std::find_if(edge_groups_.begin(), edge_groups_.end(), is_it);
+    const bool is_old = known != edge_groups_.end() &&
+                        std::none_of(group.bodies.begin(), group.bodies.end(),
+                                     [this](const b2Body* body) { return is_changed(body); });
+    group.tree = is_old ? known->tree : make_tree(group.bodies);
+  }
+  edge_groups_ = std::move(groups);
+  for (EdgeBody& each : edge_bodies_) each.is_changed = false;
+  is_grouped_ = true;
+}
+
+bool RayScene::is_changed(const b2Body* body) { return find(body)->is_changed; }
+
+RayScene::EdgeBody* RayScene::find(const b2Body* body) {
+  // The latest first: many edges are added to one body after another.
+  const auto known = std::find_if(edge_bodies_.rbegin(), edge_bodies_.rend(),
+                                  [body](const EdgeBody& e) { return e.body == body; });
+  return known == edge_bodies_.rend() ? nullptr : &*known;
+}
+
+}  // namespace flatland

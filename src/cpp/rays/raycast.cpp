@@ -1,0 +1,116 @@
+#include "rays/raycast.h"
+
+#include <box2d/b2_fixture.h>
+#include <box2d/b2_world.h>
+
+#include <algorithm>
+#include <limits>
+#include <memory>
+#include <vector>
+
+#include "rays/depth_scan.h"
+#include "rays/ray_scene.h"
+#include "world/contacts.h"
+
+namespace flatland {
+namespace {
+
+class ClosestHit final : public b2RayCastCallback {
+ public:
+  // Fixtures must have a category in each of the two masks.
+  ClosestHit(std::uint16_t mask, std::uint16_t also) : mask_(mask), also_(also) {}
+
+  float ReportFixture(b2Fixture* fixture, const b2Vec2& point, const b2Vec2& normal,
+                      float fraction) override {
+    constexpr float kGoOn = -1.0F;
+    const std::uint16_t category = fixture->GetFilterData().categoryBits;
+    if (fixture->IsSensor() || (category & mask_) == 0 || (category & also_) == 0) return kGoOn;
+    hit = RayHit{fraction, point, normal, id_of(fixture), category};
+    return fraction;
+  }
+
+  std::optional<RayHit> hit;
+
+ private:
+  std::uint16_t mask_;
+  std::uint16_t also_;
+};
+
+std::optional<RayHit> closest(const b2World& world, const b2Vec2& from, const b2Vec2& to,
+                              std::uint16_t mask, std::uint16_t also) {
+  // Box2D aborts on rays of no length, also where only the square of the length vanishes.
+  if (!((to - from).LengthSquared() > 0.0F)) return std::nullopt;
+  ClosestHit callback(mask, also);
+  world.RayCast(&callback, from, to);
+  return callback.hit;
+}
+
+}  // namespace
+
+std::optional<RayHit> ray_cast(const b2World& world, const b2Vec2& from, const b2Vec2& to,
+                               std::uint16_t mask) {
+  return closest(world, from, to, mask, 0xFFFF);
+}
+
+void cast_rays_reference(const b2World& world, const ScanRequest& request,
+                         const ScanResult& result) {
+  const b2Vec2 from = request.pose.p;
+  for (std::size_t i = 0; i < request.count; ++i) {
+    const b2Vec2 end(request.ends[2 * i], request.ends[2 * i + 1]);
+    const b2Vec2 to = b2Mul(request.pose, end);
+    const auto hit = closest(world, from, to, request.mask, 0xFFFF);
+    result.fractions[i] = hit ? hit->fraction : std::numeric_limits<float>::quiet_NaN();
+    result.reflect[i] = false;
+    if (!hit || request.reflect_mask == 0) continue;
+    const auto mirror = closest(world, from, to, request.mask, request.reflect_mask);
+    if (!mirror) continue;
+    const float length = end.Length();
+    const float farther = (mirror->fraction - hit->fraction) * length;
+    result.reflect[i] = farther <= kSameDistance + kSameFraction * length;
+  }
+}
+
+namespace {
+
+void draw_all(DepthScan& scan, RayScene& scene, RayMasks masks) {
+  for (const EdgeGroup& edges : scene.edge_groups()) {
+    scan.draw(*edges.tree, edges.bodies.front()->GetTransform(), masks);
+  }
+  scan.draw(scene.solids(), masks);
+}
+
+// Casts again, only for what reflects, and only as far as the nearest hits.
+void find_reflections(const DepthScan& hits, const BeamFan& fan, RayScene& scene,
+                      const ScanRequest& request, bool* reflect) {
+  std::vector<float> limits(fan.padded_count(), -1.0F);
+  for (std::size_t i = 0; i < fan.count(); ++i) {
+    if (hits.fractions()[i] <= 1.0F) {
+      limits[i] = hits.fractions()[i] + kSameFraction + kSameDistance / fan.length()[i];
+    }
+  }
+  DepthScan mirrors(fan, request.pose);
+  mirrors.set_limits(limits);
+  draw_all(mirrors, scene, {request.mask, request.reflect_mask});
+  for (std::size_t i = 0; i < fan.count(); ++i) {
+    reflect[fan.order()[i]] = mirrors.fractions()[i] < limits[i];
+  }
+}
+
+}  // namespace
+
+void cast_rays(RayScene& scene, const ScanRequest& request, const ScanResult& result) {
+  std::fill_n(result.fractions, request.count, std::numeric_limits<float>::quiet_NaN());
+  std::fill_n(result.reflect, request.count, false);
+  const std::shared_ptr<const BeamFan> fan = scene.fans().get(request.ends, request.count);
+  DepthScan scan(*fan, request.pose);
+  constexpr std::uint16_t kAny = 0xFFFF;
+  draw_all(scan, scene, {request.mask, kAny});
+  for (std::size_t i = 0; i < fan->count(); ++i) {
+    if (scan.fractions()[i] <= 1.0F) result.fractions[fan->order()[i]] = scan.fractions()[i];
+  }
+  if (request.reflect_mask != 0) {
+    find_reflections(scan, *fan, scene, request, result.reflect);
+  }
+}
+
+}  // namespace flatland

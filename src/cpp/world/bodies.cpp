@@ -1,0 +1,231 @@
+#include "world/bodies.h"
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+#include <string>
+#include <utility>
+
+#include "world/broad_phase.h"
+#include "world/errors.h"
+#include "world/shapes.h"
+
+namespace flatland {
+namespace {
+
+b2FixtureDef checked_definition(const b2Shape& shape, const FixtureOptions& options) {
+  b2FixtureDef definition;
+  definition.shape = &shape;
+  definition.density = checked_not_negative(options.density, "density");
+  definition.friction = checked_not_negative(options.friction, "friction");
+  definition.restitution = checked_not_negative(options.restitution, "restitution");
+  definition.isSensor = options.is_sensor;
+  definition.filter.categoryBits = options.category_bits;
+  definition.filter.maskBits = options.mask_bits;
+  return definition;
+}
+
+// What must happen after a body was moved or got another shape.
+void wake(World& world, b2Body* body) {
+  if (body->GetType() == b2_staticBody) {
+    world.wake_neighbours(body);
+  } else {
+    body->SetAwake(true);
+  }
+}
+
+Id create_fixture(World& world, Id body_id, const b2Shape& shape, const FixtureOptions& options) {
+  b2Body* body = world.change_body(body_id);
+  const b2FixtureDef definition = checked_definition(shape, options);
+  check_mass_with(*body, shape, definition.density);
+  const Id id = world.add_fixture(body, definition);
+  wake(world, body);
+  return id;
+}
+
+// Box2D keeps fixtures in a list with the newest first.
+template <typename Value>
+std::vector<Value> reversed(std::vector<Value> values) {
+  std::reverse(values.begin(), values.end());
+  return values;
+}
+
+// The largest change of velocity that a force may make in a second.
+void check_acceleration(float acceleration, const char* what) {
+  if (!(std::abs(static_cast<double>(acceleration)) <= kMaxMagnitude)) {
+    throw std::invalid_argument(std::string(what) + " is too large for the body's mass");
+  }
+}
+
+}  // namespace
+
+Id create_body(World& world, b2BodyType type, const Triple& pose, double linear_damping,
+               double angular_damping) {
+  b2BodyDef definition;
+  definition.type = type;
+  definition.position = checked_vector(pose[0], pose[1], "pose");
+  definition.angle = checked_finite(pose[2], "pose angle");
+  definition.linearDamping = checked_not_negative(linear_damping, "linear_damping");
+  definition.angularDamping = checked_not_negative(angular_damping, "angular_damping");
+  return world.add_body(definition);
+}
+
+Triple pose_of(const World& world, Id body_id) {
+  const b2Body* body = world.read_body(body_id);
+  const b2Vec2& position = body->GetPosition();
+  return {static_cast<double>(position.x), static_cast<double>(position.y),
+          static_cast<double>(body->GetAngle())};
+}
+
+void set_pose(World& world, Id body_id, const Triple& pose) {
+  b2Body* body = world.change_body(body_id);
+  const b2Vec2 position = checked_vector(pose[0], pose[1], "pose");
+  const float angle = checked_finite(pose[2], "pose angle");
+  body->SetTransform(position, angle);
+  wake(world, body);
+}
+
+Triple velocity_of(const World& world, Id body_id) {
+  const b2Body* body = world.read_body(body_id);
+  const b2Vec2 velocity = body->GetLinearVelocityFromWorldPoint(body->GetPosition());
+  return {static_cast<double>(velocity.x), static_cast<double>(velocity.y),
+          static_cast<double>(body->GetAngularVelocity())};
+}
+
+void set_velocity(World& world, Id body_id, const Triple& velocity) {
+  b2Body* body = world.change_body(body_id);
+  const b2Vec2 of_origin = checked_vector(velocity[0], velocity[1], "velocity");
+  const float omega = checked_finite(velocity[2], "velocity omega");
+  const b2Vec2 to_center = body->GetWorldCenter() - body->GetPosition();
+  body->SetLinearVelocity(of_origin + b2Cross(omega, to_center));
+  body->SetAngularVelocity(omega);
+}
+
+void apply_force(World& world, Id body_id, double fx, double fy, double px, double py) {
+  b2Body* body = world.change_body(body_id);
+  const b2Vec2 force = checked_vector(fx, fy, "force");
+  const b2Vec2 point = checked_vector(px, py, "point");
+  const float mass = body->GetMass();
+  if (mass > 0.0F) {
+    check_acceleration(force.Length() / mass, "force");
+    const float inertia = body->GetInertia() - mass * body->GetLocalCenter().LengthSquared();
+    const float torque = b2Cross(point - body->GetWorldCenter(), force);
+    if (inertia > 0.0F) check_acceleration(torque / inertia, "force");
+  }
+  body->ApplyForce(force, point, true);
+}
+
+void apply_torque(World& world, Id body_id, double torque) {
+  b2Body* body = world.change_body(body_id);
+  const float checked = checked_finite(torque, "torque");
+  const float mass = body->GetMass();
+  const float inertia = body->GetInertia() - mass * body->GetLocalCenter().LengthSquared();
+  if (inertia > 0.0F) check_acceleration(checked / inertia, "torque");
+  body->ApplyTorque(checked, true);
+}
+
+Id create_circle(World& world, Id body, double x, double y, double radius,
+                 const FixtureOptions& options) {
+  return create_fixture(world, body, make_circle(x, y, radius), options);
+}
+
+Id create_polygon(World& world, Id body, const std::vector<b2Vec2>& points,
+                  const FixtureOptions& options) {
+  return create_fixture(world, body, make_polygon(points), options);
+}
+
+std::size_t create_edges(World& world, Id body_id, const float* edges, std::size_t count,
+                         const FixtureOptions& options) {
+  check_all_finite(edges, 4 * count, 4, "edges");
+  b2EdgeShape shape;
+  const b2FixtureDef definition = checked_definition(shape, options);
+  auto* body = const_cast<b2Body*>(world.read_body(body_id));
+  world.reserve_fixtures(count);
+  const int32 waiting_before = waiting_fixtures(world.engine());
+  std::size_t made = 0;
+  for (std::size_t i = 0; i < count; ++i) {
+    if (!make_edge(edges + 4 * i, &shape)) continue;
+    world.add_fixture(body, definition);
+    ++made;
+  }
+  constexpr std::size_t kManyEdges = 10000;
+  if (made >= kManyEdges && body->GetType() == b2_staticBody) {
+    world.skip_static_fixtures(waiting_before);
+  }
+  if (made > 0) wake(world, body);
+  return made;
+}
+
+std::vector<Id> fixtures_of(const World& world, Id body_id) {
+  const b2Body* body = world.read_body(body_id);
+  std::vector<Id> ids;
+  for (const b2Fixture* f = body->GetFixtureList(); f != nullptr; f = f->GetNext()) {
+    ids.push_back(id_of(f));
+  }
+  return reversed(std::move(ids));
+}
+
+std::vector<Id> joints_of(const World& world, Id body_id) {
+  const b2Body* body = world.read_body(body_id);
+  std::vector<Id> ids;
+  for (const b2JointEdge* edge = body->GetJointList(); edge != nullptr; edge = edge->next) {
+    ids.push_back(edge->joint->GetUserData().pointer);
+  }
+  return reversed(std::move(ids));
+}
+
+std::vector<std::array<float, 4>> edges_of(const World& world, Id body_id) {
+  const b2Body* body = world.read_body(body_id);
+  std::vector<std::array<float, 4>> edges;
+  for (const b2Fixture* f = body->GetFixtureList(); f != nullptr; f = f->GetNext()) {
+    if (f->GetType() != b2Shape::e_edge) continue;
+    const auto* edge = static_cast<const b2EdgeShape*>(f->GetShape());
+    edges.push_back({edge->m_vertex1.x, edge->m_vertex1.y, edge->m_vertex2.x, edge->m_vertex2.y});
+  }
+  return reversed(std::move(edges));
+}
+
+std::vector<std::array<double, 2>> vertices_of(const b2Fixture& fixture) {
+  std::vector<std::array<double, 2>> vertices;
+  const auto add = [&](const b2Vec2& v) {
+    vertices.push_back({static_cast<double>(v.x), static_cast<double>(v.y)});
+  };
+  if (fixture.GetType() == b2Shape::e_polygon) {
+    const auto* polygon = static_cast<const b2PolygonShape*>(fixture.GetShape());
+    std::for_each(polygon->m_vertices, polygon->m_vertices + polygon->m_count, add);
+  } else if (fixture.GetType() == b2Shape::e_edge) {
+    const auto* edge = static_cast<const b2EdgeShape*>(fixture.GetShape());
+    add(edge->m_vertex1);
+    add(edge->m_vertex2);
+  }
+  return vertices;
+}
+
+b2Vec2 center_of(const b2Fixture& fixture) {
+  if (fixture.GetType() == b2Shape::e_circle) {
+    return static_cast<const b2CircleShape*>(fixture.GetShape())->m_p;
+  }
+  if (fixture.GetType() == b2Shape::e_polygon) {
+    return static_cast<const b2PolygonShape*>(fixture.GetShape())->m_centroid;
+  }
+  const auto* edge = static_cast<const b2EdgeShape*>(fixture.GetShape());
+  return 0.5F * (edge->m_vertex1 + edge->m_vertex2);
+}
+
+void set_sensor(World& world, Id fixture_id, bool is_sensor) {
+  b2Fixture* fixture = world.change_fixture(fixture_id);
+  if (fixture->IsSensor() == is_sensor) return;
+  fixture->SetSensor(is_sensor);
+  world.fixture_changed(fixture);
+}
+
+void set_filter(World& world, Id fixture_id, std::uint16_t category_bits, std::uint16_t mask_bits) {
+  b2Fixture* fixture = world.change_fixture(fixture_id);
+  b2Filter filter = fixture->GetFilterData();
+  filter.categoryBits = category_bits;
+  filter.maskBits = mask_bits;
+  fixture->SetFilterData(filter);
+  world.fixture_changed(fixture);
+}
+
+}  // namespace flatland

@@ -1,0 +1,103 @@
+#include "world/contacts.h"
+
+#include <box2d/b2_body.h>
+#include <box2d/b2_contact.h>
+#include <box2d/b2_fixture.h>
+#include <box2d/b2_world.h>
+
+#include <exception>
+#include <utility>
+
+namespace flatland {
+
+static_assert(sizeof(uintptr_t) >= sizeof(Id), "ids are kept in Box2D's user data");
+
+// Box2D 2.4 has user data only behind a reference to non-const.
+Id id_of(const b2Body* body) { return const_cast<b2Body*>(body)->GetUserData().pointer; }
+Id id_of(const b2Fixture* fixture) {
+  return const_cast<b2Fixture*>(fixture)->GetUserData().pointer;
+}
+
+void ContactRecorder::BeginContact(b2Contact* contact) {
+  try {
+    ids_[contact] = ++last_id_;
+    if (recording) rows_.push_back(make_row(contact, ContactKind::kBegin));
+  } catch (const std::exception&) {
+    failed_ = true;
+  }
+}
+
+void ContactRecorder::EndContact(b2Contact* contact) {
+  try {
+    if (recording) rows_.push_back(make_row(contact, ContactKind::kEnd));
+  } catch (const std::exception&) {
+    failed_ = true;
+  }
+  ids_.erase(contact);
+}
+
+void ContactRecorder::PreSolve(b2Contact* contact, const b2Manifold* old_manifold) {
+  if (hook == nullptr) return;
+  const bool is_wanted = hook->wants(id_of(contact->GetFixtureA()->GetBody())) ||
+                         hook->wants(id_of(contact->GetFixtureB()->GetBody()));
+  if (is_wanted) {
+    hook->pre_solve(contact, make_row(contact, ContactKind::kTouching), *old_manifold);
+  }
+}
+
+void ContactRecorder::PostSolve(b2Contact* contact, const b2ContactImpulse* impulse) {
+  if (!recording) return;
+  try {
+    ContactRow row = make_row(contact, ContactKind::kPostSolve);
+    for (int32 i = 0; i < impulse->count && i < b2_maxManifoldPoints; ++i) {
+      row.normal_impulses[i] = impulse->normalImpulses[i];
+      row.tangent_impulses[i] = impulse->tangentImpulses[i];
+    }
+    rows_.push_back(row);
+  } catch (const std::exception&) {
+    failed_ = true;
+  }
+}
+
+std::vector<ContactRow> ContactRecorder::take_rows() { return std::exchange(rows_, {}); }
+
+bool ContactRecorder::take_failure() { return std::exchange(failed_, false); }
+
+std::vector<ContactRow> ContactRecorder::touching(const b2World& world) const {
+  std::vector<ContactRow> rows;
+  // Making a row only reads the contact; Box2D's list of contacts is not const-correct.
+  auto* contact = const_cast<b2Contact*>(world.GetContactList());
+  for (; contact != nullptr; contact = contact->GetNext()) {
+    if (contact->IsTouching()) rows.push_back(make_row(contact, ContactKind::kTouching));
+  }
+  return rows;
+}
+
+ContactRow ContactRecorder::make_row(b2Contact* contact, ContactKind kind) const {
+  const b2Fixture* fixture_a = contact->GetFixtureA();
+  const b2Fixture* fixture_b = contact->GetFixtureB();
+  ContactRow row{};
+  row.kind = kind;
+  row.fixture_a = id_of(fixture_a);
+  row.fixture_b = id_of(fixture_b);
+  row.body_a = id_of(fixture_a->GetBody());
+  row.body_b = id_of(fixture_b->GetBody());
+  row.is_sensor = fixture_a->IsSensor() || fixture_b->IsSensor();
+  const auto known = ids_.find(contact);
+  row.contact_id = known == ids_.end() ? 0 : known->second;
+  const int32 count = contact->GetManifold()->pointCount;
+  row.point_count = static_cast<std::uint8_t>(count);
+  if (count > 0) {
+    b2WorldManifold manifold;
+    contact->GetWorldManifold(&manifold);
+    row.normal[0] = manifold.normal.x;
+    row.normal[1] = manifold.normal.y;
+    for (int32 i = 0; i < count; ++i) {
+      row.points[i][0] = manifold.points[i].x;
+      row.points[i][1] = manifold.points[i].y;
+    }
+  }
+  return row;
+}
+
+}  // namespace flatland

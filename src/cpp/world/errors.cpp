@@ -1,0 +1,60 @@
+#include "world/errors.h"
+
+#include <cmath>
+#include <cstdio>
+
+namespace flatland {
+namespace {
+
+// Written so that NaN is out of range.
+bool in_range(double value) { return std::abs(value) <= kMaxMagnitude; }
+
+[[noreturn]] void refuse(double value, const std::string& what) {
+  throw std::invalid_argument(what + " must be finite and within +-" + to_text(kMaxMagnitude) +
+                              ", got " + to_text(value));
+}
+
+}  // namespace
+
+std::string to_text(double value) {
+  char text[32];
+  std::snprintf(text, sizeof(text), "%.9g", value);
+  return text;
+}
+
+float checked_finite(double value, const std::string& what) {
+  if (!in_range(value)) refuse(value, what);
+  return static_cast<float>(value);
+}
+
+float checked_not_negative(double value, const std::string& what) {
+  if (value < 0.0) {
+    throw std::invalid_argument(what + " must not be negative, got " + to_text(value));
+  }
+  return checked_finite(value, what);
+}
+
+b2Vec2 checked_vector(double x, double y, const std::string& what) {
+  if (!in_range(x) || !in_range(y)) {
+    throw std::invalid_argument(what + " must be finite and within +-" + to_text(kMaxMagnitude) +
+                                ", got (" + to_text(x) + ", " + to_text(y) + ")");
+  }
+  return {static_cast<float>(x), static_cast<float>(y)};
+}
+
+void check_all_finite(const float* values, std::size_t count, std::size_t width,
+                      const std::string& what) {
+  constexpr float limit = static_cast<float>(kMaxMagnitude);
+  // One pass without branches, so that the compiler can vectorise it; the place is found later.
+  bool all = true;
+  for (std::size_t i = 0; i < count; ++i) all &= std::abs(values[i]) <= limit;
+  if (all) return;
+  for (std::size_t i = 0; i < count; ++i) {
+    if (!in_range(static_cast<double>(values[i]))) {
+      refuse(static_cast<double>(values[i]),
+             what + "[" + std::to_string(i / width) + ", " + std::to_string(i % width) + "]");
+    }
+  }
+}
+
+}  // namespace flatland

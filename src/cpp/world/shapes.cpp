@@ -1,0 +1,147 @@
+#include "world/shapes.h"
+
+#include <box2d/b2_body.h>
+#include <box2d/b2_fixture.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <string>
+
+#include "world/errors.h"
+
+namespace flatland {
+namespace {
+
+// What rounding may do to an area or an inertia, as a part of the largest term in its sum.
+constexpr float kRounding = 4.0F * b2_epsilon;
+
+// Points that Box2D keeps: those nearer to an earlier one than half its slop are dropped.
+std::vector<b2Vec2> join_near_points(const std::vector<b2Vec2>& points) {
+  constexpr float least = 0.5F * b2_linearSlop;
+  std::vector<b2Vec2> kept;
+  for (const b2Vec2& point : points) {
+    const bool is_new = std::none_of(kept.begin(), kept.end(), [&](const b2Vec2& other) {
+      return b2DistanceSquared(point, other) < least * least;
+    });
+    if (is_new) kept.push_back(point);
+  }
+  return kept;
+}
+
+// Walks round the hull as Box2D will, in float and in its order, to see where it would end.
+// Returns fewer than 3 points when there is no hull, or when rounding keeps it from closing.
+std::vector<b2Vec2> wrap_hull(const std::vector<b2Vec2>& points) {
+  const auto is_more_right = [](const b2Vec2& a, const b2Vec2& b) {
+    return a.x < b.x || (a.x == b.x && a.y > b.y);
+  };
+  const auto start = static_cast<std::size_t>(
+      std::max_element(points.begin(), points.end(), is_more_right) - points.begin());
+  std::vector<b2Vec2> hull;
+  std::size_t at = start;
+  do {
+    if (hull.size() == static_cast<std::size_t>(b2_maxPolygonVertices)) return {};
+    hull.push_back(points[at]);
+    std::size_t next = 0;
+    for (std::size_t candidate = 1; candidate < points.size(); ++candidate) {
+      if (next == at) {
+        next = candidate;
+        continue;
+      }
+      const b2Vec2 to_next = points[next] - hull.back();
+      const b2Vec2 to_candidate = points[candidate] - hull.back();
+      const float turn = b2Cross(to_next, to_candidate);
+      const bool is_farther = to_candidate.LengthSquared() > to_next.LengthSquared();
+      if (turn < 0.0F || (turn == 0.0F && is_farther)) next = candidate;
+    }
+    at = next;
+  } while (at != start);
+  return hull;
+}
+
+bool has_area(const std::vector<b2Vec2>& hull) {
+  if (hull.size() < 3) return false;
+  float area = 0.0F;
+  float longest = 0.0F;
+  for (std::size_t i = 1; i + 1 < hull.size(); ++i) {
+    const b2Vec2 a = hull[i] - hull[0];
+    const b2Vec2 b = hull[i + 1] - hull[0];
+    area += 0.5F * b2Cross(a, b);
+    longest = std::max({longest, a.LengthSquared(), b.LengthSquared()});
+  }
+  return area > std::max(2.0F * b2_epsilon, kRounding * longest);
+}
+
+}  // namespace
+
+b2CircleShape make_circle(double x, double y, double radius) {
+  b2CircleShape circle;
+  circle.m_p = checked_vector(x, y, "center");
+  circle.m_radius = checked_not_negative(radius, "radius");
+  return circle;
+}
+
+b2PolygonShape make_polygon(const std::vector<b2Vec2>& points) {
+  if (points.size() < 3 || points.size() > static_cast<std::size_t>(b2_maxPolygonVertices)) {
+    throw std::invalid_argument("a polygon must have 3 to 8 points, got " +
+                                std::to_string(points.size()));
+  }
+  const std::vector<b2Vec2> distinct = join_near_points(points);
+  if (distinct.size() < 3) {
+    throw std::invalid_argument(
+        "a polygon must have at least 3 points that are 2.5 mm or more from each other, got " +
+        std::to_string(distinct.size()));
+  }
+  if (!has_area(wrap_hull(distinct))) {
+    throw std::invalid_argument("a polygon must have an area, but its points lie on a line");
+  }
+  b2PolygonShape polygon;
+  polygon.Set(points.data(), static_cast<int32>(points.size()));
+  return polygon;
+}
+
+bool make_edge(const float* x1_y1_x2_y2, b2EdgeShape* edge) {
+  const b2Vec2 from(x1_y1_x2_y2[0], x1_y1_x2_y2[1]);
+  const b2Vec2 to(x1_y1_x2_y2[2], x1_y1_x2_y2[3]);
+  if (!((to - from).Length() >= kMinEdgeLength)) return false;
+  edge->SetTwoSided(from, to);
+  return true;
+}
+
+void check_mass_with(const b2Body& body, const b2Shape& shape, float density) {
+  if (body.GetType() != b2_dynamicBody || density == 0.0F) return;
+  constexpr float kLeast = 1e-20F;
+  constexpr float kMost = 1e15F;
+  float mass = 0.0F;
+  float inertia = 0.0F;
+  b2Vec2 center(0.0F, 0.0F);
+  const auto add = [&](const b2Shape& part, float part_density) {
+    b2MassData data;
+    part.ComputeMass(&data, part_density);
+    mass += data.mass;
+    center += data.mass * data.center;
+    inertia += data.I;
+  };
+  // The order in which Box2D adds them up: the newest first.
+  add(shape, density);
+  for (const b2Fixture* fixture = body.GetFixtureList(); fixture; fixture = fixture->GetNext()) {
+    if (fixture->GetDensity() != 0.0F) add(*fixture->GetShape(), fixture->GetDensity());
+  }
+  if (mass == 0.0F && inertia == 0.0F) return;  // a point
+  if (!(mass >= kLeast && mass <= kMost)) {
+    throw std::invalid_argument("the mass of a body must be 0 or from 1e-20 to 1e15 kg, got " +
+                                to_text(static_cast<double>(mass)));
+  }
+  center *= 1.0F / mass;
+  const float about_center = inertia - mass * b2Dot(center, center);
+  if (!(inertia <= kMost && about_center >= kLeast && about_center > kRounding * inertia)) {
+    throw std::invalid_argument(
+        "the moment of inertia of a body must be from 1e-20 to 1e15 kg m^2 and not vanish beside "
+        "that of its mass about the origin, got " +
+        to_text(static_cast<double>(about_center)) + " and " +
+        to_text(static_cast<double>(inertia)) +
+        " (is the shape tiny and far from the body's origin?)");
+  }
+}
+
+}  // namespace flatland

@@ -1,0 +1,261 @@
+#include "world/world.h"
+
+#include <box2d/b2_circle_shape.h>
+#include <box2d/b2_contact.h>
+
+#include <mutex>
+#include <new>
+#include <stdexcept>
+
+#include "world/broad_phase.h"
+#include "world/errors.h"
+
+namespace flatland {
+namespace {
+
+// Box2D fills a table of its own when the first contact of the process is made, without a lock.
+// Making one here keeps worlds in different threads from racing for it.
+void fill_contact_table() {
+  static std::once_flag once;
+  std::call_once(once, [] {
+    b2World world({0.0F, 0.0F});
+    b2BodyDef definition;
+    definition.type = b2_dynamicBody;
+    b2CircleShape circle;
+    circle.m_radius = 1.0F;
+    for (int i = 0; i < 2; ++i) world.CreateBody(&definition)->CreateFixture(&circle, 1.0F);
+    world.Step(0.01F, 1, 1);
+  });
+}
+
+// A dynamic body without mass weighs 1 kg and cannot be turned by forces, as it was in Box2D up to
+// 2.3. Box2D 2.4 makes nothing move it: a robot with such a body welded to it would stand still.
+void give_mass(b2Body* body) {
+  if (body->GetType() != b2_dynamicBody || body->GetMass() > 0.0F) return;
+  b2MassData data;
+  data.mass = 1.0F;
+  data.center.SetZero();
+  data.I = 0.0F;
+  body->SetMassData(&data);
+}
+
+class WakeDynamicBodies final : public b2QueryCallback {
+ public:
+  bool ReportFixture(b2Fixture* fixture) override {
+    if (fixture->GetBody()->GetType() == b2_dynamicBody) fixture->GetBody()->SetAwake(true);
+    return true;
+  }
+};
+
+}  // namespace
+
+World::World() : engine_(std::make_unique<b2World>(b2Vec2(0.0F, 0.0F))) {
+  fill_contact_table();
+  engine_->SetDestructionListener(this);
+  engine_->SetContactListener(&contacts_);
+}
+
+World::~World() = default;
+
+void World::close() {
+  if (closed()) return;
+  check_changeable();
+  rays_.clear();
+  bodies_.clear();
+  fixtures_.clear();
+  joints_.clear();
+  contacts_ = ContactRecorder();
+  engine_.reset();
+}
+
+void World::step(double dt, int velocity_iterations, int position_iterations, PreSolveHook* hook) {
+  // Bounds beyond which 1 / dt and the solver's sums leave the range of a float.
+  if (!(dt >= 1e-6 && dt <= 1e3)) {
+    throw std::invalid_argument("dt must be from 1e-6 to 1000 s, got " + to_text(dt));
+  }
+  for (const int iterations : {velocity_iterations, position_iterations}) {
+    if (iterations < 0) {
+      throw std::invalid_argument("iterations must not be negative, got " +
+                                  std::to_string(iterations));
+    }
+  }
+  contacts_.hook = hook;
+  engine_->Step(static_cast<float>(dt), velocity_iterations, position_iterations);
+  contacts_.hook = nullptr;
+  if (contacts_.take_failure()) throw std::bad_alloc();
+}
+
+const b2Body* World::read_body(Id id) const {
+  check_readable();
+  b2Body* const* body = bodies_.find(id);
+  if (body == nullptr) throw StaleHandleError("the body was destroyed");
+  return *body;
+}
+
+const b2Fixture* World::read_fixture(Id id) const {
+  check_readable();
+  b2Fixture* const* fixture = fixtures_.find(id);
+  if (fixture == nullptr) throw StaleHandleError("the fixture was destroyed");
+  return *fixture;
+}
+
+const JointRecord& World::read_joint(Id id) const {
+  check_readable();
+  const JointRecord* joint = joints_.find(id);
+  if (joint == nullptr) throw StaleHandleError("the joint was destroyed");
+  return *joint;
+}
+
+b2Body* World::change_body(Id id) {
+  check_changeable();
+  return const_cast<b2Body*>(read_body(id));
+}
+
+b2Fixture* World::change_fixture(Id id) {
+  check_changeable();
+  return const_cast<b2Fixture*>(read_fixture(id));
+}
+
+b2Joint* World::change_joint(Id id) {
+  check_changeable();
+  return read_joint(id).joint;
+}
+
+void World::check_readable() const {
+  if (users_.load() == kExclusive && owner_.load() != std::this_thread::get_id()) throw_locked();
+  if (closed()) throw StaleHandleError("the world is closed");
+}
+
+void World::check_changeable() const {
+  wait_for_readers();
+  if (users_.load() == kExclusive) throw_locked();
+  if (closed()) throw StaleHandleError("the world is closed");
+}
+
+void World::wait_for_readers() const {
+  // A scan takes microseconds: less than it takes to sleep and to be woken.
+  while (users_.load() > 0) std::this_thread::yield();
+}
+
+void World::throw_locked() const {
+  const char* activity = activity_.load();
+  throw WorldLockedError(std::string("the world ") +
+                         (activity == nullptr ? "is in use" : activity) +
+                         ": nothing may be created, destroyed or changed now");
+}
+
+Id World::add_body(const b2BodyDef& definition) {
+  check_changeable();
+  b2Body* body = engine_->CreateBody(&definition);
+  give_mass(body);
+  const Id id = bodies_.insert(body);
+  body->GetUserData().pointer = id;
+  return id;
+}
+
+Id World::add_fixture(b2Body* body, const b2FixtureDef& definition) {
+  b2Fixture* fixture = body->CreateFixture(&definition);
+  give_mass(body);
+  const Id id = fixtures_.insert(fixture);
+  fixture->GetUserData().pointer = id;
+  rays_.add(fixture);
+  return id;
+}
+
+void World::skip_static_fixtures(int32 waiting_before) {
+  flatland::skip_static_fixtures(*engine_, waiting_before);
+}
+
+Id World::add_joint(const b2JointDef& definition, float frequency, float damping_ratio) {
+  check_changeable();
+  b2Joint* joint = engine_->CreateJoint(&definition);
+  const Id id = joints_.insert({joint, frequency, damping_ratio});
+  joint->GetUserData().pointer = id;
+  joint->GetBodyA()->SetAwake(true);
+  joint->GetBodyB()->SetAwake(true);
+  return id;
+}
+
+void World::destroy_body(Id id) {
+  b2Body* body = change_body(id);
+  // Box2D looks through all fixtures that moved or came since the last search for pairs, for each
+  // fixture that is destroyed: hours for a large map that goes again before the first step. A
+  // search empties that list.
+  constexpr int32 kManyFixtures = 2000;
+  if (waiting_fixtures(*engine_) > kManyFixtures) {
+    const_cast<b2ContactManager&>(engine_->GetContactManager()).FindNewContacts();
+  }
+  rays_.remove_body(body);
+  engine_->DestroyBody(body);  // says goodbye to its fixtures and joints, and ends its contacts
+  bodies_.erase(id);
+}
+
+void World::destroy_joint(Id id) {
+  b2Joint* joint = change_joint(id);
+  engine_->DestroyJoint(joint);
+  joints_.erase(id);
+}
+
+void World::SayGoodbye(b2Joint* joint) { joints_.erase(joint->GetUserData().pointer); }
+
+void World::SayGoodbye(b2Fixture* fixture) { fixtures_.erase(fixture->GetUserData().pointer); }
+
+void World::wake_neighbours(const b2Body* body) {
+  for (const b2ContactEdge* edge = body->GetContactList(); edge != nullptr; edge = edge->next) {
+    edge->other->SetAwake(true);
+  }
+  const b2Fixture* fixture = body->GetFixtureList();
+  if (fixture == nullptr) return;
+  b2AABB bounds = fixture->GetAABB(0);
+  for (; fixture != nullptr; fixture = fixture->GetNext()) bounds.Combine(fixture->GetAABB(0));
+  WakeDynamicBodies callback;
+  engine_->QueryAABB(&callback, bounds);
+}
+
+void World::fixture_changed(const b2Fixture* fixture) {
+  rays_.changed(fixture);
+  auto* body = const_cast<b2Body*>(fixture->GetBody());
+  body->SetAwake(body->GetType() != b2_staticBody);
+  wake_neighbours(body);
+}
+
+World::ExclusiveUse::ExclusiveUse(World& world, const char* activity) : world_(&world) {
+  int users = 0;
+  while (!world.users_.compare_exchange_weak(users, kExclusive)) {
+    if (users == kExclusive) world.throw_locked();
+    world.wait_for_readers();
+    users = 0;
+  }
+  world.activity_ = activity;
+  world.owner_ = std::this_thread::get_id();
+  if (world.closed()) {
+    end();
+    throw StaleHandleError("the world is closed");
+  }
+}
+
+void World::ExclusiveUse::end() {
+  if (world_ == nullptr) return;
+  world_->activity_ = nullptr;
+  world_->owner_ = std::thread::id();
+  world_->users_ = 0;
+  world_ = nullptr;
+}
+
+World::SharedUse::SharedUse(World& world) : world_(&world) {
+  int users = world.users_.load();
+  do {
+    if (users == kExclusive) world.throw_locked();
+  } while (!world.users_.compare_exchange_weak(users, users + 1));
+  if (world.closed()) {
+    end();
+    throw StaleHandleError("the world is closed");
+  }
+}
+
+void World::SharedUse::end() {
+  if (world_ != nullptr) --world_->users_;
+  world_ = nullptr;
+}
+
+}  // namespace flatland
