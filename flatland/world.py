@@ -6,7 +6,6 @@ import logging
 import os
 import secrets
 import threading
-import zlib
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import Future
@@ -540,9 +539,7 @@ class World:
     ) -> None:
         """Initialises a plugin and calls its hooks from now on; leaves nothing when it fails."""
         owner = plugin.model.name if isinstance(plugin, ModelPlugin) else ""
-        words = [zlib.crc32(text.encode()) for text in (owner, name, type_name)]
-        rng = np.random.default_rng(np.random.SeedSequence([self.seed, *words]))
-        plugin._attach(self, name, type_name, namespace, rng)
+        plugin._attach(self, owner, name, type_name, namespace)
         config = entry.without("name", "type", "enabled").with_location(*place)
         try:
             for observer in self._observers:

@@ -76,7 +76,7 @@ class Odometer:
         frame_id: Frame of the odometry's pose, as written.
         child_frame_id: Frame of the body.
         twist_covariance: Reported with the twist, shape (6, 6).
-        twist_noise: Of vx, vy and the yaw rate.
+        twist_noise: Noise of vx, vy and the yaw rate of a twist published besides the odometry.
     """
 
     def __init__(
@@ -114,8 +114,10 @@ class Odometer:
         self.twist_covariance = read_covariance(
             config, "odom_twist_covariance", planar_diagonal(twist_variances)
         )
-        self._pose_noise = GaussianNoise(plugin.rng, pose_variances)
-        self.twist_noise = GaussianNoise(plugin.rng, twist_variances)
+        self._pose_noise = GaussianNoise(plugin.noise_stream("odometry pose"), pose_variances)
+        self._twist_noise = GaussianNoise(plugin.noise_stream("odometry twist"), twist_variances)
+        # The measured twist is a sensor of its own, with the variances of the odometry.
+        self.twist_noise = GaussianNoise(plugin.noise_stream("twist"), twist_variances)
         self.child_frame_id = plugin.model.frame(body.name)
         self._truth: Output[Odometry] | None = None
         self._odometry: Output[Odometry] | None = None
@@ -128,6 +130,12 @@ class Odometer:
         """Whether anybody listens to the ground truth or the odometry."""
         truth, odometry = self._truth, self._odometry
         return (truth is not None and truth.wanted) or (odometry is not None and odometry.wanted)
+
+    def begin_update(self) -> None:
+        """Advances the noise; to be called for each update due, published or not."""
+        self._pose_noise.begin_update()
+        self._twist_noise.begin_update()
+        self.twist_noise.begin_update()
 
     def report(self, stamp: int, pose: Pose, velocity: Pose) -> Pose:
         """Emits the ground truth and the odometry, each if somebody listens.
@@ -155,7 +163,7 @@ class Odometer:
                     self.frame_id,
                     child,
                     noisy_pose,
-                    self._noisy(twist, self.twist_noise),
+                    self._noisy(twist, self._twist_noise),
                     self._pose_covariance,
                     self.twist_covariance,
                 )

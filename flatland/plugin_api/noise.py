@@ -1,4 +1,4 @@
-"""Gaussian noise from a plugin's own generator."""
+"""Noise of sensors: reproducible, and independent of the listeners of other outputs."""
 
 from __future__ import annotations
 
@@ -8,26 +8,75 @@ from collections.abc import Sequence
 import numpy as np
 
 
-class GaussianNoise:
-    """Independent noise of several quantities; one whose variance is 0 draws nothing."""
+class NoiseStream:
+    """Random numbers of one output, a function of the seed and of the count of updates due.
 
-    __slots__ = ("_deviations", "_rng")
+    The generator is counter-based (Philox): each update owns a range of counters. The numbers of an
+    update are therefore the same whether or not those of earlier updates were drawn, so that they
+    depend neither on the listeners of an output nor on the time at which they connect.
 
-    def __init__(self, rng: np.random.Generator, variances: Sequence[float]) -> None:
-        """Prepares to draw.
+    Attributes:
+        updates: Count of updates that were due.
+    """
+
+    __slots__ = ("_bits", "_counter", "_is_positioned", "_rng", "_state", "updates")
+
+    def __init__(self, entropy: Sequence[int]) -> None:
+        """Creates the stream; `begin_update` precedes the first draw.
 
         Args:
-            rng: The plugin's generator.
-            variances: Of each quantity, not negative.
+            entropy: Integers of at least 0 that identify the stream.
         """
-        self._rng = rng
+        self._bits = np.random.Philox(np.random.SeedSequence(entropy))
+        self._rng = np.random.Generator(self._bits)
+        self._state = self._bits.state
+        self._counter = self._state["state"]["counter"]
+        self._is_positioned = False
+        self.updates = 0
+
+    def begin_update(self) -> None:
+        """Advances to the next update; to be called for each update due, published or not."""
+        self.updates += 1
+        self._is_positioned = False
+
+    @property
+    def rng(self) -> np.random.Generator:
+        """The generator, at the start of the current update or after the draws of this update."""
+        if not self._is_positioned:
+            self._is_positioned = True
+            # The lowest word counts the draws within an update.
+            self._counter[1] = self.updates
+            self._bits.state = self._state
+        return self._rng
+
+
+class GaussianNoise:
+    """Independent normal noise of several quantities of one output.
+
+    A quantity of variance 0 draws no number.
+    """
+
+    __slots__ = ("_deviations", "_stream")
+
+    def __init__(self, stream: NoiseStream, variances: Sequence[float]) -> None:
+        """Creates the noise.
+
+        Args:
+            stream: The stream of the output.
+            variances: Variance of each quantity, at least 0.
+        """
+        self._stream = stream
         self._deviations = tuple(math.sqrt(variance) for variance in variances)
 
     def __bool__(self) -> bool:
-        """Whether there is any noise at all."""
+        """Whether any quantity has noise."""
         return any(self._deviations)
 
+    def begin_update(self) -> None:
+        """Advances to the next update; to be called for each update due, published or not."""
+        self._stream.begin_update()
+
     def sample(self, index: int) -> float:
-        """Draws the noise of one quantity."""
+        """Returns the noise of one quantity; to be called once per quantity and update."""
         deviation = self._deviations[index]
-        return float(self._rng.normal(0.0, deviation)) if deviation else 0.0
+        return float(self._stream.rng.normal(0.0, deviation)) if deviation else 0.0

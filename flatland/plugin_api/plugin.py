@@ -6,12 +6,14 @@ A plugin declares its ports and hooks and knows no ROS. See `docs/write_a_plugin
 from __future__ import annotations
 
 import builtins
+import zlib
 from typing import TYPE_CHECKING, Any, ClassVar, TypeVar
 
 import numpy as np
 
 from flatland.entities.contact import Contact, ContactImpulse, ModelContact, MutableContact
 from flatland.errors import PluginError
+from flatland.plugin_api.noise import NoiseStream
 from flatland.plugin_api.ports import Command, Output, resolve_topic
 
 if TYPE_CHECKING:
@@ -37,7 +39,8 @@ class FlatlandPlugin:
         type: As in the YAML file.
         world: The world that it acts in.
         namespace: Under which relative topics and frames live, may be empty.
-        rng: Source of all its random numbers, seeded from the world's seed and its names.
+        rng: Generator seeded from the seed of the world and the names of model, plugin and type.
+            For the noise of an output, use `noise_stream`.
         ros: Gives access to ROS (topics, services, parameters), None without ROS.
     """
 
@@ -50,20 +53,28 @@ class FlatlandPlugin:
     rng: np.random.Generator
     ros: Any
 
+    _entropy: tuple[int, ...]
     _outputs: list[Output[Any]]
     _commands: list[Command[Any]]
     _sent: set[tuple[str, str]]
     _detached: bool
 
-    def _attach(
-        self, world: World, name: str, type_name: str, namespace: str, rng: np.random.Generator
-    ) -> None:
-        """Gives the plugin its place in a world; called once, before `on_initialize`."""
+    def _attach(self, world: World, owner: str, name: str, type_name: str, namespace: str) -> None:
+        """Attaches the plugin to a world; called once, before `on_initialize`.
+
+        Args:
+            world: The world.
+            owner: Name of the model, empty for a world plugin.
+            name: Name of the plugin.
+            type_name: The `type:` of the YAML file.
+            namespace: Namespace of the model, may be empty.
+        """
         self.world = world
         self.name = name
         self.type = type_name
         self.namespace = namespace
-        self.rng = rng
+        self._entropy = (world.seed, *(zlib.crc32(t.encode()) for t in (owner, name, type_name)))
+        self.rng = np.random.default_rng(np.random.SeedSequence(self._entropy))
         self.ros = None
         self._outputs = []
         self._commands = []
@@ -118,6 +129,17 @@ class FlatlandPlugin:
         command = self.world.ports.open_command(self._resolve(topic), value_type, initial, accept)
         self._commands.append(command)
         return command
+
+    def noise_stream(self, output: str) -> NoiseStream:
+        """Returns a stream of random numbers for the noise of one output.
+
+        The numbers derive from the seed of the world, the names of model, plugin and type, the
+        name of the output, and the count of updates due. They do not depend on other outputs.
+
+        Args:
+            output: Name of the output or quantity, unique within the plugin.
+        """
+        return NoiseStream([*self._entropy, zlib.crc32(output.encode())])
 
     def _resolve(self, topic: str) -> str:
         if self._detached:

@@ -68,10 +68,11 @@ class DiffDrive(ModelPlugin):
 
     def _publish(self, stamp: int, pose: Pose) -> None:
         twist = self._twist
-        wants_twist = twist is not None and twist.wanted
-        if not (wants_twist or self._sends_transform or self._odometer.wanted):
-            return
         odometer = self._odometer
+        odometer.begin_update()
+        wants_twist = twist is not None and twist.wanted
+        if not (wants_twist or self._sends_transform or odometer.wanted):
+            return
         velocity = self.body.physics.velocity
         noisy_pose = odometer.report(stamp, pose, velocity)
         if twist is not None and wants_twist:

@@ -41,7 +41,8 @@ class Imu(ModelPlugin):
         rate_variances = read_variances(config, "angular_velocity_noise")
         acceleration_variances = read_variances(config, "linear_acceleration_noise")
         self._noise = GaussianNoise(
-            self.rng, (yaw_variances[2], rate_variances[2], *acceleration_variances[:2])
+            self.noise_stream("filtered"),
+            (yaw_variances[2], rate_variances[2], *acceleration_variances[:2]),
         )
         self._covariances = (
             read_covariance(config, "orientation_covariance", yaw_variances),
@@ -63,6 +64,7 @@ class Imu(ModelPlugin):
         """Publishes when it is time."""
         if not self._timer.check_update(timekeeper):
             return
+        self._noise.begin_update()
         stamp, velocity = timekeeper.sim_time_ns, self._body.velocity
         truth_wanted = self._ground_truth is not None and self._ground_truth.wanted
         filtered_wanted = self._filtered is not None and self._filtered.wanted

@@ -110,6 +110,7 @@ class Laser(ModelPlugin):
         self.always_publish: bool = config.get("always_publish", "bool", False)
         self._length = np.float32(self.range)
         self._deviation = np.float32(self._read_deviation(config))
+        self._noise = self.noise_stream("scan")
         self._no_hit = self._read_no_hit(config)
         self._mask = self._read_mask(config)
         self._sends_transform: bool = config.get("broadcast_tf", "bool", True)
@@ -162,12 +163,13 @@ class Laser(ModelPlugin):
         """Sends the transform and, if anybody listens, a scan, when they are due."""
         if not self.timer.check_update(timekeeper):
             return
+        self._noise.begin_update()
         if self._sends_transform:
             self.send_transform(self._body_frame_id, self.frame_id, *self.origin, roll=self._roll)
         if not (self._scan.wanted or self.always_publish):
             return
         angles = self.angles
-        ranges = self.compute_ranges()
+        ranges = self._compute_ranges(self._noise.rng)
         self._scan.emit(
             LaserScan(
                 stamp=timekeeper.sim_time_ns,
@@ -185,18 +187,23 @@ class Laser(ModelPlugin):
         )
 
     def compute_ranges(self) -> FloatArray:
-        """Scans from where the body is now, noise included; sets `intensities` as well.
+        """Computes a scan at the current pose, with noise, and sets `intensities`.
+
+        The noise is drawn from `rng`: published scans do not depend on calls of this method.
 
         Returns:
-            Range of each beam [m], shape (n,), float32, new with each call.
+            Range of each beam [m], shape (n,), float32, a new array for each call.
         """
+        return self._compute_ranges(self.rng)
+
+    def _compute_ranges(self, rng: np.random.Generator) -> FloatArray:
         fractions, reflects = self.world.physics.cast_rays(
             compose(self.body.physics.pose, self.origin), self._ends, self._mask, self._reflect_mask
         )
         ranges = fractions * self._length
         if self._deviation:
             # A miss is NaN and stays so.
-            noise = self.rng.standard_normal(ranges.shape, dtype=np.float32)
+            noise = rng.standard_normal(ranges.shape, dtype=np.float32)
             noise *= self._deviation
             ranges += noise
         if not math.isnan(self._no_hit):

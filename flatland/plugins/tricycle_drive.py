@@ -166,8 +166,10 @@ class TricycleDrive(ModelPlugin):
         """Reports the motion so far, then steers and sets the body's velocity."""
         physics = self.body.physics
         pose = physics.pose
-        if self.timer.check_update(timekeeper) and self._odometer.wanted:
-            self._odometer.report(timekeeper.sim_time_ns, pose, physics.velocity)
+        if self.timer.check_update(timekeeper):
+            self._odometer.begin_update()
+            if self._odometer.wanted:
+                self._odometer.report(timekeeper.sim_time_ns, pose, physics.velocity)
         dt = timekeeper.step_size
         command = self._command.value
         self._steer(command.angular_z, dt)

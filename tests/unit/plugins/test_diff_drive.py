@@ -2,13 +2,14 @@ from __future__ import annotations
 
 import logging
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
 import pytest
 
 import flatland
+from flatland.plugin_api.noise import NoiseStream
 from flatland.values import Odometry, TwistWithCovariance
 
 Collect = Callable[[flatland.World, str], list[Any]]
@@ -200,14 +201,36 @@ class TestOdometry:
         world.step(20)
         assert base(world).pose == (0.0, 0.0, 0.0)
 
-    def test_variance_of_zero_draws_nothing(self, plugin_world: Any) -> None:
+    def test_variance_of_zero_draws_nothing(
+        self, plugin_world: Any, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
         world = plugin_world(drive())
         for topic in (TRUTH, ODOMETRY, "/twist"):
             world.output(topic)
-        rng = world.model("robot").plugin("wheels").rng
-        before = rng.bit_generator.state
+        monkeypatch.setattr(NoiseStream, "rng", property(lambda _: pytest.fail("drawn")))
         world.step(5)
-        assert rng.bit_generator.state == before
+        assert world.output("/twist").latest is not None
+
+    def test_noise_of_an_output_does_not_depend_on_listeners_of_others(
+        self, plugin_world: Any
+    ) -> None:
+        noise = "odom_pose_noise: [1, 1, 1], odom_twist_noise: [1, 1, 1]"
+
+        def last_odometry(others: Sequence[str], connects_at: int = 0) -> Odometry:
+            world = plugin_world(drive(noise), seed=7)
+            for topic in others:
+                world.output(topic)
+            world.step(connects_at)
+            odometry = world.output(ODOMETRY)
+            world.step(10 - connects_at)
+            value: Odometry = odometry.latest
+            return value
+
+        alone = last_odometry([])
+        assert alone.pose[0] != 0.0
+        assert last_odometry(["/twist"]).pose == alone.pose
+        assert last_odometry([TRUTH, "/twist"]).twist == alone.twist
+        assert last_odometry(["/twist"], connects_at=9).pose == alone.pose
 
     def test_the_seed_decides(self, plugin_world: Any, collect: Collect) -> None:
         def poses(seed: int) -> list[Any]:
@@ -355,9 +378,8 @@ class TestSwitches:
         world = plugin_world(drive("enable_odom_tf_pub: false, odom_pose_noise: [1, 1, 1]"))
         plugin = world.model("robot").plugin("wheels")
         monkeypatch.setattr(plugin._odometer, "report", lambda *_: pytest.fail("reported"))
-        before = plugin.rng.bit_generator.state
+        monkeypatch.setattr(NoiseStream, "rng", property(lambda _: pytest.fail("drawn")))
         world.step(5)
-        assert plugin.rng.bit_generator.state == before
         assert all(output.latest is None for output in world.ports.outputs.values())
 
 

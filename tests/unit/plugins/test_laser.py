@@ -216,6 +216,17 @@ class TestNoise:
         plugin.compute_ranges()
         assert plugin.rng.bit_generator.state == before
 
+    def test_calls_of_compute_ranges_do_not_change_published_scans(self, walls: Walls) -> None:
+        def scans(calls: int) -> list[float]:
+            world = walls.room("noise_std_dev: 0.2", seed=3)
+            output = world.output("/scan")
+            for _ in range(calls):
+                eye(world).compute_ranges()
+            world.step(3)
+            return output.latest.ranges.tolist()  # type: ignore[no-any-return]
+
+        assert scans(0) == scans(2)
+
 
 class TestIntensities:
     def load(self, walls: Walls, near: str, far: str, layers: str = "[all]") -> Any:
@@ -313,10 +324,14 @@ class TestMessage:
 
 class TestWhenItWorks:
     def count_scans(self, world: flatland.World, steps: int, monkeypatch: Any) -> int:
-        plugin = eye(world)
-        calls = []
-        compute = plugin.compute_ranges
-        monkeypatch.setattr(plugin, "compute_ranges", lambda: (calls.append(1), compute())[1])
+        calls: list[int] = []
+        cast = world.physics.cast_rays
+
+        def count(*arguments: Any) -> Any:
+            calls.append(1)
+            return cast(*arguments)
+
+        monkeypatch.setattr(type(world.physics), "cast_rays", lambda _, *rest: count(*rest))
         world.step(steps)
         return len(calls)
 
