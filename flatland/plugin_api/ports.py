@@ -7,12 +7,14 @@ bridge, a test, a notebook) finds them by their resolved topic in the world's `P
 from __future__ import annotations
 
 import re
+import threading
 from collections.abc import Callable, Hashable
-from typing import Any, Generic, TypeVar
+from typing import Any, Generic, Protocol, TypeVar
 
-from flatland.errors import FlatlandError, WorldError
+from flatland.errors import PLUGIN_FAULTS, FlatlandError, WorldError
 
 T = TypeVar("T")
+SubscriberFault = Callable[["Output[Any]", Callable[[Any], None], BaseException], None]
 
 # ROS graph names as its clients check them, less the private ~ which a model has no use for.
 _LEGAL_NAME = re.compile(r"(/|[A-Za-z])(\w|(?<!/)/)*(?<!/)", re.ASCII)
@@ -59,16 +61,39 @@ class Output(Generic[T]):
         latest: The last value emitted, None before the first.
     """
 
-    __slots__ = ("_callbacks", "_wanters", "closed", "latest", "name", "topic", "value_type")
+    __slots__ = (
+        "_lock",
+        "_on_fault",
+        "_subscribers",
+        "_wanters",
+        "closed",
+        "latest",
+        "name",
+        "topic",
+        "value_type",
+    )
 
-    def __init__(self, name: str, value_type: type[T]) -> None:
-        """Makes an output that nobody wants yet."""
+    def __init__(
+        self, name: str, value_type: type[T], on_fault: SubscriberFault | None = None
+    ) -> None:
+        """Creates an output without listeners.
+
+        Args:
+            name: Topic under the namespace of the model, with a leading `/` only if it is global.
+            value_type: Type of the values.
+            on_fault: Called with what a subscriber raises, while it is handled, so that the error
+                does not reach the plugin that emits; None lets it.
+        """
         self.name = name
         self.topic = "/" + name.lstrip("/")
         self.value_type = value_type
         self.latest: T | None = None
         self.closed = False
-        self._callbacks: tuple[Callable[[T], None], ...] = ()
+        self._on_fault = on_fault
+        # Both are replaced, never changed, so that other threads may read them at any time; the
+        # lock keeps two replacements apart.
+        self._lock = threading.Lock()
+        self._subscribers: tuple[tuple[object, Callable[[T], None]], ...] = ()
         self._wanters: frozenset[Hashable] = frozenset()
 
     @property
@@ -78,36 +103,47 @@ class Output(Generic[T]):
 
     def want(self, who: Hashable) -> None:
         """Marks the output as wanted on behalf of `who`; safe from any thread."""
-        self._wanters = self._wanters | {who}
+        with self._lock:
+            self._wanters = self._wanters | {who}
 
     def unwant(self, who: Hashable) -> None:
-        """Takes back what `want` said for `who`."""
-        self._wanters = self._wanters - {who}
+        """Reverts `want` for `who`; safe from any thread."""
+        with self._lock:
+            self._wanters = self._wanters - {who}
 
     def emit(self, value: T) -> None:
-        """Hands a value to all who subscribed and keeps it as `latest`."""
+        """Stores a value as `latest` and passes it to all subscribers."""
         self.latest = value
-        for callback in self._callbacks:
-            callback(value)
+        for _, callback in self._subscribers:
+            try:
+                callback(value)
+            except PLUGIN_FAULTS as error:
+                if self._on_fault is None:
+                    raise
+                self._on_fault(self, callback, error)
 
     def subscribe(self, callback: Callable[[T], None], *, wants: bool = True) -> Callable[[], None]:
-        """Calls `callback` with each value from now on.
+        """Subscribes a function to all further values; safe from any thread.
 
         Args:
-            callback: Called in the thread that steps the world.
-            wants: Whether that makes the output wanted; False for who tells by `want` itself.
+            callback: Called with each value, in the thread that steps the world. An exception does
+                not affect the plugin that emits; `World` documents where it is raised or logged.
+            wants: Whether the subscription makes the output wanted; False for a subscriber that
+                calls `want` and `unwant` itself.
 
         Returns:
-            A function that ends the subscription.
+            A function that ends this subscription; a second call has no effect.
         """
-        self._callbacks = (*self._callbacks, callback)
         token = object()
-        if wants:
-            self.want(token)
+        with self._lock:
+            self._subscribers = (*self._subscribers, (token, callback))
+            if wants:
+                self._wanters = self._wanters | {token}
 
         def unsubscribe() -> None:
-            self._callbacks = tuple(other for other in self._callbacks if other is not callback)
-            self.unwant(token)
+            with self._lock:
+                self._subscribers = tuple(s for s in self._subscribers if s[0] is not token)
+                self._wanters = self._wanters - {token}
 
         return unsubscribe
 
@@ -190,18 +226,37 @@ class CommandTopic(Generic[T]):
             command.set(value)
 
 
-class PortRegistry:
-    """All ports of a world by resolved topic, and who is told when they come and go."""
+class PortObserver(Protocol):
+    """Receives notifications of ports; `flatland.runtime.observer` implements it."""
 
-    def __init__(self) -> None:
-        """Starts without ports."""
+    def output_opened(self, output: Output[Any]) -> None:
+        """Called before an output is added; raising refuses it."""
+
+    def output_closed(self, output: Output[Any]) -> None:
+        """Called after an output has been removed."""
+
+    def command_opened(self, command: Command[Any]) -> None:
+        """Called before a command is added; raising refuses it."""
+
+    def command_closed(self, command: Command[Any]) -> None:
+        """Called after a command has been removed."""
+
+
+class PortRegistry:
+    """All ports of a world by resolved topic."""
+
+    def __init__(self, observer: PortObserver, on_fault: SubscriberFault | None = None) -> None:
+        """Creates an empty registry.
+
+        Args:
+            observer: Notified when ports open and close.
+            on_fault: See `Output`.
+        """
+        self._observer = observer
+        self._on_fault = on_fault
         self._outputs: dict[str, Output[Any]] = {}
         self._owners: dict[str, int] = {}
         self._commands: dict[str, list[Command[Any]]] = {}
-        self.output_opened: list[Callable[[Output[Any]], None]] = []
-        self.output_closed: list[Callable[[Output[Any]], None]] = []
-        self.command_opened: list[Callable[[Command[Any]], None]] = []
-        self.command_closed: list[Callable[[Command[Any]], None]] = []
 
     @property
     def outputs(self) -> dict[str, Output[Any]]:
@@ -225,9 +280,8 @@ class PortRegistry:
             self._check_type(topic, output.value_type, value_type)
             self._owners[topic] += 1
             return output
-        output = Output(name, value_type)
-        for notify in self.output_opened:
-            notify(output)
+        output = Output(name, value_type, self._on_fault)
+        self._observer.output_opened(output)
         self._outputs[topic] = output
         self._owners[topic] = 1
         return output
@@ -241,8 +295,7 @@ class PortRegistry:
             return
         del self._owners[output.topic], self._outputs[output.topic]
         output.closed = True
-        for notify in self.output_closed:
-            notify(output)
+        self._observer.output_closed(output)
 
     def open_command(
         self,
@@ -260,8 +313,7 @@ class PortRegistry:
         others = self._commands.get(command.topic)
         if others:
             self._check_type(command.topic, others[0].value_type, value_type)
-        for notify in self.command_opened:
-            notify(command)
+        self._observer.command_opened(command)
         self._commands.setdefault(command.topic, []).append(command)
         return command
 
@@ -274,8 +326,7 @@ class PortRegistry:
         commands[:] = [other for other in commands if other is not command]
         if not commands:
             del self._commands[command.topic]
-        for notify in self.command_closed:
-            notify(command)
+        self._observer.command_closed(command)
 
     def find_output(self, topic: str) -> Output[Any]:
         """Returns the output of a resolved topic.

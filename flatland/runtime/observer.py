@@ -1,59 +1,198 @@
-"""What a world tells those who connect it to something outside."""
+"""Observers: what connects a world to the outside without the world depending on it."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any
+
+from flatland.errors import PLUGIN_FAULTS
 
 if TYPE_CHECKING:
     from flatland.entities.model import Model
     from flatland.plugin_api.plugin import FlatlandPlugin
     from flatland.plugin_api.ports import Command, Output
+    from flatland.runtime.faults import Faults
     from flatland.values import Transform
+    from flatland.world import World
 
 
 class WorldObserver:
-    """Hears of all that happens to a world; each method does nothing until it is overridden.
+    """Receives notifications of world events; each method does nothing unless overridden.
 
-    All methods are called in the thread that loads or steps the world. The simulation does not
-    know what an observer does with it; the ROS bridge is one.
+    All methods are called in the thread that loads or steps the world. What a method raises is
+    handled as what a plugin raises (see `World`, argument `plugin_errors`), except in
+    `output_opened` and `command_opened`, where it refuses the port.
     """
 
+    def attached(self, world: World) -> None:
+        """The observer was added to a world; called before any other method."""
+
+    def detached(self) -> None:
+        """The observer was removed, or the world was closed; called after all other methods."""
+
     def output_opened(self, output: Output[Any]) -> None:
-        """A plugin declared an output; raising refuses it, and the plugin fails to load."""
+        """A plugin declares an output; raising refuses it, and the plugin fails to load."""
 
     def output_closed(self, output: Output[Any]) -> None:
-        """The last plugin that had an output is gone."""
+        """The last plugin that declared an output is gone."""
 
     def command_opened(self, command: Command[Any]) -> None:
-        """A plugin declared a command; raising refuses it, and the plugin fails to load."""
+        """A plugin declares a command; raising refuses it, and the plugin fails to load."""
 
     def command_closed(self, command: Command[Any]) -> None:
-        """The plugin that had a command is gone."""
+        """The plugin that declared a command is gone."""
 
     def model_added(self, model: Model) -> None:
         """A model is complete and in the world."""
 
     def model_moved(self, model: Model) -> None:
-        """A model was put elsewhere by a request."""
+        """A model was moved by a request."""
 
     def model_removed(self, model: Model) -> None:
-        """A model is gone from the world."""
+        """A model was removed from the world."""
 
     def layer_changed(self, layer_name: str) -> None:
-        """The edges of a layer changed, or it is new."""
+        """A layer was added, or its edges changed."""
 
     def time_advanced(self, time_ns: int) -> None:
-        """The simulated time [ns] moved on; after-step hooks have not run yet."""
+        """The simulated time [ns] advanced; hooks after the step have not run yet."""
 
     @property
     def wants_transforms(self) -> bool:
-        """Whether `transforms_sent` is worth a call in this step."""
+        """Whether `transforms_sent` is to be called in this step."""
         return True
 
     def transforms_sent(self, transforms: Sequence[Transform]) -> None:
         """All transforms of one step."""
 
     def plugin_ros(self, plugin: FlatlandPlugin) -> Any:
-        """Gives what a plugin finds as `self.ros`; None when this observer has nothing."""
+        """Returns what a plugin gets as `self.ros`, None if this observer provides nothing."""
         return None
+
+
+class Observers:
+    """The observers of one world, notified in the order in which they were added."""
+
+    def __init__(self, faults: Faults) -> None:
+        """Creates an empty list.
+
+        Args:
+            faults: Takes what observers raise.
+        """
+        self._faults = faults
+        self._all: tuple[WorldObserver, ...] = ()
+        # Notified in every step, so only those that override the method.
+        self._of_time: tuple[WorldObserver, ...] = ()
+        self._of_transforms: tuple[WorldObserver, ...] = ()
+
+    def add(self, observer: WorldObserver, world: World) -> None:
+        """Adds an observer and attaches it to a world."""
+        observer.attached(world)
+        self._set((*self._all, observer))
+
+    def remove(self, observer: WorldObserver) -> None:
+        """Removes an observer and detaches it.
+
+        Raises:
+            ValueError: It was not added, or has been removed.
+        """
+        if observer not in self._all:
+            raise ValueError(f"{observer!r} is not an observer of this world")
+        self._set(tuple(other for other in self._all if other is not observer))
+        self._call(observer, "detached")
+
+    def remove_all(self) -> None:
+        """Removes all observers, the last one first."""
+        for observer in reversed(self._all):
+            self.remove(observer)
+
+    def _set(self, observers: tuple[WorldObserver, ...]) -> None:
+        self._all = observers
+        self._of_time = tuple(o for o in observers if _overrides(o, "time_advanced"))
+        self._of_transforms = tuple(o for o in observers if _overrides(o, "transforms_sent"))
+
+    # -- ports: raising refuses the port ---------------------------------------------------
+
+    def output_opened(self, output: Output[Any]) -> None:
+        """Notifies all observers; if one refuses, those notified before are notified of the end."""
+        self._open(output, "output_opened", "output_closed")
+
+    def output_closed(self, output: Output[Any]) -> None:
+        """Notifies all observers."""
+        self._notify("output_closed", output)
+
+    def command_opened(self, command: Command[Any]) -> None:
+        """Notifies all observers; if one refuses, those notified before are notified of the end."""
+        self._open(command, "command_opened", "command_closed")
+
+    def command_closed(self, command: Command[Any]) -> None:
+        """Notifies all observers."""
+        self._notify("command_closed", command)
+
+    def _open(self, port: Output[Any] | Command[Any], opened: str, closed: str) -> None:
+        for number, observer in enumerate(self._all):
+            try:
+                getattr(observer, opened)(port)
+            except BaseException:
+                for notified in self._all[:number]:
+                    self._call(notified, closed, port)
+                raise
+
+    # -- everything else: observers are contained ------------------------------------------
+
+    def model_added(self, model: Model) -> None:
+        """Notifies all observers."""
+        self._notify("model_added", model)
+
+    def model_moved(self, model: Model) -> None:
+        """Notifies all observers."""
+        self._notify("model_moved", model)
+
+    def model_removed(self, model: Model) -> None:
+        """Notifies all observers."""
+        self._notify("model_removed", model)
+
+    def layer_changed(self, layer_name: str) -> None:
+        """Notifies all observers."""
+        self._notify("layer_changed", layer_name)
+
+    def time_advanced(self, time_ns: int) -> None:
+        """Notifies the observers that override the method."""
+        for observer in self._of_time:
+            self._call(observer, "time_advanced", time_ns)
+
+    def transforms_sent(self, make_batch: Callable[[], Sequence[Transform]]) -> None:
+        """Notifies the observers that want transforms.
+
+        Args:
+            make_batch: Returns the transforms; called at most once.
+        """
+        batch: Sequence[Transform] | None = None
+        for observer in self._of_transforms:
+            if observer.wants_transforms:
+                if batch is None:
+                    batch = make_batch()
+                self._call(observer, "transforms_sent", batch)
+
+    def plugin_ros(self, plugin: FlatlandPlugin) -> Any:
+        """Returns what the first observer that provides anything returns, None if none does."""
+        for observer in self._all:
+            ros = observer.plugin_ros(plugin)
+            if ros is not None:
+                return ros
+        return None
+
+    def _notify(self, method: str, argument: Any) -> None:
+        for observer in self._all:
+            self._call(observer, method, argument)
+
+    def _call(self, observer: WorldObserver, method: str, *arguments: Any) -> None:
+        try:
+            getattr(observer, method)(*arguments)
+        except PLUGIN_FAULTS as error:
+            what = f"observer {type(observer).__name__}: {method}"
+            self._faults.add((observer, method), what, error)
+
+
+def _overrides(observer: WorldObserver, method: str) -> bool:
+    return getattr(type(observer), method) is not getattr(WorldObserver, method)

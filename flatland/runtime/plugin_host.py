@@ -1,181 +1,227 @@
-"""Calls the hooks of all plugins of a world, in order, and contains their faults."""
+"""The plugins of a world: starts them, calls their hooks in order, ends them."""
 
 from __future__ import annotations
 
-import ctypes
 import logging
-import threading
-import time
-from collections.abc import Callable, Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from flatland.entities.contact import Contact, ContactImpulse, MutableContact
-from flatland.errors import PLUGIN_FAULTS, PluginError
-from flatland.plugin_api.plugin import FlatlandPlugin, ModelPlugin, WorldPlugin
+from flatland.errors import PLUGIN_FAULTS, FlatlandError, PluginError, YamlError
+from flatland.plugin_api.plugin import FlatlandPlugin, ModelPlugin, WorldPlugin, describe
+from flatland.plugin_api.registry import PluginRegistry
+from flatland.runtime.hooks import CONTACT_HOOKS, HookList, HookTable
+from flatland.runtime.time_limit import TimeLimitExceeded, time_limit
 
 if TYPE_CHECKING:
     from flatland.config.reader import YamlReader
     from flatland.entities.body import Body
+    from flatland.entities.model import Model
     from flatland.physics import ContactEvent, OldManifold, PreSolveContact
+    from flatland.runtime.faults import Faults
+    from flatland.runtime.observer import Observers
+    from flatland.runtime.requests import Requests
     from flatland.timekeeper import Timekeeper
+    from flatland.world import World
 
 _LOG = logging.getLogger("flatland")
 
-MAX_FAULTS = 3
-_FAULT_LOG_PERIOD = 1.0  # s of wall time between two tracebacks of one plugin
 _EVENT_HOOKS = {"begin": "begin_contact", "end": "end_contact", "post_solve": "post_solve"}
-_HOOKS = ("before_physics_step", "after_physics_step", "pre_solve", *_EVENT_HOOKS.values())
-
-Hook = Callable[..., None]
-HookList = list[tuple[FlatlandPlugin, Hook]]
-
-
-def overrides(plugin: FlatlandPlugin, hook: str) -> bool:
-    """Tells whether a plugin's class, or the plugin itself, has its own version of a hook."""
-    return hook in vars(plugin) or getattr(type(plugin), hook) is not getattr(FlatlandPlugin, hook)
-
-
-def describe(plugin: FlatlandPlugin) -> str:
-    """Names a plugin in the words of the error messages."""
-    if isinstance(plugin, ModelPlugin):
-        return f'Model Plugin "{plugin.name}" type "{plugin.type}" model "{plugin.model.name}"'
-    return f'World Plugin "{plugin.name}" type "{plugin.type}"'
-
-
-def initialize(plugin: FlatlandPlugin, config: YamlReader, timeout: float | None) -> None:
-    """Runs a plugin's `on_initialize` and checks that it read every parameter.
-
-    With a timeout it runs in a thread of its own, since nothing else can be left behind when it
-    blocks for ever.
-
-    Args:
-        plugin: The plugin, attached to its world.
-        config: Its parameters.
-        timeout: Wall time [s] that it may take, None for as long as it likes.
-
-    Raises:
-        PluginError: It took longer.
-        Exception: What it raised itself.
-    """
-    if timeout is None:
-        plugin.on_initialize(config)
-        config.ensure_accessed_all()
-        return
-    raised: list[BaseException] = []
-
-    def run() -> None:
-        try:
-            plugin.on_initialize(config)
-        except BaseException as error:
-            raised.append(error)
-
-    worker = threading.Thread(target=run, name=f"on_initialize of {plugin.name}", daemon=True)
-    worker.start()
-    with plugin.world.initialized_by(worker):
-        # Python refuses to wait longer than some centuries.
-        worker.join(min(timeout, threading.TIMEOUT_MAX))
-    if worker.is_alive():
-        # Ends a loop in Python; what blocks in C stays behind as a daemon thread.
-        ctypes.pythonapi.PyThreadState_SetAsyncExc(
-            ctypes.c_ulong(worker.ident or 0), ctypes.py_object(SystemExit)
-        )
-        raise PluginError(f"on_initialize did not return within {timeout:g} s")
-    if raised:
-        raise raised[0]
-    config.ensure_accessed_all()
 
 
 class PluginHost:
-    """The plugins of a world in order of loading: those of models first, then those of the world.
+    """Starts the plugins of a world, calls their hooks and ends them.
 
-    An exception out of a hook never goes further: it is logged, and a plugin whose hook raises
-    `MAX_FAULTS` times in a row is called no more.
+    Everything that belongs to one plugin (`on_initialize`, hooks, callbacks) runs in the thread
+    that loads or steps the world. An exception of a hook never interrupts a step: `Faults`
+    decides what becomes of it.
+
+    Attributes:
+        registry: The plugin classes that files can name.
+        world_plugins: The world plugins in order of loading.
     """
 
-    def __init__(self) -> None:
-        """Starts without plugins."""
-        self.model_plugins: list[ModelPlugin] = []
+    def __init__(
+        self,
+        world: World,
+        observers: Observers,
+        requests: Requests,
+        faults: Faults,
+        timeout: float | None,
+    ) -> None:
+        """Creates a host without plugins.
+
+        Args:
+            world: The world of the plugins.
+            observers: Provide plugins with access to ROS.
+            requests: Notified when code of a plugin runs.
+            faults: Takes what hooks raise.
+            timeout: Limit of wall time of `on_initialize` [s]; None for no limit.
+        """
+        self.registry = PluginRegistry()
         self.world_plugins: list[WorldPlugin] = []
-        self._disabled: set[FlatlandPlugin] = set()
-        self._faults: dict[tuple[FlatlandPlugin, str], int] = {}
-        self._last_log: dict[FlatlandPlugin, float] = {}
-        self._hooks: dict[str, HookList] = {}
-        self._schedule()
+        self._world = world
+        self._observers = observers
+        self._requests = requests
+        self._faults = faults
+        self._timeout = timeout
+        self._hooks = HookTable()
+
+    # -- start and end ---------------------------------------------------------------------
+
+    def start_model_plugin(self, model: Model, entry: YamlReader) -> None:
+        """Starts a plugin of a model and appends it to the model's plugins.
+
+        Args:
+            model: The model.
+            entry: Entry of the plugin in the model file.
+
+        Raises:
+            PluginError: It cannot be found, created or initialized.
+        """
+        name, type_name = entry.get("name", "string"), entry.get("type", "string")
+        what = f'Model Plugin "{name}" type "{type_name}" model "{model.name}"'
+        plugin = self._create(type_name, ModelPlugin, what, entry)
+        plugin.model = model
+        plugin._attach(self._world, model.name, name, type_name, model.namespace)
+        self._start(plugin, entry, (f'model "{model.name}"', f'plugin "{name}"'))
+        model.plugins.append(plugin)
+
+    def start_world_plugin(self, entry: YamlReader, world_config: YamlReader) -> None:
+        """Starts a world plugin.
+
+        Args:
+            entry: Entry of the plugin in the world file.
+            world_config: Reader of the whole world file.
+
+        Raises:
+            YamlError: A world plugin of that name and type exists.
+            PluginError: It cannot be found, created or initialized.
+        """
+        name, type_name = entry.get("name", "string"), entry.get("type", "string")
+        for other in self.world_plugins:
+            if (other.name, other.type) == (name, type_name):
+                raise entry.error(
+                    f'Invalid "world plugins" with name "{name}", type "{type_name}" already exists'
+                )
+        what = f'World Plugin "{name}" type "{type_name}"'
+        plugin = self._create(type_name, WorldPlugin, what, entry)
+        plugin.world_config = world_config
+        plugin._attach(self._world, "", name, type_name, "")
+        self._start(plugin, entry, ("", f'world_plugin "{name}"'))
+        self.world_plugins.append(plugin)
+
+    def _create(self, type_name: str, base: type[Any], what: str, entry: YamlReader) -> Any:
+        try:
+            return self.registry.make(type_name, base)
+        except PluginError as error:
+            raise PluginError(entry.error(f"{what}: {error.message}").message) from error
+
+    def _start(self, plugin: FlatlandPlugin, entry: YamlReader, place: tuple[str, str]) -> None:
+        """Initializes a plugin and adds its hooks; a failure leaves nothing behind."""
+        config = entry.without("name", "type", "enabled").with_location(*place)
+        try:
+            plugin.ros = self._observers.plugin_ros(plugin)
+            self._initialize(plugin, config)
+            config.ensure_accessed_all()
+        except PLUGIN_FAULTS as error:
+            self._release(plugin)
+            text = error.message if isinstance(error, PluginError) else str(error)
+            if isinstance(error, SystemExit) or not (isinstance(error, FlatlandError) or text):
+                text = f"{type(error).__name__} {text}".strip()
+            text = f"{describe(plugin)}: {text}"
+            if not isinstance(error, YamlError):  # which names a place of its own
+                text = entry.error(text).message
+            raise PluginError(text) from error
+        except BaseException:
+            self._release(plugin)
+            raise
+        self._hooks.add(plugin)
+
+    def _initialize(self, plugin: FlatlandPlugin, config: YamlReader) -> None:
+        try:
+            with self._requests.initializing(), time_limit(self._timeout):
+                plugin.on_initialize(config)
+        except TimeLimitExceeded:
+            raise PluginError(f"on_initialize did not return within {self._timeout:g} s") from None
+
+    def shut_down(self, plugins: Sequence[FlatlandPlugin]) -> None:
+        """Ends plugins, the last one first: no more hooks, `on_shutdown`, then their ports."""
+        for plugin in plugins:
+            self._hooks.remove(plugin)
+        for plugin in reversed(plugins):
+            if isinstance(plugin, WorldPlugin) and plugin in self.world_plugins:
+                self.world_plugins.remove(plugin)
+            try:
+                with self._requests.hooks():
+                    plugin.on_shutdown()
+            except PLUGIN_FAULTS as error:
+                self._faults.add(plugin, f"{describe(plugin)}: on_shutdown", error)
+            self._release(plugin)
+        self._faults.forget(set(plugins))
+
+    def _release(self, plugin: FlatlandPlugin) -> None:
+        """Closes the ports and connections that a plugin left open."""
+        try:
+            if plugin.ros is not None:
+                plugin.ros.close()
+        except PLUGIN_FAULTS:
+            _LOG.exception("%s: closing its ROS connections failed", describe(plugin))
+        plugin._detach()
+
+    # -- hooks -----------------------------------------------------------------------------
 
     @property
     def wants_contacts(self) -> bool:
-        """Whether any plugin listens to contacts."""
-        return any(self._hooks[hook] for hook in _EVENT_HOOKS.values())
+        """Whether any plugin overrides a hook for recorded contacts."""
+        return self._hooks.has_any(*CONTACT_HOOKS)
 
     @property
     def wants_pre_solve(self) -> bool:
-        """Whether any plugin changes contacts."""
-        return bool(self._hooks["pre_solve"])
+        """Whether any plugin overrides `pre_solve`."""
+        return self._hooks.has_any("pre_solve")
 
-    def is_disabled(self, plugin: FlatlandPlugin) -> bool:
-        """Tells whether a plugin is called no more because of its faults."""
-        return plugin in self._disabled
-
-    def add(self, plugin: FlatlandPlugin) -> None:
-        """Calls a plugin's hooks from now on."""
-        if isinstance(plugin, ModelPlugin):
-            self.model_plugins.append(plugin)
-        elif isinstance(plugin, WorldPlugin):
-            self.world_plugins.append(plugin)
-        self._schedule()
-
-    def remove(self, plugins: Sequence[FlatlandPlugin]) -> None:
-        """Calls the hooks of some plugins no more."""
-        gone = set(plugins)
-        self.model_plugins = [plugin for plugin in self.model_plugins if plugin not in gone]
-        self.world_plugins = [plugin for plugin in self.world_plugins if plugin not in gone]
-        self._disabled -= gone
-        self._faults = {key: n for key, n in self._faults.items() if key[0] not in gone}
-        self._last_log = {key: t for key, t in self._last_log.items() if key not in gone}
-        self._schedule()
-
-    def _schedule(self) -> None:
-        plugins = [*self.model_plugins, *self.world_plugins]
-        for hook in _HOOKS:
-            # New lists, so that a loop that runs over the old ones is not disturbed.
-            self._hooks[hook] = [
-                (plugin, getattr(plugin, hook))
-                for plugin in plugins
-                if overrides(plugin, hook) and plugin not in self._disabled
-            ]
+    def pre_solve_bodies(self, bodies: Mapping[int, Body]) -> set[int]:
+        """Returns the physics ids of the bodies whose contacts concern a `pre_solve` hook."""
+        concerned = self._hooks.bodies_concerned("pre_solve", bodies.values())
+        return {body.physics.id for body in concerned}
 
     def before_physics_step(self, timekeeper: Timekeeper) -> None:
-        """Runs `before_physics_step` of all plugins."""
-        self._run("before_physics_step", timekeeper)
+        """Calls `before_physics_step` of all plugins."""
+        self._call("before_physics_step", self._hooks.of_step("before_physics_step"), timekeeper)
 
     def after_physics_step(self, timekeeper: Timekeeper) -> None:
-        """Runs `after_physics_step` of all plugins."""
-        self._run("after_physics_step", timekeeper)
+        """Calls `after_physics_step` of all plugins."""
+        self._call("after_physics_step", self._hooks.of_step("after_physics_step"), timekeeper)
 
-    def dispatch_contacts(self, events: Sequence[ContactEvent], bodies: dict[int, Body]) -> None:
-        """Hands recorded contact events to the plugins that listen, in order.
+    def dispatch_contacts(
+        self, events: Sequence[ContactEvent], bodies: Mapping[int, Body]
+    ) -> None:
+        """Passes recorded contact events to the plugins that they concern, in order.
 
         Args:
-            events: What happened, in order.
+            events: The events in order.
             bodies: All bodies by the id of their physics body.
         """
         for event in events:
+            body_a, body_b = bodies.get(event.body_a), bodies.get(event.body_b)
+            if body_a is None or body_b is None:
+                continue  # A plugin created one of them in the physics world itself.
             hook = _EVENT_HOOKS[event.kind]
-            if not self._hooks[hook]:
+            hooks = self._hooks.of_contact(hook, body_a, body_b)
+            if not hooks:
                 continue
             contact = Contact.between(bodies, event)
-            if contact is None:
-                continue
             if hook == "post_solve":
                 impulse = ContactImpulse(event.normal_impulses, event.tangent_impulses)
-                self._run(hook, contact, impulse)
+                self._call(hook, hooks, contact, impulse)
             else:
-                self._run(hook, contact)
+                self._call(hook, hooks, contact)
 
     def pre_solve(
-        self, raw: PreSolveContact, old_manifold: OldManifold, bodies: dict[int, Body]
+        self, raw: PreSolveContact, old_manifold: OldManifold, bodies: Mapping[int, Body]
     ) -> None:
-        """Lets the plugins that ask for it change a contact; runs inside the physics step."""
+        """Calls `pre_solve` of the plugins that a contact concerns, within the physics step."""
         body_a, body_b = bodies.get(raw.body_a), bodies.get(raw.body_b)
         if body_a is None or body_b is None:
             return
@@ -186,51 +232,17 @@ class PluginHost:
             body_a.physics.fixture(raw.fixture_a),
             body_b.physics.fixture(raw.fixture_b),
         )
-        self._run("pre_solve", contact, old_manifold)
+        hooks = self._hooks.of_contact("pre_solve", body_a, body_b)
+        self._call("pre_solve", hooks, contact, old_manifold)
 
-    def shut_down(self, plugins: Sequence[FlatlandPlugin]) -> None:
-        """Takes plugins out, last first: no more hooks, `on_shutdown`, then their ports end."""
-        self.remove(plugins)
-        for plugin in reversed(plugins):
-            try:
-                plugin.on_shutdown()
-            except PLUGIN_FAULTS:
-                _LOG.exception("%s: on_shutdown raised", describe(plugin))
-            self.release(plugin)
-
-    def release(self, plugin: FlatlandPlugin) -> None:
-        """Closes the ports and connections of a plugin, also where it forgot to do so."""
-        try:
-            if plugin.ros is not None:
-                plugin.ros.close()
-        except PLUGIN_FAULTS:
-            _LOG.exception("%s: its ROS connections could not be closed", describe(plugin))
-        plugin._detach()
-
-    def _run(self, hook: str, *arguments: Any) -> None:
+    def _call(self, hook: str, hooks: HookList, *arguments: Any) -> None:
         faults = self._faults
-        for plugin, method in self._hooks[hook]:
+        for plugin, method in hooks:
             try:
                 method(*arguments)
-                if faults:
-                    faults.pop((plugin, hook), None)
-            except PLUGIN_FAULTS:
-                self._fault(plugin, hook)
-
-    def _fault(self, plugin: FlatlandPlugin, hook: str) -> None:
-        """Counts and logs the exception that is being handled."""
-        count = self._faults.get((plugin, hook), 0) + 1
-        self._faults[plugin, hook] = count
-        now = time.monotonic()
-        if now - self._last_log.get(plugin, -_FAULT_LOG_PERIOD) >= _FAULT_LOG_PERIOD:
-            self._last_log[plugin] = now
-            _LOG.exception("%s: %s raised", describe(plugin), hook)
-        if count >= MAX_FAULTS and plugin not in self._disabled:
-            self._disabled.add(plugin)
-            self._schedule()
-            _LOG.error(
-                "%s: %s raised %d times in a row, the plugin is disabled",
-                describe(plugin),
-                hook,
-                count,
-            )
+            except PLUGIN_FAULTS as error:
+                if faults.add_in_hook(plugin, hook, describe(plugin), error):
+                    self._hooks.remove(plugin)
+            else:
+                if faults.any_counted:
+                    faults.succeeded(plugin, hook)

@@ -1,0 +1,75 @@
+"""Reports contacts to plugins: recorded after a step, or changed within it by `pre_solve`."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import TYPE_CHECKING
+
+from flatland.entities.contact import Contact
+
+if TYPE_CHECKING:
+    from flatland.entities.body import Body
+    from flatland.physics import OldManifold, PhysicsWorld, PreSolveContact
+    from flatland.runtime.plugin_host import PluginHost
+
+
+class ContactReporter:
+    """Records the contacts of a physics world as far as plugins need them."""
+
+    def __init__(self, physics: PhysicsWorld, host: PluginHost) -> None:
+        """Creates a reporter without bodies.
+
+        Args:
+            physics: The physics world.
+            host: Calls the hooks of plugins.
+        """
+        self._physics = physics
+        self._host = host
+        self._bodies: dict[int, Body] = {}
+        self._is_recording = False
+        self._is_outdated = False
+
+    @property
+    def touching(self) -> list[Contact]:
+        """All pairs of fixtures that touch now."""
+        found = (Contact.between(self._bodies, info) for info in self._physics.contacts())
+        return [contact for contact in found if contact is not None]
+
+    def add_bodies(self, bodies: Iterable[Body]) -> None:
+        """Reports the contacts of some bodies."""
+        self._bodies.update((body.physics.id, body) for body in bodies)
+        self._is_outdated = True
+
+    def remove_bodies(self, bodies: Iterable[Body]) -> None:
+        """Reports the contacts of some bodies no longer; their ids may be stale."""
+        for body in bodies:
+            self._bodies.pop(body.physics.id, None)
+        self._is_outdated = True
+
+    def hooks_changed(self) -> None:
+        """Adapts to the hooks of the plugins before the next step."""
+        self._is_outdated = True
+
+    def update(self) -> None:
+        """Adapts to changes of bodies and hooks; to be called before each step."""
+        if not self._is_outdated:
+            return
+        self._is_outdated = False
+        self._is_recording = self._physics.record_contacts = self._host.wants_contacts
+        if self._host.wants_pre_solve:
+            self._physics.pre_solve = self._pre_solve
+            self._physics.pre_solve_bodies = self._host.pre_solve_bodies(self._bodies)
+        else:
+            self._physics.pre_solve = None
+
+    def dispatch(self) -> None:
+        """Passes the contacts recorded since the last call to the plugins."""
+        if self._physics.pre_solve is not None:
+            for error in self._physics.take_pre_solve_errors():
+                # The host takes what plugins raise; this is a KeyboardInterrupt or the like.
+                raise error
+        if self._is_recording:
+            self._host.dispatch_contacts(self._physics.take_contact_events(), self._bodies)
+
+    def _pre_solve(self, contact: PreSolveContact, old_manifold: OldManifold) -> None:
+        self._host.pre_solve(contact, old_manifold, self._bodies)

@@ -1,0 +1,115 @@
+"""Exceptions of plugins, subscribers and observers: raised by `World.step`, or logged."""
+
+from __future__ import annotations
+
+import logging
+import time
+from collections import Counter
+from collections.abc import Hashable
+from typing import Final, Literal, get_args
+
+from flatland.errors import PluginError
+
+_LOG = logging.getLogger("flatland")
+
+MAX_FAULTS: Final = 3
+_LOG_PERIOD: Final = 1.0  # s of wall time between two tracebacks of one source
+
+FaultPolicy = Literal["raise", "disable"]
+
+
+class Faults:
+    """The exceptions of code that is called by a world and is not part of it.
+
+    No such exception interrupts a step: all other hooks, subscribers and observers are still
+    called. With the policy `raise`, the first exception is kept, and `World.step` raises it when
+    the step is complete. With the policy `disable`, exceptions are logged, with one traceback a
+    second and source at most, and a plugin is disabled after `MAX_FAULTS` exceptions of one hook
+    in a row.
+    """
+
+    def __init__(self, policy: FaultPolicy) -> None:
+        """Creates an empty record.
+
+        Raises:
+            ValueError: The policy is unknown.
+        """
+        if policy not in get_args(FaultPolicy):
+            raise ValueError(f"plugin_errors must be 'raise' or 'disable', got {policy!r}")
+        self._raises = policy == "raise"
+        self._first: BaseException | None = None
+        self._counts: Counter[Hashable] = Counter()
+        self._last_log: dict[Hashable, float] = {}
+
+    def add(self, source: Hashable, what: str, error: BaseException) -> None:
+        """Takes an exception; to be called while it is handled.
+
+        Args:
+            source: Identifies the source, for the limit of the log.
+            what: What raised, for the log, such as `subscriber f of output "/scan"`.
+            error: The exception.
+        """
+        if self._raises:
+            if self._first is None:
+                self._first = _raisable(what, error)
+            return
+        now = time.monotonic()
+        if now - self._last_log.get(source, -_LOG_PERIOD) >= _LOG_PERIOD:
+            self._last_log[source] = now
+            _LOG.error("%s raised", what, exc_info=error)
+
+    def add_in_hook(self, plugin: Hashable, hook: str, name: str, error: BaseException) -> bool:
+        """Takes an exception of a plugin's hook; to be called while it is handled.
+
+        Args:
+            plugin: The plugin.
+            hook: Name of the hook.
+            name: Description of the plugin, for the log.
+            error: The exception.
+
+        Returns:
+            Whether the plugin is to be disabled.
+        """
+        self.add(plugin, f"{name}: {hook}", error)
+        if self._raises:
+            return False
+        self._counts[plugin, hook] += 1
+        if self._counts[plugin, hook] < MAX_FAULTS:
+            return False
+        _LOG.error(
+            "%s: %s raised %d times in a row, the plugin is disabled", name, hook, MAX_FAULTS
+        )
+        return True
+
+    @property
+    def any_counted(self) -> bool:
+        """Whether any hook raised in its last call."""
+        return bool(self._counts)
+
+    def succeeded(self, plugin: Hashable, hook: str) -> None:
+        """Resets the count of a hook that returned."""
+        self._counts.pop((plugin, hook), None)
+
+    def forget(self, plugins: set[Hashable]) -> None:
+        """Drops the records of plugins that no longer exist."""
+        for key in [key for key in self._counts if isinstance(key, tuple) and key[0] in plugins]:
+            del self._counts[key]
+        for plugin in plugins:
+            self._last_log.pop(plugin, None)
+
+    def raise_first(self) -> None:
+        """Raises the first exception taken since the last call, if there is one."""
+        if self._first is not None:
+            error, self._first = self._first, None
+            raise error
+
+
+def _raisable(what: str, error: BaseException) -> BaseException:
+    """Returns the exception to raise, which names its source."""
+    if isinstance(error, SystemExit):
+        # A plugin must not end the program.
+        fault = PluginError(f"{what} raised SystemExit({error.code!r})")
+        fault.__cause__ = error
+        return fault
+    error.add_note(f"raised by {what}")
+    return error

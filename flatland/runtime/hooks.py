@@ -1,0 +1,123 @@
+"""Which plugins have which hooks, and which contacts concern them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator
+from typing import TYPE_CHECKING, Final
+
+from flatland.plugin_api.plugin import FlatlandPlugin, ModelPlugin
+
+if TYPE_CHECKING:
+    from flatland.entities.body import Body, Entity
+
+STEP_HOOKS: Final = ("before_physics_step", "after_physics_step")
+CONTACT_HOOKS: Final = ("begin_contact", "end_contact", "post_solve")
+
+Hook = Callable[..., None]
+HookList = list[tuple[FlatlandPlugin, Hook]]
+
+
+def overrides(plugin: FlatlandPlugin, hook: str) -> bool:
+    """Returns whether a plugin's class, or the plugin itself, overrides a hook."""
+    return hook in vars(plugin) or getattr(type(plugin), hook) is not getattr(FlatlandPlugin, hook)
+
+
+class HookTable:
+    """The overridden hooks of all plugins.
+
+    Hooks are called in the order of loading, those of model plugins before those of world
+    plugins. Adding or removing a plugin takes constant time; the order is made when it is next
+    needed, so that loading n plugins takes time proportional to n.
+    """
+
+    def __init__(self) -> None:
+        """Creates an empty table."""
+        self._order: dict[FlatlandPlugin, int] = {}
+        self._count = 0
+        self._model_hooks: dict[str, dict[FlatlandPlugin, Hook]] = {h: {} for h in STEP_HOOKS}
+        self._world_hooks: dict[str, dict[FlatlandPlugin, Hook]] = {h: {} for h in STEP_HOOKS}
+        self._ordered: dict[str, HookList] = {}
+        self._contact_hooks = {h: _ContactHooks(self._order) for h in (*CONTACT_HOOKS, "pre_solve")}
+
+    def add(self, plugin: FlatlandPlugin) -> None:
+        """Adds the hooks that a plugin overrides."""
+        self._count += 1
+        is_of_model = isinstance(plugin, ModelPlugin)
+        # World plugins come last.
+        self._order[plugin] = self._count if is_of_model else self._count + (1 << 62)
+        hooks = self._model_hooks if is_of_model else self._world_hooks
+        for hook in STEP_HOOKS:
+            if overrides(plugin, hook):
+                hooks[hook][plugin] = getattr(plugin, hook)
+                self._ordered.pop(hook, None)
+        for hook, table in self._contact_hooks.items():
+            if overrides(plugin, hook):
+                table.add(plugin, getattr(plugin, hook))
+
+    def remove(self, plugin: FlatlandPlugin) -> None:
+        """Removes the hooks of a plugin; one without hooks is ignored."""
+        for hook in STEP_HOOKS:
+            for hooks in (self._model_hooks, self._world_hooks):
+                if hooks[hook].pop(plugin, None) is not None:
+                    self._ordered.pop(hook, None)
+        for table in self._contact_hooks.values():
+            table.remove(plugin)
+        self._order.pop(plugin, None)
+
+    def of_step(self, hook: str) -> HookList:
+        """Returns a hook of all plugins in order; the list is not changed afterwards."""
+        ordered = self._ordered.get(hook)
+        if ordered is None:
+            ordered = [*self._model_hooks[hook].items(), *self._world_hooks[hook].items()]
+            self._ordered[hook] = ordered
+        return ordered
+
+    def of_contact(self, hook: str, body_a: Body, body_b: Body) -> HookList:
+        """Returns a contact hook of the plugins that a contact concerns, in order."""
+        return self._contact_hooks[hook].between(body_a.entity, body_b.entity)
+
+    def has_any(self, *hooks: str) -> bool:
+        """Returns whether any plugin overrides one of some contact hooks."""
+        return any(self._contact_hooks[hook] for hook in hooks)
+
+    def bodies_concerned(self, hook: str, bodies: Iterable[Body]) -> Iterator[Body]:
+        """Returns those of some bodies whose contacts concern a plugin with a contact hook."""
+        table = self._contact_hooks[hook]
+        return (body for body in bodies if table.concerns(body.entity))
+
+
+class _ContactHooks:
+    """One contact hook: of model plugins by model, and of those that get the contacts of all."""
+
+    def __init__(self, order: dict[FlatlandPlugin, int]) -> None:
+        self._order = order
+        self._by_entity: dict[Entity, dict[FlatlandPlugin, Hook]] = {}
+        self._of_all: dict[FlatlandPlugin, Hook] = {}
+
+    def __bool__(self) -> bool:
+        return bool(self._by_entity or self._of_all)
+
+    def add(self, plugin: FlatlandPlugin, hook: Hook) -> None:
+        if isinstance(plugin, ModelPlugin) and not plugin.all_contacts:
+            self._by_entity.setdefault(plugin.model, {})[plugin] = hook
+        else:
+            self._of_all[plugin] = hook
+
+    def remove(self, plugin: FlatlandPlugin) -> None:
+        self._of_all.pop(plugin, None)
+        if isinstance(plugin, ModelPlugin):
+            hooks = self._by_entity.get(plugin.model)
+            if hooks is not None and hooks.pop(plugin, None) is not None and not hooks:
+                del self._by_entity[plugin.model]
+
+    def concerns(self, entity: Entity) -> bool:
+        return bool(self._of_all) or entity in self._by_entity
+
+    def between(self, entity_a: Entity, entity_b: Entity) -> HookList:
+        found: HookList = [*self._by_entity.get(entity_a, {}).items()]
+        if entity_b is not entity_a:
+            found += self._by_entity.get(entity_b, {}).items()
+        found += self._of_all.items()
+        if len(found) > 1:
+            found.sort(key=lambda item: self._order[item[0]])
+        return found

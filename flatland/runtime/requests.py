@@ -1,0 +1,192 @@
+"""Requests: changes of a world that are asked for by other threads, or during a step."""
+
+from __future__ import annotations
+
+import logging
+import threading
+from collections import deque
+from collections.abc import Callable, Iterator
+from concurrent.futures import Future
+from contextlib import contextmanager
+from typing import Any, Final, TypeVar
+
+from flatland.errors import WorldError
+
+_LOG = logging.getLogger("flatland")
+_LOCK_POLL_PERIOD: Final = 0.005  # s between two attempts of a waiting thread to get the lock
+
+R = TypeVar("R")
+
+
+class Requests:
+    """A queue of actions that run between two steps, in order of arrival.
+
+    Which thread runs them:
+
+    * While a thread serves the queue (`serving`, as `Simulation.run` does), that thread alone.
+    * Otherwise the first of the thread that steps the world next and the thread that made the
+      request and waits for it; the lock of the queue keeps the two apart.
+
+    Attributes:
+        lock: Held during each step and each batch of actions.
+    """
+
+    def __init__(self) -> None:
+        """Creates an empty queue."""
+        self.lock = threading.RLock()
+        self._actions: deque[Callable[[], None]] = deque()
+        self._server: int | None = None
+        self._wake: Callable[[], None] | None = None
+        # Identifiers of the thread that runs hooks of plugins, starts a plugin, runs actions.
+        self._hook_thread: int | None = None
+        self._initializing_thread: int | None = None
+        self._action_thread: int | None = None
+
+    def __bool__(self) -> bool:
+        """Whether actions are waiting."""
+        return bool(self._actions)
+
+    # -- threads ---------------------------------------------------------------------------
+
+    @contextmanager
+    def serving(self, wake: Callable[[], None]) -> Iterator[None]:
+        """Makes the current thread the only one that runs actions, for the time of the block.
+
+        Args:
+            wake: Called from any thread when an action arrives.
+
+        Raises:
+            WorldError: Another thread serves the queue.
+        """
+        with self.lock:
+            if self._server is not None:
+                raise WorldError("the world is already run by another simulation")
+            self._server, self._wake = threading.get_ident(), wake
+        try:
+            yield
+        finally:
+            self._server = self._wake = None
+
+    @contextmanager
+    def hooks(self) -> Iterator[None]:
+        """Marks the current thread as running hooks of plugins, for the time of the block."""
+        previous, self._hook_thread = self._hook_thread, threading.get_ident()
+        try:
+            yield
+        finally:
+            self._hook_thread = previous
+
+    @contextmanager
+    def initializing(self) -> Iterator[None]:
+        """Marks the current thread as running `on_initialize` of a plugin."""
+        previous = self._initializing_thread
+        self._initializing_thread = threading.get_ident()
+        try:
+            yield
+        finally:
+            self._initializing_thread = previous
+
+    @property
+    def in_hook(self) -> bool:
+        """Whether the current thread runs a hook of a plugin."""
+        return self._hook_thread == threading.get_ident()
+
+    def refuse_in_plugin(self, method: str) -> None:
+        """Raises if the current thread executes a plugin's hook or `on_initialize`.
+
+        Args:
+            method: What may not be called there.
+
+        Raises:
+            WorldError: It does.
+        """
+        thread = threading.get_ident()
+        if thread in (self._hook_thread, self._initializing_thread):
+            raise WorldError(f"{method} must not be called from a plugin's hook")
+
+    # -- actions ---------------------------------------------------------------------------
+
+    def post(self, action: Callable[[], R]) -> Future[R]:
+        """Queues an action; safe from any thread.
+
+        Returns:
+            Holds what the action returned or raised, once it has run.
+        """
+        future: Future[R] = Future()
+
+        def run() -> None:
+            if not future.set_running_or_notify_cancel():
+                return
+            try:
+                future.set_result(action())
+            except BaseException as error:
+                future.set_exception(error)
+
+        self._actions.append(run)
+        wake = self._wake
+        if wake is not None:
+            wake()
+        return future
+
+    def process(self) -> None:
+        """Runs the actions that are waiting; not those that they queue in turn."""
+        with self.lock:
+            previous, self._action_thread = self._action_thread, threading.get_ident()
+            try:
+                for _ in range(len(self._actions)):
+                    # An action may process the queue itself, so it can be empty earlier.
+                    if self._actions:
+                        self._actions.popleft()()
+            finally:
+                self._action_thread = previous
+
+    def change(self, action: Callable[[], R], what: str) -> R | None:
+        """Runs a change of the world: now, or after the step if a hook asks for it.
+
+        Args:
+            action: The change.
+            what: Description for the log, in case a deferred change fails.
+
+        Returns:
+            What the action returned; None if it is deferred.
+        """
+        if self.in_hook:
+            self.post(action).add_done_callback(lambda done: _log_failure(what, done))
+            return None
+        return self.run(action)
+
+    def read(self, action: Callable[[], R]) -> R:
+        """Runs a function that reads the world, while no other thread steps it."""
+        return action() if self.in_hook else self.run(action)
+
+    def run(self, action: Callable[[], R]) -> R:
+        """Runs an action between two steps and waits for it, after those that wait already.
+
+        Within an action or `on_initialize`, it runs at once.
+        """
+        if threading.get_ident() in (self._action_thread, self._initializing_thread):
+            return action()
+        future = self.post(action)
+        while not future.done():
+            if self._server not in (None, threading.get_ident()):
+                _wait(future)
+            elif self.lock.acquire(timeout=_LOCK_POLL_PERIOD):
+                try:
+                    self.process()
+                finally:
+                    self.lock.release()
+        return future.result()
+
+
+def _wait(future: Future[Any]) -> None:
+    """Waits for a future, for a limited time: the thread that serves the queue may end."""
+    try:
+        future.exception(timeout=_LOCK_POLL_PERIOD)
+    except TimeoutError:
+        pass
+
+
+def _log_failure(what: str, done: Future[Any]) -> None:
+    error = done.exception()
+    if error is not None:
+        _LOG.error("%s: %s", what, error)

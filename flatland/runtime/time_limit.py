@@ -1,0 +1,81 @@
+"""A limit of wall time for code that may block, executed in the calling thread."""
+
+from __future__ import annotations
+
+import ctypes
+import signal
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from types import FrameType
+from typing import Final
+
+_RETRY_PERIOD: Final = 0.1  # s, until code that catches everything has been left
+
+
+class TimeLimitExceeded(BaseException):
+    """The limit of wall time is exceeded; not an `Exception`, so that handlers do not catch it."""
+
+
+@contextmanager
+def time_limit(seconds: float | None) -> Iterator[None]:
+    """Raises in the calling thread when the block takes too long.
+
+    In the main thread a signal (SIGALRM) interrupts Python code and system calls that wait, such as
+    `sleep`, a socket or a lock. In other threads only Python code is interrupted. Code in an extension
+    that neither returns nor handles signals cannot be interrupted at all.
+
+    Args:
+        seconds: Limit of wall time [s]; None for no limit.
+
+    Raises:
+        TimeLimitExceeded: The block took longer.
+    """
+    if seconds is None:
+        yield
+    elif threading.current_thread() is threading.main_thread():
+        with _signal_limit(seconds):
+            yield
+    else:
+        with _exception_limit(seconds):
+            yield
+
+
+@contextmanager
+def _signal_limit(seconds: float) -> Iterator[None]:
+    def interrupt(_number: int, _frame: FrameType | None) -> None:
+        raise TimeLimitExceeded
+
+    previous = signal.signal(signal.SIGALRM, interrupt)
+    try:
+        signal.setitimer(signal.ITIMER_REAL, min(seconds, threading.TIMEOUT_MAX), _RETRY_PERIOD)
+        yield
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0)
+        signal.signal(signal.SIGALRM, previous)
+
+
+@contextmanager
+def _exception_limit(seconds: float) -> Iterator[None]:
+    thread = ctypes.c_ulong(threading.get_ident())
+    finished = threading.Event()
+    lock = threading.Lock()
+
+    def interrupt() -> None:
+        wait = min(seconds, threading.TIMEOUT_MAX)
+        while not finished.wait(wait):
+            with lock:
+                if not finished.is_set():
+                    ctypes.pythonapi.PyThreadState_SetAsyncExc(
+                        thread, ctypes.py_object(TimeLimitExceeded)
+                    )
+            wait = _RETRY_PERIOD
+
+    threading.Thread(target=interrupt, name="flatland-time-limit", daemon=True).start()
+    try:
+        yield
+    finally:
+        with lock:
+            finished.set()
+            # Cancels an exception that has been set and not yet been raised.
+            ctypes.pythonapi.PyThreadState_SetAsyncExc(thread, None)

@@ -1,0 +1,60 @@
+"""The transforms of a world: collected during a step, published in one batch after it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import TYPE_CHECKING, TypeAlias
+
+from flatland.values import Transform
+
+if TYPE_CHECKING:
+    from flatland.runtime.observer import Observers
+
+FramePair: TypeAlias = tuple[str, str]
+"""(parent, child)."""
+TransformFields: TypeAlias = tuple[int, float, float, float, float]
+"""(stamp, x, y, yaw, roll), as in `Transform`."""
+
+
+class TransformBuffer:
+    """The latest transform of each pair of frames, and those of the current step.
+
+    Transforms are kept as plain tuples, since most of them are never read.
+    """
+
+    def __init__(self, observers: Observers) -> None:
+        """Creates an empty buffer.
+
+        Args:
+            observers: Notified of the transforms of each step.
+        """
+        self._observers = observers
+        self._latest: dict[FramePair, TransformFields] = {}
+        self._pending: dict[FramePair, TransformFields] = {}
+
+    @property
+    def latest(self) -> dict[FramePair, Transform]:
+        """The latest transform of each (parent, child)."""
+        return dict(zip(self._latest, _values(self._latest), strict=True))
+
+    def send(self, frames: FramePair, fields: TransformFields) -> None:
+        """Adds a transform to those of this step."""
+        self._pending[frames] = fields
+
+    def forget(self, frames: Iterable[FramePair]) -> None:
+        """Drops transforms whose sender no longer exists."""
+        for pair in frames:
+            self._latest.pop(pair, None)
+            self._pending.pop(pair, None)
+
+    def flush(self) -> None:
+        """Publishes the transforms of this step."""
+        pending = self._pending
+        if pending:
+            self._latest.update(pending)
+            self._observers.transforms_sent(lambda: _values(pending))
+            pending.clear()
+
+
+def _values(fields: dict[FramePair, TransformFields]) -> list[Transform]:
+    return [Transform(stamp, *pair, *pose) for pair, (stamp, *pose) in fields.items()]
