@@ -28,8 +28,8 @@ from flatland.model import Model
 from flatland.model_loader import ModelLoader
 from flatland.observer import WorldObserver
 from flatland.physics import PhysicsWorld
-from flatland.plugin import FlatlandPlugin, ModelPlugin, WorldPlugin
-from flatland.plugin_host import PluginHost, describe, initialize
+from flatland.plugin import FlatlandPlugin, ModelPlugin, WorldPlugin, describe
+from flatland.plugin_host import PluginHost, initialize
 from flatland.plugin_registry import PluginRegistry
 from flatland.ports import CommandTopic, Output, PortRegistry, is_legal_namespace
 from flatland.timekeeper import Timekeeper
