@@ -81,13 +81,19 @@ class Output(Generic[T]):
         "value_type",
     )
 
-    def __init__(self, name: str, value_type: type[T]) -> None:
-        """Makes an output that nobody wants yet."""
+    def __init__(self, name: str, value_type: type[T], owner: str = "") -> None:
+        """Makes an output that nobody wants yet.
+
+        Args:
+            name: Resolved topic.
+            value_type: Type of the values.
+            owner: Name of the plugin, for messages.
+        """
         self.name = name
         self.topic = _key(name)
         self.value_type = value_type
         self.latest: T | None = None
-        self.owners: list[str] = []
+        self.owners = [owner]
         self.closed = False
         self._callbacks: tuple[Callable[[T], None], ...] = ()
         self._wanters: frozenset[Hashable] = frozenset()
@@ -253,11 +259,10 @@ class PortRegistry:
             self._check_type(output, output.owners[0], value_type)
             output.owners.append(owner)
             return output
-        output = Output(name, value_type)
+        output = Output(name, value_type, owner)
         for notify in self.output_opened:
             notify(output)
         self._outputs[output.topic] = output
-        output.owners.append(owner)
         return output
 
     def close_output(self, output: Output[Any], owner: str = "") -> None:
