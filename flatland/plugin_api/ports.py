@@ -14,22 +14,28 @@ from flatland.errors import FlatlandError, WorldError
 
 T = TypeVar("T")
 
-# ROS graph names as its clients check them, less the private ~ which a model has no use for.
-_LEGAL_NAME = re.compile(r"(/|[A-Za-z])(\w|(?<!/)/)*(?<!/)", re.ASCII)
+# ROS graph names as roscpp checks them, less the private ~ which a model has no use for.
+_LEGAL_NAME = re.compile(r"[A-Za-z/][\w/]*", re.ASCII)
+
+
+def clean_name(name: str) -> str:
+    """Returns a ROS name without repeated slashes and without one at the end, as roscpp does."""
+    return re.sub("/+", "/", name).removesuffix("/")
 
 
 def is_legal_namespace(namespace: str) -> bool:
-    """Tells whether a namespace is empty or a legal ROS graph name; a `/` at its end is allowed."""
-    bare = namespace.removesuffix("/")
-    return not bare or _LEGAL_NAME.fullmatch(bare) is not None
+    """Returns whether a namespace is empty or, once cleaned, a legal ROS graph name."""
+    cleaned = clean_name(namespace)
+    return not cleaned or _LEGAL_NAME.fullmatch(cleaned) is not None
 
 
 def resolve_topic(topic: str, namespace: str = "") -> str:
     """Puts a topic under a namespace.
 
     Args:
-        topic: As written; a leading `/` makes it global.
-        namespace: Of the model, may be empty.
+        topic: As written; a leading `/` makes it global. Repeated slashes and one at the end are
+            dropped.
+        namespace: Of the model, may be empty; cleaned in the same way.
 
     Returns:
         `/topic` when the topic is global, else `namespace/topic`, which starts with a slash only
@@ -38,15 +44,19 @@ def resolve_topic(topic: str, namespace: str = "") -> str:
     Raises:
         ValueError: The topic is no legal ROS name.
     """
-    if _LEGAL_NAME.fullmatch(topic) is None:
+    cleaned = clean_name(topic)
+    if _LEGAL_NAME.fullmatch(cleaned) is None:
         raise ValueError(
             f'"{topic}" is not a legal topic name: it must start with a letter or "/" and hold '
             'only letters, digits, "_" and "/"'
         )
-    if topic.startswith("/"):
-        return topic
-    namespace = namespace.removesuffix("/")
-    return f"{namespace}/{topic}" if namespace else topic
+    namespace = clean_name(namespace)
+    return cleaned if cleaned.startswith("/") or not namespace else f"{namespace}/{cleaned}"
+
+
+def _key(name: str) -> str:
+    """Returns the key of a topic in the registry: its cleaned name with a leading slash."""
+    return "/" + clean_name(name).lstrip("/")
 
 
 class Output(Generic[T]):
@@ -57,16 +67,33 @@ class Output(Generic[T]):
         topic: The same with a leading `/`: the key in the registry.
         value_type: Type of the values.
         latest: The last value emitted, None before the first.
+        owners: Names of the plugins that opened it, for messages.
     """
 
-    __slots__ = ("_callbacks", "_wanters", "closed", "latest", "name", "topic", "value_type")
+    __slots__ = (
+        "_callbacks",
+        "_wanters",
+        "closed",
+        "latest",
+        "name",
+        "owners",
+        "topic",
+        "value_type",
+    )
 
-    def __init__(self, name: str, value_type: type[T]) -> None:
-        """Makes an output that nobody wants yet."""
+    def __init__(self, name: str, value_type: type[T], owner: str = "") -> None:
+        """Makes an output that nobody wants yet.
+
+        Args:
+            name: Resolved topic.
+            value_type: Type of the values.
+            owner: Name of the plugin, for messages.
+        """
         self.name = name
-        self.topic = "/" + name.lstrip("/")
+        self.topic = _key(name)
         self.value_type = value_type
         self.latest: T | None = None
+        self.owners = [owner]
         self.closed = False
         self._callbacks: tuple[Callable[[T], None], ...] = ()
         self._wanters: frozenset[Hashable] = frozenset()
@@ -121,9 +148,10 @@ class Command(Generic[T]):
         value_type: Type of the values.
         value: The last one set, or the default.
         received: How many were set.
+        owner: Name of the plugin that opened it, for messages.
     """
 
-    __slots__ = ("accept", "closed", "name", "received", "topic", "value", "value_type")
+    __slots__ = ("accept", "closed", "name", "owner", "received", "topic", "value", "value_type")
 
     def __init__(
         self,
@@ -131,6 +159,7 @@ class Command(Generic[T]):
         value_type: type[T],
         default: T,
         accept: Callable[[T], bool] | None = None,
+        owner: str = "",
     ) -> None:
         """Makes a command that holds its default.
 
@@ -139,9 +168,11 @@ class Command(Generic[T]):
             value_type: Type of the values.
             default: Value before the first comes.
             accept: Asked with each value; one that it refuses leaves the last good one.
+            owner: Name of the plugin, for messages.
         """
         self.name = name
-        self.topic = "/" + name.lstrip("/")
+        self.owner = owner
+        self.topic = _key(name)
         self.value_type = value_type
         self.value = default
         self.received = 0
@@ -196,7 +227,6 @@ class PortRegistry:
     def __init__(self) -> None:
         """Starts without ports."""
         self._outputs: dict[str, Output[Any]] = {}
-        self._owners: dict[str, int] = {}
         self._commands: dict[str, list[Command[Any]]] = {}
         self.output_opened: list[Callable[[Output[Any]], None]] = []
         self.output_closed: list[Callable[[Output[Any]], None]] = []
@@ -213,33 +243,36 @@ class PortRegistry:
         """All open commands by resolved topic."""
         return {topic: list(commands) for topic, commands in self._commands.items()}
 
-    def open_output(self, name: str, value_type: type[T]) -> Output[T]:
+    def open_output(self, name: str, value_type: type[T], owner: str = "") -> Output[T]:
         """Opens an output; plugins that name the same topic share it.
+
+        Args:
+            name: Resolved topic.
+            value_type: Type of the values.
+            owner: Name of the plugin, for messages.
 
         Raises:
             FlatlandError: The topic carries values of another type already.
         """
-        topic = "/" + name.lstrip("/")
-        output = self._outputs.get(topic)
+        output = self._outputs.get(_key(name))
         if output is not None:
-            self._check_type(topic, output.value_type, value_type)
-            self._owners[topic] += 1
+            self._check_type(output, output.owners[0], value_type)
+            output.owners.append(owner)
             return output
-        output = Output(name, value_type)
+        output = Output(name, value_type, owner)
         for notify in self.output_opened:
             notify(output)
-        self._outputs[topic] = output
-        self._owners[topic] = 1
+        self._outputs[output.topic] = output
         return output
 
-    def close_output(self, output: Output[Any]) -> None:
-        """Lets go of an output; it ends with its last owner."""
+    def close_output(self, output: Output[Any], owner: str = "") -> None:
+        """Takes one owner off an output, which ends with its last one."""
         if output.closed:
             return
-        self._owners[output.topic] -= 1
-        if self._owners[output.topic]:
+        output.owners.remove(owner)
+        if output.owners:
             return
-        del self._owners[output.topic], self._outputs[output.topic]
+        del self._outputs[output.topic]
         output.closed = True
         for notify in self.output_closed:
             notify(output)
@@ -250,16 +283,17 @@ class PortRegistry:
         value_type: type[T],
         default: T,
         accept: Callable[[T], bool] | None = None,
+        owner: str = "",
     ) -> Command[T]:
         """Opens a command of its own for a plugin, also where others share the topic.
 
         Raises:
             FlatlandError: The topic carries values of another type already.
         """
-        command = Command(name, value_type, default, accept)
+        command = Command(name, value_type, default, accept, owner)
         others = self._commands.get(command.topic)
         if others:
-            self._check_type(command.topic, others[0].value_type, value_type)
+            self._check_type(others[0], others[0].owner, value_type)
         for notify in self.command_opened:
             notify(command)
         self._commands.setdefault(command.topic, []).append(command)
@@ -284,7 +318,7 @@ class PortRegistry:
             WorldError: There is none; names those that there are.
         """
         try:
-            return self._outputs["/" + topic.lstrip("/")]
+            return self._outputs[_key(topic)]
         except KeyError:
             raise WorldError(
                 f'no output "{topic}", there are: {", ".join(sorted(self._outputs)) or "none"}'
@@ -297,15 +331,17 @@ class PortRegistry:
             WorldError: There is none; names those that there are.
         """
         try:
-            return CommandTopic(self._commands["/" + topic.lstrip("/")])
+            return CommandTopic(self._commands[_key(topic)])
         except KeyError:
             raise WorldError(
                 f'no command "{topic}", there are: {", ".join(sorted(self._commands)) or "none"}'
             ) from None
 
     @staticmethod
-    def _check_type(topic: str, has: type[Any], wanted: type[Any]) -> None:
-        if has is not wanted:
+    def _check_type(port: Output[Any] | Command[Any], owner: str, wanted: type[Any]) -> None:
+        if port.value_type is not wanted:
+            used_by = f", used by {owner}" if owner else ""
             raise FlatlandError(
-                f'topic "{topic}" carries {has.__name__} already, not {wanted.__name__}'
+                f'topic "{port.topic}" carries {port.value_type.__name__} already{used_by}, '
+                f"not {wanted.__name__}"
             )

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from flatland.entities.contact import Contact, ContactImpulse, MutableContact
 from flatland.errors import PLUGIN_FAULTS, PluginError
-from flatland.plugin_api.plugin import FlatlandPlugin, ModelPlugin, WorldPlugin
+from flatland.plugin_api.plugin import FlatlandPlugin, ModelPlugin, WorldPlugin, describe
 
 if TYPE_CHECKING:
     from flatland.config.reader import YamlReader
@@ -33,13 +33,6 @@ HookList = list[tuple[FlatlandPlugin, Hook]]
 def overrides(plugin: FlatlandPlugin, hook: str) -> bool:
     """Tells whether a plugin's class, or the plugin itself, has its own version of a hook."""
     return hook in vars(plugin) or getattr(type(plugin), hook) is not getattr(FlatlandPlugin, hook)
-
-
-def describe(plugin: FlatlandPlugin) -> str:
-    """Names a plugin in the words of the error messages."""
-    if isinstance(plugin, ModelPlugin):
-        return f'Model Plugin "{plugin.name}" type "{plugin.type}" model "{plugin.model.name}"'
-    return f'World Plugin "{plugin.name}" type "{plugin.type}"'
 
 
 def initialize(plugin: FlatlandPlugin, config: YamlReader, timeout: float | None) -> None:
