@@ -28,11 +28,11 @@ from flatland.errors import PLUGIN_FAULTS, FlatlandError, PluginError, WorldErro
 from flatland.geometry import Pose, finite_pose
 from flatland.loading.model_loader import ModelLoader
 from flatland.physics import PhysicsWorld
-from flatland.plugin_api.plugin import FlatlandPlugin, ModelPlugin, WorldPlugin
+from flatland.plugin_api.plugin import FlatlandPlugin, ModelPlugin, WorldPlugin, describe
 from flatland.plugin_api.ports import CommandTopic, Output, PortRegistry, is_legal_namespace
 from flatland.plugin_api.registry import PluginRegistry
 from flatland.runtime.observer import WorldObserver
-from flatland.runtime.plugin_host import PluginHost, describe, initialize
+from flatland.runtime.plugin_host import PluginHost, initialize
 from flatland.timekeeper import Timekeeper
 from flatland.values import Transform
 

@@ -7,7 +7,9 @@ entries that are not written in it.
 
 from __future__ import annotations
 
+import logging
 import re
+from bisect import bisect_left
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import NoReturn
@@ -17,6 +19,7 @@ import yaml
 from flatland.errors import UnreadableFileError, YamlError
 from flatland.regular_file import open_regular
 
+_LOG = logging.getLogger("flatland")
 MAX_NESTING = 100
 _MAX_FILE_BYTES = 64 * 1024 * 1024
 
@@ -24,6 +27,10 @@ _Loader: type = getattr(yaml, "CBaseLoader", yaml.BaseLoader)
 _NULLS = frozenset(("", "~", "null", "Null", "NULL"))
 _NULL_TAG = "tag:yaml.org,2002:null"
 _NOT_YAML_TEXT = re.compile("[^\t\n\r\x20-\x7e\x85\xa0-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
+_REPLACEMENT = "\ufffd"
+_UNDECODABLE = range(0xDC80, 0xDD00)  # the surrogates for the bytes 0x80 to 0xff
+# White space before a comment or the end of a line, preceded by list and map indicators only.
+_BLANK = re.compile(r"^(?:[ \t]*+[-?:](?=[ \t]))*+[ \t]++(?=#|\r?$)", re.MULTILINE)
 
 
 @dataclass(frozen=True, slots=True)
@@ -115,13 +122,12 @@ def load_documents(path: str) -> list[Node]:
 def parse_documents(text: str, source: Source) -> list[Node]:
     """Parses all documents of a text.
 
+    Characters that YAML does not allow, and the surrogates that stand for undecodable bytes, are
+    accepted in comments only. Of a key that occurs several times in a map the first value counts.
+
     Raises:
         YamlError: The text is not YAML.
     """
-    bad = _NOT_YAML_TEXT.search(text)
-    if bad:
-        line, column = _line_and_column(text[: bad.start()])
-        _fail(source, line, column, f"character U+{ord(bad.group()):04X} is not allowed")
     return _Composer(text.removeprefix("\ufeff"), source).documents()
 
 
@@ -141,14 +147,31 @@ def _read(path: str) -> bytes:
 
 
 def _decode(content: bytes, source: Source) -> str:
-    encoding = "utf-16" if content[:2] in (b"\xff\xfe", b"\xfe\xff") else "utf-8"
+    if content[:2] not in (b"\xff\xfe", b"\xfe\xff"):
+        return content.decode("utf-8", "surrogateescape")
     try:
-        return content.decode(encoding)
+        return content.decode("utf-16")
     except UnicodeDecodeError as error:
-        before = content[: error.start].decode(encoding, "replace")
-        line, column = _line_and_column(before)
-        byte = content[error.start]
-        _fail(source, line, column, f"byte 0x{byte:02x} is not {encoding.upper()} text")
+        line, column = _line_and_column(content[: error.start].decode("utf-16", "replace"))
+        _fail(source, line, column, f"byte 0x{content[error.start]:02x} is not UTF-16 text")
+
+
+def _without_stray_tabs(text: str) -> str:
+    """Replaces tabs in blank lines and before comments by spaces if the parser rejects the text.
+
+    libyaml rejects such a tab where a key or an item may begin; yaml-cpp skips it. Each tab
+    becomes one space, so lines and columns stay the same. In a text that was rejected, this
+    includes lines of literal blocks that are blank or start with `#`.
+    """
+    blanked = _BLANK.sub(lambda match: match[0].replace("\t", " "), text)
+    if blanked == text:
+        return text
+    try:
+        for _ in yaml.parse(text, Loader=_Loader):
+            pass
+    except yaml.YAMLError:
+        return blanked
+    return text
 
 
 def _line_and_column(before: str) -> tuple[int, int]:
@@ -166,6 +189,7 @@ class _Composer:
     def __init__(self, text: str, source: Source) -> None:
         self._text = text
         self._source = source
+        self._bad = [match.start() for match in _NOT_YAML_TEXT.finditer(text)]
         self._roots: list[Node] = []
         self._anchors: dict[str, Node] = {}
         self._open: list[ListNode | MapNode] = []
@@ -173,8 +197,9 @@ class _Composer:
         self._heights: dict[int, int] = {}  # levels in each list and map, aliases counted
 
     def documents(self) -> list[Node]:
+        text = _NOT_YAML_TEXT.sub(_REPLACEMENT, self._text) if self._bad else self._text
         try:
-            for event in yaml.parse(self._text, Loader=_Loader):
+            for event in yaml.parse(_without_stray_tabs(text), Loader=_Loader):
                 self._take(event)
         except yaml.MarkedYAMLError as error:
             mark = error.problem_mark or error.context_mark
@@ -230,11 +255,28 @@ class _Composer:
         return node
 
     def _scalar(self, event: yaml.ScalarEvent) -> Node:
+        if self._bad and _REPLACEMENT in event.value:
+            self._check_characters(event)
         line = _position(event)[0]
         plain = not event.style and event.tag in (None, _NULL_TAG)
         if plain and event.value in _NULLS and not self._key_is_due():
             return NullNode(self._source, line)
         return ScalarNode(self._source, line, event.value)
+
+    def _check_characters(self, event: yaml.ScalarEvent) -> None:
+        """Refuses a scalar with a character that only comments may contain."""
+        marks = (event.start_mark, event.end_mark)
+        start, end = (mark.index if mark is not None else 0 for mark in marks)
+        first = bisect_left(self._bad, start)
+        if first == len(self._bad) or self._bad[first] >= end:
+            return
+        index = self._bad[first]
+        code = ord(self._text[index])
+        if code in _UNDECODABLE:
+            why = f"byte 0x{code & 0xFF:02x} is not UTF-8 text"
+        else:
+            why = f"character U+{code:04X} is not allowed"
+        _fail(self._source, *_line_and_column(self._text[:index]), why)
 
     def _key_is_due(self) -> bool:
         return bool(self._open) and isinstance(self._open[-1], MapNode) and self._keys[-1] is None
@@ -247,7 +289,7 @@ class _Composer:
         elif isinstance(parent, ListNode):
             parent.items.append(node)
         elif self._keys[-1] is not None:
-            parent.entries[self._keys[-1]] = node
+            parent.entries.setdefault(self._keys[-1], node)
             self._keys[-1] = None
         else:
             self._keys[-1] = self._new_key(parent, node, event)
@@ -257,10 +299,15 @@ class _Composer:
         if not isinstance(node, ScalarNode):
             self._fail_at(event, "a key must be a scalar")
         key = node.text
-        first = parent.key_lines.get(key)
-        if first is not None:
-            self._fail_at(event, f'duplicate key "{key}", first used in line {first}')
-        parent.key_lines[key] = _position(event)[0]
+        line = _position(event)[0]
+        first = parent.key_lines.setdefault(key, line)
+        if key in parent.entries:
+            _LOG.warning(
+                'Duplicate key "%s" is ignored, its first value in line %d counts%s',
+                key,
+                first,
+                self._source.place(line),
+            )
         return key
 
     def _fail_at(self, event: yaml.Event, why: str) -> NoReturn:

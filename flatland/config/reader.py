@@ -293,19 +293,22 @@ class YamlReader:
             return len(self._node.items)
         return len(self._node.entries) if isinstance(self._node, MapNode) else 0
 
+    def unread_keys(self) -> list[str]:
+        """Returns the keys of a map that were not read yet, in the order of the file."""
+        entries = self._node.entries if isinstance(self._node, MapNode) else ()
+        return [key for key in entries if key not in self._accessed]
+
     def ensure_accessed_all(self) -> None:
         """Checks that every key of the map was read.
 
         Raises:
             YamlError: Some were not; they are unknown.
         """
-        if not isinstance(self._node, MapNode):
-            return
-        unknown = [key for key in self._node.entries if key not in self._accessed]
-        if unknown:
-            names = ", ".join(f'"{key}"' for key in sorted(unknown))
+        unread = self.unread_keys()
+        if unread and isinstance(self._node, MapNode):
+            names = ", ".join(f'"{key}"' for key in sorted(unread))
             message = f"Entry {self._label()}contains unrecognized entry(s) {{{names}}}"
-            raise self._error(message, self._node.key_lines[unknown[0]])
+            raise self._error(message, self._node.key_lines[unread[0]])
 
     def error(self, message: str) -> YamlError:
         """Makes an error with the node's place, such as ` [model.yaml:12]`, behind the text."""

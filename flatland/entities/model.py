@@ -8,6 +8,7 @@ from flatland.entities.body import Body, Entity
 from flatland.entities.joint import Joint
 from flatland.errors import WorldError
 from flatland.geometry import Pose, compose, finite_pose, invert
+from flatland.graph_names import clean_name
 
 if TYPE_CHECKING:
     from flatland.plugin_api.plugin import ModelPlugin
@@ -20,7 +21,7 @@ class Model(Entity):
     Attributes:
         world: The world that it is in.
         name: Unique in the world.
-        namespace: Under which its topics and frames live, may be empty.
+        namespace: Under which its topics and frames live, cleaned, may be empty.
         path: File that it was read from.
         bodies: In the order of the file; the first one stands for the model's pose.
         joints: In the order of the file.
@@ -31,7 +32,7 @@ class Model(Entity):
         """Makes a model without bodies; `model_loader` fills it."""
         self.world = world
         self.name = name
-        self.namespace = namespace
+        self.namespace = clean_name(namespace)
         self.path = path
         self.bodies: list[Body] = []
         self.joints: list[Joint] = []

@@ -188,8 +188,8 @@ class ModelLoader:
                     f'Cannot find body with name "{body_name}" in {end.location} {end.name}'
                 )
             bodies.append(body)
-            anchors.append(_finite(end, "anchor", end.get("anchor", "vector")))
-            end.ensure_accessed_all()
+            anchor = end.get_list("anchor", "float", size=2)
+            anchors.append(_finite(end, "anchor", anchor))
         options: dict[str, Any] = {"collide_connected": collide_connected}
         make: Any
         if kind == "revolute":

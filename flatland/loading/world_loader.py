@@ -71,13 +71,12 @@ def _at_least_one(reader: YamlReader, key: str) -> int:
     return value
 
 
-def _load_layer(world: World, entry: YamlReader, simplify_map: int) -> None:
-    name_node = entry.subnode("name")
+def _load_layer(world: World, reader: YamlReader, simplify_map: int) -> None:
+    name_node = reader.subnode("name")
     if name_node.is_list:
-        names = entry.get_list("name", "string", min_size=1)
+        names = reader.get_list("name", "string", min_size=1)
     else:
-        names = [entry.get("name", "string")]
-    reader = entry.with_location(f'layer "{names[0]}"')
+        names = [reader.get("name", "string")]
     map_path: str = reader.get("map", "string", "")
     color = reader.get("color", "color", LAYER_COLOR)
     if not all(math.isfinite(number) for number in color):
@@ -113,6 +112,7 @@ def _load_layer(world: World, entry: YamlReader, simplify_map: int) -> None:
                 origin=layer_map.origin,
                 edges=layer_map.edges,
                 exact_edge_count=layer_map.exact_edge_count,
+                unknown_map_keys=layer_map.unknown_keys,
             )
         except ValueError as error:  # finite, but beyond what the physics can hold
             raise YamlError(

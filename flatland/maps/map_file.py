@@ -18,7 +18,8 @@ from flatland.maps.map_image import image_edges, read_grey_image, threshold_in_p
 
 _LOG = logging.getLogger("flatland")
 
-# What map_server and its relatives read or write beside the keys that count here.
+# Keys of map_server and similar programs, ignored without a message. Other unknown keys are allowed
+# as well, since map files are shared between programs, and logged.
 _IGNORED_IMAGE_KEYS = ("negate", "free_thresh", "mode", "frame_id")
 
 
@@ -31,12 +32,14 @@ class LayerMap:
         edges: Edges (x1, y1, x2, y2) in the frame of the layer's body [m], shape (n, 4).
         exact_edge_count: How many edges there are without simplification.
         path: The map file.
+        unknown_keys: Keys of the map file that flatland does not use, sorted.
     """
 
     origin: Pose
     edges: npt.NDArray[np.float32]
     exact_edge_count: int
     path: str
+    unknown_keys: tuple[str, ...]
 
 
 def load_map(
@@ -66,15 +69,10 @@ def load_map(
     if simplify not in (0, 1, 2):
         raise ValueError(f"simplify must be 0, 1 or 2, got {simplify!r}")
     reader = YamlReader.from_file(path, params).with_location(f'layer "{layer_name}"')
-    map_type: str | None = reader.get("type", "string", None)
-    if map_type is None:
-        layer_map = _load_image(reader, layer_name, simplify)
-    elif map_type == "line_segments":
+    if reader.get("type", "string", None) == "line_segments":
         layer_map = _load_line_segments(reader, layer_name)
     else:
-        raise reader.subnode("type").error(
-            f'Invalid "type" in layer "{layer_name}", must be line_segments or be left out (image)'
-        )
+        layer_map = _load_image(reader, layer_name, simplify)
     edge_count = len(layer_map.edges)
     if edge_count == layer_map.exact_edge_count:
         _LOG.info('Layer "%s": %d edges from %s', layer_name, edge_count, path)
@@ -86,6 +84,13 @@ def load_map(
             path,
             layer_map.exact_edge_count,
         )
+    if layer_map.unknown_keys:
+        _LOG.info(
+            'Layer "%s": flatland does not use the keys {%s} of %s',
+            layer_name,
+            ", ".join(layer_map.unknown_keys),
+            path,
+        )
     return layer_map
 
 
@@ -95,7 +100,7 @@ def _load_image(reader: YamlReader, layer_name: str, simplify: int) -> LayerMap:
     resolution = _finite(reader, layer_name, "resolution")
     origin = _finite_origin(reader, layer_name)
     occupied_thresh = _finite(reader, layer_name, "occupied_thresh")
-    reader.ensure_accessed_all()
+    unknown_keys = tuple(sorted(reader.unread_keys()))
     if resolution <= 0:
         raise _invalid(reader, layer_name, "resolution", f"must be positive, got {resolution}")
     if not 0 <= occupied_thresh <= 1:
@@ -114,7 +119,7 @@ def _load_image(reader: YamlReader, layer_name: str, simplify: int) -> LayerMap:
         edges, exact_edge_count = image_edges(mask, resolution, simplify)
     except ValueError as error:
         raise _invalid(reader, layer_name, "resolution", str(error)) from error
-    return LayerMap(origin, edges, exact_edge_count, reader.path)
+    return LayerMap(origin, edges, exact_edge_count, reader.path, unknown_keys)
 
 
 def _load_line_segments(reader: YamlReader, layer_name: str) -> LayerMap:
@@ -122,7 +127,7 @@ def _load_line_segments(reader: YamlReader, layer_name: str) -> LayerMap:
     data_path = reader.resolve_path(reader.get("data", "string"))
     scale = _finite(reader, layer_name, "scale")
     origin = _finite_origin(reader, layer_name)
-    reader.ensure_accessed_all()
+    unknown_keys = tuple(sorted(reader.unread_keys()))
     if scale == 0:
         raise _invalid(reader, layer_name, "scale", "must not be 0")
     try:
@@ -143,7 +148,7 @@ def _load_line_segments(reader: YamlReader, layer_name: str) -> LayerMap:
             data_path,
         )
         edges = edges[has_length]
-    return LayerMap(origin, edges, len(edges), reader.path)
+    return LayerMap(origin, edges, len(edges), reader.path, unknown_keys)
 
 
 def _finite(reader: YamlReader, layer_name: str, key: str) -> float:

@@ -14,7 +14,8 @@ import numpy as np
 from flatland.entities.contact import Contact, ContactImpulse, ModelContact, MutableContact
 from flatland.errors import PluginError
 from flatland.plugin_api.noise import NoiseStream
-from flatland.plugin_api.ports import Command, Output, resolve_topic
+from flatland.graph_names import resolve_topic
+from flatland.plugin_api.ports import Command, Output
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -58,6 +59,7 @@ class FlatlandPlugin:
     _commands: list[Command[Any]]
     _sent: set[tuple[str, str]]
     _detached: bool
+    _label: str
 
     def _attach(self, world: World, owner: str, name: str, type_name: str, namespace: str) -> None:
         """Attaches the plugin to a world; called once, before `on_initialize`.
@@ -80,12 +82,13 @@ class FlatlandPlugin:
         self._commands = []
         self._sent = set()
         self._detached = False
+        self._label = describe(self)
 
     def _detach(self) -> None:
         """Closes every port and forgets every transform, also what the plugin forgot itself."""
         self._detached = True
         for output in self._outputs:
-            self.world.ports.close_output(output)
+            self.world.ports.close_output(output, self._label)
         for command in self._commands:
             self.world.ports.close_command(command)
         self._outputs.clear()
@@ -103,7 +106,7 @@ class FlatlandPlugin:
         Raises:
             PluginError: The topic is no legal name, or carries another type.
         """
-        output = self.world.ports.open_output(self._resolve(topic), value_type)
+        output = self.world.ports.open_output(self._resolve(topic), value_type, self._label)
         self._outputs.append(output)
         return output
 
@@ -126,7 +129,9 @@ class FlatlandPlugin:
             PluginError: The topic is no legal name, or carries another type.
         """
         initial = value_type() if default is None else default
-        command = self.world.ports.open_command(self._resolve(topic), value_type, initial, accept)
+        command = self.world.ports.open_command(
+            self._resolve(topic), value_type, initial, accept, self._label
+        )
         self._commands.append(command)
         return command
 
@@ -253,3 +258,10 @@ class WorldPlugin(FlatlandPlugin):
     base_class_type = "flatland::WorldPlugin"
 
     world_config: YamlReader
+
+
+def describe(plugin: FlatlandPlugin) -> str:
+    """Returns the name, type and model of a plugin in the words of the error messages."""
+    if isinstance(plugin, ModelPlugin):
+        return f'Model Plugin "{plugin.name}" type "{plugin.type}" model "{plugin.model.name}"'
+    return f'World Plugin "{plugin.name}" type "{plugin.type}"'

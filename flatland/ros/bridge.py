@@ -87,6 +87,7 @@ class Bridge(WorldObserver):
             output.name,
             adapter.message_type,
             on_connection=lambda connected: (output.want if connected else output.unwant)(self),
+            owner=output.owners[0],
         )
         to_message = adapter.to_message
 
@@ -117,7 +118,7 @@ class Bridge(WorldObserver):
             self._post(lambda: None if command.closed else command.set(value))
 
         self._commands[command] = Subscriber(
-            self._registrar, command.name, adapter.message_type, receive
+            self._registrar, command.name, adapter.message_type, receive, owner=command.owner
         )
 
     def command_closed(self, command: Command[Any]) -> None:

@@ -10,8 +10,8 @@ from typing import Any, Final
 import rospy
 
 from flatland.errors import PLUGIN_FAULTS, PluginError
-from flatland.plugin_api.plugin import FlatlandPlugin
-from flatland.plugin_api.ports import resolve_topic
+from flatland.plugin_api.plugin import FlatlandPlugin, describe
+from flatland.graph_names import resolve_topic
 from flatland.ros.publisher import Publisher
 from flatland.ros.registrar import Registrar
 from flatland.ros.service import Service, wait_for
@@ -45,6 +45,7 @@ class PluginRos:
             shutting_down: Tells whether the node ends, and all connections with it.
         """
         self._plugin = plugin
+        self._owner = describe(plugin)
         self._registrar = registrar
         self._post = post
         self._shutting_down = shutting_down
@@ -66,7 +67,12 @@ class PluginRos:
             FlatlandError: The topic is no legal name, or carries another type.
         """
         publisher = Publisher(
-            self._registrar, self._resolve(topic), message_type, queue_size=queue_size, latch=latch
+            self._registrar,
+            self._resolve(topic),
+            message_type,
+            queue_size=queue_size,
+            latch=latch,
+            owner=self._owner,
         )
         self._closers.append(publisher.close)
         return publisher
@@ -97,6 +103,7 @@ class PluginRos:
             self._resolve(topic),
             message_type,
             lambda message: self._post(lambda: call(message)),
+            owner=self._owner,
         )
         self._closers.append(subscriber.close)
         return subscriber
@@ -129,6 +136,7 @@ class PluginRos:
             self._resolve(name),
             service_type,
             lambda request: wait_for(self._post(lambda: run(request))),
+            owner=self._owner,
         )
         self._closers.append(service.close)
         return service

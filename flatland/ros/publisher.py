@@ -32,6 +32,7 @@ class Publisher:
         queue_size: int = 1,
         latch: bool = False,
         on_connection: Callable[[bool], None] | None = None,
+        owner: str = "",
     ) -> None:
         """Advertises a topic, soon.
 
@@ -44,6 +45,7 @@ class Publisher:
             latch: Whether a new subscriber gets the last message at once.
             on_connection: Told whether anybody subscribes, whenever that may have changed; called
                 in a thread of rospy.
+            owner: Plugin that publishes, for messages.
 
         Raises:
             FlatlandError: This node publishes messages of another type on the topic.
@@ -55,6 +57,7 @@ class Publisher:
         self._queue_size = queue_size
         self._latch = latch
         self._on_connection = on_connection
+        self._owner = owner
         self._closed = False
         self._publisher: rospy.Publisher | None = None
         self._early_message: Any = None
@@ -62,7 +65,7 @@ class Publisher:
         self._early_lock = threading.Lock()
         self._update_lock = threading.Lock()
         self._listener = _Listener(self._update)
-        registrar.claim("publisher", self.topic, message_type)
+        registrar.claim("publisher", self.topic, message_type, owner)
         registrar.submit(self._open)
 
     def publish(self, message: Any) -> None:
@@ -90,7 +93,7 @@ class Publisher:
             return
         self._closed = True
         self._update()
-        self._registrar.release("publisher", self.topic)
+        self._registrar.release("publisher", self.topic, self._owner)
         self._registrar.submit(self._end)
 
     # -- in the registrar's thread ---------------------------------------------------------

@@ -10,7 +10,6 @@ from __future__ import annotations
 import logging
 import queue
 import threading
-from collections import Counter
 from collections.abc import Callable
 from typing import Any
 
@@ -30,7 +29,7 @@ class Registrar:
         self._closed = False
         self._lock = threading.Lock()
         self._types: dict[tuple[str, str], type[Any]] = {}
-        self._users: Counter[tuple[str, str]] = Counter()
+        self._owners: dict[tuple[str, str], list[str]] = {}
         self._thread = threading.Thread(target=self._run, name="flatland-registrar", daemon=True)
         self._thread.start()
 
@@ -51,13 +50,16 @@ class Registrar:
         self.submit(done.set)
         return done.wait(timeout)
 
-    def claim(self, kind: str, name: str, ros_type: type[Any], *, shared: bool = True) -> None:
+    def claim(
+        self, kind: str, name: str, ros_type: type[Any], owner: str, *, shared: bool = True
+    ) -> None:
         """Reserves a name; rospy itself would mix up two types of one name.
 
         Args:
             kind: `publisher`, `subscriber` or `service`.
             name: Resolved name.
             ros_type: The message or service class.
+            owner: Plugin that uses the name, for messages; empty for the node itself.
             shared: Whether others of the same type may have it as well.
 
         Raises:
@@ -66,21 +68,24 @@ class Registrar:
         key = kind, name
         with self._lock:
             known = self._types.setdefault(key, ros_type)
+            owners = self._owners.setdefault(key, [])
+            used_by = f", used by {owners[0]}" if owners and owners[0] else ""
             if known is not ros_type:
                 raise FlatlandError(
-                    f'{kind} "{name}" has the type {known._type} already, not {ros_type._type}'
+                    f'{kind} "{name}" has the type {known._type} already{used_by}, '
+                    f"not {ros_type._type}"
                 )
-            if self._users[key] and not shared:
-                raise FlatlandError(f'{kind} "{name}" exists already')
-            self._users[key] += 1
+            if owners and not shared:
+                raise FlatlandError(f'{kind} "{name}" exists already{used_by}')
+            owners.append(owner)
 
-    def release(self, kind: str, name: str) -> None:
+    def release(self, kind: str, name: str, owner: str) -> None:
         """Gives back what `claim` reserved."""
         key = kind, name
         with self._lock:
-            self._users[key] -= 1
-            if not self._users[key]:
-                del self._users[key], self._types[key]
+            self._owners[key].remove(owner)
+            if not self._owners[key]:
+                del self._owners[key], self._types[key]
 
     def close(self, timeout: float) -> None:
         """Drops what is not done yet and ends; rospy unregisters all at once at shutdown.

@@ -24,6 +24,8 @@ class Service:
         name: str,
         service_type: type[Any],
         handler: Callable[[Any], Any],
+        *,
+        owner: str = "",
     ) -> None:
         """Offers a service, soon.
 
@@ -32,6 +34,7 @@ class Service:
             name: Under the node's namespace, global with a leading `/`.
             service_type: The ROS service class.
             handler: Called with each request, returns the response.
+            owner: Plugin that offers it, for messages.
 
         Raises:
             FlatlandError: This node has a service of that name.
@@ -40,9 +43,10 @@ class Service:
         self._registrar = registrar
         self._service_type = service_type
         self._handler = handler
+        self._owner = owner
         self._closed = False
         self._service: rospy.Service | None = None
-        registrar.claim("service", self.name, service_type, shared=False)
+        registrar.claim("service", self.name, service_type, owner, shared=False)
         registrar.submit(self._open)
 
     def close(self) -> None:
@@ -50,7 +54,7 @@ class Service:
         if self._closed:
             return
         self._closed = True
-        self._registrar.release("service", self.name)
+        self._registrar.release("service", self.name, self._owner)
         self._registrar.submit(self._end)
 
     def _open(self) -> None:

@@ -23,6 +23,8 @@ class Subscriber:
         topic: str,
         message_type: type[Any],
         callback: Callable[[Any], object],
+        *,
+        owner: str = "",
     ) -> None:
         """Subscribes to a topic, soon.
 
@@ -31,6 +33,7 @@ class Subscriber:
             topic: Under the node's namespace, global with a leading `/`.
             message_type: The ROS message class.
             callback: Called with each message.
+            owner: Plugin that subscribes, for messages.
 
         Raises:
             FlatlandError: This node takes messages of another type from the topic.
@@ -39,9 +42,10 @@ class Subscriber:
         self._registrar = registrar
         self._message_type = message_type
         self._callback = callback
+        self._owner = owner
         self._closed = False
         self._subscriber: rospy.Subscriber | None = None
-        registrar.claim("subscriber", self.topic, message_type)
+        registrar.claim("subscriber", self.topic, message_type, owner)
         registrar.submit(self._open)
 
     def close(self) -> None:
@@ -49,7 +53,7 @@ class Subscriber:
         if self._closed:
             return
         self._closed = True
-        self._registrar.release("subscriber", self.topic)
+        self._registrar.release("subscriber", self.topic, self._owner)
         self._registrar.submit(self._end)
 
     def _receive(self, message: Any) -> None:

@@ -46,8 +46,8 @@ def read_image_map(path: str) -> ImageMap:
         FlatlandError: The file or the image cannot be read, or a key is missing or wrong.
     """
     reader = YamlReader.from_file(path)
-    if "type" in reader:
-        raise reader.subnode("type").error("The map must be an image map, which has no type")
+    if reader.get("type", "string", None) == "line_segments":
+        raise reader.subnode("type").error("The map must be an image map, not line segments")
     image_path = reader.resolve_path(reader.get("image", "string"))
     resolution = reader.get("resolution", "float")
     origin = reader.get("origin", "pose")

@@ -26,7 +26,7 @@ GROUP = """
 GLOBAL = """
 bodies: [{name: base, footprints: [{type: circle, radius: 0.2, density: 1}]}]
 plugins:
-  - {type: DiffDrive, name: drive, body: base, odom_pub: /odom, twist_sub: nested/cmd_vel}
+  - {type: DiffDrive, name: drive, body: base, odom_pub: /odom, twist_sub: nested//cmd_vel/}
 """
 
 
@@ -36,7 +36,7 @@ def test_node_in_a_group(
     world = write_world(
         """
   - {name: robot, model: robot.model.yaml, pose: ['$eval param("start_x")', 0, 0]}
-  - {name: spaced, model: robot.model.yaml, namespace: r1}
+  - {name: spaced, model: robot.model.yaml, namespace: r1//}
   - {name: rooted, model: global.model.yaml, namespace: /r2}
 """,
         **{"global": GLOBAL},
@@ -78,7 +78,7 @@ def test_node_in_a_group(
     assert truth.pose.pose.position.x == pytest.approx(2.5, abs=1e-4)
 
 
-@pytest.mark.parametrize("namespace", ["my robot", "1robot", "robot-1", "ro//bot", "~robot"])
+@pytest.mark.parametrize("namespace", ["my robot", "1robot", "robot-1", "ro//bot-1", "~robot"])
 def test_world_with_an_illegal_namespace_does_not_start(
     launcher: Any, write_world: Callable[..., Path], namespace: str
 ) -> None:

@@ -88,6 +88,11 @@ class WrongType(flatland.ModelPlugin):
         self.ros.advertise("/clock", String)
 
 
+class OtherType(flatland.ModelPlugin):
+    def on_initialize(self, config):
+        self.ros.advertise("/temperature/", String)
+
+
 class WrongName(flatland.ModelPlugin):
     def on_initialize(self, config):
         self.ros.subscribe("no name", String, print)
@@ -108,7 +113,16 @@ class TakenService(flatland.ModelPlugin):
     def on_initialize(self, config):
         self.ros.advertise_service("/spawn_model", Trigger, print)
 """
-NAMES = ("Talker", "Stove", "NeedsParam", "WrongType", "WrongName", "Faulty", "TakenService")
+NAMES = (
+    "Talker",
+    "Stove",
+    "NeedsParam",
+    "WrongType",
+    "OtherType",
+    "WrongName",
+    "Faulty",
+    "TakenService",
+)
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -206,6 +220,11 @@ def test_output_without_an_adapter_is_warned_of(ros: Any, server: Any) -> None:
     [
         ("NeedsParam", 'ROS parameter "/m/not_there" is not set'),
         ("WrongType", 'publisher "/clock" has the type rosgraph_msgs/Clock already'),
+        (
+            "OtherType",
+            'publisher "/temperature" has the type std_msgs/Float32 already, used by Model Plugin '
+            '"p" type "test::Stove" model "first", not std_msgs/String',
+        ),
         ("WrongName", '"no name" is not a legal topic name'),
         ("TakenService", 'service "/spawn_model" has the type flatland/SpawnModel already'),
     ],
@@ -223,7 +242,8 @@ def test_second_model_may_not_take_a_service(ros: Any, talker: None) -> None:
     del talker
     answer = ros.spawn("Talker.model.yaml", "second", "t2")
     assert answer.success is False
-    assert 'service "/fail" exists already' in answer.message
+    first = 'Model Plugin "p" type "test::Talker" model "talker"'
+    assert f'service "/fail" exists already, used by {first}' in answer.message
     assert "/t2/touch" not in ros.registered()["services"]
 
 

@@ -104,7 +104,7 @@ def test_spawn_takes_an_absolute_path(ros: Any, world: Path) -> None:
         ("/dev/zero", "m", "", (0, 0, 0), "it is not a regular file"),
         ("x" * 100_000, "m", "", (0, 0, 0), "File name too long"),
         ("a\0b", "m", "", (0, 0, 0), "Flatland YAML: File does not exist"),
-        ("ball.model.yaml", "m", "a" + "/" * 9, (0, 0, 0), "not a legal ROS name"),
+        ("ball.model.yaml", "m", "a-" + "/" * 9, (0, 0, 0), "not a legal ROS name"),
     ],
 )
 def test_refused_spawn_says_why_and_leaves_nothing(

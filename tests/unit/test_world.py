@@ -270,7 +270,7 @@ def test_unknown_names(files):
         ("", "m", "", "the path must not be empty"),
         ("minimal.model.yaml", "m", "my robot", 'namespace "my robot" is not a legal ROS name'),
         ("minimal.model.yaml", "m", "1st", "is not a legal ROS name"),
-        ("minimal.model.yaml", "m", "a//b", "is not a legal ROS name"),
+        ("minimal.model.yaml", "m", "a//b c", "is not a legal ROS name"),
         ("minimal.model.yaml", "there", "", 'Model with name "there" already exists'),
         ("nowhere.yaml", "m", "", 'File does not exist, path="'),
         (".", "m", "", "Flatland YAML: "),

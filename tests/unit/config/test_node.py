@@ -131,21 +131,98 @@ def test_a_text_without_documents(text: str) -> None:
         ("a:\n\t- 1\n", "line 2 col 1", "found character that cannot start any token"),
         ("%YAML 3.0\n---\na", "line 1 col 1", "found incompatible YAML document"),
         ("a: *b\n", "line 1 col 4", 'no anchor "b" before its alias'),
-        (
-            "a: 1\nb:\n  c: 1\n  d: 2\n  c: 3\n",
-            "line 5 col 3",
-            'duplicate key "c", first used in line 3',
-        ),
-        ("{a: 1, 'a': 2}", "line 1 col 8", 'duplicate key "a", first used in line 1'),
         ("? [a, b]\n: c\n", "line 1 col 3", "a key must be a scalar"),
         ("a: &x [1, *x]\n", "line 1 col 11", 'alias "x" stands inside its own anchor'),
         ("a: &x\n  b: {c: *x}\n", "line 2 col 10", 'alias "x" stands inside its own anchor'),
         ("a: 1\nb: '\x07'\n", "line 2 col 5", "character U+0007 is not allowed"),
         ("a: \ud800", "line 1 col 4", "character U+D800 is not allowed"),
+        ("é: 1\nb: 'ü\x07' # \x08\n", "line 2 col 6", "character U+0007 is not allowed"),
+        ("# \x07\n\x08: 1\n", "line 2 col 1", "character U+0008 is not allowed"),
+        ("a: [\ufffd, b\x07]\n", "line 1 col 9", "character U+0007 is not allowed"),
+        ("a: |\n  x\n\n  y\x07\n# \x08\n", "line 4 col 4", "character U+0007 is not allowed"),
+        ("a: 1\n\t\nb: [\n", "line 4 col 1", "did not find expected node content"),
+        ("-\tb\n", "line 1 col 2", "found character that cannot start any token"),
     ],
 )
 def test_what_is_not_yaml_is_named_with_its_place(text: str, where: str, why: str) -> None:
     assert failure(text) == f'Flatland YAML: Malformatted file, path="w.yaml", {where}, {why}'
+
+
+@pytest.mark.parametrize(
+    ("text", "lines"),
+    [
+        ("a: 1\nb:\n  c: 1\n  d: 2\n  c: {e: 3, e: 4}\n", [("e", 5, 5), ("c", 3, 5)]),
+        ("{a: 1,\n 'a': 2,\n \"a\": 3}", [("a", 1, 2), ("a", 1, 3)]),
+        ("a: &x 1\nb: 2\n*x : 3\n1: 4\n", [("1", 3, 4)]),
+        ("a: &x {<<: 1}\nb: {<<: 2, <<: *x}\n", [("<<", 2, 2)]),
+    ],
+)
+def test_the_first_of_duplicate_keys_counts(
+    text: str, lines: list[tuple[str, int, int]], caplog: pytest.LogCaptureFixture
+) -> None:
+    parse(text)
+    assert {record.levelname for record in caplog.records} == {"WARNING"}
+    messages = [record.getMessage() for record in caplog.records]
+    assert sorted(messages) == sorted(
+        f'Duplicate key "{key}" is ignored, its first value in line {first} counts [w.yaml:{line}]'
+        for key, first, line in lines
+    )
+
+
+def test_anchors_in_the_value_of_a_duplicate_key_count() -> None:
+    root = parse_map("a: 1\na: &x {b: 2}\nc: *x\n")
+    first, alias = root.entries["a"], root.entries["c"]
+    assert isinstance(first, ScalarNode)
+    assert first.text == "1"
+    assert isinstance(alias, MapNode)
+    assert (root.key_lines["a"], list(alias.entries)) == (1, ["b"])
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "a: 1\n\t\nb: 2\n",
+        "a: 1\n \t \n\t\t\nb: 2\n\t",
+        "a: 1\n\t# comment\nb: 2\n",
+        "a: 1\t# comment\nb: 2\t\n",
+        "a: 1\r\n \t# comment\r\n\t\r\nb: 2\r\n",
+        "\t\n\t# comment\n---\t# comment\na: 1\nb: 2\n",
+        "{a: 1,\n\t\n\tb: 2}\t# comment\n",
+    ],
+)
+def test_tabs_in_blank_lines_and_before_comments(text: str) -> None:
+    entries = parse_map(text).entries.values()
+    assert [node.text for node in entries if isinstance(node, ScalarNode)] == ["1", "2"]
+
+
+@pytest.mark.parametrize(
+    "text", ["a:\n-\t# comment\n  1\n- 2\n", "a: \t# one\n  \t#\n-\t\n  \t\n  1\n- 2\n"]
+)
+def test_tabs_behind_the_dash_of_an_item(text: str) -> None:
+    items = parse_map(text).entries["a"]
+    assert isinstance(items, ListNode)
+    assert [node.text for node in items.items if isinstance(node, ScalarNode)] == ["1", "2"]
+
+
+def test_tabs_in_text_stay() -> None:
+    root = parse_map('a: |\n  x\n  \t# y\n  \t\n  z\nb: "1\t# 2"\n')
+    first, second = root.entries.values()
+    assert isinstance(first, ScalarNode)
+    assert isinstance(second, ScalarNode)
+    assert (first.text, second.text) == ("x\n\t# y\n\t\nz\n", "1\t# 2")
+
+
+def test_blank_lines_with_tabs_do_not_move_places() -> None:
+    root = parse_map("a: 1\n\t\n\t# c\nb:\n  \t\n  c: 2\n")
+    inner = root.entries["b"]
+    assert isinstance(inner, MapNode)
+    assert (root.key_lines, inner.key_lines) == ({"a": 1, "b": 4}, {"c": 6})
+
+
+@pytest.mark.parametrize("line", ["\t" * 1_000_000 + "x", "-\t" * 500_000, " -" * 500_000 + "\t#"])
+def test_long_lines_of_white_space_are_read_in_linear_time(line: str) -> None:
+    # Anything worse runs into the time limit of the suite.
+    assert "Malformatted" in failure(f"a:\n{line}\n")
 
 
 @pytest.mark.parametrize("opening", ["[", "- ", "? ", "{a: "])
@@ -227,6 +304,26 @@ def test_a_file_that_is_no_text(tmp_path: Path) -> None:
     )
     file.write_bytes(b"\xff\xfea")
     assert "byte 0x61 is not UTF-16 text" in file_failure(file)
+
+
+def test_bytes_that_are_not_utf8_in_comments(tmp_path: Path) -> None:
+    file = tmp_path / "w.yaml"
+    file.write_bytes(
+        b"# caf\xe9 \x80\na: Gr\xc3\xb6\xc3\x9fe # \xff\r\nb: |  # \xfc\n  one\n  two\n# \xe4\n"
+    )
+    (root,) = load_documents(str(file))
+    assert isinstance(root, MapNode)
+    assert [node.text for node in root.entries.values() if isinstance(node, ScalarNode)] == [
+        "Größe",
+        "one\ntwo\n",
+    ]
+    for line, col, value in (
+        (2, 5, b"a: b\xe4c # \xff\n"),
+        (4, 3, b"a: '\n\n  \xe4'\n"),
+        (2, 1, b"\xe4: 1\n"),
+    ):
+        file.write_bytes(b"# \xff\n" + value)
+        assert file_failure(file).endswith(f"line {line} col {col}, byte 0xe4 is not UTF-8 text")
 
 
 def test_a_file_that_is_not_there(tmp_path: Path) -> None:

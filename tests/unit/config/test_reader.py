@@ -310,11 +310,14 @@ def test_not_yaml(file: Path) -> None:
     )
 
 
-def test_duplicate_keys(file: Path) -> None:
-    assert failure(read_file, file, "a: 1\nb: 2\na: 3\n") == (
-        f'Flatland YAML: Malformatted file, path="{file}", line 3 col 1, '
-        'duplicate key "a", first used in line 1'
-    )
+def test_duplicate_keys(file: Path, caplog: pytest.LogCaptureFixture) -> None:
+    reader = read_file(file, "a: 1\nb: 2\na: 3\n")
+    assert reader.get("a", "int") == 1
+    reader.get("b", "int")
+    reader.ensure_accessed_all()
+    assert [record.getMessage() for record in caplog.records] == [
+        f'Duplicate key "a" is ignored, its first value in line 1 counts [{file}:3]'
+    ]
 
 
 # How readers open each other.

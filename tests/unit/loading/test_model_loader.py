@@ -222,9 +222,22 @@ ERRORS = {
         joint(f"type: weld, {ENDS}, frequency: -1"),
         'Invalid "frequency" in model "robot" joint "J", must be finite and not negative, got -1.0',
     ),
-    "unknown end key": (
-        joint("type: weld, bodies: [{name: base, anchor: [0, 0], x: 1}, {name: wheel}]"),
-        'Entry index=0 contains unrecognized entry(s) {"x"} (in model "robot" joint "j" "bodies")',
+    "anchor of one number": (
+        joint("type: weld, bodies: [{name: base, anchor: [0, 0]}, {name: wheel, anchor: [0]}]"),
+        'Entry "anchor" must have size of exactly 2 (in model "robot" joint "j" "bodies" index=1)',
+    ),
+    "anchor of three numbers": (
+        joint(f"type: revolute, {ENDS.replace('[0, 0]', '[0, 0, 0]', 1)}"),
+        'Entry "anchor" must have size of exactly 2 (in model "robot" joint "j" "bodies" index=0)',
+    ),
+    "anchor no list": (
+        joint(f"type: weld, {ENDS.replace('[0, 0]', '0', 1)}"),
+        'Entry "anchor" must be a list (in model "robot" joint "j" "bodies" index=0)',
+    ),
+    "anchor of text": (
+        joint(f"type: weld, {ENDS.replace('[0, 0]', '[0, left]', 1)}"),
+        "Error converting entry index=1 to float "
+        '(in model "robot" joint "j" "bodies" index=0 "anchor")',
     ),
     "joint to a disabled body": (
         f"bodies: [{BODY}, {{name: wheel, footprints: [], enabled: false}}]\n"
@@ -345,6 +358,12 @@ joints:
     assert (rigid.collide_connected, rigid.color) == (False, (1, 1, 1, 0.5))
 
 
+def test_the_bodies_of_a_joint_may_have_further_keys(files):
+    end = "bodies: [{name: base, anchor: [0, 0], side: left}, {name: wheel, anchor: [0, 0], n: []}]"
+    world = files.load_model(joint(f"type: weld, {end}"))
+    assert [body.name for body in world.model("robot").joint("J").bodies] == ["base", "wheel"]
+
+
 def test_disabled_entries_are_skipped_and_logged(files, caplog):
     caplog.set_level(logging.INFO, "flatland")
     world = files.load_model(
@@ -373,7 +392,13 @@ def test_look_ups_name_what_is_missing(files):
 
 @pytest.mark.parametrize(
     ("namespace", "frame", "expected"),
-    [("", "base", "base"), ("r1", "base", "r1_base"), ("r1", "/map", "map"), ("", "/map", "map")],
+    [
+        ("", "base", "base"),
+        ("r1", "base", "r1_base"),
+        ("r1", "/map", "map"),
+        ("", "/map", "map"),
+        ("/a//b/", "base", "a/b_base"),
+    ],
 )
 def test_frames_take_the_namespace(files, namespace, frame, expected):
     files.write("robot.model.yaml", body())

@@ -63,7 +63,7 @@ ERRORS = {
     ),
     "layer color": (
         "{properties: {}, layers: [{name: L, color: [1, 1]}]}",
-        'Entry "color" must have size of exactly 4 (in layer "l")',
+        'Entry "color" must have size of exactly 4 (in "layers" index=0)',
     ),
     "layer color nan": (
         "{properties: {}, layers: [{name: L, color: [1, .nan, 1, 1]}]}",
@@ -71,7 +71,19 @@ ERRORS = {
     ),
     "unknown layer key": (
         "{properties: {}, layers: [{name: L, colour: red}]}",
-        'Entry contains unrecognized entry(s) {"colour"} (in layer "l")',
+        'Entry index=0 contains unrecognized entry(s) {"colour"} (in "layers")',
+    ),
+    "second layer": (
+        "{properties: {}, layers: [{name: L}, {name: [K, J], color: red}]}",
+        'Entry "color" must be a list (in "layers" index=1)',
+    ),
+    "layer no map": (
+        "{properties: {}, layers: [2d]}",
+        'Entry index=0 must be a map (in "layers")',
+    ),
+    "layer properties": (
+        "{properties: {}, layers: [{name: L, properties: []}]}",
+        'Entry "properties" must be a map (in "layers" index=0)',
     ),
     "map not there": (
         "{properties: {}, layers: [{name: L, map: nowhere.yaml}]}",
@@ -274,9 +286,22 @@ def test_layers(files):
     assert aliases.category_bits == 0b110
     assert {fixture.category_bits for fixture in walls.body.fixtures} == {1}
     assert {fixture.mask_bits for fixture in walls.body.fixtures} == {1}
+    assert walls.unknown_map_keys == aliases.unknown_map_keys == ()
     assert world.layer("b") is aliases
     with pytest.raises(flatland.WorldError, match='layer with name "x" does not exist'):
         world.layer("x")
+
+
+def test_walls_have_the_friction_of_box2d(files):
+    files.write_map("image", ["   ", " # ", "   "])
+    files.write("lines.dat", "0 0 4 0")
+    files.write("lines.yaml", "{type: line_segments, data: lines.dat, scale: 1, origin: [0, 0, 0]}")
+    world = files.load(
+        "{properties: {}, layers: [{name: a, map: image.yaml}, {name: b, map: lines.yaml}]}"
+    )
+    for layer in world.layers:
+        materials = {(wall.friction, wall.restitution) for wall in layer.body.fixtures}
+        assert materials == {(float(np.float32(0.2)), 0.0)}, layer.name
 
 
 def test_sixteen_layers_fit(files):

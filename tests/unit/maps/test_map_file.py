@@ -181,19 +181,18 @@ def test_missing_key_of_line_segments(write: Write, key: str) -> None:
 
 
 @pytest.mark.parametrize("text", [IMAGE_MAP, LINE_MAP])
-def test_unknown_key(write: Write, text: str) -> None:
-    path = write(text + "zoom: 2\nbright: 1\n")
-    fails(
-        path,
-        YamlError,
-        'Entry contains unrecognized entry(s) {"bright", "zoom"} (in layer "walls")'
-        + place(path, 5),
-    )
-
-
-def test_an_image_key_is_unknown_to_line_segments(write: Write) -> None:
-    with pytest.raises(YamlError, match=r'unrecognized entry\(s\) {"resolution"}'):
-        load_map(write(LINE_MAP + "resolution: 0.05\n"), "Walls")
+def test_unknown_keys_are_allowed_and_named(
+    write: Write, caplog: pytest.LogCaptureFixture, text: str
+) -> None:
+    caplog.set_level(logging.INFO)
+    path = write(text + "zoom: 2\nbright: [1, {a: b}]\nnegate: 0\n")
+    layer_map = load_map(path, "Walls")
+    np.testing.assert_array_equal(layer_map.edges, load_map(write(text), "Walls").edges)
+    # What map_server reads is known, but not to a map of line segments.
+    unknown = ("bright", "negate", "zoom") if text == LINE_MAP else ("bright", "zoom")
+    assert layer_map.unknown_keys == unknown
+    message = f'Layer "Walls": flatland does not use the keys {{{", ".join(unknown)}}} of {path}'
+    assert caplog.text.count(message) == 1
 
 
 def test_origin_of_another_size(write: Write) -> None:
@@ -248,10 +247,17 @@ def test_a_negative_scale_mirrors(write: Write) -> None:
     np.testing.assert_allclose(edges, [[0, 0, -1, 0], [-1, 0, -1.05, -2.025]], atol=1e-7)
 
 
-def test_unknown_type(write: Write) -> None:
-    path = write(LINE_MAP.replace("line_segments", "spline"))
-    text = 'Invalid "type" in layer "Walls", must be line_segments or be left out (image)'
-    fails(path, YamlError, text + place(path, 1))
+@pytest.mark.parametrize("map_type", ["indoor", "outdoor", "Line_Segments", '""', "", "3"])
+def test_any_other_type_is_an_image(write: Write, map_type: str) -> None:
+    layer_map = load_map(write(f"{IMAGE_MAP}type: {map_type}\n"), "Walls")
+    np.testing.assert_array_equal(layer_map.edges, load_map(write(IMAGE_MAP), "Walls").edges)
+    assert layer_map.unknown_keys == ()
+
+
+def test_a_type_is_text(write: Write) -> None:
+    path = write(IMAGE_MAP + "type: [indoor]\n")
+    text = 'Error converting entry "type" to string (in layer "walls")'
+    fails(path, YamlError, text + place(path, 5))
 
 
 @pytest.mark.parametrize("image", ["random_path/map.png", "lines.dat", "."])

@@ -5,7 +5,8 @@ from __future__ import annotations
 import pytest
 
 from flatland import FlatlandError, Twist, WorldError
-from flatland.plugin_api.ports import PortRegistry, is_legal_namespace, resolve_topic
+from flatland.graph_names import is_legal_namespace, resolve_topic
+from flatland.plugin_api.port_registry import PortRegistry
 
 
 @pytest.mark.parametrize(
@@ -17,15 +18,18 @@ from flatland.plugin_api.ports import PortRegistry, is_legal_namespace, resolve_
         ("scan", "/r1", "/r1/scan"),
         ("/scan", "r1", "/scan"),
         ("a/2d", "r1/b", "r1/b/a/2d"),
+        ("cmd_vel/", "", "cmd_vel"),
+        ("a//b", "r1", "r1/a/b"),
+        ("//a///b//", "r1", "/a/b"),
+        ("a", "//r1///b//", "/r1/b/a"),
+        ("a", "/", "a"),
     ],
 )
 def test_topics_take_the_namespace(topic, namespace, expected):
     assert resolve_topic(topic, namespace) == expected
 
 
-@pytest.mark.parametrize(
-    "topic", ["", "my robot", "1st", "a-b", "a//b", "a/", "/", "~x", "é", "_a"]
-)
+@pytest.mark.parametrize("topic", ["", "my robot", "1st", "a-b", "/", "//", "~x", "é", "_a", "a /"])
 def test_illegal_topics(topic):
     with pytest.raises(ValueError, match="is not a legal topic name"):
         resolve_topic(topic)
@@ -34,7 +38,7 @@ def test_illegal_topics(topic):
 @pytest.mark.parametrize(
     ("namespace", "legal"),
     [("", True), ("/", True), ("r1", True), ("/r1/", True), ("a/b_2", True), ("a b", False),
-     ("a-b", False), ("2", False), ("a//b", False), ("//", False)],
+     ("a-b", False), ("2", False), ("a//b", True), ("//", True), ("a//b c/", False)],
 )  # fmt: skip
 def test_namespaces(namespace, legal):
     assert is_legal_namespace(namespace) is legal
@@ -90,6 +94,28 @@ def test_a_topic_has_one_type():
         ports.open_output("x", float)
     with pytest.raises(FlatlandError, match='topic "/c" carries int already, not bool'):
         ports.open_command("c", bool, False)
+
+
+def test_a_type_conflict_names_an_owner_that_is_left():
+    ports = PortRegistry()
+    output = ports.open_output("x", int, "first")
+    assert ports.open_output("x", int, "second") is output
+    ports.close_output(output, "first")
+    with pytest.raises(FlatlandError, match='"/x" carries int already, used by second, not float'):
+        ports.open_output("x", float, "third")
+    command = ports.open_command("c", int, 0, owner="fourth")
+    ports.open_command("c", int, 0, owner="fifth")
+    ports.close_command(command)
+    with pytest.raises(FlatlandError, match='"/c" carries int already, used by fifth, not bool'):
+        ports.open_command("c", bool, False)
+
+
+def test_topics_are_found_by_any_spelling():
+    ports = PortRegistry()
+    output = ports.open_output("r1/a/b", int)
+    assert ports.find_output("/r1//a/b/") is output
+    ports.open_command("r1/c", int, 0)
+    assert ports.find_command("r1/c/").topic == "/r1/c"
 
 
 def test_commands_of_one_topic_are_set_together():

@@ -127,7 +127,9 @@ def test_start_pose_counts_not_where_the_first_body_is(plugin_world: Any, files:
     assert ((0.0, 1.0), (4.0, 1.0)) in edge_set(world.layer("2d").edges)
 
 
-def test_new_walls_have_the_bits_of_the_layer(plugin_world: Any, files: Any) -> None:
+def test_new_walls_have_the_friction_of_the_layer_and_its_bits(
+    plugin_world: Any, files: Any
+) -> None:
     world = plugin_world(
         pose=(2, 3, 0), layers=lines(files, "0 0 4 0"), world_plugins=wall("num_of_walls: 1")
     )
@@ -135,6 +137,7 @@ def test_new_walls_have_the_bits_of_the_layer(plugin_world: Any, files: Any) -> 
     assert layer.category_bits == 0b11
     assert len(layer.body.fixtures) == 4
     assert {(f.category_bits, f.mask_bits) for f in layer.body.fixtures} == {(0b11, 0b11)}
+    assert {f.friction for f in layer.body.fixtures} == {float(np.float32(0.2))}
     assert world.physics.ray_cast((2.0, 3.0), (2.0, 0.5), 0b10) is not None
     assert world.physics.ray_cast((2.0, 3.0), (2.0, 0.5), 0b100) is None
 

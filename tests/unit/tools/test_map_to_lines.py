@@ -93,6 +93,11 @@ def test_result_is_the_same_layer_within_a_pixel(image_map: Path, out: Path, det
     assert farthest(exact.edges.astype(float), lines.edges.astype(float)) <= 2 * pixel
 
 
+def test_an_image_may_have_any_other_type(image_map: Path, out: Path) -> None:
+    image_map.write_text(image_map.read_text() + "type: indoor\n")
+    assert main([str(image_map), str(out)]) == 0
+
+
 def test_threshold_decides(image_map: Path, out: Path) -> None:
     # At 0.9 the grey around the room is off as well, and only the inner side of the wall is left.
     image_map.write_text(image_map.read_text().replace("0.65", "0.9"))

@@ -1,0 +1,160 @@
+"""The ports of a world by topic."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, Protocol, TypeVar
+
+from flatland.errors import FlatlandError, WorldError
+from flatland.graph_names import global_name
+from flatland.plugin_api.ports import Command, CommandTopic, Output, SubscriberFault
+
+T = TypeVar("T")
+
+
+class PortObserver(Protocol):
+    """Receives notifications of ports; implemented by `flatland.runtime.observer.Observers`."""
+
+    def output_opened(self, output: Output[Any]) -> None:
+        """Called before an output is added; raising refuses it."""
+
+    def output_closed(self, output: Output[Any]) -> None:
+        """Called after an output has been removed."""
+
+    def command_opened(self, command: Command[Any]) -> None:
+        """Called before a command is added; raising refuses it."""
+
+    def command_closed(self, command: Command[Any]) -> None:
+        """Called after a command has been removed."""
+
+
+class PortRegistry:
+    """All open ports of a world by resolved topic."""
+
+    def __init__(self, observer: PortObserver, on_fault: SubscriberFault | None = None) -> None:
+        """Creates an empty registry.
+
+        Args:
+            observer: Notified when ports open and close.
+            on_fault: Called with what subscribers of outputs raise, see `Output`.
+        """
+        self._observer = observer
+        self._on_fault = on_fault
+        self._outputs: dict[str, Output[Any]] = {}
+        self._commands: dict[str, list[Command[Any]]] = {}
+
+    @property
+    def outputs(self) -> dict[str, Output[Any]]:
+        """All open outputs by resolved topic."""
+        return dict(self._outputs)
+
+    @property
+    def commands(self) -> dict[str, list[Command[Any]]]:
+        """All open commands by resolved topic."""
+        return {topic: list(commands) for topic, commands in self._commands.items()}
+
+    def open_output(self, name: str, value_type: type[T], owner: str = "") -> Output[T]:
+        """Opens an output; plugins that name the same topic share it.
+
+        Args:
+            name: Resolved topic.
+            value_type: Type of the values.
+            owner: Name of the plugin, for messages.
+
+        Raises:
+            FlatlandError: The topic already carries values of another type.
+        """
+        output = self._outputs.get(global_name(name))
+        if output is not None:
+            _check_type(output, output.owners[0], value_type)
+            output.owners.append(owner)
+            return output
+        output = Output(name, value_type, owner, self._on_fault)
+        self._observer.output_opened(output)
+        self._outputs[output.topic] = output
+        return output
+
+    def close_output(self, output: Output[Any], owner: str = "") -> None:
+        """Removes one owner of an output; without owners, the output closes."""
+        if output.closed:
+            return
+        output.owners.remove(owner)
+        if output.owners:
+            return
+        del self._outputs[output.topic]
+        output.closed = True
+        self._observer.output_closed(output)
+
+    def open_command(
+        self,
+        name: str,
+        value_type: type[T],
+        default: T,
+        accept: Callable[[T], bool] | None = None,
+        owner: str = "",
+    ) -> Command[T]:
+        """Opens a command; plugins that name the same topic have a command each.
+
+        Args:
+            name: Resolved topic.
+            value_type: Type of the values.
+            default: Value before the first one is received.
+            accept: Returns whether a value is valid.
+            owner: Name of the plugin, for messages.
+
+        Raises:
+            FlatlandError: The topic already carries values of another type.
+        """
+        command = Command(name, value_type, default, accept, owner)
+        others = self._commands.get(command.topic)
+        if others:
+            _check_type(others[0], others[0].owner, value_type)
+        self._observer.command_opened(command)
+        self._commands.setdefault(command.topic, []).append(command)
+        return command
+
+    def close_command(self, command: Command[Any]) -> None:
+        """Closes a command."""
+        if command.closed:
+            return
+        command.closed = True
+        commands = self._commands[command.topic]
+        commands[:] = [other for other in commands if other is not command]
+        if not commands:
+            del self._commands[command.topic]
+        self._observer.command_closed(command)
+
+    def find_output(self, topic: str) -> Output[Any]:
+        """Returns the output of a resolved topic.
+
+        Raises:
+            WorldError: It does not exist; the text lists the existing outputs.
+        """
+        try:
+            return self._outputs[global_name(topic)]
+        except KeyError:
+            raise WorldError(
+                f'no output "{topic}", there are: {", ".join(sorted(self._outputs)) or "none"}'
+            ) from None
+
+    def find_command(self, topic: str) -> CommandTopic[Any]:
+        """Returns all commands of a resolved topic as one.
+
+        Raises:
+            WorldError: None exists; the text lists the existing commands.
+        """
+        try:
+            return CommandTopic(self._commands[global_name(topic)])
+        except KeyError:
+            raise WorldError(
+                f'no command "{topic}", there are: {", ".join(sorted(self._commands)) or "none"}'
+            ) from None
+
+
+def _check_type(port: Output[Any] | Command[Any], owner: str, wanted: type[Any]) -> None:
+    if port.value_type is not wanted:
+        used_by = f", used by {owner}" if owner else ""
+        raise FlatlandError(
+            f'topic "{port.topic}" carries {port.value_type.__name__} already{used_by}, '
+            f"not {wanted.__name__}"
+        )
