@@ -7,19 +7,17 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-import numpy.typing as npt
 
 from flatland.config.reader import YamlReader
 from flatland.entities.body import Body, Color
 from flatland.entities.collision_filter import ALL_LAYERS, CollisionFilter
 from flatland.entities.model import Model
-from flatland.geometry import IDENTITY, rotate
+from flatland.geometry import IDENTITY, DoubleArray, rotate
 from flatland.loading.model_loader import ModelLoader
 from flatland.physics import PhysicsFixture, PhysicsWorld
 from flatland.world import World
 
 _CIRCLE_POINTS: Final = 32
-FloatArray = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -32,7 +30,7 @@ class Outline:
     """
 
     color: Color
-    segments: FloatArray
+    segments: DoubleArray
 
 
 class _AnyLayer(CollisionFilter):
@@ -77,17 +75,17 @@ def max_radius(outlines: Iterable[Outline]) -> float:
     return max((float(np.hypot(*each.segments.T).max()) for each in outlines), default=0.0)
 
 
-def _segments(body: Body) -> FloatArray:
+def _segments(body: Body) -> DoubleArray:
     """Returns the edges of all fixtures of a body in the model's frame [m], shape (2 n, 2)."""
     p_body = np.concatenate([_fixture_segments(fixture) for fixture in body.fixtures])
     x, y, theta = body.pose
     c, s = rotate((1.0, 0.0), theta)
-    p_model: FloatArray = p_body @ np.array([[c, s], [-s, c]])
+    p_model: DoubleArray = p_body @ np.array([[c, s], [-s, c]])
     p_model += np.array([x, y])
     return p_model
 
 
-def _fixture_segments(fixture: PhysicsFixture) -> FloatArray:
+def _fixture_segments(fixture: PhysicsFixture) -> DoubleArray:
     """Returns the edges of a circle or polygon in the body's frame [m], shape (2 n, 2)."""
     if fixture.shape == "circle":
         angles = np.linspace(0.0, 2 * np.pi, _CIRCLE_POINTS, endpoint=False)
@@ -95,5 +93,5 @@ def _fixture_segments(fixture: PhysicsFixture) -> FloatArray:
         points += fixture.center
     else:
         points = np.asarray(fixture.vertices, dtype=np.float64)
-    segments: FloatArray = np.stack([points, np.roll(points, -1, axis=0)], axis=1)
+    segments: DoubleArray = np.stack([points, np.roll(points, -1, axis=0)], axis=1)
     return segments.reshape(-1, 2)
