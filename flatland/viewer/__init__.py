@@ -1,5 +1,5 @@
-"""The viewer: a window that shows a running simulator and takes hold of it.
+"""The viewer: a window that displays a running simulator and controls it.
 
-PyQt5 makes the window, RViz's Python bindings the picture in it. All calls of ROS run in threads
-of their own, and what they find comes to the window as Qt signals.
+PyQt5 provides the window, RViz's Python bindings the 3-D view in it. All ROS calls run in
+background threads; their results reach the window as Qt signals.
 """

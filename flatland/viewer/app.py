@@ -1,4 +1,4 @@
-"""Starts the viewer: checks what it needs, makes the window, runs until it is closed."""
+"""Entry point of the viewer: checks the requirements, opens the window, runs the event loop."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from typing import Final
 
 _LOG = logging.getLogger("flatland")
 NODE_NAME: Final = "flatland_viz"
-SERVER_NAME: Final = "flatland_server"
+SIMULATOR_NODE_NAME: Final = "flatland_server"
 _USE_SIM_TIME: Final = "/use_sim_time"
 _STOP_SIGNALS: Final = (signal.SIGINT, signal.SIGTERM)
 
@@ -21,10 +21,10 @@ def main() -> int:
     """Runs the viewer.
 
     Returns:
-        The exit code: 0 after the window was closed or a stop was asked for, 1 when the viewer
-        cannot start, for a reason that the log tells.
+        The exit code: 0 after the window was closed or a stop signal was received, 1 if the
+        viewer cannot start. The reason is then in the log.
     """
-    # Told to stop while it starts, as when the simulator fails, it says nothing.
+    # Exit silently on a stop signal during start-up, for example when the simulator fails.
     for number in _STOP_SIGNALS:
         signal.signal(number, lambda *_: sys.exit(0))
     import rosgraph
@@ -36,45 +36,50 @@ def main() -> int:
         print(f"flatland_viz: {error} (from ROS_MASTER_URI)", file=sys.stderr)
         return 1
     if not online:
-        # rospy would wait for it, without a window and without a word.
+        # rospy.init_node would wait for the master without showing a window or a message.
         uri = rosgraph.get_master_uri()
         print(f"flatland_viz: no ROS master at {uri}: start the simulator first", file=sys.stderr)
         return 1
-    # Each viewer is a node of its own, unless it is given a name. The time comes from RViz.
+    # Anonymous, so that several viewers can run. RViz reads the simulated time, rospy does not.
     rospy.init_node(NODE_NAME, anonymous=True, disable_signals=True, disable_rostime=True)
     from flatland.ros.logs import log_to_ros
 
     log_to_ros()
-    reason = _why_not()
-    if reason:
-        _LOG.critical("the viewer cannot start: %s. The simulator runs on without it", reason)
+    error_text = _startup_error()
+    if error_text:
+        _LOG.critical("the viewer cannot start: %s. The simulator continues without it", error_text)
         rospy.signal_shutdown("the viewer cannot start")
         return 1
     if not rospy.has_param(_USE_SIM_TIME):
-        # RViz looks only once, now: server.launch may come later.
+        # RViz reads the parameter only once, at its start, and server.launch may run later.
         rospy.set_param(_USE_SIM_TIME, True)
-        _LOG.info("%s is set to true, as server.launch does", _USE_SIM_TIME)
+        _LOG.info("set %s to true, as server.launch does", _USE_SIM_TIME)
     return _run()
 
 
-def _why_not() -> str:
-    """Returns what keeps the viewer from starting, empty when nothing does."""
-    # RViz draws through X11, also where the desktop itself is another one.
+def _startup_error() -> str:
+    """Returns why the viewer cannot start, empty if it can."""
+    # RViz renders through X11, also on a Wayland desktop.
     os.environ.setdefault("QT_QPA_PLATFORM", "xcb")
-    reason = _why_no_display()
-    if reason:
-        return reason
+    error_text = _display_error()
+    if error_text:
+        return error_text
     try:
         importlib.import_module("PyQt5.QtWidgets")
-        # Not just rviz: a folder of that name is enough for that.
+        # Importing `rviz` is not sufficient: any folder of that name is a namespace package.
         importlib.import_module("rviz.librviz_sip")
     except ImportError as error:
-        return f"it needs PyQt5 and RViz's Python bindings (python3-pyqt5, python3-rviz): {error}"
+        return (
+            f"PyQt5 and RViz's Python bindings are required (python3-pyqt5, python3-rviz): {error}"
+        )
     return ""
 
 
-def _why_no_display() -> str:
-    """Tries the X server: Qt and RViz would abort the process without one, and without OpenGL."""
+def _display_error() -> str:
+    """Returns why the X display cannot be used, empty if it can.
+
+    Qt aborts the process if it cannot open the display, RViz if the display has no OpenGL.
+    """
     if os.environ["QT_QPA_PLATFORM"] != "xcb":
         return ""
     name = os.environ.get("DISPLAY", "")
@@ -83,16 +88,16 @@ def _why_no_display() -> str:
     try:
         x11 = ctypes.CDLL("libX11.so.6")
     except OSError as error:
-        return f"it needs an X11 client library: {error}"
+        return f"the X11 client library is required: {error}"
     x11.XOpenDisplay.restype = ctypes.c_void_p
     x11.XCloseDisplay.argtypes = [ctypes.c_void_p]
     display = x11.XOpenDisplay(None)
     if not display:
         return f"the display {name} cannot be opened"
-    numbers = (ctypes.byref(ctypes.c_int()) for _ in range(3))
-    draws = x11.XQueryExtension(ctypes.c_void_p(display), b"GLX", *numbers)
+    output_arguments = (ctypes.byref(ctypes.c_int()) for _ in range(3))
+    has_glx = x11.XQueryExtension(ctypes.c_void_p(display), b"GLX", *output_arguments)
     x11.XCloseDisplay(display)
-    return "" if draws else f"the display {name} has no OpenGL (its extension GLX)"
+    return "" if has_glx else f"the display {name} has no OpenGL (GLX extension)"
 
 
 def _run() -> int:
@@ -101,26 +106,27 @@ def _run() -> int:
     from PyQt5.QtWidgets import QApplication
 
     from flatland.viewer.ros_link import RosLink
-    from flatland.viewer.server import Server
+    from flatland.viewer.simulator_client import SimulatorClient
     from flatland.viewer.window import ViewerWindow
 
-    # RViz must not be left half made, and it brings signal handlers of its own.
+    # A signal must not interrupt the initialization of RViz, which installs its own handlers.
     signal.pthread_sigmask(signal.SIG_BLOCK, _STOP_SIGNALS)
     app = QApplication(["flatland"])
-    link = RosLink(Server(rospy.resolve_name(SERVER_NAME)))
+    link = RosLink(SimulatorClient(rospy.resolve_name(SIMULATOR_NODE_NAME)))
     window = ViewerWindow(link)
-    # The status line's clock wakes Python often enough for handlers to run.
+    # Python runs signal handlers between bytecodes: the timer of the status bar ensures that
+    # Python code runs regularly.
     for number in _STOP_SIGNALS:
         signal.signal(number, lambda *_: app.quit())
     rospy.on_shutdown(app.quit)
     window.show()
     link.start()
-    # Once the application runs: it does not hear of a stop before.
-    QTimer.singleShot(0, _take_signals)
+    # Unblock the signals inside the event loop: `quit` has no effect before it runs.
+    QTimer.singleShot(0, _unblock_stop_signals)
     app.exec_()
     link.close()
     return 0
 
 
-def _take_signals() -> None:
+def _unblock_stop_signals() -> None:
     signal.pthread_sigmask(signal.SIG_UNBLOCK, _STOP_SIGNALS)

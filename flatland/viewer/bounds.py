@@ -1,4 +1,4 @@
-"""How far the markers of layers and models reach, so that the view can show all of them."""
+"""Bounding boxes of the markers of layers and models, used to fit the view to the world."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from flatland.geometry import rotate
 
 @dataclass(frozen=True, slots=True)
 class Bounds:
-    """A rectangle along the axes of the world frame [m]."""
+    """An axis-aligned rectangle in the world frame [m]."""
 
     x_min: float
     y_min: float
@@ -23,23 +23,23 @@ class Bounds:
 
     @property
     def center(self) -> tuple[float, float]:
-        """Its middle."""
+        """The center (x, y) [m]."""
         return ((self.x_min + self.x_max) / 2, (self.y_min + self.y_max) / 2)
 
     @property
     def size(self) -> tuple[float, float]:
-        """Its extent along x and y."""
+        """The extent along x and y [m]."""
         return (self.x_max - self.x_min, self.y_max - self.y_min)
 
-    def grown(self, margin: float) -> Bounds:
-        """Returns the rectangle with a margin around it [m]."""
+    def expanded(self, margin: float) -> Bounds:
+        """Returns the rectangle expanded by a margin [m] on each side."""
         return Bounds(
             self.x_min - margin, self.y_min - margin, self.x_max + margin, self.y_max + margin
         )
 
 
 def bounds_of(markers: Any) -> Bounds | None:
-    """Returns the rectangle around all that a MarkerArray shows, None when it has none."""
+    """Returns the bounding box of all points of a MarkerArray, None if it has no points."""
     parts = []
     for marker in markers.markers:
         if not marker.points:
@@ -50,13 +50,18 @@ def bounds_of(markers: Any) -> Bounds | None:
         x = marker.pose.position.x + c * points[:, 0] - s * points[:, 1]
         y = marker.pose.position.y + s * points[:, 0] + c * points[:, 1]
         part = Bounds(float(x.min()), float(y.min()), float(x.max()), float(y.max()))
-        # A circle is a sphere, of which the marker has the middle alone.
-        parts.append(part.grown(marker.scale.x / 2 if marker.type == marker.SPHERE_LIST else 0.0))
+        # A circle is published as a sphere: one point at its center, with the diameter as scale.
+        radius = marker.scale.x / 2 if marker.type == marker.SPHERE_LIST else 0.0
+        parts.append(part.expanded(radius))
     return union(parts) if parts else None
 
 
 def union(parts: Collection[Bounds]) -> Bounds:
-    """Returns the smallest rectangle around others, of which there must be one at least."""
+    """Returns the smallest rectangle that contains all given rectangles.
+
+    Raises:
+        ValueError: There are no rectangles.
+    """
     return Bounds(
         min(part.x_min for part in parts),
         min(part.y_min for part in parts),

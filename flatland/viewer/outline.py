@@ -1,4 +1,4 @@
-"""The outline of a model, read from its file before it is spawned."""
+"""Outlines of models, read from the model file before the model is spawned."""
 
 from __future__ import annotations
 
@@ -7,19 +7,17 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-import numpy.typing as npt
 
 from flatland.config.reader import YamlReader
 from flatland.entities.body import Body, Color
 from flatland.entities.collision_filter import ALL_LAYERS, CollisionFilter
 from flatland.entities.model import Model
-from flatland.geometry import IDENTITY, rotate
+from flatland.geometry import IDENTITY, DoubleArray, rotate
 from flatland.loading.model_loader import ModelLoader
 from flatland.physics import PhysicsFixture, PhysicsWorld
 from flatland.world import World
 
 _CIRCLE_POINTS: Final = 32
-FloatArray = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -27,16 +25,16 @@ class Outline:
     """The edges of one body.
 
     Attributes:
-        color: (r, g, b, a) of the body.
+        color: Color of the body as (r, g, b, a), each in [0, 1].
         segments: Start and end of each edge in the model's frame [m], shape (2 n, 2).
     """
 
     color: Color
-    segments: FloatArray
+    segments: DoubleArray
 
 
 class _AnyLayer(CollisionFilter):
-    """Knows every layer: which ones there are is the simulator's affair."""
+    """Accepts every layer name: the layers of the simulator's world are not available here."""
 
     def unknown(self, _names: Iterable[str]) -> list[str]:
         return []
@@ -48,15 +46,18 @@ class _AnyLayer(CollisionFilter):
 def read_outline(
     path: str, params: Callable[[str], object] | None = None, *, name: str = "preview"
 ) -> list[Outline]:
-    """Reads the outlines of a model's bodies, its first body at the origin as when spawned there.
+    """Reads the outlines of the bodies of a model file, with the model at the origin.
 
     Args:
-        path: The model file.
-        params: What `param()` in the file answers from.
-        name: Of the model, for what is said of mistakes in the file.
+        path: Path of the model file.
+        params: Returns the value of `param(name)` in the file.
+        name: Name of the model in error messages.
+
+    Returns:
+        One outline for each body that has footprints.
 
     Raises:
-        YamlError: The file cannot be read, or its bodies or joints are wrong.
+        YamlError: The file cannot be read, or a body or joint in it is invalid.
     """
     with World(seed=0) as world:
         physics = PhysicsWorld()
@@ -69,27 +70,28 @@ def read_outline(
             physics.close()
 
 
-def reach(outlines: Iterable[Outline]) -> float:
-    """Returns the greatest distance of an outline from the model's origin [m]."""
+def max_radius(outlines: Iterable[Outline]) -> float:
+    """Returns the greatest distance of a vertex from the model's origin [m], 0 for no outlines."""
     return max((float(np.hypot(*each.segments.T).max()) for each in outlines), default=0.0)
 
 
-def _segments(body: Body) -> FloatArray:
-    local = np.concatenate([_closed_line(fixture) for fixture in body.fixtures])
+def _segments(body: Body) -> DoubleArray:
+    """Returns the edges of all fixtures of a body in the model's frame [m], shape (2 n, 2)."""
+    p_body = np.concatenate([_fixture_segments(fixture) for fixture in body.fixtures])
     x, y, theta = body.pose
     c, s = rotate((1.0, 0.0), theta)
-    turned: FloatArray = local @ np.array([[c, s], [-s, c]])
-    turned += np.array([x, y])
-    return turned
+    p_model: DoubleArray = p_body @ np.array([[c, s], [-s, c]])
+    p_model += np.array([x, y])
+    return p_model
 
 
-def _closed_line(fixture: PhysicsFixture) -> FloatArray:
-    """Returns the segments around a circle or polygon in the body's frame, shape (2 n, 2)."""
+def _fixture_segments(fixture: PhysicsFixture) -> DoubleArray:
+    """Returns the edges of a circle or polygon in the body's frame [m], shape (2 n, 2)."""
     if fixture.shape == "circle":
         angles = np.linspace(0.0, 2 * np.pi, _CIRCLE_POINTS, endpoint=False)
         points = fixture.radius * np.column_stack([np.cos(angles), np.sin(angles)])
         points += fixture.center
     else:
         points = np.asarray(fixture.vertices, dtype=np.float64)
-    segments: FloatArray = np.stack([points, np.roll(points, -1, axis=0)], axis=1)
+    segments: DoubleArray = np.stack([points, np.roll(points, -1, axis=0)], axis=1)
     return segments.reshape(-1, 2)

@@ -1,4 +1,4 @@
-"""What shows where a model will stand: its outline, and an arrow for its heading."""
+"""Markers that show a model while it is being placed: its outline and an arrow for its heading."""
 
 from __future__ import annotations
 
@@ -11,27 +11,28 @@ from std_msgs.msg import ColorRGBA
 from visualization_msgs.msg import Marker, MarkerArray
 
 from flatland import geometry
-from flatland.viewer.outline import Outline, reach
+from flatland.viewer.outline import Outline, max_radius
 
 _LINE_WIDTH: Final = 0.04  # m
-_ARROW_HEIGHT: Final = 0.3  # m above the floor: over everything that is drawn on it
+_OUTLINE_HEIGHT: Final = 0.1  # m
+_ARROW_HEIGHT: Final = 0.3  # m, above all other markers of the view from above
 _ARROW_COLOR: Final = (1.0, 0.85, 0.1, 1.0)
 
 
 def preview_markers(outlines: Sequence[Outline], frame: str) -> list[Any]:
-    """Makes the markers of a model at the origin; `at_pose` brings them to their place.
+    """Returns the markers of a model at the origin; `at_pose` moves them.
 
     Args:
-        outlines: Of the model's bodies.
-        frame: The world frame.
+        outlines: Outlines of the bodies of the model.
+        frame: Name of the world frame.
     """
     markers = []
     for number, outline in enumerate(outlines):
         marker = _marker(number, Marker.LINE_LIST, (*outline.color[:3], 1.0), frame)
         marker.scale.x = _LINE_WIDTH
-        marker.points = [Point(x, y, 0.1) for x, y in outline.segments.tolist()]
+        marker.points = [Point(x, y, _OUTLINE_HEIGHT) for x, y in outline.segments.tolist()]
         markers.append(marker)
-    length = max(1.0, 1.5 * reach(outlines))
+    length = max(1.0, 1.5 * max_radius(outlines))
     arrow = _marker(len(markers), Marker.ARROW, _ARROW_COLOR, frame)
     arrow.points = [Point(0, 0, _ARROW_HEIGHT), Point(length, 0, _ARROW_HEIGHT)]
     arrow.scale.x, arrow.scale.y, arrow.scale.z = 0.05 * length, 0.15 * length, 0.2 * length
@@ -39,7 +40,7 @@ def preview_markers(outlines: Sequence[Outline], frame: str) -> list[Any]:
 
 
 def at_pose(markers: Sequence[Any], pose: geometry.Pose) -> Any:
-    """Returns the markers as a MarkerArray at a pose in the world frame."""
+    """Sets the pose of the markers in the world frame and returns them as a MarkerArray."""
     x, y, theta = pose
     for marker in markers:
         marker.pose = Pose(
@@ -48,13 +49,13 @@ def at_pose(markers: Sequence[Any], pose: geometry.Pose) -> Any:
     return MarkerArray(list(markers))
 
 
-def no_markers() -> Any:
-    """Returns the MarkerArray that takes all others away."""
+def delete_all_markers() -> Any:
+    """Returns a MarkerArray that deletes all markers of the topic."""
     return MarkerArray([Marker(action=Marker.DELETEALL)])
 
 
 def _marker(number: int, kind: int, color: tuple[float, ...], frame: str) -> Any:
-    # Stamp 0: the latest transform will do, also while the simulated time stands still.
+    # The stamp 0 selects the latest transform, which also works while the simulation is paused.
     marker = Marker(ns="preview", id=number, type=kind, action=Marker.ADD)
     marker.header.frame_id = frame
     marker.color = ColorRGBA(*color)

@@ -1,7 +1,7 @@
-"""All that the viewer asks of ROS, in threads of its own; the answers come as Qt signals.
+"""ROS subscriptions and calls of the viewer, in background threads; results are Qt signals.
 
-The window's thread never waits for ROS: a simulator that hangs or is gone leaves the window
-alive.
+The window's thread never waits for ROS, so that the window stays responsive if the simulator
+hangs or ends.
 """
 
 from __future__ import annotations
@@ -18,60 +18,64 @@ from visualization_msgs.msg import MarkerArray
 
 from flatland.msg import DebugTopicList
 from flatland.viewer.bounds import bounds_of
-from flatland.viewer.server import Server, ServerState
+from flatland.viewer.simulator_client import SimulatorClient, SimulatorState
 
 _LOG = logging.getLogger("flatland")
-_PATIENCE: Final = 5.0  # s for a message that is there
-_LOOK_EVERY: Final = 1.0  # s between two looks at what the simulator has registered
+_MESSAGE_TIMEOUT: Final = 5.0  # s for the first message of a latched topic
+_STATE_POLL_PERIOD: Final = 1.0  # s
 
 
 class RosLink(QObject):
-    """The viewer's node.
+    """The viewer's ROS node.
 
-    Signals are emitted from any thread; slots of objects of the window's thread run there.
+    Signals are emitted from any thread; slots of objects that live in the window's thread run
+    in that thread.
 
     Attributes:
-        server: Names of the simulator's topics and services.
+        simulator: Names and state of the simulator.
     """
 
-    debug_topics = pyqtSignal(list)  # names of marker topics, all that there are now
+    debug_topics = pyqtSignal(list)  # all present names of marker topics
     layer_bounds = pyqtSignal(str, object)  # debug topic of a layer, its Bounds or None
     model_bounds = pyqtSignal(object)  # Bounds of all models or None
     paused = pyqtSignal(bool)
-    state = pyqtSignal(object)  # ServerState
-    _answered = pyqtSignal(object, object)  # function, its argument
+    state = pyqtSignal(object)  # SimulatorState
+    _callback_requested = pyqtSignal(object, object)  # function, its argument
 
-    def __init__(self, server: Server) -> None:
-        """Makes the link; `start` connects it."""
+    def __init__(self, simulator: SimulatorClient) -> None:
+        """Creates the link; `start` connects it."""
         super().__init__()
-        self.server = server
+        self.simulator = simulator
         self._closed = threading.Event()
-        self._measured: dict[str, Any] = {}  # subscribers by the topic of their layer
-        self._measured_lock = threading.Lock()
-        self._answered.connect(lambda function, argument: function(argument))
+        self._layer_subscribers: dict[str, Any] = {}  # by debug topic
+        self._layer_lock = threading.Lock()
+        self._callback_requested.connect(lambda function, argument: function(argument))
 
     def start(self) -> None:
-        """Connects to the simulator, now or when it comes."""
-        self.in_background(self._subscribe)
-        self.in_background(self._watch)
+        """Subscribes to the simulator's topics and starts polling its state.
+
+        The simulator need not be running yet.
+        """
+        self.run_in_background(self._subscribe)
+        self.run_in_background(self._poll_state)
 
     def close(self) -> None:
-        """Ends the threads that wait."""
+        """Stops polling; results that arrive later are discarded."""
         self._closed.set()
 
-    def in_background(
+    def run_in_background(
         self,
         work: Callable[[], Any],
         on_success: Callable[[Any], None] | None = None,
         on_failure: Callable[[str], None] | None = None,
     ) -> None:
-        """Runs something that takes time.
+        """Runs a function in a new thread.
 
         Args:
-            work: Run in a thread of its own.
-            on_success: Called with the result in the window's thread.
-            on_failure: Called with the error's text in the window's thread; without it the error
-                is logged.
+            work: The function to run.
+            on_success: Called with the result, in the window's thread.
+            on_failure: Called with the error message, in the window's thread. By default, errors
+                are logged.
         """
 
         def run() -> None:
@@ -81,12 +85,12 @@ class RosLink(QObject):
                 if self._closed.is_set() or rospy.is_shutdown():
                     return
                 if on_failure is None:
-                    _LOG.exception("the viewer failed to do something in the background")
+                    _LOG.exception("unexpected error in a background thread of the viewer")
                 else:
-                    self._answered.emit(on_failure, str(error))
+                    self._callback_requested.emit(on_failure, str(error))
             else:
                 if on_success is not None and not self._closed.is_set():
-                    self._answered.emit(on_success, result)
+                    self._callback_requested.emit(on_success, result)
 
         threading.Thread(target=run, daemon=True).start()
 
@@ -98,70 +102,75 @@ class RosLink(QObject):
         on_success: Callable[[Any], None],
         on_failure: Callable[[str], None],
     ) -> None:
-        """Calls a service of the simulator.
+        """Calls a service of the simulator in the background.
 
         Args:
-            name: Of the service, in the simulator's namespace.
+            name: Name of the service, relative to the simulator's namespace.
             service_type: The service class.
-            arguments: The request's fields.
+            arguments: Fields of the request.
             on_success: Called with the response.
-            on_failure: Called with the reason why there is none, or with the response's
-                `message` when its `success` is false.
+            on_failure: Called with the error message if the call fails, or with the `message` of
+                the response if its `success` is false.
         """
-        service = rospy.ServiceProxy(self.server.resolve(name), service_type)
+        service = rospy.ServiceProxy(self.simulator.resolve(name), service_type)
 
-        def answer(response: Any) -> None:
+        def handle_response(response: Any) -> None:
             if getattr(response, "success", True):
                 on_success(response)
             else:
                 on_failure(response.message)
 
-        self.in_background(lambda: service(*arguments), answer, on_failure)
+        self.run_in_background(lambda: service(*arguments), handle_response, on_failure)
 
     def parameter(self, name: str) -> object:
-        """Returns a parameter as the simulator's YAML files see it; not for the window's thread."""
-        return rospy.get_param(self.server.resolve(name), None)
+        """Returns a ROS parameter, resolved as `param()` in the simulator's YAML files resolves it.
 
-    def measure_models(self) -> None:
-        """Finds out how far the models reach now; the answer is `model_bounds`."""
-        topic = self.server.debug_topic("all_models")
-        self.in_background(
-            lambda: bounds_of(rospy.wait_for_message(topic, MarkerArray, _PATIENCE)),
+        Waits for the ROS master: not to be called in the window's thread.
+        """
+        return rospy.get_param(self.simulator.resolve(name), None)
+
+    def request_model_bounds(self) -> None:
+        """Computes the present bounds of all models in the background; emits `model_bounds`."""
+        topic = self.simulator.debug_topic("all_models")
+        self.run_in_background(
+            lambda: bounds_of(rospy.wait_for_message(topic, MarkerArray, _MESSAGE_TIMEOUT)),
             self.model_bounds.emit,
-            lambda _reason: None,  # The simulator has gone meanwhile.
+            lambda _reason: None,  # The simulator has ended in the meantime.
         )
 
     def _subscribe(self) -> None:
-        debug_topics = self.server.resolve("~debug/topics")
-        rospy.Subscriber(debug_topics, DebugTopicList, self._hear_topics)
-        rospy.Subscriber(self.server.resolve("~paused"), Bool, lambda m: self.paused.emit(m.data))
+        debug_topics = self.simulator.resolve("~debug/topics")
+        rospy.Subscriber(debug_topics, DebugTopicList, self._on_debug_topics)
+        rospy.Subscriber(
+            self.simulator.resolve("~paused"), Bool, lambda message: self.paused.emit(message.data)
+        )
 
-    def _hear_topics(self, message: Any) -> None:
+    def _on_debug_topics(self, message: Any) -> None:
         topics = set(message.topics)
         self.debug_topics.emit(list(message.topics))
-        # The walls in 3-D stand on the edges of the layer.
+        # The walls of a layer (`…_3d`) have the same bounds as its edges.
         walls = {f"{topic}_3d" for topic in topics}
         layers = {topic for topic in topics - walls if topic.startswith("layer/")}
-        with self._measured_lock:
-            for topic in self._measured.keys() - layers:
-                self.in_background(self._measured.pop(topic).unregister)
-            for topic in layers - self._measured.keys():
-                self._measured[topic] = self._measure(topic)
+        with self._layer_lock:
+            for topic in self._layer_subscribers.keys() - layers:
+                self.run_in_background(self._layer_subscribers.pop(topic).unregister)
+            for topic in layers - self._layer_subscribers.keys():
+                self._layer_subscribers[topic] = self._subscribe_to_layer(topic)
 
-    def _measure(self, topic: str) -> Any:
-        """Finds out how far a layer reaches, now and when it has changed."""
+    def _subscribe_to_layer(self, topic: str) -> Any:
+        """Subscribes to the markers of a layer, to emit `layer_bounds` whenever they change."""
 
-        def hear(message: Any) -> None:
+        def on_markers(message: Any) -> None:
             self.layer_bounds.emit(topic, bounds_of(message))
 
-        return rospy.Subscriber(self.server.debug_topic(topic), MarkerArray, hear)
+        return rospy.Subscriber(self.simulator.debug_topic(topic), MarkerArray, on_markers)
 
-    def _watch(self) -> None:
-        """Looks again and again at what the simulator has registered, which nobody tells."""
-        known: ServerState | None = None
+    def _poll_state(self) -> None:
+        """Emits `state` when it has changed; ROS has no notification for that."""
+        last_state: SimulatorState | None = None
         while not self._closed.is_set():
-            state = self.server.look()
-            if state != known:
-                known = state
+            state = self.simulator.query_state()
+            if state != last_state:
+                last_state = state
                 self.state.emit(state)
-            self._closed.wait(_LOOK_EVERY)
+            self._closed.wait(_STATE_POLL_PERIOD)

@@ -1,4 +1,4 @@
-"""A screen without a monitor, a viewer to ask, and pictures to look for colours in."""
+"""Fixtures: a virtual screen, a viewer whose widgets can be queried, and screenshots."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ def _load(path: Path) -> ModuleType:
 
 @pytest.fixture(scope="session")
 def screen(checkout: Path) -> Iterator[Any]:
-    """A virtual screen; skips the test where one cannot be had."""
+    """A virtual screen; skips the test if a required program or module is missing."""
     virtual_screen = _load(checkout / "tools" / "virtual_screen.py")
     missing = virtual_screen.missing_programs()
     if shutil.which("rviz") is None:
@@ -67,14 +67,14 @@ def screen(checkout: Path) -> Iterator[Any]:
 
 @pytest.fixture(scope="module")
 def drawing_launcher(module_launcher: Any, screen: Any) -> Any:
-    """Starts programs that draw on the screen and end with the last test of the file."""
+    """Starts programs on the virtual screen; they end with the last test of the file."""
     module_launcher.environment = {**module_launcher.environment, **screen.environment}
     return module_launcher
 
 
 @pytest.fixture
 def on_screen(launcher: Any, screen: Any) -> Any:
-    """Starts programs that draw on the screen and end with the test."""
+    """Starts programs on the virtual screen; they end with the test."""
     launcher.environment = {**launcher.environment, **screen.environment}
     return launcher
 
@@ -96,7 +96,7 @@ def room_server(drawing_launcher: Any, room: Path) -> Any:
 
 
 class Viewer:
-    """A running viewer, asked by lines and driven by mouse and keys."""
+    """A running viewer, inspected through a socket and controlled by mouse and keys."""
 
     def __init__(self, launcher: Any, screen: Any, folder: Path) -> None:
         script = Path(__file__).parent / "inspected_viewer.py"
@@ -111,11 +111,11 @@ class Viewer:
         connection.close()
 
     def close(self) -> None:
-        """Asks nothing more."""
+        """Closes the connection."""
         self._stream.close()
 
     def widgets(self, name: str) -> list[dict[str, Any]]:
-        """All widgets of a name or class that can be seen."""
+        """Returns the visible widgets with a name or a class."""
         print(name, file=self._stream, flush=True)
         return list(json.loads(self._stream.readline()))
 
@@ -145,7 +145,7 @@ class Viewer:
 
 @pytest.fixture
 def early_viewer(on_screen: Any, screen: Any, tmp_path: Path) -> Iterator[Viewer]:
-    """A viewer that nobody has started a simulator for, and which ends with the test."""
+    """A viewer without a simulator; it ends with the test."""
     viewer = Viewer(on_screen, screen, tmp_path)
     yield viewer
     viewer.close()
@@ -155,21 +155,21 @@ def early_viewer(on_screen: Any, screen: Any, tmp_path: Path) -> Iterator[Viewer
 def viewer(
     room_server: Any, drawing_launcher: Any, screen: Any, tmp_path_factory: pytest.TempPathFactory
 ) -> Iterator[Viewer]:
-    """A viewer of the room, which ends with the last test of the file."""
+    """A viewer of the room; it ends with the last test of the file."""
     viewer = Viewer(drawing_launcher, screen, tmp_path_factory.mktemp("socket"))
     yield viewer
     viewer.close()
 
 
 def _hue(colors: Any) -> tuple[Any, Any]:
-    """The hues of colours, and how much of them there is beside grey."""
+    """Returns the hue of each colour, and its strength relative to grey."""
     colored = colors - colors.min(axis=-1, keepdims=True).astype(float)
     strength = colored.max(axis=-1)
     return colored / np.maximum(strength, 1.0)[..., None], strength
 
 
 class Picture:
-    """What a screen shows, in metres: the walls of the room say where and how large it is."""
+    """A screenshot in the coordinates of the room [m], which it derives from the magenta walls."""
 
     def __init__(self, image: Any, area: Mapping[str, int] | None = None) -> None:
         left, top = (area["x"], area["y"]) if area else (0, 0)
@@ -177,34 +177,34 @@ class Picture:
         self.image = np.full_like(image, 0)
         self.image[top:bottom, left:right] = image[top:bottom, left:right]
         rows, columns = np.nonzero(self.mask(MAGENTA))
-        assert len(columns) > 50, "no room to be seen"
+        assert len(columns) > 50, "the walls of the room are not visible"
         left, right, top, bottom = columns.min(), columns.max(), rows.min(), rows.max()
         self.pixels_per_metre = (right - left) / 10.0
         self.center = ((left + right) / 2.0, (top + bottom) / 2.0)
         assert (bottom - top) / 10.0 == pytest.approx(self.pixels_per_metre, abs=0.2)
 
     def mask(self, color: tuple[int, int, int]) -> Any:
-        """Where the picture has the hue of a colour; thin lines mix with what is below."""
+        """Returns which pixels have the hue of a colour; thin lines blend with the background."""
         wanted, strength = _hue(np.array(color))
         found, strength = _hue(self.image)
         return (strength > _LEAST_STRENGTH) & (np.abs(found - wanted).max(axis=-1) < 0.15)
 
     def at(self, x: float, y: float) -> tuple[float, float]:
-        """The pixel of a place in the room [m]."""
+        """Returns the pixel (column, row) at a point of the room [m]."""
         return (
             self.center[0] + x * self.pixels_per_metre,
             self.center[1] - y * self.pixels_per_metre,
         )
 
     def places(self, color: tuple[int, int, int]) -> Any:
-        """Where in the room [m] a colour is, shape (n, 2)."""
+        """Returns the points of the room [m] that have a colour, shape (n, 2)."""
         rows, columns = np.nonzero(self.mask(color))
         x = (columns - self.center[0]) / self.pixels_per_metre
         y = (self.center[1] - rows) / self.pixels_per_metre
         return np.column_stack([x, y])
 
     def near(self, color: tuple[int, int, int], x: float, y: float, distance: float) -> Any:
-        """Where in the room [m] a colour is, near a place."""
+        """Returns the points of the room [m] that have a colour, within a distance of (x, y)."""
         places = self.places(color)
         return places[np.hypot(places[:, 0] - x, places[:, 1] - y) < distance]
 

@@ -1,8 +1,8 @@
-"""The viewer, with an ear for questions: which widgets there are, where, and what they say.
+"""The viewer with a socket for queries of its visible widgets: their areas, texts and states.
 
-It listens on the socket whose path is the first argument. Each line is the name of a widget, or
-the class of one; the answer is a line of JSON. Nothing of the viewer is replaced, and it is
-driven through the X server.
+The path of the socket is the first argument. A query is one line with the name or the class of
+widgets; the reply is one line of JSON. The viewer itself is unmodified, and is controlled through
+the X server.
 """
 
 from __future__ import annotations
@@ -20,13 +20,13 @@ from flatland.viewer.app import main
 
 
 class Inspector(QObject):
-    """Answers in the window's thread."""
+    """Replies to queries, in the window's thread."""
 
-    asked = pyqtSignal(str)
+    query_received = pyqtSignal(str)
 
     def __init__(self) -> None:
         super().__init__()
-        self.asked.connect(self.answer)
+        self.query_received.connect(self.reply)
         threading.Thread(target=self.listen, daemon=True).start()
 
     def listen(self) -> None:
@@ -37,14 +37,14 @@ class Inspector(QObject):
             connection, _ = server.accept()
         self.stream = connection.makefile("rw")
         for line in self.stream:
-            self.asked.emit(line.strip())
+            self.query_received.emit(line.strip())
 
-    def answer(self, name: str) -> None:
+    def reply(self, name: str) -> None:
         print(json.dumps([describe(widget) for widget in find(name)]), file=self.stream, flush=True)
 
 
 def find(name: str) -> list[QWidget]:
-    """All widgets of a name or a class that can be seen."""
+    """Returns the visible widgets with a name or a class."""
     return [
         widget
         for widget in QApplication.allWidgets()

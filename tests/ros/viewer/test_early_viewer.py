@@ -1,4 +1,4 @@
-"""A viewer that is there before the simulator, and stays when that is gone."""
+"""A viewer that starts before the simulator and keeps running after it has ended."""
 
 from __future__ import annotations
 
@@ -30,13 +30,13 @@ def elsewhere(room: Path) -> Path:
 
 @pytest.fixture
 def bare_master(ros: Any) -> Iterator[None]:
-    """A master that nobody has told of simulated time."""
+    """A ROS master without `/use_sim_time`."""
     ros.master.deleteParam("/use_sim_time")
     yield
     ros.master.setParam("/use_sim_time", True)
 
 
-def test_simulators_come_and_go(
+def test_simulator_is_started_killed_and_replaced(
     ros: Any,
     bare_master: None,
     early_viewer: Any,
@@ -50,7 +50,7 @@ def test_simulators_come_and_go(
     area = viewer.widget("rviz::RenderPanel")
 
     def waits() -> None:
-        viewer.until("rate", lambda widget: widget["text"] == "waiting for the simulator")
+        viewer.until("rate", lambda widget: widget["text"] == "Waiting for the simulator")
         viewer.until("factor", lambda widget: widget["text"] == "")
         viewer.until("toggle_pause", lambda widget: widget["text"] == "Pause")
         assert not viewer.widget("rate_slider")["enabled"]
@@ -75,7 +75,7 @@ def test_simulators_come_and_go(
     shows_room_and_robot(robot_is_there)
     ros.call("/pause", Empty)
     viewer.until("toggle_pause", lambda widget: widget["text"] == "Resume")
-    # It ends without a word, so that the master still knows it.
+    # A killed node stays registered with the master.
     first.send(signal.SIGKILL)
     first.wait()
     waits()
@@ -83,7 +83,7 @@ def test_simulators_come_and_go(
     complaint = viewer.widget("qt_msgbox_label")
     assert "service" in complaint["text"]
     viewer.screen.key("Return")
-    # The next one shows another world; nothing of the first one is left.
+    # Another simulator, with another world; nothing of the first one remains visible.
     on_screen.server(elsewhere, show_viz=True)
     shows_room_and_robot(robot_is_there)
     assert viewer.process.running
@@ -91,13 +91,13 @@ def test_simulators_come_and_go(
 
 @pytest.fixture
 def other_clock() -> Iterator[rospy.Publisher]:
-    """Tells the time beside the simulator."""
+    """A second publisher of `/clock`, beside the simulator."""
     publisher = rospy.Publisher("/clock", Clock, queue_size=1, latch=True)
     yield publisher
     publisher.unregister()
 
 
-def test_walls_stay_when_the_time_goes_back(
+def test_walls_are_shown_again_after_the_time_jumps_back(
     ros: Any, other_clock: rospy.Publisher, early_viewer: Any, on_screen: Any, room: Path, look: Any
 ) -> None:
     viewer = early_viewer
@@ -107,6 +107,6 @@ def test_walls_stay_when_the_time_goes_back(
     ros.call("/pause", Empty)
     viewer.until("toggle_pause", lambda widget: widget["text"] == "Resume")
     other_clock.publish(Clock(rospy.Time(nsecs=1)))
-    viewer.until("time", lambda widget: widget["text"] == "time 0.00 s")
-    # RViz forgets all that it has shown: the scans do not come again in the pause, the walls do.
+    viewer.until("time", lambda widget: widget["text"] == "Time: 0.00 s")
+    # RViz clears all displays. Paused, the simulator sends no scans, but the walls are latched.
     look(lambda picture: len(picture.places(RED)) == 0, area)

@@ -1,4 +1,4 @@
-"""What server.launch starts to show the simulator, and what happens where it cannot."""
+"""The viewer and RViz as started by server.launch, and their start-up errors."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ import yaml
 from rosgraph_msgs.msg import Clock
 
 BLUE, CYAN, RED = (0, 0, 255), (0, 255, 255), (255, 70, 70)
-# What RViz's panels leave for the picture; one of the tools has a magenta arrow.
+# The 3-D view between RViz's panels; the icon of one of its tools is magenta as well.
 RVIZ_PANEL = {"x": 366, "y": 64, "width": 816, "height": 636}
 
 
 @pytest.fixture(autouse=True)
 def clean_parameters() -> Iterator[None]:
-    """Leaves no parameters of one launch to the next server."""
+    """Deletes the parameters of a launch, so that they do not affect the next server."""
     yield
     with contextlib.suppress(rosgraph.MasterException):
         rosgraph.Master("/flatland_tests").deleteParam("/flatland_server")
@@ -71,7 +71,7 @@ def test_rviz_shows_all_without_being_touched(
     assert launch.stop() == 0
 
 
-def test_nothing_is_switched_off_in_rviz(ros: Any, checkout: Path) -> None:
+def test_all_displays_are_enabled_in_the_rviz_configuration(ros: Any, checkout: Path) -> None:
     del ros
     config = yaml.safe_load((checkout / "rviz" / "flatland.rviz").read_text())
     displays = list(config["Visualization Manager"]["Displays"])
@@ -99,29 +99,27 @@ def test_the_viewer_comes_with_the_simulator_and_may_go_alone(
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_the_viewer_ends_when_asked_to(
-    on_screen: Any, ros: Any, room_of_its_own: Any, look: Callable[..., Any], number: signal.Signals
+def test_viewer_exits_on_a_signal(
+    on_screen: Any, ros: Any, running_room: Any, look: Callable[..., Any], number: signal.Signals
 ) -> None:
     viewer = on_screen.program("rosrun", "flatland", "flatland_viz")
     look(lambda picture: len(picture.places(BLUE)) > 10)
     viewer.send(number)
     assert viewer.wait() == 0
     assert "Traceback" not in viewer.output
-    assert room_of_its_own.running
+    assert running_room.running
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_the_viewer_ends_when_asked_to_while_it_starts(
-    on_screen: Any, number: signal.Signals
-) -> None:
+def test_viewer_exits_on_a_signal_during_start(on_screen: Any, number: signal.Signals) -> None:
     viewer = on_screen.program("rosrun", "flatland", "flatland_viz", XDG_RUNTIME_DIR="")
-    viewer.wait_for_line("XDG_RUNTIME_DIR not set")  # Qt says so just before RViz is made.
+    viewer.wait_for_line("XDG_RUNTIME_DIR not set")  # logged by Qt just before RViz starts
     viewer.send(number)
     assert viewer.wait() == 0
     assert "Traceback" not in viewer.output
 
 
-def test_a_simulator_that_fails_has_the_last_word(on_screen: Any) -> None:
+def test_viewer_exits_silently_if_the_simulator_fails(on_screen: Any) -> None:
     launch = on_screen.launch("flatland", "server.launch", "world_path:=/no/such/world.yaml")
     launch.wait_for_line("FATAL.*no/such/world.yaml")
     launch.wait()
@@ -129,11 +127,11 @@ def test_a_simulator_that_fails_has_the_last_word(on_screen: Any) -> None:
 
 
 @pytest.fixture
-def room_of_its_own(on_screen: Any, room: Path) -> Any:
+def running_room(on_screen: Any, room: Path) -> Any:
     return on_screen.server(room, show_viz=True)
 
 
-def test_no_display_is_no_failure_of_the_simulator(launcher: Any, ros: Any, room: Path) -> None:
+def test_simulator_continues_without_a_display(launcher: Any, ros: Any, room: Path) -> None:
     launcher.environment = {k: v for k, v in launcher.environment.items() if k != "DISPLAY"}
     launch = launcher.launch("flatland", "server.launch", f"world_path:={room}")
     launch.wait_for_line(r"the viewer cannot start: there is no display \(DISPLAY is not set\)")
@@ -142,28 +140,28 @@ def test_no_display_is_no_failure_of_the_simulator(launcher: Any, ros: Any, room
     assert launch.stop() == 0
 
 
-def test_reasons_not_to_start(
+def test_viewer_reports_why_it_cannot_start(
     launcher: Any, ros_environment: dict[str, str], screen: Any, tmp_path: Path
 ) -> None:
-    def complaint(**environment: str) -> str:
+    def error_of(**environment: str) -> str:
         viewer = launcher.program("rosrun", "flatland", "flatland_viz", **environment)
         assert viewer.wait() == 1
         assert "Traceback" not in viewer.output
         return str(viewer.output)
 
-    assert "the display :4711 cannot be opened" in complaint(DISPLAY=":4711")
-    nobody = complaint(ROS_MASTER_URI="http://127.0.0.1:1", DISPLAY=screen.display)
-    assert "no ROS master at http://127.0.0.1:1" in nobody
-    nonsense = complaint(ROS_MASTER_URI="nonsense", DISPLAY=screen.display)
-    assert "invalid master URI: nonsense (from ROS_MASTER_URI)" in nonsense
-    blind = type(screen)(640, 480, "-extension", "GLX")
+    assert "the display :4711 cannot be opened" in error_of(DISPLAY=":4711")
+    no_master = error_of(ROS_MASTER_URI="http://127.0.0.1:1", DISPLAY=screen.display)
+    assert "no ROS master at http://127.0.0.1:1" in no_master
+    invalid_uri = error_of(ROS_MASTER_URI="nonsense", DISPLAY=screen.display)
+    assert "invalid master URI: nonsense (from ROS_MASTER_URI)" in invalid_uri
+    without_glx = type(screen)(640, 480, "-extension", "GLX")
     try:
-        reason = f"the display {blind.display} has no OpenGL"
-        assert reason in complaint(DISPLAY=blind.display)
+        reason = f"the display {without_glx.display} has no OpenGL"
+        assert reason in error_of(DISPLAY=without_glx.display)
     finally:
-        blind.close()
-    # A package without the bindings, in front of the real one.
+        without_glx.close()
+    # A package `rviz` without bindings, found before the real one.
     (tmp_path / "rviz").mkdir()
     (tmp_path / "rviz" / "__init__.py").touch()
     path = f"{tmp_path}:{launcher.environment.get('PYTHONPATH', '')}"
-    assert "python3-rviz" in complaint(PYTHONPATH=path, DISPLAY=screen.display)
+    assert "python3-rviz" in error_of(PYTHONPATH=path, DISPLAY=screen.display)

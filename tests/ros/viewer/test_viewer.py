@@ -1,4 +1,4 @@
-"""The viewer against a running simulator: what it shows, and what mouse and keys do."""
+"""The viewer of a running simulator: what it displays, and its response to mouse and keys."""
 
 from __future__ import annotations
 
@@ -24,18 +24,18 @@ BLUE, CYAN, RED, GREEN, LIGHT_BLUE, YELLOW = (
     *((80, 200, 255), (255, 217, 26)),
 )
 START = (-2.0, 1.0)
-SLOW_MOTION = {f"real-time factor {factor}" for factor in ("0.04", "0.05", "0.06")}
+SLOW_MOTION = {f"Real-time factor: {factor}" for factor in ("0.04", "0.05", "0.06")}
 
 
 @pytest.fixture
 def panel(viewer: Any) -> Any:
-    """Where the picture is on the screen."""
+    """The area of the 3-D view on the screen."""
     return viewer.widget("rviz::RenderPanel")
 
 
 @pytest.fixture
 def spawned(ros: Any) -> Any:
-    """Deletes what a test spawned; gives what is known of models."""
+    """Returns a function that waits for a model; deletes all spawned models after the test."""
     listed = ros.topic(f"{DEBUG}/topics", DebugTopicList)
 
     def until(name: str) -> None:
@@ -50,7 +50,7 @@ def spawned(ros: Any) -> Any:
 
 
 def choose(viewer: Any, screen: Any, path: Path, *, name: str = "", number: bool = False) -> None:
-    """Answers the dialog of the spawn tool."""
+    """Fills in and accepts the spawn dialog."""
     viewer.click("spawn")
     field = viewer.widget("path")
     screen.click(field["x"] + 20, field["y"] + field["height"] / 2)
@@ -94,7 +94,7 @@ def test_shows_walls_robot_and_scan(look: Callable[..., Any], viewer: Any, panel
 def test_shows_the_robot_at_its_pose(
     look: Callable[..., Any], viewer: Any, screen: Any, panel: Any
 ) -> None:
-    # The handle lies on it, but for the tool that moves the camera.
+    # The handle covers the robot unless the Move camera tool is selected.
     look(lambda picture: not len(picture.near(BLUE, *START, 0.15)), panel)
     viewer.click("move_camera")
     picture = look(lambda picture: len(picture.near(BLUE, *START, 0.15)) > 20, panel)
@@ -105,20 +105,20 @@ def test_shows_the_robot_at_its_pose(
     viewer.click("interact")
 
 
-def test_time_runs_and_stands_still(ros: Any, viewer: Any, screen: Any) -> None:
+def test_pause_and_resume(ros: Any, viewer: Any, screen: Any) -> None:
     paused = ros.topic("/flatland_server/paused", Bool)
     assert viewer.widget("toggle_pause")["text"] == "Pause"
-    viewer.until("factor", lambda widget: widget["text"].startswith("real-time factor 1.0"))
+    viewer.until("factor", lambda widget: widget["text"].startswith("Real-time factor: 1.0"))
     viewer.click("toggle_pause")
     assert paused.until(lambda message: message.data)
     viewer.until("toggle_pause", lambda widget: widget["text"] == "Resume")
-    viewer.until("factor", lambda widget: widget["text"] == "paused")
+    viewer.until("factor", lambda widget: widget["text"] == "Paused")
     still = viewer.widget("time")["text"]
     screen.key("space")
     assert paused.until(lambda message: not message.data)
     viewer.until("toggle_pause", lambda widget: widget["text"] == "Pause")
     viewer.until("time", lambda widget: widget["text"] != still)
-    # Somebody else pauses.
+    # A pause by another client.
     ros.call("/pause", Empty)
     viewer.until("toggle_pause", lambda widget: widget["text"] == "Resume")
     ros.call("/resume", Empty)
@@ -142,12 +142,12 @@ def test_slider_sets_the_rate(
     assert viewer.widget("rate")["text"] == "as fast as possible"
     # It stays where the mouse is, however long the text beside it.
     assert viewer.widget("rate_slider")["x"] == slider["x"]
-    # What others set is shown as well.
+    # A rate set by another client.
     assert ros.call("/set_rate", SetRate, 200.0).success
     viewer.until("rate", lambda widget: widget["text"] == "200 Hz (x1)")
 
 
-def test_spawns_by_two_clicks(
+def test_two_clicks_spawn_a_model(
     ros: Any,
     look: Callable[..., Any],
     viewer: Any,
@@ -190,7 +190,7 @@ def test_spawns_by_two_clicks(
     look(lambda picture: not len(picture.near(CYAN, 2, -1, 0.8)), panel)
 
 
-def test_name_is_the_namespace_and_takes_a_number(
+def test_model_name_is_the_namespace_and_can_be_numbered(
     ros: Any,
     look: Callable[..., Any],
     viewer: Any,
@@ -219,7 +219,7 @@ def test_name_is_the_namespace_and_takes_a_number(
     )
 
 
-def test_relative_path_and_name_of_ones_own(
+def test_relative_path_and_custom_name(
     ros: Any,
     look: Callable[..., Any],
     viewer: Any,
@@ -228,14 +228,14 @@ def test_relative_path_and_name_of_ones_own(
     spawned: Callable[[str], None],
 ) -> None:
     picture = look(lambda picture: True, panel)
-    # From the folder of the world file, as in spawn_model.
+    # Relative to the folder of the world file, as for the service spawn_model.
     choose(viewer, screen, Path("crate.model.yaml"), name="parcel", number=True)
     screen.move(*picture.at(2, 2))
     look(lambda picture: len(picture.places(YELLOW)), panel)
     screen.click(*picture.at(2, 2))
     screen.click(*picture.at(2, 2))
     spawned("parcel1")
-    # The next one needs no more than to be asked for.
+    # The dialog suggests the next free number.
     viewer.click("spawn")
     viewer.until("name", lambda widget: widget["text"] == "parcel2")
     box = viewer.widget("number")
@@ -245,7 +245,7 @@ def test_relative_path_and_name_of_ones_own(
     viewer.until("interact", lambda widget: widget["checked"])
 
 
-def test_model_files_can_be_looked_for(viewer: Any, screen: Any, room: Path) -> None:
+def test_file_dialog_sets_the_path(viewer: Any, screen: Any, room: Path) -> None:
     path = str(room.parent / "crate.model.yaml")
     viewer.click("spawn")
     viewer.click("browse")
@@ -275,7 +275,7 @@ def test_menu_deletes_a_model(
     picture = look(lambda picture: len(picture.near(GREEN, 2, -2, 0.4)) > 50, panel)
 
     def menu() -> Any:
-        # RViz looks what is below the mouse once a picture, and misses a click that is too short.
+        # RViz picks the object below the mouse once per frame, and misses a shorter click.
         screen.move(*picture.at(2.1, -2))
         screen.move(*picture.at(2, -2))
         look(lambda picture: True, panel)
@@ -307,7 +307,7 @@ def test_view_fits_the_window_until_the_camera_is_moved(
         wanted = area["height"] / 10.6
         return lambda picture: abs(picture.pixels_per_metre - wanted) < 0.8
 
-    viewer.click("whole_world")
+    viewer.click("zoom_to_fit")
     look(fits(panel), panel)
     small = resize(1000, 500)
     picture = look(fits(small), small)
@@ -315,18 +315,18 @@ def test_view_fits_the_window_until_the_camera_is_moved(
     zoomed = look(lambda seen: seen.pixels_per_metre < 0.98 * picture.pixels_per_metre, small)
     area = resize(1200, 800)
     look(lambda seen: abs(seen.pixels_per_metre - zoomed.pixels_per_metre) < 0.2, area)
-    viewer.click("whole_world")
+    viewer.click("zoom_to_fit")
     look(fits(area), area)
 
 
-def test_view_holds_models_outside_the_walls(
+def test_view_includes_models_outside_the_walls(
     ros: Any, look: Callable[..., Any], viewer: Any, screen: Any, panel: Any, spawned: Any
 ) -> None:
     def shows(metres: float, pixels: int) -> Callable[[Any], bool]:
         wanted = pixels / (1.06 * metres)
         return lambda picture: abs(picture.pixels_per_metre - wanted) < 0.5
 
-    viewer.click("whole_world")
+    viewer.click("zoom_to_fit")
     look(shows(10.0, panel["height"]), panel)
     # From the wall at x = -5 to the end of the crate.
     assert ros.spawn("crate.model.yaml", "far", "", (20, 0, 0)).success
@@ -340,10 +340,10 @@ def test_view_holds_models_outside_the_walls(
     look(shows(10.0, panel["height"]), panel)
 
 
-def test_model_is_below_the_mouse_in_a_turned_view(
+def test_model_is_below_the_mouse_in_a_rotated_view(
     look: Callable[..., Any], viewer: Any, screen: Any, panel: Any, room: Path
 ) -> None:
-    viewer.click("whole_world")
+    viewer.click("zoom_to_fit")
     x, y = panel["x"] + panel["width"] / 2, panel["y"] + panel["height"] / 2
     for _ in range(4):
         screen.click(x, y, button=5)
@@ -353,7 +353,7 @@ def test_model_is_below_the_mouse_in_a_turned_view(
     for step in range(1, 6):
         screen.move(x + 150 + 20 * step, y + 100)
     screen.release()
-    # A square that stands on a corner takes more space.
+    # The bounding box of a rotated square is larger.
     look(lambda picture: picture.pixels_per_metre > 1.2 * straight.pixels_per_metre, panel)
     choose(viewer, screen, room.parent / "crate.model.yaml")
     for mouse in ((x + 120, y + 60), (x - 40, y + 130)):
@@ -365,7 +365,7 @@ def test_model_is_below_the_mouse_in_a_turned_view(
 
         look(is_below_the_mouse, panel)
     screen.key("Escape")
-    viewer.click("whole_world")
+    viewer.click("zoom_to_fit")
     look(lambda picture: abs(picture.pixels_per_metre * 10.6 - panel["height"]) < 8, panel)
 
 
@@ -383,7 +383,7 @@ def test_escape_cancels(
         screen.move(x + 20 * step, y)
     screen.release(2)
     look(lambda seen: abs(seen.center[0] - picture.center[0] - 100) < 8, panel)
-    viewer.click("whole_world")
+    viewer.click("zoom_to_fit")
     look(lambda seen: abs(seen.center[0] - picture.center[0]) < 2, panel)
     screen.key("Escape")
     look(lambda picture: not len(picture.places(YELLOW)), panel)
@@ -397,7 +397,7 @@ def test_escape_cancels(
     assert not viewer.widgets("path")
 
 
-def test_failures_are_told_in_dialogs(
+def test_errors_are_shown_in_dialogs(
     look: Callable[..., Any], viewer: Any, screen: Any, panel: Any, room: Path, spawned: Any
 ) -> None:
     choose(viewer, screen, room.parent / "nothing.yaml")
@@ -405,7 +405,7 @@ def test_failures_are_told_in_dialogs(
     assert label["text"].startswith("Flatland YAML: ")
     assert "nothing.yaml" in label["text"]
     screen.key("Return")
-    # The simulator refuses: there is a robot already.
+    # The service reports an error: the name is already in use.
     renamed = room.parent / "robot.yaml"
     renamed.write_text((room.parent / "robot.model.yaml").read_text())
     picture = look(lambda picture: True, panel)
@@ -439,7 +439,7 @@ def test_dragged_robot_moves(
     assert ros.move("robot", (*START, 0.0)).success
 
 
-def test_ends_alone(viewer: Any, screen: Any, room_server: Any) -> None:
+def test_quit_leaves_the_simulator_running(viewer: Any, screen: Any, room_server: Any) -> None:
     screen.key("ctrl+q")
     assert viewer.process.wait() == 0
     assert "Traceback" not in viewer.process.output

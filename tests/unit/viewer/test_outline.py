@@ -1,4 +1,4 @@
-"""Outlines of models that are not spawned yet."""
+"""Outlines of model files, read without spawning the model."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import flatland
-from flatland.viewer.outline import reach, read_outline
+from flatland.viewer.outline import max_radius, read_outline
 
 MODEL = """
 bodies:
@@ -32,24 +32,24 @@ def model(tmp_path: Path) -> str:
     return str(path)
 
 
-def test_outline_of_each_body(model: str) -> None:
+def test_one_outline_per_body_with_footprints(model: str) -> None:
     base, wheel = read_outline(model)
     assert base.color == (0.25, 0.5, 0.75, 0.5)
-    sides = {tuple(map(tuple, side)) for side in base.segments.reshape(-1, 2, 2).tolist()}
-    assert sides == {((1, 0), (3, 0)), ((3, 0), (3, 1)), ((3, 1), (1, 0))}
+    edges = {tuple(map(tuple, edge)) for edge in base.segments.reshape(-1, 2, 2).tolist()}
+    assert edges == {((1, 0), (3, 0)), ((3, 0), (3, 1)), ((3, 1), (1, 0))}
     assert np.hypot(*(wheel.segments - (0, 1)).T) == pytest.approx(0.5)
     assert len(wheel.segments) == 64
-    assert reach([base, wheel]) == pytest.approx(math.sqrt(10))
-    assert reach([]) == 0.0
+    assert max_radius([base, wheel]) == pytest.approx(math.sqrt(10))
+    assert max_radius([]) == 0.0
 
 
-def test_outline_asks_for_parameters(model: str) -> None:
+def test_param_is_evaluated(model: str) -> None:
     base, _ = read_outline(model, {"turn": math.pi / 2}.get)
     assert base.segments.min(axis=0) == pytest.approx((0, 0), abs=1e-6)
     assert base.segments.max(axis=0) == pytest.approx((1, 2), abs=1e-6)
 
 
-def test_bad_model_is_told(tmp_path: Path) -> None:
+def test_invalid_model_file_raises(tmp_path: Path) -> None:
     with pytest.raises(flatland.YamlError, match=r"missing\.yaml"):
         read_outline(str(tmp_path / "missing.yaml"))
     path = tmp_path / "bad.yaml"

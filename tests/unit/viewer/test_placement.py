@@ -1,4 +1,4 @@
-"""Placing a model: a click for the place, turning, a second click."""
+"""Placing a model with two clicks: the first sets its position, the second its heading."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ import pytest
 from flatland.viewer.placement import Placement, Stage
 
 
-def test_two_clicks_give_place_and_heading() -> None:
+def test_two_clicks_set_position_and_heading() -> None:
     placement = Placement()
     placement.move(5, 5)
-    assert (placement.stage, placement.pose) == (Stage.PLACE, (5, 5, 0))
+    assert (placement.stage, placement.pose) == (Stage.POSITION, (5, 5, 0))
     placement.click(1, 2)
-    assert (placement.stage, placement.pose) == (Stage.TURN, (1, 2, 0))
+    assert (placement.stage, placement.pose) == (Stage.HEADING, (1, 2, 0))
     placement.move(1, 9)
     assert placement.pose == (1, 2, math.pi / 2)
     placement.click(0, 1)
@@ -22,14 +22,14 @@ def test_two_clicks_give_place_and_heading() -> None:
     assert placement.pose == pytest.approx((1, 2, -3 * math.pi / 4))
 
 
-def test_clicks_at_one_place_keep_the_heading() -> None:
+def test_two_clicks_at_one_point_keep_the_heading() -> None:
     placement = Placement()
     placement.click(1, 2)
     placement.click(1, 2)
     assert (placement.stage, placement.pose) == (Stage.DONE, (1, 2, 0))
 
 
-def test_nothing_moves_it_afterwards() -> None:
+def test_moves_after_the_second_click_are_ignored() -> None:
     placement = Placement()
     placement.click(1, 2)
     placement.click(1, 3)

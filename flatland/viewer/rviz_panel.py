@@ -1,4 +1,4 @@
-"""The picture: RViz without its panels, seen from above, and the displays in it."""
+"""The 3-D view: an RViz frame without its own controls, viewed from above, and its displays."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from flatland.viewer.bounds import Bounds
 from rviz import bindings as rviz
 
 WORLD_FRAME: Final = "map"
-_MARGIN: Final = 1.06  # of the view, around what it is to show
+_FIT_FACTOR: Final = 1.06  # size of the view relative to the bounds that it shows
 _LASER_COLORS: Final = (
     *("255; 70; 70", "80; 200; 255", "255; 200; 60", "120; 255; 120"),
     *("255; 120; 255", "255; 150; 80", "160; 160; 255", "80; 255; 220"),
 )
-_LASER_PIXELS: Final = 3
-_MARKERS: Final = "rviz/MarkerArray"
-_LOOK_EVERY: Final = 100  # ms between two looks at whether RViz has begun anew
+_LASER_POINT_SIZE: Final = 3  # pixels
+_MARKER_ARRAY_CLASS: Final = "rviz/MarkerArray"
+_RESET_POLL_PERIOD: Final = 0.1  # s
 _CONFIG: Final = f"""
 Panels: []
 Visualization Manager:
@@ -46,20 +46,20 @@ Visualization Manager:
 """
 
 
-class Scene:
-    """RViz's render panel, for a window to put somewhere.
+class RvizPanel:
+    """An RViz visualization frame to embed in a window.
 
     Attributes:
-        widget: What to put there.
-        panel: The widget that gets the mouse's events.
+        widget: The widget to embed.
+        render_panel: The part of the widget that receives the mouse events.
     """
 
     def __init__(self) -> None:
-        """Starts RViz; takes a second or so."""
+        """Starts RViz, which takes about one second."""
         self.widget: QMainWindow = rviz.VisualizationFrame()
         self.widget.setSplashPath("")
         with tempfile.TemporaryDirectory() as folder:
-            # Without a file it would first show what the user's own RViz shows.
+            # Without a file, RViz loads the user's own configuration.
             path = Path(folder) / "viewer.rviz"
             path.write_text(_CONFIG)
             self.widget.initialize(str(path))
@@ -68,132 +68,122 @@ class Scene:
         self.widget.setHideButtonVisibility(False)
         for bar in self.widget.findChildren(QToolBar):
             bar.hide()
-        # Keys of menus that nobody sees: saving and loading configurations, quitting.
+        # The shortcuts of the hidden menus (save, open, quit) would still work.
         for action in self.widget.findChildren(QAction):
             action.setShortcut(QKeySequence())
-        self.panel = _find_panel(self.widget)
+        self.render_panel = _find_render_panel(self.widget)
         self._manager: Any = self.widget.getManager()
         self._tools: Any = self._manager.getToolManager()
         self._root: Any = self._manager.getRootDisplayGroup()
         self._displays: dict[str, Any] = {}
-        self._lasers_seen: dict[str, str] = {}
-        self._age = 0.0  # s of wall time since RViz began
-        self._watch = QTimer(self.widget)
-        self._watch.timeout.connect(self._look_for_reset)
-        self._watch.start(_LOOK_EVERY)
+        self._laser_colors: dict[str, str] = {}
+        self._elapsed = 0.0  # s of wall time since the last reset of RViz
+        self._reset_timer = QTimer(self.widget)
+        self._reset_timer.timeout.connect(self._check_for_reset)
+        self._reset_timer.start(round(1000 * _RESET_POLL_PERIOD))
 
     # -- time ------------------------------------------------------------------------------
 
     @property
     def time(self) -> float:
-        """ROS time [s]: the simulated one, if `/use_sim_time` was set at the start."""
+        """ROS time [s]; simulated time if `/use_sim_time` was true when RViz started."""
         time: float = self._manager.getROSTime()
         return time
-
-    @property
-    def frames(self) -> int:
-        """How many pictures were drawn."""
-        count: int = self._manager.getFrameCount()
-        return count
 
     # -- displays --------------------------------------------------------------------------
 
     def add_markers(self, topic: str, name: str) -> None:
-        """Shows a MarkerArray topic."""
-        self._add(_MARKERS, topic, name, {"Marker Topic": topic, "Queue Size": 10})
+        """Adds a display of a MarkerArray topic."""
+        properties = {"Marker Topic": topic, "Queue Size": 10}
+        self._add(_MARKER_ARRAY_CLASS, topic, name, properties)
 
     def add_interactive_markers(self, topic: str, name: str) -> None:
-        """Shows interactive markers by their update topic."""
+        """Adds a display of interactive markers, given their update topic."""
         self._add("rviz/InteractiveMarkers", topic, name, {"Update Topic": topic})
 
     def add_laser(self, topic: str) -> None:
-        """Shows a LaserScan topic as points, in a colour of its own."""
-        # A laser that comes back has its old colour.
-        color = self._lasers_seen.setdefault(
-            topic, _LASER_COLORS[len(self._lasers_seen) % len(_LASER_COLORS)]
+        """Adds a display of a LaserScan topic, as points in a color of its own."""
+        # A laser that is removed and added again keeps its color.
+        color = self._laser_colors.setdefault(
+            topic, _LASER_COLORS[len(self._laser_colors) % len(_LASER_COLORS)]
         )
         properties = {
             "Topic": topic,
             "Selectable": False,
             "Style": "Points",
-            "Size (Pixels)": _LASER_PIXELS,
+            "Size (Pixels)": _LASER_POINT_SIZE,
             "Color Transformer": "FlatColor",
             "Color": color,
         }
         self._add("rviz/LaserScan", topic, f"laser {topic}", properties)
 
     def remove(self, topic: str) -> None:
-        """Takes away the display of a topic."""
+        """Removes the display of a topic.
+
+        Raises:
+            KeyError: The topic has no display.
+        """
         display = self._displays.pop(topic)
         self._root.takeDisplay(display)
         display.deleteLater()
 
     @property
     def topics(self) -> set[str]:
-        """The topics that are shown."""
+        """The topics that have a display."""
         return set(self._displays)
 
     def _add(self, kind: str, topic: str, name: str, properties: dict[str, object]) -> None:
         display = self._manager.createDisplay(kind, name, False)
         for key, value in properties.items():
             display.subProp(key).setValue(value)
-        # Only now, so that it subscribes once and to the right topic.
+        # Enabled last, so that it subscribes only once, to the configured topic.
         display.setEnabled(True)
         self._displays[topic] = display
 
-    def _look_for_reset(self) -> None:
-        """Gets those markers again that RViz forgot.
+    def _check_for_reset(self) -> None:
+        """Subscribes to all marker topics again after RViz has cleared its displays.
 
-        When the time goes back, as it does with the next simulator, RViz clears all displays. A
-        marker of a latched topic that came before the new time did would not come again.
+        RViz clears all displays when the ROS time jumps back, for example when the simulator is
+        restarted. Markers of a latched topic that were received before the jump would be lost.
         """
-        age = self._manager.getWallClockElapsed()
-        if age < self._age:
+        elapsed = self._manager.getWallClockElapsed()
+        if elapsed < self._elapsed:
             for display in self._displays.values():
-                if display.getClassId() == _MARKERS:
-                    # A new subscriber gets the latched message.
+                if display.getClassId() == _MARKER_ARRAY_CLASS:
+                    # A new subscriber receives the latched message.
                     display.setEnabled(False)
                     display.setEnabled(True)
-        self._age = age
+        self._elapsed = elapsed
 
     # -- tools -----------------------------------------------------------------------------
 
     def use_interact_tool(self) -> None:
-        """Shows the interactive markers; elsewhere the mouse moves the camera."""
+        """Shows the interactive markers; outside of them the mouse moves the camera."""
         self._tools.setCurrentTool(self._tools.getTool(0))
 
-    def use_camera_tool(self) -> None:
+    def use_move_camera_tool(self) -> None:
         """Hides the interactive markers; the mouse moves the camera."""
         self._tools.setCurrentTool(self._tools.getTool(1))
 
     # -- view ------------------------------------------------------------------------------
 
     def to_world(self, point: QPoint) -> tuple[float, float]:
-        """Returns the place in the world frame [m] below a point of the panel."""
+        """Converts a point of the render panel to world coordinates (x, y) [m]."""
         (x, y), angle, scale = self._camera()
-        right = (point.x() + 0.5 - self.panel.width() / 2) / scale
-        up = (self.panel.height() / 2 - point.y() - 0.5) / scale
+        right = (point.x() + 0.5 - self.render_panel.width() / 2) / scale
+        up = (self.render_panel.height() / 2 - point.y() - 0.5) / scale
         dx, dy = rotate((right, up), angle)
         return (x + dx, y + dy)
 
-    def to_panel(self, x: float, y: float) -> QPoint:
-        """Returns the point of the panel that shows a place in the world frame [m]."""
-        center, angle, scale = self._camera()
-        right, up = rotate((x - center[0], y - center[1]), -angle)
-        return QPoint(
-            round(self.panel.width() / 2 + right * scale - 0.5),
-            round(self.panel.height() / 2 - up * scale - 0.5),
-        )
-
     def fit(self, bounds: Bounds) -> None:
-        """Shows a part of the world, and the grid below all of it."""
+        """Fits the view to a rectangle, and extends the grid below all of it."""
         view = self._view()
         width, height = bounds.size
         scale = min(
-            self.panel.width() / max(_MARGIN * width, 1.0),
-            self.panel.height() / max(_MARGIN * height, 1.0),
+            self.render_panel.width() / max(_FIT_FACTOR * width, 1.0),
+            self.render_panel.height() / max(_FIT_FACTOR * height, 1.0),
         )
-        view.subProp("Scale").setValue(scale * self.panel.devicePixelRatioF())
+        view.subProp("Scale").setValue(scale * self.render_panel.devicePixelRatioF())
         view.subProp("X").setValue(bounds.center[0])
         view.subProp("Y").setValue(bounds.center[1])
         view.subProp("Angle").setValue(0.0)
@@ -206,17 +196,17 @@ class Scene:
         return self._manager.getViewManager().getCurrent()
 
     def _camera(self) -> tuple[Vector2, float, float]:
-        """Returns the view's centre [m], its angle [rad] and Qt's pixels in a metre."""
+        """Returns the center of the view [m], its angle [rad] and its scale [Qt pixels/m]."""
         x, y, angle, scale = (
             self._view().subProp(name).getValue() for name in ("X", "Y", "Angle", "Scale")
         )
-        # RViz counts the screen's pixels, Qt its own.
-        return (x, y), angle, scale / self.panel.devicePixelRatioF()
+        # RViz uses device pixels, Qt device-independent pixels.
+        return (x, y), angle, scale / self.render_panel.devicePixelRatioF()
 
 
-def _find_panel(frame: QWidget) -> QWidget:
-    """Finds the render panel: the bindings have no name for it."""
+def _find_render_panel(frame: QWidget) -> QWidget:
+    """Finds the render panel by its class name: the bindings have no accessor for it."""
     for widget in frame.findChildren(QWidget):
         if isinstance(widget, QWidget) and widget.metaObject().className() == "rviz::RenderPanel":
             return widget
-    raise RuntimeError("RViz's window has no render panel")
+    raise RuntimeError("RViz's frame has no render panel")
