@@ -14,6 +14,7 @@ STEP_HOOKS: Final = ("before_physics_step", "after_physics_step")
 CONTACT_HOOKS: Final = ("begin_contact", "end_contact", "post_solve")
 
 Hook = Callable[..., None]
+HookWrapper = Callable[[FlatlandPlugin, Hook], Hook]
 HookList = list[tuple[FlatlandPlugin, Hook]]
 
 
@@ -34,6 +35,7 @@ class HookTable:
         """Creates an empty table."""
         self._order: dict[FlatlandPlugin, int] = {}
         self._count = 0
+        self._wrap: HookWrapper | None = None
         self._model_hooks: dict[str, dict[FlatlandPlugin, Hook]] = {h: {} for h in STEP_HOOKS}
         self._world_hooks: dict[str, dict[FlatlandPlugin, Hook]] = {h: {} for h in STEP_HOOKS}
         self._ordered: dict[str, HookList] = {}
@@ -45,14 +47,27 @@ class HookTable:
         is_of_model = isinstance(plugin, ModelPlugin)
         # World plugins come last.
         self._order[plugin] = self._count if is_of_model else self._count + (1 << 62)
-        hooks = self._model_hooks if is_of_model else self._world_hooks
+        self._add_hooks(plugin)
+
+    def _add_hooks(self, plugin: FlatlandPlugin) -> None:
+        hooks = self._model_hooks if isinstance(plugin, ModelPlugin) else self._world_hooks
         for hook in STEP_HOOKS:
             if overrides(plugin, hook):
-                hooks[hook][plugin] = getattr(plugin, hook)
+                hooks[hook][plugin] = self._method(plugin, hook)
                 self._ordered.pop(hook, None)
         for hook, table in self._contact_hooks.items():
             if overrides(plugin, hook):
-                table.add(plugin, getattr(plugin, hook))
+                table.add(plugin, self._method(plugin, hook))
+
+    def _method(self, plugin: FlatlandPlugin, hook: str) -> Hook:
+        method: Hook = getattr(plugin, hook)
+        return method if self._wrap is None else self._wrap(plugin, method)
+
+    def wrap(self, wrapper: HookWrapper | None) -> None:
+        """Wraps all hooks, also those of plugins added later; None unwraps them."""
+        self._wrap = wrapper
+        for plugin in self._order:
+            self._add_hooks(plugin)
 
     def remove(self, plugin: FlatlandPlugin) -> None:
         """Removes the hooks of a plugin; one without hooks is ignored."""

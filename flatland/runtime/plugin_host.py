@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from flatland.entities.contact import Contact, ContactImpulse, MutableContact
 from flatland.errors import PLUGIN_FAULTS, FlatlandError, PluginError, YamlError
 from flatland.plugin_api.plugin import FlatlandPlugin, ModelPlugin, WorldPlugin, describe
+from flatland.plugin_api.missing_plugins import find_missing, missing_plugins_error
 from flatland.plugin_api.registry import PluginRegistry
 from flatland.runtime.hooks import CONTACT_HOOKS, HookList, HookTable
 from flatland.runtime.time_limit import TimeLimitExceeded, time_limit
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
     from flatland.physics import ContactEvent, OldManifold, PreSolveContact
     from flatland.runtime.faults import Faults
     from flatland.runtime.observer import Observers
+    from flatland.runtime.plugin_costs import PluginCosts
     from flatland.runtime.requests import Requests
     from flatland.timekeeper import Timekeeper
     from flatland.world import World
@@ -68,6 +70,21 @@ class PluginHost:
         self._hooks = HookTable()
 
     # -- start and end ---------------------------------------------------------------------
+
+    def require_plugins(self, entries: Iterable[YamlReader], model: str | None) -> None:
+        """Checks that a plugin class exists for each enabled entry of a `plugins` list.
+
+        Args:
+            entries: Entries of the list.
+            model: Name of the model, None for world plugins.
+
+        Raises:
+            MissingPluginsError: Classes do not exist; the text names all of them.
+            YamlError: An entry has no name or type.
+        """
+        missing = find_missing(self.registry, entries, model)
+        if missing:
+            raise missing_plugins_error(self.registry, missing)
 
     def start_model_plugin(self, model: Model, entry: YamlReader) -> None:
         """Starts a plugin of a model and appends it to the model's plugins.
@@ -170,6 +187,10 @@ class PluginHost:
         plugin._detach()
 
     # -- hooks -----------------------------------------------------------------------------
+
+    def measure(self, costs: PluginCosts | None) -> None:
+        """Adds the wall time of all hooks to some costs from now on; None ends the measurement."""
+        self._hooks.wrap(None if costs is None else costs.timed)
 
     @property
     def wants_contacts(self) -> bool:

@@ -5,9 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import TYPE_CHECKING, TypeAlias
 
+from flatland.runtime.frame_senders import FrameSenders
 from flatland.values import Transform
 
 if TYPE_CHECKING:
+    from flatland.plugin_api.plugin import FlatlandPlugin
     from flatland.runtime.observer import Observers
 
 FramePair: TypeAlias = tuple[str, str]
@@ -29,6 +31,7 @@ class TransformBuffer:
             observers: Notified of the transforms of each step.
         """
         self._observers = observers
+        self._senders = FrameSenders()
         self._latest: dict[FramePair, TransformFields] = {}
         self._pending: dict[FramePair, TransformFields] = {}
 
@@ -37,13 +40,21 @@ class TransformBuffer:
         """The latest transform of each (parent, child)."""
         return dict(zip(self._latest, _values(self._latest), strict=True))
 
+    def register(self, plugin: FlatlandPlugin, frames: FramePair) -> None:
+        """Registers a pair of frames that a plugin starts to send.
+
+        If another plugin sends the child frame with another parent, a warning is logged.
+        """
+        self._senders.add(plugin, frames)
+
     def send(self, frames: FramePair, fields: TransformFields) -> None:
         """Adds a transform to those of this step."""
         self._pending[frames] = fields
 
-    def forget(self, frames: Iterable[FramePair]) -> None:
-        """Drops transforms whose sender no longer exists."""
+    def forget(self, plugin: FlatlandPlugin, frames: Iterable[FramePair]) -> None:
+        """Drops the transforms of a plugin that ended."""
         for pair in frames:
+            self._senders.remove(plugin, pair)
             self._latest.pop(pair, None)
             self._pending.pop(pair, None)
 

@@ -1,0 +1,153 @@
+"""The models of a world: spawned, moved and deleted between two steps, all or nothing."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from flatland.config.reader import YamlReader
+from flatland.entities.model import Model
+from flatland.errors import WorldError, YamlError
+from flatland.geometry import Pose, finite_pose
+from flatland.graph_names import is_legal_namespace
+from flatland.loading.model_loader import ModelLoader
+
+if TYPE_CHECKING:
+    from flatland.runtime.contacts import ContactReporter
+    from flatland.runtime.observer import Observers
+    from flatland.runtime.placement import IfBlocked, Placement
+    from flatland.runtime.plugin_host import PluginHost
+    from flatland.runtime.requests import Requests
+    from flatland.world import World
+
+
+class ModelSet:
+    """The models of one world by name, in the order in which they were spawned.
+
+    Attributes:
+        by_name: The models; not to be changed from outside.
+    """
+
+    def __init__(
+        self,
+        world: World,
+        host: PluginHost,
+        contacts: ContactReporter,
+        placement: Placement,
+        observers: Observers,
+        requests: Requests,
+    ) -> None:
+        """Creates an empty set.
+
+        Args:
+            world: The world of the models.
+            host: Starts and ends the plugins of models.
+            contacts: Reports the contacts of the bodies.
+            placement: Finds out whether a pose is free.
+            observers: Notified of changes.
+            requests: Notified while plugins react to the end of a model.
+        """
+        self.by_name: dict[str, Model] = {}
+        self._world = world
+        self._host = host
+        self._contacts = contacts
+        self._placement = placement
+        self._observers = observers
+        self._requests = requests
+
+    def find(self, name: str) -> Model:
+        """Returns the model of a name.
+
+        Raises:
+            WorldError: It does not exist.
+        """
+        try:
+            return self.by_name[name]
+        except KeyError:
+            raise WorldError(f'model with name "{name}" does not exist') from None
+
+    def spawn(
+        self, path: str, name: str, namespace: str, pose: Sequence[float], if_blocked: IfBlocked
+    ) -> Model:
+        """Creates a model from a file; see `World.spawn_model`."""
+        world = self._world
+        checked_pose = self._check_spawn(path, name, namespace, pose)
+        path = world.resolve_path(path)
+        reader = YamlReader.from_file(path, world.params)
+        model = Model(world, name, namespace, path)
+        loader = ModelLoader(world.physics, world.collision_filter, model, reader)
+        try:
+            loader.load_bodies_and_joints(checked_pose)
+            self._place(model, model.pose, if_blocked, "spawn")
+            self._contacts.add_bodies(model.bodies)
+            entries = loader.plugin_entries()
+            self._host.require_plugins(entries, name)
+            for entry in entries:
+                self._host.start_model_plugin(model, entry)
+        except BaseException:
+            self._remove(model)
+            raise
+        self.by_name[name] = model
+        self._observers.model_added(model)
+        return model
+
+    def move(self, name: str, pose: Sequence[float], if_blocked: IfBlocked) -> Model:
+        """Moves a model; see `World.move_model`."""
+        model = self._find_to("move", name)
+        try:
+            self._place(model, finite_pose(pose), if_blocked, "move")
+        except ValueError as error:
+            raise WorldError(f'failed to move model "{name}", {error}') from None
+        self._observers.model_moved(model)
+        return model
+
+    def delete(self, name: str) -> None:
+        """Deletes a model; see `World.delete_model`."""
+        model = self._find_to("delete", name)
+        del self.by_name[name]
+        self._remove(model)
+        self._observers.model_removed(model)
+
+    def _check_spawn(self, path: str, name: str, namespace: str, pose: Sequence[float]) -> Pose:
+        if not name:
+            raise WorldError("failed to spawn model, its name must not be empty")
+        if name in self.by_name:
+            raise YamlError(f'Model with name "{name}" already exists')
+        if not path:
+            raise WorldError(f'failed to spawn model "{name}", the path must not be empty')
+        if not is_legal_namespace(namespace):
+            raise WorldError(
+                f'failed to spawn model "{name}", namespace "{namespace}" is not a legal ROS '
+                'name: it must start with a letter and hold only letters, digits, "_" and "/"'
+            )
+        try:
+            return finite_pose(pose)
+        except ValueError as error:
+            raise WorldError(f'failed to spawn model "{name}", {error}') from None
+
+    def _find_to(self, verb: str, name: str) -> Model:
+        try:
+            return self.by_name[name]
+        except KeyError:
+            raise WorldError(
+                f'failed to {verb} model, model with name "{name}" does not exist'
+            ) from None
+
+    def _place(self, model: Model, pose: Pose, if_blocked: IfBlocked, verb: str) -> None:
+        """Puts a model at a pose, or at another one if that is blocked."""
+        chosen = self._placement.choose_pose(model, pose, if_blocked, verb)
+        # The bodies of a new model are already where its file puts them, exactly.
+        if verb == "move" or chosen != pose:
+            model.set_pose(*chosen)
+        model.displacement = (chosen[0] - pose[0], chosen[1] - pose[1])
+
+    def _remove(self, model: Model) -> None:
+        """Removes a complete or incomplete model; other plugins are notified of ended contacts."""
+        self._host.shut_down(model.plugins)
+        for joint in reversed(model.joints):
+            joint.physics.destroy()
+        for body in reversed(model.bodies):
+            body.physics.destroy()
+        with self._requests.hooks():
+            self._contacts.dispatch()
+        self._contacts.remove_bodies(model.bodies)
