@@ -16,7 +16,8 @@ import yaml
 
 import flatland
 from flatland.observer import WorldObserver
-from flatland.plugin_registry import INCLUDED_PACKAGE, PluginRegistry
+from flatland.plugin_manifest import INCLUDED_PACKAGE
+from flatland.plugin_registry import PluginRegistry
 
 from scenes import BEAMS, RANGE, benchmark_world_path  # isort: skip
 from table import Row
