@@ -28,9 +28,11 @@ from flatland.errors import PLUGIN_FAULTS, FlatlandError, PluginError, WorldErro
 from flatland.geometry import Pose, finite_pose
 from flatland.loading.model_loader import ModelLoader
 from flatland.physics import PhysicsWorld
+from flatland.plugin_api.missing_plugins import find_missing, missing_plugins_error
 from flatland.plugin_api.plugin import FlatlandPlugin, ModelPlugin, WorldPlugin, describe
 from flatland.plugin_api.ports import CommandTopic, Output, PortRegistry, is_legal_namespace
 from flatland.plugin_api.registry import PluginRegistry
+from flatland.runtime.frame_senders import FramePair, FrameSenders
 from flatland.runtime.observer import WorldObserver
 from flatland.runtime.plugin_host import PluginHost, initialize
 from flatland.timekeeper import Timekeeper
@@ -41,7 +43,6 @@ PLUGIN_TIMEOUT: Final = 60.0
 _LOCK_PATIENCE: Final = 0.005  # s that a waiting thread sleeps before it looks again
 
 R = TypeVar("R")
-FramePair: TypeAlias = tuple[str, str]
 TransformFields: TypeAlias = tuple[int, float, float, float, float]
 
 
@@ -113,6 +114,7 @@ class World:
         # What transforms are made of: most are never looked at.
         self._transforms: dict[FramePair, TransformFields] = {}
         self._pending_transforms: dict[FramePair, TransformFields] = {}
+        self._frame_senders = FrameSenders()
         self._observers: list[WorldObserver] = []
         self._time_observers: list[WorldObserver] = []
         self._transform_observers: list[WorldObserver] = []
@@ -422,7 +424,9 @@ class World:
             loader.load_bodies_and_joints(checked_pose)
             self._bodies.update((body.physics.id, body) for body in model.bodies)
             self._update_contact_recording()
-            for entry in loader.plugin_entries():
+            entries = loader.plugin_entries()
+            self.require_plugins(entries, name)
+            for entry in entries:
                 self._start_model_plugin(model, entry)
         except BaseException:
             self._remove_model(model)
@@ -494,6 +498,26 @@ class World:
     def plugins(self) -> list[WorldPlugin]:
         """The world plugins in the order of the file."""
         return list(self._host.world_plugins)
+
+    @property
+    def plugin_registry(self) -> PluginRegistry:
+        """The plugin classes that models and the world file can name."""
+        return self._registry
+
+    def require_plugins(self, entries: Iterable[YamlReader], model: str | None) -> None:
+        """Checks that there is a plugin class for each enabled entry of a `plugins` list.
+
+        Args:
+            entries: Of the list.
+            model: Name of the model, None for world plugins.
+
+        Raises:
+            MissingPluginsError: There is none for some of them; the text names all of these.
+            YamlError: An entry has no name or type.
+        """
+        missing = find_missing(self._registry, entries, model)
+        if missing:
+            raise missing_plugins_error(self._registry, missing)
 
     def _start_model_plugin(self, model: Model, entry: YamlReader) -> None:
         name, type_name = entry.get("name", "string"), entry.get("type", "string")
@@ -608,9 +632,17 @@ class World:
         """
         self._pending_transforms[frames] = fields
 
-    def forget_transforms(self, keys: Iterable[FramePair]) -> None:
-        """Drops transforms whose sender is gone."""
+    def register_transform(self, plugin: FlatlandPlugin, frames: FramePair) -> None:
+        """Takes note of the frames that a plugin starts to send; for plugins.
+
+        A child frame that another plugin sends with another parent is logged as a warning.
+        """
+        self._frame_senders.add(plugin, frames)
+
+    def forget_transforms(self, plugin: FlatlandPlugin, keys: Iterable[FramePair]) -> None:
+        """Drops the transforms of a plugin that ended."""
         for key in keys:
+            self._frame_senders.remove(plugin, key)
             self._transforms.pop(key, None)
             self._pending_transforms.pop(key, None)
 

@@ -92,7 +92,7 @@ class FlatlandPlugin:
             self.world.ports.close_command(command)
         self._outputs.clear()
         self._commands.clear()
-        self.world.forget_transforms(self._sent)
+        self.world.forget_transforms(self, self._sent)
         self._sent.clear()
 
     def output(self, topic: str, value_type: builtins.type[T]) -> Output[T]:
@@ -172,8 +172,10 @@ class FlatlandPlugin:
         if self._detached:
             return
         frames = (parent, child)
-        self._sent.add(frames)
         world = self.world
+        if frames not in self._sent:
+            self._sent.add(frames)
+            world.register_transform(self, frames)
         world.post_transform(frames, (world.timekeeper.sim_time_ns, x, y, yaw, roll))
 
     def on_initialize(self, config: YamlReader) -> None:
