@@ -32,6 +32,7 @@ IfBlocked = Literal["allow", "warn", "refuse", "nearest"]
 IF_BLOCKED: Final[tuple[IfBlocked, ...]] = get_args(IfBlocked)
 
 TOLERANCE: Final = 0.005  # m that footprints may penetrate others, as Box2D's solver lets them
+_ROUNDING: Final = 1e-4  # m of overlap that single precision may make of a mere touch
 _FIRST_TRIES: Final = 1024
 _BLOCK: Final = 256  # places that are compared with those taken at once
 _MOST_SPACES: Final = 8
@@ -86,7 +87,9 @@ class Placement:
         if if_blocked == "refuse":
             raise WorldError(f'failed to {verb} model "{model.name}", it {what}')
         offset = nearest_offset(
-            lambda offsets: physics.free_poses(bodies, _poses(offsets + pose[:2], pose[2]))
+            lambda offsets: physics.free_poses(
+                bodies, _poses(offsets + pose[:2], pose[2]), least_gap=-_ROUNDING
+            )
         )
         if offset is None:
             raise WorldError(
