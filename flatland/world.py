@@ -27,13 +27,14 @@ from flatland.entities.model import Model
 from flatland.errors import PLUGIN_FAULTS, FlatlandError, PluginError, WorldError, YamlError
 from flatland.geometry import Pose, finite_pose
 from flatland.loading.model_loader import ModelLoader
-from flatland.physics import PhysicsWorld
+from flatland.physics import PhysicsBody, PhysicsWorld
 from flatland.plugin_api.missing_plugins import find_missing, missing_plugins_error
 from flatland.plugin_api.plugin import FlatlandPlugin, ModelPlugin, WorldPlugin, describe
 from flatland.plugin_api.ports import CommandTopic, Output, PortRegistry, is_legal_namespace
 from flatland.plugin_api.registry import PluginRegistry
 from flatland.runtime.frame_senders import FramePair, FrameSenders
 from flatland.runtime.observer import WorldObserver
+from flatland.runtime.placement import IfBlocked, Models, Placement, check_if_blocked
 from flatland.runtime.plugin_host import PluginHost, initialize
 from flatland.timekeeper import Timekeeper
 from flatland.values import Transform
@@ -111,6 +112,7 @@ class World:
         self._registry = PluginRegistry()
         self._host = PluginHost()
         self._bodies: dict[int, Body] = {}
+        self._placement = Placement(self)
         # What transforms are made of: most are never looked at.
         self._transforms: dict[FramePair, TransformFields] = {}
         self._pending_transforms: dict[FramePair, TransformFields] = {}
@@ -373,6 +375,7 @@ class World:
         name: str,
         namespace: str = "",
         pose: Sequence[float] = (0.0, 0.0, 0.0),
+        if_blocked: IfBlocked = "warn",
     ) -> Model | None:
         """Reads a model file and puts the model into the world.
 
@@ -381,27 +384,44 @@ class World:
             name: Unique in the world.
             namespace: Under which its topics and frames live, may be empty.
             pose: (x, y, theta) in the world frame [m, rad].
+            if_blocked: What to do where a footprint would overlap a wall or another model that it
+                collides with, by more than 5 mm: `allow` does nothing, `warn` logs one line,
+                `refuse` raises, `nearest` takes the closest free place within 5 m with the same
+                heading; `displacement` of the model says how far that is.
 
         Returns:
             The model; None when called from a plugin's hook, as it comes after the step then.
 
         Raises:
-            FlatlandError: It cannot be made; the world is as it was.
+            FlatlandError: It cannot be made, or the pose is blocked; the world is as it was.
+            ValueError: `if_blocked` is none of the four.
         """
         path = os.fspath(yaml_path)
+        check_if_blocked(if_blocked)
         return self._perform(
-            lambda: self._spawn(path, name, namespace, pose), f'spawn of model "{name}"'
+            lambda: self._spawn(path, name, namespace, pose, if_blocked), f'spawn of model "{name}"'
         )
 
-    def move_model(self, name: str, pose: Sequence[float]) -> None:
+    def move_model(
+        self, name: str, pose: Sequence[float], if_blocked: IfBlocked = "warn"
+    ) -> Model | None:
         """Moves a model rigidly so that its first body is at a pose, at rest.
 
-        Called from a plugin's hook it acts after the step.
+        Args:
+            name: Of the model.
+            pose: (x, y, theta) in the world frame [m, rad].
+            if_blocked: As in `spawn_model`.
+
+        Returns:
+            The model; None when called from a plugin's hook, as it moves after the step then.
 
         Raises:
-            WorldError: There is no such model, or the pose is not finite.
+            WorldError: There is no such model, the pose is not finite, or it is blocked; the world
+                is as it was.
+            ValueError: `if_blocked` is none of the four.
         """
-        self._perform(lambda: self._move(name, pose), f'move of model "{name}"')
+        check_if_blocked(if_blocked)
+        return self._perform(lambda: self._move(name, pose, if_blocked), f'move of model "{name}"')
 
     def delete_model(self, name: str) -> None:
         """Takes a model out of the world: plugins first, then joints and bodies.
@@ -413,7 +433,9 @@ class World:
         """
         self._perform(lambda: self._delete(name), f'deletion of model "{name}"')
 
-    def _spawn(self, path: str, name: str, namespace: str, pose: Sequence[float]) -> Model:
+    def _spawn(
+        self, path: str, name: str, namespace: str, pose: Sequence[float], if_blocked: IfBlocked
+    ) -> Model:
         self._check_open()
         checked_pose = self._check_spawn(path, name, namespace, pose)
         path = self.resolve_path(path)
@@ -422,6 +444,7 @@ class World:
         loader = ModelLoader(self._physics, self.collision_filter, model, reader)
         try:
             loader.load_bodies_and_joints(checked_pose)
+            self._place(model, model.pose, if_blocked, "spawn")
             self._bodies.update((body.physics.id, body) for body in model.bodies)
             self._update_contact_recording()
             entries = loader.plugin_entries()
@@ -453,15 +476,24 @@ class World:
         except ValueError as error:
             raise WorldError(f'failed to spawn model "{name}", {error}') from None
 
-    def _move(self, name: str, pose: Sequence[float]) -> None:
+    def _move(self, name: str, pose: Sequence[float], if_blocked: IfBlocked) -> Model:
         self._check_open()
         model = self._find_model(name, "move")
         try:
-            model.set_pose(*finite_pose(pose))
+            self._place(model, finite_pose(pose), if_blocked, "move")
         except ValueError as error:
             raise WorldError(f'failed to move model "{name}", {error}') from None
         for observer in self._observers:
             observer.model_moved(model)
+        return model
+
+    def _place(self, model: Model, pose: Pose, if_blocked: IfBlocked, verb: str) -> None:
+        """Puts a model at a pose, or at another one where that is blocked."""
+        chosen = self._placement.choose_pose(model, pose, if_blocked, verb)
+        # A new model stands where it was made, its bodies exactly as in its file.
+        if verb == "move" or chosen != pose:
+            model.set_pose(*chosen)
+        model.displacement = (chosen[0] - pose[0], chosen[1] - pose[1])
 
     def _delete(self, name: str) -> None:
         self._check_open()
@@ -491,6 +523,96 @@ class World:
         for body in model.bodies:
             self._bodies.pop(body.physics.id, None)
         self._update_contact_recording()
+
+    def is_free(
+        self,
+        pose: Sequence[float],
+        radius: float | None = None,
+        *,
+        model: str | Model | None = None,
+        layers: str | Iterable[str] = "all",
+        clearance: float = 0.0,
+        ignore: Models = (),
+    ) -> bool:
+        """Checks whether a disc, or a model, would overlap nothing at a pose.
+
+        The edges of walls and the solid footprints of models count that it would collide with;
+        overlaps of up to 5 mm do not. Walls are edges without an inside: also the inside of a
+        solid obstacle of a map image is free where no edge is touched.
+
+        Args:
+            pose: (x, y) or (x, y, theta) of the disc's centre, or of the model's first body, in the
+                world frame [m, rad].
+            radius: Of the disc [m]; either this or a model is needed.
+            model: A model of the world, or its name, with its footprints as they stand to each
+                other now; never in its own way.
+            layers: Names of the layers that the disc collides with; a model's footprints have
+                their own.
+            clearance: Distance to keep from all that counts [m].
+            ignore: Models, or their names, that do not count.
+
+        Raises:
+            WorldError: There is no such model or layer, or the world is closed.
+            ValueError: A number is out of range, or not exactly one of radius and model is given.
+        """
+        return self._look(
+            lambda: self._placement.is_free(pose, radius, model, layers, clearance, ignore)
+        )
+
+    def sample_free(
+        self,
+        n: int,
+        radius: float,
+        clearance: float = 0.0,
+        rng: np.random.Generator | int | None = None,
+        *,
+        connected_to: Sequence[float] | None = None,
+        layers: str | Iterable[str] = "all",
+        bounds: Sequence[float] | None = None,
+        ignore: Models = (),
+    ) -> npt.NDArray[np.float64]:
+        """Draws random free poses, for instance to spawn robots at.
+
+        All are at least `clearance` from walls, from models and from each other, within the bounds
+        of the walls. The inside of solid obstacles and closed rooms is free space, too; with
+        `connected_to` only places are drawn that a disc of the radius can reach.
+
+        Args:
+            n: How many.
+            radius: Of the discs that the poses are for [m].
+            clearance: Distance that the discs keep from all that counts [m].
+            rng: Generator or seed; the same one gives the same poses. None for a generator of the
+                world, made from the world's seed.
+            connected_to: A point (x, y) in the world frame [m]. A path of a disc leads from there
+                to each pose without touching a wall; models are not in its way. A passage that is
+                less than a cell of the planner's grid wider than the disc, at most 5 cm on maps of
+                less than 200 m by 200 m, may count as closed.
+            layers: Names of the layers that the discs collide with.
+            bounds: (x_min, y_min, x_max, y_max) of the area to draw from, and of the paths, in the
+                world frame [m]; None for the bounds of the walls.
+            ignore: Models, or their names, that do not count.
+
+        Returns:
+            (x, y, theta) of each [m, rad], theta from -pi to pi, shape (n, 3).
+
+        Raises:
+            WorldError: There are too few free places, the disc does not fit at `connected_to`, no
+                wall bounds the area, there is no such model or layer, or the world is closed.
+            ValueError: A number is out of range.
+        """
+        return self._look(
+            lambda: self._placement.sample_free(
+                n, radius, clearance, rng, connected_to, layers, bounds, ignore
+            )
+        )
+
+    def _look(self, look: Callable[[], R]) -> R:
+        self._check_open()
+        return self.between_steps(look)
+
+    def find_body(self, physics_body: PhysicsBody) -> Body | None:
+        """Returns the body of a model or layer by its physics body, None when it has no owner."""
+        return self._bodies.get(physics_body.id)
 
     # -- plugins ---------------------------------------------------------------------------
 

@@ -146,7 +146,7 @@ class InteractiveMarkers(WorldObserver):
         self._drags.end(name)
         self._forget_shown(name)
         if pose is not None:
-            self._world.move_model(self._models[name].name, pose)
+            self._world.move_model(self._models[name].name, pose, if_blocked="allow")
 
     def _delete(self, feedback: InteractiveMarkerFeedback) -> None:
         self._world.delete_model(self._models[feedback.marker_name].name)

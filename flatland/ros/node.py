@@ -139,7 +139,7 @@ class ServerNode:
         debug_rate = parameters.viz_pub_rate if parameters.show_viz else None
         visualization = Visualization(self._registrar, simulation, debug_rate=debug_rate)
         try:
-            Services(self._registrar, simulation)
+            Services(self._registrar, simulation, parameters.if_blocked)
             if parameters.benchmark_duration is None:
                 simulation.run()
             else:

@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from flatland.runtime.placement import IF_BLOCKED, IfBlocked
 from flatland.timekeeper import GREATEST_STEP, LEAST_STEP
 
 ParameterSource = Callable[[str], object]
@@ -35,6 +36,7 @@ class NodeParameters:
             [s]; None runs for ever.
         plugin_timeout: Wall time that a plugin may take to start [s]; None for as long as it
             likes.
+        if_blocked: What `spawn_model` and `move_model` do at poses that are not free.
     """
 
     world_path: str
@@ -46,6 +48,7 @@ class NodeParameters:
     seed: int | None
     benchmark_duration: float | None
     plugin_timeout: float | None
+    if_blocked: IfBlocked
 
 
 def read_parameters(get: ParameterSource) -> NodeParameters:
@@ -68,6 +71,7 @@ def read_parameters(get: ParameterSource) -> NodeParameters:
         seed=reader.natural("seed"),
         benchmark_duration=reader.optional_positive("benchmark_duration"),
         plugin_timeout=reader.timeout("plugin_timeout", 60.0),
+        if_blocked=reader.if_blocked("if_blocked", "warn"),
     )
 
 
@@ -134,6 +138,15 @@ class _Reader:
         if value not in choices:
             raise _bad(name, wanted, value)
         return value
+
+    def if_blocked(self, name: str, default: IfBlocked) -> IfBlocked:
+        value = self._get(name)
+        if value is None:
+            return default
+        for choice in IF_BLOCKED:
+            if value == choice:
+                return choice
+        raise _bad(name, "one of " + ", ".join(IF_BLOCKED), value)
 
     def natural(self, name: str) -> int | None:
         wanted = "an integer that is not negative"

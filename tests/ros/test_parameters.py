@@ -30,6 +30,7 @@ def test_defaults() -> None:
         seed=None,
         benchmark_duration=None,
         plugin_timeout=PLUGIN_TIMEOUT,
+        if_blocked="warn",
     )
 
 
@@ -58,6 +59,8 @@ def test_defaults() -> None:
         ("plugin_timeout", "0.5", 0.5),
         ("plugin_timeout", math.inf, None),
         ("plugin_timeout", "inf", None),
+        ("if_blocked", "allow", "allow"),
+        ("if_blocked", "nearest", "nearest"),
     ],
 )
 def test_accepted(name: str, value: object, expected: object) -> None:
@@ -99,6 +102,10 @@ def test_refused_numbers(name: str, value: object) -> None:
         ("seed", 1.5),
         ("seed", "a"),
         ("seed", False),
+        ("if_blocked", "stop"),
+        ("if_blocked", ""),
+        ("if_blocked", True),
+        ("if_blocked", ["warn"]),
         ("world_path", 5),
         ("world_path", ["a"]),
     ],
