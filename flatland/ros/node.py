@@ -121,9 +121,9 @@ class ServerNode:
     def _simulate(self, parameters: NodeParameters) -> None:
         """Loads the world and steps it until the node is asked to stop."""
         from flatland.ros.bridge import Bridge
+        from flatland.ros.deferred_topics import Visualization
         from flatland.ros.registrar import Registrar
         from flatland.ros.services import Services
-        from flatland.ros.visualization import Visualization
         from flatland.simulation import Simulation
 
         _warn_of_wall_time()

@@ -6,9 +6,9 @@ from typing import Final
 
 from std_msgs.msg import Bool
 
-from flatland.ros.latched_topic import LatchedTopic
 from flatland.ros.registrar import Registrar
 from flatland.ros.ticker import Ticker
+from flatland.ros.transport.state_topic import LatchedTopic
 from flatland.simulation import Simulation
 
 TOPIC: Final = "~paused"

@@ -12,7 +12,7 @@ from std_srvs.srv import Empty, EmptyResponse
 
 from flatland.errors import FlatlandError
 from flatland.ros.registrar import Registrar
-from flatland.ros.service import Service, wait_for
+from flatland.ros.transport.service import Service, wait_for
 from flatland.simulation import Simulation
 from flatland.srv import (
     DeleteModel,

@@ -9,9 +9,9 @@ from typing import Any, Final
 from visualization_msgs.msg import Marker
 
 from flatland.layer import Layer
-from flatland.ros.marker_geometry import edge_lines, wall_triangles
-from flatland.ros.model_markers import LINE_WIDTH
-from flatland.ros.packed_markers import PackedMarkers
+from flatland.ros.markers.marker_geometry import edge_lines, wall_triangles
+from flatland.ros.markers.model_markers import LINE_WIDTH
+from flatland.ros.markers.packed_markers import PackedMarkers
 
 _LOG = logging.getLogger("flatland")
 

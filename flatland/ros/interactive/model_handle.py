@@ -15,8 +15,8 @@ from flatland.body import Body
 from flatland.geometry import Pose, compose, invert
 from flatland.model import Model
 from flatland.ros.adapters import convert
-from flatland.ros.marker_geometry import Points, outline
-from flatland.ros.packed_markers import FRAME
+from flatland.ros.markers.marker_geometry import Points, outline
+from flatland.ros.markers.packed_markers import FRAME
 
 HANDLE_SIZE: Final = (0.5, 0.5, 0.05)  # m
 HANDLE_COLOR: Final = (0.0, 1.0, 0.0, 0.5)

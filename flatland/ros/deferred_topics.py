@@ -51,12 +51,12 @@ class Visualization:
         """Imports the modules, and starts each part between two steps."""
         try:
             if self._debug_rate is not None:
-                importlib.import_module("flatland.ros.debug_visualization")
-                importlib.import_module("flatland.ros.combined_markers")
+                importlib.import_module("flatland.ros.markers.debug_topics")
+                importlib.import_module("flatland.ros.markers.combined_markers")
                 self._start(self._start_debug_markers, "debug markers")
             importlib.import_module("flatland.ros.pause_topic")
             self._start(self._start_pause_topic, "the pause topic")
-            importlib.import_module("flatland.ros.interactive_markers")
+            importlib.import_module("flatland.ros.interactive.interactive_markers")
             self._start(self._start_interactive_markers, "interactive markers")
         except ImportError as error:
             _LOG.warning("markers are off: %s", error)
@@ -70,8 +70,8 @@ class Visualization:
         self._simulation.post(action).add_done_callback(report)
 
     def _start_debug_markers(self) -> None:
-        from flatland.ros.combined_markers import CombinedMarkers
-        from flatland.ros.debug_visualization import DebugVisualization
+        from flatland.ros.markers.combined_markers import CombinedMarkers
+        from flatland.ros.markers.debug_topics import DebugVisualization
 
         if not self._closed and self._debug_rate is not None:
             for part in (DebugVisualization, CombinedMarkers):
@@ -84,7 +84,7 @@ class Visualization:
             self._parts.append(PauseTopic(self._registrar, self._simulation))
 
     def _start_interactive_markers(self) -> None:
-        from flatland.ros.interactive_markers import InteractiveMarkers
+        from flatland.ros.interactive.interactive_markers import InteractiveMarkers
 
         if not self._closed:
             self._parts.append(InteractiveMarkers(self._registrar, self._simulation))

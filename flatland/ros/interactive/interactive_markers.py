@@ -13,11 +13,11 @@ from flatland.errors import FlatlandError
 from flatland.geometry import Pose, wrap_angle
 from flatland.model import Model
 from flatland.observer import WorldObserver
-from flatland.ros.drag import Drags
-from flatland.ros.marker_server import MarkerServer
-from flatland.ros.model_handle import model_handle, planar_pose, pose_message
+from flatland.ros.interactive.drag import Drags
+from flatland.ros.interactive.marker_server import MarkerServer
+from flatland.ros.interactive.model_handle import model_handle, planar_pose, pose_message
+from flatland.ros.markers.packed_markers import FRAME
 from flatland.ros.names import UniqueNames, sendable_text
-from flatland.ros.packed_markers import FRAME
 from flatland.ros.registrar import Registrar
 from flatland.ros.ticker import Ticker
 from flatland.simulation import Simulation

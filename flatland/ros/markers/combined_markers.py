@@ -16,12 +16,12 @@ from visualization_msgs.msg import MarkerArray
 from flatland.layer import Layer
 from flatland.model import Model
 from flatland.observer import WorldObserver
-from flatland.ros.latched_topic import LatchedTopic
-from flatland.ros.layer_markers import LayerMarkers
-from flatland.ros.model_markers import ModelMarkers
-from flatland.ros.packed_markers import JoinedMarkers, PackedMarkers
+from flatland.ros.markers.layer_markers import LayerMarkers
+from flatland.ros.markers.model_markers import ModelMarkers
+from flatland.ros.markers.packed_markers import JoinedMarkers, PackedMarkers
 from flatland.ros.registrar import Registrar
 from flatland.ros.ticker import Ticker
+from flatland.ros.transport.state_topic import LatchedTopic
 from flatland.simulation import Simulation
 
 LAYERS: Final = "~debug/all_layers"

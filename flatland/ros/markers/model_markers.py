@@ -9,7 +9,7 @@ from visualization_msgs.msg import Marker
 from flatland.body import Body, Color
 from flatland.joint import Joint
 from flatland.model import Model
-from flatland.ros.marker_geometry import (
+from flatland.ros.markers.marker_geometry import (
     CIRCLE_HEIGHT,
     Footprint,
     closed_strip,
@@ -17,7 +17,7 @@ from flatland.ros.marker_geometry import (
     joint_lines,
     joint_points,
 )
-from flatland.ros.packed_markers import PackedMarkers
+from flatland.ros.markers.packed_markers import PackedMarkers
 
 LINE_WIDTH: Final = (0.03, 0.0, 0.0)
 JOINT_LINE_WIDTH: Final = (0.01, 0.0, 0.0)

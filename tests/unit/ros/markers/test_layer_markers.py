@@ -14,7 +14,7 @@ pytest.importorskip("visualization_msgs", reason="ROS is not installed")
 
 from flatland.layer import Layer
 from flatland.physics import PhysicsWorld
-from flatland.ros.layer_markers import LayerMarkers
+from flatland.ros.markers.layer_markers import LayerMarkers
 
 
 def make_layer(properties: dict[str, Any], edges: np.ndarray | None = None) -> Layer:

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import flatland
-from flatland.scene import look_at
+from flatland.drawing.capture import look_at
 
 ROOM = ["##########", *["#........#"] * 8, "##########"]  # 1 m cells: walls at x, y = 1 and 9
 

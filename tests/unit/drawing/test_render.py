@@ -13,7 +13,8 @@ import numpy as np
 import pytest
 
 import flatland
-from flatland import drawing, scene
+from flatland import drawing
+from flatland.drawing import capture, render
 
 ROOM = ["##########", *["#........#"] * 8, "##########"]  # 1 m cells: walls at x, y = 1 and 9
 FLOOR = (251, 251, 249)
@@ -256,9 +257,9 @@ class TestThreads:
 
         def look_at(*arguments: Any) -> Any:
             inside_a_step.append(world._stepping_thread is not None)
-            return scene.look_at(*arguments)
+            return capture.look_at(*arguments)
 
-        monkeypatch.setattr(drawing, "look_at", look_at)
+        monkeypatch.setattr(render, "look_at", look_at)
         pictures: list[Any] = []
         failures: list[BaseException] = []
 

@@ -14,7 +14,7 @@ from geometry_msgs.msg import Point, Vector3
 from std_msgs.msg import ColorRGBA
 from visualization_msgs.msg import Marker, MarkerArray
 
-from flatland.ros.packed_markers import PackedMarkers
+from flatland.ros.markers.packed_markers import PackedMarkers
 
 POINTS = np.array([[1.5, -2.5, 3.5], [0.1, 0.2, 0.3]])
 COLOR = (0.25, 0.5, 0.75, 1.0)

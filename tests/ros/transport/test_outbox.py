@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 from rospy.exceptions import TransportTerminated
 
-from flatland.ros.outbox import Outbox
+from flatland.ros.transport.outbox import Outbox
 
 
 class Transport:

@@ -17,11 +17,11 @@ from visualization_msgs.msg import (
 )
 
 from flatland.geometry import Pose
-from flatland.ros.latched_topic import LatchedTopic
-from flatland.ros.model_handle import pose_message
+from flatland.ros.interactive.model_handle import pose_message
 from flatland.ros.publisher import Publisher
 from flatland.ros.registrar import Registrar
-from flatland.ros.subscriber import Subscriber
+from flatland.ros.transport.state_topic import LatchedTopic
+from flatland.ros.transport.subscriber import Subscriber
 
 _UPDATE_QUEUE: Final = 100  # messages; a client that misses one starts anew
 

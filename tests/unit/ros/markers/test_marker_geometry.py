@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from flatland.ros.marker_geometry import (
+from flatland.ros.markers.marker_geometry import (
     closed_strip,
     edge_lines,
     flat,

@@ -11,8 +11,8 @@ import pytest
 from std_msgs.msg import Int32
 
 from flatland.errors import FlatlandError
-from flatland.ros.latched_topic import LatchedTopic
 from flatland.ros.registrar import Registrar
+from flatland.ros.transport.state_topic import LatchedTopic
 
 TOPIC = "/flatland_tests/state"
 PATIENCE = 10.0

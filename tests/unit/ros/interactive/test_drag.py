@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import pytest
 
 import flatland
-from flatland.ros.drag import LONGEST_SILENCE, Drags
+from flatland.ros.interactive.drag import LONGEST_SILENCE, Drags
 
 POSE = (1.0, 2.0, 3.0)
 

@@ -11,12 +11,12 @@ from matplotlib.figure import Figure
 from matplotlib.patheffects import withStroke
 
 from flatland.body import Color
+from flatland.drawing.capture import Scene, Sweep
 from flatland.geometry import Pose, compose
-from flatland.scene import Scene, Sweep
 from flatland.values import DoubleArray
 
 if TYPE_CHECKING:
-    from flatland.drawing import Layout
+    from flatland.drawing.layout import Layout
 
 _PAPER, _FLOOR, _GRID, _FRAME, _INK = "#ffffff", "#fbfbf9", "#ebebe6", "#c8c8c0", "#4a4a46"
 _BEAMS: Final = ("#e0392b", "#0f8b8d", "#8e44ad", "#d68910", "#2471a3", "#c2185b", "#558b2f")
