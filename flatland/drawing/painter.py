@@ -1,4 +1,4 @@
-"""Paints a scene with matplotlib; the only module that imports it."""
+"""Draws a scene with matplotlib; the only module that imports matplotlib."""
 
 from __future__ import annotations
 
@@ -11,85 +11,88 @@ from matplotlib.figure import Figure
 from matplotlib.patheffects import withStroke
 
 from flatland.body import Color
-from flatland.drawing.capture import Scene, Sweep
-from flatland.geometry import Pose, compose
+from flatland.drawing.capture import ScanDrawing, Scene
+from flatland.geometry import Pose, transform_points
 from flatland.values import DoubleArray
 
 if TYPE_CHECKING:
     from flatland.drawing.layout import Layout
 
 _PAPER, _FLOOR, _GRID, _FRAME, _INK = "#ffffff", "#fbfbf9", "#ebebe6", "#c8c8c0", "#4a4a46"
-_BEAMS: Final = ("#e0392b", "#0f8b8d", "#8e44ad", "#d68910", "#2471a3", "#c2185b", "#558b2f")
-_FILLING: Final = 0.6  # opacity of a footprint, times its colour's own
-_HEADING: Final = 0.4  # length of the triangle that points ahead, of the body's breadth
-_BRIGHTEST: Final = 0.5  # luminance that still shows on the floor
-_WALL: Final = 1.44  # points: 2 pixels at 100 dpi, so that straight walls are crisp
-_SMALLEST: Final = 0.08  # inches; a model smaller than that is shown by a triangle of that size
+_SCAN_COLORS: Final = ("#e0392b", "#0f8b8d", "#8e44ad", "#d68910", "#2471a3", "#c2185b", "#558b2f")
+_FILL_OPACITY: Final = 0.6  # of a footprint, multiplied by the opacity of its colour
+_HEADING_LENGTH: Final = 0.4  # of the heading triangle, as a fraction of the model's width
+_MAX_LUMINANCE: Final = 0.5  # of a colour that is visible on the floor
+_WALL_WIDTH: Final = 1.44  # points: 2 pixels at 100 dpi, so that straight walls are crisp
+_MIN_MODEL_SIZE: Final = 0.08  # inches; a smaller model is drawn as a triangle of this size
 
-# From below to above; the grid is below them all.
-_SWEEPS, _WALLS, _HITS, _MODELS, _JOINTS, _HEADINGS, _NAMES = range(1, 8)
+# z-orders, from bottom to top; the grid is below all of them.
+_SCANS, _WALLS, _HITS, _MODELS, _JOINTS, _HEADINGS, _NAMES = range(1, 8)
 
 
 def paint(scene: Scene, layout: Layout, dpi: float, names: bool) -> Figure:
-    """Paints a scene.
+    """Draws a scene into a new figure.
 
     Args:
-        scene: What to paint.
-        layout: Where it goes.
-        dpi: Pixels an inch, which lines and letters scale with.
-        names: Whether to write the models' names beside them.
+        scene: Contents of the image.
+        layout: Placement of the scene in the image.
+        dpi: Pixels per inch; scales lines and text.
+        names: Whether to write the name of each model above it.
     """
     columns, rows = layout.size
-    # matplotlib cuts off what is behind the point, and 29 / 100 * 100 is less than 29.
+    # matplotlib truncates the size in pixels, and 29 / 100 * 100 is less than 29.
     inches = ((columns + 1e-3) / dpi, (rows + 1e-3) / dpi)
     figure = Figure(figsize=inches, dpi=dpi, facecolor=_PAPER)
     FigureCanvasAgg(figure)
-    left, below, width, height = layout.frame
+    left, bottom, width, height = layout.frame
     axes = figure.add_axes(
-        (left / columns, below / rows, width / columns, height / rows), facecolor=_FLOOR
+        (left / columns, bottom / rows, width / columns, height / rows), facecolor=_FLOOR
     )
     x_min, y_min, x_max, y_max = layout.view
     axes.set(xlim=(x_min, x_max), ylim=(y_min, y_max), autoscale_on=False)
     _paint_axes(axes, layout.has_axes)
-    for i, sweep in enumerate(scene.sweeps):
-        _paint_sweep(axes, sweep, _BEAMS[i % len(_BEAMS)])
-    for walls in scene.walls:
+    for i, scan in enumerate(scene.scans):
+        _paint_scan(axes, scan, _SCAN_COLORS[i % len(_SCAN_COLORS)])
+    for layer in scene.layers:
         lines = LineCollection(
-            walls.edges, colors=[_shown(walls.color)], linewidths=_WALL, capstyle="projecting"
+            layer.edges,
+            colors=[_visible(layer.color)],
+            linewidths=_WALL_WIDTH,
+            capstyle="projecting",
         )
         _add(axes, lines, _WALLS)
     _paint_footprints(axes, scene)
     _paint_joints(axes, scene)
-    _paint_headings(axes, scene, smallest=_SMALLEST * dpi / layout.scale)
+    _paint_headings(axes, scene, min_size=_MIN_MODEL_SIZE * dpi / layout.scale)
     if names:
         _paint_names(axes, scene)
     return figure
 
 
-def _add(axes: Any, collection: Collection, level: int) -> None:
-    collection.set_zorder(level)
+def _add(axes: Any, collection: Collection, zorder: int) -> None:
+    collection.set_zorder(zorder)
     axes.add_collection(collection, autolim=False)
 
 
 # -- colours -------------------------------------------------------------------------------
 
 
-def _shown(color: Color) -> Color:
-    """Darkens a colour that would not show on the floor; white is what files have by default."""
+def _visible(color: Color) -> Color:
+    """Darkens a colour that is too bright for the floor, such as white, the default of files."""
     r, g, b, a = (min(max(part, 0.0), 1.0) for part in color)
     luminance = 0.2126 * r + 0.7152 * g + 0.0722 * b
-    factor = _BRIGHTEST / max(luminance, _BRIGHTEST)
+    factor = _MAX_LUMINANCE / max(luminance, _MAX_LUMINANCE)
     return (r * factor, g * factor, b * factor, a)
 
 
-def _filling(color: Color) -> Color:
-    r, g, b, a = _shown(color)
-    return (r, g, b, a * _FILLING)
+def _fill(color: Color) -> Color:
+    r, g, b, a = _visible(color)
+    return (r, g, b, a * _FILL_OPACITY)
 
 
 def _stroke(color: Color) -> Color:
-    """Returns the colour of an outline; what is meant to be invisible has none."""
-    r, g, b, a = _shown(color)
+    """Returns the colour of an outline, transparent for a fully transparent colour."""
+    r, g, b, a = _visible(color)
     return (0.55 * r, 0.55 * g, 0.55 * b, 1.0 if a else 0.0)
 
 
@@ -107,11 +110,11 @@ def _paint_axes(axes: Any, visible: bool) -> None:
         axis.set_visible(visible)  # ticks, labels and grid
 
 
-def _paint_sweep(axes: Any, sweep: Sweep, color: str) -> None:
-    area = PolyCollection([sweep.area], facecolors=color, alpha=0.07, linewidths=0)
-    _add(axes, area, _SWEEPS)
+def _paint_scan(axes: Any, scan: ScanDrawing, color: str) -> None:
+    area = PolyCollection([scan.area], facecolors=color, alpha=0.07, linewidths=0)
+    _add(axes, area, _SCANS)
     axes.plot(
-        *sweep.hits.T,
+        *scan.hits.T,
         linestyle="none",
         marker="o",
         markersize=2.4,
@@ -122,13 +125,13 @@ def _paint_sweep(axes: Any, sweep: Sweep, color: str) -> None:
 
 
 def _paint_footprints(axes: Any, scene: Scene) -> None:
-    outlines = [outline for model in scene.figurines for outline in model.outlines]
+    outlines = [outline for model in scene.models for outline in model.outlines]
     for is_sensor in (False, True):
-        some = [outline for outline in outlines if outline.is_sensor == is_sensor]
+        selected = [outline for outline in outlines if outline.is_sensor == is_sensor]
         footprints = PolyCollection(
-            [outline.points for outline in some],
-            facecolors=["none" if is_sensor else _filling(outline.color) for outline in some],
-            edgecolors=[_stroke(outline.color) for outline in some],
+            [outline.points for outline in selected],
+            facecolors=["none" if is_sensor else _fill(outline.color) for outline in selected],
+            edgecolors=[_stroke(outline.color) for outline in selected],
             linewidths=0.9,
             linestyles="dashed" if is_sensor else "solid",
         )
@@ -136,45 +139,44 @@ def _paint_footprints(axes: Any, scene: Scene) -> None:
 
 
 def _paint_joints(axes: Any, scene: Scene) -> None:
-    if not scene.links:
+    if not scene.joints:
         return
-    colors = [_shown(link.color) for link in scene.links]
-    points = [link.points for link in scene.links]
+    colors = [_visible(joint.color) for joint in scene.joints]
+    points = [joint.points for joint in scene.joints]
     _add(axes, LineCollection(points, colors=colors, linewidths=1.0), _JOINTS)
-    anchors = np.concatenate([link[1:3] for link in points])
+    anchors = np.concatenate([joint[1:3] for joint in points])
     axes.scatter(
         *anchors.T, s=6, c=np.repeat(np.array(colors), 2, axis=0), linewidths=0, zorder=_JOINTS
     )
 
 
-def _paint_headings(axes: Any, scene: Scene, smallest: float) -> None:
+def _paint_headings(axes: Any, scene: Scene, min_size: float) -> None:
     arrows, colors = [], []
-    for model in scene.figurines:
-        box = model.box()
-        if model.middle is None or box is None:
+    for model in scene.models:
+        bounds = model.bounds()
+        if model.center is None or bounds is None:
             continue
-        is_tiny = max(box[2] - box[0], box[3] - box[1]) < smallest
-        length = smallest if is_tiny else _HEADING * model.breadth
-        arrows.append(_arrow(model.middle, length))
+        is_tiny = max(bounds[2] - bounds[0], bounds[3] - bounds[1]) < min_size
+        length = min_size if is_tiny else _HEADING_LENGTH * model.width
+        arrows.append(_arrow(model.center, length))
         colors.append(_stroke(model.color))
     _add(axes, PolyCollection(arrows, facecolors=colors, linewidths=0), _HEADINGS)
 
 
-def _arrow(middle: Pose, length: float) -> DoubleArray:
-    """Returns the corners of a triangle that points ahead, shape (3, 2)."""
-    # Longer than wide: which corner is the foremost one is to be seen at any heading.
-    corners = [(0.6, 0.0), (-0.4, 0.3), (-0.4, -0.3)]
-    return np.array([compose(middle, (length * x, length * y, 0.0))[:2] for x, y in corners])
+def _arrow(pose: Pose, length: float) -> DoubleArray:
+    """Returns the vertices of a triangle that points along the x axis of a pose, shape (3, 2)."""
+    # Longer than wide, so that the tip can be told from the other vertices.
+    return transform_points(pose, length * np.array([(0.6, 0.0), (-0.4, 0.3), (-0.4, -0.3)]))
 
 
 def _paint_names(axes: Any, scene: Scene) -> None:
-    for model in scene.figurines:
-        box = model.box()
-        if box is None:
+    for model in scene.models:
+        bounds = model.bounds()
+        if bounds is None:
             continue
         axes.annotate(
             model.name,
-            ((box[0] + box[2]) / 2, box[3]),
+            ((bounds[0] + bounds[2]) / 2, bounds[3]),
             xytext=(0, 4),
             textcoords="offset points",
             horizontalalignment="center",

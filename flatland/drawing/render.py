@@ -1,7 +1,6 @@
-"""Pictures of a world without ROS: map, models, joints and what the lasers see, by matplotlib.
+"""Public functions that draw a world: as an array, as a matplotlib figure, or to a file.
 
-matplotlib is needed only here, and only once something is drawn. Nothing of its global state is
-used (no pyplot), and drawing changes nothing in the world.
+matplotlib is imported when the first image is drawn. Its global state (pyplot) is not used.
 """
 
 from __future__ import annotations
@@ -16,8 +15,8 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 import numpy.typing as npt
 
-from flatland.drawing.capture import look_at
-from flatland.drawing.layout import Layout, checked_view, whole_view
+from flatland.drawing.capture import capture_scene
+from flatland.drawing.layout import Layout, checked_view, default_view
 from flatland.errors import FlatlandError
 
 if TYPE_CHECKING:
@@ -25,8 +24,8 @@ if TYPE_CHECKING:
 
 PICTURE_FORMATS: Final = (".png", ".pdf", ".svg")
 
-# matplotlib shares its fonts between figures, and they are not made for threads.
-_DRAWING = threading.Lock()
+# matplotlib shares its font cache between figures, and the cache is not thread-safe.
+_MATPLOTLIB_LOCK = threading.Lock()
 
 
 def draw(
@@ -40,32 +39,34 @@ def draw(
     names: bool = False,
     axes: bool = True,
 ) -> npt.NDArray[np.uint8]:
-    """Draws a world as it is now.
+    """Draws the current state of a world.
 
-    Walls have the colour of their layer and footprints that of their body (darkened where it would
-    not show on white), sensors are dashed, a triangle says where a model heads. Each laser shows
-    its latest scan, or, where none of now was emitted, what it sees without noise. The same world
-    and options give the same picture. May be called from any thread and from a plugin's hooks.
+    Walls are drawn in the colour of their layer and footprints in the colour of their body; bright
+    colours are darkened to be visible on white. Sensors are dashed, and a triangle shows the
+    heading of each model. Each laser is shown with its last scan, or, if it has not scanned yet,
+    with an exact scan from its current pose.
+
+    Does not modify the world. The same world and options give the same image. May be called from
+    any thread and from the hooks of a plugin.
 
     Args:
-        world: The world; it stays exactly as it is.
-        size: (width, height) of the picture [pixels]; None for as much as the view takes of
-            13 x 9 inches.
-        dpi: Pixels an inch, which lines and letters scale with.
-        view: (x_min, y_min, x_max, y_max) to be seen at least, world frame [m]; None for all
-            walls and models. It grows to the shape of the picture: a metre is as long along x
-            as along y.
-        layers: Names of the layers to draw, None for all. Models are drawn in any case.
-        scans: Whether to draw what the lasers see.
-        names: Whether to write the models' names beside them.
-        axes: Whether to draw axes in metres; without, the view fills the picture to its rim.
+        world: The world to draw.
+        size: (width, height) of the image [pixels]; None fits the view into 13 x 9 inches.
+        dpi: Pixels per inch; scales lines and text.
+        view: (x_min, y_min, x_max, y_max) of the area to show, world frame [m]; None shows all
+            walls and models. The area is extended to the aspect ratio of the image, so that the
+            scale is the same along x and y.
+        layers: Names of the layers to draw, None for all. Models are always drawn.
+        scans: Whether to draw laser scans.
+        names: Whether to write the name of each model above it.
+        axes: Whether to draw axes in metres; without axes, the view fills the whole image.
 
     Returns:
-        Red, green and blue of each pixel, the top row first, shape (height, width, 3).
+        RGB image, top row first, shape (height, width, 3).
 
     Raises:
-        FlatlandError: The world is closed, a layer is unknown, or matplotlib is missing.
-        ValueError: `size`, `dpi`, `view` or `layers` is not as it must be.
+        FlatlandError: The world is closed, a layer does not exist, or matplotlib is missing.
+        ValueError: `size`, `dpi`, `view` or `layers` is invalid.
     """
     figure = make_figure(
         world,
@@ -77,7 +78,7 @@ def draw(
         names=names,
         axes=axes,
     )
-    with _DRAWING:
+    with _MATPLOTLIB_LOCK:
         figure.canvas.draw()
         pixels = np.asarray(figure.canvas.buffer_rgba())
     return np.ascontiguousarray(pixels[:, :, :3])
@@ -94,26 +95,26 @@ def make_figure(
     names: bool = False,
     axes: bool = True,
 ) -> Any:
-    """Draws a world into a matplotlib figure, to draw more into or to save as PDF or SVG.
+    """Draws a world into a matplotlib figure that can be extended and saved.
 
-    `figure.axes[0]` is in metres of the world frame, `figure.savefig(path)` writes a file.
+    The units of `figure.axes[0]` are metres in the world frame.
 
     Args:
-        world: The world; it stays exactly as it is.
-        size: As for `draw`.
-        dpi: As for `draw`.
-        view: As for `draw`.
-        layers: As for `draw`.
-        scans: As for `draw`.
-        names: As for `draw`.
-        axes: As for `draw`.
+        world: The world to draw.
+        size: See `draw`.
+        dpi: See `draw`.
+        view: See `draw`.
+        layers: See `draw`.
+        scans: See `draw`.
+        names: See `draw`.
+        axes: See `draw`.
 
     Returns:
-        A `matplotlib.figure.Figure` on an Agg canvas, unknown to pyplot.
+        A `matplotlib.figure.Figure` on an Agg canvas, not registered with pyplot.
 
     Raises:
-        FlatlandError: The world is closed, a layer is unknown, or matplotlib is missing.
-        ValueError: `size`, `dpi`, `view` or `layers` is not as it must be.
+        FlatlandError: The world is closed, a layer does not exist, or matplotlib is missing.
+        ValueError: `size`, `dpi`, `view` or `layers` is invalid.
     """
     check_matplotlib()
     from flatland.drawing.painter import paint
@@ -122,31 +123,58 @@ def make_figure(
         raise ValueError(f"dpi must be from 10 to 2400, got {dpi}")
     if isinstance(layers, str):
         raise ValueError(f"layers must be a list of names, got {layers!r}")
-    wanted = None if view is None else checked_view(view)
-    scene = world.between_steps(lambda: look_at(world, layers, scans))
-    layout = Layout.make(size, dpi, wanted or whole_view(scene), axes)
-    with _DRAWING:
+    bounds = None if view is None else checked_view(view)
+    scene = world.between_steps(lambda: capture_scene(world, layers, scans))
+    layout = Layout.make(size, dpi, bounds or default_view(scene), axes)
+    with _MATPLOTLIB_LOCK:
         return paint(scene, layout, dpi, names)
 
 
-def save(world: World, path: str | os.PathLike[str], **options: Any) -> None:
-    """Draws a world into a file; one that is there is overwritten.
+def save(
+    world: World,
+    path: str | os.PathLike[str],
+    *,
+    size: tuple[int, int] | None = None,
+    dpi: float = 100.0,
+    view: Sequence[float] | None = None,
+    layers: Iterable[str] | None = None,
+    scans: bool = True,
+    names: bool = False,
+    axes: bool = True,
+) -> None:
+    """Draws a world to a file, overwriting an existing one.
 
     Args:
-        world: The world; it stays exactly as it is.
-        path: Ends with one of `PICTURE_FORMATS`; in PDF and SVG lines stay lines.
-        **options: As for `draw`.
+        world: The world to draw.
+        path: File name with one of the extensions in `PICTURE_FORMATS`; PDF and SVG are vector
+            graphics.
+        size: See `draw`.
+        dpi: See `draw`.
+        view: See `draw`.
+        layers: See `draw`.
+        scans: See `draw`.
+        names: See `draw`.
+        axes: See `draw`.
 
     Raises:
-        FlatlandError: The world is closed, a layer is unknown, or matplotlib is missing.
+        FlatlandError: The world is closed, a layer does not exist, or matplotlib is missing.
         OSError: The file cannot be written.
-        ValueError: The path ends otherwise, or an option is out of its range.
+        ValueError: The extension is unknown, or `size`, `dpi`, `view` or `layers` is invalid.
     """
     suffix = Path(path).suffix.lower()
     if suffix not in PICTURE_FORMATS:
         raise ValueError(f"path must end with one of {', '.join(PICTURE_FORMATS)}, got {path!r}")
-    figure = make_figure(world, **options)
-    with _DRAWING:
+    figure = make_figure(
+        world,
+        size=size,
+        dpi=dpi,
+        view=view,
+        layers=layers,
+        scans=scans,
+        names=names,
+        axes=axes,
+    )
+    with _MATPLOTLIB_LOCK:
         if suffix == ".png":
             figure.canvas.print_png(path)
         else:
@@ -154,10 +182,10 @@ def save(world: World, path: str | os.PathLike[str], **options: Any) -> None:
 
 
 def check_matplotlib() -> None:
-    """Finds out whether pictures can be drawn.
+    """Checks that matplotlib can be imported.
 
     Raises:
-        FlatlandError: matplotlib is missing or does not work.
+        FlatlandError: matplotlib is missing or broken.
     """
     try:
         import flatland.drawing.painter  # noqa: F401
