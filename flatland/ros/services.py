@@ -11,6 +11,7 @@ import rospy
 from std_srvs.srv import Empty, EmptyResponse
 
 from flatland.errors import FlatlandError
+from flatland.ros.names import sendable_text
 from flatland.ros.registrar import Registrar
 from flatland.ros.transport.service import Service, wait_for
 from flatland.simulation import Simulation
@@ -113,17 +114,12 @@ class Services:
             self._registrar.flush(_REGISTRATION_PATIENCE)
         except (FlatlandError, rospy.ServiceException) as error:
             self._registrar.flush(_REGISTRATION_PATIENCE)
-            return False, _sendable(str(error))
+            return False, sendable_text(str(error))
         except Exception as error:
             _LOG.exception("a service call failed in an unforeseen way")
-            return False, _sendable(f"{type(error).__name__}: {error}")
+            return False, sendable_text(f"{type(error).__name__}: {error}")
         return True, ""
 
 
 def _pose(pose: Any) -> tuple[float, float, float]:
     return (pose.x, pose.y, pose.theta)
-
-
-def _sendable(text: str) -> str:
-    """Replaces what UTF-8 cannot hold, such as parts of a file name that is none."""
-    return text.encode("utf-8", "replace").decode()

@@ -1,4 +1,4 @@
-"""Drags of interactive markers, and the pause of the world while they last."""
+"""Drags of interactive markers, which pause the world."""
 
 from __future__ import annotations
 
@@ -8,73 +8,82 @@ from typing import Final
 from flatland.geometry import Pose
 from flatland.world import World
 
-LONGEST_SILENCE: Final = 0.1  # s of wall time after which a drag that sends nothing is over
+DRAG_TIMEOUT: Final = 0.1  # s of wall time without feedback after which a drag ends
 
 
 @dataclass(slots=True)
 class Drag:
-    """One marker in the hands of one client.
+    """A drag of one marker by one client.
 
     Attributes:
-        client: Who drags.
-        heard: When the client was last heard of, time of `time.monotonic` [s].
-        pose: Where the marker is.
+        client: Id of the client.
+        last_feedback: Time of the last feedback of the client (`time.monotonic`) [s].
+        pose: Current pose of the marker.
     """
 
     client: str
-    heard: float
+    last_feedback: float
     pose: Pose
 
 
 class Drags:
-    """All drags of a world, which is paused while there are any.
+    """Active drags of a world, which is paused while there are any.
 
-    The world runs on afterwards, unless it was paused before, or somebody resumed and paused it
-    meanwhile.
+    When the last drag ends, the world is resumed, unless it was already paused before the first
+    drag, or was resumed and paused again in the meantime.
     """
 
     def __init__(self, world: World) -> None:
-        """Has no drag.
+        """Creates an empty set of drags.
 
         Args:
-            world: To be paused.
+            world: World to pause.
         """
         self._world = world
         self._drags: dict[str, Drag] = {}
         self._paused_here = False
 
     def __bool__(self) -> bool:
-        """Tells whether anything is dragged."""
+        """Returns whether there are active drags."""
         return bool(self._drags)
 
     def get(self, name: str) -> Drag | None:
-        """Returns the drag of a marker, None when nobody drags it."""
+        """Returns the drag of a marker, or None."""
         return self._drags.get(name)
 
     def hold(self, name: str, client: str, now: float, pose: Pose) -> None:
-        """Begins the drag of a marker, or goes on with it."""
-        self._look()
+        """Starts or continues the drag of a marker.
+
+        Args:
+            name: Name of the marker.
+            client: Id of the client.
+            now: Time of the feedback (`time.monotonic`) [s].
+            pose: Pose of the marker.
+        """
+        self._check_pause()
         if not self._drags and not self._world.paused:
             self._world.pause()
             self._paused_here = True
         self._drags[name] = Drag(client, now, pose)
 
     def end(self, name: str) -> None:
-        """Ends the drag of a marker, if there is one."""
-        self._look()
+        """Ends the drag of a marker, if any."""
+        self._check_pause()
         if self._drags.pop(name, None) and not self._drags and self._paused_here:
             self._paused_here = False
             self._world.resume()
 
-    def end_silent(self, now: float) -> list[str]:
-        """Ends the drags that send nothing any more; returns their markers."""
-        self._look()
-        silent = [name for name, drag in self._drags.items() if now - drag.heard > LONGEST_SILENCE]
-        for name in silent:
+    def end_stale(self, now: float) -> list[str]:
+        """Ends the drags that have timed out; returns the names of their markers."""
+        self._check_pause()
+        stale = [
+            name for name, drag in self._drags.items() if now - drag.last_feedback > DRAG_TIMEOUT
+        ]
+        for name in stale:
             self.end(name)
-        return silent
+        return stale
 
-    def _look(self) -> None:
-        # Whoever resumes a world that is dragged in decides from then on.
+    def _check_pause(self) -> None:
+        # The world was resumed during a drag, so that a later pause is independent of drags.
         if not self._world.paused:
             self._paused_here = False

@@ -1,4 +1,4 @@
-"""Interactive markers: take hold of models in RViz, move, turn and delete them."""
+"""Interactive markers that move, rotate and delete models in RViz."""
 
 from __future__ import annotations
 
@@ -25,29 +25,29 @@ from flatland.simulation import Simulation
 _LOG = logging.getLogger("flatland")
 
 SERVER_NAME: Final = "interactive_model_markers"
-UPDATE_RATE: Final = 30.0  # Hz of wall time
-KEEP_ALIVE_PERIOD: Final = 0.5  # s of wall time
-_SMALLEST_MOVE: Final = 1e-4  # m and rad; less is not worth a message
+UPDATE_RATE: Final = 30.0  # Hz, wall time
+KEEP_ALIVE_PERIOD: Final = 0.5  # s, wall time
+_MIN_MOVE: Final = 1e-4  # m and rad; smaller changes are not published
 
 
 class InteractiveMarkers(WorldObserver):
-    """Offers an interactive marker for each model.
+    """Publishes an interactive marker for each model.
 
-    Changes go out at most 30 times a second of wall time, and only to clients that are there.
+    Updates are published at most 30 times per second of wall time, and only if there are clients.
     """
 
     def __init__(self, registrar: Registrar, simulation: Simulation) -> None:
-        """Makes the markers of the models, now and from now on; between two steps.
+        """Advertises the topics asynchronously; must be called between two steps.
 
         Args:
-            registrar: Talks to the ROS master.
-            simulation: Whose models to offer.
+            registrar: Registers the topics with the ROS master.
+            simulation: Simulation of the world.
         """
         self._world = simulation.world
         self._closed = False
         self._names = UniqueNames()
-        self._models: dict[str, Model] = {}  # by marker
-        self._shown: dict[str, Pose] = {}  # what the clients know
+        self._models: dict[str, Model] = {}  # by marker name
+        self._published: dict[str, Pose] = {}  # last published pose of each marker
         self._drags = Drags(self._world)
         self._keep_alive_due = 0.0
         self._menu = MenuHandler()
@@ -59,56 +59,56 @@ class InteractiveMarkers(WorldObserver):
             simulation.post,
             pose_of=self._pose_of,
             receive=self._receive,
-            on_connection=self._greet,
+            on_connection=self._on_connection,
         )
         for model in self._world.models:
             self.model_added(model)
         self._world.add_observer(self)
 
     def close(self) -> None:
-        """Leaves topics and world alone from now on."""
+        """Stops publishing and ignores further feedback."""
         self._closed = True
         self._ticker.close()
 
-    # -- what happens in the world ---------------------------------------------------------
+    # -- events of the world ---------------------------------------------------------------
 
     def model_added(self, model: Model) -> None:
-        """Offers a marker for a model."""
+        """Adds the marker of a model."""
         if self._closed:
             return
         name = self._names.claim(sendable_text(model.name))
         self._models[name] = model
-        self._shown[name] = model.pose
+        self._published[name] = model.pose
         self._server.insert(model_handle(model, name))
         self._menu.apply(self._server, name)
-        self._apply_unless_watched()
+        self._apply_without_clients()
 
     def model_removed(self, model: Model) -> None:
-        """Takes a model's marker away."""
+        """Removes the marker of a model."""
         name = next((name for name, other in self._models.items() if other is model), None)
         if name is None or self._closed:
             return
         self._drags.end(name)
         self._names.release(name)
-        del self._models[name], self._shown[name]
+        del self._models[name], self._published[name]
         self._server.erase(name)
-        self._apply_unless_watched()
+        self._apply_without_clients()
 
-    def _apply_unless_watched(self) -> None:
-        # While nobody listens there is nothing to send, and nobody to send too often to.
+    def _apply_without_clients(self) -> None:
+        # Without clients nothing is published, so that the update rate does not matter.
         if not self._server.connected:
             self._server.applyChanges()
 
-    # -- what clients do -------------------------------------------------------------------
+    # -- feedback of clients ---------------------------------------------------------------
 
     def _receive(self, feedback: InteractiveMarkerFeedback, now: float) -> None:
-        """Acts on feedback, between two steps."""
+        """Handles feedback; called between two steps."""
         try:
             self._handle(feedback, now)
         except (FlatlandError, ValueError) as error:
             _LOG.warning('interactive marker "%s": %s', feedback.marker_name, error)
         except Exception:
-            _LOG.exception("feedback of an interactive marker failed in an unforeseen way")
+            _LOG.exception("unexpected internal error in the feedback of an interactive marker")
 
     def _handle(self, feedback: InteractiveMarkerFeedback, now: float) -> None:
         name = feedback.marker_name
@@ -116,25 +116,25 @@ class InteractiveMarkers(WorldObserver):
         if self._closed or model is None:
             return
         if drag is not None and drag.client != feedback.client_id:
-            return  # Somebody else has it in his hands.
+            return  # Another client is dragging it.
         event, pose = feedback.event_type, self._pose_in_map(feedback)
         if event == feedback.MENU_SELECT:
             self._menu.processFeedback(feedback)
         elif event == feedback.MOUSE_UP:
             self._release(name, pose)
         elif event in (feedback.MOUSE_DOWN, feedback.POSE_UPDATE):
-            # A drag that was too slow goes on with its next pose.
+            # Also restarts a drag that has timed out.
             if pose is not None:
                 self._drags.hold(name, feedback.client_id, now, pose)
                 self._ticker.wake()
         elif event == feedback.KEEP_ALIVE and drag is not None:
-            drag.heard = now
+            drag.last_feedback = now
 
     def _pose_in_map(self, feedback: InteractiveMarkerFeedback) -> Pose | None:
         frame = feedback.header.frame_id.lstrip("/")
         if frame not in ("", FRAME):
             _LOG.warning(
-                'interactive marker "%s": a pose in frame "%s" is ignored, it must be in "%s"',
+                'interactive marker "%s": ignoring a pose in frame "%s", expected frame "%s"',
                 feedback.marker_name,
                 frame,
                 FRAME,
@@ -144,17 +144,17 @@ class InteractiveMarkers(WorldObserver):
 
     def _release(self, name: str, pose: Pose | None) -> None:
         self._drags.end(name)
-        self._forget_shown(name)
+        self._invalidate_published(name)
         if pose is not None:
             self._world.move_model(self._models[name].name, pose)
 
     def _delete(self, feedback: InteractiveMarkerFeedback) -> None:
         self._world.delete_model(self._models[feedback.marker_name].name)
 
-    # -- what clients are told -------------------------------------------------------------
+    # -- updates to clients ----------------------------------------------------------------
 
-    def _greet(self) -> None:
-        """Hears of a client, in a thread of rospy."""
+    def _on_connection(self) -> None:
+        """Wakes the ticker when clients connect or disconnect; called in a rospy thread."""
         self._keep_alive_due = 0.0
         self._ticker.wake()
 
@@ -162,14 +162,14 @@ class InteractiveMarkers(WorldObserver):
         drag = self._drags.get(name)
         return self._models[name].pose if drag is None else drag.pose
 
-    def _forget_shown(self, name: str) -> None:
-        """Makes the next update hold a marker's pose: its client may show another one."""
-        self._shown[name] = (math.inf, math.inf, 0.0)
+    def _invalidate_published(self, name: str) -> None:
+        """Forces a pose into the next update, because a client may display another one."""
+        self._published[name] = (math.inf, math.inf, 0.0)
 
     def _tick(self, now: float) -> bool:
-        """Ends silent drags and tells the clients of what has moved."""
-        for name in self._drags.end_silent(now):
-            self._forget_shown(name)
+        """Ends stale drags and publishes changed poses."""
+        for name in self._drags.end_stale(now):
+            self._invalidate_published(name)
         if self._server.connected:
             self._send_changes()
             if now >= self._keep_alive_due:
@@ -178,16 +178,16 @@ class InteractiveMarkers(WorldObserver):
         return bool(self._drags) or self._server.connected
 
     def _send_changes(self) -> None:
-        for name, shown in self._shown.items():
+        for name, published in self._published.items():
             pose = self._pose_of(name)
-            if _differ(pose, shown) and self._server.setPose(name, pose_message(pose)):
-                self._shown[name] = pose
+            if _differ(pose, published) and self._server.setPose(name, pose_message(pose)):
+                self._published[name] = pose
         self._server.applyChanges()
 
 
 def _differ(a: Pose, b: Pose) -> bool:
     return (
-        abs(a[0] - b[0]) > _SMALLEST_MOVE
-        or abs(a[1] - b[1]) > _SMALLEST_MOVE
-        or abs(wrap_angle(a[2] - b[2])) > _SMALLEST_MOVE
+        abs(a[0] - b[0]) > _MIN_MOVE
+        or abs(a[1] - b[1]) > _MIN_MOVE
+        or abs(wrap_angle(a[2] - b[2])) > _MIN_MOVE
     )

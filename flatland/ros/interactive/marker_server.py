@@ -1,4 +1,4 @@
-"""Debian's server of interactive markers, on connections that never wait."""
+"""Interactive marker server of ROS on non-blocking connections."""
 
 from __future__ import annotations
 
@@ -20,21 +20,21 @@ from flatland.geometry import Pose
 from flatland.ros.interactive.model_handle import pose_message
 from flatland.ros.publisher import Publisher
 from flatland.ros.registrar import Registrar
-from flatland.ros.transport.state_topic import LatchedTopic
+from flatland.ros.transport.state_topic import StateTopic
 from flatland.ros.transport.subscriber import Subscriber
 
-_UPDATE_QUEUE: Final = 100  # messages; a client that misses one starts anew
+_UPDATE_QUEUE: Final = 100  # messages; a client that misses one requests the full state again
 
 Feedback = Callable[[InteractiveMarkerFeedback, float], None]
-"""Takes feedback and the time of `time.monotonic` at which it came."""
+"""Callback with feedback and the time at which it was received (`time.monotonic`) [s]."""
 
 
 class MarkerServer(InteractiveMarkerServer):  # type: ignore[misc]
-    """Keeps the markers and their numbered updates as the base class does.
+    """Manages the markers and their numbered updates like the base class.
 
-    Unlike it, this one sends nothing by itself, neither waits nor needs threads to send, and hands
-    all feedback to the thread that steps the world. The base class keeps clients alive, and
-    arbitrates between them, in ROS time, which stands still while the world is paused.
+    Unlike the base class, it publishes without blocking and without a timer of its own, and passes
+    all feedback to the thread that steps the world. The base class sends keep-alive messages and
+    arbitrates between clients in ROS time, which does not advance while the world is paused.
     """
 
     def __init__(
@@ -47,17 +47,17 @@ class MarkerServer(InteractiveMarkerServer):  # type: ignore[misc]
         receive: Feedback,
         on_connection: Callable[[], None],
     ) -> None:
-        """Advertises the topics, soon.
+        """Advertises the topics asynchronously.
 
         Args:
-            registrar: Talks to the ROS master.
+            registrar: Registers the topics with the ROS master.
             name: Namespace of the topics.
             post: Runs an action between two steps.
-            pose_of: Gives the present pose of a marker.
-            receive: Called between two steps.
-            on_connection: Called when a client comes or goes, in a thread of rospy.
+            pose_of: Returns the current pose of a marker.
+            receive: Called with feedback, between two steps.
+            on_connection: Called in a rospy thread when a client connects or disconnects.
         """
-        # Not super().__init__, which opens the connections and starts a timer.
+        # super().__init__ is not called: it opens connections and starts a timer.
         self.topic_ns = name
         self.server_id = rospy.get_name()
         self.seq_num = 0
@@ -67,7 +67,7 @@ class MarkerServer(InteractiveMarkerServer):  # type: ignore[misc]
         self._pose_of = pose_of
         self._post = post
         self._receive = receive
-        self.init_pub = LatchedTopic(
+        self.init_pub = StateTopic(
             registrar,
             f"{name}/update_full",
             InteractiveMarkerInit,
@@ -87,29 +87,29 @@ class MarkerServer(InteractiveMarkerServer):  # type: ignore[misc]
         )
 
     def __del__(self) -> None:
-        """Leaves the markers alone: the topics are gone when the process ends."""
+        """Overrides the base class, which would delete the markers."""
 
     @property
     def connected(self) -> bool:
-        """Whether anybody listens."""
+        """Whether there are clients."""
         return self.update_pub.connected or self.init_pub.connected
 
     def publishInit(self) -> None:  # noqa: N802
-        """Sends the full state to those who still wait for it."""
+        """Publishes the full state to clients that are still initializing."""
         self.init_pub.send()
 
     def keep_alive(self) -> None:
-        """Tells the clients that the server is there."""
+        """Publishes a keep-alive message."""
         if self.update_pub.connected:
             self.keepAlive(None)
 
     def processFeedback(self, feedback: InteractiveMarkerFeedback) -> None:  # noqa: N802
-        """Takes feedback, in a thread of rospy."""
+        """Posts feedback to the thread that steps the world; called in a rospy thread."""
         now = time.monotonic()
         self._post(lambda: self._receive(feedback, now))
 
     def _full_state(self) -> InteractiveMarkerInit:
-        """Makes the message of all markers that were sent, where they are now."""
+        """Returns all published markers with their current poses."""
         markers = [context.int_marker for context in self.marker_contexts.values()]
         for marker in markers:
             marker.pose = pose_message(self._pose_of(marker.name))

@@ -1,4 +1,4 @@
-"""The interactive marker of one model: what one grabs, and what one sees of it."""
+"""Interactive marker of a model: handles, name and outline."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from std_msgs.msg import ColorRGBA
 from visualization_msgs.msg import InteractiveMarker, InteractiveMarkerControl, Marker
 
 from flatland.body import Body
-from flatland.geometry import Pose, compose, invert
+from flatland.geometry import Pose, compose, invert, yaw_from_quaternion
 from flatland.model import Model
 from flatland.ros.adapters import convert
 from flatland.ros.markers.marker_geometry import Points, outline
@@ -24,48 +24,46 @@ NAME_OFFSET: Final = 0.5  # m
 NAME_HEIGHT: Final = 0.4  # m
 NAME_COLOR: Final = (1.0, 1.0, 1.0, 1.0)
 LINE_WIDTH: Final = 0.03  # m
-SMALLEST_RING: Final = 1.0  # m
+MIN_SCALE: Final = 1.0  # m; diameter of the ring that rotates the model
 
-# A control acts along its x axis: this turns it to z.
+# Rotates the x axis, about which a control acts, to the z axis.
 _ABOUT_Z: Final = Quaternion(0.0, math.sqrt(0.5), 0.0, math.sqrt(0.5))
 
 
 def model_handle(model: Model, name: str) -> InteractiveMarker:
-    """Makes the interactive marker of a model, at its first body.
+    """Creates the interactive marker of a model, with the pose of its first body.
 
     Args:
-        model: Which model.
-        name: Of the marker.
+        model: The model.
+        name: Name of the marker.
     """
     marker = InteractiveMarker(name=name)
-    # Without a stamp RViz sends poses back in this frame, whatever its own fixed frame is.
+    # For a marker without a stamp, RViz sends poses in this frame instead of its fixed frame.
     marker.header.frame_id = FRAME
     marker.pose = pose_message(model.pose)
-    drawing = _Drawing(model)
-    marker.scale = max(SMALLEST_RING, 2.0 * drawing.radius)
+    model_outline = _ModelOutline(model)
+    marker.scale = max(MIN_SCALE, 2.0 * model_outline.radius)
     marker.controls = [
         _control("move_xy", InteractiveMarkerControl.MOVE_PLANE, [_handle()]),
         _control("rotate_z", InteractiveMarkerControl.ROTATE_AXIS, []),
-        _control("model", InteractiveMarkerControl.NONE, [_name(name), *drawing.markers]),
+        _control("model", InteractiveMarkerControl.NONE, [_name(name), *model_outline.markers]),
     ]
     return marker
 
 
 def pose_message(pose: Pose) -> PoseMessage:
-    """Makes a message from a pose (x, y, theta)."""
+    """Converts a pose (x, y, theta) to a message."""
     x, y, theta = pose
     return PoseMessage(Point(x, y, 0.0), convert.quaternion(theta))
 
 
 def planar_pose(message: PoseMessage) -> Pose | None:
-    """Reads a pose (x, y, theta); None when a number is not finite or there is no rotation."""
+    """Converts a message to (x, y, theta); None for non-finite numbers or a zero quaternion."""
     position, q = message.position, message.orientation
     numbers = (position.x, position.y, position.z, q.x, q.y, q.z, q.w)
     if not all(map(math.isfinite, numbers)) or not any((q.x, q.y, q.z, q.w)):
         return None
-    forward = q.w * q.w + q.x * q.x - q.y * q.y - q.z * q.z
-    left = 2.0 * (q.w * q.z + q.x * q.y)
-    return (position.x, position.y, math.atan2(left, forward))
+    return (position.x, position.y, yaw_from_quaternion(q.x, q.y, q.z, q.w))
 
 
 def _control(name: str, mode: int, markers: list[Marker]) -> InteractiveMarkerControl:
@@ -75,7 +73,7 @@ def _control(name: str, mode: int, markers: list[Marker]) -> InteractiveMarkerCo
         orientation=_ABOUT_Z if interactive else Quaternion(0.0, 0.0, 0.0, 1.0),
         interaction_mode=mode,
         markers=markers,
-        # What one cannot grab is seen with every tool of RViz, the handles only with "Interact".
+        # Handles are visible only with the tool "Interact", other markers with every tool.
         always_visible=not interactive,
     )
 
@@ -97,12 +95,12 @@ def _name(text: str) -> Marker:
     return marker
 
 
-class _Drawing:
-    """The outline of a model in the frame of its first body.
+class _ModelOutline:
+    """Outline of a model in the frame of its first body.
 
     Attributes:
-        markers: One for each body that has footprints.
-        radius: Distance of the farthest point from the origin [m].
+        markers: One marker for each body with footprints.
+        radius: Upper bound of the distance of points from the origin [m].
     """
 
     def __init__(self, model: Model) -> None:
@@ -119,5 +117,5 @@ class _Drawing:
         marker.pose = pose_message(pose)
         marker.points = [Point(*point) for point in points.tolist()]
         self.markers.append(marker)
-        reach = np.hypot(points[:, 0], points[:, 1]).max()
-        self.radius = max(self.radius, float(reach) + math.hypot(pose[0], pose[1]))
+        max_distance = np.hypot(points[:, 0], points[:, 1]).max()
+        self.radius = max(self.radius, float(max_distance) + math.hypot(pose[0], pose[1]))

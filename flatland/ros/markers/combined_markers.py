@@ -1,8 +1,8 @@
-"""All debug markers of a kind on one topic, for clients that cannot follow `~debug/topics`.
+"""Debug markers of all layers and of all models on fixed topics.
 
-RViz's configuration holds fixed topics, while models come and go. These topics bring it all
-layers and all models, with no other program between. They are not in `~debug/topics`: whoever
-reads that list would show everything twice.
+The configuration of RViz contains fixed topics, while models are added and deleted. These topics
+are not listed in `~debug/topics`; otherwise, clients that follow the list would display everything
+twice.
 """
 
 from __future__ import annotations
@@ -21,47 +21,47 @@ from flatland.ros.markers.model_markers import ModelMarkers
 from flatland.ros.markers.packed_markers import JoinedMarkers, PackedMarkers
 from flatland.ros.registrar import Registrar
 from flatland.ros.ticker import Ticker
-from flatland.ros.transport.state_topic import LatchedTopic
+from flatland.ros.transport.state_topic import StateTopic
 from flatland.simulation import Simulation
 
 LAYERS: Final = "~debug/all_layers"
 WALLS: Final = "~debug/all_layers_3d"
 MODELS: Final = "~debug/all_models"
-FAREWELL_TIME: Final = 0.5  # s of wall time for which a deletion is repeated
+DELETION_TIME: Final = 0.5  # s of wall time during which a deletion is repeated
 
 
 class CombinedMarkers(WorldObserver):
-    """Shows a world on three topics: the lines of all layers, their walls, and all models.
+    """Publishes the markers of a world on three topics: layers as lines, layers as walls, models.
 
-    Markers keep the name of their layer or model as their namespace, so each can be switched on
-    and off in RViz.
+    The namespace of a marker is the name of its layer or model, so that each can be hidden
+    individually in RViz.
     """
 
     def __init__(self, registrar: Registrar, simulation: Simulation, rate: float) -> None:
-        """Advertises the topics; between two steps.
+        """Advertises the topics asynchronously; must be called between two steps.
 
         Args:
-            registrar: Talks to the ROS master.
-            simulation: Whose world to show.
-            rate: Messages with the models in a second of wall time [Hz].
+            registrar: Registers the topics with the ROS master.
+            simulation: Simulation of the world.
+            rate: Rate of the model markers in wall time [Hz].
         """
         self._world = simulation.world
         self._closed = False
         self._layers: dict[str, LayerMarkers] = {}
         self._models: dict[str, ModelMarkers] = {}
-        self._delete_until = 0.0  # time of time.monotonic [s]
+        self._delete_until = 0.0  # s, time.monotonic
         self._ticker = Ticker("flatland-all-markers", rate, simulation.post, self._tick)
 
         def topic(
-            name: str, make: Callable[[], JoinedMarkers], *, ticks: bool = False
-        ) -> LatchedTopic:
-            return LatchedTopic(
+            name: str, make: Callable[[], JoinedMarkers], *, periodic: bool = False
+        ) -> StateTopic:
+            return StateTopic(
                 registrar,
                 name,
                 MarkerArray,
                 make,
                 simulation.post,
-                on_connection=(lambda _connected: self._ticker.wake()) if ticks else None,
+                on_connection=(lambda _connected: self._ticker.wake()) if periodic else None,
             )
 
         for layer in self._world.layers:
@@ -70,18 +70,18 @@ class CombinedMarkers(WorldObserver):
             self.model_added(model)
         self._lines = topic(LAYERS, lambda: self._join_layers(LayerMarkers.lines))
         self._walls = topic(WALLS, lambda: self._join_layers(LayerMarkers.walls))
-        self._all_models = topic(MODELS, self._join_models, ticks=True)
+        self._all_models = topic(MODELS, self._join_models, periodic=True)
         self._world.add_observer(self)
 
     def close(self) -> None:
-        """Leaves topics alone from now on: rospy ends all of them at once at shutdown."""
+        """Stops publishing; rospy unregisters all topics at shutdown."""
         self._closed = True
         self._ticker.close()
 
-    # -- what happens in the world ---------------------------------------------------------
+    # -- events of the world ---------------------------------------------------------------
 
     def layer_changed(self, layer_name: str) -> None:
-        """Shows the layers anew."""
+        """Publishes all layers."""
         if self._closed:
             return
         if layer_name not in self._layers:
@@ -90,14 +90,14 @@ class CombinedMarkers(WorldObserver):
         self._walls.send()
 
     def model_added(self, model: Model) -> None:
-        """Shows a model from the next tick on."""
+        """Adds the markers of a model to the next message."""
         self._models[model.name] = ModelMarkers(model)
 
     def model_removed(self, model: Model) -> None:
-        """Removes a model's markers with the next tick."""
+        """Removes the markers of a model from the next message."""
         self._models.pop(model.name, None)
-        # More than once: a client that is slow misses messages.
-        self._delete_until = time.monotonic() + FAREWELL_TIME
+        # A slow client may miss messages, so that a single deletion is not enough.
+        self._delete_until = time.monotonic() + DELETION_TIME
 
     def _add_layer(self, layer: Layer) -> None:
         self._layers[layer.name] = LayerMarkers(layer)
@@ -105,7 +105,7 @@ class CombinedMarkers(WorldObserver):
     # -- messages --------------------------------------------------------------------------
 
     def _join_layers(self, make: Callable[[LayerMarkers, int], PackedMarkers]) -> JoinedMarkers:
-        # A layer may have lost all its edges: the others' markers are in the message anyway.
+        # Delete all first: a layer may have lost all its edges and with them its marker.
         parts = [_deletion(), *(make(each, self._time_ns) for each in self._layers.values())]
         return JoinedMarkers(parts)
 

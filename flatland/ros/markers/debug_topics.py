@@ -1,4 +1,4 @@
-"""Debug markers: layers, models and joints on topics of their own, for RViz and the viewer."""
+"""Debug markers: one topic per layer and per model, for RViz and the viewer."""
 
 from __future__ import annotations
 
@@ -21,37 +21,37 @@ from flatland.ros.markers.packed_markers import PackedMarkers
 from flatland.ros.names import UniqueNames, legal_name
 from flatland.ros.registrar import Registrar
 from flatland.ros.ticker import Ticker
-from flatland.ros.transport.state_topic import LatchedTopic
+from flatland.ros.transport.state_topic import StateTopic
 from flatland.simulation import Simulation
 
 _LOG = logging.getLogger("flatland")
 
 NAMESPACE: Final = "~debug"
-FAREWELL_TIME: Final = 0.2  # s of wall time that a topic lives on after its last message
+CLOSE_DELAY: Final = 0.2  # s of wall time between the last message and the end of a topic
 
 
 @dataclass(frozen=True, slots=True)
 class _Entry:
-    """One topic with markers: its name below the namespace, and itself."""
+    """A marker topic and its name relative to the namespace."""
 
     name: str
-    topic: LatchedTopic
+    topic: StateTopic
 
 
-class DebugVisualization(WorldObserver):
-    """Shows a world as markers.
+class DebugTopics(WorldObserver):
+    """Publishes the markers of each layer and each model on a topic of its own.
 
-    A topic without subscribers costs nothing; the first one gets the present state, also while
-    the world is paused.
+    Markers are created only for topics with subscribers. A new subscriber receives the current
+    state, even if the world is paused.
     """
 
     def __init__(self, registrar: Registrar, simulation: Simulation, rate: float) -> None:
-        """Advertises the topics of a world, now and from now on; between two steps.
+        """Advertises the topics asynchronously; must be called between two steps.
 
         Args:
-            registrar: Talks to the ROS master.
-            simulation: Whose world to show.
-            rate: Messages for each model in a second of wall time [Hz].
+            registrar: Registers the topics with the ROS master.
+            simulation: Simulation of the world.
+            rate: Rate of the markers of each model in wall time [Hz].
         """
         self._registrar = registrar
         self._post = simulation.post
@@ -60,7 +60,7 @@ class DebugVisualization(WorldObserver):
         self._names = UniqueNames()
         self._layers: dict[str, list[_Entry]] = {}
         self._models: dict[str, _Entry] = {}
-        self._ending: dict[str, tuple[LatchedTopic, float]] = {}  # by name, with the end
+        self._closing: dict[str, tuple[StateTopic, float]] = {}  # by name, with the closing time
         self._ticker = Ticker("flatland-markers", rate, self._post, self._tick)
         self._topics = self._open("topics", DebugTopicList, self._topic_list)
         for layer in self._world.layers:
@@ -70,14 +70,14 @@ class DebugVisualization(WorldObserver):
         self._world.add_observer(self)
 
     def close(self) -> None:
-        """Leaves topics alone from now on: rospy ends all of them at once at shutdown."""
+        """Stops publishing; rospy unregisters all topics at shutdown."""
         self._closed = True
         self._ticker.close()
 
-    # -- what happens in the world ---------------------------------------------------------
+    # -- events of the world ---------------------------------------------------------------
 
     def layer_changed(self, layer_name: str) -> None:
-        """Shows a layer anew."""
+        """Publishes a layer."""
         if self._closed:
             return
         if layer_name in self._layers:
@@ -88,19 +88,19 @@ class DebugVisualization(WorldObserver):
             self._topics.send()
 
     def model_added(self, model: Model) -> None:
-        """Shows a model."""
+        """Advertises the topic of a model."""
         if not self._closed:
             self._add_model(model)
             self._topics.send()
 
     def model_removed(self, model: Model) -> None:
-        """Removes a model's markers, and a little later its topic."""
+        """Deletes the markers of a model, and its topic after `CLOSE_DELAY`."""
         entry = self._models.pop(model.name, None)
         if entry is None or self._closed:
             return
         self._names.release(entry.name)
         entry.topic.replace(self._with_time(_deletion))
-        self._ending[entry.name] = entry.topic, time.monotonic() + FAREWELL_TIME
+        self._closing[entry.name] = entry.topic, time.monotonic() + CLOSE_DELAY
         self._topics.send()
         self._ticker.wake()
 
@@ -127,26 +127,27 @@ class DebugVisualization(WorldObserver):
         make: Callable[[int], PackedMarkers],
         on_connection: Callable[[bool], None] | None = None,
     ) -> _Entry:
-        """Advertises the markers of a layer or a model under a legal name that is free."""
-        wanted = f"{kind}/{legal_name(name)}{suffix}"
+        """Advertises the markers of a layer or a model under an unused legal name."""
+        preferred = f"{kind}/{legal_name(name)}{suffix}"
         while True:
-            free = self._names.claim(wanted)
-            if free in self._ending:
-                topic, _due = self._ending.pop(free)
+            claimed = self._names.claim(preferred)
+            if claimed in self._closing:
+                topic, _due = self._closing.pop(claimed)
                 topic.replace(self._with_time(make))
             else:
                 try:
-                    topic = self._open(free, MarkerArray, self._with_time(make), on_connection)
+                    topic = self._open(claimed, MarkerArray, self._with_time(make), on_connection)
                 except FlatlandError:
-                    continue  # A plugin has that topic for something else.
-            if free != f"{kind}/{name}{suffix}":
+                    continue  # A plugin uses the topic for another message type.
+            if claimed != f"{kind}/{name}{suffix}":
                 _LOG.warning(
-                    '%s "%s" is shown on topic "%s": its name is no legal ROS name, or taken',
+                    '%s "%s" is published on topic "%s": '
+                    "its name is not a legal ROS name, or is in use",
                     kind,
                     name,
                     topic.topic,
                 )
-            return _Entry(free, topic)
+            return _Entry(claimed, topic)
 
     def _open(
         self,
@@ -154,8 +155,8 @@ class DebugVisualization(WorldObserver):
         message_type: type[Any],
         make: Callable[[], Any],
         on_connection: Callable[[bool], None] | None = None,
-    ) -> LatchedTopic:
-        return LatchedTopic(
+    ) -> StateTopic:
+        return StateTopic(
             self._registrar,
             f"{NAMESPACE}/{name}",
             message_type,
@@ -172,16 +173,16 @@ class DebugVisualization(WorldObserver):
         return DebugTopicList([entry.name for entry in (*layers, *self._models.values())])
 
     def _tick(self, now: float) -> bool:
-        """Sends the models that somebody watches, and ends the topics of those that are gone."""
-        for name in [name for name, (_topic, due) in self._ending.items() if due <= now]:
-            self._ending.pop(name)[0].close()
+        """Publishes the models and closes the topics of deleted models."""
+        for name in [name for name, (_topic, due) in self._closing.items() if due <= now]:
+            self._closing.pop(name)[0].close()
         for entry in self._models.values():
             entry.topic.send()
-        return bool(self._ending) or any(entry.topic.connected for entry in self._models.values())
+        return bool(self._closing) or any(entry.topic.connected for entry in self._models.values())
 
 
 def _deletion(time_ns: int) -> PackedMarkers:
-    """Makes the message that removes all markers of a topic."""
+    """Returns a message that deletes all markers of a topic."""
     markers = PackedMarkers()
     markers.add_deletion_of_all()
     markers.set_stamp(time_ns)

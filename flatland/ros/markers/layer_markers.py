@@ -1,4 +1,4 @@
-"""The debug markers of one layer: its edges as lines and as walls."""
+"""Debug markers of a layer: edges as lines and as walls."""
 
 from __future__ import annotations
 
@@ -19,34 +19,36 @@ DEFAULT_HEIGHTS: Final = (0.0, 1.0)  # m
 
 
 class LayerMarkers:
-    """Makes the markers of a layer."""
+    """Creates the markers of a layer."""
 
     def __init__(self, layer: Layer) -> None:
-        """Reads how high the layer's walls are; warns where the file says nonsense.
+        """Reads the height of the walls from the properties of a layer.
+
+        Invalid heights are logged as a warning and replaced by the default.
 
         Args:
-            layer: Whose markers.
+            layer: The layer.
         """
         self._layer = layer
         self._heights = wall_heights(layer)
 
     def lines(self, time_ns: int) -> PackedMarkers:
-        """Makes the edges as lines; no marker for a layer without edges.
+        """Returns the edges as lines; no marker for a layer without edges.
 
         Args:
-            time_ns: The stamp, simulated time [ns].
+            time_ns: Stamp of the markers, simulated time [ns].
         """
         layer, markers = self._layer, PackedMarkers(self._layer.name)
         edges = layer.edges
         if len(edges):
             markers.add(Marker.LINE_LIST, edge_lines(edges), scale=LINE_WIDTH, color=layer.color)
-        return self._placed(markers, time_ns)
+        return self._finish(markers, time_ns)
 
     def walls(self, time_ns: int) -> PackedMarkers:
-        """Makes the edges as walls; no marker for a layer without edges.
+        """Returns the edges as walls; no marker for a layer without edges.
 
         Args:
-            time_ns: The stamp, simulated time [ns].
+            time_ns: Stamp of the markers, simulated time [ns].
         """
         layer, markers = self._layer, PackedMarkers(self._layer.name)
         edges = layer.edges
@@ -58,9 +60,9 @@ class LayerMarkers:
                 color=layer.color,
                 frame_locked=True,
             )
-        return self._placed(markers, time_ns)
+        return self._finish(markers, time_ns)
 
-    def _placed(self, markers: PackedMarkers, time_ns: int) -> PackedMarkers:
+    def _finish(self, markers: PackedMarkers, time_ns: int) -> PackedMarkers:
         markers.set_stamp(time_ns)
         for number in range(len(markers)):
             markers.set_pose(number, self._layer.body.pose)
@@ -68,9 +70,9 @@ class LayerMarkers:
 
 
 def wall_heights(layer: Layer) -> tuple[float, float]:
-    """Reads where a layer's walls begin and end [m] from its properties.
+    """Returns the lower and upper end of the walls of a layer [m], from its properties.
 
-    What is no pair of heights leads to a warning and to the default.
+    Invalid heights are logged as a warning and replaced by the default.
     """
     debug = layer.properties.get("debug")
     if debug is None:
@@ -94,7 +96,7 @@ def wall_heights(layer: Layer) -> tuple[float, float]:
 
 
 def _number(value: Any) -> float | None:
-    """Converts a value of the file, where numbers may stand as text."""
+    """Converts a value of a YAML file, which may be a string, to a finite number or None."""
     if isinstance(value, bool):
         return None
     try:
@@ -106,7 +108,7 @@ def _number(value: Any) -> float | None:
 
 def _warn(layer: Layer, problem: str) -> None:
     _LOG.warning(
-        'layer "%s", properties of debug: %s; its walls are shown from %g to %g m',
+        'layer "%s", property "debug": %s; using walls from %g to %g m',
         layer.name,
         problem,
         *DEFAULT_HEIGHTS,

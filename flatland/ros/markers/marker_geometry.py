@@ -1,24 +1,23 @@
-"""Turns edges, footprints and joints into the points of markers; whole arrays, no ROS."""
+"""Conversion of edges, footprints and joints to marker points, as arrays and without ROS."""
 
 from __future__ import annotations
 
-import math
 from typing import Final, Protocol
 
 import numpy as np
 import numpy.typing as npt
 
-from flatland.geometry import Pose, compose
+from flatland.geometry import Pose, circle_points, compose
 
 Points = npt.NDArray[np.float64]
 """Points (x, y, z) [m], shape (n, 3)."""
 
-CIRCLE_HEIGHT: Final = 0.01  # m; a circle lies just above the lines around it
-_CIRCLE_CORNERS: Final = 32
+CIRCLE_HEIGHT: Final = 0.01  # m; slightly above lines
+_CIRCLE_POINTS: Final = 32
 
 
 class Footprint(Protocol):
-    """What is drawn of a fixture; `PhysicsFixture` is one."""
+    """Shape of a fixture; a protocol of `PhysicsFixture`."""
 
     @property
     def shape(self) -> str:
@@ -26,11 +25,11 @@ class Footprint(Protocol):
 
     @property
     def vertices(self) -> Points:
-        """Corners in the body's frame [m], shape (n, 2)."""
+        """Vertices in the body frame [m], shape (n, 2)."""
 
     @property
     def center(self) -> tuple[float, float]:
-        """Centre of a circle in the body's frame [m]."""
+        """Centre of a circle in the body frame [m]."""
 
     @property
     def radius(self) -> float:
@@ -38,7 +37,12 @@ class Footprint(Protocol):
 
 
 def flat(points: npt.ArrayLike, z: float = 0.0) -> Points:
-    """Puts points of the plane, shape (n, 2), at a height [m]."""
+    """Adds a z coordinate to planar points.
+
+    Args:
+        points: (x, y) [m], shape (n, 2).
+        z: Height [m].
+    """
     plane = np.asarray(points, dtype=np.float64).reshape(-1, 2)
     result = np.full((len(plane), 3), z)
     result[:, :2] = plane
@@ -46,27 +50,27 @@ def flat(points: npt.ArrayLike, z: float = 0.0) -> Points:
 
 
 def edge_lines(edges: npt.NDArray[np.float32]) -> Points:
-    """Lists the two ends of each edge.
+    """Converts edges to the points of a line list.
 
     Args:
         edges: (x1, y1, x2, y2) [m], shape (n, 4).
 
     Returns:
-        Shape (2 n, 3), two points a line, at height 0.
+        Points at height 0, shape (2 n, 3), two per line.
     """
     return flat(edges)
 
 
 def wall_triangles(edges: npt.NDArray[np.float32], min_z: float, max_z: float) -> Points:
-    """Stands a wall on each edge.
+    """Converts edges to the points of a triangle list that forms vertical walls.
 
     Args:
         edges: (x1, y1, x2, y2) [m], shape (n, 4).
-        min_z: Where the walls begin [m].
-        max_z: Where they end [m].
+        min_z: Lower end of the walls [m].
+        max_z: Upper end of the walls [m].
 
     Returns:
-        Shape (6 n, 3): two triangles a wall.
+        Points of two triangles per wall, shape (6 n, 3).
     """
     triangles = np.empty((len(edges), 6, 3))
     for corner, (end, z) in enumerate(
@@ -78,20 +82,18 @@ def wall_triangles(edges: npt.NDArray[np.float32], min_z: float, max_z: float) -
 
 
 def closed_strip(vertices: npt.ArrayLike) -> Points:
-    """Lists the corners of a polygon, shape (n, 2), and the first one again at the end."""
+    """Converts vertices of a polygon, shape (n, 2), to a closed line strip, shape (n + 1, 3)."""
     corners = flat(vertices)
     strip: Points = np.concatenate((corners, corners[:1]))
     return strip
 
 
 def outline(footprint: Footprint) -> Points:
-    """Draws around a footprint; shape (2 n, 3), two points a line, in the body's frame."""
+    """Returns the outline of a footprint as a line list in the body frame, shape (2 n, 3)."""
     if footprint.shape == "edge":
         return flat(footprint.vertices)
     if footprint.shape == "circle":
-        angles = np.linspace(0.0, 2.0 * math.pi, _CIRCLE_CORNERS, endpoint=False)
-        corners = np.stack((np.cos(angles), np.sin(angles)), axis=1)
-        strip = closed_strip(footprint.center + footprint.radius * corners)
+        strip = closed_strip(circle_points(footprint.center, footprint.radius, _CIRCLE_POINTS))
     else:
         strip = closed_strip(footprint.vertices)
     lines: Points = np.stack((strip[:-1], strip[1:]), axis=1)
@@ -103,12 +105,12 @@ def joint_points(
     pose_b: Pose,
     anchors: npt.NDArray[np.float64],
 ) -> Points:
-    """Lists the points of a joint.
+    """Returns the points of a joint.
 
     Args:
-        pose_a: Of body A in the world frame.
-        pose_b: Of body B in the world frame.
-        anchors: Anchor of each body in its own frame [m], shape (2, 2).
+        pose_a: Pose of body A in the world frame.
+        pose_b: Pose of body B in the world frame.
+        anchors: Anchor of each body in the body frame [m], shape (2, 2).
 
     Returns:
         Origin of body A, anchor A, origin of body B, anchor B, in the world frame, shape (4, 3).
@@ -121,5 +123,5 @@ def joint_points(
 
 
 def joint_lines(points: Points) -> Points:
-    """Connects the points of a joint: origin and anchor of each body, and the two anchors."""
+    """Converts the points of a joint to a line list: origins to anchors, and anchor to anchor."""
     return points[[0, 1, 2, 3, 1, 3]]

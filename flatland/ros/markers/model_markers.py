@@ -1,4 +1,4 @@
-"""The debug markers of one model: its footprints and joints."""
+"""Debug markers of a model: footprints and joints."""
 
 from __future__ import annotations
 
@@ -24,17 +24,17 @@ JOINT_LINE_WIDTH: Final = (0.01, 0.0, 0.0)
 JOINT_CUBE: Final = (0.03, 0.03, 0.03)
 
 Shapes = list[tuple[Color, tuple[int, ...]]]
-"""Colour of each body, and the ids of its fixtures."""
+"""Colour of each body, and the ids of its fixtures; a change means that markers are outdated."""
 
 
 class ModelMarkers:
-    """Keeps the markers of a model, so that a message costs little more than its poses."""
+    """Caches the markers of a model, so that only poses are updated for each message."""
 
     def __init__(self, model: Model) -> None:
-        """Builds nothing yet.
+        """Creates an empty cache; the first message fills it.
 
         Args:
-            model: Whose markers.
+            model: The model.
         """
         self._model = model
         self._shapes: Shapes | None = None
@@ -43,13 +43,13 @@ class ModelMarkers:
         self._joints: list[tuple[int, Joint]] = []
 
     def message(self, time_ns: int) -> PackedMarkers:
-        """Gives the markers as the model is now; the same object each time.
+        """Returns the markers of the current state; the next call modifies the result.
 
         Args:
-            time_ns: The stamp, simulated time [ns].
+            time_ns: Stamp of the markers, simulated time [ns].
         """
-        # A plugin may have given a body another footprint, or another colour.
-        shapes = self._present_shapes()
+        # Plugins can change footprints and colours.
+        shapes = self._current_shapes()
         if shapes != self._shapes:
             self._build()
             self._shapes = shapes
@@ -64,14 +64,14 @@ class ModelMarkers:
             markers.set_points(number + 1, points)
         return markers
 
-    def _present_shapes(self) -> Shapes:
+    def _current_shapes(self) -> Shapes:
         return [
             (body.color, tuple(fixture.id for fixture in body.fixtures))
             for body in self._model.bodies
         ]
 
     def _build(self) -> None:
-        before = len(self._markers)
+        previous_count = len(self._markers)
         model, markers = self._model, PackedMarkers(self._model.name)
         self._bodies = [
             (add_footprint(markers, fixture, body.color), body)
@@ -79,13 +79,13 @@ class ModelMarkers:
             for fixture in body.fixtures
         ]
         self._joints = [(_add_joint(markers, joint), joint) for joint in model.joints]
-        while len(markers) < before:
+        while len(markers) < previous_count:
             markers.add_deletion()
         self._markers = markers
 
 
 def add_footprint(markers: PackedMarkers, footprint: Footprint, color: Color) -> int:
-    """Adds the marker of a footprint in its body's frame; returns its number."""
+    """Adds the marker of a footprint in the frame of its body; returns its number."""
     if footprint.shape == "circle":
         diameter = 2.0 * footprint.radius
         center = flat(footprint.center, CIRCLE_HEIGHT)
@@ -98,7 +98,7 @@ def add_footprint(markers: PackedMarkers, footprint: Footprint, color: Color) ->
 
 
 def _add_joint(markers: PackedMarkers, joint: Joint) -> int:
-    """Adds the two markers of a joint, in the world frame; returns the first one's number."""
+    """Adds the two markers of a joint in the world frame; returns the number of the first."""
     body_a, body_b = joint.bodies
     points = joint_points(body_a.pose, body_b.pose, joint.anchors)
     number = markers.add(

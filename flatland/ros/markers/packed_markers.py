@@ -1,13 +1,12 @@
-"""A MarkerArray that is kept as the bytes that go over the wire.
+"""A MarkerArray that is stored in serialized form.
 
-A point of a ROS message is a Python object, and a map has hundreds of thousands of them: here
-points come as an array and are never anything else. What changes from one message to the next,
-time and poses, is written over in place.
+The points of an ordinary marker are Python objects, and a map has hundreds of thousands of them.
+Here, points are copied from an array to the serialized message. Stamps and poses, which change from
+one message to the next, are overwritten in place.
 """
 
 from __future__ import annotations
 
-import math
 import struct
 from collections.abc import Sequence
 from io import BytesIO
@@ -18,6 +17,7 @@ import numpy.typing as npt
 from std_msgs.msg import ColorRGBA
 from visualization_msgs.msg import Marker, MarkerArray
 
+from flatland.geometry import quaternion_from_yaw
 from flatland.ros.names import sendable_text
 from flatland.timekeeper import NANOSECONDS
 
@@ -26,22 +26,22 @@ FRAME: Final = "map"
 _COUNT: Final = struct.Struct("<I")
 _STAMP: Final = struct.Struct("<II")
 _POSE: Final = struct.Struct("<7d")
-_SEQUENCE_SIZE: Final = 4  # bytes of a header before its stamp
-_BEFORE_POSE: Final = 3 * 4  # bytes of id, type and action
-# Bytes of pose, scale, colour, lifetime and frame_locked, which come before the points.
+_SEQUENCE_SIZE: Final = 4  # bytes of a header before the stamp
+_BEFORE_POSE: Final = 3 * 4  # bytes of id, type, action
+# Bytes from the pose to the points: pose, scale, color, lifetime, frame_locked.
 _POSE_TO_POINTS: Final = 7 * 8 + 3 * 8 + 4 * 4 + 2 * 4 + 1
 
 
 class PackedMarkers(MarkerArray):  # type: ignore[misc]
-    """Markers in the frame `map`, numbered from 0, in one namespace."""
+    """Markers in the frame `map`, numbered from 0, with a common namespace."""
 
     def __init__(self, namespace: str = "") -> None:
-        """Holds no marker yet.
+        """Creates an array without markers.
 
         Args:
-            namespace: Of all markers.
+            namespace: Namespace of all markers.
         """
-        # Not super().__init__: it would make the list that the bytes stand for.
+        # super().__init__ is not called: it would assign to `markers`, a property here.
         self._namespace = sendable_text(namespace)
         self._data = bytearray(_COUNT.size)
         self._stamps: list[int] = []
@@ -49,7 +49,7 @@ class PackedMarkers(MarkerArray):  # type: ignore[misc]
         self._points: list[tuple[int, int]] = []
 
     def __len__(self) -> int:
-        """Returns how many markers there are."""
+        """Returns the number of markers."""
         return len(self._stamps)
 
     def add(
@@ -61,17 +61,17 @@ class PackedMarkers(MarkerArray):  # type: ignore[misc]
         color: tuple[float, float, float, float],
         frame_locked: bool = False,
     ) -> int:
-        """Adds a marker at the origin.
+        """Adds a marker with the identity pose.
 
         Args:
-            kind: One of the types of `Marker`.
-            points: (x, y, z) in the marker's frame [m], shape (n, 3).
-            scale: As the kind of marker wants it [m].
+            kind: Type constant of `Marker`.
+            points: (x, y, z) in the frame of the marker [m], shape (n, 3).
+            scale: Scale of the marker, depending on its type [m].
             color: (r, g, b, a), each 0 to 1.
-            frame_locked: Whether the marker goes with its frame when that moves.
+            frame_locked: Whether clients retransform the marker when its frame moves.
 
         Returns:
-            The marker's number.
+            Number of the marker.
         """
         marker = self._new(Marker.ADD, kind)
         marker.scale.x, marker.scale.y, marker.scale.z = scale
@@ -80,30 +80,33 @@ class PackedMarkers(MarkerArray):  # type: ignore[misc]
         return self._append(marker, _packed(points), len(points))
 
     def add_deletion(self) -> int:
-        """Adds an entry that removes the marker of its number; returns the number."""
+        """Adds an entry that deletes the marker with the same number; returns the number."""
         return self._append(self._new(Marker.DELETE), b"", 0)
 
     def add_deletion_of_all(self) -> int:
-        """Adds an entry that removes all markers of the topic."""
+        """Adds an entry that deletes all markers of the topic; returns its number."""
         return self._append(self._new(Marker.DELETEALL), b"", 0)
 
     def set_stamp(self, time_ns: int) -> None:
-        """Sets the time of all markers [ns]."""
+        """Sets the stamp of all markers [ns]."""
         stamp = divmod(time_ns, NANOSECONDS)
         for offset in self._stamps:
             _STAMP.pack_into(self._data, offset, *stamp)
 
     def set_pose(self, number: int, pose: tuple[float, float, float]) -> None:
-        """Puts a marker at a pose (x, y, theta)."""
+        """Sets the planar pose (x, y, theta) of a marker."""
         x, y, theta = pose
-        quaternion = (0.0, 0.0, math.sin(theta / 2.0), math.cos(theta / 2.0))
-        _POSE.pack_into(self._data, self._poses[number], x, y, 0.0, *quaternion)
+        _POSE.pack_into(self._data, self._poses[number], x, y, 0.0, *quaternion_from_yaw(theta))
 
     def set_points(self, number: int, points: npt.NDArray[np.float64]) -> None:
-        """Replaces the points of a marker by as many others.
+        """Replaces the points of a marker.
+
+        Args:
+            number: Number of the marker.
+            points: (x, y, z) in the frame of the marker [m], shape (n, 3).
 
         Raises:
-            ValueError: There are more or fewer than before.
+            ValueError: The number of points differs from that of the marker.
         """
         offset, count = self._points[number]
         if len(points) != count:
@@ -112,16 +115,16 @@ class PackedMarkers(MarkerArray):  # type: ignore[misc]
         self._data[offset : offset + len(data)] = data
 
     def serialize(self, buff: Any) -> None:
-        """Writes the message to a buffer; rospy calls it."""
+        """Serializes the message; called by rospy."""
         buff.write(self._data)
 
     def write_markers(self, buff: Any) -> None:
-        """Writes the markers to a buffer, without their number."""
+        """Writes the serialized markers without their count."""
         buff.write(memoryview(self._data)[_COUNT.size :])
 
     @property
     def markers(self) -> list[Marker]:
-        """The markers as ROS has them, made anew at each use."""
+        """The deserialized markers; a new list on each access."""
         return MarkerArray().deserialize(bytes(self._data)).markers  # type: ignore[no-any-return]
 
     def _new(self, action: int, kind: int = Marker.ARROW) -> Marker:
@@ -131,7 +134,7 @@ class PackedMarkers(MarkerArray):  # type: ignore[misc]
         return marker
 
     def _append(self, marker: Marker, points: bytes, count: int) -> int:
-        """Adds a marker that has no points yet, and its points."""
+        """Appends a serialized marker and inserts its serialized points; returns its number."""
         buffer = BytesIO()
         marker.serialize(buffer)
         data = buffer.getvalue()
@@ -154,26 +157,26 @@ class PackedMarkers(MarkerArray):  # type: ignore[misc]
 
 
 class JoinedMarkers(MarkerArray):  # type: ignore[misc]
-    """The markers of several PackedMarkers in one message; their namespaces must differ."""
+    """The markers of several `PackedMarkers` with different namespaces in one message."""
 
     def __init__(self, parts: Sequence[PackedMarkers]) -> None:
-        """Copies nothing yet: the parts must not change before the message is sent."""
+        """Stores references; the parts must not change before the message is published."""
         self._parts = parts
 
     def serialize(self, buff: Any) -> None:
-        """Writes the message to a buffer; rospy calls it."""
+        """Serializes the message; called by rospy."""
         buff.write(_COUNT.pack(sum(map(len, self._parts))))
         for part in self._parts:
             part.write_markers(buff)
 
     @property
     def markers(self) -> list[Marker]:
-        """The markers as ROS has them, made anew at each use."""
+        """The deserialized markers; a new list on each access."""
         return [marker for part in self._parts for marker in part.markers]
 
 
 def _packed(points: npt.NDArray[np.float64]) -> bytes:
-    """Writes points, shape (n, 3), as a ROS message has them, without their number."""
+    """Serializes points, shape (n, 3), without their count."""
     if points.ndim != 2 or points.shape[1] != 3:
         raise ValueError(f"points must have shape (n, 3), got {points.shape}")
     return points.astype("<f8", copy=False).tobytes()

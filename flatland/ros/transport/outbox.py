@@ -1,9 +1,9 @@
-"""Writes to subscribers without ever waiting for one.
+"""Non-blocking writes to subscribers.
 
-rospy offers two ways: a thread for each connection, which costs ten times as much as the write
-itself, or a write in the caller's thread, which waits for ever for a subscriber that does not
-read. Here the caller's thread writes what the socket takes at once; what it does not take stays
-in the connection's outbox, and one thread for all of them sends it when the socket has room.
+rospy writes either in one thread per connection, which costs ten times as much as the write itself,
+or in the thread of the caller, which blocks forever if a subscriber does not read. Here, the thread
+of the caller writes as much as the socket accepts. The rest stays in the outbox of the connection;
+a single thread for all connections sends it when the socket becomes writable.
 """
 
 from __future__ import annotations
@@ -21,49 +21,52 @@ _LOG = logging.getLogger("flatland")
 
 
 class Outbox:
-    """What one connection of a publisher has yet to send.
+    """Queue of unsent messages of one connection of a publisher.
 
-    Takes the place of the connection's own `write_data`. A message is sent whole or not at all:
-    of those that wait the oldest ones are dropped, never one that is under way.
+    Replaces `write_data` of the connection. A message is sent completely or not at all: when the
+    queue is full, the oldest message is dropped, but never one that is partially sent.
     """
 
     def __init__(self, transport: Any, queue_size: int) -> None:
-        """Takes over the writing of a connection.
+        """Replaces `write_data` of a connection.
 
         Args:
-            transport: rospy's `TCPROSTransport`, its handshake done.
-            queue_size: How many whole messages wait at most.
+            transport: A `TCPROSTransport` of rospy, after the handshake.
+            queue_size: Maximum number of queued messages, without the partially sent one.
         """
         self._transport = transport
         self._lock = threading.Lock()
-        self._under_way: memoryview | None = None
-        self._waiting: deque[bytes] = deque(maxlen=queue_size)
+        self._partial: memoryview | None = None  # rest of the partially sent message
+        self._queue: deque[bytes] = deque(maxlen=queue_size)
         transport.socket.setblocking(False)
         transport.set_cleanup_callback(self._closed)
         transport.write_data = self.write
 
     def write(self, data: bytes) -> None:
-        """Sends a message as far as the socket takes it; never waits.
+        """Sends or queues a message without blocking.
+
+        Args:
+            data: The serialized message.
 
         Raises:
-            TransportTerminated: The connection is closed, or broke; rospy drops it then.
+            TransportTerminated: The connection is closed or broken; rospy removes it.
         """
         if self._transport.done:
             raise TransportTerminated("connection closed")
         with self._lock:
-            self._waiting.append(data)
-            if self._under_way is not None or len(self._waiting) > 1:
-                return  # The flusher has been told already, and the order must be kept.
+            self._queue.append(data)
+            if self._partial is not None or len(self._queue) > 1:
+                return  # The flusher already watches the socket; keep the order.
             if not self._send():
                 _flusher().watch(self)
 
     def fileno(self) -> int:
-        """Returns the socket's file descriptor, -1 when it is closed."""
+        """Returns the file descriptor of the socket, -1 if it is closed."""
         connection: socket.socket | None = self._transport.socket
         return -1 if connection is None else connection.fileno()
 
     def flush(self) -> None:
-        """Sends what waits; called by the flusher when the socket has room."""
+        """Sends queued messages; called by the flusher when the socket is writable."""
         try:
             with self._lock:
                 if not self._send():
@@ -72,15 +75,15 @@ class Outbox:
             self._transport.close()
 
     def _send(self) -> bool:
-        """Sends until all is sent or the socket takes no more; tells whether all is sent."""
+        """Sends queued messages until the socket would block; returns whether all were sent."""
         connection: socket.socket | None = self._transport.socket
         if connection is None or self._transport.done:
-            self._waiting.clear()
+            self._queue.clear()
             raise TransportTerminated("connection closed")
-        while self._under_way is not None or self._waiting:
-            rest = self._under_way
+        while self._partial is not None or self._queue:
+            rest = self._partial
             if rest is None:
-                rest = memoryview(self._waiting[0])
+                rest = memoryview(self._queue[0])
             try:
                 sent = connection.send(rest)
             except BlockingIOError:
@@ -88,19 +91,19 @@ class Outbox:
             except OSError as error:
                 raise TransportTerminated(str(error)) from error
             self._transport.stat_bytes += sent
-            if self._under_way is None:
-                self._waiting.popleft()
+            if self._partial is None:
+                self._queue.popleft()
                 self._transport.stat_num_msg += 1
-            self._under_way = rest[sent:] if sent < len(rest) else None
+            self._partial = rest[sent:] if sent < len(rest) else None
         return True
 
     def _closed(self, transport: Any) -> None:
-        """Forgets the flusher's watch; rospy calls it when the connection is closed."""
+        """Stops watching the socket; called by rospy when the connection is closed."""
         _flusher().forget(self, transport.fileno())
 
 
 class _Flusher(threading.Thread):
-    """Sends what outboxes could not, whenever a socket has room again."""
+    """Thread that flushes outboxes when their sockets become writable."""
 
     def __init__(self) -> None:
         super().__init__(name="flatland-flusher", daemon=True)
@@ -109,7 +112,7 @@ class _Flusher(threading.Thread):
         self._watched: dict[int, Outbox] = {}
 
     def watch(self, outbox: Outbox) -> None:
-        """Calls `flush` of an outbox once, as soon as its socket has room or breaks."""
+        """Calls `flush` of an outbox once, when its socket becomes writable or breaks."""
         number = outbox.fileno()
         if number < 0:
             return
@@ -122,16 +125,16 @@ class _Flusher(threading.Thread):
                 except FileNotFoundError:
                     self._epoll.register(number, flags)
             except OSError:
-                del self._watched[number]  # Closed just now: there is nothing left to do.
+                del self._watched[number]  # The socket was closed in the meantime.
 
     def forget(self, outbox: Outbox, number: int) -> None:
-        """Drops an outbox whose socket was closed."""
+        """Removes an outbox whose socket was closed."""
         with self._lock:
             if self._watched.get(number) is outbox:
                 del self._watched[number]
 
     def run(self) -> None:
-        """Waits for sockets, for ever."""
+        """Waits for writable sockets until the process ends."""
         while True:
             for number, _ in self._epoll.poll():
                 with self._lock:
@@ -140,7 +143,7 @@ class _Flusher(threading.Thread):
                     try:
                         outbox.flush()
                     except Exception:
-                        _LOG.exception("a message could not be sent")
+                        _LOG.exception("cannot send a message")
 
 
 _flusher_lock = threading.Lock()
@@ -148,7 +151,7 @@ _the_flusher: _Flusher | None = None
 
 
 def _flusher() -> _Flusher:
-    """Returns the process's flusher, started at its first use."""
+    """Returns the flusher of the process, starting it on first use."""
     global _the_flusher
     with _flusher_lock:
         if _the_flusher is None:

@@ -1,21 +1,23 @@
-"""A service that is registered without waiting for the ROS master."""
+"""A service that is registered asynchronously."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from concurrent.futures import Future
-from typing import Any
+from typing import Any, Final
 
 import rospy
 
 from flatland.ros.registrar import Registrar
 
+_SHUTDOWN_POLL_PERIOD: Final = 0.2  # s
+
 
 class Service:
-    """Answers requests, each in a thread of its own.
+    """Handles each request in a thread of its own.
 
     Attributes:
-        name: The resolved name of the service.
+        name: Resolved name of the service.
     """
 
     def __init__(
@@ -25,16 +27,16 @@ class Service:
         service_type: type[Any],
         handler: Callable[[Any], Any],
     ) -> None:
-        """Offers a service, soon.
+        """Advertises a service asynchronously.
 
         Args:
-            registrar: Talks to the ROS master.
-            name: Under the node's namespace, global with a leading `/`.
-            service_type: The ROS service class.
-            handler: Called with each request, returns the response.
+            registrar: Registers the service with the ROS master.
+            name: Name in the namespace of the node, global with a leading `/`.
+            service_type: ROS service class.
+            handler: Called with each request; returns the response.
 
         Raises:
-            FlatlandError: This node has a service of that name.
+            FlatlandError: This node already has a service of this name.
         """
         self.name: str = rospy.resolve_name(name)
         self._registrar = registrar
@@ -46,7 +48,7 @@ class Service:
         registrar.submit(self._open)
 
     def close(self) -> None:
-        """Ends the service, soon."""
+        """Unregisters the service asynchronously."""
         if self._closed:
             return
         self._closed = True
@@ -63,14 +65,17 @@ class Service:
 
 
 def wait_for(future: Future[Any]) -> Any:
-    """Waits in a service's thread for what the simulation's thread makes of a request.
+    """Waits in the thread of a service until the simulation has handled a request.
+
+    Args:
+        future: Result of the request.
 
     Raises:
         rospy.ServiceException: The node shuts down first.
     """
     while True:
         try:
-            return future.result(timeout=0.2)
+            return future.result(timeout=_SHUTDOWN_POLL_PERIOD)
         except TimeoutError:
             if future.done():
                 raise

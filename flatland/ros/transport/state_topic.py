@@ -1,4 +1,4 @@
-"""A latched topic that holds no message: each new subscriber gets one made for it."""
+"""A topic for a state: each new subscriber receives a message created on demand."""
 
 from __future__ import annotations
 
@@ -15,10 +15,11 @@ from flatland.ros.registrar import Registrar
 _LOG = logging.getLogger("flatland")
 
 
-class LatchedTopic(Publisher):
-    """Tells its subscribers of a state: new ones as it is now, all of them when it changes.
+class StateTopic(Publisher):
+    """Publishes a state: to new subscribers when they connect, to all when it changes.
 
-    The message is made when it is needed: without subscribers never.
+    Unlike a latched topic of rospy, it stores no message, so that a late subscriber never receives
+    an outdated one. Messages are created on demand, and not at all without subscribers.
     """
 
     def __init__(
@@ -31,52 +32,57 @@ class LatchedTopic(Publisher):
         *,
         on_connection: Callable[[bool], None] | None = None,
     ) -> None:
-        """Advertises a topic, soon.
+        """Advertises a topic asynchronously.
 
         Args:
-            registrar: Talks to the ROS master.
-            topic: Under the node's namespace, private with a leading `~`.
-            message_type: The ROS message class.
-            make: Makes the message of the present state; called between two steps.
+            registrar: Registers the topic with the ROS master.
+            topic: Name in the namespace of the node, private with a leading `~`.
+            message_type: ROS message class.
+            make: Creates the message of the current state; called between two steps.
             post: Runs an action between two steps.
-            on_connection: Told whether anybody subscribes, whenever that may have changed; called
-                in a thread of rospy.
+            on_connection: Called in a rospy thread whenever a subscriber may have connected or
+                disconnected, with whether there are subscribers.
 
         Raises:
             FlatlandError: This node publishes messages of another type on the topic.
         """
         self._make = make
         self._post = post
-        self._newcomers: list[Callable[[Any], None]] = []
-        self._reception = _Reception(self._welcome)
+        self._new_subscribers: list[Callable[[Any], None]] = []
+        self._connect_listener = _ConnectListener(self._on_connect)
         super().__init__(registrar, topic, message_type, latch=True, on_connection=on_connection)
 
     def send(self) -> None:
-        """Sends the present state to all; only in the thread that steps the world."""
+        """Publishes the current state; must be called in the thread that steps the world."""
         if self.connected:
-            # Whoever comes from here on is in the list again, and at worst served twice.
-            self._newcomers.clear()
+            # A subscriber that connects from here on is added again; at worst it receives the
+            # message twice.
+            self._new_subscribers.clear()
             self.publish(self._make())
 
     def replace(self, make: Callable[[], Any]) -> None:
-        """Tells of something else from now on; only in the thread that steps the world."""
+        """Publishes another state from now on; must be called in the thread that steps the world.
+
+        Args:
+            make: Creates the message of the new state; called between two steps.
+        """
         self._make = make
         self.send()
 
-    def _welcome(self, publish_single: Callable[[Any], None]) -> None:
-        """Hears of a subscriber, in a thread of rospy."""
-        self._newcomers.append(publish_single)
-        self._post(self._serve_newcomers)
+    def _on_connect(self, publish_single: Callable[[Any], None]) -> None:
+        """Schedules a message to a new subscriber; called in a rospy thread."""
+        self._new_subscribers.append(publish_single)
+        self._post(self._serve_new_subscribers)
 
-    def _serve_newcomers(self) -> None:
-        if self._closed or not self._newcomers:
+    def _serve_new_subscribers(self) -> None:
+        if self._closed or not self._new_subscribers:
             return
         try:
             message = self._make()
-            while self._newcomers:
-                self._publish_single(self._newcomers.pop(), message)
+            while self._new_subscribers:
+                self._publish_single(self._new_subscribers.pop(), message)
         except Exception:
-            _LOG.exception("no message for a new subscriber of %s", self.topic)
+            _LOG.exception("cannot publish to a new subscriber of %s", self.topic)
 
     def _publish_single(self, publish: Callable[[Any], None], message: Any) -> None:
         publisher = self._publisher
@@ -87,7 +93,7 @@ class LatchedTopic(Publisher):
         try:
             publish(message)
         except rospy.ROSException:
-            # The topic was closed meanwhile, by its owner or at shutdown.
+            # The topic was closed in the meantime, by its owner or by a shutdown.
             if not self._closed and not rospy.core.is_shutdown_requested():
                 raise
         finally:
@@ -98,36 +104,36 @@ class LatchedTopic(Publisher):
     def _open(self) -> None:
         super()._open()
         if self.connected:
-            # Those who were faster than us, or had the topic from a publisher that ends.
+            # Subscribers that connected before `_take_over`, or to another publisher of this node.
             self._post(self.send)
 
     def _take_over(self, impl: Any) -> None:
-        # Subscribers are told that the topic is latched, but rospy keeps no message: that would
-        # be an old one for those who come later.
+        # The topic is announced as latched, but rospy must not store a message: late subscribers
+        # would receive an outdated one.
         impl.add_headers({"latching": "1"})
         impl.is_latch = False
         super()._take_over(impl)
-        # Behind the listener that sets `connected`: a change after a newcomer was served would
-        # else find nobody to tell.
-        impl.add_subscriber_listener(self._reception)
+        # After the listener that sets `connected`; otherwise, `send` could skip a change of the
+        # state that follows the first message to a new subscriber.
+        impl.add_subscriber_listener(self._connect_listener)
 
     def _end(self) -> None:
         publisher = self._publisher
         listeners = publisher.impl.subscriber_listeners if publisher and publisher.impl else None
-        if listeners is not None and self._reception in listeners:
-            listeners.remove(self._reception)
+        if listeners is not None and self._connect_listener in listeners:
+            listeners.remove(self._connect_listener)
         super()._end()
 
 
-class _Reception(rospy.SubscribeListener):  # type: ignore[misc]
-    """Tells of every new subscriber, and how to reach it alone."""
+class _ConnectListener(rospy.SubscribeListener):  # type: ignore[misc]
+    """Reports every new subscriber, with a function that publishes to this subscriber only."""
 
-    def __init__(self, welcome: Callable[[Callable[[Any], None]], None]) -> None:
+    def __init__(self, on_connect: Callable[[Callable[[Any], None]], None]) -> None:
         super().__init__()
-        self._welcome = welcome
+        self._on_connect = on_connect
 
     def peer_subscribe(
         self, _topic: str, _publish: Any, publish_single: Callable[[Any], None]
     ) -> None:
-        """Hears of a new subscriber."""
-        self._welcome(publish_single)
+        """Reports a new subscriber; called by rospy."""
+        self._on_connect(publish_single)

@@ -1,4 +1,4 @@
-"""A subscriber that is registered without waiting for the ROS master."""
+"""A subscriber that is registered asynchronously."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ from flatland.ros.registrar import Registrar
 
 
 class Subscriber:
-    """Calls a function with each message of a topic, in a thread of rospy.
+    """Calls a function with each message of a topic, in a rospy thread.
 
     Attributes:
-        topic: The resolved name of the topic.
+        topic: Resolved name of the topic.
     """
 
     def __init__(
@@ -24,16 +24,16 @@ class Subscriber:
         message_type: type[Any],
         callback: Callable[[Any], object],
     ) -> None:
-        """Subscribes to a topic, soon.
+        """Subscribes to a topic asynchronously.
 
         Args:
-            registrar: Talks to the ROS master.
-            topic: Under the node's namespace, global with a leading `/`.
-            message_type: The ROS message class.
+            registrar: Registers the subscription with the ROS master.
+            topic: Name in the namespace of the node, global with a leading `/`.
+            message_type: ROS message class.
             callback: Called with each message.
 
         Raises:
-            FlatlandError: This node takes messages of another type from the topic.
+            FlatlandError: This node subscribes to the topic with another message type.
         """
         self.topic: str = rospy.resolve_name(topic)
         self._registrar = registrar
@@ -45,7 +45,7 @@ class Subscriber:
         registrar.submit(self._open)
 
     def close(self) -> None:
-        """Ends the subscription, soon; no message is handed over from now on."""
+        """Unsubscribes asynchronously; no callback starts after this call."""
         if self._closed:
             return
         self._closed = True

@@ -1,4 +1,4 @@
-"""Interactive markers: what clients get, and what comes of what they send."""
+"""Interactive markers of a running node: messages to clients, and effects of their feedback."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from visualization_msgs.msg import (
 
 SERVER = "/interactive_model_markers"
 NAN = math.nan
-LONG_ENOUGH = 0.3  # s; a drag is over after 0.1 s of silence
+LONGER_THAN_A_DRAG = 0.3  # s; a drag ends after 0.1 s without feedback
 
 DRIVER = """
 bodies: [{name: base, footprints: [{type: circle, radius: 0.2, density: 1}]}]
@@ -48,8 +48,8 @@ def server(module_launcher: Any, world: Path) -> Any:
 
 
 @pytest.fixture(autouse=True)
-def tidy(ros: Any, server: Any) -> Iterator[None]:
-    """Every test finds one model, at rest at (1, 2), in a world that runs."""
+def restore(ros: Any, server: Any) -> Iterator[None]:
+    """Restores the initial state: one model, at rest at (1, 2), in a running world."""
     yield
     ros.call("/resume", Empty)
     assert ros.move("rob", (1, 2, 0.5)).success
@@ -69,7 +69,7 @@ def planar(pose: Pose) -> tuple[float, float, float]:
 
 
 class Client:
-    """Sends what RViz sends."""
+    """Publishes feedback like RViz."""
 
     def __init__(self, ros: Any, name: str = "/rviz/Move Objects") -> None:
         self._ros = ros
@@ -85,7 +85,7 @@ class Client:
         frame: str = "map",
         **fields: Any,
     ) -> None:
-        """Sends feedback."""
+        """Publishes feedback."""
         feedback = InteractiveMarkerFeedback(
             client_id=self._name, marker_name=marker, event_type=event, control_name="move_xy"
         )
@@ -105,8 +105,8 @@ class Client:
         self.send(InteractiveMarkerFeedback.MOUSE_UP, pose, **options)
 
 
-class Holding:
-    """Drags on as RViz does, 30 times a second, while the block runs."""
+class ContinuousDrag:
+    """Context manager that publishes the pose of a drag 30 times per second, like RViz."""
 
     def __init__(self, client: Client, *pose: float, **options: Any) -> None:
         self._stop = threading.Event()
@@ -137,7 +137,7 @@ def clock(ros: Any) -> Any:
 
 @pytest.fixture
 def truth(ros: Any) -> Any:
-    """Where the model is, twist and all."""
+    """Ground truth of the pose and the twist of the model."""
     return ros.topic("/odometry/ground_truth", Odometry)
 
 
@@ -146,22 +146,22 @@ def updates(ros: Any) -> Any:
 
 
 def full_state(ros: Any, namespace: str = "") -> dict[str, InteractiveMarker]:
-    """What a client that comes now gets."""
+    """Returns the markers received by a new client."""
     topic = ros.topic(f"{namespace}{SERVER}/update_full", InteractiveMarkerInit)
     message = topic.next()
-    topic.close()  # rospy would give the next one this message again.
+    topic.close()  # Otherwise, rospy passes this message to the next subscriber, too.
     return {marker.name: marker for marker in message.markers}
 
 
 def assert_paused(clock: Any) -> None:
-    """Soon, as a busy machine may hold up a client until its drag is over."""
+    """Waits until the world is paused; on a busy machine, a drag may be interrupted."""
     end = time.monotonic() + 10
     while time.monotonic() < end:
         clock.drop()
-        time.sleep(0.1)  # Silence cannot be waited for otherwise.
+        time.sleep(0.1)  # The absence of messages is no event.
         if not clock.rest(0.001):
             return
-    pytest.fail("the world runs")
+    pytest.fail("the world is not paused")
 
 
 def assert_running(clock: Any) -> None:
@@ -169,8 +169,8 @@ def assert_running(clock: Any) -> None:
     clock.take(3)
 
 
-def assert_untouched(truth: Any) -> None:
-    """The model is where every test finds it."""
+def assert_not_moved(truth: Any) -> None:
+    """Checks that the model has its initial pose."""
     truth.drop()
     pose = truth.take(3)[-1].pose.pose
     assert planar(pose) == pytest.approx((1, 2, 0.5), abs=1e-5)
@@ -183,14 +183,14 @@ def moved(x: float, y: float, theta: float) -> Callable[[Odometry], bool]:
 # -- the markers ---------------------------------------------------------------------------
 
 
-def test_marker_of_a_model(ros: Any) -> None:
+def test_fields_of_a_marker(ros: Any) -> None:
     message = ros.topic(f"{SERVER}/update_full", InteractiveMarkerInit).next()
     assert message.server_id == "/flatland_server"
     assert message._connection_header["latching"] == "1"
     (marker,) = message.markers
     assert marker.name == "rob"
     assert marker.header.frame_id == "map"
-    # A stamp would make RViz send poses in its own fixed frame.
+    # With a stamp, RViz would send poses in its fixed frame.
     assert marker.header.stamp.to_nsec() == 0
     assert planar(marker.pose) == pytest.approx((1, 2, 0.5), abs=1e-5)
     move, rotate, rest = marker.controls
@@ -219,14 +219,14 @@ def test_marker_of_a_model(ros: Any) -> None:
     assert entry.command_type == entry.FEEDBACK
 
 
-def test_topics_are_where_rviz_looks(ros: Any) -> None:
+def test_topic_names_and_types(ros: Any) -> None:
     types = ros.types()
     assert types[f"{SERVER}/update"] == "visualization_msgs/InteractiveMarkerUpdate"
     assert types[f"{SERVER}/update_full"] == "visualization_msgs/InteractiveMarkerInit"
     assert types[f"{SERVER}/feedback"] == "visualization_msgs/InteractiveMarkerFeedback"
 
 
-def test_models_that_come_and_go(ros: Any) -> None:
+def test_models_are_added_moved_and_deleted(ros: Any) -> None:
     update = updates(ros)
     update.next()
     assert ros.spawn("ball.model.yaml", "ball", "", (-1, -2, 0)).success
@@ -248,7 +248,7 @@ def test_models_that_come_and_go(ros: Any) -> None:
     assert set(full_state(ros)) == {"rob"}
 
 
-def test_late_subscriber_gets_the_present_pose(ros: Any) -> None:
+def test_late_subscriber_receives_the_current_pose(ros: Any) -> None:
     full_state(ros)
     assert ros.move("rob", (-2, 0, 0)).success
     assert planar(full_state(ros)["rob"].pose) == pytest.approx((-2, 0, 0), abs=1e-5)
@@ -257,8 +257,8 @@ def test_late_subscriber_gets_the_present_pose(ros: Any) -> None:
     assert planar(full_state(ros)["rob"].pose) == pytest.approx((2, 0, 0), abs=1e-5)
 
 
-def test_numbers_of_updates_have_no_gaps(ros: Any) -> None:
-    """RViz starts anew when one is missing, and at first waits for a state among them."""
+def test_sequence_numbers_of_updates_have_no_gaps(ros: Any) -> None:
+    """RViz reinitializes when a number is missing, and initially waits for a matching state."""
     update = updates(ros)
     full = ros.topic(f"{SERVER}/update_full", InteractiveMarkerInit)
     numbers = [update.next().seq_num]
@@ -269,7 +269,7 @@ def test_numbers_of_updates_have_no_gaps(ros: Any) -> None:
     assert full.rest()[-1].seq_num == numbers[-1]
 
 
-def test_clients_are_kept_alive_also_while_paused(ros: Any) -> None:
+def test_keep_alive_messages_are_published_while_paused(ros: Any) -> None:
     update = updates(ros)
     ros.call("/pause", Empty)
     update.until(lambda message: message.type == InteractiveMarkerUpdate.KEEP_ALIVE)
@@ -285,45 +285,47 @@ def test_clients_are_kept_alive_also_while_paused(ros: Any) -> None:
 def test_drag_pauses_and_release_moves(client: Client, clock: Any, truth: Any) -> None:
     assert_running(clock)
     client.press()
-    with Holding(client, 0, -1, 1.5):
+    with ContinuousDrag(client, 0, -1, 1.5):
         assert_paused(clock)
         client.release(-1, -2, 2.5)
-    # What came after the release was another drag, which ends without one.
+    # Feedback after the release starts another drag, which times out.
     truth.until(moved(-1, -2, 2.5))
     twist = truth.next().twist.twist
     assert (twist.linear.x, twist.linear.y, twist.angular.z) == pytest.approx((0, 0, 0), abs=1e-6)
     assert_running(clock)
 
 
-def test_release_alone_moves(client: Client, clock: Any, truth: Any) -> None:
+def test_release_without_a_drag_moves(client: Client, clock: Any, truth: Any) -> None:
     client.release(-2, -1, -0.5)
     truth.until(moved(-2, -1, -0.5))
     assert_running(clock)
 
 
-def test_click_moves_nothing(client: Client, clock: Any, truth: Any) -> None:
+def test_click_does_not_move(client: Client, clock: Any, truth: Any) -> None:
     client.press()
     client.release(1, 2, 0.5)
     assert_running(clock)
-    assert_untouched(truth)
+    assert_not_moved(truth)
 
 
-def test_model_stays_while_it_is_dragged(client: Client, ros: Any, clock: Any, truth: Any) -> None:
+def test_model_does_not_move_during_a_drag(
+    client: Client, ros: Any, clock: Any, truth: Any
+) -> None:
     update = updates(ros)
-    with Holding(client, -3, -3, 1):
-        # Other clients see where it is dragged to.
+    with ContinuousDrag(client, -3, -3, 1):
+        # Other clients receive the pose of the drag.
         update.until(lambda m: m.poses and planar(m.poses[0].pose) == pytest.approx((-3, -3, 1)))
         assert_paused(clock)
         late = full_state(ros)["rob"]
         assert planar(late.pose) == pytest.approx((-3, -3, 1))
-    # It was let go without a word: it is back where the model is.
+    # The drag timed out without a release: the marker returns to the model.
     message = update.until(lambda m: m.poses and m.poses[0].pose.position.x > 0)
     assert planar(message.poses[0].pose) == pytest.approx((1, 2, 0.5), abs=1e-5)
     assert_running(clock)
-    assert_untouched(truth)
+    assert_not_moved(truth)
 
 
-def test_drag_that_stops_sending_ends(client: Client, clock: Any) -> None:
+def test_drag_without_feedback_times_out(client: Client, clock: Any) -> None:
     clock.next()
     client.press()
     client.drag(0, 0, 0)
@@ -336,33 +338,33 @@ def test_drag_that_stops_sending_ends(client: Client, clock: Any) -> None:
     assert 0.09 < paused_for < 1.0
 
 
-def test_drag_goes_on_after_a_hiccup(client: Client, clock: Any, truth: Any) -> None:
+def test_drag_continues_after_an_interruption(client: Client, clock: Any, truth: Any) -> None:
     client.press()
     client.drag(0, 0, 0)
     clock.rest(0.05)
     assert_running(clock)
-    with Holding(client, 0, 0, 0):
+    with ContinuousDrag(client, 0, 0, 0):
         assert_paused(clock)
     client.release(-1, 0, 0)
     truth.until(moved(-1, 0, 0))
 
 
-def test_client_that_is_only_alive_keeps_its_drag(client: Client, clock: Any) -> None:
+def test_keep_alive_feedback_continues_a_drag(client: Client, clock: Any) -> None:
     def kept() -> bool:
         client.press()
         for _ in range(10):
             client.send(InteractiveMarkerFeedback.KEEP_ALIVE)
-            time.sleep(0.03)  # The pace of the client is what is tested.
+            time.sleep(0.03)  # The rate of the feedback is under test.
         clock.drop()
         client.send(InteractiveMarkerFeedback.KEEP_ALIVE)
         return clock.rest(0.05) == []
 
-    # A busy machine may hold up the client for too long.
+    # On a busy machine, an attempt may be too slow.
     assert any(kept() for _ in range(5))
     assert_running(clock)
 
 
-def test_world_that_the_user_paused_stays_so(
+def test_world_paused_by_the_user_remains_paused(
     client: Client, ros: Any, clock: Any, truth: Any
 ) -> None:
     ros.call("/pause", Empty)
@@ -371,16 +373,18 @@ def test_world_that_the_user_paused_stays_so(
     client.drag(0, 0, 0)
     client.release(-1, -1, 1)
     assert_paused(clock)
-    client.press()  # never released
-    time.sleep(LONG_ENOUGH)
+    client.press()  # without a release
+    time.sleep(LONGER_THAN_A_DRAG)
     assert_paused(clock)
     ros.call("/resume", Empty)
     truth.until(moved(-1, -1, 1))
 
 
-def test_only_one_client_holds_a_marker(client: Client, ros: Any, clock: Any, truth: Any) -> None:
+def test_only_one_client_can_drag_a_marker(
+    client: Client, ros: Any, clock: Any, truth: Any
+) -> None:
     other = Client(ros, "/other_rviz/Markers")
-    with Holding(client, 0, 0, 0):
+    with ContinuousDrag(client, 0, 0, 0):
         assert_paused(clock)
         other.press()
         other.drag(3, 3, 3)
@@ -404,7 +408,7 @@ def test_menu_deletes_the_model(client: Client, ros: Any, clock: Any) -> None:
     assert_running(clock)
 
 
-def test_model_that_is_deleted_while_dragged(client: Client, ros: Any, clock: Any) -> None:
+def test_model_is_deleted_during_a_drag(client: Client, ros: Any, clock: Any) -> None:
     assert ros.spawn("ball.model.yaml", "victim").success
     client.press(marker="victim")
     client.send(InteractiveMarkerFeedback.MENU_SELECT, marker="victim", menu_entry_id=1)
@@ -420,12 +424,12 @@ def test_model_that_is_deleted_while_dragged(client: Client, ros: Any, clock: An
         pose_message(NAN, 0, 0),
         pose_message(0, math.inf, 0),
         pose_message(0, 0, NAN),
-        Pose(),  # no rotation at all
-        pose_message(1e30, 0, 0),  # beyond what the physics take
+        Pose(),  # zero quaternion
+        pose_message(1e30, 0, 0),  # out of range
     ],
     ids=["nan", "inf", "nan angle", "zero", "far"],
 )
-def test_poses_that_are_none_change_nothing(
+def test_invalid_poses_are_ignored(
     client: Client, clock: Any, truth: Any, server: Any, pose: Pose
 ) -> None:
     for event in (
@@ -438,11 +442,11 @@ def test_poses_that_are_none_change_nothing(
     ):
         client.send(event, pose)
     assert_running(clock)
-    assert_untouched(truth)
+    assert_not_moved(truth)
     assert server.running
 
 
-def test_feedback_of_unknown_markers_menus_and_frames(
+def test_unknown_markers_menu_entries_and_frames_are_ignored(
     client: Client, ros: Any, clock: Any, truth: Any, server: Any
 ) -> None:
     client.press(marker="ghost")
@@ -450,18 +454,18 @@ def test_feedback_of_unknown_markers_menus_and_frames(
     client.send(InteractiveMarkerFeedback.MENU_SELECT, marker="ghost", menu_entry_id=1)
     client.send(InteractiveMarkerFeedback.MENU_SELECT, menu_entry_id=99)
     client.release(0, 0, 0, frame="base_link")
-    server.wait_for_line('WARN.*"rob": a pose in frame "base_link" is ignored')
+    server.wait_for_line('WARN.*"rob": ignoring a pose in frame "base_link"')
     assert_running(clock)
-    assert_untouched(truth)
+    assert_not_moved(truth)
     assert set(full_state(ros)) == {"rob"}
     client.release(1, 1, 1, frame="/map")
     truth.until(moved(1, 1, 1))
 
 
-# -- how much is sent ----------------------------------------------------------------------
+# -- rate of updates -----------------------------------------------------------------------
 
 
-def test_nothing_is_sent_when_nothing_moves(ros: Any, clock: Any) -> None:
+def test_no_updates_are_published_when_nothing_moves(ros: Any, clock: Any) -> None:
     update = updates(ros)
     full = ros.topic(f"{SERVER}/update_full", InteractiveMarkerInit)
     update.until(lambda message: message.type == InteractiveMarkerUpdate.KEEP_ALIVE)
@@ -471,7 +475,7 @@ def test_nothing_is_sent_when_nothing_moves(ros: Any, clock: Any) -> None:
     assert full.rest() == []
 
 
-def test_at_most_30_updates_a_second_however_fast_the_world_runs(
+def test_rate_of_updates_is_limited_to_30_hz(
     ros: Any, launcher: Any, write_world: Callable[..., Path]
 ) -> None:
     world = write_world("[{name: shuttle, model: shuttle.model.yaml}]", shuttle=SHUTTLE)
@@ -488,7 +492,7 @@ def test_at_most_30_updates_a_second_however_fast_the_world_runs(
     assert 5 < rate < 31
 
 
-def test_no_updates_are_made_when_nobody_listens(
+def test_no_updates_are_created_without_clients(
     ros: Any, launcher: Any, write_world: Callable[..., Path]
 ) -> None:
     models = "[{name: shuttle, model: shuttle.model.yaml}, {name: rob, model: driver.model.yaml}]"
@@ -502,5 +506,5 @@ def test_no_updates_are_made_when_nobody_listens(
 
     before = next_number()
     ros.topic("/alone/odometry/ground_truth", Odometry).take(100)  # 2 s
-    # 60 with somebody there; some may be made while one comes or goes.
+    # About 60 with a client; a few are created while a client connects or disconnects.
     assert next_number() - before < 20

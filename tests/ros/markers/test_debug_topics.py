@@ -1,4 +1,4 @@
-"""The debug markers of a running node, field by field, as a subscriber sees them."""
+"""Debug marker topics of a running node, as received by a subscriber."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from visualization_msgs.msg import Marker, MarkerArray
 from flatland.msg import DebugTopicList
 
 DEBUG = "/flatland_server/debug"
-RATE = 20.0  # Hz of the model markers
+RATE = 20.0  # Hz, model markers
 
 LAYERS = """
 layers:
@@ -34,7 +34,7 @@ bodies:
      density: 1}]}
   - {name: arm, pose: [1, 0, 0], color: [0, 1, 0, 0.75], footprints: [{type: polygon, density: 1,
      points: [[0, 0], [0.5, 0], [0.5, 0.25]]}]}
-  - {name: nothing, footprints: []}
+  - {name: empty, footprints: []}
 joints:
   - {name: elbow, type: weld, color: [0, 0, 1, 0.5],
      bodies: [{name: base, anchor: [0.5, 0]}, {name: arm, anchor: [-0.5, 0]}]}
@@ -47,7 +47,7 @@ import flatland
 class Grow(flatland.WorldPlugin):
     def on_initialize(self, config):
         self.ros.advertise_service("grow", Trigger, self.grow)
-        self.ros.advertise_service("touch_up", Trigger, self.touch_up)
+        self.ros.advertise_service("modify", Trigger, self.modify)
 
     def grow(self, request):
         layer = self.world.layer("growing")
@@ -55,8 +55,8 @@ class Grow(flatland.WorldPlugin):
         self.world.layer_changed(layer)
         return TriggerResponse(True, "")
 
-    def touch_up(self, request):
-        body = self.world.model("arm").body("nothing")
+    def modify(self, request):
+        body = self.world.model("arm").body("empty")
         body.color = (1.0, 1.0, 0.0, 1.0)
         body.physics.create_edges(np.array([[9, 9, 9, 11]], np.float32))
         return TriggerResponse(True, "")
@@ -86,7 +86,7 @@ def server(module_launcher: Any, write_world: Callable[..., Path]) -> Any:
 
 @pytest.fixture
 def arm(ros: Any) -> Any:
-    """A model with all that can be shown, at (3, 1) and turned by 90 degrees."""
+    """A model with all kinds of markers, at (3, 1) and rotated by 90 degrees."""
     answer = ros.spawn("arm.model.yaml", "arm", "", (3, 1, math.pi / 2))
     assert answer.success, answer.message
     yield
@@ -95,12 +95,12 @@ def arm(ros: Any) -> Any:
 
 
 def markers_of(ros: Any, name: str) -> list[Marker]:
-    """The first markers that a new subscriber gets."""
+    """Returns the first markers received by a new subscriber."""
     return ros.topic(f"{DEBUG}/{name}", MarkerArray).next().markers
 
 
 def echo(launcher: Any, name: str) -> str:
-    """What a subscriber in another process gets first; here rospy would share the connection."""
+    """Returns the first message received in another process, with a connection of its own."""
     process = launcher.program("rostopic", "echo", "-n", "1", f"{DEBUG}/{name}")
     assert process.wait() == 0
     return process.output
@@ -127,7 +127,7 @@ def pose(marker: Marker) -> tuple[float, ...]:
 # -- layers --------------------------------------------------------------------------------
 
 
-def test_layer_is_shown_as_lines(ros: Any) -> None:
+def test_layer_as_lines(ros: Any) -> None:
     (marker,) = markers_of(ros, "layer/2d")
     assert (marker.type, marker.action) == (Marker.LINE_LIST, Marker.ADD)
     assert marker.header.frame_id == "map"
@@ -140,7 +140,7 @@ def test_layer_is_shown_as_lines(ros: Any) -> None:
     assert lines == [[corners[i], corners[(i + 1) % 4]] for i in range(4)]
 
 
-def test_layer_has_the_pose_of_its_body(ros: Any) -> None:
+def test_layer_markers_have_the_pose_of_the_layer(ros: Any) -> None:
     for name in ("layer/hall", "layer/hall_3d"):
         (marker,) = markers_of(ros, name)
         assert pose(marker) == pytest.approx((1, 2, 0.5))
@@ -151,7 +151,7 @@ def test_layer_has_the_pose_of_its_body(ros: Any) -> None:
 @pytest.mark.parametrize(
     ("name", "heights"), [("2d", {0, 1}), ("hall", {-0.5, 2.5}), ("bad_heights", {0, 1})]
 )
-def test_walls_stand_on_every_edge(ros: Any, name: str, heights: set[float]) -> None:
+def test_walls_cover_every_edge(ros: Any, name: str, heights: set[float]) -> None:
     (marker,) = markers_of(ros, f"layer/{name}_3d")
     (lines,) = markers_of(ros, f"layer/{name}")
     assert (marker.type, marker.action) == (Marker.TRIANGLE_LIST, Marker.ADD)
@@ -168,11 +168,11 @@ def test_walls_stand_on_every_edge(ros: Any, name: str, heights: set[float]) -> 
         assert {(x, y) for x, y, _z in wall} == {(x, y) for x, y, _z in edge}
 
 
-def test_bad_heights_are_warned_of(server: Any) -> None:
-    server.wait_for_line("layer \"bad heights\".*min_z must be a finite number, got 'low'")
+def test_invalid_heights_are_logged(server: Any) -> None:
+    server.wait_for_line("layer \"bad heights\".*min_z must be a finite number, received 'low'")
 
 
-def test_layer_is_sent_once_and_again_when_it_changes(ros: Any, launcher: Any) -> None:
+def test_layer_is_published_once_and_when_it_changes(ros: Any, launcher: Any) -> None:
     lines = ros.topic(f"{DEBUG}/layer/growing", MarkerArray)
     walls = ros.topic(f"{DEBUG}/layer/growing_3d", MarkerArray)
     assert lines.next().markers == walls.next().markers == []
@@ -183,7 +183,7 @@ def test_layer_is_sent_once_and_again_when_it_changes(ros: Any, launcher: Any) -
         assert len(line_marker.points) == 2 * count
         assert len(wall_marker.points) == 6 * count
     assert echo(launcher, "layer/growing").count("z: 0.0") == 3 + 4  # pose, scale; points
-    # Neither a late subscriber nor time is a reason to send to the others.
+    # Existing subscribers receive nothing for a late subscriber, or as time passes.
     assert lines.rest() == walls.rest() == []
 
 
@@ -199,7 +199,7 @@ def test_topics_are_latched(ros: Any, arm: None) -> None:
 # -- models --------------------------------------------------------------------------------
 
 
-def test_model_is_shown_as_footprints_and_joints(ros: Any, arm: None) -> None:
+def test_model_as_footprints_and_joints(ros: Any, arm: None) -> None:
     del arm
     clock = ros.topic("/clock", Clock).next().clock
     markers = markers_of(ros, "model/arm")
@@ -230,10 +230,10 @@ def test_model_is_shown_as_footprints_and_joints(ros: Any, arm: None) -> None:
     assert scale(cubes) == (0.03, 0.03, 0.03)
     assert color(lines) == color(cubes) == (0, 0, 1, 0.5)
     assert pose(lines) == pose(cubes) == (0, 0, 0)
-    wanted = [origin_a, anchor_a, origin_b, anchor_b, anchor_a, anchor_b]
-    assert np.array(points(lines)) == pytest.approx(np.array(wanted), abs=1e-5)
-    wanted = [origin_a, anchor_a, origin_b, anchor_b]
-    assert np.array(points(cubes)) == pytest.approx(np.array(wanted), abs=1e-5)
+    expected = [origin_a, anchor_a, origin_b, anchor_b, anchor_a, anchor_b]
+    assert np.array(points(lines)) == pytest.approx(np.array(expected), abs=1e-5)
+    expected = [origin_a, anchor_a, origin_b, anchor_b]
+    assert np.array(points(cubes)) == pytest.approx(np.array(expected), abs=1e-5)
 
 
 def test_markers_follow_the_model(ros: Any, arm: None) -> None:
@@ -249,7 +249,7 @@ def test_markers_follow_the_model(ros: Any, arm: None) -> None:
     assert points(cubes)[2] == pytest.approx([0, -2, 0], abs=1e-5)
 
 
-def test_markers_go_on_while_paused(ros: Any, launcher: Any, arm: None) -> None:
+def test_markers_are_published_while_paused(ros: Any, launcher: Any, arm: None) -> None:
     del arm
     topic = ros.topic(f"{DEBUG}/model/arm", MarkerArray)
     ros.call("/pause", Empty)
@@ -258,11 +258,11 @@ def test_markers_go_on_while_paused(ros: Any, launcher: Any, arm: None) -> None:
     assert ros.move("arm", (-2, 0, 0)).success
     topic.until(lambda message: pose(message.markers[0])[0] < 0)
     topic.close()
-    assert ros.move("arm", (-3, 0, 0)).success  # while nobody watches
+    assert ros.move("arm", (-3, 0, 0)).success  # without subscribers
     assert "x: -3.0" in echo(launcher, "model/arm")
 
 
-def test_rate_is_that_of_the_wall_clock(ros: Any, arm: None) -> None:
+def test_rate_is_in_wall_time(ros: Any, arm: None) -> None:
     del arm
     topic = ros.topic(f"{DEBUG}/model/arm", MarkerArray)
     topic.take(2)
@@ -273,21 +273,21 @@ def test_rate_is_that_of_the_wall_clock(ros: Any, arm: None) -> None:
     assert 0.3 * RATE < rate < 1.1 * RATE
 
 
-def test_new_footprints_and_colors_show(ros: Any, arm: None) -> None:
+def test_changed_footprints_and_colors(ros: Any, arm: None) -> None:
     del arm
     topic = ros.topic(f"{DEBUG}/model/arm", MarkerArray)
     assert len(topic.next().markers) == 4
-    assert ros.call("/touch_up", Trigger).success
+    assert ros.call("/modify", Trigger).success
     markers = topic.until(lambda message: len(message.markers) == 5).markers
     edge = markers[2]
     assert edge.type == Marker.LINE_LIST
-    assert points(edge) == [[9, 9, 0], [9, 11, 0]]  # where it touches nothing
+    assert points(edge) == [[9, 9, 0], [9, 11, 0]]  # away from all contacts
     assert scale(edge)[0] == 0.03
     assert color(edge) == (1, 1, 0, 1)
     assert pose(edge) == pytest.approx((3, 1, math.pi / 2), abs=1e-6)
 
 
-# -- models that come and go, the list of topics, names ------------------------------------
+# -- added and deleted models, list of topics, names --------------------------------------
 
 LAYER_TOPICS = [
     f"layer/{name}{suffix}"
@@ -312,7 +312,7 @@ def test_topics_are_listed(ros: Any, launcher: Any) -> None:
     assert set(ros.types()) >= {f"{DEBUG}/{name}" for name in LAYER_TOPICS}
 
 
-def test_deleted_model_removes_its_markers_and_ends_its_topic(ros: Any, eventually: Any) -> None:
+def test_deleted_model_deletes_its_markers_and_its_topic(ros: Any, eventually: Any) -> None:
     assert ros.spawn("ball.model.yaml", "one").success
     topic = ros.topic(f"{DEBUG}/model/one", MarkerArray)
     topic.next()
@@ -325,34 +325,36 @@ def test_deleted_model_removes_its_markers_and_ends_its_topic(ros: Any, eventual
     assert topic.rest() == []
 
 
-def test_model_that_comes_back_at_once_is_shown(ros: Any, launcher: Any) -> None:
+def test_model_that_is_deleted_and_spawned_again(ros: Any, launcher: Any) -> None:
     assert ros.spawn("ball.model.yaml", "one").success
     topic = ros.topic(f"{DEBUG}/model/one", MarkerArray)
     for x in (1, 2, 3):
         assert ros.delete("one").success
         assert ros.spawn("ball.model.yaml", "one", "", (x, 0, 0)).success
         topic.until(lambda message, x=x: message.markers[0].pose.position.x == x)
-    # For longer than the topic of the deleted ones lives on, and for others too.
+    # For longer than the delay after which the topic of a deleted model is closed.
     for message in topic.take(10):
         assert pose(message.markers[0]) == (3, 0, 0)
     assert "x: 3.0" in echo(launcher, "model/one")
     assert ros.delete("one").success
 
 
-def test_illegal_names_are_mapped_with_a_warning(ros: Any, server: Any) -> None:
+def test_illegal_names_are_converted_with_a_warning(ros: Any, server: Any) -> None:
     topics = ros.topic(f"{DEBUG}/topics", DebugTopicList)
     topics.next()
     names = ["my robot-1", "my_robot_1", "my-robot-1", "a/b", "Größe", "a//b"]
-    wanted = ["my_robot_1", "my_robot_1_2", "my_robot_1_3", "a/b", "Gr__e", "a/b_2"]
-    for i, (name, legal) in enumerate(zip(names, wanted, strict=True)):
+    expected = ["my_robot_1", "my_robot_1_2", "my_robot_1_3", "a/b", "Gr__e", "a/b_2"]
+    for i, (name, legal) in enumerate(zip(names, expected, strict=True)):
         answer = ros.spawn("ball.model.yaml", name, "", (i - 3, 0, 0))
         assert answer.success, answer.message
         assert topics.next().topics[-1] == f"model/{legal}"
         (marker,) = markers_of(ros, f"model/{legal}")
         assert marker.pose.position.x == i - 3
-    server.wait_for_line(r'WARN.*model "my robot-1" is shown on topic ".*/debug/model/my_robot_1"')
-    server.wait_for_line(r'WARN.*layer "bad heights" is shown on topic')
-    assert 'model "a/b" is shown' not in server.output
+    server.wait_for_line(
+        r'WARN.*model "my robot-1" is published on topic ".*/debug/model/my_robot_1"'
+    )
+    server.wait_for_line(r'WARN.*layer "bad heights" is published on topic')
+    assert 'model "a/b" is published' not in server.output
     for name in names:
         assert ros.delete(name).success
     assert "Traceback" not in server.output
@@ -365,38 +367,36 @@ def test_without_show_viz_there_are_no_debug_topics(
     ros: Any, launcher: Any, write_world: Callable[..., Path], eventually: Any
 ) -> None:
     launcher.server(write_world(), "__ns:=/other")
-    eventually("interactive markers", lambda: markers_are_up(ros, "/other"))
+    eventually("interactive markers", lambda: has_interactive_markers(ros, "/other"))
     assert not [name for name in ros.types() if name.startswith("/other/flatland_server/debug")]
 
 
-def markers_are_up(ros: Any, namespace: str) -> bool:
+def has_interactive_markers(ros: Any, namespace: str) -> bool:
     return f"{namespace}/interactive_model_markers/update" in ros.types()
 
 
-def test_50000_edges_reach_a_subscriber(
-    ros: Any, launcher: Any, write_world: Callable[..., Path]
-) -> None:
+def test_layer_with_50000_edges(ros: Any, launcher: Any, write_world: Callable[..., Path]) -> None:
     world = write_world("[{name: one, model: ball.model.yaml, pose: [500, 500, 0]}]")
     rng = np.random.default_rng(1)
     starts = rng.uniform(-100, 100, (50_000, 2))
     edges = np.concatenate((starts, starts + rng.uniform(0.1, 1, (50_000, 2))), axis=1)
     np.savetxt(world.parent / "walls.dat", edges, fmt="%.4f")
     launcher.server(world, "__ns:=/big", show_viz=True)
-    # As bytes: this test would otherwise mostly measure how long rospy takes to make points.
+    # Received as bytes, because rospy deserializes points slowly.
     debug = "/big/flatland_server/debug"
     lines = ros.topic(f"{debug}/layer/2d", rospy.AnyMsg).next()._buff
     walls = ros.topic(f"{debug}/layer/2d_3d", rospy.AnyMsg).next()._buff
     for data, count in ((lines, 100_000), (walls, 300_000)):
         (marker,) = MarkerArray().deserialize(data).markers
         assert len(marker.points) == count
-        got = np.array([(point.x, point.y) for point in marker.points[-6:]])
+        received = np.array([(point.x, point.y) for point in marker.points[-6:]])
         if data is lines:
-            assert got[-2:] == pytest.approx(edges[-1].reshape(2, 2), abs=1e-3)
+            assert received[-2:] == pytest.approx(edges[-1].reshape(2, 2), abs=1e-3)
         else:
-            assert set(np.round(got[:, 0], 2)) == set(np.round(edges[-1, ::2], 2))
+            assert set(np.round(received[:, 0], 2)) == set(np.round(edges[-1, ::2], 2))
 
 
-def test_endless_rates_are_bounded(
+def test_infinite_rates_are_limited(
     ros: Any, launcher: Any, write_world: Callable[..., Path]
 ) -> None:
     world = write_world("[{name: one, model: ball.model.yaml}]")

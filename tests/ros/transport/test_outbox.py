@@ -1,4 +1,4 @@
-"""The outbox of a connection: order, whole messages, the newest survive, nothing waits."""
+"""Outbox of a connection: order, complete messages, dropped messages, non-blocking writes."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from flatland.ros.transport.outbox import Outbox
 
 
 class Transport:
-    """As much of rospy's connection as an outbox knows."""
+    """The part of a rospy transport that an outbox uses."""
 
     def __init__(self, connection: socket.socket) -> None:
         self.socket: socket.socket | None = connection
@@ -40,7 +40,7 @@ class Transport:
 
 
 class Pair:
-    """An outbox with small buffers, and the reader at the other end."""
+    """An outbox with small socket buffers, and the reader of its connection."""
 
     def __init__(self, queue_size: int) -> None:
         ours, self.reader = socket.socketpair()
@@ -53,7 +53,7 @@ class Pair:
         self.transport.write_data(struct.pack("<II", number, size) + bytes([number % 251]) * size)
 
     def read(self) -> int:
-        """Reads one message, checks that it is whole, and returns its number."""
+        """Reads one message, checks that it is complete, and returns its number."""
         number, size = struct.unpack("<II", self._read(8))
         assert self._read(size) == bytes([number % 251]) * size
         return int(number)
@@ -73,7 +73,7 @@ def pair(request: pytest.FixtureRequest) -> Iterator[Pair]:
     pair.reader.close()
 
 
-def test_reader_that_keeps_up_gets_everything(pair: Pair) -> None:
+def test_fast_reader_receives_all_messages(pair: Pair) -> None:
     for number in range(500):
         pair.write(number)
         assert pair.read() == number
@@ -81,29 +81,27 @@ def test_reader_that_keeps_up_gets_everything(pair: Pair) -> None:
     assert pair.transport.stat_bytes == 500 * 1008
 
 
-def test_write_never_waits_and_the_newest_arrive_at_last(pair: Pair) -> None:
-    start = time.monotonic()
-    for number in range(2000):
+def test_slow_reader_receives_the_newest_messages(pair: Pair) -> None:
+    for number in range(2000):  # Would block forever if a write waited for the reader.
         pair.write(number)
-    assert time.monotonic() - start < 2
     numbers = [pair.read()]
     while numbers[-1] != 1999:
         numbers.append(pair.read())
     assert numbers == sorted(set(numbers))
     assert len(numbers) < 1000
-    queue_size = pair.outbox._waiting.maxlen
+    queue_size = pair.outbox._queue.maxlen
     assert queue_size is not None
     assert numbers[-queue_size:] == list(range(2000 - queue_size, 2000))
 
 
-def test_message_greater_than_any_buffer_arrives_whole(pair: Pair) -> None:
+def test_message_larger_than_the_socket_buffer_is_complete(pair: Pair) -> None:
     pair.write(7, 3_000_000)
     pair.write(8)
     assert [pair.read(), pair.read()] == [7, 8]
     assert pair.transport.stat_num_msg == 2
 
 
-def test_writing_goes_on_after_the_reader_caught_up(pair: Pair) -> None:
+def test_writes_continue_after_the_reader_has_caught_up(pair: Pair) -> None:
     for number in range(100):
         pair.write(number)
     while pair.read() != 99:
@@ -113,12 +111,12 @@ def test_writing_goes_on_after_the_reader_caught_up(pair: Pair) -> None:
         assert pair.read() == number
 
 
-def test_reader_that_goes_ends_the_connection(pair: Pair) -> None:
+def test_closed_reader_ends_the_connection(pair: Pair) -> None:
     for number in range(100):
         pair.write(number)
     pair.reader.close()
     end = time.monotonic() + 10
-    # The flusher notices by itself, without another message.
+    # The flusher detects it without another message.
     while not pair.transport.done and time.monotonic() < end:
         time.sleep(0.001)
     assert pair.transport.done
@@ -126,7 +124,7 @@ def test_reader_that_goes_ends_the_connection(pair: Pair) -> None:
         pair.write(100)
 
 
-def test_closed_connection_takes_nothing(pair: Pair) -> None:
+def test_write_to_a_closed_connection_raises(pair: Pair) -> None:
     pair.transport.close()
     with pytest.raises(TransportTerminated):
         pair.write(1)

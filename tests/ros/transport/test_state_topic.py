@@ -1,4 +1,4 @@
-"""Topics whose message is made for those who come; publisher here, subscribers in processes."""
+"""State topics; the publisher is in this process, the subscribers in others."""
 
 from __future__ import annotations
 
@@ -12,23 +12,23 @@ from std_msgs.msg import Int32
 
 from flatland.errors import FlatlandError
 from flatland.ros.registrar import Registrar
-from flatland.ros.transport.state_topic import LatchedTopic
+from flatland.ros.transport.state_topic import StateTopic
 
 TOPIC = "/flatland_tests/state"
-PATIENCE = 10.0
+TIMEOUT = 10.0  # s
 
 
 class State:
-    """What the topic tells of, and how often its message was made."""
+    """State to publish, and the number of messages created."""
 
     def __init__(self) -> None:
         self.value = 0
-        self.made = 0
+        self.created = 0
         self.connections: list[bool] = []
         self._lock = threading.Lock()
 
     def make(self) -> Int32:
-        self.made += 1
+        self.created += 1
         return Int32(self.value)
 
     def post(self, action: Callable[[], object]) -> Future[Any]:
@@ -48,18 +48,18 @@ def state() -> State:
 def registrar(ros: Any) -> Iterator[Registrar]:
     registrar = Registrar()
     yield registrar
-    registrar.close(PATIENCE)
+    registrar.close(TIMEOUT)
 
 
 @pytest.fixture
-def topic(registrar: Registrar, state: State) -> Iterator[LatchedTopic]:
-    topic = LatchedTopic(
+def topic(registrar: Registrar, state: State) -> Iterator[StateTopic]:
+    topic = StateTopic(
         registrar, TOPIC, Int32, state.make, state.post, on_connection=state.connections.append
     )
-    assert registrar.flush(PATIENCE)
+    assert registrar.flush(TIMEOUT)
     yield topic
     topic.close()
-    assert registrar.flush(PATIENCE)
+    assert registrar.flush(TIMEOUT)
 
 
 @pytest.fixture
@@ -72,21 +72,21 @@ def echo(launcher: Any) -> Callable[..., Any]:
     return start
 
 
-def test_nothing_is_made_for_nobody(topic: LatchedTopic, state: State) -> None:
+def test_no_message_is_created_without_subscribers(topic: StateTopic, state: State) -> None:
     topic.send()
     topic.replace(state.make)
-    assert state.made == 0
+    assert state.created == 0
     assert not topic.connected
 
 
-def test_each_subscriber_gets_the_state_of_its_time(
-    topic: LatchedTopic, state: State, echo: Callable[..., Any]
+def test_new_subscriber_receives_the_current_state(
+    topic: StateTopic, state: State, echo: Callable[..., Any]
 ) -> None:
     state.value = 1
     first = echo()
     first.wait_for_line("data: 1")
-    assert state.made == 1
-    state.value = 2  # Not told to anybody.
+    assert state.created == 1
+    state.value = 2  # Not published.
     second = echo("-n", "1")
     second.wait_for_line("data: 2")
     assert second.wait() == 0
@@ -94,28 +94,28 @@ def test_each_subscriber_gets_the_state_of_its_time(
     topic.send()
     first.wait_for_line("data: 3")
     assert [line for line in first.lines if "data" in line] == ["data: 1", "data: 3"]
-    assert state.made == 3
+    assert state.created == 3
     assert state.connections[0] is False
     assert True in state.connections
 
 
-def test_nothing_is_kept_for_those_who_come_later(
-    topic: LatchedTopic, state: State, echo: Callable[..., Any], eventually: Any
+def test_no_message_is_stored_for_late_subscribers(
+    topic: StateTopic, state: State, echo: Callable[..., Any], eventually: Any
 ) -> None:
     first = echo("-n", "1")
     first.wait_for_line("data: 0")
     assert first.wait() == 0
-    eventually("nobody", lambda: not topic.connected)
+    eventually("no subscribers", lambda: not topic.connected)
     state.value = 5
     topic.send()
-    assert state.made == 1
+    assert state.created == 1
     second = echo("-n", "1")
     second.wait_for_line("data: 5")
     assert second.wait() == 0
 
 
-def test_something_else_is_told(
-    topic: LatchedTopic, state: State, echo: Callable[..., Any]
+def test_replaced_state_is_published(
+    topic: StateTopic, state: State, echo: Callable[..., Any]
 ) -> None:
     subscriber = echo()
     subscriber.wait_for_line("data: 0")
@@ -125,8 +125,8 @@ def test_something_else_is_told(
     late.wait_for_line("data: 77")
 
 
-def test_who_has_the_state_is_told_of_what_comes_next(
-    topic: LatchedTopic, echo: Callable[..., Any]
+def test_topic_is_connected_before_the_first_message(
+    topic: StateTopic, echo: Callable[..., Any]
 ) -> None:
     connected_when_made = []
 
@@ -139,15 +139,15 @@ def test_who_has_the_state_is_told_of_what_comes_next(
     assert connected_when_made == [True]
 
 
-def test_second_topic_of_the_name_serves_those_who_are_there(
-    topic: LatchedTopic, registrar: Registrar, state: State, echo: Callable[..., Any]
+def test_second_topic_of_the_same_name_publishes_to_existing_subscribers(
+    topic: StateTopic, registrar: Registrar, state: State, echo: Callable[..., Any]
 ) -> None:
     subscriber = echo()
     subscriber.wait_for_line("data: 0")
-    second = LatchedTopic(registrar, TOPIC, Int32, lambda: Int32(9), state.post)
+    second = StateTopic(registrar, TOPIC, Int32, lambda: Int32(9), state.post)
     topic.close()
     subscriber.wait_for_line("data: 9")
-    assert registrar.flush(PATIENCE)
+    assert registrar.flush(TIMEOUT)
     late = echo("-n", "1")
     late.wait_for_line("data: 9")
     second.send()
@@ -156,8 +156,8 @@ def test_second_topic_of_the_name_serves_those_who_are_there(
     topic.send()
 
 
-def test_another_type_is_refused(topic: LatchedTopic, registrar: Registrar, state: State) -> None:
+def test_different_type_raises(topic: StateTopic, registrar: Registrar, state: State) -> None:
     from std_msgs.msg import String
 
     with pytest.raises(FlatlandError, match="has the type std_msgs/Int32 already"):
-        LatchedTopic(registrar, TOPIC, String, String, state.post)
+        StateTopic(registrar, TOPIC, String, String, state.post)

@@ -1,4 +1,4 @@
-"""Drags pause the world, and let it run on when they end."""
+"""Pausing and resuming of the world by drags."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import pytest
 
 import flatland
-from flatland.ros.interactive.drag import LONGEST_SILENCE, Drags
+from flatland.ros.interactive.drag import DRAG_TIMEOUT, Drags
 
 POSE = (1.0, 2.0, 3.0)
 
@@ -18,7 +18,7 @@ def world() -> Iterator[flatland.World]:
         yield world
 
 
-def test_world_is_paused_while_anything_is_dragged(world: flatland.World) -> None:
+def test_world_is_paused_during_drags(world: flatland.World) -> None:
     drags = Drags(world)
     drags.hold("a", "rviz", 0.0, POSE)
     drags.hold("b", "other", 0.0, POSE)
@@ -29,7 +29,7 @@ def test_world_is_paused_while_anything_is_dragged(world: flatland.World) -> Non
     assert (world.paused, bool(drags)) == (False, False)
 
 
-def test_world_that_was_paused_before_stays_so(world: flatland.World) -> None:
+def test_world_paused_before_a_drag_remains_paused(world: flatland.World) -> None:
     world.pause()
     drags = Drags(world)
     drags.hold("a", "rviz", 0.0, POSE)
@@ -38,7 +38,7 @@ def test_world_that_was_paused_before_stays_so(world: flatland.World) -> None:
     assert world.paused
 
 
-def test_pause_by_somebody_who_resumed_during_a_drag_stays(world: flatland.World) -> None:
+def test_world_resumed_and_paused_during_a_drag_remains_paused(world: flatland.World) -> None:
     drags = Drags(world)
     drags.hold("a", "rviz", 0.0, POSE)
     world.resume()
@@ -49,20 +49,20 @@ def test_pause_by_somebody_who_resumed_during_a_drag_stays(world: flatland.World
     assert world.paused
 
 
-def test_silent_drags_end(world: flatland.World) -> None:
+def test_stale_drags_end(world: flatland.World) -> None:
     drags = Drags(world)
     drags.hold("a", "rviz", 0.0, POSE)
     drags.hold("b", "rviz", 0.05, POSE)
-    assert drags.end_silent(LONGEST_SILENCE) == []
-    assert drags.end_silent(LONGEST_SILENCE + 0.01) == ["a"]
+    assert drags.end_stale(DRAG_TIMEOUT) == []
+    assert drags.end_stale(DRAG_TIMEOUT + 0.01) == ["a"]
     assert world.paused
     drags.hold("b", "rviz", 0.15, POSE)
-    assert drags.end_silent(0.2) == []
-    assert drags.end_silent(0.3) == ["b"]
+    assert drags.end_stale(0.2) == []
+    assert drags.end_stale(0.3) == ["b"]
     assert not world.paused
 
 
-def test_end_of_what_is_not_dragged_changes_nothing(world: flatland.World) -> None:
+def test_end_without_a_drag_has_no_effect(world: flatland.World) -> None:
     drags = Drags(world)
     drags.end("a")
     world.pause()

@@ -1,4 +1,4 @@
-"""Poses of interactive markers, and what RViz gets to draw of a model."""
+"""Poses and markers of the interactive marker of a model."""
 
 from __future__ import annotations
 
@@ -23,16 +23,16 @@ def pose(x: float, y: float, z: float, *quaternion: float) -> Pose:
 
 
 @pytest.mark.parametrize("theta", [0.0, 1.0, -3.0, math.pi / 2])
-def test_poses_there_and_back(theta: float) -> None:
+def test_pose_round_trip(theta: float) -> None:
     assert planar_pose(pose_message((1.0, -2.0, theta))) == pytest.approx((1, -2, theta))
 
 
-def test_heights_and_lengths_do_not_matter() -> None:
+def test_height_and_norm_of_the_quaternion_are_ignored() -> None:
     assert planar_pose(pose(1, 2, 9, 0, 0, 3, 3)) == pytest.approx((1, 2, math.pi / 2))
 
 
-def test_only_the_heading_of_a_tilted_pose_counts() -> None:
-    # First about z by 30 degrees, then about its own y axis by 60: the x axis still points there.
+def test_heading_of_a_tilted_pose() -> None:
+    # Yaw of 30 degrees, then pitch of 60 degrees, which does not change the heading.
     half_z, half_y = math.pi / 12, math.pi / 6
     tilted = (
         -math.sin(half_z) * math.sin(half_y),
@@ -54,18 +54,18 @@ def test_only_the_heading_of_a_tilted_pose_counts() -> None:
         (0, 0, 0, 0, 0, 0, 0),
     ],
 )
-def test_no_pose(numbers: tuple[float, ...]) -> None:
+def test_invalid_pose(numbers: tuple[float, ...]) -> None:
     assert planar_pose(pose(*numbers)) is None
 
 
-def test_outline_is_drawn_in_the_frame_of_the_first_body(load_model: Callable[[str], Any]) -> None:
+def test_outline_is_in_the_frame_of_the_first_body(load_model: Callable[[str], Any]) -> None:
     model = load_model("""
 bodies:
   - {name: base, pose: [1, 0, 1], footprints: [{type: circle, radius: 0.5, density: 1}]}
   - {name: arm, pose: [4, 0, 1], color: [1, 0, 0, 1], footprints: [
      {type: polygon, points: [[0, 0], [1, 0], [0, 1]], density: 1},
      {type: circle, radius: 0.1, density: 1}]}
-  - {name: nothing, footprints: []}
+  - {name: empty, footprints: []}
 """)
     marker = model_handle(model, "a name")
     text, base, arm = marker.controls[2].markers
@@ -78,11 +78,11 @@ bodies:
     corners = np.array([(point.x, point.y) for point in arm.points[:6]])
     assert sorted({tuple(corner) for corner in corners}) == [(0, 0), (0, 1), (1, 0)]
     assert len(arm.points) > 6
-    # The ring to turn it by lies around all of it.
+    # The ring encloses the whole model.
     assert marker.scale == pytest.approx(2 * (3 + 1))
 
 
-def test_small_model_has_a_ring_to_grab(load_model: Callable[[str], Any]) -> None:
+def test_minimum_size_of_the_ring(load_model: Callable[[str], Any]) -> None:
     model = load_model("bodies: [{name: base, footprints: []}]\n")
     marker = model_handle(model, "robot")
     assert marker.scale == 1.0

@@ -1,4 +1,4 @@
-"""Markers of layers: how high their walls are, and how long it takes to make them."""
+"""Markers of layers: height of walls, and vectorized construction."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def heights(properties: dict[str, Any]) -> tuple[float, float]:
 
 
 @pytest.mark.parametrize(
-    ("properties", "wanted"),
+    ("properties", "expected"),
     [
         ({}, (0, 1)),
         ({"debug": None}, (0, 1)),
@@ -45,9 +45,9 @@ def heights(properties: dict[str, Any]) -> tuple[float, float]:
     ],
 )
 def test_heights_of_walls(
-    properties: dict[str, Any], wanted: tuple[float, float], caplog: pytest.LogCaptureFixture
+    properties: dict[str, Any], expected: tuple[float, float], caplog: pytest.LogCaptureFixture
 ) -> None:
-    assert heights(properties) == wanted
+    assert heights(properties) == expected
     assert caplog.records == []
 
 
@@ -63,7 +63,7 @@ def test_heights_of_walls(
         ({"min_z": 1}, "min_z must be less than max_z, got 1 and 1"),
     ],
 )
-def test_bad_heights_are_named_and_ignored(
+def test_invalid_heights_are_logged_and_ignored(
     debug: Any, reason: str, caplog: pytest.LogCaptureFixture
 ) -> None:
     with caplog.at_level(logging.WARNING):
@@ -78,8 +78,8 @@ def test_layer_without_edges_has_no_marker() -> None:
     assert markers.walls(0).markers == []
 
 
-def lines_run_for(edge_count: int) -> int:
-    """Returns how many lines of Python run to build and serialize the markers of so many edges."""
+def executed_lines(edge_count: int) -> int:
+    """Returns the number of Python lines executed to create and serialize the markers."""
     edges = np.random.default_rng(1).uniform(-100, 100, (edge_count, 4)).astype(np.float32)
     layer = make_layer({}, edges)
     count = 0
@@ -99,6 +99,6 @@ def lines_run_for(edge_count: int) -> int:
     return count
 
 
-def test_no_line_of_python_runs_once_an_edge() -> None:
-    few = lines_run_for(100)
-    assert 0 < lines_run_for(50_000) <= few + 100
+def test_no_python_line_is_executed_per_edge() -> None:
+    few = executed_lines(100)
+    assert 0 < executed_lines(50_000) <= few + 100

@@ -1,4 +1,4 @@
-"""Edges, footprints and joints as points."""
+"""Conversion of edges, footprints and joints to points."""
 
 from __future__ import annotations
 
@@ -39,21 +39,21 @@ def test_edge_lines() -> None:
     assert edge_lines(EDGES).tolist() == [[0, 0, 0], [2, 0, 0], [1, 1, 0], [1, 3, 0]]
 
 
-def test_walls_cover_their_rectangles() -> None:
+def test_wall_triangles_cover_rectangles() -> None:
     triangles = wall_triangles(EDGES, 0.5, 2.5).reshape(-1, 3, 3)
     assert len(triangles) == 4
     sides = triangles[:, 1:] - triangles[:, :1]
     areas = np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1) / 2
-    assert areas.tolist() == [2, 2, 2, 2]  # half of a wall 2 m long and 2 m high
+    assert areas.tolist() == [2, 2, 2, 2]  # half of a wall, 2 m x 2 m
     for edge, wall in zip(EDGES, triangles.reshape(2, 6, 3), strict=True):
         corners = {tuple(corner) for corner in wall.tolist()}
         assert corners == {(x, y, z) for x, y in edge.reshape(2, 2).tolist() for z in (0.5, 2.5)}
 
 
 def test_no_edges() -> None:
-    none = np.empty((0, 4), np.float32)
-    assert edge_lines(none).shape == (0, 3)
-    assert wall_triangles(none, 0, 1).shape == (0, 3)
+    edges = np.empty((0, 4), np.float32)
+    assert edge_lines(edges).shape == (0, 3)
+    assert wall_triangles(edges, 0, 1).shape == (0, 3)
 
 
 def test_closed_strip() -> None:
@@ -70,7 +70,7 @@ def test_outline_of_an_edge() -> None:
     assert outline(Shape("edge", [(0, 0), (1, 0)])).tolist() == [[0, 0, 0], [1, 0, 0]]
 
 
-def test_outline_of_a_circle_is_closed_and_round() -> None:
+def test_outline_of_a_circle() -> None:
     lines = outline(Shape("circle", center=(1.0, 2.0), radius=0.5)).reshape(-1, 2, 3)
     assert np.allclose(lines[:, 1], np.roll(lines[:, 0], -1, axis=0))
     distances = np.hypot(lines[..., 0] - 1, lines[..., 1] - 2)

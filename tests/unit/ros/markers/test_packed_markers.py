@@ -1,4 +1,4 @@
-"""Markers as bytes: the same message as ROS makes of its own objects."""
+"""Serialized markers: equality with the serialization of ROS."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def packed() -> PackedMarkers:
     return markers
 
 
-def wanted() -> MarkerArray:
+def expected() -> MarkerArray:
     markers = [
         Marker(type=Marker.LINE_LIST, scale=Vector3(0.03, 0, 0), points=as_messages(POINTS)),
         Marker(type=Marker.CUBE_LIST, scale=Vector3(1, 2, 3), points=as_messages(POINTS[:1])),
@@ -62,19 +62,19 @@ def data(message: MarkerArray) -> bytes:
     return buffer.getvalue()
 
 
-def test_bytes_are_those_of_the_message() -> None:
-    message = wanted()
+def test_serialization_equals_that_of_the_message() -> None:
+    message = expected()
     message.markers[1].pose.orientation.z = math.sin(math.pi / 4)
     message.markers[1].pose.orientation.w = math.cos(math.pi / 4)
     assert data(packed()) == data(message)
 
 
-def test_type_is_that_of_the_message() -> None:
+def test_message_type_attributes() -> None:
     for name in ("_md5sum", "_type", "_full_text", "_has_header"):
         assert getattr(PackedMarkers, name) == getattr(MarkerArray, name)
 
 
-def test_markers_read_back() -> None:
+def test_deserialized_markers() -> None:
     markers = packed().markers
     assert [marker.id for marker in markers] == [0, 1, 2, 3]
     assert [marker.action for marker in markers] == [0, 0, Marker.DELETE, Marker.DELETEALL]
@@ -89,15 +89,15 @@ def test_points_are_replaced_in_place() -> None:
     assert second.points == as_messages(POINTS[:1])
 
 
-def test_another_number_of_points_is_refused() -> None:
+def test_different_number_of_points_raises() -> None:
     with pytest.raises(ValueError, match="marker 0 has 2 points, got 1"):
         packed().set_points(0, POINTS[:1])
 
 
-def test_points_of_another_shape_are_refused() -> None:
+def test_points_of_invalid_shape_raise() -> None:
     with pytest.raises(ValueError, match=r"points must have shape \(n, 3\), got \(2, 2\)"):
         packed().add(Marker.LINE_LIST, POINTS[:, :2], scale=(1, 1, 1), color=COLOR)
 
 
-def test_none() -> None:
+def test_empty_array() -> None:
     assert data(PackedMarkers()) == data(MarkerArray())
