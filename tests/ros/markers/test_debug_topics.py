@@ -169,7 +169,7 @@ def test_walls_cover_every_edge(ros: Any, name: str, heights: set[float]) -> Non
 
 
 def test_invalid_heights_are_logged(server: Any) -> None:
-    server.wait_for_line("layer \"bad heights\".*min_z must be a finite number, received 'low'")
+    server.wait_for_line("layer \"bad heights\".*min_z must be a finite number, got 'low'")
 
 
 def test_layer_is_published_once_and_when_it_changes(ros: Any, launcher: Any) -> None:
