@@ -807,20 +807,39 @@ class World:
 
     # -- pictures --------------------------------------------------------------------------
 
-    def draw(self, **options: Any) -> npt.NDArray[np.uint8]:
-        """Draws the world as it is now; the same as `flatland.draw`, where the options are.
+    def draw(
+        self,
+        *,
+        size: tuple[int, int] | None = None,
+        dpi: float = 100.0,
+        view: Sequence[float] | None = None,
+        layers: Iterable[str] | None = None,
+        scans: bool = True,
+        names: bool = False,
+        axes: bool = True,
+    ) -> npt.NDArray[np.uint8]:
+        """Draws the current state of the world; see `flatland.draw` for the arguments.
 
         Returns:
-            Red, green and blue of each pixel, the top row first, shape (height, width, 3).
+            RGB image, top row first, shape (height, width, 3).
 
         Raises:
-            FlatlandError: The world is closed, a layer is unknown, or matplotlib is missing.
-            ValueError: An option is out of its range.
+            FlatlandError: The world is closed, a layer does not exist, or matplotlib is missing.
+            ValueError: `size`, `dpi`, `view` or `layers` is invalid.
         """
-        # The simulation itself needs no drawing.
+        # Imported late: the simulation does not depend on drawing.
         from flatland.drawing import draw
 
-        return draw(self, **options)
+        return draw(
+            self,
+            size=size,
+            dpi=dpi,
+            view=view,
+            layers=layers,
+            scans=scans,
+            names=names,
+            axes=axes,
+        )
 
     # -- physics for plugins ---------------------------------------------------------------
 

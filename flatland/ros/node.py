@@ -121,9 +121,9 @@ class ServerNode:
     def _simulate(self, parameters: NodeParameters) -> None:
         """Loads the world and steps it until the node is asked to stop."""
         from flatland.ros.bridge import Bridge
+        from flatland.ros.deferred_topics import DeferredTopics
         from flatland.ros.registrar import Registrar
         from flatland.ros.services import Services
-        from flatland.ros.visualization import Visualization
         from flatland.simulation import Simulation
 
         _warn_of_wall_time()
@@ -137,7 +137,7 @@ class ServerNode:
         if self._stopping.is_set():
             simulation.stop()
         debug_rate = parameters.viz_pub_rate if parameters.show_viz else None
-        visualization = Visualization(self._registrar, simulation, debug_rate=debug_rate)
+        deferred_topics = DeferredTopics(self._registrar, simulation, debug_rate=debug_rate)
         try:
             Services(self._registrar, simulation, parameters.if_blocked)
             if parameters.benchmark_duration is None:
@@ -147,7 +147,7 @@ class ServerNode:
                 if not simulation.stopped:
                     _log_benchmark(result)
         finally:
-            visualization.close()
+            deferred_topics.close()
             # Plugins end first, so that they can still publish; then all topics at once.
             bridge.close()
             world.close()

@@ -14,8 +14,8 @@ from flatland.plugin_api.plugin import FlatlandPlugin, describe
 from flatland.plugin_api.ports import resolve_topic
 from flatland.ros.publisher import Publisher
 from flatland.ros.registrar import Registrar
-from flatland.ros.service import Service, wait_for
-from flatland.ros.subscriber import Subscriber
+from flatland.ros.transport.service import Service, wait_for
+from flatland.ros.transport.subscriber import Subscriber
 
 _LOG = logging.getLogger("flatland")
 

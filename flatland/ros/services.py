@@ -13,8 +13,9 @@ from std_srvs.srv import Empty, EmptyResponse
 from flatland.entities.model import Model
 from flatland.errors import FlatlandError
 from flatland.geometry import Pose
+from flatland.ros.names import sendable_text
 from flatland.ros.registrar import Registrar
-from flatland.ros.service import Service, wait_for
+from flatland.ros.transport.service import Service, wait_for
 from flatland.runtime.placement import IfBlocked
 from flatland.simulation import Simulation
 from flatland.srv import (
@@ -131,11 +132,11 @@ class Services:
             self._registrar.flush(_REGISTRATION_PATIENCE)
         except (FlatlandError, rospy.ServiceException) as error:
             self._registrar.flush(_REGISTRATION_PATIENCE)
-            return False, _sendable(str(error))
+            return False, sendable_text(str(error))
         except Exception as error:
             _LOG.exception("a service call failed in an unforeseen way")
-            return False, _sendable(f"{type(error).__name__}: {error}")
-        return True, _sendable(message)
+            return False, sendable_text(f"{type(error).__name__}: {error}")
+        return True, sendable_text(message)
 
 
 def _displacement(model: Model | None, asked: Pose) -> str:
@@ -152,8 +153,3 @@ def _displacement(model: Model | None, asked: Pose) -> str:
 
 def _pose(pose: Any) -> Pose:
     return (pose.x, pose.y, pose.theta)
-
-
-def _sendable(text: str) -> str:
-    """Replaces what UTF-8 cannot hold, such as parts of a file name that is none."""
-    return text.encode("utf-8", "replace").decode()

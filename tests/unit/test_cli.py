@@ -122,7 +122,7 @@ class TestShow:
             ([], "-o/--output"),
             (["-o", "a.gif"], "must end with one of .png, .pdf, .svg, got 'a.gif'"),
             (["-o", "a.png", "--size", "12"], "must be WIDTHxHEIGHT"),
-            (["-o", "a.png", "--size", "20x20"], "leaves no room beside the axes"),
+            (["-o", "a.png", "--size", "20x20"], "too small for the axes"),
             (["-o", "a.png", "--steps", "-1"], "must be a whole number"),
             (["-o", "a.png", "--param", "radius"], "must be NAME=VALUE"),
             (["-o", "a.png", "--param", "/radius=[1"], "the value is no YAML"),
