@@ -1,4 +1,4 @@
-"""The loop: steps a world in real time or as fast as it can, until it is told to stop."""
+"""The loop that steps a world in real time or as fast as possible until it is stopped."""
 
 from __future__ import annotations
 
@@ -10,43 +10,18 @@ from concurrent.futures import Future
 from dataclasses import dataclass
 from typing import Any, Final
 
+from flatland.cycle_statistics import CycleStatistics, CycleWindow
+from flatland.rate_monitor import RateMonitor
 from flatland.timekeeper import NANOSECONDS
 from flatland.world import World
 
-_PAUSED_CYCLE: Final = 0.01  # s between two looks at a paused world that has no rate
-_LONGEST_WAIT: Final = 3600.0  # s; more than some can be waited for is an error of Python's
+__all__ = ["MAX_LAG", "CycleStatistics", "RunResult", "Simulation"]
 
+MAX_LAG: Final = 0.1
+"""Lost wall time that a loop makes up for unless told otherwise [s]."""
 
-@dataclass(frozen=True, slots=True)
-class CycleStatistics:
-    """How the loop did since its last report.
-
-    The use of a cycle is the time worked in it, in percent of the cycle's length; when the loop
-    runs as fast as possible there is no such length, and the step size takes its place.
-
-    Attributes:
-        cycles: How many cycles there were.
-        use_min: Least use of a cycle [%].
-        use_max: Greatest use of a cycle [%].
-        use_mean: Mean use of a cycle [%].
-        asked: Real-time factor that the loop was asked for, inf for as fast as possible.
-        got: Simulated time over wall time.
-    """
-
-    cycles: int
-    use_min: float
-    use_max: float
-    use_mean: float
-    asked: float
-    got: float
-
-    def __str__(self) -> str:
-        """Writes the statistics in one line."""
-        return (
-            f"cycle use min {self.use_min:.1f} %, max {self.use_max:.1f} %, "
-            f"mean {self.use_mean:.1f} %; real-time factor asked {self.asked:.2f}, "
-            f"got {self.got:.2f}"
-        )
+_PAUSED_CYCLE: Final = 0.01  # s between two cycles of a paused world that has no rate
+_LONGEST_WAIT: Final = 3600.0  # s; Python refuses to wait for more than some centuries
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,8 +29,8 @@ class RunResult:
     """What one run of the loop did.
 
     Attributes:
-        steps: Steps of the world.
-        wall_time: How long they took [s].
+        steps: Number of steps of the world.
+        wall_time: Their duration [s].
     """
 
     steps: int
@@ -70,6 +45,13 @@ class RunResult:
 class Simulation:
     """Steps a world at a rate; everything in it happens in the thread that calls `run`.
 
+    A cycle that starts late is followed by the next ones without a wait until the lost time is
+    made up for. Of a greater lag than `max_lag` only that much is made up for and the rest is
+    dropped, so that no burst of steps is longer, whatever stopped the loop: a slow plugin, a long
+    load, a debugger. A lag of up to one cycle is always made up for. Nothing is made up for across
+    a pause or a change of the rate. When the loop keeps losing time, a warning names the most
+    expensive plugins.
+
     Attributes:
         world: The world.
     """
@@ -79,24 +61,35 @@ class Simulation:
         world: World,
         update_rate: float = 200.0,
         *,
+        max_lag: float = MAX_LAG,
         report: Callable[[CycleStatistics], None] | None = None,
         report_period: float = 1.0,
+        clock: Callable[[], float] = time.perf_counter,
+        wait: Callable[[threading.Event, float], bool] = threading.Event.wait,
     ) -> None:
         """Prepares to step a world.
 
         Args:
             world: The world.
             update_rate: Steps in a second of wall time [Hz]; 0 or inf for as many as possible.
+            max_lag: Lost wall time that is made up for at most [s]; 0 for one cycle at most.
             report: Called with statistics while the world runs.
             report_period: Wall time between two reports [s].
+            clock: Returns the wall time [s].
+            wait: Waits for an event for at most some wall time [s]; returns whether it is set.
 
         Raises:
-            ValueError: The rate is negative or not a number.
+            ValueError: The rate or the lag is negative or not a number, or the lag is infinite.
         """
+        if not 0 <= max_lag < math.inf:
+            raise ValueError(f"max_lag must be finite and not negative [s], got {max_lag}")
         self.world = world
         self._period = _period_of(update_rate)
+        self._max_lag = max_lag
         self._report = report
         self._report_period = report_period
+        self._clock = clock
+        self._wait = wait
         self._wake = threading.Event()
         self._stopped = False
 
@@ -117,7 +110,7 @@ class Simulation:
         self._period = _period_of(update_rate)
 
     def stop(self) -> None:
-        """Makes `run` return after the step that it is in; safe from any thread."""
+        """Makes `run` return after the current step; safe from any thread."""
         self._stopped = True
         self._wake.set()
 
@@ -136,60 +129,70 @@ class Simulation:
         Args:
             duration: Simulated time to run for [s].
         """
-        world, period = self.world, self._period
-        timekeeper = world.timekeeper
-        start_ns = timekeeper.sim_time_ns
+        timekeeper = self.world.timekeeper
+        start, start_ns = self._clock(), timekeeper.sim_time_ns
         end_ns = math.inf if math.isinf(duration) else start_ns + round(duration * NANOSECONDS)
-        window = _Window(period or timekeeper.step_size, self._asked(), timekeeper.sim_time_ns)
-        start = due = time.perf_counter()
+        monitor = RateMonitor(self.world, self._clock)
+        try:
+            self._loop(start, end_ns, monitor)
+        finally:
+            monitor.reset()
+        steps = (timekeeper.sim_time_ns - start_ns) // timekeeper.step_size_ns
+        return RunResult(steps, self._clock() - start)
+
+    def _loop(self, start: float, end_ns: float, monitor: RateMonitor) -> None:
+        world, clock, period, max_lag = self.world, self._clock, self._period, self._max_lag
+        timekeeper = world.timekeeper
+        due = start
+        window = self._new_window(start)
         while not self._stopped and timekeeper.sim_time_ns < end_ns:
-            begin = time.perf_counter()
+            begin = clock()
             if self._period != period:
-                # The rate was changed: what was due at the old one no longer matters.
+                # What was due at the old rate no longer matters.
                 period, due = self._period, begin
-                window = _Window(
-                    period or timekeeper.step_size, self._asked(), timekeeper.sim_time_ns
-                )
+                window = self._new_window(begin)
+                monitor.reset()
             world.step()
-            end = time.perf_counter()
+            end = clock()
             window.add(end - begin)
             if end - window.start >= self._report_period:
                 self._finish(window, end)
-                window = _Window(window.length, window.asked, timekeeper.sim_time_ns)
+                window = self._new_window(end)
             if period:
+                monitor.add(end - begin, end)
                 due += period
-                # Lost time is lost: at most one cycle is made up for.
-                if end - due > period:
-                    due = end
+                if world.paused:
+                    due = max(due, end)
+                elif end - due > max(max_lag, period):
+                    monitor.lose(end - due - max_lag, period, end)
+                    due = end - max_lag
                 self._wait_until(due, period)
             elif world.paused:
                 self._wait_until(end + _PAUSED_CYCLE, period)
-        steps = (timekeeper.sim_time_ns - start_ns) // timekeeper.step_size_ns
-        return RunResult(steps, time.perf_counter() - start)
 
     def _wait_until(self, due: float, period: float) -> None:
-        """Waits for a time of the wall clock and carries out what is asked for meanwhile.
+        """Waits for a time of the wall clock and carries out requests meanwhile.
 
-        Returns at once when that changes the period.
+        Returns early when one of them changes the period.
         """
         while not self._stopped and self._period == period:
-            left = due - time.perf_counter()
+            left = due - self._clock()
             if left <= 0:
                 return
-            if self._wake.wait(min(left, _LONGEST_WAIT)):
+            if self._wait(self._wake, min(left, _LONGEST_WAIT)):
                 self._wake.clear()
                 self.world.process_requests()
 
-    def _asked(self) -> float:
-        if not self._period:
-            return math.inf
-        return self.world.timekeeper.step_size / self._period
+    def _new_window(self, now: float) -> CycleWindow:
+        timekeeper, period = self.world.timekeeper, self._period
+        asked = timekeeper.step_size / period if period else math.inf
+        return CycleWindow(period or timekeeper.step_size, asked, now, timekeeper.sim_time_ns)
 
-    def _finish(self, window: _Window, now: float) -> None:
-        """Reports what a window saw, unless the world stood still in it."""
-        advanced_ns = self.world.timekeeper.sim_time_ns - window.start_ns
-        if self._report is not None and advanced_ns > 0:
-            self._report(window.statistics(now, advanced_ns))
+    def _finish(self, window: CycleWindow, now: float) -> None:
+        """Reports a window, unless the world stood still in it."""
+        now_ns = self.world.timekeeper.sim_time_ns
+        if self._report is not None and now_ns > window.start_ns:
+            self._report(window.statistics(now, now_ns))
 
 
 def _period_of(update_rate: float) -> float:
@@ -201,37 +204,3 @@ def _period_of(update_rate: float) -> float:
     if math.isnan(update_rate) or update_rate < 0:
         raise ValueError(f"update_rate must not be negative, got {update_rate}")
     return 0.0 if update_rate == 0 else 1.0 / update_rate
-
-
-class _Window:
-    """Adds up the cycles between two reports."""
-
-    def __init__(self, length: float, asked: float, start_ns: int) -> None:
-        self.length = length
-        self.asked = asked
-        self.start_ns = start_ns
-        self.start = time.perf_counter()
-        self._count = 0
-        self._sum = 0.0
-        self._min = math.inf
-        self._max = 0.0
-
-    def add(self, worked: float) -> None:
-        """Counts a cycle in which the loop worked for some time [s]."""
-        self._count += 1
-        self._sum += worked
-        if worked < self._min:
-            self._min = worked
-        if worked > self._max:
-            self._max = worked
-
-    def statistics(self, now: float, advanced_ns: int) -> CycleStatistics:
-        percent = 100.0 / self.length
-        return CycleStatistics(
-            cycles=self._count,
-            use_min=self._min * percent,
-            use_max=self._max * percent,
-            use_mean=self._sum / self._count * percent,
-            asked=self.asked,
-            got=advanced_ns / NANOSECONDS / (now - self.start),
-        )

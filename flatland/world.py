@@ -29,6 +29,7 @@ from flatland.model_loader import ModelLoader
 from flatland.observer import WorldObserver
 from flatland.physics import PhysicsWorld
 from flatland.plugin import FlatlandPlugin, ModelPlugin, WorldPlugin
+from flatland.plugin_costs import PluginCosts
 from flatland.plugin_host import PluginHost, describe, initialize
 from flatland.plugin_registry import PluginRegistry
 from flatland.ports import CommandTopic, Output, PortRegistry, is_legal_namespace
@@ -246,6 +247,11 @@ class World:
     def toggle_pause(self) -> None:
         """Pauses a running world, resumes a paused one."""
         self._paused = not self._paused
+
+    def measure_plugins(self, costs: PluginCosts | None) -> None:
+        """Adds the wall time of all hooks to some costs from now on; None ends that."""
+        with self._lock:
+            self._host.measure(costs)
 
     # -- requests --------------------------------------------------------------------------
 
