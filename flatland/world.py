@@ -35,6 +35,7 @@ from flatland.plugin_api.registry import PluginRegistry
 from flatland.runtime.frame_senders import FramePair, FrameSenders
 from flatland.runtime.observer import WorldObserver
 from flatland.runtime.placement import IfBlocked, Models, Placement, check_if_blocked
+from flatland.runtime.plugin_costs import PluginCosts
 from flatland.runtime.plugin_host import PluginHost, initialize
 from flatland.timekeeper import Timekeeper
 from flatland.values import Transform
@@ -249,6 +250,11 @@ class World:
     def toggle_pause(self) -> None:
         """Pauses a running world, resumes a paused one."""
         self._paused = not self._paused
+
+    def measure_plugins(self, costs: PluginCosts | None) -> None:
+        """Adds the wall time of all hooks to some costs from now on; None ends that."""
+        with self._lock:
+            self._host.measure(costs)
 
     # -- requests --------------------------------------------------------------------------
 

@@ -7,6 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from flatland.runtime.placement import IF_BLOCKED, IfBlocked
+from flatland.simulation import MAX_LAG
 from flatland.timekeeper import GREATEST_STEP, LEAST_STEP
 
 ParameterSource = Callable[[str], object]
@@ -27,6 +28,7 @@ class NodeParameters:
     Attributes:
         world_path: The world file.
         update_rate: Steps in a second of wall time [Hz], 0 for as many as possible.
+        max_lag: Lost wall time that is made up for at most [s], 0 for one cycle at most.
         step_size: Simulated time of a step [s].
         show_viz: Whether to publish debug markers.
         viz_pub_rate: Debug markers in a second of wall time [Hz].
@@ -41,6 +43,7 @@ class NodeParameters:
 
     world_path: str
     update_rate: float
+    max_lag: float
     step_size: float
     show_viz: bool
     viz_pub_rate: float
@@ -64,6 +67,7 @@ def read_parameters(get: ParameterSource) -> NodeParameters:
     return NodeParameters(
         world_path=reader.path("world_path"),
         update_rate=reader.rate("update_rate", 200.0),
+        max_lag=reader.lag("max_lag", MAX_LAG),
         step_size=reader.step_size("step_size", 0.005),
         show_viz=reader.boolean("show_viz", False),
         viz_pub_rate=reader.positive("viz_pub_rate", 30.0),
@@ -95,6 +99,13 @@ class _Reader:
         if rate < 0:
             raise _bad(name, wanted, rate)
         return 0.0 if math.isinf(rate) else rate
+
+    def lag(self, name: str, default: float) -> float:
+        wanted = "a finite number of seconds that is not negative"
+        seconds = self._number(name, default, wanted)
+        if not 0 <= seconds < math.inf:
+            raise _bad(name, wanted, seconds)
+        return seconds
 
     def step_size(self, name: str, default: float) -> float:
         wanted = f"a number of seconds from {LEAST_STEP:g} to {GREATEST_STEP:g}"

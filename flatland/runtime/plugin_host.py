@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from flatland.config.reader import YamlReader
     from flatland.entities.body import Body
     from flatland.physics import ContactEvent, OldManifold, PreSolveContact
+    from flatland.runtime.plugin_costs import PluginCosts
     from flatland.timekeeper import Timekeeper
 
 _LOG = logging.getLogger("flatland")
@@ -93,6 +94,7 @@ class PluginHost:
         self._faults: dict[tuple[FlatlandPlugin, str], int] = {}
         self._last_log: dict[FlatlandPlugin, float] = {}
         self._hooks: dict[str, HookList] = {}
+        self._costs: PluginCosts | None = None
         self._schedule()
 
     @property
@@ -127,12 +129,18 @@ class PluginHost:
         self._last_log = {key: t for key, t in self._last_log.items() if key not in gone}
         self._schedule()
 
+    def measure(self, costs: PluginCosts | None) -> None:
+        """Starts to add the time of all hooks to some costs; None ends that."""
+        self._costs = costs
+        self._schedule()
+
     def _schedule(self) -> None:
         plugins = [*self.model_plugins, *self.world_plugins]
+        timed = _untimed if self._costs is None else self._costs.timed
         for hook in _HOOKS:
             # New lists, so that a loop that runs over the old ones is not disturbed.
             self._hooks[hook] = [
-                (plugin, getattr(plugin, hook))
+                (plugin, timed(plugin, getattr(plugin, hook)))
                 for plugin in plugins
                 if overrides(plugin, hook) and plugin not in self._disabled
             ]
@@ -227,3 +235,7 @@ class PluginHost:
                 hook,
                 count,
             )
+
+
+def _untimed(_plugin: FlatlandPlugin, hook: Hook) -> Hook:
+    return hook

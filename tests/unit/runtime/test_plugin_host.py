@@ -8,6 +8,7 @@ from types import SimpleNamespace
 import pytest
 
 from flatland import ModelPlugin, WorldPlugin
+from flatland.runtime.plugin_costs import PluginCosts
 from flatland.runtime.plugin_host import PluginHost, overrides
 
 
@@ -109,3 +110,31 @@ def test_shut_down_closes_what_plugins_forget(fails, caplog):
     assert closed == ["ros", "ports"]
     assert host.model_plugins == []
     assert ("on_shutdown raised" in caplog.text) is fails
+
+
+def test_hooks_are_measured_while_costs_are_set():
+    now = [0.0]
+
+    class Slow(Faulty):
+        def before_physics_step(self, timekeeper):
+            now[0] += 1.0
+            super().before_physics_step(timekeeper)
+
+    host = PluginHost()
+    # A hook that raises takes time as well, and so does one of a plugin that is added later.
+    first, second = Slow([2, 3]), Slow()
+    second.name = "Q"
+    host.add(first)
+    host.before_physics_step(None)
+    costs = PluginCosts(lambda: now[0])
+    host.measure(costs)
+    host.add(second)
+    for _ in range(4):
+        host.before_physics_step(None)
+    host.measure(None)
+    host.before_physics_step(None)
+    assert not host.is_disabled(first)
+    assert costs.describe(100.0) == (
+        'Model Plugin "P" type "my::Faulty" model "M" 4.0 %, '
+        'Model Plugin "Q" type "my::Faulty" model "M" 4.0 %; by type: 2 x my::Faulty 8.0 %'
+    )

@@ -86,7 +86,7 @@ def test_is_never_faster_than_its_rate(world: flatland.World) -> None:
 
 
 def test_rate_changes_at_once(world: flatland.World, counter: Counter) -> None:
-    simulation = Simulation(world, 0.001)
+    simulation = Simulation(world, 0.001, max_lag=0)
     with Running(simulation):
         counter.wait_for(1)  # The next step would be due in a quarter of an hour.
         simulation.post(lambda: simulation.set_rate(50)).result(PATIENCE)
@@ -107,10 +107,10 @@ def test_bad_rate_changes_nothing(world: flatland.World) -> None:
     assert simulation.run(0.3).wall_time >= 29 * 0.002
 
 
-def test_late_loop_catches_up_with_one_cycle_at_most(
+def test_late_loop_without_lag_catches_up_with_one_cycle_at_most(
     world: flatland.World, counter: Counter
 ) -> None:
-    simulation = Simulation(world, 100)
+    simulation = Simulation(world, 100, max_lag=0)
     with Running(simulation):
         counter.wait_for(3)
         simulation.post(lambda: time.sleep(0.2)).result(PATIENCE)  # 20 cycles are lost
