@@ -62,12 +62,12 @@ def free_places(world_path: Path, count: int) -> list[tuple[float, float]]:
 
 
 @contextmanager
-def crowd(which: slice, *, scans: bool) -> Iterator[flatland.World]:
-    """A world of robots that drive in circles on the map of the benchmark world.
+def crowd_file(which: slice, *, scans: bool) -> Iterator[Path]:
+    """A world file with robots on the map of the benchmark world.
 
     Args:
         which: Of the `MOST` places that there are, so that few robots see what many see.
-        scans: Whether their lasers scan with nobody listening.
+        scans: Whether their lasers scan without a subscriber.
     """
     base = benchmark_world_path()
     places = free_places(base, MOST)[which]
@@ -87,9 +87,15 @@ def crowd(which: slice, *, scans: bool) -> Iterator[flatland.World]:
         folder = Path(name)
         (folder / "robot.model.yaml").write_text(ROBOT.format(scans=str(scans).lower()))
         (folder / "world.yaml").write_text(yaml.safe_dump(world))
-        with flatland.World.from_yaml(folder / "world.yaml", seed=1) as loaded:
-            for index in range(len(places)):
-                turn = flatland.Twist(linear_x=0.2, angular_z=1.0 if index % 2 else -1.0)
-                loaded.command(f"/robot{index}/cmd_vel").set(turn)
-            loaded.step(200)
-            yield loaded
+        yield folder / "world.yaml"
+
+
+@contextmanager
+def crowd(which: slice, *, scans: bool) -> Iterator[flatland.World]:
+    """The loaded world of `crowd_file`, whose robots drive in circles."""
+    with crowd_file(which, scans=scans) as path, flatland.World.from_yaml(path, seed=1) as loaded:
+        for index in range(len(loaded.models)):
+            turn = flatland.Twist(linear_x=0.2, angular_z=1.0 if index % 2 else -1.0)
+            loaded.command(f"/robot{index}/cmd_vel").set(turn)
+        loaded.step(200)
+        yield loaded

@@ -8,7 +8,7 @@ import numpy as np
 
 from flatland.entities.layer import Layer
 from flatland.physics import PhysicsWorld
-from flatland.ros.layer_markers import LayerMarkers
+from flatland.ros.markers.layer_markers import LayerMarkers
 
 from table import Row  # isort: skip
 from timing import best_of

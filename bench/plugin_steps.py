@@ -15,7 +15,8 @@ from typing import Any
 import yaml
 
 import flatland
-from flatland.plugin_api.registry import INCLUDED_PACKAGE, PluginRegistry
+from flatland.plugin_api.manifest import INCLUDED_PACKAGE
+from flatland.plugin_api.registry import PluginRegistry
 from flatland.runtime.observer import WorldObserver
 
 from scenes import BEAMS, RANGE, benchmark_world_path  # isort: skip

@@ -38,7 +38,9 @@ from flatland.values import (
     Twist,
     TwistWithCovariance,
 )
-from flatland.world import World, load_world
+from flatland.world import World
+
+load_world = World.from_yaml
 
 __version__ = "0.1.0"
 

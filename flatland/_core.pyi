@@ -1,6 +1,6 @@
 """The extension: Box2D behind handles for flatland.physics, and the boundaries of maps."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 import numpy.typing as npt
@@ -150,6 +150,25 @@ class World:
     def cast_rays_reference(
         self, pose: _Pose, ends: npt.ArrayLike, mask: int, reflect_mask: int
     ) -> tuple[npt.NDArray[np.float32], _Bools]: ...
+    def overlapping_bodies(
+        self, bodies: Sequence[int], pose: _Pose, ignored: Sequence[int], least_gap: float
+    ) -> list[int]: ...
+    def free_poses(
+        self,
+        bodies: Sequence[int],
+        poses: npt.ArrayLike,
+        ignored: Sequence[int],
+        least_gap: float,
+    ) -> _Bools: ...
+    def free_discs(
+        self,
+        poses: npt.ArrayLike,
+        radius: float,
+        bits: int,
+        ignored: Sequence[int],
+        only: Sequence[int] | None,
+        least_gap: float,
+    ) -> _Bools: ...
 
 class PreSolveContact:
     """A contact about to be solved; its changeable parts exist only inside of `pre_solve`."""

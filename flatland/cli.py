@@ -1,9 +1,11 @@
-"""The command `flatland`: looks at worlds without ROS."""
+"""The command `flatland`: checks and draws worlds without ROS."""
 
 from __future__ import annotations
 
 import argparse
+import os
 import re
+import signal
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -13,9 +15,12 @@ import yaml
 import flatland
 from flatland.drawing import PICTURE_FORMATS, check_matplotlib, save
 from flatland.errors import FlatlandError
+from flatland.loading.model_check import is_model_file, load_model_alone
 from flatland.loading.world_loader import SIMPLIFICATIONS
 from flatland.plugin_api.plugin import FlatlandPlugin
 from flatland.world import World
+
+_BROKEN_PIPE = 128 + signal.SIGPIPE  # what a shell reports of a program that SIGPIPE ended
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -25,15 +30,33 @@ def main(arguments: Sequence[str] | None = None) -> int:
         arguments: Without the command's name; None for those of the process.
 
     Returns:
-        0, or 1 after an error in a file or of the system, which is printed.
+        0, 1 after an error in a file or of the system, which is printed, or 141 when the reader
+        of the output went away, as in `flatland check world.yaml | head -1`.
 
     Raises:
         SystemExit: The arguments are wrong (code 2), or ask for help or version only (code 0).
     """
-    parser = _make_parser()
-    options = parser.parse_args(arguments)
     try:
-        options.run(options)
+        return _run(arguments)
+    except BrokenPipeError:
+        # What is still in the buffers has no reader, and is written when the interpreter ends.
+        nowhere = os.open(os.devnull, os.O_WRONLY)
+        for stream in (sys.stdout, sys.stderr):
+            os.dup2(nowhere, stream.fileno())
+        os.close(nowhere)
+        return _BROKEN_PIPE
+
+
+def _run(arguments: Sequence[str] | None) -> int:
+    try:
+        try:
+            options = _make_parser().parse_args(arguments)
+            options.run(options)
+        finally:
+            # An error would be printed with a traceback when the interpreter ends.
+            print(end="", flush=True)
+    except BrokenPipeError:
+        raise
     except (FlatlandError, OSError) as error:
         print(f"flatland: {error}", file=sys.stderr)
         return 1
@@ -44,11 +67,9 @@ def _make_parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="flatland", description=__doc__)
     parser.add_argument("--version", action="version", version=f"flatland {flatland.__version__}")
     commands = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
-    of_worlds = _world_arguments()
-
     show = commands.add_parser(
         "show",
-        parents=[of_worlds],
+        parents=[_file_arguments("WORLD", "world file")],
         help="draw a picture of a world",
         description="Loads a world, steps it if asked to, and draws a picture of it.",
     )
@@ -79,18 +100,24 @@ def _make_parser() -> argparse.ArgumentParser:
 
     check = commands.add_parser(
         "check",
-        parents=[of_worlds],
-        help="load a world and say what is in it",
-        description="Loads a world and says what is in it, or what is wrong with it.",
+        parents=[_file_arguments("FILE", "world or model file")],
+        help="load a world or model and say what is in it",
+        description="Loads a world or model and says what is in it, or what is wrong with it. "
+        "A model is put into an empty world that has the layers that the model names.",
     )
     check.set_defaults(run=_check)
     return parser
 
 
-def _world_arguments() -> argparse.ArgumentParser:
-    """Makes the arguments of every command that loads a world."""
+def _file_arguments(name: str, kind: str) -> argparse.ArgumentParser:
+    """Makes the arguments of every command that loads a file.
+
+    Args:
+        name: Of the file in the usage.
+        kind: What the file may be.
+    """
     parser = argparse.ArgumentParser(add_help=False)
-    parser.add_argument("world", type=Path, metavar="WORLD", help="world file")
+    parser.add_argument("path", type=Path, metavar=name, help=kind)
     parser.add_argument(
         "--param",
         type=_parameter,
@@ -150,7 +177,7 @@ def _picture_path(text: str) -> Path:
 
 def _load(options: argparse.Namespace, seed: int | None) -> World:
     return World.from_yaml(
-        options.world, seed=seed, params=dict(options.param), simplify_map=options.simplify_map
+        options.path, seed=seed, params=dict(options.param), simplify_map=options.simplify_map
     )
 
 
@@ -175,19 +202,29 @@ def _show(options: argparse.Namespace) -> None:
 
 
 def _check(options: argparse.Namespace) -> None:
-    # Nothing random is shown, so the seed need not be another one each time.
-    with _load(options, seed=0) as world:
-        print(f"{options.world}: no errors")
-        for layer in world.layers:
-            print(f"layer {', '.join(layer.names)}: {_counted(len(layer.edges), 'edge')}")
-        for model in world.models:
-            parts = [
-                _counted(len(model.bodies), "body", "bodies"),
-                _counted(len(model.joints), "joint"),
-            ]
-            print(f"model {model.name}: {', '.join(parts)}{_plugins(model.plugins)}")
-        if world.plugins:
-            print(f"world{_plugins(world.plugins)}")
+    if is_model_file(options.path, dict(options.param)):
+        with load_model_alone(options.path, dict(options.param)) as world:
+            layers = ", ".join(world.collision_filter.names) or "none"
+            _print_contents(options.path, world)
+            print(f"checked in an empty world with the layers that the model names: {layers}")
+    else:
+        # Nothing random is shown, so the seed need not be another one each time.
+        with _load(options, seed=0) as world:
+            _print_contents(options.path, world)
+
+
+def _print_contents(path: Path, world: World) -> None:
+    print(f"{path}: no errors")
+    for layer in world.layers:
+        print(f"layer {', '.join(layer.names)}: {_counted(len(layer.edges), 'edge')}")
+    for model in world.models:
+        parts = [
+            _counted(len(model.bodies), "body", "bodies"),
+            _counted(len(model.joints), "joint"),
+        ]
+        print(f"model {model.name}: {', '.join(parts)}{_plugins(model.plugins)}")
+    if world.plugins:
+        print(f"world{_plugins(world.plugins)}")
 
 
 def _counted(number: int, one: str, many: str = "") -> str:

@@ -1,4 +1,4 @@
-"""Planar poses: composition, inversion and checks.
+"""Planar geometry: poses, points, quaternions.
 
 A pose is `(x, y, theta)` in [m], [m], [rad], x forward, y left, counter-clockwise (REP 103).
 """
@@ -66,3 +66,64 @@ def finite_pose(pose: Sequence[float]) -> Pose:
     if not (math.isfinite(x) and math.isfinite(y) and math.isfinite(theta)):
         raise ValueError(f"pose must be finite, got ({x}, {y}, {theta})")
     return (x, y, theta)
+
+
+def transform_points(
+    pose: Sequence[float], points: npt.NDArray[np.float64]
+) -> npt.NDArray[np.float64]:
+    """Transforms points from the frame of a pose to the parent frame of the pose.
+
+    Args:
+        pose: Pose of the frame in its parent.
+        points: Points in the frame [m], shape (..., 2).
+
+    Returns:
+        Points in the parent frame [m], same shape.
+    """
+    x, y, theta = pose
+    c, s = math.cos(theta), math.sin(theta)
+    transformed: npt.NDArray[np.float64] = points @ np.array([[c, s], [-s, c]]) + np.array([x, y])
+    return transformed
+
+
+def circle_points(center: Sequence[float], radius: float, count: int) -> npt.NDArray[np.float64]:
+    """Returns evenly spaced points on a circle.
+
+    Args:
+        center: Centre of the circle [m].
+        radius: Radius of the circle [m].
+        count: Number of points.
+
+    Returns:
+        Points in counter-clockwise order, starting on the x axis [m], shape (count, 2).
+    """
+    angles = np.linspace(0.0, math.tau, count, endpoint=False)
+    unit_circle = np.stack((np.cos(angles), np.sin(angles)), axis=1)
+    points: npt.NDArray[np.float64] = np.asarray(center, np.float64) + radius * unit_circle
+    return points
+
+
+def quaternion_from_yaw(yaw: float, roll: float = 0.0) -> tuple[float, float, float, float]:
+    """Returns the quaternion (x, y, z, w) of a rotation about x followed by one about z.
+
+    Args:
+        yaw: Angle about the z axis [rad].
+        roll: Angle about the x axis, applied first [rad].
+    """
+    sin_yaw, cos_yaw = math.sin(yaw / 2), math.cos(yaw / 2)
+    if roll == 0.0:
+        return (0.0, 0.0, sin_yaw, cos_yaw)
+    sin_roll, cos_roll = math.sin(roll / 2), math.cos(roll / 2)
+    return (sin_roll * cos_yaw, sin_roll * sin_yaw, cos_roll * sin_yaw, cos_roll * cos_yaw)
+
+
+def yaw_from_quaternion(x: float, y: float, z: float, w: float) -> float:
+    """Returns the yaw [rad] of a rotation, that is, the heading of its x axis in the xy plane.
+
+    Args:
+        x: First component.
+        y: Second component.
+        z: Third component.
+        w: Scalar component; the quaternion need not be normalized.
+    """
+    return math.atan2(2.0 * (w * z + x * y), w * w + x * x - y * y - z * z)

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Turns an image map into a map of line segments."""
+"""Converts an image map to a map of line segments."""
 
 import sys
 

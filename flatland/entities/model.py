@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from flatland.entities.body import Body, Entity
 from flatland.entities.joint import Joint
 from flatland.errors import WorldError
-from flatland.geometry import Pose, compose, finite_pose, invert
+from flatland.geometry import Pose, Vector2, compose, finite_pose, invert
 from flatland.graph_names import clean_name
 
 if TYPE_CHECKING:
@@ -26,6 +26,8 @@ class Model(Entity):
         bodies: In the order of the file; the first one stands for the model's pose.
         joints: In the order of the file.
         plugins: In the order of the file.
+        displacement: (dx, dy) from the pose asked for to the pose that the last spawn or move gave
+            it [m]; (0, 0) unless `if_blocked` was `nearest`.
     """
 
     def __init__(self, world: World, name: str, namespace: str, path: str) -> None:
@@ -37,6 +39,7 @@ class Model(Entity):
         self.bodies: list[Body] = []
         self.joints: list[Joint] = []
         self.plugins: list[ModelPlugin] = []
+        self.displacement: Vector2 = (0.0, 0.0)
 
     def __repr__(self) -> str:
         """Names the model."""

@@ -6,6 +6,7 @@ import logging
 import math
 import os
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +15,12 @@ from flatland.config.reader import YamlReader
 from flatland.entities.layer import Layer
 from flatland.errors import UnreadableFileError, WorldError, YamlError
 from flatland.maps.map_file import load_map
+from flatland.plugin_api.missing_plugins import (
+    MissingPlugin,
+    MissingPluginsError,
+    find_missing,
+    missing_plugins_error,
+)
 from flatland.world import World
 
 _LOG = logging.getLogger("flatland")
@@ -52,10 +59,15 @@ def load_world(
     try:
         for entry in reader.subnode("layers", "list").items():
             _load_layer(world, entry, simplify_map)
-        _load_models(world, reader)
-        # Before any plugin sees the world, so that a typing mistake in the file shows first.
-        world_plugins = list(reader.optional_subnode("plugins", "list").items())
-        reader.ensure_accessed_all()
+        try:
+            _load_models(world, reader)
+            # Before any plugin sees the world, so that a typing mistake in the file shows first.
+            world_plugins = list(reader.optional_subnode("plugins", "list").items())
+            reader.ensure_accessed_all()
+            world.plugin_host.require_plugins(world_plugins, None)
+        except MissingPluginsError as error:
+            # Only of the first model that has any; a user wants to see those of all.
+            raise _all_missing_plugins(world, reader) or error from None
         for entry in world_plugins:
             _load_world_plugin(world, entry, reader)
     except BaseException:
@@ -142,9 +154,24 @@ def _load_models(world: World, reader: YamlReader) -> None:
             raise model_reader.subnode("model").error(error.message) from error
 
 
+def _all_missing_plugins(world: World, reader: YamlReader) -> MissingPluginsError | None:
+    """Makes one error of all missing plugins of a world, without those in faulty files."""
+    registry = world.plugin_host.registry
+    missing: list[MissingPlugin] = []
+    for entry in reader.optional_subnode("models", "list").items():
+        with suppress(YamlError):
+            path = world.resolve_path(entry.get("model", "string"))
+            plugins = YamlReader.from_file(path, world.params).optional_subnode("plugins", "list")
+            missing += find_missing(registry, plugins.items(), entry.get("name", "string"))
+    with suppress(YamlError):
+        plugins = reader.optional_subnode("plugins", "list")
+        missing += find_missing(registry, plugins.items(), None)
+    return missing_plugins_error(registry, missing) if missing else None
+
+
 def _load_world_plugin(world: World, entry: YamlReader, world_config: YamlReader) -> None:
     name = entry.get("name", "string")
     if not entry.get("enabled", "bool", True):
         _LOG.info('world plugin "%s" is disabled', name)
         return
-    world.start_world_plugin(entry, world_config)
+    world.plugin_host.start_world_plugin(entry, world_config)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy.typing as npt
@@ -291,6 +291,97 @@ class PhysicsWorld:
         """Does what `cast_rays` does by one `b2World::RayCast` a ray: slow, for comparison."""
         return self._core.cast_rays_reference(pose, ends, mask, reflect_mask)
 
+    # -- overlaps --------------------------------------------------------------------------
+
+    def overlapping_bodies(
+        self,
+        bodies: Sequence[PhysicsBody],
+        pose: Pose,
+        *,
+        ignored: Iterable[PhysicsBody] = (),
+        least_gap: float = 0.0,
+    ) -> list[PhysicsBody]:
+        """Returns the other bodies that some bodies would overlap at a pose.
+
+        Only fixtures that the solver would collide count: no sensors, category and mask bits that
+        match, at least one dynamic body of the two, no joint that excludes the collision. Shapes
+        are measured without the skin that Box2D puts around polygons and edges. Edges have no
+        inside: a closed loop of them overlaps only what crosses it.
+
+        Args:
+            bodies: They move together, at least one.
+            pose: (x, y, theta) of the first one in the world frame [m, rad].
+            ignored: Bodies that may be overlapped.
+            least_gap: Two fixtures that are closer than this overlap [m]; a negative one is how
+                deep they may penetrate.
+
+        Raises:
+            ValueError: There is no body, or a number is not finite.
+            StaleHandleError: A body was destroyed, or the world is closed.
+            WorldLockedError: The world is stepping.
+        """
+        found = self._core.overlapping_bodies(_ids(bodies), pose, _ids(ignored), least_gap)
+        return [PhysicsBody(self, body) for body in found]
+
+    def free_poses(
+        self,
+        bodies: Sequence[PhysicsBody],
+        poses: npt.ArrayLike,
+        *,
+        ignored: Iterable[PhysicsBody] = (),
+        least_gap: float = 0.0,
+    ) -> BoolArray:
+        """Returns at which poses some bodies would overlap nothing; see `overlapping_bodies`.
+
+        Other Python threads run meanwhile.
+
+        Args:
+            bodies: They move together, at least one.
+            poses: (x, y, theta) of the first one in the world frame [m, rad], shape (n, 3).
+            ignored: Bodies that may be overlapped.
+            least_gap: Two fixtures that are closer than this overlap [m].
+
+        Returns:
+            Shape (n,).
+
+        Raises:
+            ValueError: There is no body, a shape is wrong or a number is not finite.
+            StaleHandleError: A body was destroyed, or the world is closed.
+            WorldLockedError: The world is stepping.
+        """
+        return self._core.free_poses(_ids(bodies), poses, _ids(ignored), least_gap)
+
+    def free_discs(
+        self,
+        poses: npt.ArrayLike,
+        radius: float,
+        bits: int,
+        *,
+        ignored: Iterable[PhysicsBody] = (),
+        only: Iterable[PhysicsBody] | None = None,
+        least_gap: float = 0.0,
+    ) -> BoolArray:
+        """Returns where a disc would overlap nothing; see `free_poses`.
+
+        Args:
+            poses: (x, y, theta) of its centre in the world frame [m, rad], shape (n, 3).
+            radius: Of the disc [m], at least 0.
+            bits: Category and mask bits of the disc.
+            ignored: Bodies that may be overlapped.
+            only: All other bodies may be overlapped, too; None for no such limit.
+            least_gap: A fixture that is closer to the disc than this overlaps it [m].
+
+        Returns:
+            Shape (n,).
+
+        Raises:
+            ValueError: A shape is wrong or a number is out of range.
+            StaleHandleError: A body was destroyed, or the world is closed.
+            WorldLockedError: The world is stepping.
+        """
+        only_ids = None if only is None else _ids(only)
+        return self._core.free_discs(poses, radius, bits, _ids(ignored), only_ids, least_gap)
+
     # -- contacts --------------------------------------------------------------------------
 
     @property
@@ -321,3 +412,7 @@ class PhysicsWorld:
         """
         columns = self._core.touching_rows()
         return [] if columns is None else to_infos(columns)
+
+
+def _ids(bodies: Iterable[PhysicsBody]) -> list[int]:
+    return [body.id for body in bodies]

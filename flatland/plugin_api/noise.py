@@ -2,10 +2,28 @@
 
 from __future__ import annotations
 
+import logging
 import math
+import secrets
 from collections.abc import Sequence
 
 import numpy as np
+
+_LOG = logging.getLogger("flatland")
+
+
+def checked_seed(seed: int | None) -> int:
+    """Returns a seed; None draws one and logs it.
+
+    Raises:
+        ValueError: The seed is negative.
+    """
+    if seed is None:
+        seed = secrets.randbits(31)
+        _LOG.info("seed %d drawn at random, give it again to repeat this run", seed)
+    if seed < 0:
+        raise ValueError(f"seed must not be negative, got {seed}")
+    return seed
 
 
 class NoiseStream:

@@ -13,8 +13,8 @@ import numpy as np
 
 from flatland.entities.contact import Contact, ContactImpulse, ModelContact, MutableContact
 from flatland.errors import PluginError
-from flatland.plugin_api.noise import NoiseStream
 from flatland.graph_names import resolve_topic
+from flatland.plugin_api.noise import NoiseStream
 from flatland.plugin_api.ports import Command, Output
 
 if TYPE_CHECKING:
@@ -93,7 +93,7 @@ class FlatlandPlugin:
             self.world.ports.close_command(command)
         self._outputs.clear()
         self._commands.clear()
-        self.world.forget_transforms(self._sent)
+        self.world.transform_buffer.forget(self, self._sent)
         self._sent.clear()
 
     def output(self, topic: str, value_type: builtins.type[T]) -> Output[T]:
@@ -173,9 +173,11 @@ class FlatlandPlugin:
         if self._detached:
             return
         frames = (parent, child)
-        self._sent.add(frames)
         world = self.world
-        world.post_transform(frames, (world.timekeeper.sim_time_ns, x, y, yaw, roll))
+        if frames not in self._sent:
+            self._sent.add(frames)
+            world.transform_buffer.register(self, frames)
+        world.transform_buffer.send(frames, (world.timekeeper.sim_time_ns, x, y, yaw, roll))
 
     def on_initialize(self, config: YamlReader) -> None:
         """Reads the parameters and gets ready; called once.
@@ -215,9 +217,12 @@ class ModelPlugin(FlatlandPlugin):
 
     Attributes:
         model: The model.
+        all_contacts: Whether the contact hooks receive the contacts of all models, and not only
+            those of this one.
     """
 
     base_class_type = "flatland::ModelPlugin"
+    all_contacts: ClassVar[bool] = False
 
     model: Model
 

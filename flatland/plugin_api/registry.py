@@ -1,12 +1,10 @@
 """Finds plugin classes by the names that XML manifests give them.
 
-A manifest is a file as pluginlib has them, with the dotted path of a Python class as its type.
-Reading manifests imports no plugin; a class is imported when a world first asks for it.
+Reading manifests imports no plugin; a class is imported when a world first needs it.
 """
 
 from __future__ import annotations
 
-import difflib
 import importlib
 import importlib.metadata
 import importlib.resources
@@ -14,94 +12,32 @@ import logging
 import os
 import sys
 import threading
-import xml.etree.ElementTree as ElementTree
-from dataclasses import dataclass
+import time
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 from flatland.errors import PLUGIN_FAULTS, PluginError
+from flatland.plugin_api.manifest import PluginClass, listed_manifests, lookup_name, read_manifest
+from flatland.plugin_api.missing_plugins import LookupHints
+from flatland.plugin_api.package_exports import (
+    PYTHON_TAG,
+    are_settled,
+    modification_time,
+    package_exports,
+)
 from flatland.plugin_api.plugin import FlatlandPlugin, ModelPlugin, WorldPlugin
 
 _LOG = logging.getLogger("flatland")
 
-INCLUDED_PACKAGE = "flatland_plugins"
 ENTRY_POINT_GROUP = "flatland.plugins"
-MANIFEST_VARIABLE = "FLATLAND_PLUGIN_PATH"
 _BASE_CLASSES: dict[str, type[FlatlandPlugin]] = {
     "flatland::ModelPlugin": ModelPlugin,
     "flatland::WorldPlugin": WorldPlugin,
 }
+_Times = dict[str, int | None]
+_last_entry_points: tuple[_Times | None, Sequence[importlib.metadata.EntryPoint]] = (None, ())
 # Many worlds may load in threads of one process, and sys.path is shared by all of them.
 _IMPORT_LOCK = threading.RLock()
-
-
-@dataclass(frozen=True, slots=True)
-class PluginClass:
-    """One `<class>` of a manifest.
-
-    Attributes:
-        lookup_name: The name that YAML files use, such as `my_robots::Belt`.
-        class_path: Dotted path of the Python class.
-        base_class_type: `flatland::ModelPlugin` or `flatland::WorldPlugin`.
-        manifest: File that it stands in.
-        import_path: Folder to put on `sys.path` first, None when there is none.
-        description: For people.
-    """
-
-    lookup_name: str
-    class_path: str
-    base_class_type: str
-    manifest: str
-    import_path: str | None
-    description: str = ""
-
-
-def read_manifest(path: str | os.PathLike[str]) -> list[PluginClass]:
-    """Reads the classes of one manifest.
-
-    Raises:
-        PluginError: It cannot be read, is not XML, or a class lacks its type or base class.
-    """
-    path = os.fspath(path)
-    try:
-        # A manifest names code that runs: who may write one needs no XML trick to do harm.
-        root = ElementTree.parse(path).getroot()  # noqa: S314
-    except ElementTree.ParseError as error:
-        line, column = error.position
-        reason = str(error).split(":")[0]
-        raise PluginError(
-            f'manifest "{path}" is not XML, line {line} col {column}, {reason}'
-        ) from error
-    except OSError as error:
-        raise PluginError(f'manifest "{path}" cannot be read: {error.strerror}') from error
-    if root.tag == "library":
-        libraries = [root]
-    elif root.tag == "class_libraries":
-        libraries = root.findall("library")
-    else:
-        raise PluginError(
-            f'manifest "{path}" must hold <library> or <class_libraries>, got <{root.tag}>'
-        )
-    found = []
-    for library in libraries:
-        folder = library.get("path")
-        import_path = None if folder is None else str(Path(path).resolve().parent / folder)
-        for element in library.findall("class"):
-            class_path = element.get("type", "")
-            lookup_name = element.get("name") or class_path
-            base = element.get("base_class_type", "")
-            if "." not in class_path:
-                raise PluginError(
-                    f'manifest "{path}", class "{lookup_name}": type must be the dotted path of '
-                    f'a Python class, got "{class_path}"'
-                )
-            if base not in _BASE_CLASSES:
-                raise PluginError(
-                    f'manifest "{path}", class "{lookup_name}": base_class_type must be '
-                    f'flatland::ModelPlugin or flatland::WorldPlugin, got "{base}"'
-                )
-            text = " ".join((element.findtext("description") or "").split())
-            found.append(PluginClass(lookup_name, class_path, base, path, import_path, text))
-    return found
 
 
 def included_manifest() -> Path:
@@ -109,105 +45,77 @@ def included_manifest() -> Path:
     return Path(str(importlib.resources.files("flatland.plugins") / "flatland_plugins.xml"))
 
 
-def _package_path_manifests(problems: list[PluginError]) -> list[str]:
-    """Lists the manifests that packages on `ROS_PACKAGE_PATH` export; rospkg is no ROS client."""
-    if not os.environ.get("ROS_PACKAGE_PATH"):
-        return []
-    try:
-        import rospkg
-    except ImportError:
-        return []
-    manifests: list[str] = []
-    packages = rospkg.RosPack()
-    for package in packages.list():
-        if package == "flatland":
-            continue
-        try:
-            exports = packages.get_manifest(package).get_export("flatland", "plugin")
-            folder = packages.get_path(package)
-        except Exception as error:
-            # Several libraries read package.xml, each with errors of its own; a package that is
-            # broken is no reason to miss the others.
-            reason = " ".join(str(error).split())
-            problems.append(PluginError(f'package "{package}" cannot be read: {reason}'))
-            continue
-        manifests += [export.replace("${prefix}", folder) for export in exports]
-    return manifests
-
-
-def _entry_point_manifests() -> list[str]:
-    """Lists the manifests that Python distributions export.
+def _entry_point_manifests() -> tuple[list[str], list[PluginError]]:
+    """Lists the manifests that Python distributions export, and the exports that are invalid.
 
     The value of an entry point is `package` or `package:file.xml`; the file stands in the
     package, and is called `flatland_plugins.xml` when it is not named.
     """
-    manifests = []
-    for entry_point in importlib.metadata.entry_points(group=ENTRY_POINT_GROUP):
+    manifests, problems = [], []
+    for entry_point in _entry_points():
         package, _, name = entry_point.value.partition(":")
         try:
             resource = importlib.resources.files(package.strip())
         except ImportError as error:
-            _LOG.warning("plugins of entry point %r are left out: %s", entry_point.name, error)
+            problems.append(PluginError(f'entry point "{entry_point.name}": {error}'))
             continue
         manifests.append(str(resource / (name.strip() or "flatland_plugins.xml")))
-    return manifests
+    return manifests, problems
+
+
+def _entry_points() -> Sequence[importlib.metadata.EntryPoint]:
+    """Returns the entry points of the group; reads them again only when `sys.path` changed."""
+    global _last_entry_points
+    start = time.time_ns()
+    times = {folder: modification_time(folder or ".") for folder in sys.path}
+    if times != _last_entry_points[0]:
+        found = tuple(importlib.metadata.entry_points(group=ENTRY_POINT_GROUP))
+        _last_entry_points = (times if are_settled(times, start) else None, found)
+    return _last_entry_points[1]
 
 
 class PluginRegistry:
-    """The plugin classes that manifests name; read at the first look-up."""
+    """The plugin classes that manifests declare.
+
+    The included manifest is read at the first look-up, all others when a name is not in it. They
+    are read again when a name is not found and a manifest or package has changed since.
+    """
 
     def __init__(self) -> None:
         """Reads nothing yet."""
         self._classes: dict[str, PluginClass] = {}
         self._problems: list[PluginError] = []
-        self._read_included = False
-        self._read_others = False
+        self._others_read: object = None
 
     @property
     def classes(self) -> dict[str, PluginClass]:
         """All known classes by look-up name."""
-        self._read_all()
+        self._read_others()
         return dict(self._classes)
-
-    def add_manifest(self, path: str | os.PathLike[str]) -> None:
-        """Adds the classes of a manifest; a name that is known already keeps its first class.
-
-        Raises:
-            PluginError: The manifest is broken.
-        """
-        for entry in read_manifest(path):
-            known = self._classes.setdefault(entry.lookup_name, entry)
-            if known is not entry and not Path(known.manifest).samefile(entry.manifest):
-                _LOG.warning(
-                    'plugin "%s" of "%s" is hidden by that of "%s"',
-                    entry.lookup_name,
-                    entry.manifest,
-                    known.manifest,
-                )
 
     def find(self, type_name: str) -> PluginClass:
         """Returns what the manifests say about a `type:` of a YAML file.
 
         Raises:
-            PluginError: No manifest names it; lists the known names, the nearest first, and the
-                manifests that could not be read.
+            PluginError: No manifest declares it.
         """
-        lookup_name = type_name if "::" in type_name else f"{INCLUDED_PACKAGE}::{type_name}"
-        if not self._read_included:
-            self._read_included = True
-            self.add_manifest(included_manifest())
-        # The included plugins are found without searching the package path, which takes long.
-        if lookup_name not in self._classes:
-            self._read_all()
-        if lookup_name in self._classes:
-            return self._classes[lookup_name]
-        if type_name in self._classes:
-            return self._classes[type_name]
-        near = difflib.get_close_matches(lookup_name, self._classes, n=len(self._classes), cutoff=0)
-        text = f'no plugin "{lookup_name}", known are: {", ".join(near)}'
-        if self._problems:
-            text += "; not read: " + "; ".join(problem.message for problem in self._problems)
-        raise PluginError(text)
+        if self.find_missing([type_name]):
+            hints = self.hints()
+            raise PluginError(f"{hints.describe(type_name)}; {hints.advise([type_name])}")
+        return self._classes.get(lookup_name(type_name)) or self._classes[type_name]
+
+    def find_missing(self, type_names: Iterable[str]) -> list[str]:
+        """Returns those of some `type:` values that no manifest declares."""
+        if not self._classes:
+            self._add_manifest(included_manifest())
+        missing = [name for name in type_names if not self._is_known(name)]
+        if missing:
+            self._read_others()
+        return [name for name in missing if not self._is_known(name)]
+
+    def hints(self) -> LookupHints:
+        """Returns what to write about names that `find_missing` returned."""
+        return LookupHints(self._classes, self._problems)
 
     def make(self, type_name: str, base: type[FlatlandPlugin]) -> FlatlandPlugin:
         """Makes an instance of a plugin class, importing it if that has not been done.
@@ -233,22 +141,45 @@ class PluginRegistry:
                 f'class "{entry.class_path}" cannot be made: {type(error).__name__}: {error}'
             ) from error
 
-    def _read_all(self) -> None:
-        if self._read_others:
+    def _is_known(self, type_name: str) -> bool:
+        return lookup_name(type_name) in self._classes or type_name in self._classes
+
+    def _read_others(self) -> None:
+        """Reads all manifests, unless none has changed since the last time."""
+        packages = package_exports()
+        entry_points, problems = _entry_point_manifests()
+        exported = [export.manifest for export in packages.exports if export.tag == PYTHON_TAG]
+        paths = [*listed_manifests(), *exported, *entry_points]
+        found = ([(path, modification_time(path)) for path in paths], packages)
+        if found == self._others_read:
             return
-        self._read_others = True
-        if not self._read_included:
-            self._read_included = True
-            self.add_manifest(included_manifest())
-        listed = [path for path in os.environ.get(MANIFEST_VARIABLE, "").split(":") if path]
-        exported = _package_path_manifests(self._problems)
-        for path in [*listed, *exported, *_entry_point_manifests()]:
+        self._others_read = found
+        self._classes.clear()
+        self._add_manifest(included_manifest())
+        self._problems = [*packages.problems, *problems]
+        for path in paths:
             try:
-                self.add_manifest(path)
+                self._add_manifest(path)
             except PluginError as error:
                 # One broken package must not take all others away.
                 _LOG.error("%s", error)
                 self._problems.append(error)
+
+    def _add_manifest(self, path: str | os.PathLike[str]) -> None:
+        """Adds the classes of a manifest; a name that is known already keeps its first class.
+
+        Raises:
+            PluginError: The manifest is broken.
+        """
+        for entry in read_manifest(path):
+            known = self._classes.setdefault(entry.lookup_name, entry)
+            if known is not entry and not Path(known.manifest).samefile(entry.manifest):
+                _LOG.warning(
+                    'plugin "%s" of "%s" is hidden by that of "%s"',
+                    entry.lookup_name,
+                    entry.manifest,
+                    known.manifest,
+                )
 
 
 def _load_class(entry: PluginClass) -> type[FlatlandPlugin]:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from flatland.geometry import FloatArray, compose
+from flatland.geometry import FloatArray, Pose, compose
 from flatland.plugin_api.parameters import (
     at_key,
     read_body,
@@ -93,6 +93,9 @@ class Laser(ModelPlugin):
         origin: (x, y, theta) of the sensor in the body frame.
         intensities: Of the last scan computed: 255 for a beam whose nearest hit is in the layer
             `reflectance`, else 0; shape (n,), or (0,) in a world without that layer; float32.
+        beam_ends: End point of each beam in the sensor frame [m], shape (n, 2), read-only.
+        last_scan: Pose of the sensor in the world frame and ranges [m], shape (n,), of the last
+            scan computed; None before the first one. The ranges are those of the emitted scan.
     """
 
     def on_initialize(self, config: YamlReader) -> None:
@@ -116,7 +119,8 @@ class Laser(ModelPlugin):
         self._sends_transform: bool = config.get("broadcast_tf", "bool", True)
         upside_down: bool = config.get("upside_down", "bool", False)
         self._roll = math.pi if upside_down else 0.0
-        self._ends = self.angles.end_points(self.range, upside_down)
+        self.beam_ends = self.angles.end_points(self.range, upside_down)
+        self.last_scan: tuple[Pose, FloatArray] | None = None
         reflectance = self.world.collision_filter.layer_id(REFLECTANCE_LAYER)
         self._reflect_mask = 1 << reflectance if reflectance >= 0 else 0
         self.intensities: FloatArray = np.zeros(0, dtype=np.float32)
@@ -197,8 +201,9 @@ class Laser(ModelPlugin):
         return self._compute_ranges(self.rng)
 
     def _compute_ranges(self, rng: np.random.Generator) -> FloatArray:
+        pose = compose(self.body.physics.pose, self.origin)
         fractions, reflects = self.world.physics.cast_rays(
-            compose(self.body.physics.pose, self.origin), self._ends, self._mask, self._reflect_mask
+            pose, self.beam_ends, self._mask, self._reflect_mask
         )
         ranges = fractions * self._length
         if self._deviation:
@@ -210,4 +215,16 @@ class Laser(ModelPlugin):
             ranges[np.isnan(fractions)] = self._no_hit
         if self._reflect_mask:
             self.intensities = np.where(reflects, np.float32(REFLECTIVE), np.float32(0.0))
+        self.last_scan = (pose, ranges)
         return ranges
+
+    def cast_without_noise(self) -> tuple[Pose, FloatArray]:
+        """Casts the beams from the current pose without changing the state of the laser.
+
+        Returns:
+            Pose of the sensor in the world frame, and the exact range of each beam [m],
+            shape (n,), float32, NaN for a miss.
+        """
+        pose = compose(self.body.physics.pose, self.origin)
+        fractions, _ = self.world.physics.cast_rays(pose, self.beam_ends, self._mask)
+        return pose, fractions * self._length

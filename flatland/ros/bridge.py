@@ -18,7 +18,7 @@ from flatland.ros.adapters import convert, find_adapter, transform
 from flatland.ros.plugin_ros import PluginRos
 from flatland.ros.publisher import Publisher
 from flatland.ros.registrar import Registrar
-from flatland.ros.subscriber import Subscriber
+from flatland.ros.transport.subscriber import Subscriber
 from flatland.runtime.observer import WorldObserver
 from flatland.values import Transform
 from flatland.world import World

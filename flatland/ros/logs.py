@@ -1,4 +1,4 @@
-"""Brings what flatland logs to the console and to `/rosout`, as rospy's own messages."""
+"""Forwards the log of flatland to rospy, that is, to the console and to `/rosout`."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import logging
 
 
 class _ToRosout(logging.Handler):
-    """Hands records on to rospy's logger, with the place that they came from."""
+    """Forwards records to the logger of rospy, preserving their source location."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -18,9 +18,9 @@ class _ToRosout(logging.Handler):
 
 
 def log_to_ros() -> None:
-    """Sends all that flatland logs through rospy, once; call it after `rospy.init_node`."""
+    """Forwards the log of flatland to rospy; must be called after `rospy.init_node`."""
     logger = logging.getLogger("flatland")
-    # Records must not reach the root's handlers as well: rospy's logger passes them on there.
+    # The logger of rospy propagates to the root logger already; avoid duplicate records.
     logger.propagate = False
     logger.handlers = [_ToRosout()]
     if logger.level == logging.NOTSET:

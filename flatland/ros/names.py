@@ -1,4 +1,4 @@
-"""Names that ROS takes, for things that may be called anything."""
+"""Conversion of arbitrary names to legal ROS names."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ _ILLEGAL_CHARACTER: Final = re.compile(r"[^A-Za-z0-9_/]")
 
 
 def legal_name(name: str) -> str:
-    """Turns any name into one that may stand behind a namespace in a ROS name.
+    """Converts any name to a legal ROS name relative to a namespace.
 
-    Legal names stay as they are; every other character becomes an underscore.
+    Legal names are returned unchanged; in others, each illegal character becomes an underscore.
     """
-    # Not by rosgraph: it lets letters of all alphabets pass, which roscpp refuses.
+    # rosgraph also accepts letters outside ASCII, which roscpp rejects.
     if _LEGAL.fullmatch(name):
         return name
     parts = _ILLEGAL_CHARACTER.sub("_", name).split("/")
@@ -22,26 +22,26 @@ def legal_name(name: str) -> str:
 
 
 def sendable_text(text: str) -> str:
-    """Replaces what UTF-8 cannot hold, which no ROS message can carry."""
+    """Replaces characters that cannot be encoded as UTF-8, such as surrogates in a file name."""
     return text.encode("utf-8", "replace").decode()
 
 
 class UniqueNames:
-    """Gives each of many things a name that no other has."""
+    """A set of unique names."""
 
     def __init__(self) -> None:
-        """Has given no name yet."""
+        """Creates an empty set."""
         self._taken: set[str] = set()
 
-    def claim(self, wanted: str) -> str:
-        """Gives a name that is not in use: the wanted one, or that with a number behind it."""
-        name, number = wanted, 1
+    def claim(self, preferred: str) -> str:
+        """Returns an unused name: the preferred one, with a numeric suffix if it is in use."""
+        name, number = preferred, 1
         while name in self._taken:
             number += 1
-            name = f"{wanted}_{number}"
+            name = f"{preferred}_{number}"
         self._taken.add(name)
         return name
 
     def release(self, name: str) -> None:
-        """Lets others have a name that `claim` gave."""
+        """Makes a name returned by `claim` available again."""
         self._taken.discard(name)

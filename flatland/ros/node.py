@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import sys
 import threading
 import time
 from typing import TYPE_CHECKING, Any, Final
@@ -21,6 +22,7 @@ _LOG = logging.getLogger("flatland")
 NODE_NAME: Final = "flatland_server"
 _MASTER_PERIOD: Final = 0.2  # s between two attempts to reach the ROS master
 _MASTER_PATIENCE: Final = 1.0  # s without one until the node says that it waits
+_SWITCH_INTERVAL: Final = 0.0005  # s for which a thread keeps the GIL while others wait for it
 _UNREGISTERING: Final = 0.5  # s that saying good-bye to the ROS master may take
 
 
@@ -47,6 +49,10 @@ class ServerNode:
         """Runs until the node is asked to stop, and returns the exit code."""
         # Before anything that takes time: a signal must find someone who hears it.
         StopSignals(self._stop, lambda: _leave_ros("signal"))
+        # A connection or a registration takes rospy's threads some hundred short pieces of work.
+        # With Python's interval of 5 ms they wait a second for a loop that runs at full speed. The
+        # interval costs nothing while no other thread wants to run.
+        sys.setswitchinterval(_SWITCH_INTERVAL)
         import rospy
 
         try:
@@ -121,9 +127,9 @@ class ServerNode:
     def _simulate(self, parameters: NodeParameters) -> None:
         """Loads the world and steps it until the node is asked to stop."""
         from flatland.ros.bridge import Bridge
+        from flatland.ros.deferred_topics import DeferredTopics
         from flatland.ros.registrar import Registrar
         from flatland.ros.services import Services
-        from flatland.ros.visualization import Visualization
         from flatland.simulation import Simulation
 
         _warn_of_wall_time()
@@ -131,15 +137,18 @@ class ServerNode:
         bridge = Bridge(self._registrar)
         world = _load(parameters, bridge)
         simulation = Simulation(
-            world, parameters.update_rate, report=lambda report: _LOG.info("%s", report)
+            world,
+            parameters.update_rate,
+            max_lag=parameters.max_lag,
+            report=lambda report: _LOG.info("%s", report),
         )
         self._simulation = simulation
         if self._stopping.is_set():
             simulation.stop()
         debug_rate = parameters.viz_pub_rate if parameters.show_viz else None
-        visualization = Visualization(self._registrar, simulation, debug_rate=debug_rate)
+        deferred_topics = DeferredTopics(self._registrar, simulation, debug_rate=debug_rate)
         try:
-            Services(self._registrar, simulation)
+            Services(self._registrar, simulation, parameters.if_blocked)
             if parameters.benchmark_duration is None:
                 simulation.run()
             else:
@@ -147,7 +156,7 @@ class ServerNode:
                 if not simulation.stopped:
                     _log_benchmark(result)
         finally:
-            visualization.close()
+            deferred_topics.close()
             # Plugins end first, so that they can still publish; then all topics at once.
             bridge.close()
             world.close()

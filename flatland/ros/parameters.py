@@ -6,6 +6,8 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from flatland.runtime.placement import IF_BLOCKED, IfBlocked
+from flatland.simulation import MAX_LAG
 from flatland.timekeeper import GREATEST_STEP, LEAST_STEP
 
 ParameterSource = Callable[[str], object]
@@ -26,6 +28,7 @@ class NodeParameters:
     Attributes:
         world_path: The world file.
         update_rate: Steps in a second of wall time [Hz], 0 for as many as possible.
+        max_lag: Lost wall time that is made up for at most [s], 0 for one cycle at most.
         step_size: Simulated time of a step [s].
         show_viz: Whether to publish debug markers.
         viz_pub_rate: Debug markers in a second of wall time [Hz].
@@ -35,10 +38,12 @@ class NodeParameters:
             [s]; None runs for ever.
         plugin_timeout: Wall time that a plugin may take to start [s]; None for as long as it
             likes.
+        if_blocked: What `spawn_model` and `move_model` do at poses that are not free.
     """
 
     world_path: str
     update_rate: float
+    max_lag: float
     step_size: float
     show_viz: bool
     viz_pub_rate: float
@@ -46,6 +51,7 @@ class NodeParameters:
     seed: int | None
     benchmark_duration: float | None
     plugin_timeout: float | None
+    if_blocked: IfBlocked
 
 
 def read_parameters(get: ParameterSource) -> NodeParameters:
@@ -61,6 +67,7 @@ def read_parameters(get: ParameterSource) -> NodeParameters:
     return NodeParameters(
         world_path=reader.path("world_path"),
         update_rate=reader.rate("update_rate", 200.0),
+        max_lag=reader.lag("max_lag", MAX_LAG),
         step_size=reader.step_size("step_size", 0.005),
         show_viz=reader.boolean("show_viz", False),
         viz_pub_rate=reader.positive("viz_pub_rate", 30.0),
@@ -68,6 +75,7 @@ def read_parameters(get: ParameterSource) -> NodeParameters:
         seed=reader.natural("seed"),
         benchmark_duration=reader.optional_positive("benchmark_duration"),
         plugin_timeout=reader.timeout("plugin_timeout", 60.0),
+        if_blocked=reader.if_blocked("if_blocked", "warn"),
     )
 
 
@@ -91,6 +99,13 @@ class _Reader:
         if rate < 0:
             raise _bad(name, wanted, rate)
         return 0.0 if math.isinf(rate) else rate
+
+    def lag(self, name: str, default: float) -> float:
+        wanted = "a finite number of seconds that is not negative"
+        seconds = self._number(name, default, wanted)
+        if not 0 <= seconds < math.inf:
+            raise _bad(name, wanted, seconds)
+        return seconds
 
     def step_size(self, name: str, default: float) -> float:
         wanted = f"a number of seconds from {LEAST_STEP:g} to {GREATEST_STEP:g}"
@@ -134,6 +149,15 @@ class _Reader:
         if value not in choices:
             raise _bad(name, wanted, value)
         return value
+
+    def if_blocked(self, name: str, default: IfBlocked) -> IfBlocked:
+        value = self._get(name)
+        if value is None:
+            return default
+        for choice in IF_BLOCKED:
+            if value == choice:
+                return choice
+        raise _bad(name, "one of " + ", ".join(IF_BLOCKED), value)
 
     def natural(self, name: str) -> int | None:
         wanted = "an integer that is not negative"

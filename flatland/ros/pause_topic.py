@@ -1,4 +1,4 @@
-"""Tells whether the world is paused, on `~paused`."""
+"""Publishes on `~paused` whether the world is paused."""
 
 from __future__ import annotations
 
@@ -6,32 +6,33 @@ from typing import Final
 
 from std_msgs.msg import Bool
 
-from flatland.ros.latched_topic import LatchedTopic
 from flatland.ros.registrar import Registrar
 from flatland.ros.ticker import Ticker
+from flatland.ros.transport.state_topic import StateTopic
 from flatland.simulation import Simulation
 
 TOPIC: Final = "~paused"
-RATE: Final = 20.0  # Hz of wall time
+RATE: Final = 20.0  # Hz, wall time
 
 
 class PauseTopic:
-    """Looks at the world while anybody wants to know, and says so when the pause has changed.
+    """Publishes the pause state of a world when it changes.
 
-    Services, drags and plugins pause a world, and none of them needs to know of this.
+    The state is polled while the topic has subscribers, because services, drags and plugins pause
+    a world independently of each other.
     """
 
     def __init__(self, registrar: Registrar, simulation: Simulation) -> None:
-        """Advertises the topic; between two steps.
+        """Advertises the topic asynchronously; must be called between two steps.
 
         Args:
-            registrar: Talks to the ROS master.
-            simulation: Whose world to look at.
+            registrar: Registers the topic with the ROS master.
+            simulation: Simulation of the world.
         """
         self._world = simulation.world
-        self._sent: bool | None = None  # what all subscribers know, None if they differ
+        self._sent: bool | None = None  # last state sent to all subscribers; None if they differ
         self._ticker = Ticker("flatland-paused", RATE, simulation.post, self._tick)
-        self._topic = LatchedTopic(
+        self._topic = StateTopic(
             registrar,
             TOPIC,
             Bool,
@@ -41,12 +42,12 @@ class PauseTopic:
         )
 
     def close(self) -> None:
-        """Looks no more."""
+        """Stops polling."""
         self._ticker.close()
 
     def _message(self) -> Bool:
         if self._world.paused != self._sent:
-            # For a newcomer alone, before the others hear of it.
+            # Only new subscribers receive this message; the others still have the old state.
             self._sent = None
         return Bool(self._world.paused)
 

@@ -10,12 +10,12 @@ from typing import Any, Final
 import rospy
 
 from flatland.errors import PLUGIN_FAULTS, PluginError
-from flatland.plugin_api.plugin import FlatlandPlugin, describe
 from flatland.graph_names import resolve_topic
+from flatland.plugin_api.plugin import FlatlandPlugin, describe
 from flatland.ros.publisher import Publisher
 from flatland.ros.registrar import Registrar
-from flatland.ros.service import Service, wait_for
-from flatland.ros.subscriber import Subscriber
+from flatland.ros.transport.service import Service, wait_for
+from flatland.ros.transport.subscriber import Subscriber
 
 _LOG = logging.getLogger("flatland")
 

@@ -8,8 +8,8 @@ from typing import Any
 
 import rospy
 
-from flatland.ros.outbox import Outbox
 from flatland.ros.registrar import Registrar
+from flatland.ros.transport.outbox import Outbox
 
 
 class Publisher:

@@ -10,9 +10,13 @@ from typing import Any, Final
 import rospy
 from std_srvs.srv import Empty, EmptyResponse
 
+from flatland.entities.model import Model
 from flatland.errors import FlatlandError
+from flatland.geometry import Pose
+from flatland.ros.names import sendable_text
 from flatland.ros.registrar import Registrar
-from flatland.ros.service import Service, wait_for
+from flatland.ros.transport.service import Service, wait_for
+from flatland.runtime.placement import IfBlocked
 from flatland.simulation import Simulation
 from flatland.srv import (
     DeleteModel,
@@ -41,18 +45,22 @@ class Services:
     also while paused, and answered when it has taken effect.
     """
 
-    def __init__(self, registrar: Registrar, simulation: Simulation) -> None:
+    def __init__(
+        self, registrar: Registrar, simulation: Simulation, if_blocked: IfBlocked = "warn"
+    ) -> None:
         """Offers the services, soon.
 
         Args:
             registrar: Talks to the ROS master.
             simulation: What the services act on.
+            if_blocked: What `spawn_model` and `move_model` do at poses that are not free.
 
         Raises:
             FlatlandError: A plugin has taken the name of a service.
         """
         self._registrar = registrar
         self._simulation = simulation
+        self._if_blocked = if_blocked
         world = simulation.world
         for name, service_type, handler in (
             ("spawn_model", SpawnModel, self._spawn_model),
@@ -69,8 +77,11 @@ class Services:
         pose = _pose(request.pose)
         return SpawnModelResponse(
             *self._carry_out(
-                lambda: self._simulation.world.spawn_model(
-                    request.yaml_path, request.name, request.ns, pose
+                lambda: _displacement(
+                    self._simulation.world.spawn_model(
+                        request.yaml_path, request.name, request.ns, pose, self._if_blocked
+                    ),
+                    pose,
                 )
             )
         )
@@ -83,7 +94,11 @@ class Services:
     def _move_model(self, request: MoveModelRequest) -> MoveModelResponse:
         pose = _pose(request.pose)
         return MoveModelResponse(
-            *self._carry_out(lambda: self._simulation.world.move_model(request.name, pose))
+            *self._carry_out(
+                lambda: _displacement(
+                    self._simulation.world.move_model(request.name, pose, self._if_blocked), pose
+                )
+            )
         )
 
     def _set_rate(self, request: SetRateRequest) -> SetRateResponse:
@@ -105,25 +120,36 @@ class Services:
 
         return serve
 
-    def _carry_out(self, action: Callable[[], object]) -> tuple[bool, str]:
-        """Runs an action between two steps and says whether it worked, and if not, why."""
+    def _carry_out(self, action: Callable[[], str | None]) -> tuple[bool, str]:
+        """Runs an action between two steps.
+
+        Returns:
+            Whether it worked; the text that it returned, or why it failed.
+        """
         try:
-            wait_for(self._simulation.post(action))
+            message = wait_for(self._simulation.post(action)) or ""
             # Whoever spawned a model may look for its topics at once.
             self._registrar.flush(_REGISTRATION_PATIENCE)
         except (FlatlandError, rospy.ServiceException) as error:
             self._registrar.flush(_REGISTRATION_PATIENCE)
-            return False, _sendable(str(error))
+            return False, sendable_text(str(error))
         except Exception as error:
             _LOG.exception("a service call failed in an unforeseen way")
-            return False, _sendable(f"{type(error).__name__}: {error}")
-        return True, ""
+            return False, sendable_text(f"{type(error).__name__}: {error}")
+        return True, sendable_text(message)
 
 
-def _pose(pose: Any) -> tuple[float, float, float]:
+def _displacement(model: Model | None, asked: Pose) -> str:
+    """Describes where a model was put instead of the pose asked for; empty where it is there."""
+    if model is None or model.displacement == (0.0, 0.0):
+        return ""
+    dx, dy = model.displacement
+    x, y, theta = asked[0] + dx, asked[1] + dy, asked[2]
+    return (
+        f'the pose asked for is blocked: model "{model.name}" was put at '
+        f"({x:.3f}, {y:.3f}, {theta:.3f}), {math.hypot(dx, dy):.3f} m away"
+    )
+
+
+def _pose(pose: Any) -> Pose:
     return (pose.x, pose.y, pose.theta)
-
-
-def _sendable(text: str) -> str:
-    """Replaces what UTF-8 cannot hold, such as parts of a file name that is none."""
-    return text.encode("utf-8", "replace").decode()

@@ -1,4 +1,4 @@
-"""Does something at a rate of wall time, in the thread that steps the world."""
+"""Periodic actions in wall time, run in the thread that steps the world."""
 
 from __future__ import annotations
 
@@ -8,14 +8,15 @@ from collections.abc import Callable
 from concurrent.futures import Future
 from typing import Any, Final
 
-_SHORTEST_PERIOD: Final = 0.001  # s
-_PATIENCE: Final = 0.2  # s between two looks whether to end
+_MIN_PERIOD: Final = 0.001  # s
+_CLOSE_POLL_PERIOD: Final = 0.2  # s between two checks whether the ticker is closed
 
 
 class Ticker:
-    """Ticks while it is awake, also while the world is paused; asleep it costs nothing.
+    """Calls a function periodically while it is awake, even if the world is paused.
 
-    Two ticks are never closer than a period, and none is queued while another waits.
+    Two ticks are at least one period apart, and at most one tick is queued. A sleeping ticker uses
+    no CPU time.
     """
 
     def __init__(
@@ -25,16 +26,17 @@ class Ticker:
         post: Callable[[Callable[[], object]], Future[Any]],
         tick: Callable[[float], bool],
     ) -> None:
-        """Starts asleep.
+        """Creates a sleeping ticker.
 
         Args:
-            name: Of the thread.
-            rate: Ticks in a second of wall time [Hz].
+            name: Name of the thread.
+            rate: Ticks per second of wall time [Hz].
             post: Runs an action between two steps.
-            tick: Called between two steps, with the time of `time.monotonic` at which it was
-                due; tells whether to tick on. What it raises must not matter.
+            tick: Called between two steps with the time at which the tick was due
+                (`time.monotonic`); returns whether to stay awake. An exception does not end the
+                ticker.
         """
-        self._period = max(_SHORTEST_PERIOD, 1.0 / rate)
+        self._period = max(_MIN_PERIOD, 1.0 / rate)
         self._post = post
         self._tick = tick
         self._awake = threading.Event()
@@ -42,11 +44,11 @@ class Ticker:
         threading.Thread(target=self._run, name=name, daemon=True).start()
 
     def wake(self) -> None:
-        """Ticks from now on, the first time at once; safe from any thread."""
+        """Starts ticking, with the first tick as soon as possible; thread-safe."""
         self._awake.set()
 
     def close(self) -> None:
-        """Ends for good."""
+        """Ends the ticker and its thread."""
         self._closed.set()
         self._awake.set()
 
@@ -60,18 +62,18 @@ class Ticker:
             due = now + self._period
             done = threading.Event()
             self._post(lambda now=now, done=done: self._tick_once(now, done))  # type: ignore[misc]
-            while not done.wait(_PATIENCE):
+            while not done.wait(_CLOSE_POLL_PERIOD):
                 if self._closed.is_set():
                     return
 
     def _tick_once(self, now: float, done: threading.Event) -> None:
-        # Asleep already when the tick looks whether there is still something to do: what comes
-        # after that look wakes it again.
+        # Sleep before the call, not after it: `wake` may be called while the tick decides that
+        # there is nothing left to do.
         self._awake.clear()
-        goes_on = True
+        stay_awake = True
         try:
-            goes_on = not self._closed.is_set() and self._tick(now)
+            stay_awake = not self._closed.is_set() and self._tick(now)
         finally:
-            if goes_on or self._closed.is_set():
+            if stay_awake or self._closed.is_set():
                 self._awake.set()
             done.set()

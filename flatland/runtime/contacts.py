@@ -9,7 +9,7 @@ from flatland.entities.contact import Contact
 
 if TYPE_CHECKING:
     from flatland.entities.body import Body
-    from flatland.physics import OldManifold, PhysicsWorld, PreSolveContact
+    from flatland.physics import OldManifold, PhysicsBody, PhysicsWorld, PreSolveContact
     from flatland.runtime.plugin_host import PluginHost
 
 
@@ -27,7 +27,7 @@ class ContactReporter:
         self._host = host
         self._bodies: dict[int, Body] = {}
         self._is_recording = False
-        self._is_outdated = False
+        self._hooks_version = -1  # of the hooks that recording is adapted to
 
     @property
     def touching(self) -> list[Contact]:
@@ -38,23 +38,27 @@ class ContactReporter:
     def add_bodies(self, bodies: Iterable[Body]) -> None:
         """Reports the contacts of some bodies."""
         self._bodies.update((body.physics.id, body) for body in bodies)
-        self._is_outdated = True
+        self._hooks_version = -1
 
     def remove_bodies(self, bodies: Iterable[Body]) -> None:
         """Reports the contacts of some bodies no longer; their ids may be stale."""
         for body in bodies:
             self._bodies.pop(body.physics.id, None)
-        self._is_outdated = True
+        self._hooks_version = -1
 
-    def hooks_changed(self) -> None:
-        """Adapts to the hooks of the plugins before the next step."""
-        self._is_outdated = True
+    def clear(self) -> None:
+        """Forgets all bodies; for the end of the world."""
+        self._bodies.clear()
+
+    def find_body(self, physics_body: PhysicsBody) -> Body | None:
+        """Returns the body of a model or layer by its physics body, None if it has no owner."""
+        return self._bodies.get(physics_body.id)
 
     def update(self) -> None:
         """Adapts to changes of bodies and hooks; to be called before each step."""
-        if not self._is_outdated:
+        if self._hooks_version == self._host.hooks_version:
             return
-        self._is_outdated = False
+        self._hooks_version = self._host.hooks_version
         self._is_recording = self._physics.record_contacts = self._host.wants_contacts
         if self._host.wants_pre_solve:
             self._physics.pre_solve = self._pre_solve

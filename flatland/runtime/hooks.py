@@ -29,6 +29,9 @@ class HookTable:
     Hooks are called in the order of loading, those of model plugins before those of world
     plugins. Adding or removing a plugin takes constant time; the order is made when it is next
     needed, so that loading n plugins takes time proportional to n.
+
+    Attributes:
+        version: Changes with each plugin that is added or removed.
     """
 
     def __init__(self) -> None:
@@ -36,6 +39,7 @@ class HookTable:
         self._order: dict[FlatlandPlugin, int] = {}
         self._count = 0
         self._wrap: HookWrapper | None = None
+        self.version = 0
         self._model_hooks: dict[str, dict[FlatlandPlugin, Hook]] = {h: {} for h in STEP_HOOKS}
         self._world_hooks: dict[str, dict[FlatlandPlugin, Hook]] = {h: {} for h in STEP_HOOKS}
         self._ordered: dict[str, HookList] = {}
@@ -44,6 +48,7 @@ class HookTable:
     def add(self, plugin: FlatlandPlugin) -> None:
         """Adds the hooks that a plugin overrides."""
         self._count += 1
+        self.version += 1
         is_of_model = isinstance(plugin, ModelPlugin)
         # World plugins come last.
         self._order[plugin] = self._count if is_of_model else self._count + (1 << 62)
@@ -71,6 +76,7 @@ class HookTable:
 
     def remove(self, plugin: FlatlandPlugin) -> None:
         """Removes the hooks of a plugin; one without hooks is ignored."""
+        self.version += 1
         for hook in STEP_HOOKS:
             for hooks in (self._model_hooks, self._world_hooks):
                 if hooks[hook].pop(plugin, None) is not None:

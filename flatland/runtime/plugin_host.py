@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 from flatland.entities.contact import Contact, ContactImpulse, MutableContact
 from flatland.errors import PLUGIN_FAULTS, FlatlandError, PluginError, YamlError
-from flatland.plugin_api.plugin import FlatlandPlugin, ModelPlugin, WorldPlugin, describe
 from flatland.plugin_api.missing_plugins import find_missing, missing_plugins_error
+from flatland.plugin_api.plugin import FlatlandPlugin, ModelPlugin, WorldPlugin, describe
 from flatland.plugin_api.registry import PluginRegistry
 from flatland.runtime.hooks import CONTACT_HOOKS, HookList, HookTable
 from flatland.runtime.time_limit import TimeLimitExceeded, time_limit
@@ -193,6 +193,11 @@ class PluginHost:
         self._hooks.wrap(None if costs is None else costs.timed)
 
     @property
+    def hooks_version(self) -> int:
+        """Number that changes when hooks are added or removed."""
+        return self._hooks.version
+
+    @property
     def wants_contacts(self) -> bool:
         """Whether any plugin overrides a hook for recorded contacts."""
         return self._hooks.has_any(*CONTACT_HOOKS)
@@ -215,9 +220,7 @@ class PluginHost:
         """Calls `after_physics_step` of all plugins."""
         self._call("after_physics_step", self._hooks.of_step("after_physics_step"), timekeeper)
 
-    def dispatch_contacts(
-        self, events: Sequence[ContactEvent], bodies: Mapping[int, Body]
-    ) -> None:
+    def dispatch_contacts(self, events: Sequence[ContactEvent], bodies: Mapping[int, Body]) -> None:
         """Passes recorded contact events to the plugins that they concern, in order.
 
         Args:

@@ -7,7 +7,7 @@ import threading
 from collections import deque
 from collections.abc import Callable, Iterator
 from concurrent.futures import Future
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from typing import Any, Final, TypeVar
 
 from flatland.errors import WorldError
@@ -180,10 +180,8 @@ class Requests:
 
 def _wait(future: Future[Any]) -> None:
     """Waits for a future, for a limited time: the thread that serves the queue may end."""
-    try:
+    with suppress(TimeoutError):
         future.exception(timeout=_LOCK_POLL_PERIOD)
-    except TimeoutError:
-        pass
 
 
 def _log_failure(what: str, done: Future[Any]) -> None:

@@ -21,9 +21,9 @@ class TimeLimitExceeded(BaseException):
 def time_limit(seconds: float | None) -> Iterator[None]:
     """Raises in the calling thread when the block takes too long.
 
-    In the main thread a signal (SIGALRM) interrupts Python code and system calls that wait, such as
-    `sleep`, a socket or a lock. In other threads only Python code is interrupted. Code in an extension
-    that neither returns nor handles signals cannot be interrupted at all.
+    In the main thread, a signal (SIGALRM) interrupts Python code and system calls that wait, such
+    as `sleep`, a socket or a lock. In other threads, only Python code is interrupted. Code of an
+    extension that neither returns nor handles signals cannot be interrupted at all.
 
     Args:
         seconds: Limit of wall time [s]; None for no limit.

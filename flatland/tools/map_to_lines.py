@@ -1,6 +1,6 @@
-"""Turns an image map into a map of line segments.
+"""Convert an image map to a map of line segments.
 
-For noisy maps whose exact pixel boundary has more edges than one wants to simulate.
+For noisy maps whose exact pixel boundary has too many edges for a simulation.
 """
 
 from __future__ import annotations
@@ -24,13 +24,21 @@ from flatland.tools.wall_segments import find_wall_segments
 
 IMAGE_SCALES = {"low": 1.05, "med": 1.5, "high": 2.0}
 
-_LINE_COLOR = (0, 0, 255)  # blue, green, red
+_LINE_COLOR = (0, 0, 255)  # BGR
 _SUBPIXEL_BITS = 4
 
 
 @dataclass(frozen=True)
 class ImageMap:
-    """What the map file says and names."""
+    """Contents of a map file of map_server.
+
+    Attributes:
+        image_path: Path of the image.
+        image: Grey values, shape (rows, columns).
+        resolution: Size of a pixel [m].
+        origin: Pose of the lower left corner of the image in the layer frame.
+        occupied_thresh: Occupancy above which a pixel is occupied.
+    """
 
     image_path: str
     image: GreyImage
@@ -42,8 +50,11 @@ class ImageMap:
 def read_image_map(path: str) -> ImageMap:
     """Reads a map file of map_server and its image.
 
+    Args:
+        path: Path of the map file.
+
     Raises:
-        FlatlandError: The file or the image cannot be read, or a key is missing or wrong.
+        FlatlandError: The file or the image cannot be read, or a key is missing or invalid.
     """
     reader = YamlReader.from_file(path)
     if reader.get("type", "string", None) == "line_segments":
@@ -67,14 +78,14 @@ def read_image_map(path: str) -> ImageMap:
 
 
 def find_segments(image_map: ImageMap, detail: str) -> DoubleArray:
-    """Finds the line segments of a map.
+    """Detects the line segments of a map.
 
     Args:
         image_map: The map.
         detail: Key of `IMAGE_SCALES`.
 
     Returns:
-        Segments (x1, y1, x2, y2) in pixels, y upwards from the image's bottom edge, shape (n, 4).
+        Segments (x1, y1, x2, y2) in pixels from the lower left corner of the image, shape (n, 4).
     """
     mask = threshold_in_place(image_map.image.copy(), image_map.occupied_thresh).astype(bool)
     segments = find_wall_segments(mask, IMAGE_SCALES[detail])
@@ -83,12 +94,12 @@ def find_segments(image_map: ImageMap, detail: str) -> DoubleArray:
 
 
 def write_data(path: Path, segments: DoubleArray) -> None:
-    """Writes the segments, one a line."""
+    """Writes the data file, one segment per line."""
     np.savetxt(path, segments, fmt="%.3f")
 
 
 def write_map(path: Path, data_name: str, image_map: ImageMap) -> None:
-    """Writes the map file of line segments."""
+    """Writes the map file that refers to the data file."""
     entries = {
         "type": "line_segments",
         "data": data_name,
@@ -98,48 +109,48 @@ def write_map(path: Path, data_name: str, image_map: ImageMap) -> None:
     path.write_text(yaml.safe_dump(entries, sort_keys=False, default_flow_style=None))
 
 
-def write_picture(path: Path, segments: DoubleArray, image: GreyImage) -> None:
-    """Draws the segments over the map.
+def write_overlay(path: Path, segments: DoubleArray, image: GreyImage) -> None:
+    """Writes an image of the map with the segments drawn over it.
 
     Raises:
-        OSError: The picture cannot be written.
+        OSError: The image cannot be written.
     """
-    picture = cv2.cvtColor(image, cv2.COLOR_GRAY2BGR)
+    overlay = cv2.cvtColor(image, cv2.COLOR_GRAY2BGR)
     for x1, y1, x2, y2 in segments:
-        # OpenCV counts from the centre of the top left pixel.
+        # The origin of OpenCV is the centre of the top left pixel.
         ends = np.array([[x1, len(image) - y1], [x2, len(image) - y2]]) - 0.5
         start, end = np.rint(ends * 2**_SUBPIXEL_BITS).astype(int).tolist()
-        cv2.line(picture, start, end, _LINE_COLOR, 1, cv2.LINE_AA, _SUBPIXEL_BITS)
-    if not cv2.imwrite(str(path), picture):
+        cv2.line(overlay, start, end, _LINE_COLOR, 1, cv2.LINE_AA, _SUBPIXEL_BITS)
+    if not cv2.imwrite(str(path), overlay):
         raise OSError(f"OpenCV cannot write {path}")
 
 
 def convert(
-    map_path: str, folder: Path, name: str, *, detail: str, picture: bool, force: bool
+    map_path: str, folder: Path, name: str, *, detail: str, overlay: bool, force: bool
 ) -> None:
-    """Converts a map and says what was read and written.
+    """Converts a map and prints the names of the files read and written.
 
     Args:
-        map_path: Map file of map_server.
-        folder: Where the files go.
-        name: Of the files, without extension.
+        map_path: Path of a map file of map_server.
+        folder: Output folder.
+        name: Name of the output files, without extension.
         detail: Key of `IMAGE_SCALES`.
-        picture: Whether to write a picture as well.
-        force: Whether files that are there may be overwritten.
+        overlay: Whether to write an image of the segments.
+        force: Whether to overwrite existing files.
 
     Raises:
-        FlatlandError: Something is wrong with the map or the folder.
+        FlatlandError: The map, the folder or the name is invalid, or a file already exists.
         OSError: A file cannot be written.
     """
     if not folder.is_dir():
         raise MapFileError(f'Folder does not exist, path="{folder}"')
     if name != Path(name).name:
-        raise MapFileError(f'The name of the files must have no folder in it, got "{name}"')
-    map_file, data_file, picture_file = (folder / f"{name}.{e}" for e in ("yaml", "dat", "png"))
-    outputs = [map_file, data_file, *([picture_file] if picture else [])]
-    taken = [str(path) for path in outputs if path.exists()]
-    if taken and not force:
-        raise MapFileError(f"Already there, --force overwrites: {', '.join(taken)}")
+        raise MapFileError(f'The name of the output files must not contain a folder, got "{name}"')
+    map_file, data_file, overlay_file = (folder / f"{name}.{e}" for e in ("yaml", "dat", "png"))
+    outputs = [map_file, data_file, *([overlay_file] if overlay else [])]
+    existing = [str(path) for path in outputs if path.exists()]
+    if existing and not force:
+        raise MapFileError(f"File exists (use --force to overwrite): {', '.join(existing)}")
 
     image_map = read_image_map(map_path)
     rows, columns = image_map.image.shape
@@ -149,8 +160,8 @@ def convert(
         raise MapFileError(f'No line segments found in "{image_map.image_path}"')
     write_data(data_file, segments)
     write_map(map_file, data_file.name, image_map)
-    if picture:
-        write_picture(picture_file, segments, image_map.image)
+    if overlay:
+        write_overlay(overlay_file, segments, image_map.image)
     print(f"Wrote {', '.join(map(str, outputs))}: {len(segments)} line segments")
 
 
@@ -158,21 +169,25 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Runs the tool.
 
     Returns:
-        0, or 1 after an error, which is printed.
+        Exit code: 0, or 1 after an error, which is printed to the standard error.
     """
     parser = argparse.ArgumentParser(prog="map_to_lines.py", description=__doc__)
     parser.add_argument("map", metavar="MAP_YAML", help="map file of map_server")
-    parser.add_argument("folder", metavar="OUTPUT_DIR", type=Path, help="where the files go")
+    parser.add_argument("folder", metavar="OUTPUT_DIR", type=Path, help="output folder")
     parser.add_argument(
-        "-f", "--file", default="map_lines", metavar="NAME", help="of the files (map_lines)"
+        "-f",
+        "--file",
+        default="map_lines",
+        metavar="NAME",
+        help="name of the output files (map_lines)",
     )
     parser.add_argument(
-        "-i", "--image", action="store_true", help="also draw the segments over the map, NAME.png"
+        "-i", "--image", action="store_true", help="also write NAME.png, the map with the segments"
     )
     parser.add_argument(
-        "-d", "--detail", choices=IMAGE_SCALES, default="med", help="how much of it (med)"
+        "-d", "--detail", choices=IMAGE_SCALES, default="med", help="level of detail (med)"
     )
-    parser.add_argument("--force", action="store_true", help="overwrite files that are there")
+    parser.add_argument("--force", action="store_true", help="overwrite existing files")
     options = parser.parse_args(arguments)
     try:
         convert(
@@ -180,7 +195,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             options.folder,
             options.file,
             detail=options.detail,
-            picture=options.image,
+            overlay=options.image,
             force=options.force,
         )
     except (FlatlandError, OSError) as error:

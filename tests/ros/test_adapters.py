@@ -1,4 +1,4 @@
-"""Values as messages: every field, as it arrives after serialization."""
+"""Conversion of values to messages: every field after serialization."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from std_msgs.msg import Bool, String
 import flatland
 from flatland.ros.adapters import find_adapter, register_adapter
 
-STAMP = 1_234_567_890_987_654_321  # more digits than a float holds
+STAMP = 1_234_567_890_987_654_321  # more digits than a float can represent
 
 
 def sent(value: Any) -> Any:
-    """The message of a value as a subscriber gets it."""
+    """Returns the message of a value as received by a subscriber."""
     adapter = find_adapter(type(value))
     assert adapter is not None
     assert adapter.to_message is not None
@@ -71,7 +71,7 @@ def test_laser_scan() -> None:
     ],
     ids=["float64", "strided", "big-endian"],
 )
-def test_laser_scan_of_any_array(ranges: Any) -> None:
+def test_laser_scan_of_any_array_layout(ranges: Any) -> None:
     scan = flatland.LaserScan(0, "l", 0, 1, 1, 0, 0, 0, 1, ranges, np.zeros(0, np.float32))
     assert list(sent(scan).ranges) == list(range(10))
 
@@ -157,7 +157,7 @@ def test_collisions() -> None:
     assert (list(second.magnitude_forces), second.contact_positions) == ([], [])
 
 
-def test_bool_and_twist_go_both_ways() -> None:
+def test_bool_and_twist_are_converted_in_both_directions() -> None:
     assert sent(True).data is True
     switch = find_adapter(bool)
     assert switch is not None
@@ -174,7 +174,7 @@ def test_bool_and_twist_go_both_ways() -> None:
 @pytest.mark.parametrize(
     ("yaw", "roll"), [(0.0, 0.0), (0.7, 0.0), (-2.5, 0.0), (0.7, math.pi), (-2.5, 1.2)]
 )
-def test_transform_rolls_before_it_turns(yaw: float, roll: float) -> None:
+def test_transform_applies_roll_before_yaw(yaw: float, roll: float) -> None:
     message = sent(flatland.Transform(STAMP, "base", "laser", 0.5, -0.25, yaw, roll))
     assert header(message) == (1_234_567_890, 987_654_321, "base")
     assert message.child_frame_id == "laser"
@@ -190,16 +190,16 @@ def test_transform_rolls_before_it_turns(yaw: float, roll: float) -> None:
         ]
     )
     c, s, cr, sr = math.cos(yaw), math.sin(yaw), math.cos(roll), math.sin(roll)
-    turn = np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]])
-    tilt = np.array([[1, 0, 0], [0, cr, -sr], [0, sr, cr]])
-    np.testing.assert_allclose(got, turn @ tilt, atol=1e-12)
+    yaw_matrix = np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]])
+    roll_matrix = np.array([[1, 0, 0], [0, cr, -sr], [0, sr, cr]])
+    np.testing.assert_allclose(got, yaw_matrix @ roll_matrix, atol=1e-12)
 
 
 class Word(str):
     __slots__ = ()
 
 
-def test_adapter_of_a_base_class_serves_and_none_is_found_for_strangers() -> None:
+def test_adapter_of_a_base_class() -> None:
     assert find_adapter(Word) is None
     register_adapter(str, String, String)
     adapter = find_adapter(Word)
@@ -208,21 +208,21 @@ def test_adapter_of_a_base_class_serves_and_none_is_found_for_strangers() -> Non
     assert find_adapter(dict) is None
 
 
-def test_later_registration_takes_the_place_of_an_included_one() -> None:
-    included = find_adapter(flatland.NavSatFix)
-    assert included is not None
+def test_registration_replaces_a_built_in_adapter() -> None:
+    built_in = find_adapter(flatland.NavSatFix)
+    assert built_in is not None
     register_adapter(flatland.NavSatFix, String, lambda fix: String(fix.frame_id))
     try:
         assert sent(flatland.NavSatFix(0, "gps", 0, 0, 0)).data == "gps"
     finally:
         register_adapter(
             flatland.NavSatFix,
-            included.message_type,
-            included.to_message,
-            included.from_message,
+            built_in.message_type,
+            built_in.to_message,
+            built_in.from_message,
         )
 
 
-def test_adapter_needs_a_function() -> None:
+def test_adapter_without_functions_raises() -> None:
     with pytest.raises(ValueError, match="an adapter for int needs at least one function"):
         register_adapter(int, String)

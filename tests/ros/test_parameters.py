@@ -23,6 +23,7 @@ def test_defaults() -> None:
     assert read() == NodeParameters(
         world_path="world.yaml",
         update_rate=200.0,
+        max_lag=0.1,
         step_size=0.005,
         show_viz=False,
         viz_pub_rate=30.0,
@@ -30,6 +31,7 @@ def test_defaults() -> None:
         seed=None,
         benchmark_duration=None,
         plugin_timeout=PLUGIN_TIMEOUT,
+        if_blocked="warn",
     )
 
 
@@ -41,6 +43,8 @@ def test_defaults() -> None:
         ("update_rate", "inf", 0.0),  # roslaunch hands it over as text
         ("update_rate", "1e3", 1000.0),
         ("update_rate", 0.5, 0.5),
+        ("max_lag", 0, 0.0),
+        ("max_lag", "0.5", 0.5),
         ("step_size", 1, 1.0),
         ("step_size", "1e-3", 0.001),
         ("step_size", "1e-6", 1e-6),
@@ -58,6 +62,8 @@ def test_defaults() -> None:
         ("plugin_timeout", "0.5", 0.5),
         ("plugin_timeout", math.inf, None),
         ("plugin_timeout", "inf", None),
+        ("if_blocked", "allow", "allow"),
+        ("if_blocked", "nearest", "nearest"),
     ],
 )
 def test_accepted(name: str, value: object, expected: object) -> None:
@@ -67,7 +73,15 @@ def test_accepted(name: str, value: object, expected: object) -> None:
 
 
 @pytest.mark.parametrize(
-    "name", ["update_rate", "step_size", "viz_pub_rate", "benchmark_duration", "plugin_timeout"]
+    "name",
+    [
+        "update_rate",
+        "max_lag",
+        "step_size",
+        "viz_pub_rate",
+        "benchmark_duration",
+        "plugin_timeout",
+    ],
 )
 @pytest.mark.parametrize("value", [math.nan, "nan", -1, -1e-300, "fast", "", True, [1], {"a": 1}])
 def test_refused_numbers(name: str, value: object) -> None:
@@ -80,6 +94,8 @@ def test_refused_numbers(name: str, value: object) -> None:
 @pytest.mark.parametrize(
     ("name", "value"),
     [
+        ("max_lag", math.inf),
+        ("max_lag", "inf"),
         ("step_size", 0),
         ("step_size", math.inf),
         ("step_size", 1e-10),
@@ -99,6 +115,10 @@ def test_refused_numbers(name: str, value: object) -> None:
         ("seed", 1.5),
         ("seed", "a"),
         ("seed", False),
+        ("if_blocked", "stop"),
+        ("if_blocked", ""),
+        ("if_blocked", True),
+        ("if_blocked", ["warn"]),
         ("world_path", 5),
         ("world_path", ["a"]),
     ],
@@ -190,3 +210,69 @@ def test_spawned_plugin_that_never_starts_is_given_up(
     clock.until(lambda message: message.clock > now)
     assert ros.spawn("ball.model.yaml", "stuck").success
     assert process.running
+
+
+# -- max_lag in the real node -----------------------------------------------------------------
+
+SLOW = """
+import time
+import flatland
+
+class Slow(flatland.ModelPlugin):
+    def before_physics_step(self, timekeeper):
+        time.sleep(0.03)
+"""
+SLOW_MANIFEST = """
+<library path=".">
+  <class name="slow::Slow" type="slow_plugin.Slow" base_class_type="flatland::ModelPlugin"/>
+</library>
+"""
+SLOW_MODEL = """
+bodies: [{name: base, footprints: []}]
+plugins: [{name: plug, type: "slow::Slow"}]
+"""
+
+
+@pytest.fixture
+def slow_world(write_world: Callable[..., Path], launcher: Any) -> Path:
+    """A world whose steps take three periods of 100 Hz."""
+    world = write_world("[{name: slow, model: slow.model.yaml}]", slow=SLOW_MODEL)
+    (world.parent / "slow_plugin.py").write_text(SLOW)
+    manifest = world.parent / "manifest.xml"
+    manifest.write_text(SLOW_MANIFEST)
+    launcher.environment = {**launcher.environment, "FLATLAND_PLUGIN_PATH": str(manifest)}
+    return world
+
+
+def test_rate_that_is_not_held_is_reported_with_the_expensive_plugin(
+    launcher: Any, slow_world: Path
+) -> None:
+    process = launcher.launch(
+        "flatland",
+        "server.launch",
+        f"world_path:={slow_world}",
+        "show_viz:=false",
+        "update_rate:=100",
+        "max_lag:=0",
+    )
+    line = process.wait_for_line(r"\[WARN\] .* the update rate of 100 Hz cannot be held").string
+    assert 'percent of the wall time: Model Plugin "plug" type "slow::Slow" model "slow" ' in line
+
+
+def test_lag_within_max_lag_is_no_loss(
+    launcher: Any, slow_world: Path, eventually: Callable[..., Any]
+) -> None:
+    process = launcher.server(slow_world, update_rate=100, max_lag=1000)
+    # With the default the warning is logged with the third report.
+    eventually("six reports", lambda: process.output.count("cycle use min") >= 6)
+    assert "cannot be held" not in process.output
+
+
+def test_invalid_max_lag_ends_the_node(launcher: Any, write_world: Callable[..., Path]) -> None:
+    process = launcher.start(world_path=write_world(), max_lag=-0.1)
+    line = process.wait_for_line(r"\[FATAL\]").string
+    assert line.endswith(
+        'Invalid parameter "~max_lag": it must be a finite number of seconds that is not '
+        "negative, got -0.1"
+    )
+    assert process.wait() == 1

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
 import tomllib
@@ -121,7 +122,7 @@ class TestShow:
             ([], "-o/--output"),
             (["-o", "a.gif"], "must end with one of .png, .pdf, .svg, got 'a.gif'"),
             (["-o", "a.png", "--size", "12"], "must be WIDTHxHEIGHT"),
-            (["-o", "a.png", "--size", "20x20"], "leaves no room beside the axes"),
+            (["-o", "a.png", "--size", "20x20"], "too small for the axes"),
             (["-o", "a.png", "--steps", "-1"], "must be a whole number"),
             (["-o", "a.png", "--param", "radius"], "must be NAME=VALUE"),
             (["-o", "a.png", "--param", "/radius=[1"], "the value is no YAML"),
@@ -195,6 +196,124 @@ class TestCheck:
         (line,) = done.stderr.splitlines()
         assert line.startswith("flatland: Flatland YAML: ")
         assert '"colour"' in line
+
+
+LAYERED = """
+bodies:
+- name: base
+  footprints:
+  - type: circle
+    radius: $eval param("/radius", 0.5)
+    density: 1
+    layers: [low, high]
+  - {type: circle, radius: 0.2, density: 1, layers: [all]}
+plugins:
+- {type: Laser, name: eye, body: base, range: 9, layers: [high, top],
+   angle: {min: 0, max: 6, increment: 0.01}}
+"""
+
+
+class TestCheckModel:
+    def test_accepts_any_layer(self, files, capsys):
+        path = files.write("my.robot.model.yaml", LAYERED)
+        assert main("check", path) == 0
+        assert capsys.readouterr().out.splitlines() == [
+            f"{path}: no errors",
+            "model my: 1 body, 0 joints; plugins: eye (Laser)",
+            "checked in an empty world with the layers that the model names: low, high, top",
+        ]
+
+    def test_a_model_without_layers(self, files, capsys):
+        assert main("check", files.folder / "minimal.model.yaml") == 0
+        assert capsys.readouterr().out.splitlines()[-1] == (
+            "checked in an empty world with the layers that the model names: none"
+        )
+
+    def test_param_and_relative_path(self, files):
+        files.write("robot.yaml", LAYERED)
+        assert run("check", "robot.yaml", cwd=files.folder).returncode == 0
+        done = run("check", "robot.yaml", "--param", "/radius=-1", cwd=files.folder)
+        assert done.returncode == 1
+        assert 'Invalid "radius"' in done.stderr
+        assert f"[{files.folder}/robot.yaml:5]" in done.stderr
+
+    @pytest.mark.parametrize(
+        ("old", "new", "message"),
+        [
+            ("bodies:", "colour: red\nbodies:", '"colour"'),
+            ("[all]", "[all, low]", '{all} layer(s) does not exist'),
+            ("body: base", "body: bass", 'Body with name "bass" does not exist'),
+            ("Laser", "Lasser", 'type "Lasser" model "my": no plugin'),
+        ],
+    )  # fmt: skip
+    def test_says_what_is_wrong(self, files, capsys, old, new, message):
+        path = files.write("my.model.yaml", LAYERED.replace(old, new))
+        assert main("check", path) == 1
+        captured = capsys.readouterr()
+        assert captured.out == ""
+        (line,) = captured.err.splitlines()
+        assert message in line
+        assert f"[{path}:" in line
+
+    def test_accepts_16_layers(self, files, capsys):
+        names = [f"l{i}" for i in range(15)]
+        text = LAYERED.replace("[low, high]", f"[{', '.join(names)}]")
+        assert main("check", files.write("m.yaml", text.replace("high, top", "l3, top"))) == 0
+        path = files.write("m.yaml", text)
+        assert main("check", path) == 1
+        error = capsys.readouterr().err
+        assert "Model names 17 layers {l0, l1, " in error
+        assert f"max allowed in a world is 16 [{path}]" in error
+
+    def test_warnings_of_a_file_come_once(self, files):
+        path = files.write("m.yaml", f"{LAYERED}---\nsecond: document\n")
+        done = run("check", path)
+        assert (done.returncode, done.stderr.count("YAML documents")) == (0, 1)
+
+    @pytest.mark.parametrize("key", ["layers", "properties"])
+    def test_a_world_file_with_bodies_is_a_world(self, files, capsys, key):
+        path = files.write("w.yaml", f"{key}: []\nbodies: []\n")
+        assert main("check", path) == 1
+        assert "empty world" not in capsys.readouterr().out
+
+
+class TestBrokenPipe:
+    @pytest.mark.parametrize(
+        "arguments",
+        [["check", "world.yaml"], ["check", "minimal.model.yaml"], ["--version"], ["--help"],
+         ["show", "--help"]],
+    )  # fmt: skip
+    def test_output_without_a_reader(self, world_file, tmp_path, arguments):
+        done = run_into_broken_pipe(arguments, tmp_path, stderr=subprocess.PIPE)
+        assert (done.returncode, done.stderr) == (141, b"")
+
+    @pytest.mark.parametrize("command", ["check", "show"])
+    def test_errors_without_a_reader(self, tmp_path, command):
+        options = ["-o", "a.png"] if command == "show" else []
+        arguments = [command, "nowhere.yaml", *options]
+        done = run_into_broken_pipe(arguments, tmp_path, stderr=subprocess.STDOUT)
+        assert done.returncode == 141
+
+    def test_in_a_shell(self, world_file):
+        command = f'"{sys.executable}" -m flatland check "{world_file}" | head -1; ' + (
+            'echo "${PIPESTATUS[1]}"'
+        )
+        done = subprocess.run(["bash", "-c", command], capture_output=True, text=True, timeout=60)
+        assert done.stdout.splitlines() == [f"{world_file}: no errors", "0"]
+        assert done.stderr == ""
+
+
+def run_into_broken_pipe(arguments, folder, **options):
+    """Runs the command with an output pipe that is closed on the other side."""
+    reading, writing = os.pipe()
+    os.close(reading)
+    try:
+        command = [sys.executable, "-m", "flatland", *arguments]
+        return subprocess.run(
+            command, stdout=writing, cwd=folder, timeout=60, check=False, **options
+        )
+    finally:
+        os.close(writing)
 
 
 def test_version_is_that_of_the_packages(checkout):

@@ -4,11 +4,22 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from flatland.geometry import compose, finite_pose, invert, rotate, wrap_angle
+from flatland.geometry import (
+    circle_points,
+    compose,
+    finite_pose,
+    invert,
+    quaternion_from_yaw,
+    rotate,
+    transform_points,
+    wrap_angle,
+    yaw_from_quaternion,
+)
 
 numbers = st.floats(-1e3, 1e3)
 poses = st.tuples(numbers, numbers, st.floats(-10, 10))
@@ -41,3 +52,35 @@ def test_finite_pose_refuses(pose):
 
 def test_finite_pose_takes_any_sequence():
     assert finite_pose(["1", 2, 3.5]) == (1.0, 2.0, 3.5)
+
+
+@given(poses, st.lists(st.tuples(numbers, numbers), min_size=1, max_size=5))
+def test_transform_points_agrees_with_compose(pose, points):
+    transformed = transform_points(pose, np.array(points))
+    expected = [compose(pose, (*point, 0.0))[:2] for point in points]
+    assert transformed == pytest.approx(np.array(expected), abs=1e-9)
+
+
+def test_transform_points_keeps_the_shape():
+    assert transform_points((1, 2, 3), np.zeros(2)).shape == (2,)
+    assert transform_points((1, 2, 3), np.zeros((4, 2, 2))).shape == (4, 2, 2)
+    assert transform_points((1, 2, 3), np.zeros((0, 2))).shape == (0, 2)
+
+
+def test_circle_points_are_evenly_spaced_and_counter_clockwise():
+    points = circle_points((1, 2), 0.5, 4)
+    assert points == pytest.approx(np.array([(1.5, 2), (1, 2.5), (0.5, 2), (1, 1.5)]))
+
+
+def test_quaternion_from_yaw():
+    assert quaternion_from_yaw(0.0) == (0, 0, 0, 1)
+    half = math.sqrt(0.5)
+    assert quaternion_from_yaw(math.pi / 2) == pytest.approx((0, 0, half, half))
+    assert quaternion_from_yaw(0.0, math.pi / 2) == pytest.approx((half, 0, 0, half))
+    assert quaternion_from_yaw(math.pi / 2, math.pi) == pytest.approx((half, half, 0, 0))
+
+
+@given(st.floats(-3.1, 3.1), st.floats(-1.5, 1.5), st.floats(0.1, 10))
+def test_yaw_from_quaternion_of_any_norm(yaw, roll, norm):
+    quaternion = (norm * part for part in quaternion_from_yaw(yaw, roll))
+    assert yaw_from_quaternion(*quaternion) == pytest.approx(yaw, abs=1e-9)

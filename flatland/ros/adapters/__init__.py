@@ -1,7 +1,7 @@
-"""How values become ROS messages and back: one adapter a value type.
+"""Adapters that convert values to ROS messages and back, one per value type.
 
-The included adapters are imported when their type is first used, since every message package that
-is imported makes the start of the node slower. Other packages register their own:
+A built-in adapter is imported when its value type is first used, because importing message packages
+slows down the start of the node. Other packages register their own adapters:
 
     from flatland.ros.adapters import register_adapter
     register_adapter(Temperature, sensor_msgs.msg.Temperature, to_message=make_message)
@@ -16,7 +16,7 @@ from typing import Any
 
 from flatland import values
 
-_INCLUDED: dict[type[Any], str] = {
+_BUILT_IN: dict[type[Any], str] = {
     bool: "boolean",
     values.Collisions: "collisions",
     values.Imu: "imu",
@@ -31,13 +31,13 @@ _INCLUDED: dict[type[Any], str] = {
 
 @dataclass(frozen=True, slots=True)
 class Adapter:
-    """How values of one type become messages and back.
+    """Conversion between the values of one type and ROS messages.
 
     Attributes:
         value_type: Type of the values.
         message_type: The ROS message class.
-        to_message: Makes a message from a value; None when values of this type are only taken.
-        from_message: Makes a value from a message; None when they are only published.
+        to_message: Converts a value to a message; None if values are only received.
+        from_message: Converts a message to a value; None if values are only published.
     """
 
     value_type: type[Any]
@@ -55,18 +55,18 @@ def register_adapter(
     to_message: Callable[[Any], Any] | None = None,
     from_message: Callable[[Any], Any] | None = None,
 ) -> None:
-    """Says how values of a type are published, and how messages become such values.
+    """Registers the conversion between the values of a type and ROS messages.
 
-    A second adapter for the same type takes the place of the first.
+    A later registration replaces an earlier one for the same type.
 
     Args:
-        value_type: Type of the values that a plugin's ports carry.
-        message_type: The ROS message class.
-        to_message: Makes a message from a value; called in the thread that steps the world.
-        from_message: Makes a value from a message; called in a thread of rospy.
+        value_type: Type of the values carried by the ports of a plugin.
+        message_type: ROS message class.
+        to_message: Converts a value to a message; called in the thread that steps the world.
+        from_message: Converts a message to a value; called in a rospy thread.
 
     Raises:
-        ValueError: Both functions are left out.
+        ValueError: Neither function is given.
     """
     if to_message is None and from_message is None:
         raise ValueError(f"an adapter for {value_type.__name__} needs at least one function")
@@ -74,10 +74,10 @@ def register_adapter(
 
 
 def find_adapter(value_type: type[Any]) -> Adapter | None:
-    """Returns the adapter of a type or of its nearest base class, None when there is none."""
+    """Returns the adapter of a type or of its nearest base class, or None."""
     for candidate in value_type.__mro__:
-        if candidate not in _adapters and candidate in _INCLUDED:
-            importlib.import_module(f"{__name__}.{_INCLUDED[candidate]}")
+        if candidate not in _adapters and candidate in _BUILT_IN:
+            importlib.import_module(f"{__name__}.{_BUILT_IN[candidate]}")
         if candidate in _adapters:
             return _adapters[candidate]
     return None

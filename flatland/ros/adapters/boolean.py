@@ -6,12 +6,12 @@ from flatland.ros.adapters import register_adapter
 
 
 def to_message(value: bool) -> Bool:
-    """Makes a message from a value."""
+    """Converts a value to a message."""
     return Bool(value)
 
 
 def from_message(message: Bool) -> bool:
-    """Makes a value from a message."""
+    """Converts a message to a value."""
     return bool(message.data)
 
 

@@ -8,7 +8,7 @@ from flatland.values import Collision, Collisions
 
 
 def to_message(value: Collisions) -> CollisionsMessage:
-    """Makes a message from a value."""
+    """Converts a value to a message."""
     return CollisionsMessage(
         convert.header(value.stamp, value.frame_id),
         [_collision(collision) for collision in value.collisions],

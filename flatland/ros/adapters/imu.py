@@ -8,7 +8,7 @@ from flatland.values import Imu
 
 
 def to_message(value: Imu) -> ImuMessage:
-    """Makes a message from a value."""
+    """Converts a value to a message."""
     return ImuMessage(
         convert.header(value.stamp, value.frame_id),
         convert.quaternion(value.yaw),

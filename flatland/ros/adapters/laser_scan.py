@@ -11,20 +11,20 @@ from flatland.values import LaserScan
 
 
 class PackedLaserScan(LaserScanMessage):  # type: ignore[misc]
-    """A scan whose ranges and intensities are float32 arrays that go out as they lie in memory.
+    """A scan whose ranges and intensities are float32 arrays, serialized without a copy per beam.
 
-    rospy's way for arrays would visit every beam in Python.
+    The default serialization of rospy iterates over the beams in Python.
     """
 
-    __slots__ = LaserScanMessage.__slots__  # genpy reads the names of the fields from here
+    __slots__ = LaserScanMessage.__slots__  # genpy reads the field names from here
 
     def serialize(self, buff: Any) -> None:
-        """Writes the message; rospy calls it."""
+        """Serializes the message; called by rospy."""
         self.serialize_numpy(buff, np)
 
 
 def to_message(value: LaserScan) -> PackedLaserScan:
-    """Makes a message from a value."""
+    """Converts a value to a message."""
     return PackedLaserScan(
         convert.header(value.stamp, value.frame_id),
         value.angle_min,
@@ -40,7 +40,7 @@ def to_message(value: LaserScan) -> PackedLaserScan:
 
 
 def _packed(numbers: FloatArray) -> FloatArray:
-    """Makes sure that the memory holds what the wire wants: float32, little-endian."""
+    """Converts an array to the wire format, little-endian float32."""
     return np.asarray(numbers, dtype="<f4")
 
 

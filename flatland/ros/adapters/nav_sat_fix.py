@@ -8,7 +8,7 @@ from flatland.values import NavSatFix
 
 
 def to_message(value: NavSatFix) -> NavSatFixMessage:
-    """Makes a message from a value; its covariance is unknown."""
+    """Converts a value to a message with unknown covariance."""
     return NavSatFixMessage(
         header=convert.header(value.stamp, value.frame_id),
         status=NavSatStatus(NavSatStatus.STATUS_FIX, NavSatStatus.SERVICE_GPS),

@@ -8,7 +8,7 @@ from flatland.values import Odometry
 
 
 def to_message(value: Odometry) -> OdometryMessage:
-    """Makes a message from a value."""
+    """Converts a value to a message."""
     make = convert.make
     return make(
         OdometryMessage,

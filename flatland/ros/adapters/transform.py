@@ -8,7 +8,7 @@ from flatland.values import Transform
 
 
 def to_message(value: Transform) -> TransformStamped:
-    """Makes a message from a value."""
+    """Converts a value to a message."""
     make = convert.make
     return make(
         TransformStamped,

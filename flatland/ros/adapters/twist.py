@@ -7,12 +7,12 @@ from flatland.values import Twist
 
 
 def to_message(value: Twist) -> TwistMessage:
-    """Makes a message from a value."""
+    """Converts a value to a message."""
     return convert.twist(value.linear_x, value.linear_y, value.angular_z)
 
 
 def from_message(message: TwistMessage) -> Twist:
-    """Makes a value from a message, less what does not lie in the plane."""
+    """Converts a message to a value, discarding the components outside the plane."""
     return Twist(message.linear.x, message.linear.y, message.angular.z)
 
 

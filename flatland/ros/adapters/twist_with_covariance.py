@@ -8,7 +8,7 @@ from flatland.values import TwistWithCovariance
 
 
 def to_message(value: TwistWithCovariance) -> TwistWithCovarianceStamped:
-    """Makes a message from a value."""
+    """Converts a value to a message."""
     return TwistWithCovarianceStamped(
         convert.header(value.stamp, value.frame_id),
         TwistWithCovarianceMessage(

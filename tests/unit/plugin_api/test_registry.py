@@ -8,7 +8,8 @@ import sys
 import pytest
 
 from flatland import ModelPlugin, PluginError, WorldPlugin
-from flatland.plugin_api.registry import PluginRegistry, read_manifest
+from flatland.plugin_api.manifest import read_manifest, read_reference_names
+from flatland.plugin_api.registry import PluginRegistry
 
 MANIFEST = """
 <library path="src">
@@ -129,9 +130,10 @@ def test_a_model_plugin_is_no_world_plugin(package):
 def test_unknown_names_list_the_nearest_first(package):
     with pytest.raises(PluginError) as caught:
         PluginRegistry().find("Lasser")
-    assert 'no plugin "flatland_plugins::Lasser", known are: flatland_plugins::Laser, ' in str(
-        caught.value
+    assert str(caught.value).startswith(
+        'Flatland plugin: no plugin "flatland_plugins::Lasser" (did you mean "Laser"?); '
     )
+    assert "; known are: flatland_plugins::Laser, " in str(caught.value)
 
 
 @pytest.mark.parametrize(
@@ -182,7 +184,7 @@ def test_several_libraries_in_one_manifest(files):
 PACKAGE = """
 <package format="2">
   <name>{name}</name><version>0.0.1</version><description>x</description>
-  <maintainer email="{email}">a</maintainer><license>BSD</license>
+  <maintainer email="a@example.org">a</maintainer><license>BSD</license>
   <export><flatland plugin="${{prefix}}/plugins.xml"/></export>
 </package>
 """
@@ -190,7 +192,7 @@ PACKAGE = """
 
 def test_packages_on_the_ros_package_path_are_found(package, files, monkeypatch):
     name, manifest = package
-    files.write("package.xml", PACKAGE.format(name=name, email="a@example.org"))
+    files.write("package.xml", PACKAGE.format(name=name))
     monkeypatch.delenv("FLATLAND_PLUGIN_PATH")
     with pytest.raises(PluginError):
         PluginRegistry().find(f"{name}::Good")
@@ -200,14 +202,55 @@ def test_packages_on_the_ros_package_path_are_found(package, files, monkeypatch)
 
 def test_a_broken_package_does_not_hide_the_others(package, files, monkeypatch):
     name, manifest = package
-    files.write("package.xml", PACKAGE.format(name=name, email="a@example.org"))
-    files.write("other/package.xml", PACKAGE.format(name="other", email="nobody"))
+    files.write("package.xml", PACKAGE.format(name=name))
+    other = files.write("other/package.xml", PACKAGE.format(name="other").replace("<exp", "<<"))
     monkeypatch.delenv("FLATLAND_PLUGIN_PATH")
     monkeypatch.setenv("ROS_PACKAGE_PATH", f"{files.folder / 'other'}:{files.folder}")
     registry = PluginRegistry()
     assert registry.find(f"{name}::Good").manifest == manifest
-    with pytest.raises(PluginError, match=r'not read: package "other" cannot be read: .*email'):
+    with pytest.raises(PluginError, match=rf'not read: "{other}" is not XML, not well-formed'):
         registry.find("other::Good")
+
+
+def test_a_package_that_comes_later_is_found(package, files, monkeypatch):
+    name, manifest = package
+    monkeypatch.delenv("FLATLAND_PLUGIN_PATH")
+    monkeypatch.setenv("ROS_PACKAGE_PATH", str(files.folder))
+    registry = PluginRegistry()
+    assert registry.find_missing([f"{name}::Good", "Laser"]) == [f"{name}::Good"]
+    files.write("package.xml", PACKAGE.format(name=name))
+    assert registry.find(f"{name}::Good").manifest == manifest
+    # Its manifest gets another class, while the folders stay as they are.
+    assert registry.find_missing([f"{name}::New"]) == [f"{name}::New"]
+    text = MANIFEST.format(package=name).replace("::Good", "::New")
+    files.write("plugins.xml", text)
+    assert registry.find(f"{name}::New").class_path == f"{name}.things.Good"
+    assert registry.find_missing([f"{name}::Good"]) == [f"{name}::Good"]
+
+
+def test_manifests_are_read_again_only_after_a_change(package, files, monkeypatch, caplog):
+    name, manifest = package
+    monkeypatch.setenv("FLATLAND_PLUGIN_PATH", f"{manifest}:{files.folder}/absent.xml")
+    registry = PluginRegistry()
+    for _ in range(3):
+        assert registry.find_missing(["a::B", "a::C"]) == ["a::B", "a::C"]
+    assert caplog.text.count("absent.xml") == 1
+    files.write("absent.xml", MANIFEST.format(package=name).replace("::Good", "::Late"))
+    assert registry.find_missing([f"{name}::Late"]) == []
+
+
+def test_cpp_classes_of_a_manifest_are_left_out(files):
+    path = files.write(
+        "m.xml",
+        """
+        <library path="lib/libx">
+          <class type="x::Cpp" base_class_type="flatland_server::ModelPlugin"/>
+          <class type="x.Python" base_class_type="flatland::ModelPlugin"/>
+        </library>
+        """,
+    )
+    assert [entry.lookup_name for entry in read_manifest(path)] == ["x.Python"]
+    assert read_reference_names(path) == ["x::Cpp"]
 
 
 def test_python_distributions_are_found(package, files, monkeypatch):

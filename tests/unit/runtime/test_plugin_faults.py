@@ -387,7 +387,7 @@ def test_a_manifest_that_is_not_xml_hides_only_itself(files, faults, caplog):
         world.spawn_model("bad.yaml", "second")
     assert str(caught.value).startswith(
         'Flatland plugin: Model Plugin "bad" type "broken::Plugin" model "second": '
-        'no plugin "broken::Plugin", known are: '
+        'no plugin "broken::Plugin"; '
     )
     assert problem in str(caught.value)
     live_through_it(world)

@@ -1,4 +1,4 @@
-"""The tool that turns image maps into maps of line segments."""
+"""Conversion of image maps to maps of line segments."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ ROWS, COLUMNS = 100, 150
 
 @pytest.fixture
 def image_map(tmp_path: Path) -> Path:
-    """A map with a room of 80 x 60 pixels, 30 pixels from the left and 10 from the bottom."""
+    """A map of a room, 80 x 60 pixels, 30 pixels from the left and 10 from the bottom edge."""
     folder = tmp_path / "in"
     folder.mkdir()
     image = np.full((ROWS, COLUMNS), 205, np.uint8)
@@ -49,7 +49,7 @@ def names(folder: Path) -> set[str]:
     return {path.name for path in folder.iterdir()}
 
 
-def test_files_and_what_is_said(image_map: Path, out: Path, capsys: Any) -> None:
+def test_output_files_and_messages(image_map: Path, out: Path, capsys: Any) -> None:
     assert main([str(image_map), str(out)]) == 0
     assert names(out) == {"map_lines.yaml", "map_lines.dat"}
     assert yaml.safe_load((out / "map_lines.yaml").read_text()) == {
@@ -59,14 +59,14 @@ def test_files_and_what_is_said(image_map: Path, out: Path, capsys: Any) -> None
         "origin": [-1.5, 2.25, 0.5],
     }
     segments = read_line_segments(str(out / "map_lines.dat"))
-    said = capsys.readouterr()
-    assert str(image_map) in said.out
-    assert "room.png, 150 x 100 pixels" in said.out
-    assert f"{out / 'map_lines.dat'}: {len(segments)} line segments" in said.out
-    assert said.err == ""
+    captured = capsys.readouterr()
+    assert str(image_map) in captured.out
+    assert "room.png, 150 x 100 pixels" in captured.out
+    assert f"{out / 'map_lines.dat'}: {len(segments)} line segments" in captured.out
+    assert captured.err == ""
 
 
-def test_pixels_are_counted_upwards_from_the_bottom(image_map: Path, out: Path) -> None:
+def test_origin_of_coordinates_is_the_lower_left_corner(image_map: Path, out: Path) -> None:
     assert main([str(image_map), str(out)]) == 0
     segments = read_line_segments(str(out / "map_lines.dat"))
     xs, ys = segments[:, ::2], segments[:, 1::2]
@@ -75,22 +75,24 @@ def test_pixels_are_counted_upwards_from_the_bottom(image_map: Path, out: Path) 
 
 
 @pytest.mark.parametrize("detail", ["low", "med", "high"])
-def test_result_is_the_same_layer_within_a_pixel(image_map: Path, out: Path, detail: str) -> None:
+def test_segments_match_the_exact_boundary_within_a_pixel(
+    image_map: Path, out: Path, detail: str
+) -> None:
     assert main([str(image_map), str(out), "-d", detail]) == 0
     exact, lines = load_map(str(image_map), "2d"), load_map(str(out / "map_lines.yaml"), "2d")
     assert lines.origin == exact.origin
     pixel = 0.05
 
-    def farthest(of: Any, to: Any) -> float:
-        """Greatest distance of the inner points of edges from other edges."""
-        points = np.concatenate([np.linspace(e[:2], e[2:], 40)[1:-1] for e in of])
-        start, way = to[:, :2], to[:, 2:] - to[:, :2]
-        t = ((points[:, None] - start) * way).sum(2) / (way**2).sum(1)
-        nearest = start + np.clip(t, 0, 1)[:, :, None] * way
+    def max_distance(edges: Any, others: Any) -> float:
+        """Returns the largest distance of the inner points of edges from other edges."""
+        points = np.concatenate([np.linspace(e[:2], e[2:], 40)[1:-1] for e in edges])
+        start, extent = others[:, :2], others[:, 2:] - others[:, :2]
+        t = ((points[:, None] - start) * extent).sum(2) / (extent**2).sum(1)
+        nearest = start + np.clip(t, 0, 1)[:, :, None] * extent
         return float(np.linalg.norm(points[:, None] - nearest, axis=2).min(axis=1).max())
 
-    assert farthest(lines.edges.astype(float), exact.edges.astype(float)) <= pixel
-    assert farthest(exact.edges.astype(float), lines.edges.astype(float)) <= 2 * pixel
+    assert max_distance(lines.edges.astype(float), exact.edges.astype(float)) <= pixel
+    assert max_distance(exact.edges.astype(float), lines.edges.astype(float)) <= 2 * pixel
 
 
 def test_an_image_may_have_any_other_type(image_map: Path, out: Path) -> None:
@@ -98,8 +100,8 @@ def test_an_image_may_have_any_other_type(image_map: Path, out: Path) -> None:
     assert main([str(image_map), str(out)]) == 0
 
 
-def test_threshold_decides(image_map: Path, out: Path) -> None:
-    # At 0.9 the grey around the room is off as well, and only the inner side of the wall is left.
+def test_threshold_separates_on_and_off_pixels(image_map: Path, out: Path) -> None:
+    # At 0.9 the grey pixels around the room are off, too, and only the inner boundary remains.
     image_map.write_text(image_map.read_text().replace("0.65", "0.9"))
     assert main([str(image_map), str(out)]) == 0
     segments = read_line_segments(str(out / "map_lines.dat"))
@@ -107,55 +109,55 @@ def test_threshold_decides(image_map: Path, out: Path) -> None:
     assert segments[inside][:, ::2].min() == pytest.approx(32, abs=0.5)
 
 
-def test_name_and_picture(image_map: Path, out: Path) -> None:
+def test_name_and_overlay_image(image_map: Path, out: Path) -> None:
     assert main([str(image_map), str(out), "-f", "walls", "-i"]) == 0
     assert names(out) == {"walls.yaml", "walls.dat", "walls.png"}
     assert yaml.safe_load((out / "walls.yaml").read_text())["data"] == "walls.dat"
-    picture = cv2.imread(str(out / "walls.png"))
-    assert picture.shape == (ROWS, COLUMNS, 3)
-    red = (picture[:, :, 2].astype(int) - picture[:, :, 1]) > 60
-    # The room's left wall, from outside.
+    image = cv2.imread(str(out / "walls.png"))
+    assert image.shape == (ROWS, COLUMNS, 3)
+    red = (image[:, :, 2].astype(int) - image[:, :, 1]) > 60
+    # Outer boundary of the left wall.
     assert red[40:80, 29:31].any(axis=1).all()
     assert not red[40:80, 50:100].any()
-    # What is not drawn over is the map.
-    assert (picture[5, 5] == 205).all()
+    # Pixels beside the lines are those of the map.
+    assert (image[5, 5] == 205).all()
 
 
-def test_details_differ(image_map: Path, out: Path) -> None:
-    picture = cv2.imread(str(image_map.parent / "room.png"), 0)
+def test_higher_level_of_detail_yields_more_segments(image_map: Path, out: Path) -> None:
+    image = cv2.imread(str(image_map.parent / "room.png"), 0)
     rng = np.random.default_rng(1)
     for x, y in rng.integers((35, 35), (100, 80), (25, 2)):
-        picture[y : y + 3, x : x + 3] = 0
-    cv2.imwrite(str(image_map.parent / "room.png"), picture)
+        image[y : y + 3, x : x + 3] = 0
+    cv2.imwrite(str(image_map.parent / "room.png"), image)
     counts = {}
     for detail in ("low", "med", "high"):
         assert main([str(image_map), str(out), "-d", detail, "-f", detail]) == 0
         counts[detail] = len(read_line_segments(str(out / f"{detail}.dat")))
     assert counts["low"] < counts["med"] < counts["high"]
-    # Medium is the default.
+    # The default is "med".
     assert main([str(image_map), str(out)]) == 0
     assert (out / "map_lines.dat").read_text() == (out / "med.dat").read_text()
 
 
-@pytest.mark.parametrize("taken", ["map_lines.yaml", "map_lines.dat", "map_lines.png"])
-def test_nothing_is_overwritten_without_force(
-    image_map: Path, out: Path, taken: str, capsys: Any
+@pytest.mark.parametrize("existing", ["map_lines.yaml", "map_lines.dat", "map_lines.png"])
+def test_existing_file_is_not_overwritten_without_force(
+    image_map: Path, out: Path, existing: str, capsys: Any
 ) -> None:
-    (out / taken).write_text("mine")
+    (out / existing).write_text("existing")
     assert main([str(image_map), str(out), "-i"]) == 1
-    assert names(out) == {taken}
-    assert (out / taken).read_text() == "mine"
-    said = capsys.readouterr()
-    assert str(out / taken) in said.err
-    assert "--force" in said.err
+    assert names(out) == {existing}
+    assert (out / existing).read_text() == "existing"
+    captured = capsys.readouterr()
+    assert str(out / existing) in captured.err
+    assert "--force" in captured.err
     assert main([str(image_map), str(out), "-i", "--force"]) == 0
-    assert (out / taken).read_bytes() != b"mine"
+    assert (out / existing).read_bytes() != b"existing"
 
 
-def test_picture_that_is_not_asked_for_is_in_nobodys_way(image_map: Path, out: Path) -> None:
-    (out / "map_lines.png").write_text("mine")
+def test_existing_image_is_no_conflict_without_image_option(image_map: Path, out: Path) -> None:
+    (out / "map_lines.png").write_text("existing")
     assert main([str(image_map), str(out)]) == 0
-    assert (out / "map_lines.png").read_text() == "mine"
+    assert (out / "map_lines.png").read_text() == "existing"
 
 
 @pytest.mark.parametrize("key", ["image", "resolution", "origin", "occupied_thresh"])
@@ -175,11 +177,13 @@ def test_missing_key(image_map: Path, out: Path, key: str, capsys: Any) -> None:
         ("0.05", "0", 'Invalid "resolution", must be greater than 0'),
         ("0.05", "wide", 'Error converting entry "resolution" to float'),
         ("[-1.5, 2.25, 0.5]", "[.nan, 0, 0]", 'Invalid "origin", must be finite'),
-        ("negate: 0", "type: line_segments", "The map must be an image map"),
+        ("negate: 0", "type: line_segments", "The map must be an image map, without"),
         ("negate: 0", "negate: [", "Malformatted file"),
     ],
 )
-def test_wrong_map(image_map: Path, out: Path, old: str, new: str, text: str, capsys: Any) -> None:
+def test_invalid_map(
+    image_map: Path, out: Path, old: str, new: str, text: str, capsys: Any
+) -> None:
     image_map.write_text(image_map.read_text().replace(old, new))
     assert main([str(image_map), str(out)]) == 1
     assert text in capsys.readouterr().err
@@ -199,7 +203,7 @@ def test_missing_folder(image_map: Path, out: Path, capsys: Any) -> None:
 
 def test_name_with_a_folder(image_map: Path, out: Path, capsys: Any) -> None:
     assert main([str(image_map), str(out), "-f", "a/b"]) == 1
-    assert 'must have no folder in it, got "a/b"' in capsys.readouterr().err
+    assert 'must not contain a folder, got "a/b"' in capsys.readouterr().err
 
 
 def test_map_without_walls(image_map: Path, out: Path, capsys: Any) -> None:
@@ -216,8 +220,7 @@ def test_unknown_detail(image_map: Path, out: Path, capsys: Any) -> None:
     assert "huge" in capsys.readouterr().err
 
 
-def test_as_a_program(image_map: Path, out: Path, checkout: Path) -> None:
-    # As rosrun starts it, from another folder.
+def test_script_in_another_folder(image_map: Path, out: Path, checkout: Path) -> None:
     script = checkout / "scripts" / "map_to_lines.py"
     assert os.access(script, os.X_OK)
     environment = {**os.environ, "PYTHONPATH": str(checkout)}
@@ -240,10 +243,10 @@ def test_as_a_program(image_map: Path, out: Path, checkout: Path) -> None:
         check=False,
     )
     assert again.returncode == 1
-    assert again.stderr.startswith("map_to_lines.py: Flatland File: Already there")
+    assert again.stderr.startswith("map_to_lines.py: Flatland File: File exists")
 
 
-def test_world_with_the_result(image_map: Path, out: Path, files: Any) -> None:
+def test_scan_in_the_converted_map(image_map: Path, out: Path, files: Any) -> None:
     assert main([str(image_map), str(out)]) == 0
     files.write(
         "robot.model.yaml",
@@ -254,7 +257,7 @@ def test_world_with_the_result(image_map: Path, out: Path, files: Any) -> None:
              angle: {min: 0, max: 4.712389, increment: 1.570796}}
         """,
     )
-    # In the middle of the room, in the map's frame, looking along its x axis.
+    # In the centre of the room, heading along the x axis of the map.
     x, y = 70 * 0.05, 40 * 0.05
     c, s = math.cos(0.5), math.sin(0.5)
     pose = [-1.5 + c * x - s * y, 2.25 + s * x + c * y, 0.5]

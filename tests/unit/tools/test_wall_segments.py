@@ -1,4 +1,4 @@
-"""Line segments along the walls of bitmaps."""
+"""Detection of line segments along the walls of bitmaps."""
 
 from __future__ import annotations
 
@@ -16,20 +16,20 @@ SCALES = [1.05, 1.5, 2.0]
 
 
 def edges_of(mask: npt.NDArray[np.bool_]) -> npt.NDArray[np.float64]:
-    """The exact boundary as a layer has it, y downwards."""
+    """Returns the exact boundary, with y down."""
     edges = np.asarray(boundary_edges(mask.astype(np.uint8), 1.0), dtype=np.float64)
     edges[:, 1::2] = len(mask) - edges[:, 1::2]
     return edges
 
 
 def distance(points: npt.NDArray[np.float64], segments: npt.NDArray[np.float64]) -> float:
-    """Greatest distance of any of some points from the nearest of some segments."""
+    """Returns the largest distance of points from the nearest segment."""
     worst = 0.0
     for point in points:
-        start, way = segments[:, :2], segments[:, 2:] - segments[:, :2]
-        square = np.maximum((way**2).sum(axis=1), 1e-12)
-        t = np.clip(((point - start) * way).sum(axis=1) / square, 0, 1)
-        nearest = start + t[:, None] * way
+        start, extent = segments[:, :2], segments[:, 2:] - segments[:, :2]
+        square = np.maximum((extent**2).sum(axis=1), 1e-12)
+        t = np.clip(((point - start) * extent).sum(axis=1) / square, 0, 1)
+        nearest = start + t[:, None] * extent
         worst = max(worst, float(np.hypot(*(nearest - point).T).min()))
     return worst
 
@@ -40,8 +40,8 @@ def samples(segments: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
     )
 
 
-def drawing() -> npt.NDArray[np.bool_]:
-    """A room with thick, thin, slanted and round things in it."""
+def sample_mask() -> npt.NDArray[np.bool_]:
+    """A room with thick, thin, slanted and round obstacles."""
     image = np.full((160, 220), 255, np.uint8)
     cv2.rectangle(image, (10, 10), (209, 149), 0, 2)
     image[40:70, 30:80] = 0
@@ -54,18 +54,18 @@ def drawing() -> npt.NDArray[np.bool_]:
 
 
 @pytest.mark.parametrize("scale", SCALES)
-def test_segments_lie_on_the_walls_within_a_pixel(scale: float) -> None:
-    mask = drawing()
+def test_segments_are_within_a_pixel_of_the_walls(scale: float) -> None:
+    mask = sample_mask()
     segments = find_wall_segments(mask, scale)
     assert len(segments) > 20
     assert distance(samples(segments), edges_of(mask)) <= 1.0
 
 
 @pytest.mark.parametrize("scale", SCALES)
-def test_walls_of_a_noisy_map(scale: float) -> None:
+def test_noisy_walls(scale: float) -> None:
     rng = np.random.default_rng(3)
-    mask = drawing()
-    # Every tenth pixel beside a wall is wrong.
+    mask = sample_mask()
+    # Every tenth pixel at a wall is flipped.
     walls = cv2.morphologyEx(mask.astype(np.uint8), cv2.MORPH_GRADIENT, np.ones((3, 3))) > 0
     mask ^= walls & (rng.random(mask.shape) < 0.1)
     segments = find_wall_segments(mask, scale)
@@ -74,19 +74,19 @@ def test_walls_of_a_noisy_map(scale: float) -> None:
 
 
 @pytest.mark.parametrize("scale", SCALES)
-def test_straight_walls_are_where_they_are(scale: float) -> None:
+def test_straight_walls_are_exact(scale: float) -> None:
     mask = np.ones((100, 150), bool)
     mask[30:60, 40:120] = False
     segments = find_wall_segments(mask, scale)
     sides = edges_of(mask)
     assert len(sides) == 4
-    # Each side is there, but for its corners, and no side is off by more than a tenth.
+    # Each side is found within 0.1 pixels, except for its corners.
     middles = np.concatenate([np.linspace(s[:2], s[2:], 20)[2:-2] for s in sides])
     assert distance(middles, segments) < 0.1
 
 
 @pytest.mark.parametrize("scale", SCALES)
-def test_wall_of_one_pixel_is_not_thickened(scale: float) -> None:
+def test_wall_of_one_pixel_keeps_its_thickness(scale: float) -> None:
     mask = np.ones((60, 150), bool)
     mask[30, 20:130] = False
     segments = find_wall_segments(mask, scale)
@@ -97,7 +97,7 @@ def test_wall_of_one_pixel_is_not_thickened(scale: float) -> None:
 
 
 @pytest.mark.parametrize("scale", SCALES)
-def test_rim_of_the_image_is_a_wall_where_it_is_off(scale: float) -> None:
+def test_edge_of_the_image_is_a_wall_next_to_off_pixels(scale: float) -> None:
     mask = np.zeros((60, 80), bool)
     mask[5:-5, 5:-5] = True
     segments = find_wall_segments(mask, scale)
@@ -106,29 +106,29 @@ def test_rim_of_the_image_is_a_wall_where_it_is_off(scale: float) -> None:
 
 
 @pytest.mark.parametrize("value", [True, False])
-def test_nothing_to_find(value: bool) -> None:
+def test_uniform_image_has_no_segments(value: bool) -> None:
     found = find_wall_segments(np.full((1, 1), value), 1.5)
     assert found.shape[1] == 4
     assert len(find_wall_segments(np.ones((50, 50), bool), 1.5)) == 0
 
 
-def test_more_detail_finds_more() -> None:
-    mask = drawing()
+def test_larger_image_scale_yields_more_segments() -> None:
+    mask = sample_mask()
     counts = [len(find_wall_segments(mask, scale)) for scale in SCALES]
     assert counts == sorted(counts)
     assert counts[0] < counts[-1]
 
 
-def test_offsets_against_all_edges_one_by_one() -> None:
+def test_offsets_agree_with_a_search_over_all_edges() -> None:
     rng = np.random.default_rng(5)
     mask = rng.random((12, 17)) < 0.8
     points = rng.uniform((-3, -3), (20, 15), (500, 2))
-    ways = WallBoundary(mask).offsets(points)
+    offsets = WallBoundary(mask).offsets(points)
     edges = edges_of(mask)
-    for point, way in zip(points, ways, strict=True):
+    for point, offset in zip(points, offsets, strict=True):
         expected = distance(point[None], edges)
         if expected <= 2.0:
-            assert math.hypot(*way) == pytest.approx(expected, abs=1e-9)
-            assert distance((point + way)[None], edges) == pytest.approx(0.0, abs=1e-9)
+            assert math.hypot(*offset) == pytest.approx(expected, abs=1e-9)
+            assert distance((point + offset)[None], edges) == pytest.approx(0.0, abs=1e-9)
         else:
-            assert np.isinf(way).all()
+            assert np.isinf(offset).all()

@@ -1,0 +1,34 @@
+"""A plugin that records the start of each cycle; its model has to be the first one of the world."""
+
+from __future__ import annotations
+
+import time
+from array import array
+
+import numpy as np
+
+import flatland
+
+MANIFEST = """
+<library path="{folder}">
+  <class name="bench::Recorder" type="recorder.Recorder" base_class_type="flatland::ModelPlugin"/>
+</library>
+"""
+MODEL = """
+bodies: [{{name: base, footprints: []}}]
+plugins: [{{name: recorder, type: "bench::Recorder", file: "{file}"}}]
+"""
+
+
+class Recorder(flatland.ModelPlugin):
+    """Writes the wall time of all cycle starts [s] into a file when it ends."""
+
+    def on_initialize(self, config: flatland.YamlReader) -> None:
+        self._file: str = config.get("file", "string")
+        self._starts = array("d")
+
+    def before_physics_step(self, timekeeper: flatland.Timekeeper) -> None:
+        self._starts.append(time.perf_counter())
+
+    def on_shutdown(self) -> None:
+        np.save(self._file, np.array(self._starts))

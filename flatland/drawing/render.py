@@ -1,0 +1,196 @@
+"""Public functions that draw a world: as an array, as a matplotlib figure, or to a file.
+
+matplotlib is imported when the first image is drawn. Its global state (pyplot) is not used.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+import threading
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+import numpy.typing as npt
+
+from flatland.drawing.capture import capture_scene
+from flatland.drawing.layout import Layout, checked_view, default_view
+from flatland.errors import FlatlandError
+
+if TYPE_CHECKING:
+    from flatland.world import World
+
+PICTURE_FORMATS: Final = (".png", ".pdf", ".svg")
+
+# matplotlib shares its font cache between figures, and the cache is not thread-safe.
+_MATPLOTLIB_LOCK = threading.Lock()
+
+
+def draw(
+    world: World,
+    *,
+    size: tuple[int, int] | None = None,
+    dpi: float = 100.0,
+    view: Sequence[float] | None = None,
+    layers: Iterable[str] | None = None,
+    scans: bool = True,
+    names: bool = False,
+    axes: bool = True,
+) -> npt.NDArray[np.uint8]:
+    """Draws the current state of a world.
+
+    Walls are drawn in the colour of their layer and footprints in the colour of their body; bright
+    colours are darkened to be visible on white. Sensors are dashed, and a triangle shows the
+    heading of each model. Each laser is shown with its last scan, or, if it has not scanned yet,
+    with an exact scan from its current pose.
+
+    Does not modify the world. The same world and options give the same image. May be called from
+    any thread and from the hooks of a plugin.
+
+    Args:
+        world: The world to draw.
+        size: (width, height) of the image [pixels]; None fits the view into 13 x 9 inches.
+        dpi: Pixels per inch; scales lines and text.
+        view: (x_min, y_min, x_max, y_max) of the area to show, world frame [m]; None shows all
+            walls and models. The area is extended to the aspect ratio of the image, so that the
+            scale is the same along x and y.
+        layers: Names of the layers to draw, None for all. Models are always drawn.
+        scans: Whether to draw laser scans.
+        names: Whether to write the name of each model above it.
+        axes: Whether to draw axes in metres; without axes, the view fills the whole image.
+
+    Returns:
+        RGB image, top row first, shape (height, width, 3).
+
+    Raises:
+        FlatlandError: The world is closed, a layer does not exist, or matplotlib is missing.
+        ValueError: `size`, `dpi`, `view` or `layers` is invalid.
+    """
+    figure = make_figure(
+        world,
+        size=size,
+        dpi=dpi,
+        view=view,
+        layers=layers,
+        scans=scans,
+        names=names,
+        axes=axes,
+    )
+    with _MATPLOTLIB_LOCK:
+        figure.canvas.draw()
+        pixels = np.asarray(figure.canvas.buffer_rgba())
+    return np.ascontiguousarray(pixels[:, :, :3])
+
+
+def make_figure(
+    world: World,
+    *,
+    size: tuple[int, int] | None = None,
+    dpi: float = 100.0,
+    view: Sequence[float] | None = None,
+    layers: Iterable[str] | None = None,
+    scans: bool = True,
+    names: bool = False,
+    axes: bool = True,
+) -> Any:
+    """Draws a world into a matplotlib figure that can be extended and saved.
+
+    The units of `figure.axes[0]` are metres in the world frame.
+
+    Args:
+        world: The world to draw.
+        size: See `draw`.
+        dpi: See `draw`.
+        view: See `draw`.
+        layers: See `draw`.
+        scans: See `draw`.
+        names: See `draw`.
+        axes: See `draw`.
+
+    Returns:
+        A `matplotlib.figure.Figure` on an Agg canvas, not registered with pyplot.
+
+    Raises:
+        FlatlandError: The world is closed, a layer does not exist, or matplotlib is missing.
+        ValueError: `size`, `dpi`, `view` or `layers` is invalid.
+    """
+    check_matplotlib()
+    from flatland.drawing.painter import paint
+
+    if not (math.isfinite(dpi) and 10 <= dpi <= 2400):
+        raise ValueError(f"dpi must be from 10 to 2400, got {dpi}")
+    if isinstance(layers, str):
+        raise ValueError(f"layers must be a list of names, got {layers!r}")
+    bounds = None if view is None else checked_view(view)
+    scene = world.between_steps(lambda: capture_scene(world, layers, scans))
+    layout = Layout.make(size, dpi, bounds or default_view(scene), axes)
+    with _MATPLOTLIB_LOCK:
+        return paint(scene, layout, dpi, names)
+
+
+def save(
+    world: World,
+    path: str | os.PathLike[str],
+    *,
+    size: tuple[int, int] | None = None,
+    dpi: float = 100.0,
+    view: Sequence[float] | None = None,
+    layers: Iterable[str] | None = None,
+    scans: bool = True,
+    names: bool = False,
+    axes: bool = True,
+) -> None:
+    """Draws a world to a file, overwriting an existing one.
+
+    Args:
+        world: The world to draw.
+        path: File name with one of the extensions in `PICTURE_FORMATS`; PDF and SVG are vector
+            graphics.
+        size: See `draw`.
+        dpi: See `draw`.
+        view: See `draw`.
+        layers: See `draw`.
+        scans: See `draw`.
+        names: See `draw`.
+        axes: See `draw`.
+
+    Raises:
+        FlatlandError: The world is closed, a layer does not exist, or matplotlib is missing.
+        OSError: The file cannot be written.
+        ValueError: The extension is unknown, or `size`, `dpi`, `view` or `layers` is invalid.
+    """
+    suffix = Path(path).suffix.lower()
+    if suffix not in PICTURE_FORMATS:
+        raise ValueError(f"path must end with one of {', '.join(PICTURE_FORMATS)}, got {path!r}")
+    figure = make_figure(
+        world,
+        size=size,
+        dpi=dpi,
+        view=view,
+        layers=layers,
+        scans=scans,
+        names=names,
+        axes=axes,
+    )
+    with _MATPLOTLIB_LOCK:
+        if suffix == ".png":
+            figure.canvas.print_png(path)
+        else:
+            figure.savefig(path, format=suffix[1:])
+
+
+def check_matplotlib() -> None:
+    """Checks that matplotlib can be imported.
+
+    Raises:
+        FlatlandError: matplotlib is missing or broken.
+    """
+    try:
+        import flatland.drawing.painter  # noqa: F401
+    except ImportError as error:
+        raise FlatlandError(
+            f"drawing needs matplotlib ({error}): "
+            "apt-get install python3-matplotlib, or pip install matplotlib"
+        ) from error

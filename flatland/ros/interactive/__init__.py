@@ -1,0 +1,1 @@
+"""Interactive markers that move, rotate and delete models."""

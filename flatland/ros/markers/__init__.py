@@ -1,0 +1,1 @@
+"""Markers of layers and models for RViz and the viewer."""

@@ -1,0 +1,160 @@
+"""Non-blocking writes to subscribers.
+
+rospy writes either in one thread per connection, which costs ten times as much as the write itself,
+or in the thread of the caller, which blocks forever if a subscriber does not read. Here, the thread
+of the caller writes as much as the socket accepts. The rest stays in the outbox of the connection;
+a single thread for all connections sends it when the socket becomes writable.
+"""
+
+from __future__ import annotations
+
+import logging
+import select
+import socket
+import threading
+from collections import deque
+from typing import Any
+
+from rospy.exceptions import TransportTerminated
+
+_LOG = logging.getLogger("flatland")
+
+
+class Outbox:
+    """Queue of unsent messages of one connection of a publisher.
+
+    Replaces `write_data` of the connection. A message is sent completely or not at all: when the
+    queue is full, the oldest message is dropped, but never one that is partially sent.
+    """
+
+    def __init__(self, transport: Any, queue_size: int) -> None:
+        """Replaces `write_data` of a connection.
+
+        Args:
+            transport: A `TCPROSTransport` of rospy, after the handshake.
+            queue_size: Maximum number of queued messages, without the partially sent one.
+        """
+        self._transport = transport
+        self._lock = threading.Lock()
+        self._partial: memoryview | None = None  # rest of the partially sent message
+        self._queue: deque[bytes] = deque(maxlen=queue_size)
+        transport.socket.setblocking(False)
+        transport.set_cleanup_callback(self._closed)
+        transport.write_data = self.write
+
+    def write(self, data: bytes) -> None:
+        """Sends or queues a message without blocking.
+
+        Args:
+            data: The serialized message.
+
+        Raises:
+            TransportTerminated: The connection is closed or broken; rospy removes it.
+        """
+        if self._transport.done:
+            raise TransportTerminated("connection closed")
+        with self._lock:
+            self._queue.append(data)
+            if self._partial is not None or len(self._queue) > 1:
+                return  # The flusher already watches the socket; keep the order.
+            if not self._send():
+                _flusher().watch(self)
+
+    def fileno(self) -> int:
+        """Returns the file descriptor of the socket, -1 if it is closed."""
+        connection: socket.socket | None = self._transport.socket
+        return -1 if connection is None else connection.fileno()
+
+    def flush(self) -> None:
+        """Sends queued messages; called by the flusher when the socket is writable."""
+        try:
+            with self._lock:
+                if not self._send():
+                    _flusher().watch(self)
+        except TransportTerminated:
+            self._transport.close()
+
+    def _send(self) -> bool:
+        """Sends queued messages until the socket would block; returns whether all were sent."""
+        connection: socket.socket | None = self._transport.socket
+        if connection is None or self._transport.done:
+            self._queue.clear()
+            raise TransportTerminated("connection closed")
+        while self._partial is not None or self._queue:
+            rest = self._partial
+            if rest is None:
+                rest = memoryview(self._queue[0])
+            try:
+                sent = connection.send(rest)
+            except BlockingIOError:
+                return False
+            except OSError as error:
+                raise TransportTerminated(str(error)) from error
+            self._transport.stat_bytes += sent
+            if self._partial is None:
+                self._queue.popleft()
+                self._transport.stat_num_msg += 1
+            self._partial = rest[sent:] if sent < len(rest) else None
+        return True
+
+    def _closed(self, transport: Any) -> None:
+        """Stops watching the socket; called by rospy when the connection is closed."""
+        _flusher().forget(self, transport.fileno())
+
+
+class _Flusher(threading.Thread):
+    """Thread that flushes outboxes when their sockets become writable."""
+
+    def __init__(self) -> None:
+        super().__init__(name="flatland-flusher", daemon=True)
+        self._epoll = select.epoll()
+        self._lock = threading.Lock()
+        self._watched: dict[int, Outbox] = {}
+
+    def watch(self, outbox: Outbox) -> None:
+        """Calls `flush` of an outbox once, when its socket becomes writable or breaks."""
+        number = outbox.fileno()
+        if number < 0:
+            return
+        flags = select.EPOLLOUT | select.EPOLLONESHOT
+        with self._lock:
+            self._watched[number] = outbox
+            try:
+                try:
+                    self._epoll.modify(number, flags)
+                except FileNotFoundError:
+                    self._epoll.register(number, flags)
+            except OSError:
+                del self._watched[number]  # The socket was closed in the meantime.
+
+    def forget(self, outbox: Outbox, number: int) -> None:
+        """Removes an outbox whose socket was closed."""
+        with self._lock:
+            if self._watched.get(number) is outbox:
+                del self._watched[number]
+
+    def run(self) -> None:
+        """Waits for writable sockets until the process ends."""
+        while True:
+            for number, _ in self._epoll.poll():
+                with self._lock:
+                    outbox = self._watched.pop(number, None)
+                if outbox is not None:
+                    try:
+                        outbox.flush()
+                    except Exception:
+                        _LOG.exception("cannot send a message")
+
+
+_flusher_lock = threading.Lock()
+_the_flusher: _Flusher | None = None
+
+
+def _flusher() -> _Flusher:
+    """Returns the flusher of the process, starting it on first use."""
+    global _the_flusher
+    with _flusher_lock:
+        if _the_flusher is None:
+            _the_flusher = _Flusher()
+            _the_flusher.start()
+        return _the_flusher

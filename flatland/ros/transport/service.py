@@ -1,0 +1,87 @@
+"""A service that is registered asynchronously."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from concurrent.futures import Future
+from typing import Any, Final
+
+import rospy
+
+from flatland.ros.registrar import Registrar
+
+_SHUTDOWN_POLL_PERIOD: Final = 0.2  # s
+
+
+class Service:
+    """Handles each request in a thread of its own.
+
+    Attributes:
+        name: Resolved name of the service.
+    """
+
+    def __init__(
+        self,
+        registrar: Registrar,
+        name: str,
+        service_type: type[Any],
+        handler: Callable[[Any], Any],
+        *,
+        owner: str = "",
+    ) -> None:
+        """Advertises a service asynchronously.
+
+        Args:
+            registrar: Registers the service with the ROS master.
+            name: Name in the namespace of the node, global with a leading `/`.
+            service_type: ROS service class.
+            handler: Called with each request; returns the response.
+            owner: Plugin that offers the service, for messages.
+
+        Raises:
+            FlatlandError: This node already has a service of this name.
+        """
+        self.name: str = rospy.resolve_name(name)
+        self._registrar = registrar
+        self._service_type = service_type
+        self._handler = handler
+        self._owner = owner
+        self._closed = False
+        self._service: rospy.Service | None = None
+        registrar.claim("service", self.name, service_type, owner, shared=False)
+        registrar.submit(self._open)
+
+    def close(self) -> None:
+        """Unregisters the service asynchronously."""
+        if self._closed:
+            return
+        self._closed = True
+        self._registrar.release("service", self.name, self._owner)
+        self._registrar.submit(self._end)
+
+    def _open(self) -> None:
+        if not self._closed:
+            self._service = rospy.Service(self.name, self._service_type, self._handler)
+
+    def _end(self) -> None:
+        if self._service is not None:
+            self._service.shutdown()
+
+
+def wait_for(future: Future[Any]) -> Any:
+    """Waits in the thread of a service until the simulation has handled a request.
+
+    Args:
+        future: Result of the request.
+
+    Raises:
+        rospy.ServiceException: The node shuts down first.
+    """
+    while True:
+        try:
+            return future.result(timeout=_SHUTDOWN_POLL_PERIOD)
+        except TimeoutError:
+            if future.done():
+                raise
+            if rospy.core.is_shutdown_requested():
+                raise rospy.ServiceException("the simulator is shutting down") from None

@@ -1,0 +1,250 @@
+"""The part of a world that holds its layers and models, changes them and finds free places."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterable, Sequence
+from typing import TYPE_CHECKING, TypeVar
+
+import numpy as np
+
+from flatland.errors import WorldError
+from flatland.geometry import DoubleArray
+from flatland.runtime.placement import IfBlocked, Models, check_if_blocked
+
+if TYPE_CHECKING:
+    from flatland.config.node import Source
+    from flatland.entities.layer import Layer
+    from flatland.entities.model import Model
+    from flatland.runtime.contacts import ContactReporter
+    from flatland.runtime.model_set import ModelSet
+    from flatland.runtime.observer import Observers
+    from flatland.runtime.placement import Placement
+    from flatland.runtime.requests import Requests
+
+R = TypeVar("R")
+
+
+class Contents:
+    """The layers and models of a world; the base class of `World`.
+
+    Changes that a plugin's hook requests take effect after the step.
+
+    Attributes:
+        layers: The layers in the order of the file.
+    """
+
+    layers: list[Layer]
+
+    _contacts: ContactReporter
+    _files: Source
+    _models: ModelSet
+    _observers: Observers
+    _placement: Placement
+    _requests: Requests
+
+    @property
+    def models(self) -> list[Model]:
+        """All models in the order in which they were spawned."""
+        return list(self._models.by_name.values())
+
+    def model(self, name: str) -> Model:
+        """Returns the model of a name.
+
+        Raises:
+            WorldError: It does not exist.
+        """
+        return self._models.find(name)
+
+    def layer(self, name: str) -> Layer:
+        """Returns the layer that has a name, possibly among others.
+
+        Raises:
+            WorldError: It does not exist.
+        """
+        for layer in self.layers:
+            if name in layer.names:
+                return layer
+        raise WorldError(f'layer with name "{name}" does not exist')
+
+    def add_layer(self, layer: Layer) -> None:
+        """Adds a layer whose names are registered; for the loader."""
+        self.layers.append(layer)
+        self._contacts.add_bodies([layer.body])
+        self.layer_changed(layer)
+
+    def layer_changed(self, layer: Layer) -> None:
+        """Notifies the observers that the edges of a layer changed."""
+        self._observers.layer_changed(layer.name)
+
+    def resolve_path(self, path: str) -> str:
+        """Returns the absolute path of a model or map file.
+
+        Args:
+            path: An absolute path, one that starts with `~`, or one relative to the folder of the
+                world file, also if it is given in a file that the world file includes.
+        """
+        return self._files.resolve(path)
+
+    def spawn_model(
+        self,
+        yaml_path: str | os.PathLike[str],
+        name: str,
+        namespace: str = "",
+        pose: Sequence[float] = (0.0, 0.0, 0.0),
+        if_blocked: IfBlocked = "warn",
+    ) -> Model | None:
+        """Reads a model file and adds the model to the world.
+
+        Args:
+            yaml_path: Model file; a relative path starts from the folder of the world file.
+            name: Name of the model, unique in the world.
+            namespace: Namespace of its topics and frames, may be empty.
+            pose: (x, y, theta) of its first body in the world frame [m, rad].
+            if_blocked: What to do if a footprint would overlap a wall or another model that it
+                collides with, by more than 5 mm: `allow` nothing, `warn` log one line, `refuse`
+                raise, `nearest` take the closest free place within 5 m with the same heading;
+                `displacement` of the model is the distance to it.
+
+        Returns:
+            The model; None if a plugin's hook calls this: the model is then spawned after the step.
+
+        Raises:
+            FlatlandError: The model is invalid, or the pose is blocked; the world is unchanged.
+            ValueError: `if_blocked` is invalid.
+        """
+        path = os.fspath(yaml_path)
+        check_if_blocked(if_blocked)
+        return self._change(
+            lambda: self._models.spawn(path, name, namespace, pose, if_blocked),
+            f'spawn of model "{name}"',
+        )
+
+    def move_model(
+        self, name: str, pose: Sequence[float], if_blocked: IfBlocked = "warn"
+    ) -> Model | None:
+        """Moves a model rigidly so that its first body is at a pose, at rest.
+
+        Args:
+            name: Name of the model.
+            pose: (x, y, theta) in the world frame [m, rad].
+            if_blocked: As in `spawn_model`.
+
+        Returns:
+            The model; None if a plugin's hook calls this, since the model moves after the step.
+
+        Raises:
+            WorldError: The model does not exist, the pose is not finite or blocked; the world is
+                unchanged.
+            ValueError: `if_blocked` is invalid.
+        """
+        check_if_blocked(if_blocked)
+        return self._change(
+            lambda: self._models.move(name, pose, if_blocked), f'move of model "{name}"'
+        )
+
+    def delete_model(self, name: str) -> None:
+        """Removes a model: plugins first, then joints and bodies; from a hook, after the step.
+
+        Raises:
+            WorldError: The model does not exist.
+        """
+        self._change(lambda: self._models.delete(name), f'deletion of model "{name}"')
+
+    def _change(self, action: Callable[[], R], what: str) -> R | None:
+        def checked() -> R:
+            self._check_open()
+            return action()
+
+        return self._requests.change(checked, what)
+
+    # -- free places -----------------------------------------------------------------------
+
+    def is_free(
+        self,
+        pose: Sequence[float],
+        radius: float | None = None,
+        *,
+        model: str | Model | None = None,
+        layers: str | Iterable[str] = "all",
+        clearance: float = 0.0,
+        ignore: Models = (),
+    ) -> bool:
+        """Checks whether a disc, or a model, would overlap nothing at a pose.
+
+        The edges of walls and the solid footprints of models count that it would collide with;
+        overlaps of up to 5 mm do not. Walls are edges without an inside: also the inside of a
+        solid obstacle of a map image is free where no edge is touched.
+
+        Args:
+            pose: (x, y) or (x, y, theta) of the disc's centre, or of the model's first body, in the
+                world frame [m, rad].
+            radius: Of the disc [m]; either this or a model is needed.
+            model: A model of the world, or its name, with its footprints as they stand to each
+                other now; never in its own way.
+            layers: Names of the layers that the disc collides with; a model's footprints have
+                their own.
+            clearance: Distance to keep from all that counts [m].
+            ignore: Models, or their names, that do not count.
+
+        Raises:
+            WorldError: There is no such model or layer, or the world is closed.
+            ValueError: A number is out of range, or not exactly one of radius and model is given.
+        """
+        return self._read(
+            lambda: self._placement.is_free(pose, radius, model, layers, clearance, ignore)
+        )
+
+    def sample_free(
+        self,
+        n: int,
+        radius: float,
+        clearance: float = 0.0,
+        rng: np.random.Generator | int | None = None,
+        *,
+        connected_to: Sequence[float] | None = None,
+        layers: str | Iterable[str] = "all",
+        bounds: Sequence[float] | None = None,
+        ignore: Models = (),
+    ) -> DoubleArray:
+        """Draws random free poses, for instance to spawn robots at.
+
+        All are at least `clearance` from walls, from models and from each other, within the bounds
+        of the walls. The inside of solid obstacles and closed rooms is free space, too; with
+        `connected_to` only places are drawn that a disc of the radius can reach.
+
+        Args:
+            n: How many.
+            radius: Of the discs that the poses are for [m].
+            clearance: Distance that the discs keep from all that counts [m].
+            rng: Generator or seed; the same one gives the same poses. None for a generator of the
+                world, made from the world's seed.
+            connected_to: A point (x, y) in the world frame [m]. A path of a disc leads from there
+                to each pose without touching a wall; models are not in its way. A passage that is
+                less than a cell of the planner's grid wider than the disc, at most 5 cm on maps of
+                less than 200 m by 200 m, may count as closed.
+            layers: Names of the layers that the discs collide with.
+            bounds: (x_min, y_min, x_max, y_max) of the area to draw from, and of the paths, in the
+                world frame [m]; None for the bounds of the walls.
+            ignore: Models, or their names, that do not count.
+
+        Returns:
+            (x, y, theta) of each [m, rad], theta from -pi to pi, shape (n, 3).
+
+        Raises:
+            WorldError: There are too few free places, the disc does not fit at `connected_to`, no
+                wall bounds the area, there is no such model or layer, or the world is closed.
+            ValueError: A number is out of range.
+        """
+        return self._read(
+            lambda: self._placement.sample_free(
+                n, radius, clearance, rng, connected_to, layers, bounds, ignore
+            )
+        )
+
+    def _read(self, action: Callable[[], R]) -> R:
+        self._check_open()
+        return self._requests.read(action)
+
+    def _check_open(self) -> None:
+        raise NotImplementedError

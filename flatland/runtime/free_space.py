@@ -1,0 +1,182 @@
+"""The space between walls on a grid: where a disc fits, and which places it can reach."""
+
+from __future__ import annotations
+
+import importlib
+import math
+from collections.abc import Callable
+from typing import Final
+
+import numpy as np
+import numpy.typing as npt
+
+from flatland.errors import WorldError
+
+DoubleArray = npt.NDArray[np.float64]
+IntArray = npt.NDArray[np.int64]
+BoolArray = npt.NDArray[np.bool_]
+Bounds = tuple[float, float, float, float]
+
+_CELLS_PER_RADIUS: Final = 4.0
+_LEAST_CELL: Final = 0.02  # m
+_GREATEST_CELL: Final = 0.05  # m, unless there would be too many
+_MOST_CELLS: Final = 16_000_000
+
+
+class FreeSpace:
+    """Square cells in a rectangle, and how far from the nearest wall each one is.
+
+    Distances on the grid are estimates. What depends on them is either on the safe side or decided
+    by an exact test.
+    """
+
+    def __init__(
+        self,
+        walls: DoubleArray,
+        bounds: Bounds,
+        radius: float,
+        clearance: float,
+        fits: Callable[[DoubleArray, float], BoolArray],
+    ) -> None:
+        """Measures the distances.
+
+        Args:
+            walls: Edges (x1, y1, x2, y2) in the world frame [m], shape (n, 4).
+            bounds: (x_min, y_min, x_max, y_max) of the rectangle in the world frame [m].
+            radius: Of the disc [m], positive.
+            clearance: Least distance between the disc and a wall where it stays [m].
+            fits: The exact test: returns for centres (n, 2) and a radius which discs overlap no
+                wall, shape (n,).
+        """
+        x_min, y_min, x_max, y_max = bounds
+        width, height = x_max - x_min, y_max - y_min
+        self._radius = radius
+        self._fits = fits
+        self._cell = max(
+            min(max(radius / _CELLS_PER_RADIUS, _LEAST_CELL), _GREATEST_CELL),
+            math.sqrt(width * height / _MOST_CELLS),
+            max(width, height) / _MOST_CELLS,
+        )
+        self._origin = np.array([x_min, y_min])
+        self._extent = np.array([width, height])
+        self._columns = max(1, math.ceil(width / self._cell))
+        self._rows = max(1, math.ceil(height / self._cell))
+        # Walls outside of the bounds count, too, as far as the disc would reach them.
+        margin = math.ceil((radius + clearance) / self._cell) + 2
+        distances = self._distances(walls, margin)
+        # A wall may be one cell nearer than estimated, and a place 0.71 cells from the centre.
+        slack = (1.0 + math.sqrt(0.5)) * self._cell
+        self._roomy: IntArray = np.flatnonzero(distances >= radius + clearance - slack)
+        self._regions = self._connected(distances)
+
+    def cells(self, connected_to: tuple[float, float] | None) -> IntArray:
+        """Returns the cells that may hold a place for the disc, shape (n,).
+
+        Args:
+            connected_to: Only cells that the disc can reach from this point, world frame [m];
+                None for all.
+
+        Raises:
+            WorldError: The point is out of bounds, or the disc does not fit there.
+        """
+        if connected_to is None:
+            return self._roomy
+        reached = self._regions_around(np.array(connected_to))
+        return self._roomy[np.isin(self._regions[self._roomy], reached)]
+
+    def places_in(self, cells: IntArray, rng: np.random.Generator) -> DoubleArray:
+        """Returns a random point of each cell in the world frame [m], shape (n, 2)."""
+        corners = np.stack((cells % self._columns, cells // self._columns), axis=1)
+        inside = (corners + rng.random((len(cells), 2))) * self._cell
+        # The last row and column may stand out.
+        places: DoubleArray = self._origin + np.minimum(inside, self._extent)
+        return places
+
+    def _centers(self, cells: IntArray) -> DoubleArray:
+        corners = np.stack((cells % self._columns, cells // self._columns), axis=1)
+        centers: DoubleArray = self._origin + (corners + 0.5) * self._cell
+        return centers
+
+    def _distances(self, walls: DoubleArray, margin: int) -> DoubleArray:
+        """Estimates the distance of each cell's centre to the nearest wall [m], to within a cell.
+
+        Args:
+            walls: Edges in the world frame.
+            margin: How many cells around the grid are looked at, too.
+
+        Returns:
+            Row by row, shape (rows * columns,), float32; infinite where there is no wall.
+        """
+        shape = (self._rows + 2 * margin, self._columns + 2 * margin)
+        ends = (walls.reshape(-1, 2, 2) - self._origin) / self._cell + margin
+        points = _points_on(ends, np.array([shape[1], shape[0]]))
+        cells = np.minimum(points.astype(np.int64), np.array([shape[1], shape[0]]) - 1)
+        empty = np.ones(shape, np.uint8)
+        empty[cells[:, 1], cells[:, 0]] = 0
+        if not len(cells):
+            return np.full(self._rows * self._columns, math.inf)
+        cv2 = importlib.import_module("cv2")
+        distances = cv2.distanceTransform(empty, cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
+        inner = distances[margin : margin + self._rows, margin : margin + self._columns]
+        result: DoubleArray = inner.ravel() * np.float32(self._cell)
+        return result
+
+    def _connected(self, distances: DoubleArray) -> npt.NDArray[np.int32]:
+        """Numbers the regions within which the disc can move from centre to centre, 0 for none.
+
+        Between two centres that are L apart and have the distance sqrt(r² + L² / 4) to all walls,
+        the distance is never less than r. Here L is the diagonal of a cell.
+        """
+        least = math.hypot(self._radius, self._cell * math.sqrt(0.5))
+        passable = distances >= least + self._cell
+        unsure = np.flatnonzero((distances >= least - self._cell) & ~passable)
+        passable[unsure] = self._fits(self._centers(unsure), least)
+        cv2 = importlib.import_module("cv2")
+        grid = passable.view(np.uint8).reshape(self._rows, self._columns)
+        regions: npt.NDArray[np.int32] = cv2.connectedComponents(grid, connectivity=8)[1].ravel()
+        return regions
+
+    def _regions_around(self, point: DoubleArray) -> npt.NDArray[np.int32]:
+        where = f"connected_to ({point[0]:g}, {point[1]:g})"
+        if not ((point >= self._origin) & (point <= self._origin + self._extent)).all():
+            raise WorldError(f"{where} is outside of the bounds of the walls")
+        if not self._fits(point[np.newaxis], self._radius)[0]:
+            raise WorldError(f"{where} is not free for a disc of radius {self._radius:g} m")
+        column, row = ((point - self._origin) / self._cell).astype(np.int64).tolist()
+        columns = np.clip(np.arange(column - 1, column + 2), 0, self._columns - 1)
+        rows = np.clip(np.arange(row - 1, row + 2), 0, self._rows - 1)
+        around: IntArray = np.unique(rows[:, np.newaxis] * self._columns + columns)
+        near = np.hypot(*(self._centers(around) - point).T) <= math.sqrt(2) * self._cell
+        regions: npt.NDArray[np.int32] = np.unique(self._regions[around[near]])
+        return np.trim_zeros(regions)
+
+
+def _points_on(ends: DoubleArray, size: IntArray) -> DoubleArray:
+    """Returns points at most half a unit apart on the parts of edges that lie in a rectangle.
+
+    Args:
+        ends: Both ends of each edge, shape (n, 2, 2).
+        size: Width and height of the rectangle, which starts at the origin.
+
+    Returns:
+        Shape (m, 2).
+    """
+    start, along = ends[:, 0], ends[:, 1] - ends[:, 0]
+    # The part of each edge, from 0 to 1, between the two lines that bound each axis.
+    with np.errstate(divide="ignore", invalid="ignore"):
+        crossings = np.stack((-start / along, (size - start) / along))
+    parallel = along == 0
+    inside = (start >= 0) & (start <= size)
+    enter = np.where(parallel, np.where(inside, 0.0, 2.0), crossings.min(axis=0))
+    leave = np.where(parallel, np.where(inside, 1.0, -1.0), crossings.max(axis=0))
+    first = np.maximum(enter.max(axis=1), 0.0)
+    last = np.minimum(leave.min(axis=1), 1.0)
+    kept = first <= last
+    start, along, first, last = start[kept], along[kept], first[kept], last[kept]
+    lengths = np.hypot(along[:, 0], along[:, 1]) * (last - first)
+    counts = np.ceil(2 * lengths).astype(np.int64) + 1
+    edge = np.repeat(np.arange(len(counts)), counts)
+    number = np.arange(len(edge)) - np.repeat(np.cumsum(counts) - counts, counts)
+    fraction = first[edge] + (last - first)[edge] * number / np.maximum(counts[edge] - 1, 1)
+    points: DoubleArray = np.clip(start[edge] + along[edge] * fraction[:, np.newaxis], 0, size)
+    return points

@@ -1,0 +1,275 @@
+"""Where models can be put: what blocks a pose, and which places are free."""
+
+from __future__ import annotations
+
+import logging
+import math
+import zlib
+from collections.abc import Iterable, Sequence
+from typing import TYPE_CHECKING, Final, Literal, TypeAlias, get_args
+
+import numpy as np
+import numpy.typing as npt
+
+from flatland.entities.layer import Layer
+from flatland.entities.model import Model
+from flatland.errors import WorldError
+from flatland.geometry import Pose, finite_pose
+from flatland.runtime.free_space import Bounds, FreeSpace
+from flatland.runtime.nearest_place import SEARCH_RADIUS, nearest_offset
+
+if TYPE_CHECKING:
+    from flatland.physics import PhysicsBody
+    from flatland.runtime.contacts import ContactReporter
+    from flatland.world import World
+
+_LOG = logging.getLogger("flatland")
+
+DoubleArray = npt.NDArray[np.float64]
+BoolArray = npt.NDArray[np.bool_]
+Models: TypeAlias = str | Model | Iterable[str | Model]
+
+IfBlocked = Literal["allow", "warn", "refuse", "nearest"]
+IF_BLOCKED: Final[tuple[IfBlocked, ...]] = get_args(IfBlocked)
+
+TOLERANCE: Final = 0.005  # m that footprints may penetrate others, as Box2D's solver lets them
+_ROUNDING: Final = 1e-4  # m of overlap that single precision may make of a mere touch
+_FIRST_TRIES: Final = 1024
+_BLOCK: Final = 256  # places that are compared with those taken at once
+_MOST_SPACES: Final = 8
+
+
+def check_if_blocked(if_blocked: str) -> None:
+    """Raises ValueError for a value that `if_blocked` cannot have."""
+    if if_blocked not in IF_BLOCKED:
+        raise ValueError(f"if_blocked must be one of {', '.join(IF_BLOCKED)}, got {if_blocked!r}")
+
+
+class Placement:
+    """Answers what is blocked and what is free in one world, between two steps."""
+
+    def __init__(self, world: World, contacts: ContactReporter) -> None:
+        """Prepares for a world.
+
+        Args:
+            world: World of the layers and models.
+            contacts: Finds the bodies of models and layers.
+        """
+        self._world = world
+        self._contacts = contacts
+        self._rng: np.random.Generator | None = None
+        # What does not change with the models, by the arguments that it depends on.
+        self._spaces: dict[tuple[object, ...], tuple[DoubleArray, FreeSpace]] = {}
+
+    # -- models ----------------------------------------------------------------------------
+
+    def choose_pose(self, model: Model, pose: Pose, if_blocked: IfBlocked, verb: str) -> Pose:
+        """Returns the pose at which to put a model.
+
+        Args:
+            model: The model, somewhere in the physics world.
+            pose: The pose asked for, of its first body in the world frame.
+            if_blocked: What to do where the model would overlap walls or other models.
+            verb: What is done to the model, for texts.
+
+        Raises:
+            WorldError: The pose is blocked and must not be, or no place near it is free.
+            ValueError: The pose is out of the range of the physics.
+        """
+        if if_blocked == "allow":
+            return pose
+        physics, bodies = self._world.physics, [body.physics for body in model.bodies]
+        overlapped = physics.overlapping_bodies(bodies, pose, least_gap=-TOLERANCE)
+        if not overlapped:
+            return pose
+        at = "({:.3f}, {:.3f}, {:.3f})".format(*pose)
+        what = f"overlaps {self._describe(overlapped)} at {at}"
+        if if_blocked == "warn":
+            _LOG.warning('model "%s" %s', model.name, what)
+            return pose
+        if if_blocked == "refuse":
+            raise WorldError(f'failed to {verb} model "{model.name}", it {what}')
+        offset = nearest_offset(
+            lambda offsets: physics.free_poses(
+                bodies, _poses(offsets + pose[:2], pose[2]), least_gap=-_ROUNDING
+            )
+        )
+        if offset is None:
+            raise WorldError(
+                f'failed to {verb} model "{model.name}", it {what}, and there is no free place '
+                f"within {SEARCH_RADIUS:g} m"
+            )
+        return (pose[0] + offset[0], pose[1] + offset[1], pose[2])
+
+    def _describe(self, bodies: list[PhysicsBody]) -> str:
+        names = []
+        for physics_body in bodies:
+            body = self._contacts.find_body(physics_body)
+            if body is None:
+                names.append("a body of no model")
+            else:
+                kind = "layer" if isinstance(body.entity, Layer) else "model"
+                names.append(f'{kind} "{body.entity.name}"')
+        return ", ".join(dict.fromkeys(names))
+
+    # -- free places -----------------------------------------------------------------------
+
+    def is_free(
+        self,
+        pose: Sequence[float],
+        radius: float | None,
+        model: str | Model | None,
+        layers: str | Iterable[str],
+        clearance: float,
+        ignore: Models,
+    ) -> bool:
+        """Checks one pose; see `World.is_free`."""
+        x, y, theta = finite_pose(pose if len(pose) == 3 else (*pose, 0.0))
+        least_gap = _checked("clearance", clearance) - TOLERANCE
+        physics, ignored = self._world.physics, self._bodies(ignore)
+        if radius is not None and model is None:
+            disc, bits = _checked("radius", radius), self._bits(layers)
+            free = physics.free_discs(
+                [(x, y, theta)], disc, bits, ignored=ignored, least_gap=least_gap
+            )
+        elif model is not None and radius is None:
+            bodies = self._bodies(model)
+            free = physics.free_poses(bodies, [(x, y, theta)], ignored=ignored, least_gap=least_gap)
+        else:
+            raise ValueError("is_free needs either a radius or a model")
+        return bool(free[0])
+
+    def sample_free(
+        self,
+        n: int,
+        radius: float,
+        clearance: float,
+        rng: np.random.Generator | int | None,
+        connected_to: Sequence[float] | None,
+        layers: str | Iterable[str],
+        bounds: Sequence[float] | None,
+        ignore: Models,
+    ) -> DoubleArray:
+        """Draws free poses; see `World.sample_free`."""
+        if n < 0:
+            raise ValueError(f"n must not be negative, got {n}")
+        if not _checked("radius", radius) > 0:
+            raise ValueError(f"radius must be positive [m], got {radius}")
+        _checked("clearance", clearance)
+        bits, ignored = self._bits(layers), self._bodies(ignore)
+        start = None if connected_to is None else finite_pose((*connected_to[:2], 0.0))[:2]
+        generator = self._generator(rng)
+        space = self._free_space(bits, radius, clearance, bounds)
+        cells = space.cells(start)
+        taken = np.empty((0, 2))
+        # Most calls need a small part of the cells only.
+        for tries in (_FIRST_TRIES + 32 * n, len(cells)):
+            picked = generator.choice(cells, size=min(tries, len(cells)), replace=False)
+            places = space.places_in(picked, generator)
+            free = self._world.physics.free_discs(
+                _poses(places, 0.0), radius, bits, ignored=ignored, least_gap=clearance
+            )
+            taken = _add_apart(taken, places[free], n, 2 * radius + clearance)
+            if len(taken) == n:
+                return np.column_stack((taken, generator.uniform(-math.pi, math.pi, n)))
+        where = "" if start is None else f" that are connected to ({start[0]:g}, {start[1]:g})"
+        raise WorldError(
+            f"found only {len(taken)} of {n} free places for discs of radius {radius:g} m with a "
+            f"clearance of {clearance:g} m{where}"
+        )
+
+    def _free_space(
+        self, bits: int, radius: float, clearance: float, bounds: Sequence[float] | None
+    ) -> FreeSpace:
+        layers = [layer for layer in self._world.layers if layer.category_bits & bits]
+        walls = np.concatenate([np.empty((0, 4)), *map(_world_edges, layers)])
+        area = _bounds_of(walls) if bounds is None else _checked_bounds(bounds)
+        key = (bits, radius, clearance, area)
+        known = self._spaces.get(key)
+        # Plugins may have added or moved walls.
+        if known is not None and np.array_equal(known[0], walls):
+            return known[1]
+        bodies = [layer.body.physics for layer in layers]
+
+        def fits(points: DoubleArray, disc: float) -> BoolArray:
+            return self._world.physics.free_discs(_poses(points, 0.0), disc, bits, only=bodies)
+
+        space = FreeSpace(walls, area, radius, clearance, fits)
+        if len(self._spaces) >= _MOST_SPACES:
+            self._spaces.clear()
+        self._spaces[key] = (walls, space)
+        return space
+
+    def _generator(self, rng: np.random.Generator | int | None) -> np.random.Generator:
+        if rng is not None:
+            return np.random.default_rng(rng)
+        if self._rng is None:
+            seeds = [self._world.seed, zlib.crc32(b"placement")]
+            self._rng = np.random.default_rng(np.random.SeedSequence(seeds))
+        return self._rng
+
+    def _bits(self, layers: str | Iterable[str]) -> int:
+        names = [layers] if isinstance(layers, str) else list(layers)
+        unknown = self._world.collision_filter.unknown(names)
+        if unknown:
+            raise WorldError(f'layer with name "{unknown[0]}" does not exist')
+        return self._world.collision_filter.category_bits(names)
+
+    def _bodies(self, models: Models) -> list[PhysicsBody]:
+        each = [models] if isinstance(models, str | Model) else models
+        found = [self._world.model(one) if isinstance(one, str) else one for one in each]
+        return [body.physics for model in found for body in model.bodies]
+
+
+def _checked(name: str, value: float) -> float:
+    if not (math.isfinite(value) and value >= 0):
+        raise ValueError(f"{name} must be finite and not negative [m], got {value}")
+    return value
+
+
+def _checked_bounds(bounds: Sequence[float]) -> Bounds:
+    x_min, y_min, x_max, y_max = (float(number) for number in bounds)
+    if not (
+        all(map(math.isfinite, (x_min, y_min, x_max, y_max))) and x_min < x_max and y_min < y_max
+    ):
+        raise ValueError(
+            f"bounds must be (x_min, y_min, x_max, y_max) of an area [m], got {tuple(bounds)}"
+        )
+    return (x_min, y_min, x_max, y_max)
+
+
+def _bounds_of(walls: DoubleArray) -> Bounds:
+    if not len(walls):
+        raise WorldError("there are no walls to sample between: give bounds")
+    points = walls.reshape(-1, 2)
+    (x_min, y_min), (x_max, y_max) = points.min(axis=0).tolist(), points.max(axis=0).tolist()
+    return (x_min, y_min, x_max, y_max)
+
+
+def _world_edges(layer: Layer) -> DoubleArray:
+    """Returns the edges (x1, y1, x2, y2) of a layer in the world frame [m], shape (n, 4)."""
+    x, y, theta = layer.body.pose
+    turn = np.array([[math.cos(theta), math.sin(theta)], [-math.sin(theta), math.cos(theta)]])
+    edges: DoubleArray = layer.edges.astype(np.float64).reshape(-1, 2) @ turn + (x, y)
+    return edges.reshape(-1, 4)
+
+
+def _poses(points: DoubleArray, theta: float) -> DoubleArray:
+    return np.column_stack((points, np.full(len(points), theta)))
+
+
+def _add_apart(taken: DoubleArray, places: DoubleArray, n: int, least: float) -> DoubleArray:
+    """Adds places in order while there are fewer than `n`, each at least so far from the others."""
+    for begin in range(0, len(places), _BLOCK):
+        block = places[begin : begin + _BLOCK]
+        apart = np.hypot(*(block[:, np.newaxis] - taken).transpose(2, 0, 1)) >= least
+        added: list[DoubleArray] = []
+        for place in block[apart.all(axis=1)]:
+            if len(taken) + len(added) == n:
+                break
+            if all(math.dist(place, other) >= least for other in added):
+                added.append(place)
+        taken = np.concatenate((taken, np.array(added).reshape(-1, 2)))
+        if len(taken) == n:
+            break
+    return taken

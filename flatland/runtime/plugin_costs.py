@@ -1,0 +1,68 @@
+"""Measures the wall time that plugins spend in their hooks."""
+
+from __future__ import annotations
+
+import time
+from collections import defaultdict
+from collections.abc import Callable
+from typing import Any
+
+from flatland.plugin_api.plugin import FlatlandPlugin, describe
+from flatland.runtime.hooks import Hook
+
+
+class PluginCosts:
+    """Wall time of all hooks since the start of a measurement, by plugin.
+
+    Hooks include what they cause: scans, and the messages of the outputs that they write to. See
+    `World.measure_plugins`.
+    """
+
+    def __init__(self, clock: Callable[[], float] = time.perf_counter) -> None:
+        """Starts at zero.
+
+        Args:
+            clock: Returns the wall time [s].
+        """
+        self._clock = clock
+        self._seconds: defaultdict[FlatlandPlugin, float] = defaultdict(float)
+
+    def timed(self, plugin: FlatlandPlugin, hook: Hook) -> Hook:
+        """Returns a hook that also adds the time of each call to the costs of its plugin."""
+        clock, seconds = self._clock, self._seconds
+
+        def call(*arguments: Any) -> None:
+            start = clock()
+            try:
+                hook(*arguments)
+            finally:
+                seconds[plugin] += clock() - start
+
+        return call
+
+    def describe(self, elapsed: float, count: int = 3) -> str:
+        """Returns the names and shares of the most expensive plugins in one line.
+
+        Where plugins share a type, the shares of the most expensive types follow: each of a
+        hundred lasers may be cheap while all of them together are not.
+
+        Args:
+            elapsed: Wall time of the measurement [s], positive.
+            count: Greatest number of plugins and of types.
+        """
+        percent = 100.0 / elapsed
+        plugins = sorted(self._seconds.items(), key=lambda entry: -entry[1])
+        if not plugins:
+            return "no plugin ran"
+        text = ", ".join(
+            f"{describe(plugin)} {seconds * percent:.1f} %" for plugin, seconds in plugins[:count]
+        )
+        members: defaultdict[str, list[float]] = defaultdict(list)
+        for plugin, seconds in plugins:
+            members[plugin.type].append(seconds)
+        if len(members) == len(plugins):
+            return text
+        types = sorted(members.items(), key=lambda entry: -sum(entry[1]))
+        return f"{text}; by type: " + ", ".join(
+            f"{len(times)} x {name} {sum(times) * percent:.1f} %" for name, times in types[:count]
+        )

@@ -1,0 +1,405 @@
+"""Debug marker topics of a running node, as received by a subscriber."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import rospy
+from rosgraph_msgs.msg import Clock
+from std_srvs.srv import Empty, Trigger
+from visualization_msgs.msg import Marker, MarkerArray
+
+from flatland.msg import DebugTopicList
+
+DEBUG = "/flatland_server/debug"
+RATE = 20.0  # Hz, model markers
+
+LAYERS = """
+layers:
+  - {name: 2d, map: map.yaml, color: [0.1, 0.2, 0.3, 0.4]}
+  - {name: [hall, alias], map: turned.yaml, properties: {debug: {min_z: -0.5, max_z: 2.5}}}
+  - {name: bad heights, map: map.yaml, properties: {debug: {min_z: low}}}
+  - {name: growing}
+"""
+TURNED = "type: line_segments\ndata: walls.dat\nscale: 0.5\norigin: [1, 2, 0.5]\n"
+ARM = """
+bodies:
+  - {name: base, color: [1, 0, 0, 1], footprints: [{type: circle, radius: 0.2, center: [0.1, 0.3],
+     density: 1}]}
+  - {name: arm, pose: [1, 0, 0], color: [0, 1, 0, 0.75], footprints: [{type: polygon, density: 1,
+     points: [[0, 0], [0.5, 0], [0.5, 0.25]]}]}
+  - {name: empty, footprints: []}
+joints:
+  - {name: elbow, type: weld, color: [0, 0, 1, 0.5],
+     bodies: [{name: base, anchor: [0.5, 0]}, {name: arm, anchor: [-0.5, 0]}]}
+"""
+PLUGIN = """
+import numpy as np
+from std_srvs.srv import Trigger, TriggerResponse
+import flatland
+
+class Grow(flatland.WorldPlugin):
+    def on_initialize(self, config):
+        self.ros.advertise_service("grow", Trigger, self.grow)
+        self.ros.advertise_service("modify", Trigger, self.modify)
+
+    def grow(self, request):
+        layer = self.world.layer("growing")
+        layer.add_edges(np.array([[0, 0, 1, len(layer.edges)]], np.float32))
+        self.world.layer_changed(layer)
+        return TriggerResponse(True, "")
+
+    def modify(self, request):
+        body = self.world.model("arm").body("empty")
+        body.color = (1.0, 1.0, 0.0, 1.0)
+        body.physics.create_edges(np.array([[9, 9, 9, 11]], np.float32))
+        return TriggerResponse(True, "")
+"""
+MANIFEST = """
+<library path="."><class name="test::Grow" type="test_plugin_of_markers.Grow"
+  base_class_type="flatland::WorldPlugin"/></library>
+"""
+
+
+@pytest.fixture(scope="module", autouse=True)
+def server(module_launcher: Any, write_world: Callable[..., Path]) -> Any:
+    world = write_world(arm=ARM)
+    folder = world.parent
+    (folder / "turned.yaml").write_text(TURNED)
+    (folder / "test_plugin_of_markers.py").write_text(PLUGIN)
+    (folder / "manifest.xml").write_text(MANIFEST)
+    world.write_text(
+        f"properties: {{}}\n{LAYERS}\nmodels: []\nplugins: [{{name: grow, type: 'test::Grow'}}]\n"
+    )
+    module_launcher.environment = {
+        **module_launcher.environment,
+        "FLATLAND_PLUGIN_PATH": str(folder / "manifest.xml"),
+    }
+    return module_launcher.server(world, show_viz=True, viz_pub_rate=RATE)
+
+
+@pytest.fixture
+def arm(ros: Any) -> Any:
+    """A model with all kinds of markers, at (3, 1) and rotated by 90 degrees."""
+    answer = ros.spawn("arm.model.yaml", "arm", "", (3, 1, math.pi / 2))
+    assert answer.success, answer.message
+    yield
+    ros.call("/resume", Empty)
+    ros.delete("arm")
+
+
+def markers_of(ros: Any, name: str) -> list[Marker]:
+    """Returns the first markers received by a new subscriber."""
+    return ros.topic(f"{DEBUG}/{name}", MarkerArray).next().markers
+
+
+def echo(launcher: Any, name: str) -> str:
+    """Returns the first message received in another process, with a connection of its own."""
+    process = launcher.program("rostopic", "echo", "-n", "1", f"{DEBUG}/{name}")
+    assert process.wait() == 0
+    return process.output
+
+
+def color(marker: Marker) -> tuple[float, ...]:
+    return (marker.color.r, marker.color.g, marker.color.b, marker.color.a)
+
+
+def scale(marker: Marker) -> tuple[float, ...]:
+    return (marker.scale.x, marker.scale.y, marker.scale.z)
+
+
+def points(marker: Marker) -> list[list[float]]:
+    return [[point.x, point.y, point.z] for point in marker.points]
+
+
+def pose(marker: Marker) -> tuple[float, ...]:
+    position, orientation = marker.pose.position, marker.pose.orientation
+    assert (position.z, orientation.x, orientation.y) == (0, 0, 0)
+    return (position.x, position.y, 2 * math.atan2(orientation.z, orientation.w))
+
+
+# -- layers --------------------------------------------------------------------------------
+
+
+def test_layer_as_lines(ros: Any) -> None:
+    (marker,) = markers_of(ros, "layer/2d")
+    assert (marker.type, marker.action) == (Marker.LINE_LIST, Marker.ADD)
+    assert marker.header.frame_id == "map"
+    assert color(marker) == pytest.approx((0.1, 0.2, 0.3, 0.4))
+    assert marker.scale.x == 0.03
+    assert pose(marker) == (0, 0, 0)
+    assert marker.lifetime == rospy.Duration(0)
+    corners = [[-5, -5, 0], [5, -5, 0], [5, 5, 0], [-5, 5, 0]]
+    lines = [points(marker)[i : i + 2] for i in range(0, 8, 2)]
+    assert lines == [[corners[i], corners[(i + 1) % 4]] for i in range(4)]
+
+
+def test_layer_markers_have_the_pose_of_the_layer(ros: Any) -> None:
+    for name in ("layer/hall", "layer/hall_3d"):
+        (marker,) = markers_of(ros, name)
+        assert pose(marker) == pytest.approx((1, 2, 0.5))
+        assert {abs(x) for x, _y, _z in points(marker)} == {2.5}
+        assert color(marker) == (1, 1, 1, 1)
+
+
+@pytest.mark.parametrize(
+    ("name", "heights"), [("2d", {0, 1}), ("hall", {-0.5, 2.5}), ("bad_heights", {0, 1})]
+)
+def test_walls_cover_every_edge(ros: Any, name: str, heights: set[float]) -> None:
+    (marker,) = markers_of(ros, f"layer/{name}_3d")
+    (lines,) = markers_of(ros, f"layer/{name}")
+    assert (marker.type, marker.action) == (Marker.TRIANGLE_LIST, Marker.ADD)
+    assert marker.header.frame_id == "map"
+    assert marker.frame_locked
+    assert scale(marker) == (1, 1, 1)
+    assert color(marker) == color(lines)
+    corners = points(marker)
+    assert len(corners) == 4 * 6
+    assert {z for _x, _y, z in corners} == heights
+    edges = [points(lines)[i : i + 2] for i in range(0, 8, 2)]
+    for i, edge in enumerate(edges):
+        wall = corners[6 * i : 6 * i + 6]
+        assert {(x, y) for x, y, _z in wall} == {(x, y) for x, y, _z in edge}
+
+
+def test_invalid_heights_are_logged(server: Any) -> None:
+    server.wait_for_line("layer \"bad heights\".*min_z must be a finite number, got 'low'")
+
+
+def test_layer_is_published_once_and_when_it_changes(ros: Any, launcher: Any) -> None:
+    lines = ros.topic(f"{DEBUG}/layer/growing", MarkerArray)
+    walls = ros.topic(f"{DEBUG}/layer/growing_3d", MarkerArray)
+    assert lines.next().markers == walls.next().markers == []
+    for count in (1, 2):
+        assert ros.call("/grow", Trigger).success
+        (line_marker,), (wall_marker,) = lines.next().markers, walls.next().markers
+        assert points(line_marker)[-1] == [1, count - 1, 0]
+        assert len(line_marker.points) == 2 * count
+        assert len(wall_marker.points) == 6 * count
+    assert echo(launcher, "layer/growing").count("z: 0.0") == 3 + 4  # pose, scale; points
+    # Existing subscribers receive nothing for a late subscriber, or as time passes.
+    assert lines.rest() == walls.rest() == []
+
+
+def test_topics_are_latched(ros: Any, arm: None) -> None:
+    del arm
+    for name in ("layer/2d", "layer/2d_3d", "model/arm"):
+        message = ros.topic(f"{DEBUG}/{name}", MarkerArray).next()
+        assert message._connection_header["latching"] == "1"
+    message = ros.topic(f"{DEBUG}/topics", DebugTopicList).next()
+    assert message._connection_header["latching"] == "1"
+
+
+# -- models --------------------------------------------------------------------------------
+
+
+def test_model_as_footprints_and_joints(ros: Any, arm: None) -> None:
+    del arm
+    clock = ros.topic("/clock", Clock).next().clock
+    markers = markers_of(ros, "model/arm")
+    assert {marker.header.frame_id for marker in markers} == {"map"}
+    assert {marker.action for marker in markers} == {Marker.ADD}
+    assert len({(marker.ns, marker.id) for marker in markers}) == 4
+    (stamp,) = {marker.header.stamp for marker in markers}
+    assert 0 <= (stamp - clock).to_sec() < 5
+    circle, polygon, lines, cubes = markers
+
+    assert circle.type == Marker.SPHERE_LIST
+    assert points(circle) == [pytest.approx([0.1, 0.3, 0.01])]
+    assert scale(circle) == pytest.approx((0.4, 0.4, 0.4))
+    assert color(circle) == (1, 0, 0, 1)
+    assert pose(circle) == pytest.approx((3, 1, math.pi / 2), abs=1e-6)
+
+    assert polygon.type == Marker.LINE_STRIP
+    assert scale(polygon)[0] == 0.03
+    assert color(polygon) == (0, 1, 0, 0.75)
+    assert pose(polygon) == pytest.approx((3, 2, math.pi / 2), abs=1e-6)
+    strip = points(polygon)
+    assert strip[0] == strip[3]
+    assert sorted(strip[:3]) == [[0, 0, 0], [0.5, 0, 0], [0.5, 0.25, 0]]
+
+    origin_a, anchor_a, origin_b, anchor_b = [3, 1, 0], [3, 1.5, 0], [3, 2, 0], [3, 1.5, 0]
+    assert (lines.type, cubes.type) == (Marker.LINE_LIST, Marker.CUBE_LIST)
+    assert scale(lines)[0] == 0.01
+    assert scale(cubes) == (0.03, 0.03, 0.03)
+    assert color(lines) == color(cubes) == (0, 0, 1, 0.5)
+    assert pose(lines) == pose(cubes) == (0, 0, 0)
+    expected = [origin_a, anchor_a, origin_b, anchor_b, anchor_a, anchor_b]
+    assert np.array(points(lines)) == pytest.approx(np.array(expected), abs=1e-5)
+    expected = [origin_a, anchor_a, origin_b, anchor_b]
+    assert np.array(points(cubes)) == pytest.approx(np.array(expected), abs=1e-5)
+
+
+def test_markers_follow_the_model(ros: Any, arm: None) -> None:
+    del arm
+    topic = ros.topic(f"{DEBUG}/model/arm", MarkerArray)
+    topic.next()
+    assert ros.move("arm", (-1, -2, 0)).success
+    message = topic.until(lambda message: pose(message.markers[0])[0] < 0)
+    circle, polygon, lines, cubes = message.markers
+    assert pose(circle) == pytest.approx((-1, -2, 0), abs=1e-5)
+    assert pose(polygon) == pytest.approx((0, -2, 0), abs=1e-5)
+    assert points(lines)[1] == pytest.approx([-0.5, -2, 0], abs=1e-5)
+    assert points(cubes)[2] == pytest.approx([0, -2, 0], abs=1e-5)
+
+
+def test_markers_are_published_while_paused(ros: Any, launcher: Any, arm: None) -> None:
+    del arm
+    topic = ros.topic(f"{DEBUG}/model/arm", MarkerArray)
+    ros.call("/pause", Empty)
+    stamp = topic.take(3)[-1].markers[0].header.stamp
+    assert {message.markers[0].header.stamp for message in topic.take(3)} == {stamp}
+    assert ros.move("arm", (-2, 0, 0)).success
+    topic.until(lambda message: pose(message.markers[0])[0] < 0)
+    topic.close()
+    assert ros.move("arm", (-3, 0, 0)).success  # without subscribers
+    assert "x: -3.0" in echo(launcher, "model/arm")
+
+
+def test_rate_is_in_wall_time(ros: Any, arm: None) -> None:
+    del arm
+    topic = ros.topic(f"{DEBUG}/model/arm", MarkerArray)
+    topic.take(2)
+    start = time.monotonic()
+    count = round(1.5 * RATE)
+    topic.take(count)
+    rate = count / (time.monotonic() - start)
+    assert 0.3 * RATE < rate < 1.1 * RATE
+
+
+def test_changed_footprints_and_colors(ros: Any, arm: None) -> None:
+    del arm
+    topic = ros.topic(f"{DEBUG}/model/arm", MarkerArray)
+    assert len(topic.next().markers) == 4
+    assert ros.call("/modify", Trigger).success
+    markers = topic.until(lambda message: len(message.markers) == 5).markers
+    edge = markers[2]
+    assert edge.type == Marker.LINE_LIST
+    assert points(edge) == [[9, 9, 0], [9, 11, 0]]  # away from all contacts
+    assert scale(edge)[0] == 0.03
+    assert color(edge) == (1, 1, 0, 1)
+    assert pose(edge) == pytest.approx((3, 1, math.pi / 2), abs=1e-6)
+
+
+# -- added and deleted models, list of topics, names --------------------------------------
+
+LAYER_TOPICS = [
+    f"layer/{name}{suffix}"
+    for name in ("2d", "hall", "bad_heights", "growing")
+    for suffix in ("", "_3d")
+]
+
+
+def test_topics_are_listed(ros: Any, launcher: Any) -> None:
+    topics = ros.topic(f"{DEBUG}/topics", DebugTopicList)
+    assert topics.next().topics == LAYER_TOPICS
+    assert ros.spawn("ball.model.yaml", "one").success
+    assert topics.next().topics == [*LAYER_TOPICS, "model/one"]
+    assert ros.spawn("ball.model.yaml", "two").success
+    assert topics.next().topics == [*LAYER_TOPICS, "model/one", "model/two"]
+    assert echo(launcher, "topics").splitlines()[-3:-1] == ["  - model/one", "  - model/two"]
+    assert ros.delete("one").success
+    assert topics.next().topics == [*LAYER_TOPICS, "model/two"]
+    assert ros.delete("two").success
+    assert topics.next().topics == LAYER_TOPICS
+    assert topics.rest() == []
+    assert set(ros.types()) >= {f"{DEBUG}/{name}" for name in LAYER_TOPICS}
+
+
+def test_deleted_model_deletes_its_markers_and_its_topic(ros: Any, eventually: Any) -> None:
+    assert ros.spawn("ball.model.yaml", "one").success
+    topic = ros.topic(f"{DEBUG}/model/one", MarkerArray)
+    topic.next()
+    assert ros.delete("one").success
+    message = topic.until(lambda message: message.markers[0].action == Marker.DELETEALL)
+    assert len(message.markers) == 1
+    assert message.markers[0].header.frame_id == "map"
+    eventually("end of the topic", lambda: not topic.connected)
+    assert f"{DEBUG}/model/one" not in ros.registered()["publishers"]
+    assert topic.rest() == []
+
+
+def test_model_that_is_deleted_and_spawned_again(ros: Any, launcher: Any) -> None:
+    assert ros.spawn("ball.model.yaml", "one").success
+    topic = ros.topic(f"{DEBUG}/model/one", MarkerArray)
+    for x in (1, 2, 3):
+        assert ros.delete("one").success
+        assert ros.spawn("ball.model.yaml", "one", "", (x, 0, 0)).success
+        topic.until(lambda message, x=x: message.markers[0].pose.position.x == x)
+    # For longer than the delay after which the topic of a deleted model is closed.
+    for message in topic.take(10):
+        assert pose(message.markers[0]) == (3, 0, 0)
+    assert "x: 3.0" in echo(launcher, "model/one")
+    assert ros.delete("one").success
+
+
+def test_illegal_names_are_converted_with_a_warning(ros: Any, server: Any) -> None:
+    topics = ros.topic(f"{DEBUG}/topics", DebugTopicList)
+    topics.next()
+    names = ["my robot-1", "my_robot_1", "my-robot-1", "a/b", "Größe", "a//b"]
+    expected = ["my_robot_1", "my_robot_1_2", "my_robot_1_3", "a/b", "Gr__e", "a/b_2"]
+    for i, (name, legal) in enumerate(zip(names, expected, strict=True)):
+        answer = ros.spawn("ball.model.yaml", name, "", (i - 3, 0, 0))
+        assert answer.success, answer.message
+        assert topics.next().topics[-1] == f"model/{legal}"
+        (marker,) = markers_of(ros, f"model/{legal}")
+        assert marker.pose.position.x == i - 3
+    server.wait_for_line(
+        r'WARN.*model "my robot-1" is published on topic ".*/debug/model/my_robot_1"'
+    )
+    server.wait_for_line(r'WARN.*layer "bad heights" is published on topic')
+    assert 'model "a/b" is published' not in server.output
+    for name in names:
+        assert ros.delete(name).success
+    assert "Traceback" not in server.output
+
+
+# -- other servers -------------------------------------------------------------------------
+
+
+def test_without_show_viz_there_are_no_debug_topics(
+    ros: Any, launcher: Any, write_world: Callable[..., Path], eventually: Any
+) -> None:
+    launcher.server(write_world(), "__ns:=/other")
+    eventually("interactive markers", lambda: has_interactive_markers(ros, "/other"))
+    assert not [name for name in ros.types() if name.startswith("/other/flatland_server/debug")]
+
+
+def has_interactive_markers(ros: Any, namespace: str) -> bool:
+    return f"{namespace}/interactive_model_markers/update" in ros.types()
+
+
+def test_layer_with_50000_edges(ros: Any, launcher: Any, write_world: Callable[..., Path]) -> None:
+    world = write_world("[{name: one, model: ball.model.yaml, pose: [500, 500, 0]}]")
+    rng = np.random.default_rng(1)
+    starts = rng.uniform(-100, 100, (50_000, 2))
+    edges = np.concatenate((starts, starts + rng.uniform(0.1, 1, (50_000, 2))), axis=1)
+    np.savetxt(world.parent / "walls.dat", edges, fmt="%.4f")
+    launcher.server(world, "__ns:=/big", show_viz=True)
+    # Received as bytes, because rospy deserializes points slowly.
+    debug = "/big/flatland_server/debug"
+    lines = ros.topic(f"{debug}/layer/2d", rospy.AnyMsg).next()._buff
+    walls = ros.topic(f"{debug}/layer/2d_3d", rospy.AnyMsg).next()._buff
+    for data, count in ((lines, 100_000), (walls, 300_000)):
+        (marker,) = MarkerArray().deserialize(data).markers
+        assert len(marker.points) == count
+        received = np.array([(point.x, point.y) for point in marker.points[-6:]])
+        if data is lines:
+            assert received[-2:] == pytest.approx(edges[-1].reshape(2, 2), abs=1e-3)
+        else:
+            assert set(np.round(received[:, 0], 2)) == set(np.round(edges[-1, ::2], 2))
+
+
+def test_infinite_rates_are_limited(
+    ros: Any, launcher: Any, write_world: Callable[..., Path]
+) -> None:
+    world = write_world("[{name: one, model: ball.model.yaml}]")
+    launcher.server(world, "__ns:=/fast", show_viz=True, viz_pub_rate=".inf", update_rate=0)
+    ros.topic("/fast/flatland_server/debug/model/one", MarkerArray).take(20)
+    assert ros.call("/fast/pause", Empty) is not None

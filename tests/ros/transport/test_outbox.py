@@ -1,0 +1,130 @@
+"""Outbox of a connection: order, complete messages, dropped messages, non-blocking writes."""
+
+from __future__ import annotations
+
+import socket
+import struct
+import time
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+from rospy.exceptions import TransportTerminated
+
+from flatland.ros.transport.outbox import Outbox
+
+
+class Transport:
+    """The part of a rospy transport that an outbox uses."""
+
+    def __init__(self, connection: socket.socket) -> None:
+        self.socket: socket.socket | None = connection
+        self.done = False
+        self.stat_bytes = self.stat_num_msg = 0
+        self._fileno = connection.fileno()
+        self._cleanup: Any = None
+
+    def set_cleanup_callback(self, callback: Any) -> None:
+        self._cleanup = callback
+
+    def fileno(self) -> int:
+        return self._fileno
+
+    def close(self) -> None:
+        if not self.done:
+            self.done = True
+            assert self.socket is not None
+            self.socket.close()
+            self.socket = None
+            self._cleanup(self)
+
+
+class Pair:
+    """An outbox with small socket buffers, and the reader of its connection."""
+
+    def __init__(self, queue_size: int) -> None:
+        ours, self.reader = socket.socketpair()
+        ours.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, 4096)
+        self.reader.settimeout(10)
+        self.transport = Transport(ours)
+        self.outbox = Outbox(self.transport, queue_size)
+
+    def write(self, number: int, size: int = 1000) -> None:
+        self.transport.write_data(struct.pack("<II", number, size) + bytes([number % 251]) * size)
+
+    def read(self) -> int:
+        """Reads one message, checks that it is complete, and returns its number."""
+        number, size = struct.unpack("<II", self._read(8))
+        assert self._read(size) == bytes([number % 251]) * size
+        return int(number)
+
+    def _read(self, size: int) -> bytes:
+        data = b""
+        while len(data) < size:
+            data += self.reader.recv(size - len(data))
+        return data
+
+
+@pytest.fixture(params=[1, 3])
+def pair(request: pytest.FixtureRequest) -> Iterator[Pair]:
+    pair = Pair(request.param)
+    yield pair
+    pair.transport.close()
+    pair.reader.close()
+
+
+def test_fast_reader_receives_all_messages(pair: Pair) -> None:
+    for number in range(500):
+        pair.write(number)
+        assert pair.read() == number
+    assert pair.transport.stat_num_msg == 500
+    assert pair.transport.stat_bytes == 500 * 1008
+
+
+def test_slow_reader_receives_the_newest_messages(pair: Pair) -> None:
+    for number in range(2000):  # Would block forever if a write waited for the reader.
+        pair.write(number)
+    numbers = [pair.read()]
+    while numbers[-1] != 1999:
+        numbers.append(pair.read())
+    assert numbers == sorted(set(numbers))
+    assert len(numbers) < 1000
+    queue_size = pair.outbox._queue.maxlen
+    assert queue_size is not None
+    assert numbers[-queue_size:] == list(range(2000 - queue_size, 2000))
+
+
+def test_message_larger_than_the_socket_buffer_is_complete(pair: Pair) -> None:
+    pair.write(7, 3_000_000)
+    pair.write(8)
+    assert [pair.read(), pair.read()] == [7, 8]
+    assert pair.transport.stat_num_msg == 2
+
+
+def test_writes_continue_after_the_reader_has_caught_up(pair: Pair) -> None:
+    for number in range(100):
+        pair.write(number)
+    while pair.read() != 99:
+        pass
+    for number in range(100, 200):
+        pair.write(number)
+        assert pair.read() == number
+
+
+def test_closed_reader_ends_the_connection(pair: Pair) -> None:
+    for number in range(100):
+        pair.write(number)
+    pair.reader.close()
+    end = time.monotonic() + 10
+    # The flusher detects it without another message.
+    while not pair.transport.done and time.monotonic() < end:
+        time.sleep(0.001)
+    assert pair.transport.done
+    with pytest.raises(TransportTerminated):
+        pair.write(100)
+
+
+def test_write_to_a_closed_connection_raises(pair: Pair) -> None:
+    pair.transport.close()
+    with pytest.raises(TransportTerminated):
+        pair.write(1)

@@ -1,0 +1,213 @@
+"""Capturing the contents of an image: geometry, and that the world is not modified."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+
+import flatland
+from flatland.drawing.capture import capture_scene
+
+ROOM = ["##########", *["#........#"] * 8, "##########"]  # 1 m cells: walls at x, y = 1 and 9
+
+
+def room_world(
+    files: Any, plugins: str = "[]", bodies: str = "", joints: str = "[]", **options: Any
+) -> flatland.World:
+    """A room with a robot at (4, 3), heading along the y axis."""
+    files.write_map("room", ROOM)
+    default = "[{name: base, footprints: [{type: circle, radius: 0.5, density: 1}]}]"
+    files.write(
+        "robot.model.yaml",
+        f"{{bodies: {bodies or default}, joints: {joints}, plugins: {plugins}}}",
+    )
+    return files.load(
+        """
+        properties: {}
+        layers: [{name: [walls, 3d], map: room.yaml, color: [1, 0, 0, 1]}, {name: empty}]
+        models: [{name: robot, model: robot.model.yaml, pose: [4, 3, 1.5707963267948966]}]
+        """,
+        **options,
+    )
+
+
+def laser(extra: str = "", increment: float = math.pi / 2) -> str:
+    fan = f"{{min: 0, max: 4.8, increment: {increment}}}"
+    return f"{{type: Laser, name: eye, body: base, range: 20, angle: {fan}, {extra}}}"
+
+
+DRIVE = "{type: DiffDrive, name: drive, body: base}"
+CROSS_HITS = [(4, 9), (1, 3), (4, 1), (9, 3)]  # front, left, back, right
+
+
+def hits(world: flatland.World) -> Any:
+    (scan,) = capture_scene(world, None, scans=True).scans
+    return scan.hits
+
+
+def eye(world: flatland.World) -> Any:
+    return world.model("robot").plugin("eye")
+
+
+def distance_from_walls(points: Any) -> Any:
+    """Distance from the walls of the room [m], shape (n,)."""
+    return np.abs(np.abs(points - 5).max(axis=1) - 4)
+
+
+def test_walls_are_in_the_world_frame(files):
+    files.write_map("room", ["##", "#."], origin="[10, 20, 1.5707963267948966]")
+    world = files.load("{properties: {}, layers: [{name: a, map: room.yaml}]}")
+    (layer,) = capture_scene(world, None, scans=True).layers
+    corners = {tuple(point) for point in layer.edges.reshape(-1, 2).round(6).tolist()}
+    corners_in_map = [(0, 0), (1, 0), (1, 1), (2, 1), (2, 2), (0, 2)]
+    assert corners == {(10 - y, 20 + x) for x, y in corners_in_map}  # rotated by 90 degrees
+    assert layer.color == (1, 1, 1, 1)
+
+
+def test_layers_are_selected_by_any_of_their_names(files):
+    world = room_world(files)
+    assert [len(each.edges) for each in capture_scene(world, None, scans=True).layers] == [8, 0]
+    (layer,) = capture_scene(world, ["3d", "walls"], scans=True).layers
+    assert len(layer.edges) == 8
+    assert capture_scene(world, [], scans=True).layers == []
+    with pytest.raises(flatland.WorldError, match='layer with name "roof" does not exist'):
+        capture_scene(world, ["walls", "roof"], scans=True)
+
+
+def test_footprints_have_the_pose_of_their_body(files):
+    bodies = """[
+      {name: base, color: [0, 0, 1, 1], footprints: [
+        {type: polygon, points: [[0, 0], [2, 0], [2, 1], [0, 1]], density: 1}]},
+      {name: arm, pose: [1, 0, 0], footprints: [
+        {type: circle, radius: 0.25, center: [0.5, 0], density: 1, sensor: true}]}]"""
+    scene = capture_scene(room_world(files, bodies=bodies), None, scans=True)
+    (model,) = scene.models
+    base, arm = model.outlines
+    corners = {tuple(point) for point in base.points.round(4).tolist()}
+    assert corners == {(4, 3), (4, 5), (3, 5), (3, 3)}
+    assert (base.color, base.is_sensor) == ((0, 0, 1, 1), False)
+    assert arm.is_sensor
+    # 1.5 m in front of the model, which heads along the y axis.
+    assert np.hypot(*(arm.points - (4, 4.5)).T) == pytest.approx(0.25, abs=1e-5)
+    assert model.center == pytest.approx((3.5, 4, math.pi / 2), abs=1e-5)
+    assert model.width == pytest.approx(1)
+    assert scene.bounds() == (0, 0, 10, 10)
+
+
+def test_joint_connects_origins_and_anchors(files):
+    bodies = "[{name: a, footprints: []}, {name: b, pose: [2, 0, 0], footprints: []}]"
+    ends = "[{name: a, anchor: [1.5, 0]}, {name: b, anchor: [-0.5, 0.1]}]"
+    joint = f"{{type: revolute, name: j, bodies: {ends}, color: [0, 1, 0, 1]}}"
+    scene = capture_scene(room_world(files, bodies=bodies, joints=f"[{joint}]"), None, scans=True)
+    (drawing,) = scene.joints
+    assert drawing.points == pytest.approx(
+        np.array([(4, 3), (4, 4.5), (3.9, 4.5), (4, 5)]), abs=1e-5
+    )
+    assert drawing.color == (0, 1, 0, 1)
+    # A body without footprints has no heading triangle.
+    assert scene.models[0].center is None
+
+
+class TestScans:
+    def test_laser_without_a_scan_is_drawn_without_noise(self, files):
+        world = room_world(files, f"[{laser('noise_std_dev: 0.5')}]")
+        assert hits(world) == pytest.approx(np.array(CROSS_HITS), abs=1e-4)
+        (scan,) = capture_scene(world, None, scans=True).scans
+        assert scan.area == pytest.approx(np.array([(4, 3), *CROSS_HITS]), abs=1e-4)
+        assert eye(world).last_scan is None
+
+    def test_scans_are_optional(self, files):
+        assert capture_scene(room_world(files, f"[{laser()}]"), None, scans=False).scans == []
+
+    def test_mounting_pose_and_upside_down(self, files):
+        world = room_world(files, f"[{laser('upside_down: true, origin: [1, 0, 0]')}]")
+        expected = [(4, 9), (9, 4), (4, 1), (1, 4)]
+        # The circle of the body itself, with a radius of 0.5 m, is behind the sensor.
+        expected[2] = (4, 3.5)
+        assert hits(world) == pytest.approx(np.array(expected), abs=1e-4)
+
+    @pytest.mark.parametrize("no_hit", ["nan", "inf", "range"])
+    def test_beam_without_a_hit_has_no_point(self, files, no_hit):
+        world = room_world(files, f"[{laser(f'layers: [empty], no_hit: {no_hit}')}]")
+        for _ in range(2):  # without and with a scan
+            (scan,) = capture_scene(world, None, scans=True).scans
+            assert scan.hits.shape == (0, 2)
+            assert np.hypot(*(scan.area[1:] - (4, 3)).T) == pytest.approx(20)
+            world.output("/scan")
+            world.step()
+        assert eye(world).last_scan is not None
+
+    def test_last_scan_is_drawn_with_its_noise(self, files):
+        world = room_world(files, f"[{laser('noise_std_dev: 0.02', increment=0.01)}]")
+        output = world.output("/scan")
+        world.step()
+        (scan,) = capture_scene(world, None, scans=True).scans
+        ranges = np.hypot(*(scan.hits - (4, 3)).T)
+        assert ranges == pytest.approx(output.latest.ranges, abs=1e-5)
+        assert 0.005 < distance_from_walls(scan.hits).std() < 0.05
+
+    def test_last_scan_is_drawn_at_the_pose_of_the_sensor_at_that_time(self, files):
+        world = room_world(files, f"[{DRIVE}, {laser('update_rate: 20', increment=0.01)}]")
+        output = world.output("/scan")
+        world.command("/cmd_vel").set(flatland.Twist(linear_x=1.0, angular_z=1.0))
+        world.step(59)
+        assert world.timekeeper.sim_time_ns - output.latest.stamp == 45_000_000
+        (scan,) = capture_scene(world, None, scans=True).scans
+        ranges = np.hypot(*(scan.hits - scan.area[0]).T)
+        assert ranges == pytest.approx(output.latest.ranges, abs=1e-5)
+        assert distance_from_walls(scan.hits).max() < 1e-4
+        # Within 45 ms the robot has driven 45 mm.
+        assert np.hypot(*(scan.area[0] - world.models[0].pose[:2])) == pytest.approx(
+            0.045, abs=5e-3
+        )
+
+    def test_last_scan_stays_where_it_was_taken_when_the_model_is_moved(self, files):
+        world = room_world(files, f"[{laser('update_rate: 1', increment=0.01)}]")
+        world.output("/scan")
+        world.step()
+        before = hits(world)
+        world.move_model("robot", (7, 6, 0.3))
+        assert (hits(world) == before).all()
+
+    def test_lasers_with_the_same_topic_and_frame_are_drawn_separately(self, files):
+        other = laser("origin: [0, 0, 0.5], frame: eye").replace("name: eye", "name: other")
+        world = room_world(files, f"[{laser()}, {other}]")
+        world.output("/scan")
+        world.step()
+        first, second = capture_scene(world, None, scans=True).scans
+        assert first.hits == pytest.approx(np.array(CROSS_HITS), abs=1e-4)
+        assert distance_from_walls(second.hits).max() < 1e-4
+        assert np.abs(second.hits - first.hits).max() > 0.5
+
+
+def test_capturing_does_not_modify_the_world(files):
+    plugins = f"[{DRIVE}, {laser('noise_std_dev: 0.1', increment=0.1)}]"
+
+    def run(capture: bool) -> tuple[Any, ...]:
+        world = room_world(files, plugins, seed=5)
+        plugin = eye(world)
+        world.command("/cmd_vel").set(flatland.Twist(linear_x=0.5, angular_z=1.0))
+        for _ in range(20):
+            if capture:
+                capture_scene(world, None, scans=True)
+            world.step(5)
+        assert not world.ports.find_output("/scan").wanted
+        body = world.models[0].bodies[0]
+        return (
+            body.pose,
+            body.velocity,
+            plugin.rng.bit_generator.state,
+            plugin.intensities.tobytes(),
+        )
+
+    assert run(capture=True) == run(capture=False)
+
+
+def test_closed_world_raises(files):
+    world = room_world(files)
+    world.close()
+    with pytest.raises(flatland.WorldError, match="the world is closed"):
+        capture_scene(world, None, scans=True)

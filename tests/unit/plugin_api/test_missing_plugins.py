@@ -1,0 +1,214 @@
+"""Plugins that no manifest declares: all of a world or model in one error, and what to do."""
+
+from __future__ import annotations
+
+import re
+
+import pytest
+
+import flatland
+from flatland import PluginError
+from flatland.plugin_api.missing_plugins import PORTING_GUIDE, MissingPluginsError
+
+BODY = "{name: base, footprints: [{type: circle, radius: 0.2, density: 1}]}"
+
+CPP_PACKAGE = """
+<package format="2"><name>{name}</name><export>
+  <{tag} plugin="${{prefix}}/plugins.xml"/>
+</export></package>
+"""
+CPP_MANIFEST = """
+<library path="lib/libhall">
+  <class type="flatland_plugins::Elevator" base_class_type="flatland_server::ModelPlugin"/>
+  <class name="hall::Door" type="hall_internal::Door"
+         base_class_type="flatland_server::WorldPlugin"/>
+</library>
+"""
+
+
+@pytest.fixture(autouse=True)
+def _no_other_plugins(monkeypatch):
+    monkeypatch.delenv("ROS_PACKAGE_PATH", raising=False)
+    monkeypatch.delenv("FLATLAND_PLUGIN_PATH", raising=False)
+
+
+def write_model(files, name, *plugins):
+    lines = [f"bodies: [{BODY}]", "plugins:", *(f"- {{{plugin}}}" for plugin in plugins)]
+    return files.write(name, "\n".join(lines) + "\n")
+
+
+def error_of(action, *arguments):
+    with pytest.raises(MissingPluginsError) as caught:
+        action(*arguments)
+    return str(caught.value)
+
+
+def find_error(type_name):
+    with pytest.raises(PluginError) as caught:
+        flatland.World(seed=1).plugin_registry.find(type_name)
+    return str(caught.value)
+
+
+def test_all_missing_plugins_of_a_world_are_in_one_error(files):
+    a = write_model(files, "a.yaml", "name: up, type: Elevator", "name: eye, type: Lasser")
+    b = write_model(files, "b.yaml", "name: d, type: Tween, body: base", 'name: g, type: "x::Gate"')
+    text = """
+    properties: {}
+    layers: []
+    models:
+    - {name: one, model: a.yaml}
+    - {name: two, model: b.yaml}
+    - {name: three, model: a.yaml}
+    plugins:
+    - {name: W, type: Weather}
+    - {name: off, type: Absent, enabled: false}
+    """
+    first, *others, advice = error_of(files.load, text).split("\n")
+    world = files.folder / "world.yaml"
+    assert [first, *others] == [
+        'Flatland plugin: Model Plugin "up" type "Elevator" model "one", "three": no plugin '
+        f'"flatland_plugins::Elevator" [{a}:3]',
+        'Model Plugin "eye" type "Lasser" model "one", "three": no plugin '
+        f'"flatland_plugins::Lasser" (did you mean "Laser"?) [{a}:4]',
+        f'Model Plugin "g" type "x::Gate" model "two": no plugin "x::Gate" [{b}:4]',
+        f'World Plugin "W" type "Weather": no plugin "flatland_plugins::Weather" [{world}:9]',
+    ]
+    assert advice.startswith("C++ plugins cannot be loaded, ")
+    assert advice.count("flatland_plugins::") == 10
+
+
+def test_missing_world_plugins_are_found_before_any_of_them_starts(files, caplog):
+    text = """
+    properties: {}
+    layers: []
+    plugins: [{name: A, type: RandomWall}, {name: B, type: Wind}, {name: C, type: Rain}]
+    """
+    message = error_of(files.load, text)
+    assert re.search(r'"B" type "Wind".*\n.*"C" type "Rain"', message)
+    assert '"A"' not in message
+
+
+def test_a_faulty_file_hides_no_missing_plugin(files):
+    write_model(files, "a.yaml", "name: p, type: Pump")
+    files.write("broken.yaml", "bodies: [")
+    text = """
+    properties: {}
+    layers: []
+    models:
+    - {name: one, model: a.yaml}
+    - {name: two, model: broken.yaml}
+    - {name: three, model: absent.yaml}
+    - {name: four}
+    - {name: five, model: minimal.model.yaml}
+    plugins: [{name: x}, {name: W, type: Weather}]
+    """
+    message = error_of(files.load, text)
+    assert '"p" type "Pump" model "one"' in message
+    assert "Weather" not in message  # its list is faulty
+    text = text.replace("{name: x}, ", "")
+    assert '"W" type "Weather"' in error_of(files.load, text)
+
+
+def test_a_spawned_model_reports_all_its_missing_plugins_and_starts_none(files, empty_world):
+    path = write_model(
+        files,
+        "m.yaml",
+        "name: t, type: Tween, body: base, mode: trigger, trigger_topic: go",
+        "name: a, type: Aaa",
+        "name: off, type: Off, enabled: false",
+        "name: b, type: Bbb",
+    )
+    message = error_of(empty_world.spawn_model, path, "m")
+    assert [line.split(":")[0] for line in message.split("\n")[1:2]] == [
+        'Model Plugin "b" type "Bbb" model "m"'
+    ]
+    assert '"a" type "Aaa" model "m"' in message
+    assert "Off" not in message
+    assert f"[{path}:4]" in message
+    assert f"[{path}:6]" in message
+    assert (empty_world.models, empty_world.ports.commands) == ([], {})
+
+
+def test_one_missing_plugin_is_reported_in_one_line(files, empty_world):
+    path = write_model(files, "m.yaml", "name: p, type: Pump")
+    message = error_of(empty_world.spawn_model, path, "m")
+    assert message.startswith(
+        'Flatland plugin: Model Plugin "p" type "Pump" model "m": no plugin '
+        '"flatland_plugins::Pump"; C++ plugins cannot be loaded, '
+    )
+    assert message.endswith(f" [{path}:3]")
+    assert "\n" not in message
+
+
+def test_advice_holds(files, empty_world, checkout):
+    path = write_model(files, "m.yaml", "name: p, type: Pump")
+    assert '"enabled: false"' in error_of(empty_world.spawn_model, path, "m")
+    path = write_model(files, "m.yaml", "name: p, type: Pump, enabled: false")
+    assert empty_world.spawn_model(path, "m").plugins == []
+    section, page = re.fullmatch('section "(.*)" of (.*)', PORTING_GUIDE).groups()
+    assert f"\n## {section}\n" in (checkout / page).read_text()
+
+
+@pytest.mark.parametrize(
+    ("type_name", "near"),
+    [
+        ("Lasser", '"Laser"'),
+        ("laser", '"Laser"'),
+        ("my_plugins::Laser", '"Laser"'),
+        ("flatland_plugins/DiffDrive", '"DiffDrive"'),
+        ("diff_drive", '"DiffDrive"'),
+        ("ModelTFPublisher", '"ModelTfPublisher"'),
+        ("Pump", ""),
+        ("PedestrianCrowd", ""),
+        ("DummyModelPlugn", ""),
+        ("DummyWorldPlugins", ""),
+        ("Plugin", ""),
+    ],
+)
+def test_near_names(type_name, near):
+    message = find_error(type_name)
+    found = re.search(r" \(did you mean (.*)\?\)", message)
+    assert (found[1] if found else "") == near
+    assert "::Dummy" not in message.split("known are: ")[1]
+
+
+def test_near_names_of_other_packages(files, monkeypatch):
+    classes = [
+        f'<class name="{name}" type="a.B" base_class_type="flatland::ModelPlugin"/>'
+        for name in ("robots::Battery", "carts::Battery", "robots::Wing")
+    ]
+    manifest = files.write("m.xml", f"<library>{''.join(classes)}</library>")
+    monkeypatch.setenv("FLATLAND_PLUGIN_PATH", manifest)
+    message = find_error("Batery")
+    assert '(did you mean "carts::Battery" or "robots::Battery"?)' in message
+    assert "known are: carts::Battery, robots::Battery, " in message
+
+
+@pytest.mark.parametrize("tag", ["flatland", "flatland_server"])
+def test_packages_that_export_a_cpp_plugin_of_the_name(files, monkeypatch, tag, caplog):
+    for name in ("hall", "other"):
+        files.write(f"{name}/package.xml", CPP_PACKAGE.format(name=name, tag=tag))
+        files.write(f"{name}/plugins.xml", CPP_MANIFEST)
+    monkeypatch.setenv("ROS_PACKAGE_PATH", str(files.folder))
+    places = [f'package "{name}" ({files.folder}/{name}/plugins.xml)' for name in ("hall", "other")]
+    exported = f"; a C++ plugin of that name is exported by {places[0]} and {places[1]}; "
+    for type_name in ("Elevator", "flatland_plugins::Elevator", "hall::Door"):
+        assert exported in find_error(type_name)
+    for type_name in ("Door", "hall_internal::Door", "x::Elevator"):
+        assert "exported" not in find_error(type_name)
+    assert "not read" not in find_error("Door")
+    assert not caplog.records
+
+
+def test_a_cpp_manifest_that_cannot_be_read(files, monkeypatch):
+    files.write("hall/package.xml", CPP_PACKAGE.format(name="hall", tag="flatland_server"))
+    monkeypatch.setenv("ROS_PACKAGE_PATH", str(files.folder))
+    path = f"{files.folder}/hall/plugins.xml"
+    assert f'; not read: manifest "{path}" cannot be read: No such file' in find_error("Door")
+
+
+def test_a_listed_manifest_with_cpp_plugins(files, monkeypatch):
+    manifest = files.write("cpp.xml", CPP_MANIFEST)
+    monkeypatch.setenv("FLATLAND_PLUGIN_PATH", manifest)
+    exported = f'a C++ plugin of that name is exported by manifest "{manifest}";'
+    assert exported in find_error("Elevator")

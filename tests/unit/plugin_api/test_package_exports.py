@@ -1,0 +1,174 @@
+"""The search of packages on `ROS_PACKAGE_PATH` and when it is repeated."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import pytest
+
+from flatland.plugin_api import package_exports
+from flatland.plugin_api.package_exports import Export
+
+LONG_AGO = 1_000_000_000  # s, a time of files that no clock unit is near to
+
+
+def package(name: str, exports: str) -> str:
+    return f"<package><name>{name}</name><export>{exports}</export></package>"
+
+
+def exported(tag: str = "flatland") -> str:
+    return f'<{tag} plugin="${{prefix}}/p.xml"/>'
+
+
+@pytest.fixture
+def search(files, monkeypatch):
+    """Writes files, makes them old, and returns the exports below some folders."""
+
+    def search_folders(contents, folders=(".",)):
+        for path, text in contents.items():
+            files.write(path, text)
+        age(files.folder)
+        roots = [str(files.folder / folder) for folder in folders]
+        monkeypatch.setenv("ROS_PACKAGE_PATH", ":".join(roots))
+        return package_exports.package_exports()
+
+    return search_folders
+
+
+def age(folder: Path) -> None:
+    """Gives a folder and all that it holds an old time."""
+    for path in [*folder.rglob("*"), folder]:
+        os.utime(path, (LONG_AGO, LONG_AGO))
+
+
+def names(found) -> list[str]:
+    return [export.package for export in found.exports]
+
+
+def test_exports_of_both_tags(search, files):
+    found = search(
+        {
+            "a/package.xml": package("first", exported()),
+            "b/deep/package.xml": package("second", exported("flatland_server") + exported()),
+            "c/package.xml": package("third", '<rviz plugin="x.xml"/><flatland/>'),
+        }
+    )
+    folder = files.folder
+    assert found.exports == (
+        Export("first", "flatland", f"{folder}/a/p.xml"),
+        Export("second", "flatland_server", f"{folder}/b/deep/p.xml"),
+        Export("second", "flatland", f"{folder}/b/deep/p.xml"),
+    )
+    assert found.problems == ()
+
+
+@pytest.mark.parametrize(
+    ("contents", "expected"),
+    [
+        ({"a/CATKIN_IGNORE": "", "a/package.xml": package("a", exported())}, []),
+        ({"a/CATKIN_IGNORE": "", "a/b/package.xml": package("b", exported())}, []),
+        ({"a/rospack_nosubdirs": "", "a/b/package.xml": package("b", exported())}, []),
+        ({".hidden/package.xml": package("a", exported())}, []),
+        ({"a/package.xml": package("a", ""), "a/b/package.xml": package("b", exported())}, []),
+        ({"a/manifest.xml": f"<package><export>{exported()}</export></package>"}, ["a"]),
+        ({"a/package.xml": package("flatland", exported())}, []),
+        ({"a/package.xml": package("x", exported()), "b/package.xml": package("x", exported())},
+         ["x"]),
+    ],
+)  # fmt: skip
+def test_what_a_package_is(search, contents, expected):
+    assert names(search(contents)) == expected
+
+
+def test_a_package_hides_one_of_that_name_later_on_the_path(search):
+    contents = {
+        "over/x/package.xml": package("x", ""),
+        "under/x/package.xml": package("x", exported()),
+        "under/y/package.xml": package("y", exported()),
+    }
+    assert names(search(contents, ["over", "under"])) == ["y"]
+    assert names(search(contents, ["under", "over"])) == ["x", "y"]
+
+
+def test_links_in_a_circle(search, files):
+    files.write("a/package.xml", package("a", exported()))
+    (files.folder / "b").mkdir()
+    (files.folder / "b" / "up").symlink_to(files.folder)
+    assert names(search({})) == ["a"]
+
+
+def test_a_package_file_that_is_not_xml(search, files):
+    contents = {
+        "a/package.xml": "<package><name>a</name><flatland",
+        "b/package.xml": "<package><name>b</name><broken, but no plugins",
+        "c/package.xml": package("c", exported()),
+    }
+    found = search(contents)
+    (problem,) = found.problems
+    assert str(problem) == (
+        f'Flatland plugin: "{files.folder}/a/package.xml" is not XML, '
+        "unclosed token: line 1, column 23"
+    )
+    assert names(found) == ["c"]
+
+
+def test_no_path_and_folders_that_do_not_exist(search, monkeypatch):
+    assert names(search({}, ["absent"])) == []
+    for value in ("", ":"):
+        monkeypatch.setenv("ROS_PACKAGE_PATH", value)
+        assert names(package_exports.package_exports()) == []
+    monkeypatch.delenv("ROS_PACKAGE_PATH")
+    assert names(package_exports.package_exports()) == []
+
+
+@pytest.fixture
+def searches(monkeypatch):
+    """The package paths that were searched, in order."""
+    searched = []
+    search = package_exports._search
+
+    def count(path):
+        searched.append(path)
+        return search(path)
+
+    monkeypatch.setattr(package_exports, "_search", count)
+    return searched
+
+
+def test_the_path_is_searched_once_while_nothing_changes(search, searches):
+    first = search({"a/package.xml": package("a", exported())})
+    assert package_exports.package_exports() is first
+    assert len(searches) == 1
+    search({"empty/x": ""}, ["empty"])
+    assert len(searches) == 2
+
+
+@pytest.mark.parametrize(
+    ("change", "expected"),
+    [
+        (lambda folder: (folder / "new").mkdir(), ["a"]),
+        (lambda folder: (folder / "b" / "package.xml").write_text(package("b", exported())),
+         ["a", "b"]),
+        (lambda folder: (folder / "a" / "package.xml").write_text(package("z", exported())), ["z"]),
+        (lambda folder: (folder / "a" / "package.xml").unlink(), []),
+        (lambda folder: (folder / "a" / "CATKIN_IGNORE").touch(), []),
+    ],
+)  # fmt: skip
+def test_a_change_of_a_folder_or_package_file_is_noticed(search, searches, files, change, expected):
+    assert names(search({"a/package.xml": package("a", exported()), "b/x": ""})) == ["a"]
+    change(files.folder)
+    assert names(package_exports.package_exports()) == expected
+    assert len(searches) == 2
+
+
+def test_a_change_right_after_a_search_is_noticed(search, searches, files):
+    """The change may leave the time of the folder as it is, when its clock is coarse."""
+    search({"a/x": ""})
+    (files.folder / "a" / "package.xml").write_text(package("a", exported()))
+    now = (files.folder / "a").stat().st_mtime_ns
+    assert names(package_exports.package_exports()) == ["a"]
+    (files.folder / "a" / "CATKIN_IGNORE").touch()
+    os.utime(files.folder / "a", ns=(now, now))
+    assert names(package_exports.package_exports()) == []
+    assert len(searches) == 3

@@ -1,0 +1,104 @@
+"""Markers of layers: height of walls, and vectorized construction."""
+
+from __future__ import annotations
+
+import logging
+import sys
+from io import BytesIO
+from typing import Any
+
+import numpy as np
+import pytest
+
+pytest.importorskip("visualization_msgs", reason="ROS is not installed")
+
+from flatland.entities.layer import Layer
+from flatland.physics import PhysicsWorld
+from flatland.ros.markers.layer_markers import LayerMarkers
+
+
+def make_layer(properties: dict[str, Any], edges: np.ndarray | None = None) -> Layer:
+    if edges is None:
+        edges = np.array([[0, 0, 2, 0]], np.float32)
+    color = (0.1, 0.2, 0.3, 0.4)
+    return Layer(
+        PhysicsWorld(), ["walls"], 1, color, properties, origin=(1, 2, 0.5), edges=edges
+    )  # fmt: skip
+
+
+def heights(properties: dict[str, Any]) -> tuple[float, float]:
+    (marker,) = LayerMarkers(make_layer(properties)).walls(0).markers
+    z = [point.z for point in marker.points]
+    return min(z), max(z)
+
+
+@pytest.mark.parametrize(
+    ("properties", "expected"),
+    [
+        ({}, (0, 1)),
+        ({"debug": None}, (0, 1)),
+        ({"debug": {}}, (0, 1)),
+        ({"debug": {"min_z": -0.5, "max_z": 2}}, (-0.5, 2)),
+        ({"debug": {"min_z": "0.25", "max_z": "3"}}, (0.25, 3)),
+        ({"debug": {"max_z": 0.5}}, (0, 0.5)),
+        ({"debug": {"max_z": 0.5, "other": [1]}, "more": 1}, (0, 0.5)),
+    ],
+)
+def test_heights_of_walls(
+    properties: dict[str, Any], expected: tuple[float, float], caplog: pytest.LogCaptureFixture
+) -> None:
+    assert heights(properties) == expected
+    assert caplog.records == []
+
+
+@pytest.mark.parametrize(
+    ("debug", "reason"),
+    [
+        ("high", "debug must be a map with min_z and max_z, got 'high'"),
+        ([0, 1], "debug must be a map"),
+        ({"min_z": "low"}, "min_z must be a finite number, got 'low'"),
+        ({"max_z": float("nan")}, "max_z must be a finite number, got nan"),
+        ({"max_z": [1]}, "max_z must be a finite number"),
+        ({"max_z": True}, "max_z must be a finite number"),
+        ({"min_z": 1}, "min_z must be less than max_z, got 1 and 1"),
+    ],
+)
+def test_invalid_heights_are_logged_and_ignored(
+    debug: Any, reason: str, caplog: pytest.LogCaptureFixture
+) -> None:
+    with caplog.at_level(logging.WARNING):
+        assert heights({"debug": debug}) == (0, 1)
+    assert 'layer "walls"' in caplog.text
+    assert reason in caplog.text
+
+
+def test_layer_without_edges_has_no_marker() -> None:
+    markers = LayerMarkers(make_layer({}, np.empty((0, 4), np.float32)))
+    assert markers.lines(0).markers == []
+    assert markers.walls(0).markers == []
+
+
+def executed_lines(edge_count: int) -> int:
+    """Returns the number of Python lines executed to create and serialize the markers."""
+    edges = np.random.default_rng(1).uniform(-100, 100, (edge_count, 4)).astype(np.float32)
+    layer = make_layer({}, edges)
+    count = 0
+
+    def trace(_frame: Any, event: str, _argument: Any) -> Any:
+        nonlocal count
+        count += event == "line"
+        return trace
+
+    sys.settrace(trace)
+    try:
+        markers = LayerMarkers(layer)
+        for message in (markers.lines(0), markers.walls(0)):
+            message.serialize(BytesIO())
+    finally:
+        sys.settrace(None)
+    return count
+
+
+def test_no_python_line_is_executed_per_edge() -> None:
+    few = executed_lines(100)
+    assert 0 < executed_lines(50_000) <= few + 100

@@ -1,0 +1,97 @@
+"""Frames with two parents are logged once, with the plugins that send them."""
+
+from __future__ import annotations
+
+import pytest
+
+DRIVE = "{name: drive, type: DiffDrive, body: base}"
+TF = "{name: tf, type: ModelTfPublisher, publish_tf_world: true}"
+
+
+def model(files, name, *plugins):
+    files.write(
+        f"{name}.yaml",
+        f"""
+        bodies:
+        - {{name: base, footprints: [{{type: circle, radius: 0.2, density: 1}}]}}
+        - {{name: arm, footprints: [{{type: circle, radius: 0.2, density: 1}}]}}
+        plugins: [{", ".join(plugins)}]
+        """,
+    )
+    return f"{name}.yaml"
+
+
+def warnings(caplog):
+    return [r.getMessage() for r in caplog.records if "has two parents" in r.getMessage()]
+
+
+def test_a_drive_and_a_tf_publisher_of_one_model(files, empty_world, caplog):
+    empty_world.spawn_model(model(files, "m", DRIVE, TF), "m")
+    empty_world.step(50)
+    assert warnings(caplog) == [
+        'TF frame "base" has two parents, "odom" from Model Plugin "drive" type "DiffDrive" '
+        'model "m" and "map" from Model Plugin "tf" type "ModelTfPublisher" model "m"; give the '
+        "frames different names, or let one plugin not send it"
+    ]
+    assert caplog.records[0].levelname == "WARNING"
+
+
+def test_two_models(files, empty_world, caplog):
+    empty_world.spawn_model(model(files, "a", DRIVE), "a")
+    empty_world.spawn_model(model(files, "b", TF), "b")
+    empty_world.step(3)
+    (text,) = warnings(caplog)
+    assert '"odom" from Model Plugin "drive" type "DiffDrive" model "a"' in text
+    assert '"map" from Model Plugin "tf" type "ModelTfPublisher" model "b"' in text
+
+
+def test_each_pair_of_parents_of_a_frame_is_logged_once(files, empty_world, caplog):
+    drive2 = DRIVE.replace("drive,", "drive2,").replace("base}", "base, odom_frame_id: odom2}")
+    empty_world.spawn_model(model(files, "m", DRIVE, TF, drive2), "m")
+    empty_world.step(2)
+    assert len(warnings(caplog)) == 3
+    for index in range(3):
+        empty_world.spawn_model("m.yaml", f"m{index}")
+        empty_world.step(2)
+        empty_world.delete_model(f"m{index}")
+    assert len(warnings(caplog)) == 3
+    empty_world.spawn_model("m.yaml", "n", "robot")
+    empty_world.step(2)
+    assert len(warnings(caplog)) == 6
+
+
+@pytest.mark.parametrize(
+    "plugins",
+    [
+        [DRIVE.replace("body: base", "body: base, enable_odom_tf_pub: false"), TF],
+        [DRIVE, TF.replace("publish_tf_world: true", "publish_tf_world: false")],
+        [DRIVE, DRIVE.replace("drive,", "same,")],
+    ],
+)
+def test_no_warning_where_each_frame_has_one_parent(files, empty_world, caplog, plugins):
+    empty_world.spawn_model(model(files, "m", *plugins), "m")
+    empty_world.spawn_model("m.yaml", "other", "ns")
+    empty_world.step(3)
+    assert warnings(caplog) == []
+    assert empty_world.transforms
+
+
+def test_a_sender_that_ended_does_not_count(files, empty_world, caplog):
+    empty_world.spawn_model(model(files, "a", DRIVE), "a")
+    empty_world.spawn_model(model(files, "b", TF), "b", "ns")
+    empty_world.step(3)
+    empty_world.delete_model("a")
+    empty_world.spawn_model("b.yaml", "c")
+    empty_world.step(3)
+    assert warnings(caplog) == []
+    empty_world.spawn_model("a.yaml", "d")
+    empty_world.step(1)
+    assert len(warnings(caplog)) == 1
+
+
+def test_a_plugin_may_move_a_frame_to_another_parent(files, empty_world, caplog):
+    empty_world.spawn_model(model(files, "m", DRIVE), "m")
+    (plugin,) = empty_world.model("m").plugins
+    for parent in ("shelf", "gripper", "shelf"):
+        plugin.send_transform(parent, "box", 0.0, 0.0, 0.0)
+    assert warnings(caplog) == []

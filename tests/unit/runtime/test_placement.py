@@ -1,0 +1,488 @@
+"""Blocked poses in a world: what `if_blocked` does, and which places are free."""
+
+from __future__ import annotations
+
+import logging
+import math
+from pathlib import Path
+from typing import Any, ClassVar
+
+import numpy as np
+import pytest
+
+import flatland
+from flatland import PluginError, WorldError
+
+ROOM = "-5 -5 5 -5\n5 -5 5 5\n5 5 -5 5\n-5 5 -5 -5\n"
+WORLD = """
+properties: {}
+layers:
+  - {name: walls, map: room.yaml}
+  - {name: high, map: high.yaml}
+models: []
+"""
+CRATE = """
+bodies:
+  - name: base
+    footprints: [{type: polygon, points: [[-.5, -.5], [.5, -.5], [.5, .5], [-.5, .5]], density: 1,
+                  layers: [walls]}]
+"""
+CART = """
+bodies:
+  - {name: front, pose: [1, 0, 0], footprints: [{type: circle, radius: 0.2, density: 1}]}
+  - {name: rear, footprints: [{type: circle, radius: 0.2, density: 1},
+                              {type: circle, radius: 2, density: 0, sensor: true}]}
+joints:
+  - {name: hitch, type: weld,
+     bodies: [{name: front, anchor: [-1, 0]}, {name: rear, anchor: [0, 0]}]}
+"""
+
+
+@pytest.fixture
+def world(files: Any) -> flatland.World:
+    """A room of 10 m by 10 m in one layer, and a shelf at x = 2 in another."""
+    files.write("room.dat", ROOM)
+    files.write("high.dat", "2 -1 2 1\n")
+    for name in ("room", "high"):
+        files.write(
+            f"{name}.yaml",
+            f"{{type: line_segments, data: {name}.dat, scale: 1, origin: [0, 0, 0]}}",
+        )
+    files.write("crate.model.yaml", CRATE)
+    files.write("cart.model.yaml", CART)
+    loaded: flatland.World = files.load(WORLD)
+    return loaded
+
+
+def spawn(
+    world: flatland.World, file: str, name: str, pose: tuple[float, ...], **options: Any
+) -> Any:
+    return world.spawn_model(f"{file}.model.yaml", name, pose=pose, **options)
+
+
+def warnings_of(caplog: pytest.LogCaptureFixture) -> list[str]:
+    return [r.getMessage() for r in caplog.records if r.levelno >= logging.WARNING]
+
+
+# -- if_blocked ---------------------------------------------------------------------------------
+
+
+def test_warn_is_the_default_and_names_all_that_is_overlapped(
+    world: flatland.World, caplog: pytest.LogCaptureFixture
+) -> None:
+    spawn(world, "minimal", "first", (4.5, 0, 0))
+    assert warnings_of(caplog) == []
+    model = spawn(world, "minimal", "second", (4.84, 0.1, 0.5))
+    text = 'model "second" overlaps layer "walls", model "first" at '
+    assert warnings_of(caplog) == [text + "(4.840, 0.100, 0.500)"]
+    assert model.pose == pytest.approx((4.84, 0.1, 0.5))
+    assert world.move_model("second", (4.81, 0.0, 0.0)) is model
+    assert warnings_of(caplog)[1:] == [text + "(4.810, 0.000, 0.000)"]
+    assert model.pose == pytest.approx((4.81, 0.0, 0.0))
+    assert model.displacement == (0.0, 0.0)
+
+
+def test_allow_says_nothing(world: flatland.World, caplog: pytest.LogCaptureFixture) -> None:
+    model = spawn(world, "minimal", "m", (5, 0, 0), if_blocked="allow")
+    world.move_model("m", (-5, 0, 0), if_blocked="allow")
+    assert model.pose == pytest.approx((-5, 0, 0))
+    assert warnings_of(caplog) == []
+
+
+def test_refuse_leaves_the_world_as_it_was(world: flatland.World) -> None:
+    first = spawn(world, "minimal", "first", (1, 0, 0), if_blocked="refuse")
+    first.bodies[0].set_velocity(0.1, 0.2, 0.3)
+    fixtures = len(world.physics.contacts())
+    with pytest.raises(WorldError) as error:
+        spawn(world, "minimal", "second", (1.3, 0, 0), if_blocked="refuse")
+    assert str(error.value) == (
+        'Flatland World: failed to spawn model "second", it overlaps model "first" at '
+        "(1.300, 0.000, 0.000)"
+    )
+    assert world.models == [first]
+    assert len(world.physics.contacts()) == fixtures
+    with pytest.raises(WorldError, match='failed to move model "first", it overlaps layer "walls"'):
+        world.move_model("first", (1, 4.9, 0), if_blocked="refuse")
+    assert first.pose == pytest.approx((1, 0, 0))
+    assert first.bodies[0].velocity == pytest.approx((0.1, 0.2, 0.3))
+    world.move_model("first", (1.1, 0, 0), if_blocked="refuse")  # overlaps only where it was
+    assert first.pose == pytest.approx((1.1, 0, 0))
+
+
+def test_a_model_that_is_refused_starts_no_plugin(world: flatland.World, files: Any) -> None:
+    files.write("bad.model.yaml", CRATE + "plugins: [{name: p, type: Missing}]\n")
+    with pytest.raises(PluginError):
+        spawn(world, "bad", "m", (0, 0, 0), if_blocked="refuse")
+    with pytest.raises(WorldError, match="it overlaps"):
+        spawn(world, "bad", "m", (5, 0, 0), if_blocked="refuse")
+    assert world.models == []
+
+
+@pytest.mark.parametrize(
+    ("asked", "distance"),
+    [
+        ((4.9, 1.0, 0.7), 0.1),  # 0.2 from the wall at x = 5, inside
+        ((4.9, 4.85, -2.0), math.hypot(0.1, 0.05)),  # both walls of the corner
+        ((5.1, 0.0, 0.0), 0.1),  # outside is nearer
+    ],
+)
+def test_nearest_to_walls(
+    world: flatland.World, asked: tuple[float, float, float], distance: float
+) -> None:
+    model = spawn(world, "minimal", "m", asked, if_blocked="nearest")
+    assert model.pose[2] == pytest.approx(asked[2])
+    assert math.dist(model.pose[:2], asked[:2]) == pytest.approx(distance, abs=0.006)
+    assert model.displacement == pytest.approx(
+        (model.pose[0] - asked[0], model.pose[1] - asked[1]), abs=1e-6
+    )
+    assert world.is_free(model.pose, model=model)
+    world.move_model("m", (0, 0, 0), if_blocked="nearest")
+    assert model.pose == pytest.approx((0, 0, 0))
+    assert model.displacement == (0.0, 0.0)
+    world.move_model("m", asked, if_blocked="nearest")
+    assert math.hypot(*model.displacement) == pytest.approx(distance, abs=0.006)
+
+
+def test_nearest_among_crates_is_between_them(world: flatland.World) -> None:
+    """A ring of crates around a hole: the next free place is in the hole."""
+    for i, (x, y) in enumerate(
+        [(-1, -1), (0, -1), (1, -1), (-1, 0), (1, 0), (-1, 1), (0, 1), (1, 1)]
+    ):
+        spawn(world, "crate", f"c{i}", (x, y, 0), if_blocked="refuse")
+    model = spawn(world, "minimal", "m", (0.4, 0.4, 0), if_blocked="nearest")
+    # A disc of radius 0.2 in a hole from -0.5 to 0.5
+    assert model.pose == pytest.approx((0.3, 0.3, 0), abs=0.005)
+
+
+def test_nearest_moves_all_bodies(world: flatland.World) -> None:
+    """The rear body is the one that is blocked; the pose of the model is that of the front."""
+    model = spawn(world, "cart", "m", (-4.9, 0, 0), if_blocked="nearest")
+    front, rear = model.body("front").pose, model.body("rear").pose
+    assert rear == pytest.approx((-4.8, 0, 0), abs=0.006)
+    assert front == pytest.approx((rear[0] + 1, rear[1], 0), abs=1e-5)
+    assert model.displacement == pytest.approx((0.1, 0), abs=0.006)
+
+
+def test_nearest_finds_none(world: flatland.World, files: Any) -> None:
+    """A disc that is larger than the room overlaps the walls within 5 m of the middle."""
+    files.write(
+        "giant.model.yaml",
+        "bodies: [{name: b, footprints: [{type: circle, radius: 5.5, density: 1}]}]",
+    )
+    with pytest.raises(WorldError) as error:
+        spawn(world, "giant", "m", (0, 0, 0), if_blocked="nearest")
+    assert str(error.value) == (
+        'Flatland World: failed to spawn model "m", it overlaps layer "walls", layer "high" at '
+        "(0.000, 0.000, 0.000), and there is no free place within 5 m"
+    )
+    assert world.models == []
+
+
+def test_touching_is_not_blocked(world: flatland.World, caplog: pytest.LogCaptureFixture) -> None:
+    """A row of crates from wall to wall, and a stack of two."""
+    for i in range(10):
+        spawn(world, "crate", f"c{i}", (-4.5 + i, -4.5, 0))
+    spawn(world, "crate", "top", (0.3, -3.5, math.pi / 2))
+    spawn(world, "crate", "sunk", (3.0, -3.504, 0))  # by less than 5 mm
+    assert warnings_of(caplog) == []
+    spawn(world, "crate", "deep", (-3.0, -3.506, 0))
+    assert len(warnings_of(caplog)) == 1
+
+
+def test_layers_and_sensors_count_as_in_the_physics(world: flatland.World) -> None:
+    """A crate is in the layer of the walls only, and the sensor of a cart reaches the wall."""
+    spawn(world, "crate", "c", (2, 0, 0), if_blocked="refuse")
+    spawn(world, "cart", "cart", (3.5, 3, math.pi), if_blocked="refuse")
+    with pytest.raises(WorldError, match='overlaps layer "high"'):
+        spawn(world, "minimal", "m", (2, 0.9, 0), if_blocked="refuse")
+
+
+def test_bodies_that_belong_to_no_model(world: flatland.World) -> None:
+    world.physics.create_body("static", (0, 3, 0)).create_circle((0, 0), 0.5, density=1)
+    with pytest.raises(WorldError, match="it overlaps a body of no model at"):
+        spawn(world, "minimal", "m", (0, 3, 0), if_blocked="refuse")
+
+
+def test_unknown_choice(world: flatland.World) -> None:
+    text = "if_blocked must be one of allow, warn, refuse, nearest, got 'stop'"
+    with pytest.raises(ValueError, match=text):
+        spawn(world, "minimal", "m", (0, 0, 0), if_blocked="stop")
+    spawn(world, "minimal", "m", (0, 0, 0))
+    with pytest.raises(ValueError, match=text):
+        world.move_model("m", (0, 0, 0), if_blocked="stop")  # type: ignore[arg-type]
+
+
+def test_a_hook_that_is_refused_gets_one_error_in_the_log(
+    world: flatland.World, caplog: pytest.LogCaptureFixture
+) -> None:
+    spawn(world, "minimal", "m", (0, 0, 0))
+
+    class MoveOnce(flatland.WorldObserver):
+        results: ClassVar[list[object]] = []
+
+        def time_advanced(self, sim_time_ns: int) -> None:
+            if not self.results:
+                assert world.is_free((4, 0), radius=0.2)
+                self.results.append(world.move_model("m", (5, 0, 0), if_blocked="refuse"))
+
+    world.add_observer(MoveOnce())
+    world.step()
+    assert MoveOnce.results == [None]
+    assert world.model("m").pose == pytest.approx((0, 0, 0))
+    assert ["failed to move" in line for line in warnings_of(caplog)] == [True]
+
+
+def test_models_of_a_world_file_warn_once_each(
+    world: flatland.World, files: Any, caplog: pytest.LogCaptureFixture
+) -> None:
+    models = """
+    models:
+      - {name: a, model: minimal.model.yaml, pose: [5, 0, 0]}
+      - {name: b, model: minimal.model.yaml, pose: [5, 0.1, 0]}
+      - {name: c, model: minimal.model.yaml, pose: [0, 0, 0]}
+    """
+    files.load(WORLD.replace("models: []", "") + models.replace("\n    ", "\n"))
+    assert warnings_of(caplog) == [
+        'model "a" overlaps layer "walls" at (5.000, 0.000, 0.000)',
+        'model "b" overlaps layer "walls", model "a" at (5.000, 0.100, 0.000)',
+    ]
+
+
+# -- worlds that people have --------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", ["office", "simple"])
+def test_included_worlds_have_no_overlaps(
+    checkout: Path, name: str, caplog: pytest.LogCaptureFixture
+) -> None:
+    with flatland.World.from_yaml(checkout / "worlds" / name / "world.yaml", seed=1):
+        assert warnings_of(caplog) == []
+
+
+@pytest.mark.parametrize(
+    ("name", "expected"),
+    [
+        ("benchmark_world", []),
+        ("conestogo_office_test", []),
+        (
+            # Discs of radius 1.78 m and 0.5 m that are 1 m apart, a robot in a wall, ...
+            "simple_test_A",
+            [
+                'model "turtlebot1" overlaps layer "2d", layer "3d" at (0.000, 0.000, 0.000)',
+                'model "turtlebot2" overlaps layer "3d" at (3.000, 4.500, 3.142)',
+                'model "chair1" overlaps model "turtlebot2" at (1.200, 3.500, 2.123)',
+                'model "person1" overlaps model "turtlebot1" at (0.000, 1.000, 2.000)',
+            ],
+        ),
+    ],
+)
+def test_worlds_of_the_reference_warn_of_true_overlaps_only(
+    shared_dir: Path, name: str, expected: list[str], caplog: pytest.LogCaptureFixture
+) -> None:
+    with flatland.World.from_yaml(shared_dir / "worlds" / name / "world.yaml", seed=1):
+        assert warnings_of(caplog) == expected
+
+
+# -- is_free ------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("pose", "options", "free"),
+    [
+        ((4.69, 0), {"radius": 0.3}, True),
+        ((4.704, 0, 2.0), {"radius": 0.3}, True),  # less than 5 mm deep
+        ((4.706, 0), {"radius": 0.3}, False),
+        ((4.6, 0), {"radius": 0.3, "clearance": 0.05}, True),
+        ((4.6, 0), {"radius": 0.3, "clearance": 0.15}, False),
+        ((2.0, 0), {"radius": 0.3}, False),
+        ((2.0, 0), {"radius": 0.3, "layers": "walls"}, True),
+        ((2.0, 0), {"radius": 0.3, "layers": ["high", "walls"]}, False),
+        ((4.9, 0), {"radius": 0.3, "layers": ["high"]}, True),
+        ((0, 0.5), {"radius": 0.3}, False),  # the model m
+        ((0, 0.5), {"radius": 0.3, "ignore": "m"}, True),
+        ((0, 0.5), {"radius": 0.3, "ignore": ["m", "n"]}, True),
+        ((0, 0.5), {"radius": 0.3, "ignore": ["n"]}, False),
+        ((0, 0.1, 0), {"model": "m"}, True),
+        ((0, 3.1, 0), {"model": "m"}, False),
+        ((0, 3.1, 0), {"model": "m", "ignore": "n"}, True),
+        ((0, 2.5, 0), {"model": "m"}, True),
+        ((0, 2.5, 0), {"model": "m", "clearance": 0.2}, False),
+        ((9, 9), {"radius": 0.3}, True),
+    ],
+)
+def test_is_free(
+    world: flatland.World, pose: tuple[float, ...], options: dict[str, Any], free: bool
+) -> None:
+    spawn(world, "minimal", "m", (0, 0.3, 0))
+    spawn(world, "minimal", "n", (0, 3, 0))
+    assert world.is_free(pose, **options) is free
+    if isinstance(options.get("model"), str):
+        options = {**options, "model": world.model(options["model"])}
+        assert world.is_free(pose, **options) is free
+
+
+@pytest.mark.parametrize(
+    ("pose", "options", "error", "text"),
+    [
+        ((0, 0), {}, ValueError, "needs either a radius or a model"),
+        ((0, 0), {"radius": 1, "model": "m"}, ValueError, "needs either a radius or a model"),
+        ((0, math.nan), {"radius": 1}, ValueError, "pose must be finite"),
+        ((0, 1, 2, 3), {"radius": 1}, ValueError, "pose must be three numbers"),
+        ((0, 0), {"radius": -1}, ValueError, "radius must be finite and not negative"),
+        ((0, 0), {"radius": 1, "clearance": math.inf}, ValueError, "clearance must be finite"),
+        ((0, 0), {"model": "x"}, WorldError, 'model with name "x" does not exist'),
+        ((0, 0), {"radius": 1, "ignore": "x"}, WorldError, 'model with name "x" does not exist'),
+        ((0, 0), {"radius": 1, "layers": "x"}, WorldError, 'layer with name "x" does not exist'),
+    ],
+)
+def test_bad_questions(
+    world: flatland.World,
+    pose: tuple[float, ...],
+    options: dict[str, Any],
+    error: type[Exception],
+    text: str,
+) -> None:
+    spawn(world, "minimal", "m", (0, 0, 0))
+    with pytest.raises(error, match=text):
+        world.is_free(pose, **options)
+
+
+def test_is_free_in_a_closed_world(world: flatland.World) -> None:
+    world.close()
+    with pytest.raises(WorldError, match="the world is closed"):
+        world.is_free((0, 0), radius=1)
+
+
+# -- sample_free --------------------------------------------------------------------------------
+
+
+def check_samples(
+    world: flatland.World, poses: Any, n: int, radius: float, clearance: float
+) -> None:
+    assert poses.shape == (n, 3)
+    assert poses.dtype == np.float64
+    assert (np.abs(poses[:, 2]) <= math.pi).all()
+    for index, (x, y, _) in enumerate(poses):
+        assert world.is_free((x, y), radius, clearance=clearance + 0.005 - 1e-4)
+        for other in poses[:index]:
+            assert math.dist((x, y), other[:2]) >= 2 * radius + clearance - 1e-9
+
+
+def test_samples_are_free_apart_and_repeatable(world: flatland.World) -> None:
+    spawn(world, "crate", "c", (0, 0, 0.5))
+    poses = world.sample_free(60, 0.3, 0.1, np.random.default_rng(5))
+    check_samples(world, poses, 60, 0.3, 0.1)
+    assert np.abs(poses[:, :2]).max() <= 5 - 0.4 + 1e-4
+    assert len(np.unique(np.sign(poses[:, :2]), axis=0)) == 4  # in all corners of the room
+    assert np.array_equal(poses, world.sample_free(60, 0.3, 0.1, np.random.default_rng(5)))
+    assert np.array_equal(poses, world.sample_free(60, 0.3, 0.1, 5))
+    assert not np.array_equal(poses, world.sample_free(60, 0.3, 0.1, 6))
+
+
+def test_the_generator_of_the_world_follows_its_seed(world: flatland.World, files: Any) -> None:
+    first, second = (world.sample_free(5, 0.3) for _ in range(2))
+    assert not np.array_equal(first, second)
+    again = files.load(WORLD)
+    assert np.array_equal(first, again.sample_free(5, 0.3))
+    other = files.load(WORLD, seed=2)
+    assert not np.array_equal(first, other.sample_free(5, 0.3))
+
+
+def test_samples_can_be_spawned_at_without_a_warning(
+    world: flatland.World, caplog: pytest.LogCaptureFixture
+) -> None:
+    for index, pose in enumerate(world.sample_free(40, 0.2, rng=3)):
+        spawn(world, "minimal", f"m{index}", tuple(pose), if_blocked="refuse")
+    assert warnings_of(caplog) == []
+    check_samples(world, world.sample_free(10, 0.2, rng=4), 10, 0.2, 0.0)
+    ignoring = world.sample_free(500, 0.05, rng=4, ignore=world.models)
+    assert not all(world.is_free(pose, 0.05) for pose in ignoring)
+
+
+def test_samples_in_bounds_and_layers(world: flatland.World) -> None:
+    poses = world.sample_free(9, 0.1, 0.0, 1, bounds=(1.5, -0.5, 2.5, 0.5))
+    assert (poses[:, :2] >= (1.5, -0.5)).all()
+    assert (poses[:, :2] <= (2.5, 0.5)).all()
+    assert (np.abs(poses[:, 0] - 2) >= 0.1 - 1e-6).all()
+    through = world.sample_free(9, 0.1, 0.0, 1, bounds=(1.5, -0.5, 2.5, 0.5), layers="walls")
+    assert (np.abs(through[:, 0] - 2) < 0.1).any()
+
+
+def test_walls_that_come_later_count(world: flatland.World) -> None:
+    """A wall at x = 0 cuts the room in two; what was cached is not used any more."""
+    before = world.sample_free(40, 0.3, 0.0, 1, connected_to=(-3, 0))
+    assert (before[:, 0] > 0).any()
+    world.layer("walls").add_edges(np.array([[0, -5, 0, 5]], np.float32))
+    after = world.sample_free(40, 0.3, 0.0, 1, connected_to=(-3, 0))
+    assert (after[:, 0] <= -0.3 + 1e-4).all()
+    assert (world.sample_free(40, 0.3, 0.0, 1)[:, 0] > 0).any()
+
+
+def test_moved_walls_count(world: flatland.World) -> None:
+    world.layer("walls").body.set_pose(20, 0, math.pi / 4)
+    poses = world.sample_free(20, 0.3, 0.0, 1, connected_to=(20, 0))
+    assert np.abs(poses[:, 0] - 20).max() <= 5 * math.sqrt(2)
+    check_samples(world, poses, 20, 0.3, 0.0)
+    x, y = poses[:, 0] - 20, poses[:, 1]
+    assert max(np.abs(x + y).max(), np.abs(x - y).max()) <= (5 - 0.3) * math.sqrt(2) + 1e-4
+
+
+def test_too_few_places(world: flatland.World) -> None:
+    with pytest.raises(
+        WorldError, match=r"found only [1-9] of 20 free places for discs of radius 2 m"
+    ):
+        world.sample_free(20, 2.0, rng=1)
+    with pytest.raises(WorldError, match="found only 0 of 1 free places"):
+        world.sample_free(1, 5.1, rng=1)
+    with pytest.raises(WorldError, match=r"found only 0 of 1 .* connected to \(4, 4\)"):
+        world.sample_free(1, 0.3, 4.8, rng=1, connected_to=(4, 4))
+    assert world.sample_free(0, 1.0, rng=1).shape == (0, 3)
+
+
+def test_a_place_that_just_fits_is_found(world: flatland.World) -> None:
+    """4.98 m of radius leave a square of 4 cm in the middle of the room."""
+    poses = world.sample_free(1, 4.98, rng=1, layers="walls")
+    assert np.abs(poses[0, :2]).max() <= 0.0201
+
+
+@pytest.mark.parametrize(
+    ("arguments", "options", "text"),
+    [
+        ((-1, 0.3), {}, "n must not be negative"),
+        ((1, 0), {}, "radius must be positive"),
+        ((1, math.nan), {}, "radius must be finite"),
+        ((1, 0.3, -0.1), {}, "clearance must be finite and not negative"),
+        ((1, 0.3), {"bounds": (0, 0, 0, 1)}, "bounds must be"),
+        ((1, 0.3), {"connected_to": (0, math.inf)}, "must be finite"),
+    ],
+)
+def test_bad_samples(
+    world: flatland.World, arguments: Any, options: dict[str, Any], text: str
+) -> None:
+    with pytest.raises(ValueError, match=text):
+        world.sample_free(*arguments, **options)
+
+
+def test_a_world_without_walls_needs_bounds(empty_world: flatland.World) -> None:
+    with pytest.raises(WorldError, match="no walls to sample between: give bounds"):
+        empty_world.sample_free(3, 0.3)
+    poses = empty_world.sample_free(9, 0.3, 0.0, 1, bounds=(-2, 3, 2, 5), connected_to=(0, 4))
+    check_samples(empty_world, poses, 9, 0.3, 0.0)
+
+
+def test_samples_in_the_office_are_all_in_rooms(checkout: Path) -> None:
+    """All that a robot reaches is inside of the building, and beside its tables."""
+    with flatland.World.from_yaml(checkout / "worlds/office/world.yaml", seed=1) as world:
+        x, y, _ = world.model("robot").pose
+        poses = world.sample_free(50, 0.25, 0.1, rng=2, connected_to=(x, y))
+        check_samples(world, poses, 50, 0.25, 0.1)
+        walls = world.layer("walls")
+        corners = walls.edges.reshape(-1, 2) + walls.body.pose[:2]
+        low, high = corners.min(axis=0), corners.max(axis=0)
+        assert (poses[:, :2] > low + 0.35 - 1e-4).all()
+        assert (poses[:, :2] < high - 0.35 + 1e-4).all()
+        assert world.is_free(poses[0], radius=0.25)
+        everywhere = world.sample_free(400, 0.05, rng=2)
+        reached = world.sample_free(400, 0.05, rng=2, connected_to=(x, y))
+        # Without a start, places within thick walls and in shafts are drawn, too.
+        assert not np.array_equal(everywhere, reached)

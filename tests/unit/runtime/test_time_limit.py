@@ -1,0 +1,96 @@
+"""Limits of wall time: what is interrupted, and what is left behind."""
+
+from __future__ import annotations
+
+import signal
+import socket
+import threading
+import time
+from collections.abc import Callable
+from concurrent.futures import Future
+
+import pytest
+
+from flatland.runtime.time_limit import TimeLimitExceeded, time_limit
+
+LIMIT = 0.05
+
+
+def loop() -> None:
+    while True:
+        pass
+
+
+def stubborn_loop() -> None:
+    interruptions = 0
+    while interruptions < 3:
+        try:
+            loop()
+        except BaseException:
+            interruptions += 1
+    loop()
+
+
+def receive() -> None:
+    reader, _writer = socket.socketpair()
+    with reader, _writer:
+        reader.recv(1)
+
+
+def in_thread(run: Callable[[], object]) -> BaseException | None:
+    """Returns what a function raises in a thread of its own."""
+    done: Future[None] = Future()
+
+    def call() -> None:
+        try:
+            run()
+        except BaseException as error:
+            done.set_exception(error)
+        else:
+            done.set_result(None)
+
+    threading.Thread(target=call, daemon=True).start()
+    return done.exception()
+
+
+def limited(run: Callable[[], object]) -> None:
+    with time_limit(LIMIT):
+        run()
+
+
+@pytest.mark.parametrize(
+    "block",
+    [loop, stubborn_loop, receive, lambda: time.sleep(1e6), lambda: threading.Event().wait()],
+    ids=["loop", "stubborn loop", "socket", "sleep", "lock"],
+)
+def test_code_that_blocks_the_main_thread_is_interrupted(block: Callable[[], object]) -> None:
+    handler = signal.getsignal(signal.SIGALRM)
+    with pytest.raises(TimeLimitExceeded):
+        limited(block)
+    assert signal.getsignal(signal.SIGALRM) is handler
+    assert signal.getitimer(signal.ITIMER_REAL) == (0.0, 0.0)
+
+
+@pytest.mark.parametrize("block", [loop, stubborn_loop])
+def test_python_code_in_another_thread_is_interrupted(block: Callable[[], object]) -> None:
+    assert isinstance(in_thread(lambda: limited(block)), TimeLimitExceeded)
+
+
+@pytest.mark.parametrize("in_main_thread", [False, True])
+def test_code_that_returns_in_time_is_not_disturbed(in_main_thread: bool) -> None:
+    def run() -> None:
+        for _ in range(20):
+            with time_limit(10):
+                pass
+        with pytest.raises(KeyError), time_limit(10):
+            raise KeyError
+
+    if in_main_thread:
+        run()
+    else:
+        assert in_thread(run) is None
+
+
+def test_no_limit() -> None:
+    with time_limit(None):
+        assert signal.getitimer(signal.ITIMER_REAL) == (0.0, 0.0)

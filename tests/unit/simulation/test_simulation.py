@@ -1,0 +1,236 @@
+"""The loop: its rate, pauses, requests, reports and ends; without ROS."""
+
+from __future__ import annotations
+
+import itertools
+import math
+import threading
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+import flatland
+from flatland.simulation import CycleStatistics, Simulation
+
+PATIENCE = 20.0  # s; only a test that fails waits that long
+
+
+class Counter(flatland.WorldObserver):
+    """Counts steps and lets others wait for them."""
+
+    def __init__(self) -> None:
+        self.times: list[float] = []
+        self._condition = threading.Condition()
+
+    def time_advanced(self, time_ns: int) -> None:
+        del time_ns
+        with self._condition:
+            self.times.append(time.perf_counter())
+            self._condition.notify_all()
+
+    def wait_for(self, count: int) -> None:
+        with self._condition:
+            assert self._condition.wait_for(lambda: len(self.times) >= count, PATIENCE)
+
+
+@pytest.fixture
+def counter() -> Counter:
+    return Counter()
+
+
+@pytest.fixture
+def world(counter: Counter) -> Iterator[flatland.World]:
+    with flatland.World(seed=1, step_size=0.01, observers=[counter]) as world:
+        yield world
+
+
+class Running:
+    """A simulation that runs in a thread for the length of a with block."""
+
+    def __init__(self, simulation: Simulation) -> None:
+        self.simulation = simulation
+        self.thread = threading.Thread(target=simulation.run)
+
+    def __enter__(self) -> Simulation:
+        self.thread.start()
+        return self.simulation
+
+    def __exit__(self, *_: object) -> None:
+        self.simulation.stop()
+        self.thread.join(PATIENCE)
+        assert not self.thread.is_alive()
+
+
+@pytest.mark.parametrize("rate", [-1.0, math.nan, -math.inf])
+def test_bad_rate_is_refused(world: flatland.World, rate: float) -> None:
+    with pytest.raises(ValueError, match="update_rate must not be negative"):
+        Simulation(world, rate)
+
+
+def test_runs_for_an_exact_simulated_time(world: flatland.World) -> None:
+    result = Simulation(world, 0).run(2.5)
+    assert result.steps == 250
+    assert world.time == 2.5
+    assert result.steps_per_second == pytest.approx(result.steps / result.wall_time)
+    assert Simulation(world, math.inf).run(0.1).steps == 10
+    assert world.time == 2.6
+
+
+def test_is_never_faster_than_its_rate(world: flatland.World) -> None:
+    result = Simulation(world, 500).run(0.5)
+    assert result.steps == 50
+    # The first step is due at once, the other 49 follow in steps of 2 ms.
+    assert result.wall_time >= 49 * 0.002
+
+
+def test_rate_changes_at_once(world: flatland.World, counter: Counter) -> None:
+    simulation = Simulation(world, 0.001, max_lag=0)
+    with Running(simulation):
+        counter.wait_for(1)  # The next step would be due in a quarter of an hour.
+        simulation.post(lambda: simulation.set_rate(50)).result(PATIENCE)
+        counter.wait_for(12)
+        simulation.post(lambda: simulation.set_rate(math.inf)).result(PATIENCE)
+        counter.wait_for(400)
+    steps = counter.times
+    # At 50 Hz no cycle is made up for here but the first; as fast as possible it takes no time.
+    assert steps[11] - steps[2] >= 9 * 0.02 - 0.02
+    assert steps[399] - steps[20] < 379 * 0.02
+
+
+def test_bad_rate_changes_nothing(world: flatland.World) -> None:
+    simulation = Simulation(world, 500)
+    for rate in (-1.0, math.nan):
+        with pytest.raises(ValueError, match="update_rate must not be negative"):
+            simulation.set_rate(rate)
+    assert simulation.run(0.3).wall_time >= 29 * 0.002
+
+
+def test_late_loop_without_lag_catches_up_with_one_cycle_at_most(
+    world: flatland.World, counter: Counter
+) -> None:
+    simulation = Simulation(world, 100, max_lag=0)
+    with Running(simulation):
+        counter.wait_for(3)
+        simulation.post(lambda: time.sleep(0.2)).result(PATIENCE)  # 20 cycles are lost
+        counter.wait_for(len(counter.times) + 8)
+    gaps = [after - before for before, after in itertools.pairwise(counter.times)]
+    late = gaps.index(max(gaps))
+    # Had it made up for the lost time, the steps behind the gap would have come all at once.
+    assert sum(gaps[late + 1 : late + 7]) > 0.03
+
+
+def test_pause_and_resume_by_requests(world: flatland.World, counter: Counter) -> None:
+    for rate in (200, 0):
+        simulation = Simulation(world, rate)
+        with Running(simulation):
+            counter.wait_for(len(counter.times) + 3)
+            simulation.post(world.pause).result(PATIENCE)
+            steps = len(counter.times)
+            assert simulation.post(lambda: world.paused).result(PATIENCE) is True
+            assert len(counter.times) == steps
+            simulation.post(world.resume).result(PATIENCE)
+            counter.wait_for(steps + 3)
+
+
+def test_requests_run_in_order_in_the_loops_thread(world: flatland.World) -> None:
+    seen: list[int] = []
+    running = Running(Simulation(world, 200))
+    with running as simulation:
+        futures = [simulation.post(lambda i=i: seen.append(i)) for i in range(50)]  # type: ignore[misc]
+        ident = simulation.post(threading.get_ident).result(PATIENCE)
+        assert all(future.done() for future in futures)
+    assert seen == list(range(50))
+    assert ident == running.thread.ident
+
+
+def test_models_come_and_go_in_the_order_of_the_requests(
+    world: flatland.World, tmp_path: Path
+) -> None:
+    path = tmp_path / "ball.yaml"
+    path.write_text("bodies: [{name: b, footprints: []}]\n")
+    simulation = Simulation(world, 0)
+    # All wait for the first step: a later one must not overtake an earlier one.
+    futures = [
+        simulation.post(action)
+        for _ in range(5)
+        for action in (
+            lambda: world.spawn_model(path, "ball"),
+            lambda: len(world.models),
+            lambda: world.delete_model("ball"),
+            lambda: len(world.models),
+        )
+    ]
+    simulation.run(0.01)
+    assert [future.exception(PATIENCE) for future in futures] == [None] * 20
+    assert [future.result() for future in futures[1::2]] == [1, 0] * 5
+
+
+def test_request_does_not_wait_for_a_slow_cycle(world: flatland.World, counter: Counter) -> None:
+    simulation = Simulation(world, 0.001)  # one step in 1000 s
+    with Running(simulation):
+        counter.wait_for(1)
+        start = time.monotonic()
+        assert simulation.post(lambda: "done").result(PATIENCE) == "done"
+        assert time.monotonic() - start < 5
+    assert len(counter.times) == 1
+
+
+def test_failing_request_does_not_stop_the_loop(world: flatland.World, counter: Counter) -> None:
+    def fail() -> None:
+        raise RuntimeError("as asked for")
+
+    with Running(Simulation(world, 200)) as simulation:
+        with pytest.raises(RuntimeError, match="as asked for"):
+            simulation.post(fail).result(PATIENCE)
+        counter.wait_for(len(counter.times) + 2)
+
+
+def test_stop_before_run(world: flatland.World) -> None:
+    simulation = Simulation(world)
+    simulation.stop()
+    assert simulation.stopped
+    assert simulation.run().steps == 0
+
+
+def test_reports_come_in_wall_time_and_not_while_paused(world: flatland.World) -> None:
+    reports: list[CycleStatistics] = []
+    came = threading.Event()
+
+    def report(statistics: CycleStatistics) -> None:
+        reports.append(statistics)
+        came.set()
+
+    simulation = Simulation(world, 200, report=report, report_period=0.05)
+    with Running(simulation):
+        assert came.wait(PATIENCE)
+        simulation.post(world.pause).result(PATIENCE)
+        simulation.post(lambda: time.sleep(0.1)).result(PATIENCE)
+        count = len(reports)
+        for _ in range(3):  # several reports would be due
+            simulation.post(lambda: time.sleep(0.06)).result(PATIENCE)
+        assert len(reports) <= count + 1  # the one of the cycle in which the pause came
+    first = reports[0]
+    assert first.cycles >= 1
+    assert 0 < first.use_min <= first.use_mean <= first.use_max
+    assert first.asked == pytest.approx(2.0)  # 200 steps of 0.01 s in a second
+    assert 0 < first.got < 2.5
+
+
+def test_statistics_of_a_loop_without_a_rate(world: flatland.World) -> None:
+    reports: list[CycleStatistics] = []
+    Simulation(world, 0, report=reports.append, report_period=0.01).run(100)
+    assert reports
+    assert math.isinf(reports[0].asked)
+    assert reports[0].got > 1
+    text = str(reports[0])
+    assert text.startswith("cycle use min ")
+    assert "real-time factor asked inf, got " in text
+
+
+def test_closed_world_ends_the_loop_with_its_error(world: flatland.World) -> None:
+    simulation = Simulation(world, 0)
+    world.close()
+    with pytest.raises(flatland.WorldError, match="closed"):
+        simulation.run()
