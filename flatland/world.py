@@ -25,7 +25,7 @@ from flatland.errors import PLUGIN_FAULTS, FlatlandError, PluginError, WorldErro
 from flatland.frame_senders import FramePair, FrameSenders
 from flatland.geometry import Pose, finite_pose
 from flatland.layer import Layer
-from flatland.missing_plugins import find_missing, missing_plugins_error
+from flatland.missing_plugins import missing_plugins_error, read_entries
 from flatland.model import Model
 from flatland.model_loader import ModelLoader
 from flatland.observer import WorldObserver
@@ -516,9 +516,9 @@ class World:
             MissingPluginsError: There is none for some of them; the text names all of these.
             YamlError: An entry has no name or type.
         """
-        missing = find_missing(self._registry, entries, model)
-        if missing:
-            raise missing_plugins_error(self._registry, missing)
+        error = missing_plugins_error(self._registry, read_entries(entries, model))
+        if error is not None:
+            raise error
 
     def _start_model_plugin(self, model: Model, entry: YamlReader) -> None:
         name, type_name = entry.get("name", "string"), entry.get("type", "string")
