@@ -28,7 +28,7 @@ from flatland.errors import PLUGIN_FAULTS, FlatlandError, PluginError, WorldErro
 from flatland.geometry import Pose, finite_pose
 from flatland.loading.model_loader import ModelLoader
 from flatland.physics import PhysicsBody, PhysicsWorld
-from flatland.plugin_api.missing_plugins import find_missing, missing_plugins_error
+from flatland.plugin_api.missing_plugins import missing_plugins_error, read_entries
 from flatland.plugin_api.plugin import FlatlandPlugin, ModelPlugin, WorldPlugin, describe
 from flatland.plugin_api.ports import CommandTopic, Output, PortRegistry, is_legal_namespace
 from flatland.plugin_api.registry import PluginRegistry
@@ -643,9 +643,9 @@ class World:
             MissingPluginsError: There is none for some of them; the text names all of these.
             YamlError: An entry has no name or type.
         """
-        missing = find_missing(self._registry, entries, model)
-        if missing:
-            raise missing_plugins_error(self._registry, missing)
+        error = missing_plugins_error(self._registry, read_entries(entries, model))
+        if error is not None:
+            raise error
 
     def _start_model_plugin(self, model: Model, entry: YamlReader) -> None:
         name, type_name = entry.get("name", "string"), entry.get("type", "string")

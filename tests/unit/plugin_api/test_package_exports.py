@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from flatland import package_exports
+from flatland.plugin_api import package_exports
 from flatland.plugin_api.package_exports import Export
 
 LONG_AGO = 1_000_000_000  # s, a time of files that no clock unit is near to

@@ -11,11 +11,10 @@ from typing import Any
 import pytest
 
 import flatland
-from flatland import rate_monitor
 from flatland.plugins.diff_drive import DiffDrive
 from flatland.plugins.laser import Laser
 from flatland.runtime.plugin_costs import PluginCosts
-from flatland.simulation import MAX_LAG, Simulation
+from flatland.simulation import MAX_LAG, Simulation, rate_monitor
 
 # Powers of two, so that sums of times are exact.
 RATE = 128.0
