@@ -17,6 +17,8 @@ FloatArray = npt.NDArray[np.float32]
 DoubleArray = npt.NDArray[np.float64]
 BoolArray = npt.NDArray[np.bool_]
 
+MAX_MAGNITUDE = 1e9
+"""Largest magnitude of the numbers that the physics accepts."""
 IDENTITY: Pose = (0.0, 0.0, 0.0)
 
 

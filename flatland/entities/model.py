@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from flatland.entities.body import Body, Entity
 from flatland.entities.joint import Joint
 from flatland.errors import WorldError
-from flatland.geometry import Pose, Vector2, compose, finite_pose, invert
+from flatland.geometry import MAX_MAGNITUDE, Pose, Vector2, compose, finite_pose, invert
 from flatland.graph_names import clean_name
 
 if TYPE_CHECKING:
@@ -106,13 +106,20 @@ class Model(Entity):
         """Moves the model rigidly so that its first body is at a pose; all velocities become 0.
 
         Raises:
-            ValueError: A number is NaN or infinite.
+            ValueError: A number is NaN or infinite, or a body would be beyond the range of the
+                physics; no body has moved.
         """
         # Unlike the reference: the bodies keep their angles to each other, and nothing flies on.
         target = finite_pose((x, y, theta))
         to_first = invert(self.bodies[0].pose)
         poses = [target]
         poses += [compose(target, compose(to_first, body.pose)) for body in self.bodies[1:]]
+        for body, pose in zip(self.bodies, poses, strict=True):
+            if not all(abs(number) <= MAX_MAGNITUDE for number in pose):
+                raise ValueError(
+                    f'pose of body "{body.name}" must be finite and within +-{MAX_MAGNITUDE:g}, '
+                    f"got {pose}"
+                )
         for body, pose in zip(self.bodies, poses, strict=True):
             body.set_pose(*pose)
             body.set_velocity(0.0, 0.0, 0.0)

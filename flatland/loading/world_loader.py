@@ -16,10 +16,10 @@ from flatland.entities.layer import Layer
 from flatland.errors import UnreadableFileError, WorldError, YamlError
 from flatland.maps.map_file import load_map
 from flatland.plugin_api.missing_plugins import (
-    MissingPlugin,
     MissingPluginsError,
-    find_missing,
+    PluginEntry,
     missing_plugins_error,
+    read_entries,
 )
 from flatland.world import World
 
@@ -156,17 +156,18 @@ def _load_models(world: World, reader: YamlReader) -> None:
 
 def _all_missing_plugins(world: World, reader: YamlReader) -> MissingPluginsError | None:
     """Makes one error of all missing plugins of a world, without those in faulty files."""
-    registry = world.plugin_host.registry
-    missing: list[MissingPlugin] = []
-    for entry in reader.optional_subnode("models", "list").items():
+    lists: dict[str, YamlReader] = {}  # of the files of models, which many models may share
+    entries: list[PluginEntry] = []
+    for model in reader.optional_subnode("models", "list").items():
         with suppress(YamlError):
-            path = world.resolve_path(entry.get("model", "string"))
-            plugins = YamlReader.from_file(path, world.params).optional_subnode("plugins", "list")
-            missing += find_missing(registry, plugins.items(), entry.get("name", "string"))
+            name, path = model.get("name", "string"), model.get("model", "string")
+            if path not in lists:
+                file = YamlReader.from_file(world.resolve_path(path), world.params)
+                lists[path] = file.optional_subnode("plugins", "list")
+            entries += read_entries(lists[path].items(), name)
     with suppress(YamlError):
-        plugins = reader.optional_subnode("plugins", "list")
-        missing += find_missing(registry, plugins.items(), None)
-    return missing_plugins_error(registry, missing) if missing else None
+        entries += read_entries(reader.optional_subnode("plugins", "list").items(), None)
+    return missing_plugins_error(world.plugin_host.registry, entries)
 
 
 def _load_world_plugin(world: World, entry: YamlReader, world_config: YamlReader) -> None:

@@ -33,12 +33,12 @@ class MissingPluginsError(PluginError):
 
 
 @dataclass(frozen=True, slots=True)
-class MissingPlugin:
-    """An entry of a file that names a plugin that no manifest declares.
+class PluginEntry:
+    """An enabled entry of a `plugins` list.
 
     Attributes:
-        name: Of the plugin, from the entry.
-        type_name: From the entry.
+        name: Of the plugin.
+        type_name: The `type:`.
         place: File and line of the entry, as ` [robot.model.yaml:12]`.
         model: Name of the model, None for a world plugin.
     """
@@ -49,44 +49,48 @@ class MissingPlugin:
     model: str | None
 
 
-def find_missing(
-    registry: PluginRegistry, entries: Iterable[YamlReader], model: str | None
-) -> list[MissingPlugin]:
-    """Returns the enabled plugins that no manifest declares.
+def read_entries(entries: Iterable[YamlReader], model: str | None) -> list[PluginEntry]:
+    """Reads the enabled entries of a `plugins` list.
 
     Args:
-        registry: Of the known plugins.
-        entries: Of a `plugins` list.
+        entries: Of the list.
         model: Name of the model, None for world plugins.
 
     Raises:
         YamlError: An entry has no name or type.
     """
-    found = [
-        MissingPlugin(
+    return [
+        PluginEntry(
             entry.get("name", "string"), entry.get("type", "string"), entry.error("").message, model
         )
         for entry in entries
         if entry.get("enabled", "bool", True)
     ]
-    missing = set(registry.find_missing(plugin.type_name for plugin in found))
-    return [plugin for plugin in found if plugin.type_name in missing]
 
 
 def missing_plugins_error(
-    registry: PluginRegistry, missing: Sequence[MissingPlugin]
-) -> MissingPluginsError:
-    """Makes one error of all missing plugins, with a line for each entry of a file if many.
+    registry: PluginRegistry, entries: Sequence[PluginEntry]
+) -> MissingPluginsError | None:
+    """Makes one error of all entries whose plugin no manifest declares.
+
+    Models that share a file share its lines.
 
     Args:
         registry: Of the known plugins.
-        missing: At least one; models that share a file share its lines.
+        entries: Of any models and the world.
+
+    Returns:
+        None when there is a plugin for each entry.
     """
+    missing_types = set(registry.find_missing(entry.type_name for entry in entries))
+    if not missing_types:
+        return None
     hints = registry.hints()
+    advice = hints.advise(missing_types)
     models: dict[tuple[str, str, str], list[str | None]] = {}
-    for plugin in missing:
-        models.setdefault((plugin.name, plugin.type_name, plugin.place), []).append(plugin.model)
-    advice = hints.advise({plugin.type_name for plugin in missing})
+    for entry in entries:
+        if entry.type_name in missing_types:
+            models.setdefault((entry.name, entry.type_name, entry.place), []).append(entry.model)
     lines = []
     for (name, type_name, place), owners in models.items():
         kind = "World" if owners[0] is None else "Model"

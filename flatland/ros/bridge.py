@@ -55,6 +55,10 @@ class Bridge(WorldObserver):
         """Leaves topics alone from now on: rospy ends all of them at once at shutdown."""
         self._closed = True
 
+    def attached(self, world: World) -> None:
+        """Stores the world, which carries out what arrives from ROS."""
+        self._world = world
+
     # -- time and transforms ---------------------------------------------------------------
 
     def time_advanced(self, time_ns: int) -> None:
@@ -139,15 +143,13 @@ class Bridge(WorldObserver):
     # -- plugins ---------------------------------------------------------------------------
 
     def plugin_ros(self, plugin: FlatlandPlugin) -> PluginRos:
-        """Gives a plugin its own access to ROS."""
-        self._world = plugin.world
+        """Returns access to ROS for one plugin."""
         return PluginRos(plugin, self._registrar, self._post, lambda: self._closed)
 
     def _post(self, action: Callable[[], object]) -> Future[Any]:
         """Runs an action between two steps, in order of arrival."""
-        # Ports belong to plugins, and each plugin shows its world before it opens any.
         if self._world is None:
-            raise RuntimeError("the bridge has not seen a world yet")
+            raise RuntimeError("the bridge is not attached to a world")
         return self._world.post(action)
 
 

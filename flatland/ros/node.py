@@ -174,6 +174,7 @@ def _load(parameters: NodeParameters, bridge: Any) -> World:
         step_size=parameters.step_size,
         observers=[bridge],
         plugin_timeout=parameters.plugin_timeout,
+        plugin_errors="disable",
     )
     _LOG.info(
         'loaded "%s" in %.2f s: %d layers, %d models',

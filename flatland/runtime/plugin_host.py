@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from flatland.entities.contact import Contact, ContactImpulse, MutableContact
 from flatland.errors import PLUGIN_FAULTS, FlatlandError, PluginError, YamlError
-from flatland.plugin_api.missing_plugins import find_missing, missing_plugins_error
+from flatland.plugin_api.missing_plugins import missing_plugins_error, read_entries
 from flatland.plugin_api.plugin import FlatlandPlugin, ModelPlugin, WorldPlugin, describe
 from flatland.plugin_api.registry import PluginRegistry
 from flatland.runtime.hooks import CONTACT_HOOKS, HookList, HookTable
@@ -82,9 +82,9 @@ class PluginHost:
             MissingPluginsError: Classes do not exist; the text names all of them.
             YamlError: An entry has no name or type.
         """
-        missing = find_missing(self.registry, entries, model)
-        if missing:
-            raise missing_plugins_error(self.registry, missing)
+        error = missing_plugins_error(self.registry, read_entries(entries, model))
+        if error is not None:
+            raise error
 
     def start_model_plugin(self, model: Model, entry: YamlReader) -> None:
         """Starts a plugin of a model and appends it to the model's plugins.

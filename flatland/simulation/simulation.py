@@ -113,26 +113,30 @@ class Simulation:
         self._wake.set()
 
     def post(self, action: Callable[[], object]) -> Future[Any]:
-        """Queues an action that runs between two steps, soon, also while the world is paused.
+        """Queues an action that runs between two steps; safe from any thread, see `World.post`.
 
-        Safe from any thread; see `World.post`.
+        It runs soon, also while the loop waits or the world is paused.
         """
-        future = self.world.post(action)
-        self._wake.set()
-        return future
+        return self.world.post(action)
 
     def run(self, duration: float = math.inf) -> RunResult:
         """Steps the world until `stop` is called or some simulated time has passed.
 
+        Meanwhile all requests of other threads are carried out in the calling thread.
+
         Args:
             duration: Simulated time to run for [s].
+
+        Raises:
+            WorldError: The world is closed, or another simulation runs it.
         """
         timekeeper = self.world.timekeeper
         start, start_ns = self._clock(), timekeeper.sim_time_ns
         end_ns = math.inf if math.isinf(duration) else start_ns + round(duration * NANOSECONDS)
         monitor = RateMonitor(self.world, self._clock)
         try:
-            self._loop(start, end_ns, monitor)
+            with self.world.requests.serving(self._wake.set):
+                self._loop(start, end_ns, monitor)
         finally:
             monitor.reset()
         steps = (timekeeper.sim_time_ns - start_ns) // timekeeper.step_size_ns

@@ -26,7 +26,8 @@ def world(write_world: Callable[..., Path]) -> Path:
     return write_world(
         "[{name: first, model: robot.model.yaml, namespace: first, pose: [3, 3, 0]}]",
         broken="bodies: []\n",
-        unplugged="bodies: [{name: b, footprints: []}]\nplugins: [{name: p, type: Nothing}]\n",
+        unplugged="bodies: [{name: b, footprints: []}]\n"
+        "plugins: [{name: p, type: Nothing}, {name: q, type: Neither}]\n",
         spaced="bodies: [{name: b, footprints: []}]\n"
         "plugins: [{name: p, type: Bumper, topic: my topic}]\n",
     )
@@ -95,7 +96,8 @@ def test_spawn_takes_an_absolute_path(ros: Any, world: Path) -> None:
         ("ball.model.yaml", "m", "", (NAN, 0, 0), "pose must be finite"),
         ("ball.model.yaml", "m", "", (0, 0, INF), "pose must be finite"),
         ("broken.model.yaml", "m", "", (0, 0, 0), 'Invalid "bodies" in "m" model, must be a list'),
-        ("unplugged.model.yaml", "m", "", (0, 0, 0), "Flatland plugin: "),
+        ("unplugged.model.yaml", "m", "", (0, 0, 0), 'Plugin "p" type "Nothing" model "m": no '),
+        ("unplugged.model.yaml", "m", "", (0, 0, 0), 'Plugin "q" type "Neither" model "m": no '),
         ("spaced.model.yaml", "m", "", (0, 0, 0), '"my topic" is not a legal topic name'),
         ("missing/ünïcode.yaml", "ñ", "", (0, 0, 0), "ünïcode"),
         ("ball.model.yaml", "m", "", (1e300, 0, 0), "must be finite and within"),

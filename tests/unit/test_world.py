@@ -196,6 +196,19 @@ def test_move_is_rigid_and_stops_everything(files):
     assert base.pose == pytest.approx((-1, -2, 0.1 + math.pi / 2), abs=1e-4)
 
 
+def test_a_move_that_one_body_cannot_follow_moves_no_body(files):
+    files.write("two.model.yaml", TWO_BODIES)
+    world = files.load("{properties: {}, layers: []}")
+    model = world.spawn_model("two.model.yaml", "m", pose=(5, 5, 0))
+    before = [body.pose for body in model.bodies]
+    # The arm is 1 m to the left of the base, so that it would be beyond the range of the physics.
+    with pytest.raises(ValueError, match=r'pose of body "arm" must be finite and within \+-1e\+09'):
+        model.set_pose(0.0, 1e9, 0.0)
+    with pytest.raises(WorldError, match=r'failed to move model "m", pose of body "arm" must be'):
+        world.move_model("m", (0.0, 1e9, 0.0), if_blocked="allow")
+    assert [body.pose for body in model.bodies] == before
+
+
 NAN, INF = math.nan, math.inf
 
 
@@ -366,7 +379,7 @@ def test_a_failed_request_from_a_hook_is_logged(files, probe, caplog):
 
 
 def test_step_and_close_in_a_hook_are_refused(files, probe, caplog):
-    world = files.load("{properties: {}, layers: []}")
+    world = files.load("{properties: {}, layers: []}", plugin_errors="disable")
     world.spawn_model("probe.model.yaml", "a")
     probe.hook, probe.act = "before", staticmethod(lambda p: p.world.step())
     world.step()

@@ -256,7 +256,7 @@ class TestThreads:
         inside_a_step: list[bool] = []
 
         def capture_scene(*arguments: Any) -> Any:
-            inside_a_step.append(world._stepping_thread is not None)
+            inside_a_step.append(world.requests.in_hook)
             return capture.capture_scene(*arguments)
 
         monkeypatch.setattr(render, "capture_scene", capture_scene)

@@ -138,7 +138,9 @@ def test_end_is_heard_when_the_other_one_is_deleted(bench: Any) -> None:
     assert {contact.body_a.entity.name, contact.body_b.entity.name} == {"robot", "wall"}
 
 
-def test_contacts_of_strangers_are_heard_by_all(bench: Any) -> None:
+def test_contacts_of_other_models_reach_world_plugins_and_those_that_ask_for_all(
+    bench: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
     world = bench.load(
         "  - {name: far, model: Ear.yaml, pose: [50, 0, 0]}\n"
         f"  - {{name: disc, model: disc.yaml}}\n{WALL}",
@@ -146,11 +148,14 @@ def test_contacts_of_strangers_are_heard_by_all(bench: Any) -> None:
     )
     world.step()
     [everywhere] = world.plugins
-    for listener in (ear(world, "far"), everywhere):
-        assert listener.hooks() == ["begin", "post_solve"]
-    contact = ear(world, "far").heard[0][1]
-    # Yet they are none of the model's.
-    assert ear(world, "far").filter_contact(contact) is None
+    assert everywhere.hooks() == ["begin", "post_solve"]
+    assert ear(world, "far").hooks() == []
+    monkeypatch.setattr(type(ear(world, "far")), "all_contacts", True)
+    world.spawn_model("Ear.yaml", "farther", pose=(90, 0, 0))
+    world.step()
+    assert ear(world, "farther").hooks() == ["post_solve"]
+    contact = ear(world, "farther").heard[0][1]
+    assert ear(world, "farther").filter_contact(contact) is None
 
 
 @pytest.mark.parametrize("side", ["a", "b"])
@@ -269,8 +274,10 @@ def test_a_plugin_that_does_not_change_contacts_is_not_asked(bench: Any) -> None
     world.step()
     assert world.physics.pre_solve is None
     world.spawn_model("Hand.yaml", "hand", pose=(40, 0, 0))
+    world.step()
     assert world.physics.pre_solve is not None
     world.delete_model("hand")
+    world.step()
     assert world.physics.pre_solve is None
 
 
@@ -279,6 +286,8 @@ def test_without_listeners_nothing_is_recorded(bench: Any) -> None:
     world.step()
     assert world.physics.record_contacts is False
     world.spawn_model("Ear.yaml", "robot", pose=(40, 0, 0))
+    world.step()
     assert world.physics.record_contacts is True
     world.delete_model("robot")
+    world.step()
     assert world.physics.record_contacts is False

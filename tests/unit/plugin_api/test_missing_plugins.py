@@ -45,7 +45,7 @@ def error_of(action, *arguments):
 
 def find_error(type_name):
     with pytest.raises(PluginError) as caught:
-        flatland.World(seed=1).plugin_registry.find(type_name)
+        flatland.World(seed=1).plugin_host.registry.find(type_name)
     return str(caught.value)
 
 

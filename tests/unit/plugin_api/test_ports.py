@@ -1,51 +1,37 @@
-"""Topic names, outputs and commands."""
+"""Outputs, commands and their registry."""
 
 from __future__ import annotations
+
+import sys
+import threading
 
 import pytest
 
 from flatland import FlatlandError, Twist, WorldError
-from flatland.graph_names import is_legal_namespace, resolve_topic
 from flatland.plugin_api.port_registry import PortRegistry
 
 
-@pytest.mark.parametrize(
-    ("topic", "namespace", "expected"),
-    [
-        ("scan", "", "scan"),
-        ("scan", "r1", "r1/scan"),
-        ("scan", "r1/", "r1/scan"),
-        ("scan", "/r1", "/r1/scan"),
-        ("/scan", "r1", "/scan"),
-        ("a/2d", "r1/b", "r1/b/a/2d"),
-        ("cmd_vel/", "", "cmd_vel"),
-        ("a//b", "r1", "r1/a/b"),
-        ("//a///b//", "r1", "/a/b"),
-        ("a", "//r1///b//", "/r1/b/a"),
-        ("a", "/", "a"),
-    ],
-)
-def test_topics_take_the_namespace(topic, namespace, expected):
-    assert resolve_topic(topic, namespace) == expected
+class Recorder:
+    """Records the notifications of a registry."""
 
+    def __init__(self):
+        self.events = []
 
-@pytest.mark.parametrize("topic", ["", "my robot", "1st", "a-b", "/", "//", "~x", "é", "_a", "a /"])
-def test_illegal_topics(topic):
-    with pytest.raises(ValueError, match="is not a legal topic name"):
-        resolve_topic(topic)
+    def output_opened(self, output):
+        self.events.append(("output_opened", output))
 
+    def output_closed(self, output):
+        self.events.append(("output_closed", output))
 
-@pytest.mark.parametrize(
-    ("namespace", "legal"),
-    [("", True), ("/", True), ("r1", True), ("/r1/", True), ("a/b_2", True), ("a b", False),
-     ("a-b", False), ("2", False), ("a//b", True), ("//", True), ("a//b c/", False)],
-)  # fmt: skip
-def test_namespaces(namespace, legal):
-    assert is_legal_namespace(namespace) is legal
+    def command_opened(self, command):
+        self.events.append(("command_opened", command))
+
+    def command_closed(self, command):
+        self.events.append(("command_closed", command))
 
 
 def test_output_is_wanted_while_someone_listens():
-    output = PortRegistry().open_output("r1/x", int)
+    output = PortRegistry(Recorder()).open_output("r1/x", int)
     assert output.topic == "/r1/x"
     assert not output.wanted
     got = []
@@ -62,32 +48,30 @@ def test_output_is_wanted_while_someone_listens():
 
 
 def test_a_listener_that_does_not_want():
-    output = PortRegistry().open_output("x", int)
+    output = PortRegistry(Recorder()).open_output("x", int)
     output.subscribe(print, wants=False)
     assert not output.wanted
 
 
 def test_outputs_of_one_topic_are_shared_until_the_last_owner_goes():
-    ports = PortRegistry()
-    opened, closed = [], []
-    ports.output_opened.append(opened.append)
-    ports.output_closed.append(closed.append)
+    recorder = Recorder()
+    ports = PortRegistry(recorder)
     first, second = ports.open_output("x", int), ports.open_output("/x", int)
     assert first is second
-    assert opened == [first]
+    assert recorder.events == [("output_opened", first)]
     ports.close_output(first)
-    assert closed == []
+    assert len(recorder.events) == 1
     assert ports.find_output("x") is first
     ports.close_output(second)
     ports.close_output(second)
-    assert closed == [first]
+    assert recorder.events[1:] == [("output_closed", first)]
     assert first.closed
     with pytest.raises(WorldError, match=r'no output "x", there are: none'):
         ports.find_output("x")
 
 
 def test_a_topic_has_one_type():
-    ports = PortRegistry()
+    ports = PortRegistry(Recorder())
     ports.open_output("x", int)
     ports.open_command("c", int, 0)
     with pytest.raises(FlatlandError, match='topic "/x" carries int already, not float'):
@@ -97,7 +81,7 @@ def test_a_topic_has_one_type():
 
 
 def test_a_type_conflict_names_an_owner_that_is_left():
-    ports = PortRegistry()
+    ports = PortRegistry(Recorder())
     output = ports.open_output("x", int, "first")
     assert ports.open_output("x", int, "second") is output
     ports.close_output(output, "first")
@@ -111,7 +95,7 @@ def test_a_type_conflict_names_an_owner_that_is_left():
 
 
 def test_topics_are_found_by_any_spelling():
-    ports = PortRegistry()
+    ports = PortRegistry(Recorder())
     output = ports.open_output("r1/a/b", int)
     assert ports.find_output("/r1//a/b/") is output
     ports.open_command("r1/c", int, 0)
@@ -119,7 +103,7 @@ def test_topics_are_found_by_any_spelling():
 
 
 def test_commands_of_one_topic_are_set_together():
-    ports = PortRegistry()
+    ports = PortRegistry(Recorder())
     first = ports.open_command("cmd_vel", Twist, Twist())
     ports.find_command("/cmd_vel").set(Twist(1.0))
     second = ports.open_command("cmd_vel", Twist, Twist())
@@ -140,7 +124,7 @@ def test_commands_of_one_topic_are_set_together():
 
 
 def test_commands_refuse_what_they_do_not_take():
-    command = PortRegistry().open_command("c", int, 7, accept=lambda value: value >= 0)
+    command = PortRegistry(Recorder()).open_command("c", int, 7, accept=lambda value: value >= 0)
     command.set(-1)
     assert (command.value, command.received) == (7, 0)
     command.set(3)
@@ -150,15 +134,74 @@ def test_commands_refuse_what_they_do_not_take():
 
 
 def test_an_observer_may_refuse_a_port():
-    ports = PortRegistry()
+    class Refusal(Recorder):
+        def output_opened(self, output):
+            raise FlatlandError("no")
 
-    def refuse(port):
-        raise FlatlandError("no")
+        command_opened = output_opened
 
-    ports.output_opened.append(refuse)
-    ports.command_opened.append(refuse)
+    ports = PortRegistry(Refusal())
     with pytest.raises(FlatlandError):
         ports.open_output("x", int)
     with pytest.raises(FlatlandError):
         ports.open_command("x", int, 0)
     assert (ports.outputs, ports.commands) == ({}, {})
+
+
+def test_a_function_subscribed_twice_has_two_subscriptions():
+    output = PortRegistry(Recorder()).open_output("x", int)
+    got = []
+    first, second = output.subscribe(got.append), output.subscribe(got.append)
+    output.emit(1)
+    assert got == [1, 1]
+    first()
+    first()
+    output.emit(2)
+    assert got == [1, 1, 2]
+    assert output.wanted
+    second()
+    output.emit(3)
+    assert got == [1, 1, 2]
+    assert not output.wanted
+
+
+def test_no_update_of_want_is_lost_between_threads():
+    output = PortRegistry(Recorder()).open_output("x", int)
+    start = threading.Barrier(4)
+    interval = sys.getswitchinterval()
+
+    def toggle(number):
+        start.wait()
+        for turn in range(3000):
+            output.want((number, turn))
+            unsubscribe = output.subscribe(print)
+            output.unwant((number, turn))
+            if turn % 2:
+                unsubscribe()
+
+    threads = [threading.Thread(target=toggle, args=(number,)) for number in range(4)]
+    try:
+        sys.setswitchinterval(1e-6)
+        for thread in threads:
+            thread.start()
+        for thread in threads:
+            thread.join()
+    finally:
+        sys.setswitchinterval(interval)
+    assert len(output._subscribers) == len(output._wanters) == 4 * 1500
+
+
+def test_what_a_subscriber_raises_does_not_reach_the_plugin():
+    faults, got = [], []
+    ports = PortRegistry(Recorder(), lambda *fault: faults.append(fault))
+    output = ports.open_output("x", int)
+
+    def fail(value):
+        raise RuntimeError(f"no use for {value}")
+
+    output.subscribe(fail)
+    output.subscribe(got.append)
+    output.emit(5)
+    assert got == [5]
+    [(where, callback, error)] = faults
+    assert (where, callback, str(error)) == (output, fail, "no use for 5")

@@ -96,6 +96,16 @@ class Here(ModelPlugin):
         self.thread = threading.current_thread()
 
 
+class Stepping(ModelPlugin):
+    def on_initialize(self, config):
+        self.world.step()
+
+
+class Closing(ModelPlugin):
+    def on_initialize(self, config):
+        self.world.close()
+
+
 class Looping(ModelPlugin):
     def on_initialize(self, config):
         started.append(self)
@@ -165,7 +175,11 @@ WITNESS = 'name: witness, type: "faults::Witness"'
 
 
 def crowded(files, *plugins, world_plugins="[]", **options):
-    """Loads a world where the robot, which has a witness, overlaps four discs."""
+    """Loads a world where the robot, which has a witness, overlaps four discs.
+
+    Exceptions of plugins are logged, unless the options say otherwise.
+    """
+    options.setdefault("plugin_errors", "disable")
     robot(files, *plugins, WITNESS)
     discs = "\n".join(
         f"  - {{name: disc{i}, model: minimal.model.yaml, pose: [{x}, {y}, 0]}}"
@@ -305,14 +319,7 @@ def test_a_plugin_that_never_starts_is_given_up(files, faults, which):
     assert [model.name for model in world.models if "disc" not in model.name] == ["robot"]
     live_through_it(world)
     assert all(count > 3 for count in witness(world).values())
-    # A loop in Python is ended; a call in C ends when it returns, and can do no harm then.
-    module = importlib.import_module(faults.module)
-    module.woken.set()
-    for thread in threading.enumerate():
-        if thread.name == "on_initialize of bad":
-            thread.join(20)
-            assert not thread.is_alive()
-    [plugin] = module.started
+    [plugin] = importlib.import_module(faults.module).started
     with pytest.raises(PluginError, match='plugin "bad" has ended and can open no "late"'):
         plugin.output("late", float)
     assert world.ports.outputs == {}
@@ -323,13 +330,22 @@ def test_loading_gives_up_a_plugin_that_never_starts(files, faults):
         crowded(files, 'name: bad, type: "faults::Looping"', plugin_timeout=0.1)
 
 
-def test_only_with_a_limit_a_plugin_starts_in_a_thread_of_its_own(files, faults):
+@pytest.mark.parametrize("timeout", [None, 10])
+def test_a_plugin_starts_in_the_thread_that_loads(files, faults, timeout):
     robot(files, 'name: here, type: "faults::Here"')
     text = "{properties: {}, layers: [], models: [{name: r, model: robot.model.yaml}]}"
-    limited = files.load(text, plugin_timeout=10).model("r").plugin("here").thread
-    assert limited.name == "on_initialize of here"
-    free = files.load(text, plugin_timeout=None).model("r").plugin("here").thread
-    assert free is threading.current_thread()
+    plugin = files.load(text, plugin_timeout=timeout).model("r").plugin("here")
+    assert plugin.thread is threading.current_thread()
+
+
+def test_on_initialize_may_not_step_or_close_the_world(files, faults):
+    for act, plugin in (("step", "Stepping"), ("close", "Closing")):
+        robot(files, f'name: bad, type: "faults::{plugin}"', name="bad.yaml")
+        world = crowded(files)
+        with pytest.raises(PluginError, match=f"{act} must not be called from a plugin's hook"):
+            world.spawn_model("bad.yaml", "second")
+        assert not world.closed
+        assert world.time == 0.0
 
 
 def test_a_limit_may_be_as_long_as_one_likes(files, faults):
@@ -392,6 +408,101 @@ def test_a_manifest_that_is_not_xml_hides_only_itself(files, faults, caplog):
     assert problem in str(caught.value)
     live_through_it(world)
     assert all(count > 3 for count in witness(world).values())
+
+
+# -- plugin_errors="raise" -------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("hook", HOOKS)
+def test_step_raises_what_a_hook_raised_when_the_step_is_complete(files, faults, hook):
+    world = crowded(files, f'name: bad, type: "faults::Model", hook: {hook}', plugin_errors="raise")
+    if hook == "end_contact":
+        world.step()
+        world.move_model("robot", (20, 0, 0))
+    time, calls = world.time, dict(witness(world))
+    with pytest.raises(RuntimeError, match="fault 1") as caught:
+        world.step()
+    place = 'Model Plugin "bad" type "faults::Model" model "robot"'
+    assert caught.value.__notes__ == [f"raised by {place}: {hook}"]
+    assert world.time == pytest.approx(time + 0.005)
+    # The hooks of the other plugins ran, too, and the plugin is not disabled.
+    assert witness(world)["after_physics_step"] == calls["after_physics_step"] + 1
+    bad = world.model("robot").plugin("bad")
+    before = bad.calls
+    if hook != "begin_contact" and hook != "end_contact":
+        for _ in range(4):
+            with pytest.raises(RuntimeError, match="fault"):
+                world.step()
+        assert bad.calls >= before + 4
+
+
+def test_sys_exit_of_a_plugin_is_raised_as_an_error(files, faults):
+    hook = "before_physics_step"
+    world = crowded(
+        files, f'name: bad, type: "faults::Quitter", hook: {hook}', plugin_errors="raise"
+    )
+    with pytest.raises(PluginError, match=f"{hook} raised SystemExit"):
+        world.step()
+
+
+def test_close_raises_what_on_shutdown_raised_and_closes(files, faults):
+    world = crowded(files, 'name: bad, type: "faults::Goodbye"', plugin_errors="raise")
+    with pytest.raises(RuntimeError, match="will not go"):
+        world.close()
+    assert world.closed
+    world.close()
+
+
+def test_an_exception_of_a_with_block_is_not_replaced_by_one_of_a_plugin(files, faults):
+    world = crowded(files, 'name: bad, type: "faults::Goodbye"', plugin_errors="raise")
+    with pytest.raises(KeyError), world:
+        raise KeyError
+    assert world.closed
+
+
+def test_an_exception_of_a_subscriber_is_raised_by_step_and_not_blamed_on_the_plugin(files, faults):
+    world = laser_world(files, plugin_errors="raise")
+    output = world.output("/scan")
+
+    def fail(scan):
+        raise ValueError("no use for it")
+
+    unsubscribe = output.subscribe(fail)
+    for _ in range(5):
+        with pytest.raises(ValueError, match="no use for it") as caught:
+            world.step()
+    [note] = caught.value.__notes__
+    assert note.startswith("raised by subscriber ")
+    assert note.endswith('fail of output "/scan"')
+    unsubscribe()
+    stamp = output.latest.stamp
+    world.step()
+    assert output.latest.stamp > stamp
+
+
+def test_an_exception_of_a_subscriber_is_logged_and_never_disables_the_plugin(
+    files, faults, caplog
+):
+    world = laser_world(files, plugin_errors="disable")
+    output = world.output("/scan")
+
+    def fail(scan):
+        raise ValueError("no use for it")
+
+    output.subscribe(fail)
+    world.step(10)
+    assert output.latest.stamp == 9 * world.timekeeper.step_size_ns
+    assert caplog.text.count("ValueError: no use for it") == 1
+    assert 'fail of output "/scan" raised' in caplog.text
+    assert "disabled" not in caplog.text
+
+
+def laser_world(files, **options):
+    """Loads a world with one robot that has a laser which scans in each step."""
+    laser = "type: Laser, name: laser, body: base, range: 5, angle: {min: 0, max: 1, increment: 1}"
+    robot(files, laser)
+    text = "{properties: {}, layers: [{name: 2d}], models: [{name: r, model: robot.model.yaml}]}"
+    return files.load(text, **options)
 
 
 # -- inside the physics step -----------------------------------------------------------------

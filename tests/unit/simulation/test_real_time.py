@@ -14,6 +14,7 @@ import flatland
 from flatland.plugins.diff_drive import DiffDrive
 from flatland.plugins.laser import Laser
 from flatland.runtime.plugin_costs import PluginCosts
+from flatland.runtime.plugin_host import PluginHost
 from flatland.simulation import MAX_LAG, Simulation, rate_monitor
 
 # Powers of two, so that sums of times are exact.
@@ -341,13 +342,13 @@ class Stops(flatland.WorldObserver):
 def measured(monkeypatch: pytest.MonkeyPatch) -> list[bool]:
     """Whether plugins are measured, after each change."""
     changes = []
-    measure = flatland.World.measure_plugins
+    measure = PluginHost.measure
 
-    def record(world: flatland.World, costs: Any) -> None:
+    def record(host: PluginHost, costs: Any) -> None:
         changes.append(costs is not None)
-        measure(world, costs)
+        measure(host, costs)
 
-    monkeypatch.setattr(flatland.World, "measure_plugins", record)
+    monkeypatch.setattr(PluginHost, "measure", record)
     return changes
 
 
@@ -397,7 +398,7 @@ def test_costs_include_contacts(
         )
     world = fleet(0.0, 0.0)
     costs = PluginCosts(time.clock)
-    world.measure_plugins(costs)
+    world.plugin_host.measure(costs)
     world.step()
     # Both robots are at the origin and touch each other.
     assert costs.describe(1000.0, 1).startswith(

@@ -1,0 +1,210 @@
+"""Requests of other threads and of plugins: when and in which thread they run."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any
+
+import pytest
+
+import flatland
+from flatland import WorldError
+from flatland.runtime.requests import Requests
+from flatland.simulation import Simulation
+
+EMPTY = "{properties: {}, layers: []}"
+
+
+def test_actions_run_in_order_of_arrival_and_later_ones_wait() -> None:
+    requests, done = Requests(), []
+    requests.post(lambda: done.append(1))
+    requests.post(lambda: requests.post(lambda: done.append(3)))
+    requests.post(lambda: done.append(2))
+    requests.process()
+    assert done == [1, 2]
+    requests.process()
+    assert done == [1, 2, 3]
+
+
+def test_an_action_that_raises_is_the_affair_of_who_posted_it() -> None:
+    requests = Requests()
+    failing = requests.post(lambda: 1 / 0)
+    good = requests.post(lambda: 7)
+    requests.process()
+    assert isinstance(failing.exception(timeout=0), ZeroDivisionError)
+    assert good.result(timeout=0) == 7
+
+
+def test_a_cancelled_action_does_not_run() -> None:
+    requests, done = Requests(), []
+    assert requests.post(lambda: done.append(1)).cancel()
+    requests.process()
+    assert done == []
+
+
+def test_a_change_within_an_action_runs_at_once() -> None:
+    requests = Requests()
+    outer = requests.post(lambda: requests.change(lambda: "inner", "test"))
+    requests.process()
+    assert outer.result(timeout=0) == "inner"
+
+
+def test_a_change_within_a_hook_is_deferred_and_its_failure_logged(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    requests, done = Requests(), []
+    with requests.hooks():
+        assert requests.change(lambda: done.append(1), "change") is None
+        assert requests.change(lambda: 1 / 0, "division") is None
+        assert done == []
+    requests.process()
+    assert done == [1]
+    assert "division: division by zero" in caplog.text
+
+
+def test_without_a_server_the_thread_that_waits_runs_its_action(files: Any) -> None:
+    world = files.load(EMPTY)
+    with ThreadPoolExecutor(1) as pool:
+        thread = pool.submit(threading.get_ident).result()
+        assert pool.submit(world.between_steps, threading.get_ident).result() == thread
+
+
+@pytest.mark.parametrize("update_rate", [0.0, 1000.0])
+@pytest.mark.parametrize("is_paused", [False, True])
+def test_while_a_simulation_runs_all_requests_run_in_its_thread(
+    files: Any, update_rate: float, is_paused: bool
+) -> None:
+    world = files.load(EMPTY)
+    simulation = Simulation(world, update_rate)
+    running = threading.Event()
+    world.post(running.set)
+    if is_paused:
+        world.pause()
+    threads: list[int] = []
+
+    class Recorder(flatland.WorldObserver):
+        def model_added(self, model: flatland.Model) -> None:
+            threads.append(threading.get_ident())
+
+    world.add_observer(Recorder())
+    with ThreadPoolExecutor(5) as pool:
+        loop = pool.submit(lambda: (simulation.run(), threading.get_ident())[1])
+        assert running.wait(60)
+
+        def spawn(number: int) -> None:
+            for turn in range(20):
+                pose = (10.0 * turn, 10.0 * number, 0.0)
+                world.spawn_model("minimal.model.yaml", f"{number}-{turn}", pose=pose)
+
+        for spawned in [pool.submit(spawn, number) for number in range(4)]:
+            spawned.result(60)
+        simulation.stop()
+        server = loop.result(60)
+    assert set(threads) == {server}
+    assert len(threads) == 80
+
+
+def test_a_request_that_waits_when_the_simulation_ends_is_carried_out(files: Any) -> None:
+    world = files.load(EMPTY)
+    simulation = Simulation(world, 0)
+    entered, release = threading.Event(), threading.Event()
+    with ThreadPoolExecutor(2) as pool:
+        world.post(lambda: (entered.set(), release.wait(60), simulation.stop()))
+        loop = pool.submit(simulation.run, 0.0)
+        loop.result(60)  # ends at once, before any action
+        loop = pool.submit(simulation.run)
+        assert entered.wait(60)
+        late = pool.submit(world.spawn_model, "minimal.model.yaml", "late")
+        release.set()
+        loop.result(60)
+        assert late.result(60) is world.model("late")
+
+
+def test_a_world_is_run_by_one_simulation_at_a_time(files: Any) -> None:
+    world = files.load(EMPTY)
+    inner = Simulation(world, 0)
+    outer = Simulation(world, 0)
+    attempt = world.post(lambda: inner.run(0.0))
+    outer.run(0.01)
+    with pytest.raises(WorldError, match="already run by another simulation"):
+        attempt.result(timeout=0)
+    inner.run(0.01)
+    assert world.time == pytest.approx(0.02)
+
+
+# -- plugins that react to the end of a model ------------------------------------------------
+
+PLUGIN = """
+from flatland import ModelPlugin
+
+act = None
+
+
+class Reacting(ModelPlugin):
+    def on_initialize(self, config):
+        self.results = []
+        setattr(self, config.get("hook", "string"), self.react)
+
+    def react(self, *arguments):
+        if act is not None:
+            try:
+                self.results.append(act(self.world))
+            except Exception as error:
+                self.results.append(error)
+"""
+
+
+@pytest.fixture
+def reacting(files: Any, monkeypatch: pytest.MonkeyPatch, request: Any) -> Callable[..., Any]:
+    """Loads a world with a plugin that acts in one of its hooks."""
+    name = f"reacting_{abs(hash(request.node.nodeid))}"
+    files.write(f"src/{name}.py", PLUGIN)
+    manifest = files.write(
+        "plugins.xml",
+        f'<library path="src"><class name="test::Reacting" type="{name}.Reacting" '
+        'base_class_type="flatland::ModelPlugin"/></library>',
+    )
+    monkeypatch.setenv("FLATLAND_PLUGIN_PATH", manifest)
+
+    def load(hook: str, act: Callable[[flatland.World], object]) -> tuple[flatland.World, Any]:
+        plugin = f'{{name: p, type: "test::Reacting", hook: {hook}}}'
+        disc = "bodies: [{name: b, footprints: [{type: circle, radius: 0.5, density: 1}]}]"
+        files.write("reacting.model.yaml", f"{disc}\nplugins: [{plugin}]")
+        world = files.load(EMPTY)
+        world.spawn_model("reacting.model.yaml", "a")
+        world.spawn_model("minimal.model.yaml", "b", pose=(0.5, 0, 0), if_blocked="allow")
+        world.step()
+        found = world.model("a").plugin("p")
+        monkeypatch.setattr(f"{name}.act", act)
+        return world, found
+
+    return load
+
+
+@pytest.mark.parametrize(("hook", "deleted"), [("end_contact", "b"), ("on_shutdown", "a")])
+def test_a_spawn_of_a_hook_that_runs_while_a_model_is_deleted_comes_later(
+    reacting: Callable[..., Any], hook: str, deleted: str
+) -> None:
+    world, plugin = reacting(
+        hook, lambda world: world.spawn_model("minimal.model.yaml", "new", pose=(9, 9, 0))
+    )
+    world.delete_model(deleted)
+    assert plugin.results == [None]
+    assert "new" not in [model.name for model in world.models]
+    world.step()
+    assert "new" in [model.name for model in world.models]
+
+
+@pytest.mark.parametrize(("hook", "deleted"), [("end_contact", "b"), ("on_shutdown", "a")])
+def test_a_hook_that_runs_while_a_model_is_deleted_may_not_step(
+    reacting: Callable[..., Any], hook: str, deleted: str
+) -> None:
+    world, plugin = reacting(hook, lambda world: world.step())
+    time = world.time
+    world.delete_model(deleted)
+    [error] = plugin.results
+    assert isinstance(error, WorldError)
+    assert "step must not be called from a plugin's hook" in str(error)
+    assert world.time == time
