@@ -22,7 +22,7 @@ _LOG = logging.getLogger("flatland")
 NODE_NAME: Final = "flatland_server"
 _MASTER_PERIOD: Final = 0.2  # s between two attempts to reach the ROS master
 _MASTER_PATIENCE: Final = 1.0  # s without one until the node says that it waits
-_SWITCH_INTERVAL: Final = 0.0005  # s for which a thread keeps the GIL while others wait for it
+_SWITCH_INTERVAL: Final = 0.0002  # s for which a thread keeps the GIL while others wait for it
 _UNREGISTERING: Final = 0.5  # s that saying good-bye to the ROS master may take
 
 
@@ -49,9 +49,9 @@ class ServerNode:
         """Runs until the node is asked to stop, and returns the exit code."""
         # Before anything that takes time: a signal must find someone who hears it.
         StopSignals(self._stop, lambda: _leave_ros("signal"))
-        # A connection or a registration takes rospy's threads some hundred short pieces of work.
-        # With Python's interval of 5 ms they wait a second for a loop that runs at full speed. The
-        # interval costs nothing while no other thread wants to run.
+        # rospy's threads need the GIL some hundred times for one connection or registration. With
+        # Python's interval of 5 ms that takes up to a second beside a loop at full speed. A short
+        # interval costs nothing while no other thread waits for the GIL.
         sys.setswitchinterval(_SWITCH_INTERVAL)
         import rospy
 

@@ -253,6 +253,7 @@ def test_server_launch_sets_all_parameters(launcher: Any, ros: Any, world: Path)
         "server.launch",
         f"world_path:={world}",
         "update_rate:=inf",
+        "max_lag:=0.25",
         "step_size:=0.01",
         "show_viz:=false",
         "viz_pub_rate:=15",
@@ -266,6 +267,7 @@ def test_server_launch_sets_all_parameters(launcher: Any, ros: Any, world: Path)
     assert parameters == {
         "world_path": str(world),
         "update_rate": "inf",
+        "max_lag": 0.25,
         "step_size": 0.01,
         "show_viz": False,
         "viz_pub_rate": 15,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Iterator
 from pathlib import Path
 from textwrap import dedent
@@ -84,3 +85,28 @@ def files(tmp_path: Path) -> Iterator[WorldFiles]:
 def empty_world(files: WorldFiles) -> flatland.World:
     """A world without layers and models."""
     return files.load("{properties: {}, layers: []}")
+
+
+class FakeTime:
+    """A wall clock that only moves in waits and where a test spends time."""
+
+    def __init__(self) -> None:
+        self.now = 1024.0
+
+    def clock(self) -> float:
+        return self.now
+
+    def wait(self, event: threading.Event, seconds: float) -> bool:
+        assert seconds > 0
+        if not event.is_set():
+            self.now += seconds
+        return event.is_set()
+
+    def spend(self, seconds: float) -> None:
+        self.now += seconds
+
+
+@pytest.fixture
+def fake_time() -> FakeTime:
+    """The clock and the wait of a `Simulation` whose wall time passes as a test says."""
+    return FakeTime()
