@@ -97,7 +97,7 @@ for _ in range(10):
     while heard.get():
         pass
     pause()
-    while not heard.get(timeout=10):
+    while not heard.get():
         pass
     subscriber.unregister()
 resume()

@@ -9,13 +9,13 @@ from typing import Any
 
 import pytest
 from std_msgs.msg import Int32
+from waiting import TIMEOUT
 
 from flatland.errors import FlatlandError
 from flatland.ros.latched_topic import LatchedTopic
 from flatland.ros.registrar import Registrar
 
 TOPIC = "/flatland_tests/state"
-PATIENCE = 10.0
 
 
 class State:
@@ -48,7 +48,7 @@ def state() -> State:
 def registrar(ros: Any) -> Iterator[Registrar]:
     registrar = Registrar()
     yield registrar
-    registrar.close(PATIENCE)
+    registrar.close(TIMEOUT)
 
 
 @pytest.fixture
@@ -56,10 +56,10 @@ def topic(registrar: Registrar, state: State) -> Iterator[LatchedTopic]:
     topic = LatchedTopic(
         registrar, TOPIC, Int32, state.make, state.post, on_connection=state.connections.append
     )
-    assert registrar.flush(PATIENCE)
+    assert registrar.flush(TIMEOUT)
     yield topic
     topic.close()
-    assert registrar.flush(PATIENCE)
+    assert registrar.flush(TIMEOUT)
 
 
 @pytest.fixture
@@ -147,7 +147,7 @@ def test_second_topic_of_the_name_serves_those_who_are_there(
     second = LatchedTopic(registrar, TOPIC, Int32, lambda: Int32(9), state.post)
     topic.close()
     subscriber.wait_for_line("data: 9")
-    assert registrar.flush(PATIENCE)
+    assert registrar.flush(TIMEOUT)
     late = echo("-n", "1")
     late.wait_for_line("data: 9")
     second.send()

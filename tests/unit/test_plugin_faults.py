@@ -11,6 +11,7 @@ import time
 from types import SimpleNamespace
 
 import pytest
+from waiting import TIMEOUT
 
 import flatland
 from flatland import PluginError, WorldLockedError
@@ -296,7 +297,7 @@ def test_a_plugin_that_never_starts_is_given_up(files, faults, which):
     start = time.monotonic()
     with pytest.raises(PluginError) as caught:
         world.spawn_model("bad.yaml", "second")
-    assert 0.2 <= time.monotonic() - start < 5
+    assert time.monotonic() - start >= 0.2
     assert str(caught.value).startswith(
         f'Flatland plugin: Model Plugin "bad" type "faults::{which}" model "second": '
         "on_initialize did not return within 0.2 s ["
@@ -310,7 +311,7 @@ def test_a_plugin_that_never_starts_is_given_up(files, faults, which):
     module.woken.set()
     for thread in threading.enumerate():
         if thread.name == "on_initialize of bad":
-            thread.join(20)
+            thread.join(TIMEOUT)
             assert not thread.is_alive()
     [plugin] = module.started
     with pytest.raises(PluginError, match='plugin "bad" has ended and can open no "late"'):

@@ -64,6 +64,9 @@ def describe(widget: Any) -> dict[str, Any]:
         "enabled": widget.isEnabled(),
         "checked": widget.isChecked() if hasattr(widget, "isChecked") else None,
         "title": widget.windowTitle(),
+        # Keys go to the active window, and in it to the widget that has the focus.
+        "active": widget.isActiveWindow(),
+        "focus": widget.hasFocus(),
     }
 
 

@@ -10,10 +10,10 @@ from concurrent.futures import Future
 from typing import Any
 
 import pytest
+from waiting import TIMEOUT
 
 from flatland.ros.ticker import Ticker
 
-PATIENCE = 10.0  # s
 RATE = 50.0  # Hz
 
 
@@ -33,8 +33,11 @@ class Loop:
         self.ticks.append(now)
         return self.goes_on
 
-    def run_next(self, timeout: float = PATIENCE) -> None:
+    def run_next(self, timeout: float = TIMEOUT) -> None:
         self._actions.get(timeout=timeout)()
+
+    def wait_for_post(self) -> None:
+        self._actions.put(self._actions.get(timeout=TIMEOUT))
 
     def idle(self, seconds: float) -> bool:
         """Whether nothing is posted for some time."""
@@ -91,34 +94,40 @@ def test_rests_and_wakes(loop: Loop, ticker: Ticker) -> None:
 def test_what_comes_during_the_last_tick_wakes_it_again(loop: Loop) -> None:
     """Such as a subscriber, right after the tick found that there is none."""
 
-    def tick(_now: float) -> bool:
-        goes_on = False
+    ticks: list[float] = []
+
+    def tick(now: float) -> bool:
+        ticks.append(now)
         ticker.wake()
-        return goes_on
+        return False
 
     ticker = Ticker("woken", RATE, loop.post, tick)
     ticker.wake()
     for _ in range(3):
         loop.run_next()
     ticker.close()
+    assert len(ticks) == 3
 
 
-def test_close_ends_the_thread_whatever_it_waits_for(loop: Loop) -> None:
-    for wake in (False, True):
-        ticker = Ticker(f"closing-{wake}", RATE, loop.post, loop.tick)
-        if wake:
-            ticker.wake()
-        ticker.close()
-        (thread,) = [t for t in threading.enumerate() if t.name == f"closing-{wake}"] or [None]
-        if thread is not None:
-            thread.join(PATIENCE)
-            assert not thread.is_alive()
+@pytest.mark.parametrize("waits_for", ["wake", "period", "loop"])
+def test_close_ends_the_thread_whatever_it_waits_for(loop: Loop, waits_for: str) -> None:
+    ticker = Ticker(f"closing-{waits_for}", 1e-4, loop.post, loop.tick)
+    (thread,) = [t for t in threading.enumerate() if t.name == f"closing-{waits_for}"]
+    if waits_for != "wake":
+        ticker.wake()
+        loop.wait_for_post()
+    if waits_for == "period":
+        loop.run_next()  # The next tick is due in hours.
+    assert thread.is_alive()
+    ticker.close()
+    thread.join(TIMEOUT)
+    assert not thread.is_alive()
+    assert len(loop.ticks) == (waits_for == "period")
 
 
 def test_tick_that_was_posted_before_the_end_does_nothing(loop: Loop, ticker: Ticker) -> None:
     ticker.wake()
-    while loop.idle(0.01):
-        pass
+    loop.wait_for_post()
     ticker.close()
     loop.run_next()
     assert loop.ticks == []
