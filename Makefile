@@ -59,13 +59,32 @@ dev:  ## build the extension and the messages into the source tree (PYTHONPATH=.
 	@cmake --preset dev >build/dev.log || { cat build/dev.log; exit 1; }
 	cmake --build build/dev
 
+.PHONY: coverage
+coverage: setup-dev  ## measure which lines the tests run, into build/coverage: make coverage [ARGS="tests/unit"]
+	@cmake --preset coverage >build/coverage.log || { cat build/coverage.log; exit 1; }
+	cmake --build build/coverage
+	@. ./setup.bash && tools/coverage.sh $(or $(ARGS),tests/unit tests/conformance tests/examples tests/ros)
+
+# address, undefined or thread; without one the first two together.
+SANITIZER :=
+sanitize_preset := sanitize$(addprefix -,$(SANITIZER))
+libraries_ := libasan.so libubsan.so
+libraries_address := libasan.so
+libraries_undefined := libubsan.so
+libraries_thread := libtsan.so
+
 .PHONY: sanitize
-sanitize: setup-dev  ## run the unit tests with address and undefined-behaviour sanitizers in the extension
-	@cmake --preset sanitize >build/sanitize.log || { cat build/sanitize.log; exit 1; }
-	cmake --build build/sanitize
-	. ./setup.bash && LD_PRELOAD="$$(g++ -print-file-name=libasan.so) $$(g++ -print-file-name=libubsan.so)" \
-	  ASAN_OPTIONS=detect_leaks=0:quarantine_size_mb=16 UBSAN_OPTIONS=print_stacktrace=1 PYTHONPATH="$$PWD/build/sanitize/python:$$PYTHONPATH" \
-	  pytest tests/unit $(ARGS)
+sanitize: setup-dev  ## run the unit tests with sanitizers in the extension: make sanitize [SANITIZER=address|undefined|thread]
+	@$(if $(filter-out address undefined thread,$(SANITIZER)),$(error SANITIZER must be address, undefined or thread))
+	@cmake --preset $(sanitize_preset) >build/sanitize.log || { cat build/sanitize.log; exit 1; }
+	cmake --build build/$(sanitize_preset)
+	. ./setup.bash && \
+	  LD_PRELOAD="$$(for library in $(libraries_$(SANITIZER)); do g++ -print-file-name=$$library; done | xargs)" \
+	  ASAN_OPTIONS=detect_leaks=0:quarantine_size_mb=16 UBSAN_OPTIONS=print_stacktrace=1 \
+	  TSAN_OPTIONS="suppressions=$$PWD/tools/tsan_suppressions.txt:exitcode=66" \
+	  PYTHONPATH="$$PWD/build/$(sanitize_preset)/python:$$PYTHONPATH" \
+	  $(if $(filter thread,$(SANITIZER)),setarch -R) \
+	  pytest --capture=sys tests/unit $(if $(filter thread,$(SANITIZER)),-m threads) $(ARGS)
 
 .PHONY: clean
 clean:  ## remove all that was built, .venv too

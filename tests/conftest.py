@@ -8,16 +8,29 @@ from pathlib import Path
 import pytest
 from hypothesis import HealthCheck, settings
 
-# How fast a loaded machine is says nothing about the code; CI draws the same examples every time.
+# How fast a loaded machine is says nothing about the code. The examples are new in each run, also
+# in CI: a failure prints the blob that reproduces it, and belongs into the test as an @example.
 settings.register_profile(
     "flatland",
     deadline=None,
-    derandomize=bool(os.environ.get("CI")),
+    derandomize=False,
+    print_blob=True,
     suppress_health_check=[HealthCheck.too_slow],
 )
 settings.load_profile("flatland")
 
-_CHECKOUT = Path(__file__).resolve().parent.parent
+_TESTS = Path(__file__).resolve().parent
+_CHECKOUT = _TESTS.parent
+# Tests that need a ROS master, a screen or a compiler, and take a while.
+_MARKED_FOLDERS = {"ros": "ros", "ros/viewer": "viewer", "build": "build"}
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Gives all tests of a folder the marker of the folder."""
+    for item in items:
+        for folder, marker in _MARKED_FOLDERS.items():
+            if _TESTS / folder in item.path.parents:
+                item.add_marker(marker)
 
 
 @pytest.fixture(scope="session")

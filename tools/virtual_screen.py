@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import shutil
 import struct
@@ -58,11 +59,13 @@ class VirtualScreen:
 
     def picture(self) -> Image:
         """Returns what the screen shows: red, green, blue; shape (height, width, 3)."""
-        try:
-            data = self._run("xwd", "-root", "-silent")
-        except subprocess.CalledProcessError:
-            # A window went while xwd looked at it.
-            data = self._run("xwd", "-root", "-silent")
+        for _ in range(10):
+            # xwd fails if a window is closed meanwhile.
+            with contextlib.suppress(subprocess.CalledProcessError):
+                data = self._run("xwd", "-root", "-silent")
+                break
+        else:
+            raise RuntimeError(f"no picture of the display {self.display}")
         header = struct.unpack(">25I", data[:100])
         size, width, height, pixel_bits, row_bytes, colors = (
             header[index] for index in (0, 4, 5, 11, 12, 19)
@@ -120,5 +123,5 @@ class VirtualScreen:
         """Runs a program on the screen and returns what it printed."""
         environment = {**os.environ, "DISPLAY": self.display}
         return subprocess.run(  # noqa: S603 - our own words
-            command, env=environment, check=True, capture_output=True, timeout=20
+            command, env=environment, check=True, capture_output=True, timeout=120
         ).stdout

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
+from waiting import BUILD_TIMEOUT, TIMEOUT
 
 WORLD = """
 properties: {}
@@ -28,7 +29,10 @@ def clean_environment(home: Path) -> dict[str, str]:
 
 
 def run(
-    command: Sequence[str | Path], environment: dict[str, str], folder: Path, timeout: float = 60
+    command: Sequence[str | Path],
+    environment: dict[str, str],
+    folder: Path,
+    timeout: float = TIMEOUT,
 ) -> str:
     """Runs a command and returns what it printed; a failure shows that and fails the test."""
     done = subprocess.run(
@@ -61,7 +65,7 @@ class Space:
     environment: dict[str, str]
     scratch: Path
 
-    def run(self, *command: str | Path, timeout: float = 60) -> str:
+    def run(self, *command: str | Path, timeout: float = TIMEOUT) -> str:
         """Runs a command in the space's environment and returns what it printed."""
         return run(command, self.environment, self.scratch, timeout)
 
@@ -86,8 +90,8 @@ def catkin_workspace(tmp_path_factory: pytest.TempPathFactory, checkout: Path) -
     (workspace / "src" / "flatland").symlink_to(checkout)
     (workspace / "src" / "my_robots").symlink_to(checkout / "examples" / "my_robots")
     environment = clean_environment(workspace)
-    run(["catkin_make", "-j2"], environment, workspace, timeout=400)
-    run(["catkin_make", "install", "-j2"], environment, workspace, timeout=100)
+    run(["catkin_make", "-j2"], environment, workspace, timeout=BUILD_TIMEOUT)
+    run(["catkin_make", "install", "-j2"], environment, workspace, timeout=BUILD_TIMEOUT)
     return workspace
 
 

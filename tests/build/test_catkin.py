@@ -9,9 +9,10 @@ import subprocess
 from pathlib import Path
 
 import pytest
+from waiting import BUILD_TIMEOUT, TIMEOUT
 
 # Building the workspace is part of the first test.
-pytestmark = pytest.mark.timeout(600)
+pytestmark = pytest.mark.timeout(BUILD_TIMEOUT)
 
 STEP_A_WORLD = """
 import sys, flatland, flatland._core, flatland.msg, flatland.plugins
@@ -100,7 +101,7 @@ def test_each_script_is_a_program(space, checkout):
         stdout=subprocess.PIPE,
         stderr=subprocess.STDOUT,
         text=True,
-        timeout=60,
+        timeout=TIMEOUT,
     )
     assert viewer.returncode == 1
     assert viewer.stdout.startswith("flatland_viz: no ROS master at http://127.0.0.1:1")
@@ -140,28 +141,24 @@ def test_the_node_runs(space, world_file):
         )
     wait_for_clock = (
         "import rospy; from rosgraph_msgs.msg import Clock; "
-        "rospy.init_node('waiter', anonymous=True); rospy.wait_for_message('/clock', Clock, 60)"
+        "rospy.init_node('waiter', anonymous=True); rospy.wait_for_message('/clock', Clock)"
     )
     try:
         # The master is the first thing that roslaunch starts.
         wait_for_master = (
-            "import rosgraph, time\n"
-            "end = time.monotonic() + 30\n"
-            "while not rosgraph.is_master_online():\n"
-            "    assert time.monotonic() < end\n"
-            "    time.sleep(0.1)\n"
+            "import rosgraph, time\nwhile not rosgraph.is_master_online():\n    time.sleep(0.1)\n"
         )
         for script in (wait_for_master, wait_for_clock):
             waited = subprocess.run(
                 ["/usr/bin/python3", "-c", script],
                 env=environment,
-                timeout=90,
+                timeout=TIMEOUT,
                 capture_output=True,
                 text=True,
             )
             assert waited.returncode == 0, waited.stderr + log.read_text()
         os.kill(launch.pid, signal.SIGINT)
-        assert launch.wait(30) == 0, log.read_text()
+        assert launch.wait(TIMEOUT) == 0, log.read_text()
     finally:
         if launch.poll() is None:
             os.killpg(launch.pid, signal.SIGKILL)

@@ -5,9 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+from waiting import BUILD_TIMEOUT
 
 # Building the workspace is part of the first test.
-pytestmark = pytest.mark.timeout(600)
+pytestmark = pytest.mark.timeout(BUILD_TIMEOUT)
 
 DRIVE_THROUGH_THE_GATE = """
 import rospkg, flatland

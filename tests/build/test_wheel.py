@@ -12,8 +12,9 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from waiting import BUILD_TIMEOUT
 
-pytestmark = pytest.mark.timeout(600)
+pytestmark = pytest.mark.timeout(BUILD_TIMEOUT)
 
 
 def source_files(checkout: Path) -> set[str]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import shutil
 from collections import defaultdict
 from pathlib import Path
 from typing import Any
@@ -24,9 +23,7 @@ Pair = tuple[str, str, str, str]
 class Run:
     """The world of the trace, stepped to its end, beside what the trace says."""
 
-    def __init__(self, shared_dir: Path, folder: Path) -> None:
-        golden = folder / "golden"
-        shutil.copytree(shared_dir / "golden", golden)
+    def __init__(self, golden: Path) -> None:
         trace = json.loads((golden / "contact.trace.json").read_text())
         commands = defaultdict(list)
         for line in (golden / "contact.cmd").read_text().splitlines():
@@ -65,8 +62,8 @@ class Run:
 
 
 @pytest.fixture(scope="module")
-def run(shared_dir: Path, tmp_path_factory: pytest.TempPathFactory) -> Run:
-    return Run(shared_dir, tmp_path_factory.mktemp("contact"))
+def run(golden_dir: Path) -> Run:
+    return Run(golden_dir)
 
 
 def our_pairs(message: flatland.Collisions) -> list[Pair]:

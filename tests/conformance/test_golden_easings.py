@@ -21,8 +21,8 @@ models: [{name: door, model: door.model.yaml}]
 
 
 @pytest.fixture(scope="module")
-def golden(shared_dir: Path) -> dict[str, Any]:
-    trace: dict[str, Any] = json.loads((shared_dir / "golden" / "easings.json").read_text())
+def golden(golden_dir: Path) -> dict[str, Any]:
+    trace: dict[str, Any] = json.loads((golden_dir / "easings.json").read_text())
     return trace
 
 

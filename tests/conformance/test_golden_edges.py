@@ -27,10 +27,9 @@ def undirected(edges: npt.ArrayLike) -> npt.NDArray[np.float64]:
 @pytest.mark.parametrize(
     ("layer", "map_file"), [("walls", "walls.yaml"), ("low", "low.yaml"), ("lines", "lines.yaml")]
 )
-def test_edges(shared_dir: Path, layer: str, map_file: str) -> None:
-    golden = shared_dir / "golden"
-    trace = json.loads((golden / "free.trace.json").read_text())
+def test_edges(golden_dir: Path, layer: str, map_file: str) -> None:
+    trace = json.loads((golden_dir / "free.trace.json").read_text())
     expected = {entry["name"]: entry["edges"] for entry in trace["layers"]}[layer]
-    layer_map = load_map(str(golden / map_file), layer)
+    layer_map = load_map(str(golden_dir / map_file), layer)
     assert layer_map.edges.shape == (len(expected), 4)
     np.testing.assert_allclose(undirected(layer_map.edges), undirected(expected), rtol=0, atol=1e-5)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-import shutil
 from pathlib import Path
 from typing import Any
 
@@ -18,18 +17,16 @@ POSE_TOLERANCE = 2e-4  # m and rad
 
 
 @pytest.fixture(scope="module")
-def records(shared_dir: Path) -> list[dict[str, Any]]:
-    trace = json.loads((shared_dir / "golden" / "free.trace.json").read_text())
+def records(golden_dir: Path) -> list[dict[str, Any]]:
+    trace = json.loads((golden_dir / "free.trace.json").read_text())
     found: list[dict[str, Any]] = trace["records"]
     return found
 
 
-def test_gps(shared_dir: Path, records: list[dict[str, Any]], tmp_path: Path) -> None:
+def test_gps(golden_dir: Path, records: list[dict[str, Any]]) -> None:
     # The antenna is put where the trace has the robot: this is about the conversion alone.
-    golden = tmp_path / "golden"
-    shutil.copytree(shared_dir / "golden", golden)
     worst = 0.0
-    with flatland.World.from_yaml(golden / "free.yaml", seed=1) as world:
+    with flatland.World.from_yaml(golden_dir / "free.yaml", seed=1) as world:
         model = world.model("diff1")
         gps = model.plugin("gps")
         assert isinstance(gps, Gps)
@@ -42,12 +39,10 @@ def test_gps(shared_dir: Path, records: list[dict[str, Any]], tmp_path: Path) ->
     assert worst < GPS_TOLERANCE
 
 
-def test_door(shared_dir: Path, records: list[dict[str, Any]], tmp_path: Path) -> None:
-    golden = tmp_path / "golden"
-    shutil.copytree(shared_dir / "golden", golden)
+def test_door(golden_dir: Path, records: list[dict[str, Any]]) -> None:
     by_step = {record["step"]: record["bodies"]["door1/panel"] for record in records}
     worst = 0.0
-    with flatland.World.from_yaml(golden / "free.yaml", seed=1, step_size=0.005) as world:
+    with flatland.World.from_yaml(golden_dir / "free.yaml", seed=1, step_size=0.005) as world:
         panel = world.model("door1").body("panel")
         for step in range(max(by_step) + 1):
             if step in by_step:

@@ -9,15 +9,13 @@ import signal
 import socket
 import subprocess
 import sys
-import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 
 import pytest
+from waiting import TIMEOUT, wait_until
 
 import flatland
-
-PATIENCE = 60.0  # s; only a test that fails waits that long
 
 
 def free_port() -> int:
@@ -32,7 +30,7 @@ def run(
     command: Sequence[str | Path],
     environment: Mapping[str, str],
     folder: Path,
-    timeout: float = PATIENCE,
+    timeout: float = TIMEOUT,
 ) -> str:
     """Runs a command and returns what it printed; a failure shows that and fails the test."""
     done = subprocess.run(
@@ -74,18 +72,23 @@ class Background:
 
     def wait_for(self, pattern: str) -> None:
         """Waits until its output holds a pattern."""
-        end = time.monotonic() + PATIENCE
-        while not re.search(pattern, self.output):
-            assert self._process.poll() is None, f"ended:\n{self.output}"
-            assert time.monotonic() < end, f"no {pattern!r} in:\n{self.output}"
-            time.sleep(0.05)
+
+        def printed() -> bool:
+            # The order counts: what a program prints last is complete once it has ended.
+            ended = self._process.poll() is not None
+            found = re.search(pattern, self.output) is not None
+            if ended and not found:
+                pytest.fail(f"ended without {pattern!r}:\n{self.output}")
+            return found
+
+        wait_until(f"output with {pattern!r}", printed, poll_period=0.05)
 
     def stop(self) -> None:
         """Ends it as Control-C does."""
         if self._process.poll() is None:
             os.killpg(self._process.pid, signal.SIGINT)
             try:
-                self._process.wait(PATIENCE)
+                self._process.wait(TIMEOUT)
             except subprocess.TimeoutExpired:
                 with contextlib.suppress(ProcessLookupError):
                     os.killpg(self._process.pid, signal.SIGKILL)

@@ -15,6 +15,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
+from waiting import BUILD_TIMEOUT
 
 _BLOCK = re.compile(
     r"(?:^(?P<how>File|Add to) `(?P<path>[^`]+)`:\n\n|^(?P<background><!-- leave running -->)\n)?"
@@ -118,7 +119,9 @@ class Shell:
         return printed
 
 
-@pytest.mark.timeout(400)
+@pytest.mark.ros
+@pytest.mark.build
+@pytest.mark.timeout(BUILD_TIMEOUT)
 def test_a_user_who_follows_the_page_gets_what_it_shows(
     blocks, environment, tmp_path, run_command, start
 ):

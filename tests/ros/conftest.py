@@ -26,11 +26,10 @@ pytest.importorskip("flatland.msg", reason="the messages are not built")
 import rosgraph
 import roslib.packages
 import rospy
+from waiting import TIMEOUT, wait_until
 
 import flatland
 from flatland.srv import DeleteModel, MoveModel, SpawnModel
-
-PATIENCE = 20.0  # s; only a test that fails waits that long
 
 MAP = "type: line_segments\ndata: walls.dat\nscale: 1.0\norigin: [0, 0, 0]\n"
 WALLS = "-5 -5 5 -5\n5 -5 5 5\n5 5 -5 5\n-5 5 -5 -5\n"  # a room of 10 m by 10 m around (0, 0)
@@ -59,17 +58,6 @@ def _collect_leavings() -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         gc.collect()
-
-
-def wait_until(what: str, condition: Callable[[], Any], timeout: float = PATIENCE) -> Any:
-    """Waits until a condition holds and returns what it gave; for states that nobody tells of."""
-    end = time.monotonic() + timeout
-    while time.monotonic() < end:
-        result = condition()
-        if result:
-            return result
-        time.sleep(0.01)
-    pytest.fail(f"{what} did not come true in {timeout} s")
 
 
 class Process:
@@ -111,7 +99,7 @@ class Process:
         """Whether it has not ended."""
         return self._popen.poll() is None
 
-    def wait_for_line(self, pattern: str, timeout: float = PATIENCE) -> re.Match[str]:
+    def wait_for_line(self, pattern: str, timeout: float = TIMEOUT) -> re.Match[str]:
         """Waits for a line that holds a pattern."""
         end = time.monotonic() + timeout
         seen = 0
@@ -133,14 +121,14 @@ class Process:
         """Sends a signal."""
         self._popen.send_signal(number)
 
-    def wait(self, timeout: float = PATIENCE) -> int:
+    def wait(self, timeout: float = TIMEOUT) -> int:
         """Waits until the program ends and returns its exit code."""
         try:
             code = self._popen.wait(timeout)
         except subprocess.TimeoutExpired:
             self.kill()
             pytest.fail(f"still running after {timeout} s:\n{self.output}")
-        self._reader.join(PATIENCE)
+        self._reader.join(TIMEOUT)
         return code
 
     def stop(self) -> int:
@@ -156,6 +144,11 @@ class Process:
         self._popen.wait()
 
 
+# s; a subscriber overlooks a publisher of this process that comes back while rospy still closes
+# the connection to the last one, so this is tried again.
+_ADVERTISING_TIME = 10.0
+
+
 class Topic:
     """What comes on a topic, from now on."""
 
@@ -164,7 +157,7 @@ class Topic:
         self._messages: queue.Queue[Any] = queue.Queue()
         self._subscriber = rospy.Subscriber(name, message_type, self._messages.put)
 
-    def next(self, timeout: float = PATIENCE) -> Any:
+    def next(self, timeout: float = TIMEOUT) -> Any:
         """Waits for a message."""
         try:
             return self._messages.get(timeout=timeout)
@@ -173,7 +166,7 @@ class Topic:
 
     def until(self, accept: Callable[[Any], bool]) -> Any:
         """Waits for a message that is as wanted."""
-        end = time.monotonic() + PATIENCE
+        end = time.monotonic() + TIMEOUT
         message = self.next()
         while not accept(message):
             assert time.monotonic() < end, f"last on {self.name}:\n{message}"
@@ -224,14 +217,23 @@ class Ros:
 
     def publisher(self, name: str, message_type: type[Any]) -> rospy.Publisher:
         """Advertises a topic for the length of the test; waits for its subscriber."""
-        publisher = rospy.Publisher(name, message_type, queue_size=10)
-        self._closers.append(publisher.unregister)
-        wait_until(f"a subscriber of {name}", publisher.get_num_connections)
-        return publisher
+
+        def advertise() -> rospy.Publisher | None:
+            publisher = rospy.Publisher(name, message_type, queue_size=10)
+            end = time.monotonic() + _ADVERTISING_TIME
+            while not publisher.get_num_connections():
+                if time.monotonic() > end:
+                    publisher.unregister()
+                    return None
+                time.sleep(0.01)
+            self._closers.append(publisher.unregister)
+            return publisher
+
+        return wait_until(f"a subscriber of {name}", advertise)
 
     def call(self, name: str, service_type: type[Any], *arguments: Any) -> Any:
         """Calls a service."""
-        rospy.wait_for_service(name, PATIENCE)
+        rospy.wait_for_service(name, TIMEOUT)
         return rospy.ServiceProxy(name, service_type)(*arguments)
 
     def spawn(

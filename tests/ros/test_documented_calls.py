@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from waiting import TIMEOUT
 
 _CALL = re.compile(r"^rosservice call .*$", re.MULTILINE)
 PAGES = ["README.md", "docs/models.md", "docs/ros.md", "docs/viewer.md"]
@@ -27,7 +28,7 @@ def test_calls_do_what_the_page_says(
             env=ros_environment,
             capture_output=True,
             text=True,
-            timeout=60,
+            timeout=TIMEOUT,
             check=False,
         )
         assert done.returncode == 0, f"{call}\n{done.stderr}"

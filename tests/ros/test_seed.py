@@ -8,7 +8,6 @@ from typing import Any
 
 import pytest
 from sensor_msgs.msg import LaserScan
-from std_srvs.srv import Empty
 
 NOISY = """
 bodies: [{name: base, footprints: [{type: circle, radius: 0.2, density: 1}]}]
@@ -23,35 +22,43 @@ def world(write_world: Callable[..., Path]) -> Path:
     return write_world("[{name: robot, model: noisy.model.yaml}]", noisy=NOISY)
 
 
-def scans_by_stamp(ros: Any, launcher: Any, world: Path, **parameters: int) -> dict[int, Any]:
-    """The scans of the first seconds of a run, as far as they were heard."""
-    process = launcher.server(world, **parameters)
-    scans = ros.topic("/scan", LaserScan).take(8)
-    ros.call("/pause", Empty)
-    assert process.stop() == 0
-    ros.close()
-    return {scan.header.stamp.to_nsec(): list(scan.ranges) for scan in scans}
+Scans = dict[int, list[float]]
+
+
+def common_scans(first: Any, second: Any) -> list[tuple[list[float], list[float]]]:
+    """Waits for three scans of each of two servers that have the same stamps, and returns them.
+
+    The servers run side by side at the same rate, the second one behind the first: however late a
+    subscriber connects to either, their scans have stamps in common after a while.
+    """
+    found: tuple[Scans, Scans] = ({}, {})
+    while len(common := sorted(found[0].keys() & found[1].keys())) < 3:
+        for scans, topic in zip(found, (first, second), strict=True):
+            scan = topic.next()
+            scans[scan.header.stamp.to_nsec()] = list(scan.ranges)
+    return [(found[0][stamp], found[1][stamp]) for stamp in common]
+
+
+def scans_of(ros: Any, launcher: Any, world: Path, namespace: str, seed: int) -> Any:
+    launcher.start(f"__ns:={namespace}", world_path=world, seed=seed)
+    return ros.topic(f"{namespace}/scan", LaserScan)
 
 
 def test_runs_with_one_seed_are_alike(ros: Any, launcher: Any, world: Path) -> None:
-    first = scans_by_stamp(ros, launcher, world, seed=42)
-    second = scans_by_stamp(ros, launcher, world, seed=42)
-    other = scans_by_stamp(ros, launcher, world, seed=43)
-    common = first.keys() & second.keys()
-    assert len(common) >= 3
-    assert all(first[stamp] == second[stamp] for stamp in common)
-    common = first.keys() & other.keys()
-    assert common
-    assert all(first[stamp] != other[stamp] for stamp in common)
+    first = scans_of(ros, launcher, world, "/first", seed=42)
+    second = scans_of(ros, launcher, world, "/second", seed=42)
+    assert all(a == b for a, b in common_scans(first, second))
+
+
+def test_runs_with_two_seeds_differ(ros: Any, launcher: Any, world: Path) -> None:
+    first = scans_of(ros, launcher, world, "/first", seed=42)
+    second = scans_of(ros, launcher, world, "/second", seed=43)
+    assert all(a != b for a, b in common_scans(first, second))
 
 
 def test_seed_is_drawn_and_logged(ros: Any, launcher: Any, world: Path) -> None:
-    process = launcher.server(world)
+    process = launcher.start("__ns:=/unseeded", world_path=world)
     seed = int(process.wait_for_line(r"seed (\d+) drawn at random")[1])
-    scans = ros.topic("/scan", LaserScan).take(8)
-    assert process.stop() == 0
-    ros.close()
-    again = scans_by_stamp(ros, launcher, world, seed=seed)
-    common = [scan for scan in scans if scan.header.stamp.to_nsec() in again]
-    assert common
-    assert all(list(scan.ranges) == again[scan.header.stamp.to_nsec()] for scan in common)
+    first = ros.topic("/unseeded/scan", LaserScan)
+    second = scans_of(ros, launcher, world, "/second", seed=seed)
+    assert all(a == b for a, b in common_scans(first, second))

@@ -15,6 +15,7 @@ import pytest
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import LaserScan
 from std_srvs.srv import Empty
+from waiting import TIMEOUT
 
 BEAMS = """
 bodies: [{name: base, footprints: [{type: circle, radius: 0.2, density: 1}]}]
@@ -35,7 +36,7 @@ class StuckSubscriber:
         assert code == 1, text
         self.socket = socket.socket()
         self.socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
-        self.socket.settimeout(20)
+        self.socket.settimeout(TIMEOUT)
         self.socket.connect((urlparse(f"//{protocol[1]}").hostname, protocol[2]))
         fields = {
             "callerid": "/stuck",

@@ -12,6 +12,7 @@ from typing import Any
 
 import cv2
 import pytest
+from waiting import TIMEOUT
 
 import flatland
 from flatland import cli
@@ -49,7 +50,7 @@ def world_file(files: Any) -> str:
 def run(*arguments: str | Path, **options: Any) -> subprocess.CompletedProcess[str]:
     """Runs the command as a process of its own."""
     command = [sys.executable, "-W", "error", "-m", "flatland", *map(str, arguments)]
-    return subprocess.run(command, capture_output=True, text=True, timeout=60, **options)
+    return subprocess.run(command, capture_output=True, text=True, timeout=TIMEOUT, **options)
 
 
 def main(*arguments: str | Path) -> int:

@@ -95,6 +95,7 @@ def test_number_of_cores_does_not_matter(checkout: Path, digest: str) -> None:
     assert run(checkout, 3, "0", "one core") == digest
 
 
+@pytest.mark.threads
 def test_scans_of_other_threads_do_not_matter(checkout: Path, digest: str) -> None:
     assert run(checkout, 3, "3") == digest
 

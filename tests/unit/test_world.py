@@ -392,6 +392,7 @@ def test_step_and_close_in_a_hook_are_refused(files, probe, caplog):
     assert world.timekeeper.sim_time_ns == 10_000_000
 
 
+@pytest.mark.threads
 def test_other_threads_may_ask_while_the_world_steps(files):
     world = files.load("{properties: {}, layers: []}")
     errors = []

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 import threading
 import time
@@ -22,6 +23,7 @@ from visualization_msgs.msg import (
     InteractiveMarkerUpdate,
     Marker,
 )
+from waiting import wait_until
 
 SERVER = "/interactive_model_markers"
 NAN = math.nan
@@ -154,14 +156,14 @@ def full_state(ros: Any, namespace: str = "") -> dict[str, InteractiveMarker]:
 
 
 def assert_paused(clock: Any) -> None:
-    """Waits until the world is paused; on a busy machine, a drag may be interrupted."""
-    end = time.monotonic() + 10
-    while time.monotonic() < end:
+    """Waits, as a busy machine may hold up a client until its drag is over."""
+
+    def silent() -> bool:
         clock.drop()
         time.sleep(0.1)  # The absence of messages is no event.
-        if not clock.rest(0.001):
-            return
-    pytest.fail("the world is not paused")
+        return not clock.rest(0.001)
+
+    wait_until("a pause", silent)
 
 
 def assert_running(clock: Any) -> None:
@@ -266,17 +268,18 @@ def test_sequence_numbers_of_updates_have_no_gaps(ros: Any) -> None:
         assert ros.move("rob", (i, 0, 0)).success
         numbers.append(update.until(lambda message: message.poses).seq_num)
     assert numbers == list(range(numbers[0], numbers[0] + 4))
-    assert full.rest()[-1].seq_num == numbers[-1]
+    full.until(lambda message: message.seq_num == numbers[-1])
 
 
 def test_keep_alive_messages_are_published_while_paused(ros: Any) -> None:
+    before_the_first = time.monotonic()
     update = updates(ros)
     ros.call("/pause", Empty)
     update.until(lambda message: message.type == InteractiveMarkerUpdate.KEEP_ALIVE)
-    start = time.monotonic()
     messages = update.take(3)
     assert {message.type for message in messages} == {InteractiveMarkerUpdate.KEEP_ALIVE}
-    assert 0.9 < time.monotonic() - start < 4
+    # Half a second between two of them, however late they arrive, but for the one on connection.
+    assert time.monotonic() - before_the_first > 2 * 0.5 - 0.1
 
 
 # -- drags ---------------------------------------------------------------------------------
@@ -325,23 +328,30 @@ def test_model_does_not_move_during_a_drag(
     assert_not_moved(truth)
 
 
+def drag_and_stop_sending(client: Client, clock: Any) -> None:
+    """Drags without a release until a pause of the length that ends such a drag is observed."""
+
+    def longest_gap() -> float:
+        clock.drop()
+        client.press()
+        client.drag(0, 0, 0)
+        times = [time.monotonic()]
+        for _ in range(50):  # 0.25 s of simulated time, in which the drag arrives
+            clock.next()
+            times.append(time.monotonic())
+        return max(after - before for before, after in itertools.pairwise(times))
+
+    # On a busy machine the clock may arrive so late that the gap closes.
+    wait_until("a pause", lambda: longest_gap() > 0.09)
+
+
 def test_drag_without_feedback_times_out(client: Client, clock: Any) -> None:
-    clock.next()
-    client.press()
-    client.drag(0, 0, 0)
-    wall, paused_for = time.monotonic(), 0.0
-    end = wall + 10
-    while paused_for < 0.09 and time.monotonic() < end:
-        clock.next()
-        now = time.monotonic()
-        paused_for, wall = max(paused_for, now - wall), now
-    assert 0.09 < paused_for < 1.0
+    drag_and_stop_sending(client, clock)
+    assert_running(clock)
 
 
 def test_drag_continues_after_an_interruption(client: Client, clock: Any, truth: Any) -> None:
-    client.press()
-    client.drag(0, 0, 0)
-    clock.rest(0.05)
+    drag_and_stop_sending(client, clock)
     assert_running(clock)
     with ContinuousDrag(client, 0, 0, 0):
         assert_paused(clock)
@@ -359,8 +369,8 @@ def test_keep_alive_feedback_continues_a_drag(client: Client, clock: Any) -> Non
         client.send(InteractiveMarkerFeedback.KEEP_ALIVE)
         return clock.rest(0.05) == []
 
-    # On a busy machine, an attempt may be too slow.
-    assert any(kept() for _ in range(5))
+    # A busy machine may hold up the client for too long.
+    assert any(kept() for _ in range(20))
     assert_running(clock)
 
 
@@ -480,16 +490,13 @@ def test_rate_of_updates_is_limited_to_30_hz(
 ) -> None:
     world = write_world("[{name: shuttle, model: shuttle.model.yaml}]", shuttle=SHUTTLE)
     launcher.server(world, "__ns:=/fast", update_rate=0)
+    before_the_first = time.monotonic()
     update = ros.topic(f"/fast{SERVER}/update", InteractiveMarkerUpdate)
-    update.until(lambda message: message.poses)
-    start, times = time.monotonic(), []
-    while time.monotonic() < start + 2:
-        message = update.next()
-        if message.type == InteractiveMarkerUpdate.UPDATE:
-            assert [pose.name for pose in message.poses] == ["shuttle"]
-            times.append(time.monotonic())
-    rate = len(times) / (times[-1] - start)
-    assert 5 < rate < 31
+    for _ in range(60):
+        message = update.until(lambda message: message.type == InteractiveMarkerUpdate.UPDATE)
+        assert [pose.name for pose in message.poses] == ["shuttle"]
+    # A period between two of them, however late they arrive.
+    assert time.monotonic() - before_the_first > 59 / 30
 
 
 def test_no_updates_are_created_without_clients(
@@ -504,7 +511,7 @@ def test_no_updates_are_created_without_clients(
         update.close()
         return int(number)
 
-    before = next_number()
+    before, start = next_number(), time.monotonic()
     ros.topic("/alone/odometry/ground_truth", Odometry).take(100)  # 2 s
-    # About 60 with a client; a few are created while a client connects or disconnects.
-    assert next_number() - before < 20
+    # 30 a second with a client; a few are created while a client connects or disconnects.
+    assert next_number() - before < 10 * (time.monotonic() - start)

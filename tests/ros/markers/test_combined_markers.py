@@ -97,7 +97,7 @@ for _ in range(10):
     while received.get():
         pass
     pause()
-    while not received.get(timeout=10):
+    while not received.get():
         pass
     subscriber.unregister()
 resume()

@@ -14,6 +14,7 @@ import rospy
 from rosgraph_msgs.msg import Clock
 from std_srvs.srv import Empty, Trigger
 from visualization_msgs.msg import Marker, MarkerArray
+from waiting import TIMEOUT
 
 from flatland.msg import DebugTopicList
 
@@ -178,7 +179,9 @@ def test_layer_is_published_once_and_when_it_changes(ros: Any, launcher: Any) ->
     assert lines.next().markers == walls.next().markers == []
     for count in (1, 2):
         assert ros.call("/grow", Trigger).success
-        (line_marker,), (wall_marker,) = lines.next().markers, walls.next().markers
+        # A new subscriber may get the state before the change twice.
+        (line_marker,) = lines.until(lambda message: message.markers).markers
+        (wall_marker,) = walls.until(lambda message: message.markers).markers
         assert points(line_marker)[-1] == [1, count - 1, 0]
         assert len(line_marker.points) == 2 * count
         assert len(wall_marker.points) == 6 * count
@@ -207,7 +210,7 @@ def test_model_as_footprints_and_joints(ros: Any, arm: None) -> None:
     assert {marker.action for marker in markers} == {Marker.ADD}
     assert len({(marker.ns, marker.id) for marker in markers}) == 4
     (stamp,) = {marker.header.stamp for marker in markers}
-    assert 0 <= (stamp - clock).to_sec() < 5
+    assert 0 <= (stamp - clock).to_sec() < TIMEOUT
     circle, polygon, lines, cubes = markers
 
     assert circle.type == Marker.SPHERE_LIST
@@ -253,24 +256,32 @@ def test_markers_are_published_while_paused(ros: Any, launcher: Any, arm: None) 
     del arm
     topic = ros.topic(f"{DEBUG}/model/arm", MarkerArray)
     ros.call("/pause", Empty)
-    stamp = topic.take(3)[-1].markers[0].header.stamp
-    assert {message.markers[0].header.stamp for message in topic.take(3)} == {stamp}
+    # Messages from before the pause may still be on their way; the move is made in the pause.
     assert ros.move("arm", (-2, 0, 0)).success
-    topic.until(lambda message: pose(message.markers[0])[0] < 0)
+    moved = topic.until(lambda message: pose(message.markers[0])[0] < 0)
+    stamp = moved.markers[0].header.stamp
+    assert {message.markers[0].header.stamp for message in topic.take(3)} == {stamp}
     topic.close()
     assert ros.move("arm", (-3, 0, 0)).success  # without subscribers
     assert "x: -3.0" in echo(launcher, "model/arm")
 
 
-def test_rate_is_in_wall_time(ros: Any, arm: None) -> None:
+def test_rate_is_in_wall_time(ros: Any, arm: None, eventually: Any) -> None:
     del arm
-    topic = ros.topic(f"{DEBUG}/model/arm", MarkerArray)
-    topic.take(2)
-    start = time.monotonic()
     count = round(1.5 * RATE)
+    before_the_first = time.monotonic()
+    topic = ros.topic(f"{DEBUG}/model/arm", MarkerArray)
     topic.take(count)
-    rate = count / (time.monotonic() - start)
-    assert 0.3 * RATE < rate < 1.1 * RATE
+    # A period between two of them, however late they arrive, but for the one on connection.
+    assert (count - 2) / RATE < time.monotonic() - before_the_first
+
+    def rate() -> float:
+        start = time.monotonic()
+        topic.take(count)
+        return count / (time.monotonic() - start)
+
+    # A busy machine slows it down for a while.
+    eventually("the rate", lambda: rate() > 0.3 * RATE)
 
 
 def test_changed_footprints_and_colors(ros: Any, arm: None) -> None:
@@ -300,7 +311,9 @@ def test_topics_are_listed(ros: Any, launcher: Any) -> None:
     topics = ros.topic(f"{DEBUG}/topics", DebugTopicList)
     assert topics.next().topics == LAYER_TOPICS
     assert ros.spawn("ball.model.yaml", "one").success
-    assert topics.next().topics == [*LAYER_TOPICS, "model/one"]
+    # A new subscriber may get the state before the change twice.
+    message = topics.until(lambda message: message.topics != LAYER_TOPICS)
+    assert message.topics == [*LAYER_TOPICS, "model/one"]
     assert ros.spawn("ball.model.yaml", "two").success
     assert topics.next().topics == [*LAYER_TOPICS, "model/one", "model/two"]
     assert echo(launcher, "topics").splitlines()[-3:-1] == ["  - model/one", "  - model/two"]
@@ -321,7 +334,10 @@ def test_deleted_model_deletes_its_markers_and_its_topic(ros: Any, eventually: A
     assert len(message.markers) == 1
     assert message.markers[0].header.frame_id == "map"
     eventually("end of the topic", lambda: not topic.connected)
-    assert f"{DEBUG}/model/one" not in ros.registered()["publishers"]
+    eventually(
+        "its end at the master",
+        lambda: f"{DEBUG}/model/one" not in ros.registered()["publishers"],
+    )
     assert topic.rest() == []
 
 
@@ -347,7 +363,8 @@ def test_illegal_names_are_converted_with_a_warning(ros: Any, server: Any) -> No
     for i, (name, legal) in enumerate(zip(names, expected, strict=True)):
         answer = ros.spawn("ball.model.yaml", name, "", (i - 3, 0, 0))
         assert answer.success, answer.message
-        assert topics.next().topics[-1] == f"model/{legal}"
+        message = topics.until(lambda message, i=i: len(message.topics) > len(LAYER_TOPICS) + i)
+        assert message.topics[-1] == f"model/{legal}"
         (marker,) = markers_of(ros, f"model/{legal}")
         assert marker.pose.position.x == i - 3
     server.wait_for_line(

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import socket
 import struct
-import time
 from collections.abc import Iterator
 from typing import Any
 
 import pytest
 from rospy.exceptions import TransportTerminated
+from waiting import TIMEOUT, wait_until
 
 from flatland.ros.transport.outbox import Outbox
 
@@ -45,7 +45,7 @@ class Pair:
     def __init__(self, queue_size: int) -> None:
         ours, self.reader = socket.socketpair()
         ours.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, 4096)
-        self.reader.settimeout(10)
+        self.reader.settimeout(TIMEOUT)
         self.transport = Transport(ours)
         self.outbox = Outbox(self.transport, queue_size)
 
@@ -82,7 +82,8 @@ def test_fast_reader_receives_all_messages(pair: Pair) -> None:
 
 
 def test_slow_reader_receives_the_newest_messages(pair: Pair) -> None:
-    for number in range(2000):  # Would block forever if a write waited for the reader.
+    # A write that waited for this reader would never return.
+    for number in range(2000):
         pair.write(number)
     numbers = [pair.read()]
     while numbers[-1] != 1999:
@@ -115,11 +116,8 @@ def test_closed_reader_ends_the_connection(pair: Pair) -> None:
     for number in range(100):
         pair.write(number)
     pair.reader.close()
-    end = time.monotonic() + 10
-    # The flusher detects it without another message.
-    while not pair.transport.done and time.monotonic() < end:
-        time.sleep(0.001)
-    assert pair.transport.done
+    # The flusher detects it, without another message.
+    wait_until("end of the connection", lambda: pair.transport.done)
     with pytest.raises(TransportTerminated):
         pair.write(100)
 

@@ -9,13 +9,13 @@ from typing import Any
 
 import pytest
 from std_msgs.msg import Int32
+from waiting import TIMEOUT
 
 from flatland.errors import FlatlandError
 from flatland.ros.registrar import Registrar
 from flatland.ros.transport.state_topic import StateTopic
 
 TOPIC = "/flatland_tests/state"
-TIMEOUT = 10.0  # s
 
 
 class State:

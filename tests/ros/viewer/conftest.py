@@ -7,7 +7,6 @@ import json
 import shutil
 import socket
 import sys
-import time
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from types import ModuleType
@@ -16,8 +15,8 @@ from typing import Any
 import cv2
 import numpy as np
 import pytest
+from waiting import TIMEOUT, wait_until
 
-PATIENCE = 30.0  # s; only a test that fails waits that long
 MAGENTA = (255, 0, 255)  # the walls
 _LEAST_STRENGTH = 45  # of 255
 BODY = "name: base, color: [0, 0, 1, 1], footprints: [{type: circle, radius: 0.4, density: 1}]"
@@ -103,9 +102,9 @@ class Viewer:
         path = str(folder / "viewer")
         self.screen = screen
         self.process = launcher.program(sys.executable, str(script), path)
-        self.process.wait_for_line("the window is up", PATIENCE)
+        self.process.wait_for_line("the window is up")
         connection = socket.socket(socket.AF_UNIX)
-        connection.settimeout(PATIENCE)
+        connection.settimeout(TIMEOUT)
         connection.connect(path)
         self._stream = connection.makefile("rw")
         connection.close()
@@ -121,26 +120,33 @@ class Viewer:
 
     def widget(self, name: str) -> dict[str, Any]:
         """The one widget of a name or class, waited for."""
-        end = time.monotonic() + PATIENCE
-        while time.monotonic() < end:
-            found = self.widgets(name)
-            if len(found) == 1:
-                return found[0]
-            time.sleep(0.05)
-        pytest.fail(f"no single widget {name} but {found}")
+        return self.until(name, lambda widget: True)
 
     def until(self, name: str, accept: Callable[[dict[str, Any]], bool]) -> dict[str, Any]:
         """Waits until a widget is as wanted."""
-        end = time.monotonic() + PATIENCE
-        while not accept(widget := self.widget(name)):
-            assert time.monotonic() < end, widget
-            time.sleep(0.02)
+
+        def accepted() -> dict[str, Any] | None:
+            found = self.widgets(name)
+            assert len(found) == 1, f"widgets of that name: {found}"
+            assert accept(found[0]), found[0]
+            return found[0]
+
+        widget: dict[str, Any] = wait_until(f"widget {name}", accepted, poll_period=0.02)
         return widget
 
     def click(self, name: str) -> None:
         """Clicks on a widget."""
         widget = self.widget(name)
         self.screen.click(widget["x"] + widget["width"] / 2, widget["y"] + widget["height"] / 2)
+
+    def fill_in(self, name: str, text: str) -> None:
+        """Replaces the text of a field."""
+        field = self.widget(name)
+        self.screen.click(field["x"] + 20, field["y"] + field["height"] / 2)
+        self.until(name, lambda widget: widget["focus"])
+        self.screen.key("ctrl+a")
+        self.screen.type(text)
+        self.until(name, lambda widget: widget["text"] == text)
 
 
 @pytest.fixture
@@ -211,23 +217,23 @@ class Picture:
 
 @pytest.fixture
 def look(screen: Any, tmp_path: Path) -> Callable[..., Picture]:
-    """Takes pictures until one is as wanted, and gives that one."""
+    """Takes pictures until one passes a check, and returns that one; the check may assert."""
 
     def look(accept: Callable[[Picture], Any], area: Mapping[str, int] | None = None) -> Picture:
-        end = time.monotonic() + PATIENCE
-        while True:
+        image = None
+
+        def accepted() -> Picture | None:
+            nonlocal image
             image = screen.picture()
-            reason = "it is not as wanted"
-            try:
-                picture = Picture(image, area)
-                if accept(picture):
-                    return picture
-            except AssertionError as error:
-                reason = str(error)
-            if time.monotonic() > end:
-                path = tmp_path / "screen.png"
-                cv2.imwrite(str(path), image[:, :, ::-1])
-                pytest.fail(f"the picture {path}: {reason}")
-            time.sleep(0.1)
+            picture = Picture(image, area)
+            return picture if accept(picture) else None
+
+        path = tmp_path / "screen.png"
+        try:
+            picture: Picture = wait_until(f"the picture {path}", accepted, poll_period=0.1)
+        except pytest.fail.Exception:
+            cv2.imwrite(str(path), image[:, :, ::-1])
+            raise
+        return picture
 
     return look

@@ -35,6 +35,8 @@ class Inspector(QObject):
             server.listen()
             print("the window is up", flush=True)
             connection, _ = server.accept()
+        # rospy sets a default timeout for sockets, but questions may be minutes apart.
+        connection.settimeout(None)
         self.stream = connection.makefile("rw")
         for line in self.stream:
             self.query_received.emit(line.strip())
@@ -64,6 +66,9 @@ def describe(widget: Any) -> dict[str, Any]:
         "enabled": widget.isEnabled(),
         "checked": widget.isChecked() if hasattr(widget, "isChecked") else None,
         "title": widget.windowTitle(),
+        # Keys go to the active window, and in it to the widget that has the focus.
+        "active": widget.isActiveWindow(),
+        "focus": widget.hasFocus(),
     }
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import re
 import signal
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -38,34 +39,50 @@ def subscriptions(node: str) -> set[str]:
 
 
 def test_rviz_shows_all_without_being_touched(
-    on_screen: Any, ros: Any, room: Path, screen: Any, look: Callable[..., Any]
+    on_screen: Any,
+    ros: Any,
+    room: Path,
+    screen: Any,
+    look: Callable[..., Any],
+    eventually: Callable[..., Any],
 ) -> None:
     launch = on_screen.launch("flatland", "server.launch", f"world_path:={room}", "use_rviz:=true")
     launch.wait_for_line("started with pid")
-    picture = look(lambda picture: len(picture.places(RED)) > 30, RVIZ_PANEL)
+
+    def shows_scan_and_robot(picture: Any) -> bool:
+        # From above, with the scan on the walls and the robot at its pose.
+        scan = picture.places(RED)
+        assert len(scan) > 30
+        assert (np.abs(np.abs(scan).max(axis=1) - 5.0) < 0.15).mean() > 0.9
+        x, y = picture.at(4, 4)
+        assert np.abs(picture.image[int(y), int(x)].astype(int) - 48).max() < 40
+        ring = picture.places(BLUE)
+        assert np.median(ring, axis=0) == pytest.approx((-2, 1), abs=0.1)
+        return True
+
+    look(shows_scan_and_robot, RVIZ_PANEL)
     assert "/rviz" in nodes()
     assert "/flatland_viz" not in nodes()
-    assert subscriptions("/rviz") >= {
+    wanted = {
         *("/tf", "/scan", "/odometry/filtered", "/interactive_model_markers/update"),
         *(f"/flatland_server/debug/all_{kind}" for kind in ("layers", "layers_3d", "models")),
     }
-    # From above, with the scan on the walls and the robot at its pose.
-    scan = picture.places(RED)
-    assert (np.abs(np.abs(scan).max(axis=1) - 5.0) < 0.15).mean() > 0.9
-    x, y = picture.at(4, 4)
-    assert np.abs(picture.image[int(y), int(x)].astype(int) - 48).max() < 40
-    ring = picture.places(BLUE)
-    assert np.median(ring, axis=0) == pytest.approx((-2, 1), abs=0.1)
+    eventually("all subscriptions of RViz", lambda: subscriptions("/rviz") >= wanted)
     # Below its handle, which goes with the tool that moves the camera, there is the robot.
     screen.click(500, 200)
     screen.key("m")
     look(lambda picture: len(picture.near(BLUE, -2, 1, 0.4)) > 80, RVIZ_PANEL)
     # Models that come and go do so in the picture.
     assert ros.spawn(room.parent / "crate.model.yaml", "crate", "", (2, -2, 0)).success
-    picture = look(lambda picture: len(picture.near(CYAN, 2, -2, 0.7)) > 10, RVIZ_PANEL)
-    crate = picture.near(CYAN, 2, -2, 0.7)
-    assert crate.min(axis=0) == pytest.approx((1.5, -2.25), abs=0.15)
-    assert crate.max(axis=0) == pytest.approx((2.5, -1.75), abs=0.15)
+
+    def shows_crate(picture: Any) -> bool:
+        crate = picture.near(CYAN, 2, -2, 0.7)
+        assert len(crate) > 10
+        assert crate.min(axis=0) == pytest.approx((1.5, -2.25), abs=0.15)
+        assert crate.max(axis=0) == pytest.approx((2.5, -1.75), abs=0.15)
+        return True
+
+    look(shows_crate, RVIZ_PANEL)
     assert ros.delete("crate").success
     look(lambda picture: not len(picture.near(CYAN, 2, -2, 0.7)), RVIZ_PANEL)
     assert launch.stop() == 0
@@ -85,14 +102,25 @@ def test_all_displays_are_enabled_in_the_rviz_configuration(ros: Any, checkout: 
 
 
 def test_the_viewer_comes_with_the_simulator_and_may_go_alone(
-    on_screen: Any, ros: Any, room: Path, screen: Any, look: Callable[..., Any]
+    on_screen: Any,
+    ros: Any,
+    room: Path,
+    screen: Any,
+    look: Callable[..., Any],
+    eventually: Callable[..., Any],
 ) -> None:
     launch = on_screen.launch("flatland", "server.launch", f"world_path:={room}")
     look(lambda picture: len(picture.places(BLUE)) > 10)
     assert "/flatland_viz" in nodes()
-    screen.click(600, 600)  # There is no window manager to give the window the keys.
-    screen.key("ctrl+q")
-    launch.wait_for_line(r"flatland_viz-\d+. process has finished cleanly")
+
+    def has_ended() -> bool:
+        screen.click(600, 600)  # There is no window manager to give the window the keys.
+        screen.key("ctrl+q")
+        return (
+            re.search(r"flatland_viz-\d+. process has finished cleanly", launch.output) is not None
+        )
+
+    eventually("end of the viewer", has_ended, poll_period=1.0)
     clock = ros.topic("/clock", Clock)
     assert clock.take(20)
     assert launch.stop() == 0

@@ -13,6 +13,7 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
+from waiting import TIMEOUT
 
 from flatland.config import lua
 from flatland.config.lua import EvalError, evaluate
@@ -252,7 +253,7 @@ def test_memory_is_bounded(runtime: str) -> None:
         capture_output=True,
         text=True,
         check=False,
-        timeout=100,
+        timeout=TIMEOUT,
     )
     assert done.returncode == 0, done.stdout + done.stderr
     *answers, grown = done.stdout.splitlines()

@@ -292,9 +292,9 @@ def test_a_plugin_config_by_its_place(file: Path) -> None:
 
 
 def test_only_maps_have_unknown_keys() -> None:
-    read("[1, 2]").ensure_accessed_all()
-    read("x").ensure_accessed_all()
-    read("").ensure_accessed_all()
+    for text in ("[1, 2]", "x", ""):
+        assert read(text).ensure_accessed_all() is None
+    assert "unrecognized" in failure(read("{a: 1}").ensure_accessed_all)
 
 
 def test_file_not_there(file: Path) -> None:

@@ -194,6 +194,7 @@ def test_a_wrong_resolution_is_refused(resolution: float) -> None:
         boundary_edges(np.zeros((10, 10), bool), resolution)
 
 
+@pytest.mark.threads
 def test_other_threads_run_meanwhile() -> None:
     mask = np.zeros((6000, 6000), bool)
     mask[::2, ::2] = True

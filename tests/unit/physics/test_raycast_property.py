@@ -1,8 +1,11 @@
 """Scans against one `b2World::RayCast` a ray, on random worlds.
 
 A ray must get the same distance within 1e-4 m + 1e-5 of its length. Some rays have no such
-distance: those that graze a corner, run along a wall, or start on one. For them a hair decides, and
-what counts is whether a ray shifted by a hair would get that distance, by Box2D's word.
+distance: those that graze a corner, run along a wall, or start on one. There, rounding decides
+which of several surfaces a ray hits, or whether it hits one. Its distance must then be the distance
+that Box2D computes for one of the rays beside it: a range between two of those distances would be a
+hit in mid-air. On a slanted surface two of those rays are some tolerances apart, and ten were never
+exceeded in 2.4 million rays.
 """
 
 from __future__ import annotations
@@ -21,9 +24,10 @@ from flatland.physics import PhysicsBody, PhysicsWorld, Pose
 FloatArray = npt.NDArray[np.float64]
 EdgeMaker = Callable[[np.random.Generator, int], FloatArray]
 
-# The examples are the same in each run: a hair that no shift explains must not break a build.
+# A failure prints a blob that reproduces it. The scene that it shows belongs into test_raycast.py
+# as a test of its own, since a blob is only valid for one version of hypothesis.
 PROPERTY = settings(
-    max_examples=250, deadline=None, derandomize=True, suppress_health_check=list(HealthCheck)
+    max_examples=250, deadline=None, print_blob=True, suppress_health_check=list(HealthCheck)
 )
 MASKS = st.sampled_from([0xFFFF, 1, 2, 3, 6, 0])
 ANGLES = st.one_of(st.sampled_from([0.0, math.pi / 2, math.pi, -math.pi / 4]), st.floats(-7, 7))
@@ -181,7 +185,11 @@ def ranges(fractions: npt.NDArray[np.float32], lengths: FloatArray) -> FloatArra
 
 
 def hairs(pose: Pose, longest: float) -> list[Pose]:
-    """The pose and those beside it, as far away as rounding can tell."""
+    """The pose and those beside it, as far away as rounding errors reach.
+
+    Box2D computes in single precision, whose errors grow with the coordinates and the length of a
+    ray; nine positions and three headings put a ray on either side of any corner or edge nearby.
+    """
     x, y, theta = pose
     shift = 2e-5 + 1e-6 * (abs(x) + abs(y) + longest)
     turn = 2e-5
@@ -214,18 +222,15 @@ def test_scans_are_those_of_box2d(data: st.DataObject) -> None:
         expected, expected_reflect = world.cast_rays_reference(pose, ends, mask, reflect_mask)
         same = equal_or_close(got, ranges(expected, lengths), tolerance)
         same_reflect = reflect == expected_reflect
-        if not (same.all() and same_reflect.all()):
+        for hair in hairs(pose, float(lengths.max())):
+            if same.all() and same_reflect.all():
+                break
             # By how much longer a ray is matters to Box2D's formula for circles.
-            nearest, farthest = np.full_like(got, np.inf), np.full_like(got, -np.inf)
-            for hair in hairs(pose, float(lengths.max())):
-                for stretch in (1.0, 1.001):
-                    longer = ends * np.float32(stretch)
-                    other = world.cast_rays_reference(hair, longer, mask, reflect_mask)
-                    other_ranges = ranges(other[0], lengths * stretch)
-                    nearest = np.minimum(nearest, other_ranges)
-                    farthest = np.maximum(farthest, other_ranges)
-                    same_reflect |= reflect == other[1]
-            same |= (got >= nearest - 10 * tolerance) & (got <= farthest + 10 * tolerance)
+            for stretch in (1.0, 1.001):
+                longer = ends * np.float32(stretch)
+                other = world.cast_rays_reference(hair, longer, mask, reflect_mask)
+                same |= equal_or_close(got, ranges(other[0], lengths * stretch), 10 * tolerance)
+                same_reflect |= reflect == other[1]
         assert same.all(), f"rays {np.nonzero(~same)[0]} from {pose}"
         assert same_reflect.all(), f"reflection of rays {np.nonzero(~same_reflect)[0]} from {pose}"
     world.close()

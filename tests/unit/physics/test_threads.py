@@ -10,9 +10,12 @@ from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
+from waiting import TIMEOUT
 
 from flatland.errors import WorldLockedError
 from flatland.physics import OldManifold, PhysicsBody, PhysicsWorld, PreSolveContact
+
+pytestmark = pytest.mark.threads
 
 
 def crowd(seed: int) -> tuple[PhysicsWorld, list[PhysicsBody]]:
@@ -101,11 +104,11 @@ class SlowStep:
 
     def _hold(self, _contact: PreSolveContact, _old: OldManifold) -> None:
         self.inside.set()
-        assert self.go_on.wait(60)
+        assert self.go_on.wait(TIMEOUT)
 
     def __enter__(self) -> SlowStep:
         self._thread.start()
-        assert self.inside.wait(60)
+        assert self.inside.wait(TIMEOUT)
         return self
 
     def __exit__(self, *_: object) -> None:

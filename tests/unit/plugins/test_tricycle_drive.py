@@ -388,7 +388,8 @@ class TestErrors:
         ) in self.error(plugin_world, drive(), changed)
 
     def test_rear_wheels_in_line_within_tolerance(self, trike: Any) -> None:
-        trike(joints=joints(left=joint("left_j", "weld", "left", "[-1, 0.400005]")))
+        world = trike(joints=joints(left=joint("left_j", "weld", "left", "[-1, 0.400005]")))
+        assert plugin(world).geometry.rear_center == pytest.approx((-1.0, 0.0), abs=1e-4)
 
     def test_rear_wheels_in_one_place(self, plugin_world: Any) -> None:
         changed = joints(left=joint("left_j", "weld", "left", "[-1, -0.4]"))

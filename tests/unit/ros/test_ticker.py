@@ -10,10 +10,10 @@ from concurrent.futures import Future
 from typing import Any
 
 import pytest
+from waiting import TIMEOUT
 
 from flatland.ros.ticker import Ticker
 
-TIMEOUT = 10.0  # s
 RATE = 50.0  # Hz
 
 
@@ -36,9 +36,8 @@ class Loop:
     def run_next(self, timeout: float = TIMEOUT) -> None:
         self._actions.get(timeout=timeout)()
 
-    @property
-    def queued(self) -> int:
-        return self._actions.qsize()
+    def wait_for_post(self) -> None:
+        self._actions.put(self._actions.get(timeout=TIMEOUT))
 
     def idle(self, seconds: float) -> bool:
         """Returns whether no action is posted within some time."""
@@ -95,8 +94,10 @@ def test_ticker_sleeps_and_wakes(loop: Loop, ticker: Ticker) -> None:
 def test_wake_during_the_last_tick_is_not_lost(loop: Loop) -> None:
     """For example, a subscriber may connect right after the tick has found none."""
 
+    ticks: list[float] = []
+
     def tick(now: float) -> bool:
-        loop.tick(now)
+        ticks.append(now)
         ticker.wake()
         return False
 
@@ -104,25 +105,29 @@ def test_wake_during_the_last_tick_is_not_lost(loop: Loop) -> None:
     ticker.wake()
     for _ in range(3):
         loop.run_next()
-    assert len(loop.ticks) == 3
     ticker.close()
+    assert len(ticks) == 3
 
 
-def test_close_ends_the_thread(loop: Loop) -> None:
-    for wake in (False, True):
-        ticker = Ticker(f"closing-{wake}", RATE, loop.post, loop.tick)
-        (thread,) = [t for t in threading.enumerate() if t.name == f"closing-{wake}"]
-        if wake:
-            ticker.wake()
-        ticker.close()
-        thread.join(TIMEOUT)
-        assert not thread.is_alive()
+@pytest.mark.parametrize("waits_for", ["wake", "period", "loop"])
+def test_close_ends_the_thread_whatever_it_waits_for(loop: Loop, waits_for: str) -> None:
+    ticker = Ticker(f"closing-{waits_for}", 1e-4, loop.post, loop.tick)
+    (thread,) = [t for t in threading.enumerate() if t.name == f"closing-{waits_for}"]
+    if waits_for != "wake":
+        ticker.wake()
+        loop.wait_for_post()
+    if waits_for == "period":
+        loop.run_next()  # The next tick is due in hours.
+    assert thread.is_alive()
+    ticker.close()
+    thread.join(TIMEOUT)
+    assert not thread.is_alive()
+    assert len(loop.ticks) == (waits_for == "period")
 
 
 def test_tick_posted_before_close_is_skipped(loop: Loop, ticker: Ticker) -> None:
     ticker.wake()
-    while loop.idle(0.01):
-        pass
+    loop.wait_for_post()
     ticker.close()
     loop.run_next()
     assert loop.ticks == []

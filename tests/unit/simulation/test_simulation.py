@@ -10,11 +10,12 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from waiting import TIMEOUT
 
 import flatland
 from flatland.simulation import CycleStatistics, Simulation
 
-PATIENCE = 20.0  # s; only a test that fails waits that long
+pytestmark = pytest.mark.threads
 
 
 class Counter(flatland.WorldObserver):
@@ -32,7 +33,7 @@ class Counter(flatland.WorldObserver):
 
     def wait_for(self, count: int) -> None:
         with self._condition:
-            assert self._condition.wait_for(lambda: len(self.times) >= count, PATIENCE)
+            assert self._condition.wait_for(lambda: len(self.times) >= count, TIMEOUT)
 
 
 @pytest.fixture
@@ -59,7 +60,7 @@ class Running:
 
     def __exit__(self, *_: object) -> None:
         self.simulation.stop()
-        self.thread.join(PATIENCE)
+        self.thread.join(TIMEOUT)
         assert not self.thread.is_alive()
 
 
@@ -89,9 +90,9 @@ def test_rate_changes_at_once(world: flatland.World, counter: Counter) -> None:
     simulation = Simulation(world, 0.001, max_lag=0)
     with Running(simulation):
         counter.wait_for(1)  # The next step would be due in a quarter of an hour.
-        simulation.post(lambda: simulation.set_rate(50)).result(PATIENCE)
+        simulation.post(lambda: simulation.set_rate(50)).result(TIMEOUT)
         counter.wait_for(12)
-        simulation.post(lambda: simulation.set_rate(math.inf)).result(PATIENCE)
+        simulation.post(lambda: simulation.set_rate(math.inf)).result(TIMEOUT)
         counter.wait_for(400)
     steps = counter.times
     # At 50 Hz no cycle is made up for here but the first; as fast as possible it takes no time.
@@ -113,7 +114,7 @@ def test_late_loop_without_lag_catches_up_with_one_cycle_at_most(
     simulation = Simulation(world, 100, max_lag=0)
     with Running(simulation):
         counter.wait_for(3)
-        simulation.post(lambda: time.sleep(0.2)).result(PATIENCE)  # 20 cycles are lost
+        simulation.post(lambda: time.sleep(0.2)).result(TIMEOUT)  # 20 cycles are lost
         counter.wait_for(len(counter.times) + 8)
     gaps = [after - before for before, after in itertools.pairwise(counter.times)]
     late = gaps.index(max(gaps))
@@ -126,11 +127,11 @@ def test_pause_and_resume_by_requests(world: flatland.World, counter: Counter) -
         simulation = Simulation(world, rate)
         with Running(simulation):
             counter.wait_for(len(counter.times) + 3)
-            simulation.post(world.pause).result(PATIENCE)
+            simulation.post(world.pause).result(TIMEOUT)
             steps = len(counter.times)
-            assert simulation.post(lambda: world.paused).result(PATIENCE) is True
+            assert simulation.post(lambda: world.paused).result(TIMEOUT) is True
             assert len(counter.times) == steps
-            simulation.post(world.resume).result(PATIENCE)
+            simulation.post(world.resume).result(TIMEOUT)
             counter.wait_for(steps + 3)
 
 
@@ -139,7 +140,7 @@ def test_requests_run_in_order_in_the_loops_thread(world: flatland.World) -> Non
     running = Running(Simulation(world, 200))
     with running as simulation:
         futures = [simulation.post(lambda i=i: seen.append(i)) for i in range(50)]  # type: ignore[misc]
-        ident = simulation.post(threading.get_ident).result(PATIENCE)
+        ident = simulation.post(threading.get_ident).result(TIMEOUT)
         assert all(future.done() for future in futures)
     assert seen == list(range(50))
     assert ident == running.thread.ident
@@ -163,7 +164,7 @@ def test_models_come_and_go_in_the_order_of_the_requests(
         )
     ]
     simulation.run(0.01)
-    assert [future.exception(PATIENCE) for future in futures] == [None] * 20
+    assert [future.exception(TIMEOUT) for future in futures] == [None] * 20
     assert [future.result() for future in futures[1::2]] == [1, 0] * 5
 
 
@@ -172,7 +173,7 @@ def test_request_does_not_wait_for_a_slow_cycle(world: flatland.World, counter: 
     with Running(simulation):
         counter.wait_for(1)
         start = time.monotonic()
-        assert simulation.post(lambda: "done").result(PATIENCE) == "done"
+        assert simulation.post(lambda: "done").result(TIMEOUT) == "done"
         assert time.monotonic() - start < 5
     assert len(counter.times) == 1
 
@@ -183,7 +184,7 @@ def test_failing_request_does_not_stop_the_loop(world: flatland.World, counter: 
 
     with Running(Simulation(world, 200)) as simulation:
         with pytest.raises(RuntimeError, match="as asked for"):
-            simulation.post(fail).result(PATIENCE)
+            simulation.post(fail).result(TIMEOUT)
         counter.wait_for(len(counter.times) + 2)
 
 
@@ -204,12 +205,12 @@ def test_reports_come_in_wall_time_and_not_while_paused(world: flatland.World) -
 
     simulation = Simulation(world, 200, report=report, report_period=0.05)
     with Running(simulation):
-        assert came.wait(PATIENCE)
-        simulation.post(world.pause).result(PATIENCE)
-        simulation.post(lambda: time.sleep(0.1)).result(PATIENCE)
+        assert came.wait(TIMEOUT)
+        simulation.post(world.pause).result(TIMEOUT)
+        simulation.post(lambda: time.sleep(0.1)).result(TIMEOUT)
         count = len(reports)
         for _ in range(3):  # several reports would be due
-            simulation.post(lambda: time.sleep(0.06)).result(PATIENCE)
+            simulation.post(lambda: time.sleep(0.06)).result(TIMEOUT)
         assert len(reports) <= count + 1  # the one of the cycle in which the pause came
     first = reports[0]
     assert first.cycles >= 1
