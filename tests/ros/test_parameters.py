@@ -12,7 +12,6 @@ import pytest
 from rosgraph_msgs.msg import Clock
 
 from flatland.ros.parameters import NodeParameters, ParameterError, read_parameters
-from flatland.world import PLUGIN_TIMEOUT
 
 
 def read(**given: Any) -> NodeParameters:
@@ -30,7 +29,7 @@ def test_defaults() -> None:
         simplify_map=0,
         seed=None,
         benchmark_duration=None,
-        plugin_timeout=PLUGIN_TIMEOUT,
+        plugin_timeout=60.0,
         if_blocked="warn",
     )
 

@@ -36,6 +36,10 @@ class Loop:
     def run_next(self, timeout: float = TIMEOUT) -> None:
         self._actions.get(timeout=timeout)()
 
+    @property
+    def queued(self) -> int:
+        return self._actions.qsize()
+
     def wait_for_post(self) -> None:
         self._actions.put(self._actions.get(timeout=TIMEOUT))
 

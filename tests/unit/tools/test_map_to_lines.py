@@ -177,7 +177,7 @@ def test_missing_key(image_map: Path, out: Path, key: str, capsys: Any) -> None:
         ("0.05", "0", 'Invalid "resolution", must be greater than 0'),
         ("0.05", "wide", 'Error converting entry "resolution" to float'),
         ("[-1.5, 2.25, 0.5]", "[.nan, 0, 0]", 'Invalid "origin", must be finite'),
-        ("negate: 0", "type: line_segments", "The map must be an image map, without"),
+        ("negate: 0", "type: line_segments", "The map must be an image map, not line segments"),
         ("negate: 0", "negate: [", "Malformatted file"),
     ],
 )
