@@ -452,6 +452,8 @@ class World:
             self._remove_model(model)
             raise
         self._models[name] = model
+        if if_blocked == "warn":
+            self._placement.warn_if_blocked(model)
         for observer in self._observers:
             observer.model_added(model)
         return model
@@ -480,6 +482,8 @@ class World:
             self._place(model, finite_pose(pose), if_blocked, "move")
         except ValueError as error:
             raise WorldError(f'failed to move model "{name}", {error}') from None
+        if if_blocked == "warn":
+            self._placement.warn_if_blocked(model)
         for observer in self._observers:
             observer.model_moved(model)
         return model

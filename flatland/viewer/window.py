@@ -325,7 +325,9 @@ class ViewerWindow(QMainWindow):
             choice.name,
             choice.name,
             Pose2D(*pose),
-            on_success=lambda _response: self.status.say(f"Spawned {choice.name}"),
+            on_success=lambda response: self.status.say(
+                response.message or f"Spawned {choice.name}"
+            ),
             on_failure=lambda reason: self._complain("Spawn model", reason),
         )
 
