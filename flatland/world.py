@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 import os
+import threading
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import Future
 from pathlib import Path
@@ -201,19 +202,24 @@ class World(Contents):
             WorldError: The world is closed, or a plugin calls this.
             Exception: Raised by a plugin, subscriber or observer, with `plugin_errors="raise"`.
         """
-        requests = self._requests
+        requests, faults = self._requests, self._faults
         requests.refuse_in_plugin("step")
+        actions, thread = requests.actions, threading.get_ident()
         for _ in range(n):
             with requests.lock:
                 self._check_open()
-                if requests:
+                if actions:
                     requests.process()
                 if not self._paused:
-                    with requests.hooks():
+                    requests.hook_thread = thread
+                    try:
                         self._step_once()
-                if requests:
+                    finally:
+                        requests.hook_thread = None
+                if actions:
                     requests.process()
-            self._faults.raise_first()
+            if faults.first is not None:
+                faults.raise_first()
 
     def _step_once(self) -> None:
         timekeeper, host = self.timekeeper, self.plugin_host

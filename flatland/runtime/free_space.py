@@ -151,6 +151,52 @@ class FreeSpace:
         return np.trim_zeros(regions)
 
 
+class Spread:
+    """Places that keep a distance from each other.
+
+    Attributes:
+        places: (x, y) of each [m], in the order in which they came.
+    """
+
+    def __init__(self, distance: float) -> None:
+        """Has no place yet.
+
+        Args:
+            distance: Least distance between two places [m], positive.
+        """
+        self.places: list[tuple[float, float]] = []
+        self._distance = distance
+        # By square cells of that width: only the neighbouring ones can hold a place too near.
+        self._cells: dict[tuple[int, int], list[tuple[float, float]]] = {}
+
+    def fill(self, candidates: DoubleArray, n: int) -> bool:
+        """Adds the candidates, in order, that are far enough from all places.
+
+        Args:
+            candidates: Shape (m, 2) [m].
+            n: Stops when there are so many places.
+
+        Returns:
+            Whether there are `n` places.
+        """
+        for x, y in candidates.tolist():
+            if len(self.places) == n:
+                break
+            column, row = math.floor(x / self._distance), math.floor(y / self._distance)
+            if not self._is_near(x, y, column, row):
+                self.places.append((x, y))
+                self._cells.setdefault((column, row), []).append((x, y))
+        return len(self.places) == n
+
+    def _is_near(self, x: float, y: float, column: int, row: int) -> bool:
+        for i in (column, column - 1, column + 1):
+            for j in (row, row - 1, row + 1):
+                for other_x, other_y in self._cells.get((i, j), ()):
+                    if math.hypot(other_x - x, other_y - y) < self._distance:
+                        return True
+        return False
+
+
 def _points_on(ends: DoubleArray, size: IntArray) -> DoubleArray:
     """Returns points at most half a unit apart on the parts of edges that lie in a rectangle.
 

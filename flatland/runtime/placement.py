@@ -15,7 +15,7 @@ from flatland.entities.layer import Layer
 from flatland.entities.model import Model
 from flatland.errors import WorldError
 from flatland.geometry import Pose, finite_pose
-from flatland.runtime.free_space import Bounds, FreeSpace
+from flatland.runtime.free_space import Bounds, FreeSpace, Spread
 from flatland.runtime.nearest_place import SEARCH_RADIUS, nearest_offset
 
 if TYPE_CHECKING:
@@ -35,7 +35,6 @@ IF_BLOCKED: Final[tuple[IfBlocked, ...]] = get_args(IfBlocked)
 TOLERANCE: Final = 0.005  # m that footprints may penetrate others, as Box2D's solver lets them
 _ROUNDING: Final = 1e-4  # m of overlap that single precision may make of a mere touch
 _FIRST_TRIES: Final = 1024
-_BLOCK: Final = 256  # places that are compared with those taken at once
 _MOST_SPACES: Final = 8
 
 
@@ -70,36 +69,44 @@ class Placement:
             model: The model, somewhere in the physics world.
             pose: The pose asked for, of its first body in the world frame.
             if_blocked: What to do where the model would overlap walls or other models.
-            verb: What is done to the model, for texts.
+            verb: What is done to the model, for the text of an error.
 
         Raises:
             WorldError: The pose is blocked and must not be, or no place near it is free.
             ValueError: The pose is out of the range of the physics.
         """
-        if if_blocked == "allow":
+        if if_blocked in ("allow", "warn"):
             return pose
-        physics, bodies = self._world.physics, [body.physics for body in model.bodies]
-        overlapped = physics.overlapping_bodies(bodies, pose, least_gap=-TOLERANCE)
-        if not overlapped:
+        overlap = self._overlap(model, pose)
+        if overlap is None:
             return pose
-        at = "({:.3f}, {:.3f}, {:.3f})".format(*pose)
-        what = f"overlaps {self._describe(overlapped)} at {at}"
-        if if_blocked == "warn":
-            _LOG.warning('model "%s" %s', model.name, what)
-            return pose
+        failure = f'failed to {verb} model "{model.name}", it {overlap}'
         if if_blocked == "refuse":
-            raise WorldError(f'failed to {verb} model "{model.name}", it {what}')
+            raise WorldError(failure)
+        physics, bodies = self._world.physics, [body.physics for body in model.bodies]
         offset = nearest_offset(
             lambda offsets: physics.free_poses(
                 bodies, _poses(offsets + pose[:2], pose[2]), least_gap=-_ROUNDING
             )
         )
         if offset is None:
-            raise WorldError(
-                f'failed to {verb} model "{model.name}", it {what}, and there is no free place '
-                f"within {SEARCH_RADIUS:g} m"
-            )
+            raise WorldError(f"{failure}, and there is no free place within {SEARCH_RADIUS:g} m")
         return (pose[0] + offset[0], pose[1] + offset[1], pose[2])
+
+    def warn_if_blocked(self, model: Model) -> None:
+        """Logs one line if a model overlaps walls or other models."""
+        overlap = self._overlap(model, model.pose)
+        if overlap is not None:
+            _LOG.warning('model "%s" %s', model.name, overlap)
+
+    def _overlap(self, model: Model, pose: Pose) -> str | None:
+        """Describes what a model overlaps at a pose; None where it is free."""
+        bodies = [body.physics for body in model.bodies]
+        overlapped = self._world.physics.overlapping_bodies(bodies, pose, least_gap=-TOLERANCE)
+        if not overlapped:
+            return None
+        x, y, theta = pose
+        return f"overlaps {self._describe(overlapped)} at ({x:.3f}, {y:.3f}, {theta:.3f})"
 
     def _describe(self, bodies: list[PhysicsBody]) -> str:
         names = []
@@ -161,7 +168,7 @@ class Placement:
         generator = self._generator(rng)
         space = self._free_space(bits, radius, clearance, bounds)
         cells = space.cells(start)
-        taken = np.empty((0, 2))
+        spread = Spread(2 * radius + clearance)
         # Most calls need a small part of the cells only.
         for tries in (_FIRST_TRIES + 32 * n, len(cells)):
             picked = generator.choice(cells, size=min(tries, len(cells)), replace=False)
@@ -169,13 +176,13 @@ class Placement:
             free = self._world.physics.free_discs(
                 _poses(places, 0.0), radius, bits, ignored=ignored, least_gap=clearance
             )
-            taken = _add_apart(taken, places[free], n, 2 * radius + clearance)
-            if len(taken) == n:
-                return np.column_stack((taken, generator.uniform(-math.pi, math.pi, n)))
+            if spread.fill(places[free], n):
+                points = np.array(spread.places).reshape(-1, 2)
+                return np.column_stack((points, generator.uniform(-math.pi, math.pi, n)))
         where = "" if start is None else f" that are connected to ({start[0]:g}, {start[1]:g})"
         raise WorldError(
-            f"found only {len(taken)} of {n} free places for discs of radius {radius:g} m with a "
-            f"clearance of {clearance:g} m{where}"
+            f"found only {len(spread.places)} of {n} free places for discs of radius {radius:g} m "
+            f"with a clearance of {clearance:g} m{where}"
         )
 
     def _free_space(
@@ -256,20 +263,3 @@ def _world_edges(layer: Layer) -> DoubleArray:
 
 def _poses(points: DoubleArray, theta: float) -> DoubleArray:
     return np.column_stack((points, np.full(len(points), theta)))
-
-
-def _add_apart(taken: DoubleArray, places: DoubleArray, n: int, least: float) -> DoubleArray:
-    """Adds places in order while there are fewer than `n`, each at least so far from the others."""
-    for begin in range(0, len(places), _BLOCK):
-        block = places[begin : begin + _BLOCK]
-        apart = np.hypot(*(block[:, np.newaxis] - taken).transpose(2, 0, 1)) >= least
-        added: list[DoubleArray] = []
-        for place in block[apart.all(axis=1)]:
-            if len(taken) + len(added) == n:
-                break
-            if all(math.dist(place, other) >= least for other in added):
-                added.append(place)
-        taken = np.concatenate((taken, np.array(added).reshape(-1, 2)))
-        if len(taken) == n:
-            break
-    return taken

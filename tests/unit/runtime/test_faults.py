@@ -60,10 +60,10 @@ def test_faults_that_are_not_in_a_row_are_forgiven() -> None:
         assert not take(faults)
         assert not take(faults)
         assert not take(faults, hook="other")
-        assert faults.any_counted
+        assert faults.counts
         faults.succeeded("p", "hook")
         faults.succeeded("p", "other")
-    assert not faults.any_counted
+    assert not faults.counts
 
 
 def test_the_log_has_one_traceback_a_second_and_source(caplog: pytest.LogCaptureFixture) -> None:
@@ -81,5 +81,5 @@ def test_faults_of_plugins_that_are_gone_do_not_count_for_new_ones() -> None:
     assert not take(faults)
     assert not take(faults)
     faults.forget({"p"})
-    assert not faults.any_counted
+    assert not faults.counts
     assert not take(faults)
