@@ -23,11 +23,12 @@ from flatland.collision_filter import CollisionFilter
 from flatland.contact import Contact
 from flatland.errors import PLUGIN_FAULTS, FlatlandError, PluginError, WorldError, YamlError
 from flatland.geometry import Pose, finite_pose
+from flatland.jam import ON_INVALID_BODY, JamWatch, describe_invalid
 from flatland.layer import Layer
 from flatland.model import Model
 from flatland.model_loader import ModelLoader
 from flatland.observer import WorldObserver
-from flatland.physics import PhysicsWorld
+from flatland.physics import PhysicsWorld, StepReport
 from flatland.plugin import FlatlandPlugin, ModelPlugin, WorldPlugin
 from flatland.plugin_host import PluginHost, describe, initialize
 from flatland.plugin_registry import PluginRegistry
@@ -74,6 +75,7 @@ class World:
         base_dir: str | os.PathLike[str] = ".",
         observers: Iterable[WorldObserver] = (),
         plugin_timeout: float | None = PLUGIN_TIMEOUT,
+        on_invalid_body: str = "raise",
     ) -> None:
         """Makes an empty world; most users want `from_yaml`.
 
@@ -88,7 +90,14 @@ class World:
             observers: Told of all that happens, from the start.
             plugin_timeout: Wall time [s] that `on_initialize` of a plugin may take; None for as
                 long as it likes, in the thread that loads.
+            on_invalid_body: What a step does that leaves a body with a pose or velocity that is
+                not finite: `raise` a WorldError that names the model, or `remove` the model with a
+                logged error and go on.
         """
+        if on_invalid_body not in ON_INVALID_BODY:
+            raise ValueError(
+                f"on_invalid_body must be one of {ON_INVALID_BODY}, got {on_invalid_body!r}"
+            )
         if plugin_timeout is not None and not plugin_timeout > 0:
             raise ValueError(f"plugin_timeout must be positive [s] or None, got {plugin_timeout}")
         if seed is None:
@@ -123,6 +132,8 @@ class World:
         self._requests_thread: int | None = None
         self._records_contacts = False
         self._plugin_timeout = plugin_timeout
+        self._on_invalid_body = on_invalid_body
+        self._jams = JamWatch()
         self._initializing_thread: threading.Thread | None = None
         self._paused = False
         self._closed = False
@@ -139,6 +150,7 @@ class World:
         step_size: float = 0.005,
         observers: Iterable[WorldObserver] = (),
         plugin_timeout: float | None = PLUGIN_TIMEOUT,
+        on_invalid_body: str = "raise",
     ) -> World:
         """Loads a world file: properties, layers, models with their plugins, world plugins.
 
@@ -150,6 +162,7 @@ class World:
             step_size: Simulated time of one step [s].
             observers: Told of all that happens, from the start.
             plugin_timeout: Wall time [s] that `on_initialize` of a plugin may take.
+            on_invalid_body: `raise` or `remove`, as for `World`.
 
         Raises:
             FlatlandError: Something in the files is wrong; nothing is left behind.
@@ -167,6 +180,7 @@ class World:
             step_size=step_size,
             observers=observers,
             plugin_timeout=plugin_timeout,
+            on_invalid_body=on_invalid_body,
         )
 
     def __enter__(self) -> World:
@@ -193,7 +207,9 @@ class World:
         """Steps `n` times; does nothing while paused.
 
         Raises:
-            WorldError: The world is closed, or this was called from a plugin's hook.
+            WorldError: The world is closed, this was called from a plugin's hook, or a step left a
+                body with a pose or velocity that is not finite. In the last case the time stands
+                still, and each further step raises, until the model is moved or deleted.
         """
         if self._stepping_thread == threading.get_ident():
             raise WorldError("step must not be called from a plugin's hook")
@@ -212,9 +228,11 @@ class World:
         self._stepping_thread = threading.get_ident()
         try:
             self._host.before_physics_step(timekeeper)
-            self._physics.step(
+            report = self._physics.step(
                 timekeeper.step_size, self.velocity_iterations, self.position_iterations
             )
+            if report is not None:
+                self._examine(report)
             if self._physics.pre_solve is not None:
                 for error in self._physics.take_pre_solve_errors():
                     # The host keeps what plugins raise; this is Control-C or the like.
@@ -229,6 +247,23 @@ class World:
                 self._flush_transforms()
         finally:
             self._stepping_thread = None
+
+    def _examine(self, report: StepReport) -> None:
+        """Handles jammed and invalid bodies of a step."""
+        limited = [self._bodies[id] for id in report.limited if id in self._bodies]
+        self._jams.update(limited, self.timekeeper)
+        if not report.invalid:
+            return
+        text = describe_invalid(report.invalid, self._bodies)
+        if self._on_invalid_body == "raise":
+            raise WorldError(text)
+        _LOG.error("%s: removed from the world", text)
+        for body_id in report.invalid:
+            body = self._bodies.get(body_id)
+            if body is not None:
+                self._delete(body.entity.name)
+            elif self._physics.body(body_id).alive:
+                self._physics.body(body_id).destroy()
 
     @property
     def paused(self) -> bool:
@@ -457,6 +492,7 @@ class World:
             model.set_pose(*finite_pose(pose))
         except ValueError as error:
             raise WorldError(f'failed to move model "{name}", {error}') from None
+        self._jams.forget(model)
         for observer in self._observers:
             observer.model_moved(model)
 
@@ -479,6 +515,7 @@ class World:
     def _remove_model(self, model: Model) -> None:
         """Ends a model, whole or half made, and tells the other plugins of contacts that end."""
         self._host.shut_down(model.plugins)
+        self._jams.forget(model)
         for joint in reversed(model.joints):
             joint.physics.destroy()
         for body in reversed(model.bodies):

@@ -165,6 +165,7 @@ def _load(parameters: NodeParameters, bridge: Any) -> World:
         step_size=parameters.step_size,
         observers=[bridge],
         plugin_timeout=parameters.plugin_timeout,
+        on_invalid_body="remove",
     )
     _LOG.info(
         'loaded "%s" in %.2f s: %d layers, %d models',
