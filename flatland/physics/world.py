@@ -92,12 +92,13 @@ class PhysicsWorld:
     ) -> StepReport | None:
         """Advances the world; other Python threads run meanwhile.
 
-        Contacts add no energy: a dynamic body without joints that touches only static bodies of a
-        restitution up to 1 is never faster after a step than before it, forces included, by more
-        than 1 % and 0.01 m/s; several that touch each other or are joined never more than twice as
-        fast together, and 0.1 m/s. Box2D alone breaks this where bodies have no room; then they are
-        slowed down and reported. A contact that is updated more than 6 times in one step, while
-        Box2D handles times of impact, is disabled for the rest of the step and reported.
+        Contacts add no energy: a dynamic body without joints that touches only static bodies is
+        at most 1 % and 0.01 m/s faster after a step than before this step or the previous one.
+        Bodies that touch each other or are joined are together at most twice as fast and 0.1 m/s.
+        Forces, springs, restitution above 1 and moving kinematic bodies are allowed for. Box2D
+        alone breaks this where bodies have no room; then they are slowed down and reported. A
+        contact that is updated more than 6 times in one step, while Box2D handles times of impact,
+        is disabled for the rest of the step, and its bodies are reported.
 
         Args:
             dt: Simulated time of the step [s], from 1e-6 to 1000.
