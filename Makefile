@@ -28,7 +28,7 @@ test: setup-dev  ## run all tests: make test [ARGS="-k laser"]
 
 .PHONY: fuzz
 fuzz: setup-dev  ## try thousands of random jams against the promises of the physics engine
-	@. ./setup.bash && FLATLAND_FUZZ=1 pytest tests/unit/test_jammed_bodies.py $(ARGS)
+	@. ./setup.bash && FLATLAND_FUZZ=1 pytest --timeout 0 tests/unit/test_jammed_bodies.py $(ARGS)
 
 .PHONY: lint
 lint: setup-dev  ## check style, types, and the stubs of the extension against the binary

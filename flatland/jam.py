@@ -32,8 +32,8 @@ class _Jam:
 class JamWatch:
     """Logs each model that is jammed once, by name.
 
-    A model is jammed when the engine limits one of its bodies in `JAM_STEPS` successive steps. It is
-    logged again only after `FREE_TIME` without a limited step, or after `forget`.
+    A model is jammed when the engine limits one of its bodies in `JAM_STEPS` successive steps.
+    It is logged again only after `FREE_TIME` without a limited step, or after `forget`.
     """
 
     def __init__(self) -> None:

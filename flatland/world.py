@@ -250,8 +250,8 @@ class World:
 
     def _examine(self, report: StepReport) -> None:
         """Handles jammed and invalid bodies of a step."""
-        limited = [self._bodies[id] for id in report.limited if id in self._bodies]
-        self._jams.update(limited, self.timekeeper)
+        bodies = map(self._bodies.get, report.limited)
+        self._jams.update(filter(None, bodies), self.timekeeper)
         if not report.invalid:
             return
         text = describe_invalid(report.invalid, self._bodies)

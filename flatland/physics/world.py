@@ -98,7 +98,8 @@ class PhysicsWorld:
         Forces, springs, restitution above 1 and moving kinematic bodies are allowed for. Box2D
         alone breaks this where bodies have no room; then they are slowed down and reported. A
         contact that is updated more than 6 times in one step, while Box2D handles times of impact,
-        is disabled for the rest of the step, and its bodies are reported.
+        has its bodies reported; it is disabled for the rest of the step after 6 updates, and
+        after 20 in the first ten successive steps.
 
         Args:
             dt: Simulated time of the step [s], from 1e-6 to 1000.

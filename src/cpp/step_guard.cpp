@@ -17,7 +17,10 @@ namespace {
 
 // How often the handling of impacts may update one contact in a step. With room to move it is three
 // times at most; a contact that is updated more often is updated until Box2D's own limit stops it.
+// The first steps of a jam may cost more, so that bodies that overlap can be pushed apart.
 constexpr int kMostUpdates = 6;
+constexpr int kMostUpdatesAtFirst = 20;
+constexpr std::uint64_t kFirstSteps = 10;
 
 // Contacts cannot add energy, but the solver is approximate. A body on its own that gets faster
 // than this is in a jam, and so is a group of bodies; speeds are compared, not energies.
@@ -101,6 +104,7 @@ void StepGuard::begin(b2World& world, float dt) {
     const auto slot = static_cast<std::uint32_t>(id_of(body));
     if (slot >= starts_.size()) starts_.resize(slot + 1);
     Start& start = starts_[slot];
+    if (start.last_jam + 1 != step_) start.jammed_steps = 0;
     if (is_dynamic(body)) {
       mass += body->GetMass();
       // The impulses that this step starts from were computed in the previous one.
@@ -131,11 +135,17 @@ void StepGuard::pre_solve(b2Contact* contact) noexcept {
   const bool handles_impacts = world_->GetProfile().collide >= 0.0F;
   if (!handles_impacts || failed_) return;
   try {
-    if (++updates_[contact] <= kMostUpdates) return;
+    const int updates = ++updates_[contact];
+    if (updates <= kMostUpdates) return;
+    b2Body* body_a = contact->GetFixtureA()->GetBody();
+    b2Body* body_b = contact->GetFixtureB()->GetBody();
+    limit(body_a);
+    limit(body_b);
+    const bool is_first =
+        std::max(start_of(body_a).jammed_steps, start_of(body_b).jammed_steps) < kFirstSteps;
+    if (is_first && updates <= kMostUpdatesAtFirst) return;
     // The bodies go on without this contact until the next step, which updates all contacts.
     contact->SetEnabled(false);
-    limit(contact->GetFixtureA()->GetBody());
-    limit(contact->GetFixtureB()->GetBody());
   } catch (const std::exception&) {
     failed_ = true;
   }
@@ -162,7 +172,12 @@ StepReport StepGuard::end(b2World& world) {
       if (is_faster && start.step != step_) examine_group(body);
     }
   }
-  for (const b2Body* body : limited_) report.limited.push_back(id_of(body));
+  for (const b2Body* body : limited_) {
+    report.limited.push_back(id_of(body));
+    Start& start = start_of(body);
+    start.jammed_steps = start.last_jam + 1 == step_ ? start.jammed_steps + 1 : 1;
+    start.last_jam = step_;
+  }
   limited_.clear();
   if (has_accelerations_) {
     for (Start& start : starts_) start.acceleration = start.angular_acceleration = 0.0F;

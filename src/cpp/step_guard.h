@@ -53,7 +53,9 @@ class StepGuard {
     float angular_acceleration = 0.0F;
     b2Vec2 position{0.0F, 0.0F};  // of static bodies only
     float angle = 0.0F;
-    std::uint64_t step = 0;  // in which the body was examined last
+    std::uint64_t step = 0;          // in which the body was examined last
+    std::uint64_t last_jam = 0;      // the latest step in which it was limited
+    std::uint64_t jammed_steps = 0;  // in succession, up to that one
   };
 
   Start& start_of(const b2Body* body);

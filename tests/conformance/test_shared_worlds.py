@@ -41,7 +41,9 @@ def silence(caplog: pytest.LogCaptureFixture) -> Any:
     """Fails the test for warnings in the log; pytest itself raises those of Python."""
     caplog.set_level(logging.WARNING)
     yield
-    assert [record.getMessage() for record in caplog.get_records("call")] == []
+    messages = [record.getMessage() for record in caplog.get_records("call")]
+    # Models are spawned on top of each other and of walls here.
+    assert [text for text in messages if "is jammed between walls" not in text] == []
 
 
 def test_these_are_all_worlds(shared_dir: Path) -> None:
