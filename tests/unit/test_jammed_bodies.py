@@ -7,7 +7,7 @@ import os
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 
 from flatland.physics import PhysicsBody, PhysicsWorld, StepReport
@@ -115,6 +115,11 @@ def test_known_overflow_does_not_happen() -> None:
         assert all_finite([body, far.body, walls])
 
 
+# With Box2D alone these break the bound within 500 steps.
+@example(52)
+@example(55)
+@example(184)
+@example(301)
 @PROPERTY
 @given(SEEDS)
 def test_no_robot_in_a_pocket_is_faster_than_commanded(seed: int) -> None:
