@@ -15,6 +15,9 @@ _Bools = npt.NDArray[np.bool_]
 # normals (n, 2), normal and tangent impulses (n, 2, 2), sensors (n,)
 _ContactColumns = tuple[npt.NDArray[np.uint8], _Ints, _Ints, _Doubles, _Doubles, _Doubles, _Bools]
 
+# ids of limited bodies, ids of invalid bodies
+_StepReport = tuple[list[int], list[int]]
+
 # --- world, bodies, fixtures, joints, contacts, rays (flatland.physics documents them) ---
 
 class World:
@@ -22,7 +25,9 @@ class World:
     def close(self) -> None: ...
     @property
     def closed(self) -> bool: ...
-    def step(self, dt: float, velocity_iterations: int, position_iterations: int) -> None: ...
+    def step(
+        self, dt: float, velocity_iterations: int, position_iterations: int
+    ) -> _StepReport | None: ...
     def step_with_hook(
         self,
         dt: float,
@@ -31,7 +36,7 @@ class World:
         hook: Callable[[PreSolveContact, OldManifold], object],
         bodies: set[int],
         errors: list[BaseException],
-    ) -> None: ...
+    ) -> _StepReport | None: ...
     def destroy_body(self, body: int) -> None: ...
     def destroy_joint(self, joint: int) -> None: ...
     def has_body(self, body: int) -> bool: ...

@@ -24,6 +24,7 @@ from flatland.plugin_api.noise import checked_seed
 from flatland.plugin_api.plugin import WorldPlugin
 from flatland.plugin_api.port_registry import PortRegistry
 from flatland.plugin_api.ports import CommandTopic, Output
+from flatland.runtime.body_monitor import BodyMonitor, InvalidBodyPolicy
 from flatland.runtime.contacts import ContactReporter
 from flatland.runtime.contents import Contents
 from flatland.runtime.faults import FaultPolicy, Faults
@@ -75,6 +76,7 @@ class World(Contents):
         observers: Iterable[WorldObserver] = (),
         plugin_timeout: float | None = None,
         plugin_errors: FaultPolicy = "raise",
+        on_invalid_body: InvalidBodyPolicy = "raise",
     ) -> None:
         """Creates an empty world; see `from_yaml` for the arguments that are not listed here.
 
@@ -88,6 +90,7 @@ class World(Contents):
             observers: Receive notifications of all events.
             plugin_timeout: Limit of wall time of `on_initialize` of a plugin [s].
             plugin_errors: What happens to exceptions of hooks, subscribers and observers.
+            on_invalid_body: What happens to bodies whose pose or velocity is not finite.
 
         Raises:
             ValueError: An argument is out of range.
@@ -117,8 +120,12 @@ class World(Contents):
         self._models = ModelSet(
             self, self.plugin_host, self._contacts, self._placement, self._observers, self._requests
         )
+        self._body_monitor = BodyMonitor(
+            self.physics, self._contacts, self._models, on_invalid_body
+        )
         self._paused = False
         self._closed = False
+        self.add_observer(self._body_monitor)
         for observer in observers:
             self.add_observer(observer)
 
@@ -133,6 +140,7 @@ class World(Contents):
         observers: Iterable[WorldObserver] = (),
         plugin_timeout: float | None = None,
         plugin_errors: FaultPolicy = "raise",
+        on_invalid_body: InvalidBodyPolicy = "raise",
     ) -> World:
         """Loads a world file: properties, layers, models with their plugins, world plugins.
 
@@ -150,6 +158,9 @@ class World(Contents):
                 them interrupts a step. `raise`: `step` raises the first one when the step is
                 complete. `disable`: they are logged, and a plugin whose hook raises three times in
                 a row is disabled.
+            on_invalid_body: What happens if a step leaves a body with a pose or velocity that is
+                not finite. `raise`: `step` raises, and raises again, until the model is moved or
+                deleted; the time stands still. `remove`: the model is removed with a logged error.
 
         Raises:
             FlatlandError: A file is invalid; nothing is left behind.
@@ -168,6 +179,7 @@ class World(Contents):
             observers=observers,
             plugin_timeout=plugin_timeout,
             plugin_errors=plugin_errors,
+            on_invalid_body=on_invalid_body,
         )
 
     def __enter__(self) -> World:
@@ -199,7 +211,7 @@ class World(Contents):
         """Steps `n` times; has no effect while paused.
 
         Raises:
-            WorldError: The world is closed, or a plugin calls this.
+            WorldError: The world is closed, a plugin calls this, or a body is not finite.
             Exception: Raised by a plugin, subscriber or observer, with `plugin_errors="raise"`.
         """
         requests, faults = self._requests, self._faults
@@ -225,7 +237,11 @@ class World(Contents):
         timekeeper, host = self.timekeeper, self.plugin_host
         self._contacts.update()
         host.before_physics_step(timekeeper)
-        self.physics.step(timekeeper.step_size, self.velocity_iterations, self.position_iterations)
+        report = self.physics.step(
+            timekeeper.step_size, self.velocity_iterations, self.position_iterations
+        )
+        if report is not None:
+            self._body_monitor.examine(report, timekeeper)
         self._contacts.dispatch()
         timekeeper.advance()
         self._observers.time_advanced(timekeeper.sim_time_ns)
