@@ -161,7 +161,7 @@ class World(Contents):
         # The loader is imported late: a world depends on no file of its own.
         from flatland.loading.world_loader import load_world
 
-        return load_world(
+        world = load_world(
             cls,
             path,
             params=params,
@@ -173,6 +173,9 @@ class World(Contents):
             plugin_errors=plugin_errors,
             on_invalid_body=on_invalid_body,
         )
+        # Otherwise part of the first step, which would take too long for a loop in real time.
+        world.physics.find_new_contacts()
+        return world
 
     def __enter__(self) -> World:
         """Returns the world, which is closed at the end of the block."""

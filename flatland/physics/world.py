@@ -129,6 +129,18 @@ class PhysicsWorld:
             )
         return None if ids is None else StepReport(tuple(ids[0]), tuple(ids[1]))
 
+    def find_new_contacts(self) -> None:
+        """Searches for pairs of fixtures that may touch, which the next step would do otherwise.
+
+        The first search takes as long as many steps if there are many edges. The results of the
+        next step are the same.
+
+        Raises:
+            StaleHandleError: The world is closed.
+            WorldLockedError: The world is stepping.
+        """
+        self._core.find_new_contacts()
+
     def take_pre_solve_errors(self) -> list[BaseException]:
         """Returns what `pre_solve` raised since the last call, in order."""
         errors = self._pre_solve_errors

@@ -26,6 +26,7 @@ WorldClass bind_world(py::module_& module) {
             use, [&] { return self.step(dt, velocity_iterations, position_iterations, nullptr); }));
       },
       py::arg("dt"), py::arg("velocity_iterations"), py::arg("position_iterations"));
+  world.def("find_new_contacts", &World::find_new_contacts);
   world.def("destroy_body", &World::destroy_body, py::arg("body"));
   world.def("destroy_joint", &World::destroy_joint, py::arg("joint"));
   world.def("has_body", &World::has_body, py::arg("body"));

@@ -197,15 +197,18 @@ Id World::add_joint(const b2JointDef& definition, float frequency, float damping
   return id;
 }
 
+void World::find_new_contacts() {
+  check_changeable();
+  const_cast<b2ContactManager&>(engine_->GetContactManager()).FindNewContacts();
+}
+
 void World::destroy_body(Id id) {
   b2Body* body = change_body(id);
   // Box2D looks through all fixtures that moved or came since the last search for pairs, for each
   // fixture that is destroyed: hours for a large map that goes again before the first step. A
   // search empties that list.
   constexpr int32 kManyFixtures = 2000;
-  if (waiting_fixtures(*engine_) > kManyFixtures) {
-    const_cast<b2ContactManager&>(engine_->GetContactManager()).FindNewContacts();
-  }
+  if (waiting_fixtures(*engine_) > kManyFixtures) find_new_contacts();
   rays_.remove_body(body);
   engine_->DestroyBody(body);  // says goodbye to its fixtures and joints, and ends its contacts
   bodies_.erase(id);

@@ -66,6 +66,8 @@ class World final : private b2DestructionListener {
   // Before and after many fixtures are added to one static body; see broad_phase.h.
   void reserve_fixtures(std::size_t more) { fixtures_.reserve(more); }
   void skip_static_fixtures(int32 waiting_before);
+  // Searches for pairs of fixtures that may touch, which the next step would do otherwise.
+  void find_new_contacts();
   Id add_joint(const b2JointDef& definition, float frequency, float damping_ratio);
   void destroy_body(Id id);
   void destroy_joint(Id id);
