@@ -101,10 +101,10 @@ class Faults:
 
     def forget(self, plugins: set[Hashable]) -> None:
         """Drops the records of plugins that no longer exist."""
-        for key in [key for key in self.counts if isinstance(key, tuple) and key[0] in plugins]:
-            del self.counts[key]
-        for plugin in plugins:
-            self._last_log.pop(plugin, None)
+        for records in (self.counts, self._last_log):
+            for key in list(records):
+                if key in plugins or (isinstance(key, tuple) and key[0] in plugins):
+                    del records[key]
 
     def raise_first(self) -> None:
         """Raises the first exception taken since the last call, if there is one."""

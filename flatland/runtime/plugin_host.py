@@ -174,7 +174,8 @@ class PluginHost:
                 with self._requests.hooks():
                     plugin.on_shutdown()
             except PLUGIN_FAULTS as error:
-                self._faults.add(plugin, f"{describe(plugin)}: on_shutdown", error)
+                name = f"{describe(plugin)}: on_shutdown"
+                self._faults.add((plugin, "on_shutdown"), name, error)
             self._release(plugin)
         self._faults.forget(set(plugins))
 
