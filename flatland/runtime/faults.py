@@ -5,10 +5,13 @@ from __future__ import annotations
 import logging
 import time
 from collections import Counter
-from collections.abc import Hashable
-from typing import Final, Literal, get_args
+from collections.abc import Callable, Hashable
+from typing import TYPE_CHECKING, Any, Final, Literal, get_args
 
 from flatland.errors import PluginError
+
+if TYPE_CHECKING:
+    from flatland.plugin_api.ports import Output
 
 _LOG = logging.getLogger("flatland")
 
@@ -84,6 +87,13 @@ class Faults:
             "%s: %s raised %d times in a row, the plugin is disabled", name, hook, MAX_FAULTS
         )
         return True
+
+    def add_of_subscriber(
+        self, output: Output[Any], callback: Callable[[Any], None], error: BaseException
+    ) -> None:
+        """Takes an exception of a subscriber of an output; to be called while it is handled."""
+        name = getattr(callback, "__qualname__", None) or repr(callback)
+        self.add(callback, f'subscriber {name} of output "{output.topic}"', error)
 
     def succeeded(self, plugin: Hashable, hook: str) -> None:
         """Resets the count of a hook that returned."""

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import logging
 import math
+import re
 from collections import Counter
 from pathlib import Path
 from typing import Any
@@ -53,7 +54,10 @@ def silence(name: str, caplog: pytest.LogCaptureFixture) -> Any:
     caplog.set_level(logging.WARNING)
     yield
     messages = [record.getMessage() for record in caplog.get_records("call")]
-    assert messages == OVERLAPS.get(name, [])
+    # Models that overlap walls or each other from the start may be jammed.
+    jams = [text for text in messages if "is jammed between walls" in text]
+    assert all(re.match(r'model "(spawned\d+|turtlebot2)" is jammed', text) for text in jams)
+    assert [text for text in messages if text not in jams] == OVERLAPS.get(name, [])
 
 
 def test_these_are_all_worlds(shared_dir: Path) -> None:
