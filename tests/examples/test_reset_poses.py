@@ -10,7 +10,7 @@ RESET = '[{{name: reset, type: "my_robots::ResetPoses"{parameters}}}]'
 PLAIN = "bodies: [{name: base, footprints: [{type: circle, radius: 0.2, density: 1}]}]"
 
 
-def test_reset_moves_models_back_at_rest(load):
+def test_reset_moves_models_to_their_initial_poses_with_zero_velocities(load):
     world = load(RESET.format(parameters=""), a=PLAIN, b=PLAIN)
     world.move_model("b", (3, 0, 0))
     [plugin] = world.plugins
@@ -25,7 +25,7 @@ def test_reset_moves_models_back_at_rest(load):
     assert world.model("late").pose == (8, 8, 0)
 
 
-def test_reset_takes_the_models_that_it_is_told(load):
+def test_reset_moves_only_the_models_in_the_parameter(load):
     world = load(RESET.format(parameters=", models: [b]"), a=PLAIN, b=PLAIN)
     world.move_model("a", (3, 0, 0))
     world.move_model("b", (3, 3, 0))
@@ -36,11 +36,11 @@ def test_reset_takes_the_models_that_it_is_told(load):
 @pytest.mark.parametrize(
     ("parameters", "text"),
     [
-        (", models: [ghost]", 'Invalid "models", there is no model "ghost" at the start'),
+        (", models: [ghost]", 'Invalid "models", model "ghost" does not exist at the start'),
         (", modells: [a]", 'contains unrecognized entry(s) {"modells"}'),
     ],
 )
-def test_reset_refuses_what_makes_no_sense(load, parameters, text):
+def test_reset_rejects_invalid_parameters(load, parameters, text):
     with pytest.raises(PluginError) as caught:
         load(RESET.format(parameters=parameters), a=PLAIN)
     assert str(caught.value).startswith(
