@@ -13,7 +13,7 @@ from flatland.ros.parameters import NodeParameters, ParameterError, read_paramet
 from flatland.ros.shutdown import StopSignals
 
 if TYPE_CHECKING:
-    from flatland.ros.registrar import Registrar
+    from flatland.ros.transport.registrar import Registrar
     from flatland.simulation import RunResult, Simulation
     from flatland.world import World
 
@@ -128,8 +128,8 @@ class ServerNode:
         """Loads the world and steps it until the node is asked to stop."""
         from flatland.ros.bridge import Bridge
         from flatland.ros.deferred_topics import DeferredTopics
-        from flatland.ros.registrar import Registrar
         from flatland.ros.services import Services
+        from flatland.ros.transport.registrar import Registrar
         from flatland.simulation import Simulation
 
         _warn_of_wall_time()

@@ -94,7 +94,7 @@ def test_nearest_puts_the_model_elsewhere_and_says_where(
     assert math.dist((x, y), (3, 3)) == pytest.approx(0.4, abs=0.006)
     away = math.dist((x, y), (3.1, 3))
     assert answer.message == (
-        'the pose asked for is blocked: model "second" was put at '
+        'the requested pose is blocked: model "second" was put at '
         f"({x:.3f}, {y:.3f}, 0.500), {away:.3f} m away"
     )
     answer = ros.move("first", (4.9, 0, 0))
