@@ -30,6 +30,7 @@ def test_defaults() -> None:
         seed=None,
         benchmark_duration=None,
         plugin_timeout=60.0,
+        shutdown_timeout=2.0,
         if_blocked="warn",
     )
 
@@ -61,6 +62,8 @@ def test_defaults() -> None:
         ("plugin_timeout", "0.5", 0.5),
         ("plugin_timeout", math.inf, None),
         ("plugin_timeout", "inf", None),
+        ("shutdown_timeout", "0.5", 0.5),
+        ("shutdown_timeout", math.inf, None),
         ("if_blocked", "allow", "allow"),
         ("if_blocked", "nearest", "nearest"),
     ],
@@ -80,6 +83,7 @@ def test_accepted(name: str, value: object, expected: object) -> None:
         "viz_pub_rate",
         "benchmark_duration",
         "plugin_timeout",
+        "shutdown_timeout",
     ],
 )
 @pytest.mark.parametrize("value", [math.nan, "nan", -1, -1e-300, "fast", "", True, [1], {"a": 1}])
@@ -104,6 +108,7 @@ def test_refused_numbers(name: str, value: object) -> None:
         ("viz_pub_rate", 0),
         ("benchmark_duration", 0),
         ("plugin_timeout", 0),
+        ("shutdown_timeout", 0),
         ("show_viz", 1),
         ("show_viz", "yes"),
         ("simplify_map", 3),
