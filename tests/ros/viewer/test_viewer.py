@@ -77,12 +77,12 @@ def test_shows_walls_robot_and_scan(look: Callable[..., Any], viewer: Any, panel
         return True
 
     picture = look(shows_room_and_scan, panel)
-    # The ground is dark grey, with a faint line each metre.
+    # The background is dark grey, with a thin line every metre.
     (left, row), (right, _) = picture.at(0.5, 3.5), picture.at(4.5, 3.5)
-    ground = picture.image[int(row), int(left) : int(right)].max(axis=1).astype(int)
-    assert np.median(ground) == 48
-    assert set(ground) <= set(range(48, 80))
-    lines = np.flatnonzero(np.diff((ground > 50).astype(int)) > 0)
+    background = picture.image[int(row), int(left) : int(right)].max(axis=1).astype(int)
+    assert np.median(background) == 48
+    assert set(background) <= set(range(48, 80))
+    lines = np.flatnonzero(np.diff((background > 50).astype(int)) > 0)
     assert len(lines) == 4
     assert np.diff(lines) == pytest.approx(picture.pixels_per_metre, abs=1.5)
 
@@ -128,20 +128,20 @@ def test_pause_and_resume(ros: Any, viewer: Any, screen: Any) -> None:
 def test_slider_sets_the_rate(
     ros: Any, viewer: Any, screen: Any, eventually: Callable[..., Any]
 ) -> None:
-    def asked(rate: float) -> bool:
+    def is_set(rate: float) -> bool:
         return bool(rospy.get_param("/flatland_server/update_rate", 200.0) == rate)
 
     viewer.until("rate", lambda widget: widget["text"] == "200 Hz (x1)")
     slider = viewer.widget("rate_slider")
     viewer.click("rate_slider")
     screen.key("Home")
-    eventually("slow motion", lambda: asked(10.0))
+    eventually("slow motion", lambda: is_set(10.0))
     viewer.until("rate", lambda widget: widget["text"] == "10 Hz (x0.05)")
     viewer.until("factor", lambda widget: widget["text"] in SLOW_MOTION)
     screen.key("End")
-    eventually("no limit", lambda: asked(0.0))
+    eventually("no limit", lambda: is_set(0.0))
     viewer.until("rate", lambda widget: widget["text"] == "as fast as possible")
-    # It stays where the mouse is, however long the text beside it.
+    # The length of the text beside the slider does not move it.
     assert viewer.widget("rate_slider")["x"] == slider["x"]
     # A rate set by another client.
     assert ros.call("/set_rate", SetRate, 200.0).success
@@ -162,7 +162,7 @@ def test_two_clicks_spawn_a_model(
     x, y = picture.at(2, -1)
     screen.move(x, y)
 
-    # The outline follows the mouse, an arrow tells the heading.
+    # The preview is an outline at the mouse, with an arrow in the direction of the heading.
     def shows_outline_and_arrow(preview: Any) -> bool:
         assert len(preview.near(CYAN, 2, -1, 0.7)) > 50
         assert preview.near(YELLOW, 2.5, -1, 0.6).size
@@ -170,7 +170,7 @@ def test_two_clicks_spawn_a_model(
         return True
 
     look(shows_outline_and_arrow, panel)
-    # No handle is in the way of the mouse.
+    # The handles are hidden, so that they do not receive the clicks.
     look(lambda picture: len(picture.near(BLUE, *START, 0.15)) > 20, panel)
     screen.click(x, y)
     screen.move(*picture.at(2, 2))
@@ -182,7 +182,7 @@ def test_two_clicks_spawn_a_model(
     yaw = 2 * math.atan2(marker.pose.orientation.z, marker.pose.orientation.w)
     assert yaw == pytest.approx(math.pi / 2, abs=0.05)
 
-    # It is shown where it is, and the preview is gone.
+    # The model is displayed at its pose, and the preview is hidden.
     def shows_crate(picture: Any) -> bool:
         crate = picture.near(CYAN, 2, -1, 0.8)
         assert len(crate) > 50
@@ -192,7 +192,7 @@ def test_two_clicks_spawn_a_model(
         return True
 
     look(shows_crate, panel)
-    # A deleted model is gone from the picture, too.
+    # A deleted model disappears.
     assert ros.delete("crate_model").success
     look(lambda picture: not len(picture.near(CYAN, 2, -1, 0.8)), panel)
 
@@ -215,12 +215,12 @@ def test_model_name_is_the_namespace_and_can_be_numbered(
         screen.click(*picture.at(x, -3))
         spawned(f"robot_model{count}")
     assert {"/robot_model1/scan", "/robot_model2/scan"} <= ros.registered()["publishers"]
-    # Each laser has a colour of its own.
+    # Each laser has a different colour.
     look(
         lambda picture: len(picture.places(LIGHT_BLUE)) > 30 and len(picture.places(RED)) > 30,
         panel,
     )
-    # Its points go with it.
+    # The points of a laser disappear with its model.
     assert ros.delete("robot_model1").success
     look(
         lambda picture: not (np.abs(picture.places(LIGHT_BLUE)).max(axis=1) > 4.8).any(),
@@ -262,7 +262,7 @@ def test_file_dialog_sets_the_path(viewer: Any, screen: Any, room: Path) -> None
     viewer.fill_in("fileNameEdit", path)
     screen.key("Return")
     viewer.until("path", lambda widget: widget["text"] == path)
-    viewer.click("path")  # Without a window manager a dialog has the keys when it was clicked on.
+    viewer.click("path")  # Without a window manager, a click gives a dialog the focus.
     viewer.until("path", lambda widget: widget["focus"])
     screen.key("Escape")
     viewer.until("interact", lambda widget: widget["checked"])
@@ -334,7 +334,7 @@ def test_view_includes_models_outside_the_walls(
 
     viewer.click("zoom_to_fit")
     look(shows(10.0, panel["height"]), panel)
-    # From the wall at x = -5 to the end of the crate.
+    # The view extends from the wall at x = -5 to the end of the crate.
     assert ros.spawn("crate.model.yaml", "far", "", (20, 0, 0)).success
     spawned("far")
     shows_all = shows(25.5, panel["width"])
@@ -354,7 +354,7 @@ def test_model_is_below_the_mouse_in_a_rotated_view(
     straight = look(lambda picture: True, panel)
     for _ in range(4):
         screen.click(x, y, button=5)
-        # Each of the steps has been made before the next one.
+        # RViz must apply each zoom step before the next one.
         nearer = straight.pixels_per_metre
         straight = look(lambda seen, nearer=nearer: seen.pixels_per_metre < 0.95 * nearer, panel)
     assert straight.pixels_per_metre * 10 < 0.8 * panel["height"]
@@ -404,7 +404,7 @@ def test_escape_cancels(
     look(lambda picture: not len(picture.places(YELLOW)), panel)
     viewer.until("interact", lambda widget: widget["checked"])
     viewer.until("spawn", lambda widget: not widget["checked"])
-    # In the dialog, too.
+    # Escape closes the dialog as well.
     viewer.click("spawn")
     viewer.until("path", lambda widget: widget["active"])
     screen.key("Escape")
@@ -450,7 +450,7 @@ def test_dragged_robot_moves(
         return float(picture.image[row - 5 : row + 6, column - 5 : column + 6].mean())
 
     screen.move(*picture.at(*START))
-    # RViz takes a press for one on the handle only after it has highlighted the handle.
+    # RViz ignores a press on the handle until it has highlighted the handle.
     look(lambda seen: brightness(seen) > brightness(picture) + 5, panel)
     screen.press()
     for step in range(1, 11):
