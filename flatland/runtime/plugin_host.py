@@ -173,6 +173,8 @@ class PluginHost:
                 with self._requests.hooks():
                     plugin.on_shutdown()
             except PLUGIN_FAULTS as error:
+                # Otherwise, an exception of a hook in the last second would suppress the log.
+                self._faults.forget({plugin})
                 self._faults.add(plugin, f"{describe(plugin)}: on_shutdown", error)
             self._release(plugin)
         self._faults.forget(set(plugins))
