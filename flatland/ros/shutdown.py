@@ -62,23 +62,22 @@ class ShutdownWatchdog:
     def _watch(self) -> None:
         while self._reading_end.recv(1)[0] not in _STOP_SIGNALS:
             pass
-        requested = time.monotonic()
         self._on_stop()
-        if self.timeout is None:
+        timeout = self.timeout
+        if timeout is None:
             return
-        time.sleep(min(self.timeout, threading.TIMEOUT_MAX))
+        time.sleep(min(timeout, threading.TIMEOUT_MAX))
         # The process still runs. Each action has a thread of its own, because it may block as
         # well, for example on a pipe or a lock.
-        elapsed = time.monotonic() - requested
-        for action in (lambda: _log_running(elapsed), self._unregister, logging.shutdown):
+        for action in (lambda: _log_running(timeout), self._unregister, logging.shutdown):
             thread = threading.Thread(target=action, daemon=True)
             thread.start()
             thread.join(_LAST_ACTION_TIMEOUT)
         os._exit(1)
 
 
-def _log_running(elapsed: float) -> None:
-    _LOG.critical("not stopped within %.1f s, exiting; still running: %s", elapsed, _running())
+def _log_running(timeout: float) -> None:
+    _LOG.critical("not stopped within %g s, exiting; still running: %s", timeout, _running())
 
 
 def _running() -> str:

@@ -216,10 +216,12 @@ class Picture:
 
 
 @pytest.fixture
-def look(screen: Any, tmp_path: Path) -> Callable[..., Picture]:
+def screenshot(screen: Any, tmp_path: Path) -> Callable[..., Picture]:
     """Takes screenshots until one is accepted, and returns it; the check may assert."""
 
-    def look(accept: Callable[[Picture], Any], area: Mapping[str, int] | None = None) -> Picture:
+    def screenshot(
+        accept: Callable[[Picture], Any], area: Mapping[str, int] | None = None
+    ) -> Picture:
         image = None
 
         def accepted() -> Picture | None:
@@ -236,4 +238,4 @@ def look(screen: Any, tmp_path: Path) -> Callable[..., Picture]:
             raise
         return picture
 
-    return look
+    return screenshot

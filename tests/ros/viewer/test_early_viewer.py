@@ -43,7 +43,7 @@ def test_simulator_is_started_killed_and_replaced(
     on_screen: Any,
     room: Path,
     elsewhere: Path,
-    look: Any,
+    screenshot: Any,
 ) -> None:
     del bare_master
     viewer = early_viewer
@@ -64,8 +64,8 @@ def test_simulator_is_started_killed_and_replaced(
     def assert_shows_room_and_robot(place: Callable[[Any], Any]) -> None:
         viewer.until("rate", lambda widget: widget["text"] == "200 Hz (x1)")
         viewer.until("time", is_simulated_time)
-        look(lambda picture: place(picture) and fits(picture), area)
-        look(lambda picture: len(picture.places(RED)) > 30, area)
+        screenshot(lambda picture: place(picture) and fits(picture), area)
+        screenshot(lambda picture: len(picture.places(RED)) > 30, area)
 
     def robot_is_there(picture: Any) -> bool:
         return len(picture.near(BLUE, -2, 1, 0.6)) > 10
@@ -98,15 +98,20 @@ def other_clock() -> Iterator[rospy.Publisher]:
 
 
 def test_walls_are_shown_again_after_the_time_jumps_back(
-    ros: Any, other_clock: rospy.Publisher, early_viewer: Any, on_screen: Any, room: Path, look: Any
+    ros: Any,
+    other_clock: rospy.Publisher,
+    early_viewer: Any,
+    on_screen: Any,
+    room: Path,
+    screenshot: Any,
 ) -> None:
     viewer = early_viewer
     area = viewer.widget("rviz::RenderPanel")
     on_screen.server(room, show_viz=True)
-    look(lambda picture: len(picture.places(RED)) > 30, area)
+    screenshot(lambda picture: len(picture.places(RED)) > 30, area)
     ros.call("/pause", Empty)
     viewer.until("toggle_pause", lambda widget: widget["text"] == "Resume")
     other_clock.publish(Clock(rospy.Time(nsecs=1)))
     viewer.until("time", lambda widget: widget["text"] == "Time: 0.00 s")
     # RViz clears all displays. Paused, the simulator sends no scans, but the walls are latched.
-    look(lambda picture: len(picture.places(RED)) == 0, area)
+    screenshot(lambda picture: len(picture.places(RED)) == 0, area)

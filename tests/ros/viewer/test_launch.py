@@ -43,7 +43,7 @@ def test_rviz_displays_everything_without_user_input(
     ros: Any,
     room: Path,
     screen: Any,
-    look: Callable[..., Any],
+    screenshot: Callable[..., Any],
     eventually: Callable[..., Any],
 ) -> None:
     launch = on_screen.launch("flatland", "server.launch", f"world_path:={room}", "use_rviz:=true")
@@ -60,7 +60,7 @@ def test_rviz_displays_everything_without_user_input(
         assert np.median(ring, axis=0) == pytest.approx((-2, 1), abs=0.1)
         return True
 
-    look(shows_scan_and_robot, RVIZ_PANEL)
+    screenshot(shows_scan_and_robot, RVIZ_PANEL)
     assert "/rviz" in nodes()
     assert "/flatland_viz" not in nodes()
     wanted = {
@@ -71,7 +71,7 @@ def test_rviz_displays_everything_without_user_input(
     # The tool that moves the camera hides the handle, which covers the robot.
     screen.click(500, 200)
     screen.key("m")
-    look(lambda picture: len(picture.near(BLUE, -2, 1, 0.4)) > 80, RVIZ_PANEL)
+    screenshot(lambda picture: len(picture.near(BLUE, -2, 1, 0.4)) > 80, RVIZ_PANEL)
     # Spawned models appear, and deleted models disappear.
     assert ros.spawn(room.parent / "crate.model.yaml", "crate", "", (2, -2, 0)).success
 
@@ -82,9 +82,9 @@ def test_rviz_displays_everything_without_user_input(
         assert crate.max(axis=0) == pytest.approx((2.5, -1.75), abs=0.15)
         return True
 
-    look(shows_crate, RVIZ_PANEL)
+    screenshot(shows_crate, RVIZ_PANEL)
     assert ros.delete("crate").success
-    look(lambda picture: not len(picture.near(CYAN, 2, -2, 0.7)), RVIZ_PANEL)
+    screenshot(lambda picture: not len(picture.near(CYAN, 2, -2, 0.7)), RVIZ_PANEL)
     assert launch.stop() == 0
 
 
@@ -106,11 +106,11 @@ def test_viewer_starts_with_the_simulator_and_can_be_closed_alone(
     ros: Any,
     room: Path,
     screen: Any,
-    look: Callable[..., Any],
+    screenshot: Callable[..., Any],
     eventually: Callable[..., Any],
 ) -> None:
     launch = on_screen.launch("flatland", "server.launch", f"world_path:={room}")
-    look(lambda picture: len(picture.places(BLUE)) > 10)
+    screenshot(lambda picture: len(picture.places(BLUE)) > 10)
     assert "/flatland_viz" in nodes()
 
     def has_ended() -> bool:
@@ -128,10 +128,14 @@ def test_viewer_starts_with_the_simulator_and_can_be_closed_alone(
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_viewer_exits_on_a_signal(
-    on_screen: Any, ros: Any, running_room: Any, look: Callable[..., Any], number: signal.Signals
+    on_screen: Any,
+    ros: Any,
+    running_room: Any,
+    screenshot: Callable[..., Any],
+    number: signal.Signals,
 ) -> None:
     viewer = on_screen.program("rosrun", "flatland", "flatland_viz")
-    look(lambda picture: len(picture.places(BLUE)) > 10)
+    screenshot(lambda picture: len(picture.places(BLUE)) > 10)
     viewer.send(number)
     assert viewer.wait() == 0
     assert "Traceback" not in viewer.output

@@ -62,7 +62,9 @@ def choose(viewer: Any, screen: Any, path: Path, *, name: str = "", number: bool
     screen.key("Return")
 
 
-def test_shows_walls_robot_and_scan(look: Callable[..., Any], viewer: Any, panel: Any) -> None:
+def test_shows_walls_robot_and_scan(
+    screenshot: Callable[..., Any], viewer: Any, panel: Any
+) -> None:
     def shows_room_and_scan(picture: Any) -> bool:
         # The whole room is in view, as large as fits.
         assert picture.pixels_per_metre * 10 == pytest.approx(panel["height"] / 1.06, abs=8)
@@ -76,7 +78,7 @@ def test_shows_walls_robot_and_scan(look: Callable[..., Any], viewer: Any, panel
         assert len(set(np.sign(scan[:, 0]))) == len(set(np.sign(scan[:, 1]))) == 2
         return True
 
-    picture = look(shows_room_and_scan, panel)
+    picture = screenshot(shows_room_and_scan, panel)
     # The background is dark grey, with a thin line every metre.
     (left, row), (right, _) = picture.at(0.5, 3.5), picture.at(4.5, 3.5)
     background = picture.image[int(row), int(left) : int(right)].max(axis=1).astype(int)
@@ -88,10 +90,10 @@ def test_shows_walls_robot_and_scan(look: Callable[..., Any], viewer: Any, panel
 
 
 def test_shows_the_robot_at_its_pose(
-    look: Callable[..., Any], viewer: Any, screen: Any, panel: Any
+    screenshot: Callable[..., Any], viewer: Any, screen: Any, panel: Any
 ) -> None:
     # The handle covers the robot unless the Move camera tool is selected.
-    look(lambda picture: not len(picture.near(BLUE, *START, 0.15)), panel)
+    screenshot(lambda picture: not len(picture.near(BLUE, *START, 0.15)), panel)
     viewer.click("move_camera")
 
     def shows_robot(picture: Any) -> bool:
@@ -102,7 +104,7 @@ def test_shows_the_robot_at_its_pose(
         assert np.hypot(*(robot - START).T).max() == pytest.approx(0.4, abs=0.08)
         return True
 
-    look(shows_robot, panel)
+    screenshot(shows_robot, panel)
     viewer.click("interact")
 
 
@@ -150,14 +152,14 @@ def test_slider_sets_the_rate(
 
 def test_two_clicks_spawn_a_model(
     ros: Any,
-    look: Callable[..., Any],
+    screenshot: Callable[..., Any],
     viewer: Any,
     screen: Any,
     panel: Any,
     room: Path,
     spawned: Callable[[str], None],
 ) -> None:
-    picture = look(lambda picture: True, panel)
+    picture = screenshot(lambda picture: True, panel)
     choose(viewer, screen, room.parent / "crate.model.yaml")
     x, y = picture.at(2, -1)
     screen.move(x, y)
@@ -169,12 +171,12 @@ def test_two_clicks_spawn_a_model(
         assert not preview.near(YELLOW, 1.4, -1, 0.3).size
         return True
 
-    look(shows_outline_and_arrow, panel)
+    screenshot(shows_outline_and_arrow, panel)
     # The handles are hidden, so that they do not receive the clicks.
-    look(lambda picture: len(picture.near(BLUE, *START, 0.15)) > 20, panel)
+    screenshot(lambda picture: len(picture.near(BLUE, *START, 0.15)) > 20, panel)
     screen.click(x, y)
     screen.move(*picture.at(2, 2))
-    look(lambda picture: picture.near(YELLOW, 2, -0.4, 0.2).size, panel)
+    screenshot(lambda picture: picture.near(YELLOW, 2, -0.4, 0.2).size, panel)
     screen.click(*picture.at(2, 2))
     spawned("crate_model")
     (marker,) = ros.topic(f"{DEBUG}/model/crate_model", MarkerArray).next().markers
@@ -191,38 +193,38 @@ def test_two_clicks_spawn_a_model(
         assert crate.min(axis=0) == pytest.approx((1.75, -1.5), abs=0.07)
         return True
 
-    look(shows_crate, panel)
+    screenshot(shows_crate, panel)
     # A deleted model disappears.
     assert ros.delete("crate_model").success
-    look(lambda picture: not len(picture.near(CYAN, 2, -1, 0.8)), panel)
+    screenshot(lambda picture: not len(picture.near(CYAN, 2, -1, 0.8)), panel)
 
 
 def test_model_name_is_the_namespace_and_can_be_numbered(
     ros: Any,
-    look: Callable[..., Any],
+    screenshot: Callable[..., Any],
     viewer: Any,
     screen: Any,
     panel: Any,
     room: Path,
     spawned: Callable[[str], None],
 ) -> None:
-    picture = look(lambda picture: True, panel)
+    picture = screenshot(lambda picture: True, panel)
     for count, x in ((1, 0.0), (2, 3.0)):
         choose(viewer, screen, room.parent / "robot.model.yaml", number=True)
         screen.move(*picture.at(x, -3))
-        look(lambda picture, x=x: len(picture.near(YELLOW, x + 0.5, -3, 0.6)), panel)
+        screenshot(lambda picture, x=x: len(picture.near(YELLOW, x + 0.5, -3, 0.6)), panel)
         screen.click(*picture.at(x, -3))
         screen.click(*picture.at(x, -3))
         spawned(f"robot_model{count}")
     assert {"/robot_model1/scan", "/robot_model2/scan"} <= ros.registered()["publishers"]
     # Each laser has a different colour.
-    look(
+    screenshot(
         lambda picture: len(picture.places(LIGHT_BLUE)) > 30 and len(picture.places(RED)) > 30,
         panel,
     )
     # The points of a laser disappear with its model.
     assert ros.delete("robot_model1").success
-    look(
+    screenshot(
         lambda picture: not (np.abs(picture.places(LIGHT_BLUE)).max(axis=1) > 4.8).any(),
         panel,
     )
@@ -230,17 +232,17 @@ def test_model_name_is_the_namespace_and_can_be_numbered(
 
 def test_relative_path_and_custom_name(
     ros: Any,
-    look: Callable[..., Any],
+    screenshot: Callable[..., Any],
     viewer: Any,
     screen: Any,
     panel: Any,
     spawned: Callable[[str], None],
 ) -> None:
-    picture = look(lambda picture: True, panel)
+    picture = screenshot(lambda picture: True, panel)
     # Relative to the folder of the world file, as for the service spawn_model.
     choose(viewer, screen, Path("crate.model.yaml"), name="parcel", number=True)
     screen.move(*picture.at(2, 2))
-    look(lambda picture: len(picture.places(YELLOW)), panel)
+    screenshot(lambda picture: len(picture.places(YELLOW)), panel)
     screen.click(*picture.at(2, 2))
     screen.click(*picture.at(2, 2))
     spawned("parcel1")
@@ -270,7 +272,7 @@ def test_file_dialog_sets_the_path(viewer: Any, screen: Any, room: Path) -> None
 
 def test_menu_deletes_a_model(
     ros: Any,
-    look: Callable[..., Any],
+    screenshot: Callable[..., Any],
     viewer: Any,
     screen: Any,
     panel: Any,
@@ -278,27 +280,27 @@ def test_menu_deletes_a_model(
 ) -> None:
     topics = ros.topic(f"{DEBUG}/topics", DebugTopicList)
     assert ros.spawn("crate.model.yaml", "crate", "", (2, -2, 0)).success
-    picture = look(lambda picture: len(picture.near(GREEN, 2, -2, 0.4)) > 50, panel)
+    picture = screenshot(lambda picture: len(picture.near(GREEN, 2, -2, 0.4)) > 50, panel)
 
     def menu() -> Any:
         # RViz picks the object below the mouse once per frame, and misses a shorter click.
         screen.move(*picture.at(2.1, -2))
         screen.move(*picture.at(2, -2))
-        look(lambda picture: True, panel)
+        screenshot(lambda picture: True, panel)
         screen.press(3)
-        look(lambda picture: True, panel)
+        screenshot(lambda picture: True, panel)
         screen.release(3)
-        look(lambda picture: True, panel)
+        screenshot(lambda picture: True, panel)
         return viewer.widgets("QMenu")
 
     (area,) = eventually("menu", menu)
     screen.click(area["x"] + 30, area["y"] + area["height"] / 2)
     topics.until(lambda message: "model/crate" not in message.topics)
-    look(lambda picture: not len(picture.near(CYAN, 2, -2, 0.8)), panel)
+    screenshot(lambda picture: not len(picture.near(CYAN, 2, -2, 0.8)), panel)
 
 
 def test_view_fits_the_window_until_the_camera_is_moved(
-    look: Callable[..., Any], viewer: Any, screen: Any, panel: Any
+    screenshot: Callable[..., Any], viewer: Any, screen: Any, panel: Any
 ) -> None:
     def resize(width: int, height: int) -> Any:
         screen.resize("flatland", width, height)
@@ -314,49 +316,53 @@ def test_view_fits_the_window_until_the_camera_is_moved(
         return lambda picture: abs(picture.pixels_per_metre - wanted) < 0.8
 
     viewer.click("zoom_to_fit")
-    look(fits(panel), panel)
+    screenshot(fits(panel), panel)
     small = resize(1000, 500)
-    picture = look(fits(small), small)
+    picture = screenshot(fits(small), small)
     screen.click(*picture.at(3, 3), button=5)
-    zoomed = look(lambda seen: seen.pixels_per_metre < 0.98 * picture.pixels_per_metre, small)
+    zoomed = screenshot(lambda seen: seen.pixels_per_metre < 0.98 * picture.pixels_per_metre, small)
     area = resize(1200, 800)
-    look(lambda seen: abs(seen.pixels_per_metre - zoomed.pixels_per_metre) < 0.2, area)
+    screenshot(lambda seen: abs(seen.pixels_per_metre - zoomed.pixels_per_metre) < 0.2, area)
     viewer.click("zoom_to_fit")
-    look(fits(area), area)
+    screenshot(fits(area), area)
 
 
 def test_view_includes_models_outside_the_walls(
-    ros: Any, look: Callable[..., Any], viewer: Any, screen: Any, panel: Any, spawned: Any
+    ros: Any, screenshot: Callable[..., Any], viewer: Any, screen: Any, panel: Any, spawned: Any
 ) -> None:
     def shows(metres: float, pixels: int) -> Callable[[Any], bool]:
         wanted = pixels / (1.06 * metres)
         return lambda picture: abs(picture.pixels_per_metre - wanted) < 0.5
 
     viewer.click("zoom_to_fit")
-    look(shows(10.0, panel["height"]), panel)
+    screenshot(shows(10.0, panel["height"]), panel)
     # The view extends from the wall at x = -5 to the end of the crate.
     assert ros.spawn("crate.model.yaml", "far", "", (20, 0, 0)).success
     spawned("far")
     shows_all = shows(25.5, panel["width"])
-    look(lambda picture: shows_all(picture) and len(picture.near(CYAN, 20, 0, 0.7)) > 10, panel)
+    screenshot(
+        lambda picture: shows_all(picture) and len(picture.near(CYAN, 20, 0, 0.7)) > 10, panel
+    )
     assert ros.move("far", (25, 0, 0)).success
     screen.key("f")
-    look(shows(30.5, panel["width"]), panel)
+    screenshot(shows(30.5, panel["width"]), panel)
     assert ros.delete("far").success
-    look(shows(10.0, panel["height"]), panel)
+    screenshot(shows(10.0, panel["height"]), panel)
 
 
 def test_model_is_below_the_mouse_in_a_rotated_view(
-    look: Callable[..., Any], viewer: Any, screen: Any, panel: Any, room: Path
+    screenshot: Callable[..., Any], viewer: Any, screen: Any, panel: Any, room: Path
 ) -> None:
     viewer.click("zoom_to_fit")
     x, y = panel["x"] + panel["width"] / 2, panel["y"] + panel["height"] / 2
-    straight = look(lambda picture: True, panel)
+    straight = screenshot(lambda picture: True, panel)
     for _ in range(4):
         screen.click(x, y, button=5)
         # RViz must apply each zoom step before the next one.
         nearer = straight.pixels_per_metre
-        straight = look(lambda seen, nearer=nearer: seen.pixels_per_metre < 0.95 * nearer, panel)
+        straight = screenshot(
+            lambda seen, nearer=nearer: seen.pixels_per_metre < 0.95 * nearer, panel
+        )
     assert straight.pixels_per_metre * 10 < 0.8 * panel["height"]
     screen.move(x + 150, y + 100)
     screen.press()
@@ -364,7 +370,7 @@ def test_model_is_below_the_mouse_in_a_rotated_view(
         screen.move(x + 150 + 20 * step, y + 100)
     screen.release()
     # The bounding box of a rotated square is larger.
-    look(lambda picture: picture.pixels_per_metre > 1.2 * straight.pixels_per_metre, panel)
+    screenshot(lambda picture: picture.pixels_per_metre > 1.2 * straight.pixels_per_metre, panel)
     choose(viewer, screen, room.parent / "crate.model.yaml")
     for mouse in ((x + 120, y + 60), (x - 40, y + 130)):
         screen.move(*mouse)
@@ -373,35 +379,35 @@ def test_model_is_below_the_mouse_in_a_rotated_view(
             rows, columns = np.nonzero(picture.mask(CYAN))
             return len(rows) > 30 and math.dist((columns.mean(), rows.mean()), mouse) < 6
 
-        look(is_below_the_mouse, panel)
+        screenshot(is_below_the_mouse, panel)
     screen.key("Escape")
     viewer.click("zoom_to_fit")
-    look(lambda picture: abs(picture.pixels_per_metre * 10.6 - panel["height"]) < 8, panel)
+    screenshot(lambda picture: abs(picture.pixels_per_metre * 10.6 - panel["height"]) < 8, panel)
 
 
 def test_escape_cancels(
-    look: Callable[..., Any],
+    screenshot: Callable[..., Any],
     viewer: Any,
     screen: Any,
     panel: Any,
     room: Path,
     eventually: Callable[..., Any],
 ) -> None:
-    picture = look(lambda picture: True, panel)
+    picture = screenshot(lambda picture: True, panel)
     choose(viewer, screen, room.parent / "crate.model.yaml")
     x, y = picture.at(2, -1)
     screen.click(x, y)
-    look(lambda picture: len(picture.places(YELLOW)), panel)
+    screenshot(lambda picture: len(picture.places(YELLOW)), panel)
     # The camera can still be moved.
     screen.press(2)
     for step in range(1, 6):
         screen.move(x + 20 * step, y)
     screen.release(2)
-    look(lambda seen: abs(seen.center[0] - picture.center[0] - 100) < 8, panel)
+    screenshot(lambda seen: abs(seen.center[0] - picture.center[0] - 100) < 8, panel)
     viewer.click("zoom_to_fit")
-    look(lambda seen: abs(seen.center[0] - picture.center[0]) < 2, panel)
+    screenshot(lambda seen: abs(seen.center[0] - picture.center[0]) < 2, panel)
     screen.key("Escape")
-    look(lambda picture: not len(picture.places(YELLOW)), panel)
+    screenshot(lambda picture: not len(picture.places(YELLOW)), panel)
     viewer.until("interact", lambda widget: widget["checked"])
     viewer.until("spawn", lambda widget: not widget["checked"])
     # Escape closes the dialog as well.
@@ -413,7 +419,7 @@ def test_escape_cancels(
 
 
 def test_errors_are_shown_in_dialogs(
-    look: Callable[..., Any], viewer: Any, screen: Any, panel: Any, room: Path, spawned: Any
+    screenshot: Callable[..., Any], viewer: Any, screen: Any, panel: Any, room: Path, spawned: Any
 ) -> None:
     choose(viewer, screen, room.parent / "nothing.yaml")
     label = viewer.until(
@@ -424,10 +430,10 @@ def test_errors_are_shown_in_dialogs(
     # The service reports an error: the name is already in use.
     renamed = room.parent / "robot.yaml"
     renamed.write_text((room.parent / "robot.model.yaml").read_text())
-    picture = look(lambda picture: True, panel)
+    picture = screenshot(lambda picture: True, panel)
     choose(viewer, screen, renamed)
     screen.move(*picture.at(2, 2))
-    look(lambda picture: len(picture.places(YELLOW)), panel)
+    screenshot(lambda picture: len(picture.places(YELLOW)), panel)
     screen.click(*picture.at(2, 2))
     screen.click(*picture.at(2, 2))
     label = viewer.until(
@@ -438,12 +444,12 @@ def test_errors_are_shown_in_dialogs(
 
 
 def test_dragged_robot_moves(
-    ros: Any, look: Callable[..., Any], viewer: Any, screen: Any, panel: Any
+    ros: Any, screenshot: Callable[..., Any], viewer: Any, screen: Any, panel: Any
 ) -> None:
     truth = ros.topic("/odometry/ground_truth", Odometry)
     paused = ros.topic("/flatland_server/paused", Bool)
     screen.move(panel["x"] + 10, panel["y"] + 10)
-    picture = look(lambda picture: len(picture.near(GREEN, *START, 0.15)) > 20, panel)
+    picture = screenshot(lambda picture: len(picture.near(GREEN, *START, 0.15)) > 20, panel)
 
     def brightness(picture: Any) -> float:
         column, row = (round(value) for value in picture.at(*START))
@@ -451,7 +457,7 @@ def test_dragged_robot_moves(
 
     screen.move(*picture.at(*START))
     # RViz ignores a press on the handle until it has highlighted the handle.
-    look(lambda seen: brightness(seen) > brightness(picture) + 5, panel)
+    screenshot(lambda seen: brightness(seen) > brightness(picture) + 5, panel)
     screen.press()
     for step in range(1, 11):
         screen.move(*picture.at(START[0] + 0.3 * step, START[1] - 0.2 * step))
