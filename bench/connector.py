@@ -18,15 +18,15 @@ from sensor_msgs.msg import LaserScan
 
 from flatland.srv import SpawnModel
 
-PATIENCE = 30.0  # s
+TIMEOUT = 30.0  # s
 
 
 def wait_until(condition: Callable[[], object]) -> float:
     """Returns the time until a condition holds [s]."""
     start = time.perf_counter()
     while not condition():
-        if time.perf_counter() - start > PATIENCE:
-            raise RuntimeError(f"not connected within {PATIENCE:g} s")
+        if time.perf_counter() - start > TIMEOUT:
+            raise RuntimeError(f"not connected within {TIMEOUT:g} s")
         time.sleep(0.001)
     return time.perf_counter() - start
 
@@ -64,7 +64,7 @@ def main() -> None:
     """Measures and prints."""
     path, *robots = sys.argv[1:]
     rospy.init_node("bench_connector", disable_signals=True, disable_rostime=True)
-    rospy.wait_for_service("/toggle_pause", PATIENCE)
+    rospy.wait_for_service("/toggle_pause", TIMEOUT)
     time.sleep(2.0)  # until the simulator has settled
     for name, times in (
         ("publisher", [publish(robot) for robot in robots]),

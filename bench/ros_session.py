@@ -18,7 +18,7 @@ from pathlib import Path
 import flatland
 
 CHECKOUT = Path(__file__).resolve().parent.parent
-PATIENCE = 60.0  # s that anything may take
+TIMEOUT = 60.0  # s, for any event
 
 _TICKS = os.sysconf("SC_CLK_TCK")
 
@@ -44,7 +44,7 @@ class Program:
         """Its process id."""
         return self._popen.pid
 
-    def wait_for(self, pattern: str, timeout: float = PATIENCE) -> re.Match[str]:
+    def wait_for(self, pattern: str, timeout: float = TIMEOUT) -> re.Match[str]:
         """Reads what it prints until a pattern is there.
 
         Raises:
@@ -165,7 +165,7 @@ def _overlay(package: Path, folder: Path) -> Path:
     return share.parent
 
 
-def wait_until(what: str, condition: Callable[[], bool], timeout: float = PATIENCE) -> None:
+def wait_until(what: str, condition: Callable[[], bool], timeout: float = TIMEOUT) -> None:
     """Waits until a condition holds.
 
     Raises:

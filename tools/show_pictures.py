@@ -34,7 +34,7 @@ _IN_3D = (
 )
 _SPAWN_BUTTON = (525, 20)  # pixels in the viewer
 _FIRST_FIELD = 24  # pixels below the top of its dialog
-_PATIENCE = 60.0  # s
+_TIMEOUT = 60.0  # s
 _SETTLING = 1.5  # s that RViz gets to draw what it has just been told
 
 
@@ -90,10 +90,10 @@ def _running(command: list[str], environment: dict[str, str]) -> Iterator[None]:
 
 
 def _wait(what: str, condition: Callable[[], Any]) -> None:
-    end = time.monotonic() + _PATIENCE
+    end = time.monotonic() + _TIMEOUT
     while not condition():
         if time.monotonic() > end:
-            raise TimeoutError(f"{what} did not come in {_PATIENCE} s")
+            raise TimeoutError(f"{what}: not within {_TIMEOUT} s")
         time.sleep(0.1)
 
 
@@ -104,7 +104,7 @@ def _furnish() -> None:
 
     from flatland.srv import SpawnModel
 
-    rospy.wait_for_service("/spawn_model", _PATIENCE)
+    rospy.wait_for_service("/spawn_model", _TIMEOUT)
     spawn = rospy.ServiceProxy("/spawn_model", SpawnModel)
     for number, (kind, pose) in enumerate(THINGS, start=1):
         answer = spawn(str(_OFFICE / f"{kind}.model.yaml"), f"{kind}_{number}", "", Pose2D(*pose))

@@ -1,4 +1,4 @@
-"""The ROS 1 side: a node, and a bridge between a world's ports and topics.
+"""The ROS 1 interface: the node, and a bridge between the ports of a world and topics.
 
-Nothing outside of this package imports it; the simulation runs without ROS.
+No other package except the viewer imports it; the simulation runs without ROS.
 """

@@ -12,12 +12,13 @@ from rosgraph_msgs.msg import Clock
 from rospy import rostime
 from tf2_msgs.msg import TFMessage
 
+from flatland.errors import PLUGIN_FAULTS
 from flatland.plugin_api.plugin import FlatlandPlugin
 from flatland.plugin_api.ports import Command, Output
 from flatland.ros.adapters import convert, find_adapter, transform
 from flatland.ros.plugin_ros import PluginRos
-from flatland.ros.publisher import Publisher
-from flatland.ros.registrar import Registrar
+from flatland.ros.transport.publisher import Publisher
+from flatland.ros.transport.registrar import Registrar
 from flatland.ros.transport.subscriber import Subscriber
 from flatland.runtime.observer import WorldObserver
 from flatland.values import Transform
@@ -25,26 +26,26 @@ from flatland.world import World
 
 _LOG = logging.getLogger("flatland")
 
-TF_QUEUE_SIZE = 100  # messages; a step sends one, and a lost one is a gap in a transform
+TF_QUEUE_SIZE = 100  # messages, one per step; a dropped one is a gap in its transforms
 
 
 class Bridge(WorldObserver):
-    """Shows one world on ROS; give it to `World.from_yaml` as an observer.
+    """Connects one world to ROS; passed to `World.from_yaml` as an observer.
 
-    Made after `rospy.init_node`. The node's own ROS time is set from here at each step: it does
-    not subscribe to the clock that it publishes.
+    Must be created after `rospy.init_node`. The bridge sets the ROS time of the node in each step,
+    because the node does not subscribe to the clock that it publishes.
     """
 
     def __init__(self, registrar: Registrar) -> None:
-        """Advertises the clock and the transforms, at time 0.
+        """Advertises the clock and the transforms, and sets the ROS time to 0.
 
         Args:
-            registrar: Talks to the ROS master.
+            registrar: Registers topics and services with the ROS master.
         """
         self._registrar = registrar
         self._world: World | None = None
         self._closed = False
-        self._outputs: dict[Output[Any], tuple[Publisher, Callable[[], None]]] = {}
+        self._outputs: dict[Output[Any], _OutputTopic] = {}
         self._commands: dict[Command[Any], Subscriber] = {}
         self._clock = Publisher(registrar, "/clock", Clock)
         self._clock_message = Clock()
@@ -52,11 +53,11 @@ class Bridge(WorldObserver):
         _set_ros_time(rospy.Time(0))
 
     def close(self) -> None:
-        """Leaves topics alone from now on: rospy ends all of them at once at shutdown."""
+        """Stops closing single topics, because rospy is about to close all of them."""
         self._closed = True
 
     def attached(self, world: World) -> None:
-        """Stores the world, which carries out what arrives from ROS."""
+        """Stores the world, which runs the requests and commands from ROS."""
         self._world = world
 
     # -- time and transforms ---------------------------------------------------------------
@@ -71,7 +72,7 @@ class Bridge(WorldObserver):
 
     @property
     def wants_transforms(self) -> bool:
-        """Whether anybody subscribes to `/tf`."""
+        """Whether `/tf` has subscribers."""
         return self._tf.connected
 
     def transforms_sent(self, transforms: Sequence[Transform]) -> None:
@@ -93,21 +94,15 @@ class Bridge(WorldObserver):
             on_connection=lambda connected: (output.want if connected else output.unwant)(self),
             owner=output.owners[0],
         )
-        to_message = adapter.to_message
-
-        def publish(value: Any) -> None:
-            if publisher.connected:
-                publisher.publish(to_message(value))
-
-        self._outputs[output] = publisher, output.subscribe(publish, wants=False)
+        self._outputs[output] = _OutputTopic(output, publisher, adapter.to_message)
 
     def output_closed(self, output: Output[Any]) -> None:
-        """Ends the topic of an output."""
-        publisher, unsubscribe = self._outputs.pop(output, (None, None))
-        if publisher is not None and unsubscribe is not None:
-            unsubscribe()
+        """Closes the topic of an output."""
+        topic = self._outputs.pop(output, None)
+        if topic is not None:
+            topic.unsubscribe()
             if not self._closed:
-                publisher.close()
+                topic.publisher.close()
 
     def command_opened(self, command: Command[Any]) -> None:
         """Subscribes to the topic of a command."""
@@ -119,14 +114,14 @@ class Bridge(WorldObserver):
 
         def receive(message: Any) -> None:
             value = from_message(message)
-            self._post(lambda: None if command.closed else command.set(value))
+            self._post(lambda: _set_command(command, value))
 
         self._commands[command] = Subscriber(
             self._registrar, command.name, adapter.message_type, receive, owner=command.owner
         )
 
     def command_closed(self, command: Command[Any]) -> None:
-        """Ends the subscription of a command."""
+        """Closes the subscription of a command."""
         subscriber = self._commands.pop(command, None)
         if subscriber is not None and not self._closed:
             subscriber.close()
@@ -153,11 +148,47 @@ class Bridge(WorldObserver):
         return self._world.post(action)
 
 
-def _set_ros_time(time: rospy.Time) -> None:
-    """Sets what `rospy.get_rostime` returns, and wakes who waits for it.
+def _set_command(command: Command[Any], value: Any) -> None:
+    """Sets a command; the function `accept` of its plugin may raise."""
+    if not command.closed:
+        try:
+            command.set(value)
+        except PLUGIN_FAULTS:
+            _LOG.exception('%s: command "%s" raised', command.owner, command.topic)
 
-    As rospy does it when a `/clock` arrives, but without a copy and a deprecation warning that
-    nobody sees: both cost more than a step of the physics.
+
+class _OutputTopic:
+    """Publishes the values of an output.
+
+    Attributes:
+        publisher: Publisher of the topic.
+        unsubscribe: Ends the subscription of the output.
+    """
+
+    def __init__(
+        self, output: Output[Any], publisher: Publisher, to_message: Callable[[Any], Any]
+    ) -> None:
+        self.publisher = publisher
+        self._to_message = to_message
+        # The subscribers of the topic decide whether the output is wanted, see `on_connection`.
+        self.unsubscribe = output.subscribe(self, wants=False)
+
+    def __call__(self, value: Any) -> None:
+        if self.publisher.connected:
+            self.publisher.publish(self._to_message(value))
+
+    def __repr__(self) -> str:
+        """Returns the name of the subscriber in the log."""
+        adapter = getattr(self._to_message, "__qualname__", repr(self._to_message))
+        module = getattr(self._to_message, "__module__", "")
+        return f'ROS topic "{self.publisher.topic}" (adapter {module}.{adapter})'
+
+
+def _set_ros_time(time: rospy.Time) -> None:
+    """Sets the value of `rospy.get_rostime` and wakes the threads that sleep in ROS time.
+
+    Equivalent to the callback of rospy for `/clock`, but without its copy and its deprecation
+    warning, which cost more than a physics step.
     """
     rostime._rostime_current = time
     changed = rostime.get_rostime_cond()

@@ -8,7 +8,7 @@ import threading
 from concurrent.futures import Future
 from typing import Any
 
-from flatland.ros.registrar import Registrar
+from flatland.ros.transport.registrar import Registrar
 from flatland.simulation import Simulation
 
 _LOG = logging.getLogger("flatland")

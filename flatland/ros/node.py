@@ -3,35 +3,39 @@
 from __future__ import annotations
 
 import logging
+import math
 import sys
 import threading
 import time
+from concurrent.futures import Future, wait
 from typing import TYPE_CHECKING, Any, Final
 
 from flatland.errors import FlatlandError
 from flatland.ros.parameters import NodeParameters, ParameterError, read_parameters
-from flatland.ros.shutdown import StopSignals
+from flatland.ros.shutdown import ShutdownWatchdog
 
 if TYPE_CHECKING:
-    from flatland.ros.registrar import Registrar
+    from flatland.ros.transport.registrar import Registrar
     from flatland.simulation import RunResult, Simulation
     from flatland.world import World
 
 _LOG = logging.getLogger("flatland")
 
 NODE_NAME: Final = "flatland_server"
-_MASTER_PERIOD: Final = 0.2  # s between two attempts to reach the ROS master
-_MASTER_PATIENCE: Final = 1.0  # s without one until the node says that it waits
+_MASTER_POLL_PERIOD: Final = 0.2  # s between two attempts to reach the ROS master
+_MASTER_WARNING_TIMEOUT: Final = 1.0  # s without a ROS master until a warning is logged
 _SWITCH_INTERVAL: Final = 0.0002  # s for which a thread keeps the GIL while others wait for it
-_UNREGISTERING: Final = 0.5  # s that saying good-bye to the ROS master may take
+_UNREGISTER_TIMEOUT: Final = 0.5  # s
+_STOP_POLL_PERIOD: Final = 0.05  # s between two checks for a stop request without a master
+_SHUTDOWN_POLL_PERIOD: Final = 0.002  # s
 
 
 def main() -> int:
     """Runs the node.
 
     Returns:
-        The exit code: 0 after a stop that was asked for, 1 after a failure, which one fatal log
-        line tells.
+        The exit code: 0 after a requested stop or a complete benchmark, 1 after a failure, whose
+        cause is logged at critical level.
     """
     return ServerNode().run()
 
@@ -40,18 +44,18 @@ class ServerNode:
     """One run of the node."""
 
     def __init__(self) -> None:
-        """Does nothing yet."""
+        """Prepares the run."""
         self._stopping = threading.Event()
         self._simulation: Simulation | None = None
         self._registrar: Registrar | None = None
 
     def run(self) -> int:
-        """Runs until the node is asked to stop, and returns the exit code."""
-        # Before anything that takes time: a signal must find someone who hears it.
-        StopSignals(self._stop, lambda: _leave_ros("signal"))
-        # rospy's threads need the GIL some hundred times for one connection or registration. With
-        # Python's interval of 5 ms that takes up to a second beside a loop at full speed. A short
-        # interval costs nothing while no other thread waits for the GIL.
+        """Runs until a stop is requested, and returns the exit code."""
+        # First of all, so that no signal is lost.
+        watchdog = ShutdownWatchdog(self._stop, _unregister)
+        # The threads of rospy need the GIL about a hundred times for a connection or registration.
+        # With the default interval of 5 ms, this takes up to a second beside a loop at full speed.
+        # A short interval costs nothing while no other thread waits for the GIL.
         sys.setswitchinterval(_SWITCH_INTERVAL)
         import rospy
 
@@ -62,7 +66,7 @@ class ServerNode:
             _LOG.critical("%s (from ROS_MASTER_URI)", error)
             return 1
         try:
-            # Without rostime: rospy would subscribe to our own clock. The bridge sets its time.
+            # Without rostime, rospy does not subscribe to `/clock`; the bridge sets its time.
             rospy.init_node(NODE_NAME, disable_signals=True, disable_rostime=True)
         except rospy.ROSInitException as error:
             if self._stopping.is_set():
@@ -71,65 +75,75 @@ class ServerNode:
             return 1
         from flatland.ros.logs import log_to_ros
 
-        rospy.on_shutdown(self._stop)
+        rospy.on_shutdown(watchdog.request_stop)
         log_to_ros()
         try:
-            self._simulate(read_parameters(_private_parameter))
+            parameters = read_parameters(_private_parameter)
+            watchdog.timeout = parameters.shutdown_timeout
+            self._simulate(parameters)
         except (ParameterError, FlatlandError) as error:
             code = self._fail(str(error))
         except Exception:
-            code = self._fail("the simulator failed in an unforeseen way", exc_info=True)
+            code = self._fail("unexpected internal error", exc_info=True)
         else:
             code = 0
         if self._registrar is not None:
-            self._registrar.close(_UNREGISTERING)
-        _leave_ros("the simulation ended")
+            self._registrar.close(_UNREGISTER_TIMEOUT)
+        _unregister()
         return code
 
     def _wait_for_master(self) -> bool:
-        """Waits until a ROS master answers; returns False when the node is stopped first.
+        """Waits for the ROS master; returns False if a stop is requested first.
 
         Raises:
-            ValueError: The address of the master is none.
+            ValueError: The address of the master is invalid.
         """
         import rosgraph
 
-        # To standard error: rospy's logs begin with a master. By the clock, since a program that
-        # is no master may take our question and never answer.
-        uri = rosgraph.get_master_uri()
-        notice = threading.Timer(
-            _MASTER_PATIENCE, lambda: _LOG.warning("waiting for the ROS master at %s", uri)
-        )
-        notice.daemon = True
-        notice.start()
-        try:
-            while not rosgraph.is_master_online():
-                if self._stopping.wait(_MASTER_PERIOD):
-                    return False
-        finally:
-            notice.cancel()
-        return True
+        found: Future[None] = Future()
+
+        def search() -> None:
+            try:
+                while not rosgraph.is_master_online():
+                    time.sleep(_MASTER_POLL_PERIOD)
+                found.set_result(None)
+            except Exception as error:
+                found.set_exception(error)
+
+        # In a separate thread, because a server that is not a ROS master may accept the call and
+        # never respond.
+        threading.Thread(target=search, name="flatland-master-search", daemon=True).start()
+        warning_due = time.monotonic() + _MASTER_WARNING_TIMEOUT
+        while not self._stopping.is_set():
+            if wait([found], timeout=_STOP_POLL_PERIOD).done:
+                found.result()
+                return True
+            if time.monotonic() > warning_due:
+                # To standard error, because rospy logs nothing without a master.
+                _LOG.warning("waiting for the ROS master at %s", rosgraph.get_master_uri())
+                warning_due = math.inf
+        return False
 
     def _stop(self) -> None:
-        """Makes the simulation end soon; safe from any thread."""
+        """Ends the simulation after the current step; safe from any thread."""
         self._stopping.set()
         if self._simulation is not None:
             self._simulation.stop()
 
     def _fail(self, text: str, **options: Any) -> int:
         if self._stopping.is_set():
-            # What a stop in the middle of loading leads to is no failure.
+            # An error caused by the stop, for example during loading, is not a failure.
             _LOG.info("stopped: %s", text)
             return 0
         _LOG.critical("%s", text, **options)
         return 1
 
     def _simulate(self, parameters: NodeParameters) -> None:
-        """Loads the world and steps it until the node is asked to stop."""
+        """Loads the world and steps it until a stop is requested."""
         from flatland.ros.bridge import Bridge
         from flatland.ros.deferred_topics import DeferredTopics
-        from flatland.ros.registrar import Registrar
         from flatland.ros.services import Services
+        from flatland.ros.transport.registrar import Registrar
         from flatland.simulation import Simulation
 
         _warn_of_wall_time()
@@ -157,7 +171,8 @@ class ServerNode:
                     _log_benchmark(result)
         finally:
             deferred_topics.close()
-            # Plugins end first, so that they can still publish; then all topics at once.
+            # Plugins are closed before their topics, so that `on_shutdown` can publish; rospy then
+            # unregisters all topics at once.
             bridge.close()
             world.close()
 
@@ -197,18 +212,18 @@ def _log_benchmark(result: RunResult) -> None:
 
 
 def _private_parameter(name: str) -> object:
-    """Looks up a parameter of the node; `simplify_map` may also be set outside of it."""
+    """Returns a private parameter; `simplify_map` is searched for in outer namespaces too."""
     import rospy
 
     resolved = rospy.resolve_name(f"~{name}")
     if name == "simplify_map":
-        # Looks in the node's own namespace first, then in each one above it.
+        # Searches the namespace of the node, then each one above it.
         resolved = rospy.search_param(name) or resolved
     return rospy.get_param(resolved, None)
 
 
 def _yaml_parameter(name: str) -> object:
-    """Answers `param()` in YAML files; relative names are under the node's namespace."""
+    """Returns the value of `param()` in YAML files; relative names are in the node's namespace."""
     import rospy
 
     return rospy.get_param(name, None)
@@ -218,18 +233,18 @@ def _warn_of_wall_time() -> None:
     import rospy
 
     if rospy.get_param("/use_sim_time", False) is not True:
-        _LOG.warning("/use_sim_time is not true: other nodes will not follow the simulated time")
+        _LOG.warning("/use_sim_time is not true: other nodes do not follow the simulated time")
 
 
-def _leave_ros(reason: str) -> None:
-    """Takes the node's topics and services off the ROS master.
+def _unregister() -> None:
+    """Unregisters all topics and services of the node from the ROS master.
 
-    rospy's shutdown does that first and then sleeps for more than half a second, which nobody
-    needs to wait for: the process ends.
+    rospy does this at the start of its shutdown and then sleeps for more than half a second. The
+    process does not wait for that part.
     """
     import rospy
 
-    threading.Thread(target=rospy.signal_shutdown, args=(reason,), daemon=True).start()
-    end = time.monotonic() + _UNREGISTERING
+    threading.Thread(target=rospy.signal_shutdown, args=("shutdown",), daemon=True).start()
+    end = time.monotonic() + _UNREGISTER_TIMEOUT
     while not rospy.is_shutdown() and time.monotonic() < end:
-        time.sleep(0.002)
+        time.sleep(_SHUTDOWN_POLL_PERIOD)

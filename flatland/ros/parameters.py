@@ -1,4 +1,4 @@
-"""The node's private parameters, read once and checked."""
+"""The private parameters of the node, read once and checked."""
 
 from __future__ import annotations
 
@@ -6,39 +6,41 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from flatland.ros.shutdown import DEFAULT_SHUTDOWN_TIMEOUT
 from flatland.runtime.placement import IF_BLOCKED, IfBlocked
 from flatland.simulation import MAX_LAG
 from flatland.timekeeper import GREATEST_STEP, LEAST_STEP
 
 ParameterSource = Callable[[str], object]
-"""Gives the value of a parameter, None where it is not set."""
+"""Returns the value of a parameter, None if it is not set."""
 
 NO_WORLD_PATH = "No world_path parameter given!"
 _SIMPLIFICATIONS = (0, 1, 2)
 
 
 class ParameterError(Exception):
-    """A parameter of the node is missing or bad; the text names it and its value."""
+    """A parameter of the node is missing or invalid; the text names it and its value."""
 
 
 @dataclass(frozen=True, slots=True)
 class NodeParameters:
-    """What the node is told by its parameters.
+    """The parameters of the node.
 
     Attributes:
         world_path: The world file.
-        update_rate: Steps in a second of wall time [Hz], 0 for as many as possible.
-        max_lag: Lost wall time that is made up for at most [s], 0 for one cycle at most.
-        step_size: Simulated time of a step [s].
-        show_viz: Whether to publish debug markers.
-        viz_pub_rate: Debug markers in a second of wall time [Hz].
+        update_rate: Steps per second of wall time [Hz]; 0 for as many as possible.
+        max_lag: Limit of the lost wall time that is made up for [s]; 0 for one cycle.
+        step_size: Simulated time of one step [s].
+        show_viz: Whether debug markers are published.
+        viz_pub_rate: Rate of the debug markers in wall time [Hz].
         simplify_map: 0 exact, 1 simplified, 2 opened and simplified map boundaries.
-        seed: Makes all noise repeatable; None draws one.
-        benchmark_duration: Simulated time after which the node ends and says how fast it was
-            [s]; None runs for ever.
-        plugin_timeout: Wall time that a plugin may take to start [s]; None for as long as it
-            likes.
-        if_blocked: What `spawn_model` and `move_model` do at poses that are not free.
+        seed: Seed of all random numbers; None draws one.
+        benchmark_duration: Simulated time after which the node logs its speed and ends [s]; None
+            for no end.
+        plugin_timeout: Limit of wall time of `on_initialize` of a plugin [s]; None for no limit.
+        shutdown_timeout: Limit of wall time between a stop request and the end of the process [s];
+            None for no limit.
+        if_blocked: Behaviour of `spawn_model` and `move_model` at poses that are not free.
     """
 
     world_path: str
@@ -51,6 +53,7 @@ class NodeParameters:
     seed: int | None
     benchmark_duration: float | None
     plugin_timeout: float | None
+    shutdown_timeout: float | None
     if_blocked: IfBlocked
 
 
@@ -58,10 +61,10 @@ def read_parameters(get: ParameterSource) -> NodeParameters:
     """Reads and checks all parameters of the node.
 
     Args:
-        get: Gives the value of a parameter of the node, None where it is not set.
+        get: Returns the value of a parameter of the node, None if it is not set.
 
     Raises:
-        ParameterError: One is missing or bad.
+        ParameterError: A parameter is missing or invalid.
     """
     reader = _Reader(get)
     return NodeParameters(
@@ -75,6 +78,7 @@ def read_parameters(get: ParameterSource) -> NodeParameters:
         seed=reader.natural("seed"),
         benchmark_duration=reader.optional_positive("benchmark_duration"),
         plugin_timeout=reader.timeout("plugin_timeout", 60.0),
+        shutdown_timeout=reader.timeout("shutdown_timeout", DEFAULT_SHUTDOWN_TIMEOUT),
         if_blocked=reader.if_blocked("if_blocked", "warn"),
     )
 
@@ -90,35 +94,35 @@ class _Reader:
         if value is None or value == "":
             raise ParameterError(NO_WORLD_PATH)
         if not isinstance(value, str):
-            raise _bad(name, "the path of a world file", value)
+            raise _invalid(name, "the path of a world file", value)
         return value
 
     def rate(self, name: str, default: float) -> float:
         wanted = "a number of Hz that is not negative (0 or inf: as fast as possible)"
         rate = self._number(name, default, wanted)
         if rate < 0:
-            raise _bad(name, wanted, rate)
+            raise _invalid(name, wanted, rate)
         return 0.0 if math.isinf(rate) else rate
 
     def lag(self, name: str, default: float) -> float:
         wanted = "a finite number of seconds that is not negative"
         seconds = self._number(name, default, wanted)
         if not 0 <= seconds < math.inf:
-            raise _bad(name, wanted, seconds)
+            raise _invalid(name, wanted, seconds)
         return seconds
 
     def step_size(self, name: str, default: float) -> float:
         wanted = f"a number of seconds from {LEAST_STEP:g} to {GREATEST_STEP:g}"
         size = self._number(name, default, wanted)
         if not LEAST_STEP <= size <= GREATEST_STEP:
-            raise _bad(name, wanted, size)
+            raise _invalid(name, wanted, size)
         return size
 
     def positive(self, name: str, default: float) -> float:
         wanted = "a positive number"
         number = self._number(name, default, wanted)
         if number <= 0:
-            raise _bad(name, wanted, number)
+            raise _invalid(name, wanted, number)
         return number
 
     def optional_positive(self, name: str) -> float | None:
@@ -128,7 +132,7 @@ class _Reader:
         wanted = "a positive number of seconds (inf: no limit)"
         seconds = self._number(name, default, wanted)
         if seconds <= 0:
-            raise _bad(name, wanted, seconds)
+            raise _invalid(name, wanted, seconds)
         return None if math.isinf(seconds) else seconds
 
     def boolean(self, name: str, default: bool) -> bool:
@@ -139,7 +143,7 @@ class _Reader:
             return value
         if isinstance(value, str) and value.lower() in ("true", "false"):
             return value.lower() == "true"
-        raise _bad(name, "true or false", value)
+        raise _invalid(name, "true or false", value)
 
     def choice(self, name: str, default: int, choices: tuple[int, ...]) -> int:
         wanted = "one of " + ", ".join(map(str, choices))
@@ -147,7 +151,7 @@ class _Reader:
         if value is None:
             return default
         if value not in choices:
-            raise _bad(name, wanted, value)
+            raise _invalid(name, wanted, value)
         return value
 
     def if_blocked(self, name: str, default: IfBlocked) -> IfBlocked:
@@ -157,44 +161,44 @@ class _Reader:
         for choice in IF_BLOCKED:
             if value == choice:
                 return choice
-        raise _bad(name, "one of " + ", ".join(IF_BLOCKED), value)
+        raise _invalid(name, "one of " + ", ".join(IF_BLOCKED), value)
 
     def natural(self, name: str) -> int | None:
         wanted = "an integer that is not negative"
         if self._get(name) == "":
-            return None  # a launch argument that was left empty
+            return None  # The launch argument is empty.
         value = self._integer(name, wanted)
         if value is not None and value < 0:
-            raise _bad(name, wanted, value)
+            raise _invalid(name, wanted, value)
         return value
 
     def _number(self, name: str, default: float, wanted: str) -> float:
-        """Reads a number that may be infinite; roslaunch hands over `inf` and `1e3` as text."""
+        """Reads a number that may be infinite; roslaunch passes `inf` and `1e3` as text."""
         value = self._get(name)
         if value is None:
             return default
         if isinstance(value, bool) or not isinstance(value, (int, float, str)):
-            raise _bad(name, wanted, value)
+            raise _invalid(name, wanted, value)
         try:
             number = float(value)
         except (ValueError, OverflowError):
-            raise _bad(name, wanted, value) from None
+            raise _invalid(name, wanted, value) from None
         if math.isnan(number):
-            raise _bad(name, wanted, value)
+            raise _invalid(name, wanted, value)
         return number
 
     def _integer(self, name: str, wanted: str) -> int | None:
-        """Reads an integer; one too great for XML-RPC comes as text."""
+        """Reads an integer; one that is too large for XML-RPC is passed as text."""
         value = self._get(name)
         if value is None:
             return None
         if isinstance(value, bool) or not isinstance(value, (int, str)):
-            raise _bad(name, wanted, value)
+            raise _invalid(name, wanted, value)
         try:
             return int(value)
         except ValueError:
-            raise _bad(name, wanted, value) from None
+            raise _invalid(name, wanted, value) from None
 
 
-def _bad(name: str, wanted: str, value: object) -> ParameterError:
+def _invalid(name: str, wanted: str, value: object) -> ParameterError:
     return ParameterError(f'Invalid parameter "~{name}": it must be {wanted}, got {value!r}')

@@ -6,9 +6,9 @@ from typing import Final
 
 from std_msgs.msg import Bool
 
-from flatland.ros.registrar import Registrar
-from flatland.ros.ticker import Ticker
+from flatland.ros.transport.registrar import Registrar
 from flatland.ros.transport.state_topic import StateTopic
+from flatland.ros.transport.ticker import Ticker
 from flatland.simulation import Simulation
 
 TOPIC: Final = "~paused"

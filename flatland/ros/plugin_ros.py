@@ -1,4 +1,4 @@
-"""What a plugin finds as `self.ros`: ROS itself, for what ports cannot say."""
+"""Access to ROS for plugins, as `self.ros`, for everything that ports do not cover."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ import rospy
 from flatland.errors import PLUGIN_FAULTS, PluginError
 from flatland.graph_names import resolve_topic
 from flatland.plugin_api.plugin import FlatlandPlugin, describe
-from flatland.ros.publisher import Publisher
-from flatland.ros.registrar import Registrar
+from flatland.ros.transport.publisher import Publisher
+from flatland.ros.transport.registrar import Registrar
 from flatland.ros.transport.service import Service, wait_for
 from flatland.ros.transport.subscriber import Subscriber
 
@@ -23,10 +23,10 @@ _REQUIRED: Final = object()
 
 
 class PluginRos:
-    """Topics, services and parameters of one plugin, under its model's namespace.
+    """Topics, services and parameters of one plugin, in the namespace of its model.
 
-    A name that starts with `/` is global. Callbacks run in the thread that steps the world,
-    between two steps. Everything ends with the plugin, also what it forgot to close.
+    A name that starts with `/` is global. Callbacks run between two steps, in the thread that
+    steps the world. Everything that the plugin leaves open is closed with the plugin.
     """
 
     def __init__(
@@ -36,13 +36,13 @@ class PluginRos:
         post: Callable[[Callable[[], object]], Future[Any]],
         shutting_down: Callable[[], bool],
     ) -> None:
-        """Opens nothing yet.
+        """Provides access for a plugin.
 
         Args:
-            plugin: Whose access this is.
-            registrar: Talks to the ROS master.
+            plugin: The plugin.
+            registrar: Registers topics and services with the ROS master.
             post: Runs an action between two steps.
-            shutting_down: Tells whether the node ends, and all connections with it.
+            shutting_down: Returns whether the node is about to close all connections.
         """
         self._plugin = plugin
         self._owner = describe(plugin)
@@ -55,16 +55,19 @@ class PluginRos:
     def advertise(
         self, topic: str, message_type: type[Any], *, queue_size: int = 1, latch: bool = False
     ) -> Publisher:
-        """Advertises a topic; `publish` of what it returns never waits for a subscriber.
+        """Advertises a topic.
 
         Args:
-            topic: Under the model's namespace.
-            message_type: The ROS message class.
-            queue_size: How many messages wait for a subscriber that reads slowly.
-            latch: Whether a new subscriber gets the last message at once.
+            topic: Name in the namespace of the model.
+            message_type: ROS message class.
+            queue_size: Maximum number of messages queued for a slow subscriber.
+            latch: Whether a new subscriber receives the last message when it connects.
+
+        Returns:
+            The publisher; its `publish` never blocks.
 
         Raises:
-            FlatlandError: The topic is no legal name, or carries another type.
+            FlatlandError: The topic is not a legal name, or has another type.
         """
         publisher = Publisher(
             self._registrar,
@@ -80,23 +83,27 @@ class PluginRos:
     def subscribe(
         self, topic: str, message_type: type[Any], callback: Callable[[Any], object]
     ) -> Subscriber:
-        """Calls a function with each message of a topic; `close` of the result ends it.
+        """Subscribes to a topic.
 
         Args:
-            topic: Under the model's namespace.
-            message_type: The ROS message class.
-            callback: Called between two steps; what it raises is logged.
+            topic: Name in the namespace of the model.
+            message_type: ROS message class.
+            callback: Called with each message between two steps; its exceptions are logged.
+
+        Returns:
+            The subscription; its `close` ends it.
 
         Raises:
-            FlatlandError: The topic is no legal name, or carries another type.
+            FlatlandError: The topic is not a legal name, or has another type.
         """
 
         def call(message: Any) -> None:
             if not self._closed:
                 try:
-                    callback(message)
+                    with self._plugin.world.requests.plugin_code():
+                        callback(message)
                 except PLUGIN_FAULTS:
-                    _LOG.exception("plugin %r: callback of %s raised", self._plugin.name, topic)
+                    _LOG.exception("%s: callback of topic %s raised", self._owner, topic)
 
         subscriber = Subscriber(
             self._registrar,
@@ -111,25 +118,29 @@ class PluginRos:
     def advertise_service(
         self, name: str, service_type: type[Any], handler: Callable[[Any], Any]
     ) -> Service:
-        """Offers a service; `close` of the result ends it.
+        """Advertises a service.
 
         Args:
-            name: Under the model's namespace.
-            service_type: The ROS service class.
-            handler: Called between two steps with the request, returns the response. What it
-                raises is the caller's error.
+            name: Name in the namespace of the model.
+            service_type: ROS service class.
+            handler: Called with each request between two steps; returns the response. Its
+                exceptions are reported to the client.
+
+        Returns:
+            The service; its `close` ends it.
 
         Raises:
-            FlatlandError: The service has no legal name, or this node has it already.
+            FlatlandError: The name is not legal, or this node already has the service.
         """
 
         def run(request: Any) -> Any:
             if self._closed:
-                raise rospy.ServiceException(f"service {name} is gone with its model")
+                raise rospy.ServiceException(f"service {name}: its model was deleted")
             try:
-                return handler(request)
+                with self._plugin.world.requests.plugin_code():
+                    return handler(request)
             except SystemExit as error:
-                raise rospy.ServiceException(f"service {name} ended with {error!r}") from error
+                raise rospy.ServiceException(f"service {name} raised {error!r}") from error
 
         service = Service(
             self._registrar,
@@ -145,11 +156,11 @@ class PluginRos:
         """Returns a ROS parameter.
 
         Args:
-            name: Under the model's namespace.
-            default: Returned where the parameter is not set.
+            name: Name in the namespace of the model.
+            default: Returned if the parameter is not set.
 
         Raises:
-            PluginError: It is not set, and there is no default.
+            PluginError: The parameter is not set, and no default is given.
         """
         resolved = rospy.resolve_name(self._resolve(name))
         if not rospy.has_param(resolved):
@@ -159,7 +170,7 @@ class PluginRos:
         return rospy.get_param(resolved)
 
     def close(self) -> None:
-        """Ends everything that the plugin opened, last first; a second call does nothing."""
+        """Closes everything that the plugin opened, the last first; idempotent."""
         self._closed = True
         while self._closers:
             close = self._closers.pop()
@@ -167,7 +178,7 @@ class PluginRos:
                 try:
                     close()
                 except PLUGIN_FAULTS:
-                    _LOG.exception("plugin %r: a connection did not close", self._plugin.name)
+                    _LOG.exception("%s: cannot close a connection", self._owner)
 
     def _resolve(self, name: str) -> str:
         try:

@@ -1,4 +1,4 @@
-"""The node's services: models come, go and move; time stops, runs on, runs faster."""
+"""The services of the node: spawn, delete and move models, pause, resume and set the rate."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from flatland.entities.model import Model
 from flatland.errors import FlatlandError
 from flatland.geometry import Pose
 from flatland.ros.names import sendable_text
-from flatland.ros.registrar import Registrar
+from flatland.ros.transport.registrar import Registrar
 from flatland.ros.transport.service import Service, wait_for
 from flatland.runtime.placement import IfBlocked
 from flatland.simulation import Simulation
@@ -35,28 +35,28 @@ from flatland.srv import (
 
 _LOG = logging.getLogger("flatland")
 
-_REGISTRATION_PATIENCE: Final = 5.0  # s that an answer waits for the ROS master to know the topics
+_REGISTRATION_TIMEOUT: Final = 5.0  # s, for the registration of the topics of a new model
 
 
 class Services:
-    """Offers the services of one simulation in the node's namespace.
+    """The services of one simulation in the namespace of the node.
 
-    Each call is carried out in the simulation's thread between two steps, in order of arrival,
-    also while paused, and answered when it has taken effect.
+    Each call is carried out between two steps in the thread that steps the world, in order of
+    arrival, also while paused. The response is sent after the call has taken effect.
     """
 
     def __init__(
         self, registrar: Registrar, simulation: Simulation, if_blocked: IfBlocked = "warn"
     ) -> None:
-        """Offers the services, soon.
+        """Advertises the services asynchronously.
 
         Args:
-            registrar: Talks to the ROS master.
-            simulation: What the services act on.
-            if_blocked: What `spawn_model` and `move_model` do at poses that are not free.
+            registrar: Registers the services with the ROS master.
+            simulation: Simulation that the services control.
+            if_blocked: Behaviour of `spawn_model` and `move_model` at poses that are not free.
 
         Raises:
-            FlatlandError: A plugin has taken the name of a service.
+            FlatlandError: A plugin has a service of the same name.
         """
         self._registrar = registrar
         self._simulation = simulation
@@ -107,10 +107,10 @@ class Services:
             return SetRateResponse(False, f"update_rate must not be negative, got {rate}")
         done, message = self._carry_out(lambda: self._simulation.set_rate(rate))
         if done:
-            # Who looks there is to find what holds now.
+            # Clients read the current rate from the parameter.
             value = 0.0 if math.isinf(rate) else rate
             self._registrar.submit(lambda: rospy.set_param("~update_rate", value))
-            self._registrar.flush(_REGISTRATION_PATIENCE)
+            self._registrar.flush(_REGISTRATION_TIMEOUT)
         return SetRateResponse(done, message)
 
     def _switch(self, action: Callable[[], None]) -> Callable[[Any], EmptyResponse]:
@@ -124,29 +124,29 @@ class Services:
         """Runs an action between two steps.
 
         Returns:
-            Whether it worked; the text that it returned, or why it failed.
+            Whether it succeeded, and the text that it returned or the error.
         """
         try:
             message = wait_for(self._simulation.post(action)) or ""
-            # Whoever spawned a model may look for its topics at once.
-            self._registrar.flush(_REGISTRATION_PATIENCE)
+            # A client may use the topics of a model as soon as it receives the response.
+            self._registrar.flush(_REGISTRATION_TIMEOUT)
         except (FlatlandError, rospy.ServiceException) as error:
-            self._registrar.flush(_REGISTRATION_PATIENCE)
+            self._registrar.flush(_REGISTRATION_TIMEOUT)
             return False, sendable_text(str(error))
         except Exception as error:
-            _LOG.exception("a service call failed in an unforeseen way")
+            _LOG.exception("unexpected internal error in a service call")
             return False, sendable_text(f"{type(error).__name__}: {error}")
         return True, sendable_text(message)
 
 
-def _displacement(model: Model | None, asked: Pose) -> str:
-    """Describes where a model was put instead of the pose asked for; empty where it is there."""
+def _displacement(model: Model | None, requested: Pose) -> str:
+    """Describes where a model was put instead of the requested pose; empty if it is there."""
     if model is None or model.displacement == (0.0, 0.0):
         return ""
     dx, dy = model.displacement
-    x, y, theta = asked[0] + dx, asked[1] + dy, asked[2]
+    x, y, theta = requested[0] + dx, requested[1] + dy, requested[2]
     return (
-        f'the pose asked for is blocked: model "{model.name}" was put at '
+        f'the requested pose is blocked: model "{model.name}" was put at '
         f"({x:.3f}, {y:.3f}, {theta:.3f}), {math.hypot(dx, dy):.3f} m away"
     )
 

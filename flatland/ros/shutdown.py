@@ -1,57 +1,128 @@
-"""Ends the node within a second of SIGINT or SIGTERM, whatever it is doing."""
+"""Stop requests, and a time limit for the node to react to one."""
 
 from __future__ import annotations
 
+import contextlib
 import logging
 import os
 import signal
 import socket
+import sys
 import threading
 import time
 from collections.abc import Callable
+from types import FrameType
 from typing import Final
 
-_GRACE: Final = 0.6  # s that the node has to end by itself
-_LAST_CALLS: Final = 0.2  # s for saying good-bye to the ROS master after that
+from flatland.plugin_api.plugin import FlatlandPlugin, describe
+
+_LOG = logging.getLogger("flatland")
+
+DEFAULT_SHUTDOWN_TIMEOUT: Final = 2.0  # s
+_LAST_ACTION_TIMEOUT: Final = 0.5  # s, for each action that precedes a forced exit
+_STACK_DEPTH: Final = 10  # calls shown of a stack
+_STOP_SIGNALS: Final = (signal.SIGINT, signal.SIGTERM)
 
 
-class StopSignals:
-    """Watches for SIGINT and SIGTERM in a thread of its own.
+class ShutdownWatchdog:
+    """Stops the node on SIGINT and SIGTERM, and ends a process that does not stop in time.
 
-    Python runs signal handlers in the main thread only, and only between two of its own
-    instructions: not while a large map is being loaded in C++. The thread hears of a signal at
-    once, asks the node to stop, and ends the process if it does not do so in time.
+    Python executes signal handlers in the main thread only, and only between two of its own
+    instructions, so not while a large map is loaded in C++. A separate thread therefore reads the
+    signals, requests the stop, and waits. If the process still runs after the time limit, it logs
+    what is running and exits with code 1.
 
     Attributes:
-        received: Set with the first signal.
+        timeout: Limit of wall time between a stop request and the end of the process [s]; None
+            for no limit.
     """
 
-    def __init__(self, on_stop: Callable[[], None], good_bye: Callable[[], None]) -> None:
-        """Starts to watch; call it from the main thread.
+    def __init__(self, on_stop: Callable[[], None], unregister: Callable[[], None]) -> None:
+        """Starts the thread; must be called in the main thread.
 
         Args:
-            on_stop: Called with the first signal, in the watching thread.
-            good_bye: Called before the process is ended by force.
+            on_stop: Called in that thread when the first stop is requested.
+            unregister: Unregisters the node from the ROS master; called before a forced exit.
         """
-        self.received = threading.Event()
+        self.timeout: float | None = DEFAULT_SHUTDOWN_TIMEOUT
         self._on_stop = on_stop
-        self._good_bye = good_bye
+        self._unregister = unregister
         self._reading_end, self._writing_end = socket.socketpair()
         self._writing_end.setblocking(False)
         signal.set_wakeup_fd(self._writing_end.fileno(), warn_on_full_buffer=False)
-        for number in (signal.SIGINT, signal.SIGTERM):
+        for number in _STOP_SIGNALS:
             signal.signal(number, lambda *_: None)
-        threading.Thread(target=self._watch, name="flatland-signals", daemon=True).start()
+        threading.Thread(target=self._watch, name="flatland-watchdog", daemon=True).start()
+
+    def request_stop(self) -> None:
+        """Requests a stop, as a signal does; safe from any thread, never blocks."""
+        with contextlib.suppress(BlockingIOError):  # A full buffer contains earlier requests.
+            self._writing_end.send(bytes([signal.SIGTERM]))
 
     def _watch(self) -> None:
-        while self._reading_end.recv(1)[0] not in (signal.SIGINT, signal.SIGTERM):
+        while self._reading_end.recv(1)[0] not in _STOP_SIGNALS:
             pass
-        self.received.set()
         self._on_stop()
-        time.sleep(_GRACE)
-        # Still here: the main thread is busy in C++ or in a plugin that does not return.
-        farewell = threading.Thread(target=self._good_bye, daemon=True)
-        farewell.start()
-        farewell.join(_LAST_CALLS)
-        logging.shutdown()
-        os._exit(0)
+        timeout = self.timeout
+        if timeout is None:
+            return
+        time.sleep(min(timeout, threading.TIMEOUT_MAX))
+        # The process still runs. Each action has a thread of its own, because it may block as
+        # well, for example on a pipe or a lock.
+        for action in (lambda: _log_running(timeout), self._unregister, logging.shutdown):
+            thread = threading.Thread(target=action, daemon=True)
+            thread.start()
+            thread.join(_LAST_ACTION_TIMEOUT)
+        os._exit(1)
+
+
+def _log_running(timeout: float) -> None:
+    _LOG.critical("not stopped within %g s, exiting; still running: %s", timeout, _running())
+
+
+def _running() -> str:
+    """Describes the code that keeps the process from ending, in one line."""
+    main = threading.main_thread()
+    threads = [main]
+    if not main.is_alive():
+        # Python waits for these threads after the main thread has ended.
+        others = [t for t in threading.enumerate() if t.is_alive() and not t.daemon]
+        threads = others or threads
+    frames = sys._current_frames()
+    return "; ".join(
+        f"thread {thread.name}: {describe_stack(frames[thread.ident])}"
+        for thread in threads
+        if thread.ident in frames
+    )
+
+
+def describe_stack(frame: FrameType) -> str:
+    """Describes a stack in one line.
+
+    Args:
+        frame: Innermost frame.
+
+    Returns:
+        The innermost calls with file, line and function, the last one made at the end; in code of
+        a plugin, preceded by the plugin and its method, and only the calls from there on.
+    """
+    calls: list[str] = []
+    plugin_method, plugin_calls = "", None
+    current: FrameType | None = frame
+    while current is not None:
+        code = current.f_code
+        calls.append(f"{code.co_filename}:{current.f_lineno} in {code.co_name}")
+        owner = current.f_locals.get("self")
+        if isinstance(owner, FlatlandPlugin):
+            # The outermost such call counts: the hook or callback.
+            plugin_method, plugin_calls = f"{_name(owner)}: {code.co_name}, ", len(calls)
+        current = current.f_back
+    innermost = calls[:plugin_calls][:_STACK_DEPTH]
+    return plugin_method + " > ".join(reversed(innermost))
+
+
+def _name(plugin: FlatlandPlugin) -> str:
+    try:
+        return describe(plugin)
+    except AttributeError:  # A plugin has no name or model before it is attached to a world.
+        return type(plugin).__qualname__

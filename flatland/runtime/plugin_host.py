@@ -158,7 +158,7 @@ class PluginHost:
 
     def _initialize(self, plugin: FlatlandPlugin, config: YamlReader) -> None:
         try:
-            with self._requests.initializing(), time_limit(self._timeout):
+            with self._requests.plugin_code(), time_limit(self._timeout):
                 plugin.on_initialize(config)
         except TimeLimitExceeded:
             raise PluginError(f"on_initialize did not return within {self._timeout:g} s") from None

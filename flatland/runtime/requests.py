@@ -40,8 +40,8 @@ class Requests:
         self._server: int | None = None
         self._wake: Callable[[], None] | None = None
         self.hook_thread: int | None = None
-        # Identifiers of the threads that start a plugin and run actions.
-        self._initializing_thread: int | None = None
+        # Identifiers of the threads that run other code of plugins, and that run actions.
+        self._plugin_thread: int | None = None
         self._action_thread: int | None = None
 
     # -- threads ---------------------------------------------------------------------------
@@ -75,14 +75,17 @@ class Requests:
             self.hook_thread = previous
 
     @contextmanager
-    def initializing(self) -> Iterator[None]:
-        """Marks the current thread as running `on_initialize` of a plugin."""
-        previous = self._initializing_thread
-        self._initializing_thread = threading.get_ident()
+    def plugin_code(self) -> Iterator[None]:
+        """Marks the current thread as running code of a plugin between two steps.
+
+        This is `on_initialize`, or a callback: changes take effect at once.
+        """
+        previous = self._plugin_thread
+        self._plugin_thread = threading.get_ident()
         try:
             yield
         finally:
-            self._initializing_thread = previous
+            self._plugin_thread = previous
 
     @property
     def in_hook(self) -> bool:
@@ -90,7 +93,7 @@ class Requests:
         return self.hook_thread == threading.get_ident()
 
     def refuse_in_plugin(self, method: str) -> None:
-        """Raises if the current thread executes a plugin's hook or `on_initialize`.
+        """Raises if the current thread executes code of a plugin.
 
         Args:
             method: What may not be called there.
@@ -99,7 +102,7 @@ class Requests:
             WorldError: It does.
         """
         thread = threading.get_ident()
-        if thread in (self.hook_thread, self._initializing_thread):
+        if thread in (self.hook_thread, self._plugin_thread):
             raise WorldError(f"{method} must not be called from a plugin's hook")
 
     # -- actions ---------------------------------------------------------------------------
@@ -160,9 +163,9 @@ class Requests:
     def run(self, action: Callable[[], R]) -> R:
         """Runs an action between two steps and waits for it, after those that wait already.
 
-        Within an action or `on_initialize`, it runs at once.
+        Within an action or code of a plugin between two steps, it runs at once.
         """
-        if threading.get_ident() in (self._action_thread, self._initializing_thread):
+        if threading.get_ident() in (self._action_thread, self._plugin_thread):
             return action()
         future = self.post(action)
         while not future.done():

@@ -1,4 +1,4 @@
-"""A catkin workspace that all tests of this folder share, and clean environments."""
+"""A catkin workspace shared by the tests of this folder, and clean environments."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ bodies:
 
 
 def clean_environment(home: Path) -> dict[str, str]:
-    """What a fresh login has: nothing of a virtual environment, a workspace or the caller's ROS."""
+    """Returns the environment of a new login, without virtual environment, workspace or ROS."""
     return {"HOME": str(home), "PATH": "/usr/bin:/bin", "LANG": "C.UTF-8"}
 
 
@@ -34,7 +34,7 @@ def run(
     folder: Path,
     timeout: float = TIMEOUT,
 ) -> str:
-    """Runs a command and returns what it printed; a failure shows that and fails the test."""
+    """Runs a command and returns its output; fails the test if the command fails."""
     done = subprocess.run(
         command,
         env=environment,
@@ -55,9 +55,9 @@ class Space:
 
     Attributes:
         name: `devel` or `install`.
-        folder: Where it is.
-        environment: What `setup.bash` of the space exports.
-        scratch: An empty folder to run in.
+        folder: Folder of the space.
+        environment: Variables exported by `setup.bash` of the space.
+        scratch: Empty working folder.
     """
 
     name: str
@@ -66,13 +66,13 @@ class Space:
     scratch: Path
 
     def run(self, *command: str | Path, timeout: float = TIMEOUT) -> str:
-        """Runs a command in the space's environment and returns what it printed."""
+        """Runs a command in the environment of the space and returns its output."""
         return run(command, self.environment, self.scratch, timeout)
 
 
 @pytest.fixture(scope="session")
 def world_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A world with one ball and no map; it takes Lua to read."""
+    """A world with one ball and no map; its model file contains a Lua expression."""
     folder = tmp_path_factory.mktemp("world")
     (folder / "ball.yaml").write_text(MODEL)
     path = folder / "world.yaml"
@@ -99,7 +99,7 @@ def catkin_workspace(tmp_path_factory: pytest.TempPathFactory, checkout: Path) -
 def make_space(
     catkin_workspace: Path, tmp_path_factory: pytest.TempPathFactory
 ) -> Callable[[str], Space]:
-    """Enters a space of the workspace by name."""
+    """Returns the space of a name."""
 
     def enter(name: str) -> Space:
         scratch = tmp_path_factory.mktemp(name)

@@ -1,4 +1,4 @@
-"""catkin_make and catkin_make install give a ROS package that works in both spaces."""
+"""The ROS package built by catkin_make, in the devel and the install space."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 from waiting import BUILD_TIMEOUT, TIMEOUT
 
-# Building the workspace is part of the first test.
+# The first test builds the workspace.
 pytestmark = pytest.mark.timeout(BUILD_TIMEOUT)
 
 STEP_A_WORLD = """
@@ -34,23 +34,23 @@ def test_ros_tools_find_the_package(space, checkout):
     assert md5 == "952237af09cbedc354d376afc6d2fc71"
 
 
-def test_a_world_steps_in_the_systems_python(space, world_file, checkout):
+def test_world_steps_in_the_python_of_the_system(space, world_file, checkout):
     printed = space.run("/usr/bin/python3", "-W", "error", "-c", STEP_A_WORLD, world_file)
     package, core, messages, world = map(Path, printed.split("\n")[:4])
     built = space.folder / "lib" / "python3" / "dist-packages" / "flatland"
     assert (package.parent, core.parent, messages.parent) == (built, built, built / "msg")
-    # The devel space leads to the sources, so that an edit counts at once.
+    # The devel space uses the sources, so that edits take effect without a build.
     assert world.parent.resolve() == (checkout / "flatland" if space.name == "devel" else built)
 
 
-def test_devel_space_puts_only_the_package_on_the_path(make_space, checkout):
+def test_devel_space_does_not_put_the_checkout_on_the_path(make_space, checkout):
     path = make_space("devel").run(
         "/usr/bin/python3", "-c", "import sys; print(*sys.path, sep='\\n')"
     )
     assert str(checkout) not in path.splitlines()
 
 
-def test_the_plugin_manifest_is_exported(space):
+def test_plugin_manifest_is_exported(space):
     script = (
         "import rospkg; p = rospkg.RosPack(); "
         "print(p.get_manifest('flatland').get_export('flatland', 'plugin')[0]"
@@ -60,7 +60,7 @@ def test_the_plugin_manifest_is_exported(space):
     assert manifest.read_text().count("<class ") >= 10
 
 
-def test_install_space_holds_all_and_nothing_of_make_dev(make_space, checkout):
+def test_install_space_contains_all_files_and_none_of_make_dev(make_space, checkout):
     folder = make_space("install").folder
     package = folder / "lib" / "python3" / "dist-packages" / "flatland"
     sources = {
@@ -80,19 +80,19 @@ def test_install_space_holds_all_and_nothing_of_make_dev(make_space, checkout):
 
 
 @pytest.mark.parametrize("launch_file", ["server.launch", "benchmark.launch"])
-def test_roslaunch_reads_the_launch_files(space, launch_file):
+def test_roslaunch_parses_the_launch_files(space, launch_file):
     files = space.run("roslaunch", "--files", "flatland", launch_file, "show_viz:=false")
     assert Path(files.splitlines()[0]).name == launch_file
     nodes = space.run("roslaunch", "--nodes", "flatland", launch_file, "show_viz:=false")
     assert nodes.strip()
 
 
-def test_each_script_is_a_program(space, checkout):
+def test_each_script_is_executable(space, checkout):
     programs = space.folder / "lib" / "flatland"
     scripts = {path.name for path in (checkout / "scripts").iterdir() if path.is_file()}
     assert scripts <= {path.name for path in programs.iterdir() if os.access(path, os.X_OK)}
     assert "MAP_YAML" in space.run(programs / "map_to_lines.py", "--help")
-    # Port 1 is nobody's.
+    # No program listens on port 1.
     viewer = subprocess.run(
         [programs / "flatland_viz"],
         env={**space.environment, "ROS_MASTER_URI": "http://127.0.0.1:1"},
@@ -107,23 +107,22 @@ def test_each_script_is_a_program(space, checkout):
     assert viewer.stdout.startswith("flatland_viz: no ROS master at http://127.0.0.1:1")
 
 
-def test_rosrun_finds_the_programs(make_space):
-    """Of the devel space, too, but for a checkout with `.venv`: there rosrun asks which one."""
+def test_rosrun_starts_a_program(make_space):
+    """In the install space only: in a checkout with a `.venv`, rosrun finds each program twice."""
     assert "MAP_YAML" in make_space("install").run(
         "rosrun", "flatland", "map_to_lines.py", "--help"
     )
 
 
-def test_bundled_worlds_and_the_command(space):
+def test_bundled_worlds_are_valid(space):
     share = Path(space.run("rospack", "find", "flatland").strip())
     for world in sorted((share / "worlds").glob("*/world.yaml")):
-        told = space.run("/usr/bin/python3", "-m", "flatland", "check", world)
-        assert "no errors" in told
+        printed = space.run("/usr/bin/python3", "-m", "flatland", "check", world)
+        assert "no errors" in printed
     assert (share / "rviz" / "flatland.rviz").is_file()
 
 
-def test_the_node_runs(space, world_file):
-    """The server comes up from the space, ticks, and ends with roslaunch."""
+def test_node_publishes_the_clock_until_roslaunch_is_stopped(space, world_file):
     with socket.socket() as free:
         free.bind(("127.0.0.1", 0))
         port = free.getsockname()[1]
@@ -144,7 +143,7 @@ def test_the_node_runs(space, world_file):
         "rospy.init_node('waiter', anonymous=True); rospy.wait_for_message('/clock', Clock)"
     )
     try:
-        # The master is the first thing that roslaunch starts.
+        # roslaunch starts the master first.
         wait_for_master = (
             "import rosgraph, time\nwhile not rosgraph.is_master_online():\n    time.sleep(0.1)\n"
         )

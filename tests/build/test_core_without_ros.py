@@ -1,4 +1,4 @@
-"""The simulation core imports nothing of ROS, not even messages."""
+"""The simulation core imports no ROS module, not even messages."""
 
 from __future__ import annotations
 

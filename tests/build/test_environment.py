@@ -1,4 +1,4 @@
-"""What `make setup` leaves and `setup.bash` exports: the environment of a user."""
+"""The environment of a user: files installed by `make setup`, variables of `setup.bash`."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from flatland.errors import FlatlandError
 
 @pytest.fixture(scope="module")
 def installed(checkout: Path) -> Path:
-    """The checkout, once `make setup` has been run in it."""
+    """The checkout; skips the test if `make setup` has not been run."""
     if not (checkout / ".venv" / "share" / "flatland" / "package.xml").exists():
         pytest.skip("`make setup` has not been run")
     return checkout
@@ -22,7 +22,7 @@ def installed(checkout: Path) -> Path:
 
 @pytest.fixture
 def shell(installed, tmp_path):
-    """Runs a script of a fresh login shell in an empty folder; $0 is setup.bash."""
+    """Runs a script in a new login shell and an empty folder; $0 is setup.bash."""
 
     def run_script(script: str, **variables: str) -> subprocess.CompletedProcess[str]:
         environment = {"HOME": str(tmp_path), "PATH": "/usr/bin:/bin", "LANG": "C.UTF-8"}
@@ -38,7 +38,7 @@ def shell(installed, tmp_path):
     return run_script
 
 
-def test_ros_tools_know_the_package(shell, installed):
+def test_ros_tools_find_the_package(shell, installed):
     done = shell('set -eu; . "$0"; rospack find flatland; rosmsg show flatland/Collisions')
     assert done.returncode == 0, done.stderr
     assert done.stdout.startswith(f"{installed}/.venv/share/flatland\n")
@@ -47,27 +47,27 @@ def test_ros_tools_know_the_package(shell, installed):
 
 
 def test_system_python_imports_services(shell, installed):
-    """rosservice runs on /usr/bin/python3 and imports the service's class."""
+    """rosservice runs in /usr/bin/python3 and imports the class of the service."""
     done = shell('. "$0"; rossrv show flatland/SpawnModel; /usr/bin/python3 -c "'
                  'import flatland.srv; print(flatland.srv.__file__)"')  # fmt: skip
     assert done.returncode == 0, done.stderr
     assert f"{installed}/.venv/lib" in done.stdout
 
 
-def test_launch_files_are_found(shell):
+def test_roslaunch_finds_the_launch_files(shell):
     done = shell('. "$0"; roslaunch --nodes flatland server.launch show_viz:=false')
     assert done.returncode == 0, done.stderr
     assert done.stdout.strip()
 
 
-def test_sourcing_twice_changes_nothing(shell):
+def test_second_source_has_no_effect(shell):
     names = "$PATH $PYTHONPATH $ROS_PACKAGE_PATH"
     once, twice = shell(f'. "$0"; echo {names}'), shell(f'. "$0"; . "$0"; echo {names}')
     assert once.stdout == twice.stdout
     assert once.stdout.strip()
 
 
-def test_what_the_shell_had_is_kept(shell):
+def test_existing_variables_are_extended(shell):
     done = shell(
         '. "$0"; echo "$ROS_MASTER_URI"; echo "$ROS_PACKAGE_PATH"; echo "$PYTHONPATH"',
         ROS_MASTER_URI="http://robot:11311",
@@ -80,14 +80,13 @@ def test_what_the_shell_had_is_kept(shell):
     assert python.endswith(":/opt/python")
 
 
-def test_run_names_a_world_that_is_not_there(shell, installed):
+def test_run_reports_a_missing_world(shell, installed):
     done = shell(f"'{installed}/tools/run.sh' nowhere.yaml")
     assert done.returncode == 1
     assert "there is no world file nowhere.yaml" in done.stderr
 
 
-def test_server_starts_by_launcher_whatever_python_is_first(shell, world_file, tmp_path):
-    """A world runs for a second, though none of the first Pythons on PATH can start anything."""
+def test_server_runs_with_a_broken_python_first_on_path(shell, world_file, tmp_path):
     broken = tmp_path / "broken"
     broken.mkdir()
     for name in ("python", "python3", "python3.11"):
@@ -107,16 +106,15 @@ def test_server_starts_by_launcher_whatever_python_is_first(shell, world_file, t
     assert "was started" not in printed
 
 
-def test_numpy_is_debians(shell):
-    """ROS's modules were built against it: nothing may pull a newer one in."""
+def test_numpy_is_the_debian_package(shell):
+    """The extensions of ROS were built with it, so that no newer version may be installed."""
     done = shell('. "$0"; python -c "import numpy, yaml; print(numpy.__file__, yaml.__file__)"')
     assert done.stdout.count("/usr/lib/python3/dist-packages/") == 2
 
 
-def test_tests_test_what_users_get(installed):
-    """Under `make test` the package is the installed one, not the source tree."""
+def test_tests_use_the_installed_package(installed):
     if os.environ.get("VIRTUAL_ENV") != str(installed / ".venv"):
-        pytest.skip("not run by `make test`")
+        pytest.skip("only in the virtual environment, as under `make test`")
     import inspect
 
     assert inspect.getfile(FlatlandError).startswith(f"{installed}/.venv/lib/")

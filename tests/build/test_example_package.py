@@ -1,4 +1,4 @@
-"""The example package, built in the workspace beside flatland: its plugins are found and work."""
+"""The plugins of the example package, built in the same workspace as flatland."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from waiting import BUILD_TIMEOUT
 
-# Building the workspace is part of the first test.
+# The first test builds the workspace.
 pytestmark = pytest.mark.timeout(BUILD_TIMEOUT)
 
 DRIVE_THROUGH_THE_GATE = """
@@ -28,7 +28,7 @@ print(my_robots.battery.__file__)
 """
 
 
-def test_the_manifest_is_found(space, checkout):
+def test_rospack_finds_the_manifest(space, checkout):
     packages = space.run("rospack", "plugins", "--attrib=plugin", "flatland").splitlines()
     found = dict(line.split(" ", 1) for line in packages)
     share = space.folder / "share" / "my_robots"
@@ -36,12 +36,12 @@ def test_the_manifest_is_found(space, checkout):
     assert Path(found["my_robots"]).resolve() == folder / "flatland_plugins.xml"
 
 
-def test_the_plugins_work_in_the_systems_python(space, checkout):
+def test_plugins_work_in_the_python_of_the_system(space, checkout):
     printed = space.run("/usr/bin/python3", "-W", "error", "-c", DRIVE_THROUGH_THE_GATE)
     message, module = printed.splitlines()
     assert message == "sensor_msgs/BatteryState"
     if space.name == "devel":
-        # The sources themselves, so that an edit counts at once.
+        # The sources, so that edits take effect without a build.
         assert (
             Path(module).resolve().parent
             == checkout / "examples" / "my_robots" / "src" / "my_robots"

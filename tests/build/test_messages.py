@@ -1,4 +1,4 @@
-"""The messages are those that existing clients of the reference speak."""
+"""The messages and services are compatible with existing clients of the reference."""
 
 from __future__ import annotations
 

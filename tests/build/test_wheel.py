@@ -1,4 +1,4 @@
-"""The wheel holds the package, its extension, the messages and the ROS package's data."""
+"""Contents of the wheel: package, extension, messages and the data of the ROS package."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ pytestmark = pytest.mark.timeout(BUILD_TIMEOUT)
 
 
 def source_files(checkout: Path) -> set[str]:
-    """What a clone of the checkout holds, and what is new in it and not ignored."""
+    """Returns the files of the checkout that are tracked, or new and not ignored."""
     listed = subprocess.run(
         ["git", "-C", checkout, "ls-files", "-z", "-co", "--exclude-standard"],
         capture_output=True,
@@ -30,7 +30,7 @@ def source_files(checkout: Path) -> set[str]:
 
 @pytest.fixture(scope="module")
 def wheel(tmp_path_factory: pytest.TempPathFactory, checkout: Path) -> Iterator[zipfile.ZipFile]:
-    """The wheel of the checkout, built where `make setup` builds, so that little is compiled."""
+    """The wheel of the checkout, built in the folder of `make setup` to compile little."""
     pytest.importorskip("scikit_build_core")
     folder = tmp_path_factory.mktemp("wheel")
     (checkout / "build").mkdir(exist_ok=True)
@@ -50,7 +50,7 @@ def wheel(tmp_path_factory: pytest.TempPathFactory, checkout: Path) -> Iterator[
         yield archive
 
 
-def test_package_holds_sources_and_what_is_built_and_nothing_else(wheel, checkout):
+def test_package_contains_sources_and_built_files_only(wheel, checkout):
     names = {name for name in wheel.namelist() if name.startswith("flatland/")}
     sources = {name for name in source_files(checkout) if name.startswith("flatland/")}
     messages = {f"flatland/msg/_{path.stem}.py" for path in (checkout / "msg").iterdir()}
@@ -85,7 +85,7 @@ def test_each_script_is_an_entry_point(wheel, checkout):
     for script in scripts:
         assert script in commands
         (info,) = [i for i in wheel.infolist() if i.filename.endswith(f"flatland/scripts/{script}")]
-        assert info.external_attr >> 16 & 0o111, "roslaunch finds only what may be executed"
+        assert info.external_attr >> 16 & 0o111, "roslaunch finds executable files only"
 
 
 def test_versions_agree(checkout):

@@ -1,4 +1,4 @@
-"""A ROS master of our own, nodes as roslaunch starts them, and helpers that wait for events."""
+"""A ROS master for the tests, nodes as started by roslaunch, and helpers that wait for events."""
 
 from __future__ import annotations
 
@@ -46,22 +46,22 @@ plugins:
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """rospy itself uses what Python calls deprecated, and closes its sockets when it likes."""
+    """Ignores warnings caused by rospy: deprecated functions, sockets that are closed late."""
     for item in items:
         if Path(__file__).parent in item.path.parents:
             for ignored in ("ignore::DeprecationWarning", "ignore::ResourceWarning"):
                 item.add_marker(pytest.mark.filterwarnings(ignored))
 
 
-def _collect_leavings() -> None:
-    """Lets go of what rospy left open, where nobody minds."""
+def _collect_garbage() -> None:
+    """Finalizes the sockets that rospy left open, without warnings."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         gc.collect()
 
 
 class Process:
-    """A program and what it prints, line by line."""
+    """A running program and the lines that it has printed."""
 
     def __init__(self, command: list[str], environment: Mapping[str, str]) -> None:
         self.lines: list[str] = []
@@ -90,17 +90,17 @@ class Process:
 
     @property
     def output(self) -> str:
-        """All that was printed so far."""
+        """The text printed so far."""
         with self._changed:
             return "\n".join(self.lines)
 
     @property
     def running(self) -> bool:
-        """Whether it has not ended."""
+        """Whether the program has not ended."""
         return self._popen.poll() is None
 
     def wait_for_line(self, pattern: str, timeout: float = TIMEOUT) -> re.Match[str]:
-        """Waits for a line that holds a pattern."""
+        """Waits for a line that matches a pattern."""
         end = time.monotonic() + timeout
         seen = 0
         with self._changed:
@@ -132,25 +132,25 @@ class Process:
         return code
 
     def stop(self) -> int:
-        """Asks the program to end and returns its exit code."""
+        """Stops the program with SIGINT and returns its exit code."""
         if self.running:
             self.send(signal.SIGINT)
         return self.wait()
 
     def kill(self) -> None:
-        """Ends the program and its children by force."""
+        """Kills the program and its children."""
         with contextlib.suppress(ProcessLookupError):
             os.killpg(self._popen.pid, signal.SIGKILL)
         self._popen.wait()
 
 
-# s; a subscriber overlooks a publisher of this process that comes back while rospy still closes
-# the connection to the last one, so this is tried again.
-_ADVERTISING_TIME = 10.0
+# s; until a publisher is advertised again. A subscriber may miss a publisher of this process that
+# is advertised while rospy still closes the connection to the previous one.
+_ADVERTISE_TIMEOUT = 10.0
 
 
 class Topic:
-    """What comes on a topic, from now on."""
+    """The messages received on a topic since its creation."""
 
     def __init__(self, name: str, message_type: type[Any]) -> None:
         self.name = name
@@ -162,10 +162,10 @@ class Topic:
         try:
             return self._messages.get(timeout=timeout)
         except queue.Empty:
-            pytest.fail(f"nothing came on {self.name} for {timeout} s")
+            pytest.fail(f"no message on {self.name} for {timeout} s")
 
     def until(self, accept: Callable[[Any], bool]) -> Any:
-        """Waits for a message that is as wanted."""
+        """Waits for a message that is accepted."""
         end = time.monotonic() + TIMEOUT
         message = self.next()
         while not accept(message):
@@ -174,17 +174,17 @@ class Topic:
         return message
 
     def take(self, count: int) -> list[Any]:
-        """Waits for some messages."""
+        """Waits for a number of messages."""
         return [self.next() for _ in range(count)]
 
     def drop(self) -> None:
-        """Forgets all that came so far."""
+        """Discards the messages received so far."""
         with contextlib.suppress(queue.Empty):
             while True:
                 self._messages.get_nowait()
 
     def rest(self, silence: float = 0.2) -> list[Any]:
-        """Takes messages until none comes for some time."""
+        """Returns messages until none is received for some time."""
         messages = []
         with contextlib.suppress(queue.Empty):
             while True:
@@ -202,25 +202,25 @@ class Topic:
 
 
 class Ros:
-    """The test's own node, and what it sees of the others."""
+    """The node of the tests, and its view of other nodes."""
 
     def __init__(self) -> None:
         self.master = rosgraph.Master("/flatland_tests")
         self._closers: list[Callable[[], None]] = []
 
     def topic(self, name: str, message_type: type[Any]) -> Topic:
-        """Subscribes to a topic for the length of the test; waits for its publisher."""
+        """Subscribes to a topic until the end of the test; waits for its publisher."""
         topic = Topic(name, message_type)
         self._closers.append(topic.close)
         wait_until(f"a publisher of {name}", lambda: topic.connected)
         return topic
 
     def publisher(self, name: str, message_type: type[Any]) -> rospy.Publisher:
-        """Advertises a topic for the length of the test; waits for its subscriber."""
+        """Advertises a topic until the end of the test; waits for its subscriber."""
 
         def advertise() -> rospy.Publisher | None:
             publisher = rospy.Publisher(name, message_type, queue_size=10)
-            end = time.monotonic() + _ADVERTISING_TIME
+            end = time.monotonic() + _ADVERTISE_TIMEOUT
             while not publisher.get_num_connections():
                 if time.monotonic() > end:
                     publisher.unregister()
@@ -259,10 +259,10 @@ class Ros:
         return self.call("/move_model", MoveModel, name, Pose2D(*pose))
 
     def registered(self, node: str = "/flatland_server") -> dict[str, set[str]]:
-        """What a node has registered with the master: publishers, subscribers, services.
+        """Returns the publishers, subscribers and services that a node has registered.
 
-        Without the interactive markers and the pause, which every node has, a little after its
-        start.
+        Without those of the interactive markers and the pause state, which every node registers
+        some time after its start.
         """
         late = re.compile(rf"/interactive_model_markers/|^{node}/paused$")
         state = self.master.getSystemState()
@@ -273,18 +273,18 @@ class Ros:
         }
 
     def types(self) -> dict[str, str]:
-        """The message type of each topic."""
+        """Returns the message type of each topic."""
         return dict(self.master.getTopicTypes())
 
     def close(self) -> None:
-        """Ends what this test opened."""
+        """Closes all topics that the test opened."""
         while self._closers:
             self._closers.pop()()
 
 
 @pytest.fixture(scope="session")
 def ros_environment(checkout: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
-    """Environment of ROS programs: a port of its own, and the package under test."""
+    """Environment of ROS programs: a free port for the master, and the package under test."""
     folder = tmp_path_factory.mktemp("ros")
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
@@ -312,7 +312,7 @@ def ros_environment(checkout: Path, tmp_path_factory: pytest.TempPathFactory) ->
 
 
 def _overlay(checkout: Path, folder: Path) -> Path:
-    """The package as an install would lay it out, with links into the source tree."""
+    """Creates the layout of an installed package, with links into the source tree."""
     share = folder / "share" / "flatland"
     (share / "scripts").mkdir(parents=True)
     for name in ("package.xml", "flatland_plugins.xml", "launch", "msg", "rviz", "srv", "worlds"):
@@ -327,7 +327,7 @@ def _overlay(checkout: Path, folder: Path) -> Path:
 
 @pytest.fixture(scope="session")
 def ros_master(ros_environment: dict[str, str]) -> Iterator[dict[str, str]]:
-    """A running roscore, and this process as a node of it; gives the environment."""
+    """A running roscore with this process as a node; yields the environment."""
     port = ros_environment["ROS_MASTER_URI"].rsplit(":", 1)[1]
     core = Process(["roscore", "-p", port], ros_environment)
     names = [name for name in ros_environment if name.startswith("ROS_")]
@@ -337,19 +337,19 @@ def ros_master(ros_environment: dict[str, str]) -> Iterator[dict[str, str]]:
         rosgraph.Master("/flatland_tests").setParam("/use_sim_time", True)
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
-            # Without ROS time: this process measures and waits in wall time.
+            # Without ROS time, because this process measures and waits in wall time.
             rospy.init_node("flatland_tests", disable_signals=True, disable_rostime=True)
         yield ros_environment
         rospy.signal_shutdown("the tests are over")
     finally:
         core.send(signal.SIGINT)
         core.wait()
-        _collect_leavings()
+        _collect_garbage()
 
 
 @pytest.fixture
 def ros(ros_master: dict[str, str]) -> Iterator[Ros]:
-    """The test's own node; what a test opens ends with it."""
+    """The node of the tests; topics are closed at the end of the test."""
     del ros_master
     ros = Ros()
     yield ros
@@ -358,7 +358,7 @@ def ros(ros_master: dict[str, str]) -> Iterator[Ros]:
 
 @pytest.fixture(scope="module")
 def module_ros(ros_master: dict[str, str]) -> Iterator[Ros]:
-    """The same for all tests of a file."""
+    """The node of the tests; topics are closed at the end of the file."""
     del ros_master
     ros = Ros()
     yield ros
@@ -367,7 +367,7 @@ def module_ros(ros_master: dict[str, str]) -> Iterator[Ros]:
 
 @pytest.fixture(scope="session")
 def server_path(ros_environment: dict[str, str]) -> str:
-    """The program that roslaunch would start as flatland_server."""
+    """The program that roslaunch starts as flatland_server."""
     paths = ros_environment["ROS_PACKAGE_PATH"].split(":")
     import rospkg
 
@@ -377,7 +377,7 @@ def server_path(ros_environment: dict[str, str]) -> str:
 
 
 class Launcher:
-    """Starts nodes and launch files, and ends them."""
+    """Starts and stops nodes and launch files."""
 
     def __init__(self, environment: dict[str, str], server: str) -> None:
         self.environment = environment
@@ -385,13 +385,13 @@ class Launcher:
         self._processes: list[Process] = []
 
     def program(self, *command: str, **environment: str) -> Process:
-        """Starts any program."""
+        """Starts a program."""
         process = Process(list(command), {**self.environment, **environment})
         self._processes.append(process)
         return process
 
     def start(self, *arguments: str, **parameters: object) -> Process:
-        """Starts a server with private parameters; does not wait for it."""
+        """Starts a server with private parameters, without waiting for it."""
         clear = rosgraph.Master("/flatland_tests")
         for node in ("/flatland_server", "/flatland_benchmark"):
             with contextlib.suppress(rosgraph.MasterException):
@@ -400,7 +400,7 @@ class Launcher:
         return self.program(self._server, *arguments, *given)
 
     def server(self, world: Path, *arguments: str, **parameters: object) -> Process:
-        """Starts a server and waits until its services are there."""
+        """Starts a server and waits for its services."""
         process = self.start(*arguments, world_path=world, **parameters)
         wait_for_services(process)
         return process
@@ -410,7 +410,7 @@ class Launcher:
         return self.program("roslaunch", *arguments)
 
     def stop(self) -> None:
-        """Ends all that still runs."""
+        """Stops all programs that are still running."""
         for process in reversed(self._processes):
             if process.running:
                 process.send(signal.SIGINT)
@@ -420,7 +420,7 @@ class Launcher:
 
 
 def wait_for_services(process: Process, name: str = "/toggle_pause") -> None:
-    """Waits until a server offers its services; the last one it offers is `toggle_pause`."""
+    """Waits for the services of a server; by default, for the one that is advertised last."""
     master = rosgraph.Master("/flatland_tests")
 
     def ready() -> bool:
@@ -436,7 +436,7 @@ def wait_for_services(process: Process, name: str = "/toggle_pause") -> None:
 
 @pytest.fixture
 def launcher(ros_master: dict[str, str], server_path: str) -> Iterator[Launcher]:
-    """Starts nodes that end with the test."""
+    """Starts nodes that are stopped at the end of the test."""
     launcher = Launcher(ros_master, server_path)
     yield launcher
     launcher.stop()
@@ -444,7 +444,7 @@ def launcher(ros_master: dict[str, str], server_path: str) -> Iterator[Launcher]
 
 @pytest.fixture(scope="module")
 def module_launcher(ros_master: dict[str, str], server_path: str) -> Iterator[Launcher]:
-    """Starts nodes that end with the last test of the file."""
+    """Starts nodes that are stopped at the end of the file."""
     launcher = Launcher(ros_master, server_path)
     yield launcher
     launcher.stop()
@@ -452,7 +452,7 @@ def module_launcher(ros_master: dict[str, str], server_path: str) -> Iterator[La
 
 @pytest.fixture(scope="session")
 def write_world(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., Path]:
-    """Writes a world with a room of 10 m by 10 m: models as YAML, and further files by name."""
+    """Writes a world with a room of 10 m by 10 m, from models as YAML and more files by name."""
 
     def write(
         models: str = "[]", plugins: str = "[]", layers: str = f"[{LAYER}]", **files: str
@@ -474,5 +474,5 @@ def write_world(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., Path]
 
 @pytest.fixture(scope="session")
 def eventually() -> Callable[..., Any]:
-    """Waits until a condition holds: `eventually("what", condition)`."""
+    """Waits until a condition holds: `eventually("name", condition)`."""
     return wait_until

@@ -1,4 +1,4 @@
-"""benchmark.launch: runs for some simulated time, says how fast it was, and ends."""
+"""benchmark.launch: runs for a simulated time, reports its speed, and ends."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Commands from ROS: they drive the robot, the last one wins, and bad ones are refused."""
+"""Velocity commands from ROS: the last valid one is in effect."""
 
 from __future__ import annotations
 
@@ -41,12 +41,12 @@ def test_robot_follows_the_command(ros: Any) -> None:
     assert first.twist.twist.angular.z == pytest.approx(0.25, abs=1e-4)
     last = odometry.until(lambda m: m.header.stamp.to_sec() > first.header.stamp.to_sec() + 2)
     position = last.pose.pose.position
-    # It drives on a circle of radius 0.5 / 0.25 around (0, 2).
+    # The robot drives in a circle of radius 0.5 / 0.25 around (0, 2).
     assert math.hypot(position.x, position.y - 2) == pytest.approx(2, abs=0.02)
     assert position.x > 0.5
 
 
-def test_last_command_wins(ros: Any) -> None:
+def test_last_command_is_in_effect(ros: Any) -> None:
     odometry = ros.topic("/r1/odometry/ground_truth", Odometry)
     publisher = ros.publisher("/r1/cmd_vel", Twist)
     for i in range(100):
@@ -58,7 +58,7 @@ def test_last_command_wins(ros: Any) -> None:
 
 
 @pytest.mark.parametrize("bad", [math.nan, math.inf])
-def test_command_that_is_no_number_is_refused(ros: Any, bad: float) -> None:
+def test_command_that_is_not_finite_is_ignored(ros: Any, bad: float) -> None:
     odometry = ros.topic("/r1/odometry/ground_truth", Odometry)
     publisher = ros.publisher("/r1/cmd_vel", Twist)
     publisher.publish(twist(0.1, 0))
@@ -69,11 +69,11 @@ def test_command_that_is_no_number_is_refused(ros: Any, bad: float) -> None:
     assert velocities == pytest.approx([0.1] * 10, abs=1e-4)
 
 
-def test_refused_command_is_warned_of_on_rosout(ros: Any, server: Any) -> None:
+def test_ignored_command_gives_a_warning_on_rosout(ros: Any, server: Any) -> None:
     log = ros.topic("/rosout", Log)
     server.wait_for_line(
         r"\[WARN\].*last good command stays"
-    )  # from the test before, or from this one
+    )  # logged in the previous test or in this one
     publisher = ros.publisher("/r1/cmd_vel", Twist)
 
     def warned(message: Log) -> bool:

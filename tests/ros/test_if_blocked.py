@@ -1,4 +1,4 @@
-"""`~if_blocked` in the real node: what spawn_model and move_model answer at blocked poses."""
+"""`~if_blocked` in the real node: responses of spawn_model and move_model at blocked poses."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from nav_msgs.msg import Odometry
 from std_srvs.srv import Empty
 from visualization_msgs.msg import InteractiveMarkerFeedback
 
-# Nothing pushes it away, so that its odometry shows where it was put.
+# Kinematic, so that other bodies do not push it away from where it was put.
 POST = """
 bodies: [{name: base, type: kinematic, footprints: [{type: circle, radius: 0.2, density: 1}]}]
 plugins: [{type: DiffDrive, name: drive, body: base, pub_rate: 50}]
@@ -28,7 +28,7 @@ def world(write_world: Callable[..., Path]) -> Path:
 
 
 def place(ros: Any, topic: str = "/second/odometry/ground_truth") -> tuple[float, float]:
-    """Where a model is put while time stands still: it publishes in the next step."""
+    """Returns the position of a model in a paused world, which publishes in the next step."""
     odometry = ros.topic(topic, Odometry)
     ros.call("/resume", Empty)
     point = odometry.next().pose.pose.position
@@ -46,7 +46,7 @@ def test_the_model_is_put_at_a_blocked_pose(
     assert (answer.success, answer.message) == (True, "")
     assert place(ros) == pytest.approx((3.1, 3), abs=1e-4)
     ros.call("/pause", Empty)
-    assert ros.move("first", (3, 3, 0)).success  # it was pushed away
+    assert ros.move("first", (3, 3, 0)).success  # It was pushed away.
     answer = ros.move("second", (2.7, 3, 0))
     assert (answer.success, answer.message) == (True, "")
     assert ros.move("second", (0, 0, 0)).success
@@ -61,7 +61,7 @@ def test_the_model_is_put_at_a_blocked_pose(
         assert MOVE in found[1]
 
 
-def test_refuse(launcher: Any, ros: Any, world: Path) -> None:
+def test_refused_models_are_not_placed(launcher: Any, ros: Any, world: Path) -> None:
     launcher.server(world, if_blocked="refuse")
     before = ros.registered()
     answer = ros.spawn("post.model.yaml", "second", "second", (3.1, 3, 0.5))
@@ -81,20 +81,18 @@ def test_refuse(launcher: Any, ros: Any, world: Path) -> None:
     assert place(ros) == pytest.approx((1, 1), abs=1e-4)
 
 
-def test_nearest_puts_the_model_elsewhere_and_says_where(
-    launcher: Any, ros: Any, world: Path
-) -> None:
+def test_nearest_reports_the_chosen_pose(launcher: Any, ros: Any, world: Path) -> None:
     launcher.server(world, if_blocked="nearest")
     ros.call("/pause", Empty)
     answer = ros.spawn("post.model.yaml", "second", "second", (3.1, 3, 0.5))
     assert answer.success is True
-    # Two discs of radius 0.2: from 0.1 m to 0.4 m between their centres.
+    # Two discs of radius 0.2 m, at first 0.1 m apart, must be 0.4 m apart.
     x, y = place(ros)
     assert math.dist((x, y), (3.1, 3)) == pytest.approx(0.3, abs=0.006)
     assert math.dist((x, y), (3, 3)) == pytest.approx(0.4, abs=0.006)
     away = math.dist((x, y), (3.1, 3))
     assert answer.message == (
-        'the pose asked for is blocked: model "second" was put at '
+        'the requested pose is blocked: model "second" was put at '
         f"({x:.3f}, {y:.3f}, 0.500), {away:.3f} m away"
     )
     answer = ros.move("first", (4.9, 0, 0))
@@ -104,7 +102,7 @@ def test_nearest_puts_the_model_elsewhere_and_says_where(
     assert (answer.success, answer.message) == (True, "")
 
 
-def test_nearest_without_any_place(
+def test_nearest_without_a_free_pose(
     launcher: Any, ros: Any, write_world: Callable[..., Path]
 ) -> None:
     giant = "bodies: [{name: b, footprints: [{type: circle, radius: 5.5, density: 1}]}]"
@@ -119,7 +117,7 @@ def test_nearest_without_any_place(
 
 
 @pytest.mark.parametrize("value", ["stop", "Warn", "1"])
-def test_invalid_value(launcher: Any, world: Path, value: str) -> None:
+def test_invalid_value_is_fatal(launcher: Any, world: Path, value: str) -> None:
     process = launcher.start(world_path=world, if_blocked=value)
     shown = 1 if value == "1" else value
     process.wait_for_line(
@@ -129,7 +127,7 @@ def test_invalid_value(launcher: Any, world: Path, value: str) -> None:
     assert process.wait() == 1
 
 
-def test_argument_of_the_launch_file(launcher: Any, ros: Any, world: Path) -> None:
+def test_launch_file_passes_the_value(launcher: Any, ros: Any, world: Path) -> None:
     process = launcher.launch(
         "flatland",
         "server.launch",
@@ -141,7 +139,9 @@ def test_argument_of_the_launch_file(launcher: Any, ros: Any, world: Path) -> No
     assert not ros.spawn("ball.model.yaml", "second", "", (3.1, 3, 0.5)).success
 
 
-def test_dragging_stays_free(launcher: Any, ros: Any, write_world: Callable[..., Path]) -> None:
+def test_dragging_ignores_if_blocked(
+    launcher: Any, ros: Any, write_world: Callable[..., Path]
+) -> None:
     world = write_world("[{name: robot, model: robot.model.yaml}]")
     server = launcher.server(world, if_blocked="refuse")
     feedback = ros.publisher("/interactive_model_markers/feedback", InteractiveMarkerFeedback)

@@ -1,9 +1,9 @@
-"""The MD5 sums by which ROS tells types apart are those of the reference's fields.
+"""MD5 sums of the messages and services, which identify types in ROS.
 
-The expected sums are worked out here from field lists alone, by the rule that ROS has: the fields
-one a line, without comments and with single spaces; a field of another message type as the sum of
-that type and the field's name, without brackets; a service is its request's text followed by its
-response's.
+The expected sums are computed from lists of fields by the rules of ROS: one field per line, without
+comments and with single spaces; a field of another message type is replaced by the sum of that type
+and the name of the field, without brackets; a service is the text of its request followed by that
+of its response.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ import pytest
 import flatland.msg
 import flatland.srv
 
-# ROS's own types, as the messages of `std_msgs` and `geometry_msgs` have them.
+# Including the types of `std_msgs` and `geometry_msgs` that are used.
 FIELDS = {
     "Header": "uint32 seq, time stamp, string frame_id",
     "Pose2D": "float64 x, float64 y, float64 theta",
@@ -32,7 +32,7 @@ REQUESTS = {
     "DeleteModel": "string name",
     "MoveModel": "string name, Pose2D pose",
 }
-# What `rosmsg md5` and `rossrv md5` say of the reference's `flatland_msgs`, where that is known.
+# Known output of `rosmsg md5` and `rossrv md5` for the `flatland_msgs` of the reference.
 OF_THE_REFERENCE = {
     "SpawnModel": "952237af09cbedc354d376afc6d2fc71",
     "DeleteModel": "d82dc6474dd88dad5e1615ab1b2ca74c",
@@ -62,12 +62,12 @@ def expected_sum(name: str) -> str:
 
 
 @pytest.mark.parametrize("name", OF_THE_REFERENCE)
-def test_field_lists_are_those_of_the_reference(name: str) -> None:
+def test_field_lists_have_the_sums_of_the_reference(name: str) -> None:
     assert expected_sum(name) == OF_THE_REFERENCE[name]
 
 
 @pytest.mark.parametrize("name", [*MESSAGES, *REQUESTS])
-def test_classes_have_the_sums(name: str) -> None:
+def test_sums_of_the_classes(name: str) -> None:
     package = flatland.msg if name in MESSAGES else flatland.srv
     assert getattr(package, name)._md5sum == expected_sum(name)
 
@@ -75,7 +75,7 @@ def test_classes_have_the_sums(name: str) -> None:
 @pytest.mark.parametrize(
     ("tool", "names"), [("rosmsg", MESSAGES), ("rossrv", tuple(REQUESTS))], ids=["msg", "srv"]
 )
-def test_tools_say_the_sums(
+def test_sums_printed_by_the_tools(
     ros_environment: dict[str, str], tool: str, names: tuple[str, ...]
 ) -> None:
     for name in names:

@@ -1,4 +1,4 @@
-"""Where names go: model namespaces, global names, node groups and remappings."""
+"""Resolution of names: model namespaces, global names, node groups and remappings."""
 
 from __future__ import annotations
 
@@ -73,7 +73,7 @@ def test_node_in_a_group(
         "/robots/r1/cmd_vel",
         "/r2/nested/cmd_vel",
     }
-    # param() looks in the node's namespace.
+    # `param()` resolves relative names in the namespace of the node.
     truth = ros.topic("/robots/odometry/ground_truth", Odometry).next()
     assert truth.pose.pose.position.x == pytest.approx(2.5, abs=1e-4)
 
@@ -89,7 +89,7 @@ def test_world_with_an_illegal_namespace_does_not_start(
     assert f'namespace "{namespace}" is not a legal ROS name' in line
 
 
-def test_topic_that_the_node_itself_publishes_with_another_type(
+def test_topic_of_the_node_itself_with_another_type_is_refused(
     launcher: Any, write_world: Callable[..., Path]
 ) -> None:
     world = write_world(

@@ -1,4 +1,4 @@
-"""The node's parameters: defaults, what is accepted, what is refused and how."""
+"""The parameters of the node: defaults, accepted values and errors."""
 
 from __future__ import annotations
 
@@ -30,6 +30,7 @@ def test_defaults() -> None:
         seed=None,
         benchmark_duration=None,
         plugin_timeout=60.0,
+        shutdown_timeout=2.0,
         if_blocked="warn",
     )
 
@@ -39,7 +40,7 @@ def test_defaults() -> None:
     [
         ("update_rate", 0, 0.0),
         ("update_rate", math.inf, 0.0),
-        ("update_rate", "inf", 0.0),  # roslaunch hands it over as text
+        ("update_rate", "inf", 0.0),  # roslaunch passes it as text
         ("update_rate", "1e3", 1000.0),
         ("update_rate", 0.5, 0.5),
         ("max_lag", 0, 0.0),
@@ -55,17 +56,19 @@ def test_defaults() -> None:
         ("simplify_map", 2, 2),
         ("simplify_map", "1", 1),
         ("seed", 0, 0),
-        ("seed", "12345678901", 12345678901),  # too great for XML-RPC
+        ("seed", "12345678901", 12345678901),  # too large for XML-RPC
         ("benchmark_duration", 2.5, 2.5),
         ("plugin_timeout", 2, 2.0),
         ("plugin_timeout", "0.5", 0.5),
         ("plugin_timeout", math.inf, None),
         ("plugin_timeout", "inf", None),
+        ("shutdown_timeout", "0.5", 0.5),
+        ("shutdown_timeout", math.inf, None),
         ("if_blocked", "allow", "allow"),
         ("if_blocked", "nearest", "nearest"),
     ],
 )
-def test_accepted(name: str, value: object, expected: object) -> None:
+def test_valid_values(name: str, value: object, expected: object) -> None:
     got = getattr(read(**{name: value}), name)
     assert got == expected
     assert type(got) is type(expected)
@@ -80,10 +83,11 @@ def test_accepted(name: str, value: object, expected: object) -> None:
         "viz_pub_rate",
         "benchmark_duration",
         "plugin_timeout",
+        "shutdown_timeout",
     ],
 )
 @pytest.mark.parametrize("value", [math.nan, "nan", -1, -1e-300, "fast", "", True, [1], {"a": 1}])
-def test_refused_numbers(name: str, value: object) -> None:
+def test_invalid_numbers(name: str, value: object) -> None:
     with pytest.raises(ParameterError) as error:
         read(**{name: value})
     assert str(error.value).startswith(f'Invalid parameter "~{name}": it must be ')
@@ -104,6 +108,7 @@ def test_refused_numbers(name: str, value: object) -> None:
         ("viz_pub_rate", 0),
         ("benchmark_duration", 0),
         ("plugin_timeout", 0),
+        ("shutdown_timeout", 0),
         ("show_viz", 1),
         ("show_viz", "yes"),
         ("simplify_map", 3),
@@ -122,12 +127,12 @@ def test_refused_numbers(name: str, value: object) -> None:
         ("world_path", ["a"]),
     ],
 )
-def test_refused_values(name: str, value: object) -> None:
+def test_invalid_values(name: str, value: object) -> None:
     with pytest.raises(ParameterError, match=f'Invalid parameter "~{name}": it must be '):
         read(**{name: value})
 
 
-def test_empty_seed_is_none() -> None:
+def test_empty_seed_is_no_seed() -> None:
     assert read(seed="").seed is None
 
 
@@ -157,7 +162,7 @@ STUCK_MODEL = """
 bodies: [{name: base, footprints: []}]
 plugins: [{name: plug, type: "stuck::Stuck"}]
 """
-GIVEN_UP = (
+TIMED_OUT = (
     'Flatland plugin: Model Plugin "plug" type "stuck::Stuck" model "stuck": '
     "on_initialize did not return within 0.25 s"
 )
@@ -165,7 +170,7 @@ GIVEN_UP = (
 
 @pytest.fixture
 def stuck_world(write_world: Callable[..., Path], launcher: Any) -> Callable[[str], Path]:
-    """Writes a world whose folder has a model that does not start."""
+    """Writes a world beside a model whose plugin does not start."""
 
     def write(models: str) -> Path:
         world = write_world(models, stuck=STUCK_MODEL)
@@ -179,7 +184,7 @@ def stuck_world(write_world: Callable[..., Path], launcher: Any) -> Callable[[st
 
 
 @pytest.mark.parametrize("file", ["server.launch", "benchmark.launch"])
-def test_world_with_a_plugin_that_never_starts_is_given_up(
+def test_world_with_a_plugin_that_never_starts_fails_to_load(
     launcher: Any, stuck_world: Callable[[str], Path], file: str
 ) -> None:
     world = stuck_world("[{name: stuck, model: stuck.model.yaml}]")
@@ -188,12 +193,12 @@ def test_world_with_a_plugin_that_never_starts_is_given_up(
         arguments.append("show_viz:=false")
     process = launcher.launch("flatland", file, *arguments)
     line = process.wait_for_line(r"\[FATAL\]").string
-    assert re.search(re.escape(GIVEN_UP) + r" \[.*stuck\.model\.yaml:\d+\]$", line)
+    assert re.search(re.escape(TIMED_OUT) + r" \[.*stuck\.model\.yaml:\d+\]$", line)
     process.wait_for_line("process has died .*exit code 1")
     process.wait()
 
 
-def test_spawned_plugin_that_never_starts_is_given_up(
+def test_model_with_a_plugin_that_never_starts_fails_to_spawn(
     launcher: Any, ros: Any, stuck_world: Callable[[str], Path]
 ) -> None:
     world = stuck_world("[{name: robot, model: robot.model.yaml}]")
@@ -201,9 +206,9 @@ def test_spawned_plugin_that_never_starts_is_given_up(
     before = ros.registered()
     answer = ros.spawn("stuck.model.yaml", "stuck")
     assert answer.success is False
-    assert answer.message.startswith(GIVEN_UP)
+    assert answer.message.startswith(TIMED_OUT)
     assert ros.registered() == before
-    # The simulation goes on, and so do its services.
+    # The simulation and its services continue.
     clock = ros.topic("/clock", Clock)
     now = clock.next().clock
     clock.until(lambda message: message.clock > now)
@@ -234,7 +239,7 @@ plugins: [{name: plug, type: "slow::Slow"}]
 
 @pytest.fixture
 def slow_world(write_world: Callable[..., Path], launcher: Any) -> Path:
-    """A world whose steps take three periods of 100 Hz."""
+    """A world whose steps take three cycles at 100 Hz."""
     world = write_world("[{name: slow, model: slow.model.yaml}]", slow=SLOW_MODEL)
     (world.parent / "slow_plugin.py").write_text(SLOW)
     manifest = world.parent / "manifest.xml"
@@ -243,7 +248,7 @@ def slow_world(write_world: Callable[..., Path], launcher: Any) -> Path:
     return world
 
 
-def test_rate_that_is_not_held_is_reported_with_the_expensive_plugin(
+def test_missed_rate_is_reported_with_the_most_expensive_plugin(
     launcher: Any, slow_world: Path
 ) -> None:
     process = launcher.launch(
@@ -258,11 +263,11 @@ def test_rate_that_is_not_held_is_reported_with_the_expensive_plugin(
     assert 'percent of the wall time: Model Plugin "plug" type "slow::Slow" model "slow" ' in line
 
 
-def test_lag_within_max_lag_is_no_loss(
+def test_lag_within_max_lag_is_not_reported(
     launcher: Any, slow_world: Path, eventually: Callable[..., Any]
 ) -> None:
     process = launcher.server(slow_world, update_rate=100, max_lag=1000)
-    # With the default the warning is logged with the third report.
+    # With the default value, the warning is logged with the third report.
     eventually("six reports", lambda: process.output.count("cycle use min") >= 6)
     assert "cannot be held" not in process.output
 

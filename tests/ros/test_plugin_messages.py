@@ -1,7 +1,7 @@
-"""What each included plugin sends: fields, frames, stamps, rates and covariances on the wire.
+"""Messages of each built-in plugin: fields, frames, stamps, rates and covariances.
 
-One server and one recording serve all tests. While it is made, the robot `r1` drives in a circle,
-the tricycle `t1` too, and `p1` pushes against a wall.
+All tests share one server and one recording, in which the robot `r1` and the tricycle `t1` drive
+in circles, and `p1` pushes against a wall.
 """
 
 from __future__ import annotations
@@ -81,7 +81,7 @@ plugins:
   - {type: Bumper, name: calm, update_rate: 10, publish_all_collisions: false, topic: calm,
      world_frame_id: world, exclude: [feeler]}
 """
-# Its arm touches a post all the time, which must not switch the sensor of the plate.
+# The arm touches a post permanently, which must not switch the sensor of the plate.
 PLATE = """
 bodies:
   - {name: plate, footprints: [{type: circle, radius: 0.3, density: 1, sensor: true}]}
@@ -125,8 +125,8 @@ MODELS = """
 """
 LAYERS = "[{name: 2d, map: map.yaml}, {name: reflectance}]"
 
-# Topic: type, and the period in simulated time [ns].
-HEARD: dict[str, tuple[type[Any], int]] = {
+# Type and period in simulated time [ns] by topic.
+RECORDED: dict[str, tuple[type[Any], int]] = {
     "/r1/odometry/ground_truth": (Odometry, STEP),
     "/r1/odometry/filtered": (Odometry, STEP),
     "/r1/twist": (TwistWithCovarianceStamped, STEP),
@@ -140,7 +140,7 @@ HEARD: dict[str, tuple[type[Any], int]] = {
     "/p1/calm": (Collisions, 100_000_000),
     "/mirror_scan": (LaserScan, 20_000_000),
 }
-# Parent and child: the period.
+# Period in simulated time [ns] by parent and child.
 TRANSFORMS = {
     ("here", "r1_base"): STEP,
     ("r1_base", "r1_front"): 40_000_000,
@@ -188,14 +188,14 @@ def drive(ros: Any, topic: str, linear: float, angular: float) -> None:
 
 @pytest.fixture(scope="module")
 def recording(module_ros: Any, server: Any) -> dict[str, Stamped]:
-    """All that came in the same part of simulated time, by topic and stamp."""
+    """All messages of one interval of simulated time, by topic and stamp."""
     ros = module_ros
-    topics = {name: ros.topic(name, kind) for name, (kind, _) in HEARD.items()}
+    topics = {name: ros.topic(name, kind) for name, (kind, _) in RECORDED.items()}
     topics["/tf"] = ros.topic("/tf", TFMessage)
     drive(ros, "/r1/cmd_vel", SPEED, TURN)
     drive(ros, "/t1/cmd_vel", WHEEL_SPEED, STEERING)
     drive(ros, "/p1/cmd_vel", PUSH, 0)
-    # The last thing to happen: the pusher gets to the wall, and the solver holds it there.
+    # The last event is that the pusher reaches the wall.
     first = topics["/p1/collisions"].until(
         lambda message: any(len(each.magnitude_forces) for each in message.collisions)
     )
@@ -232,7 +232,7 @@ def same_angle(value: float, expected: float, tolerance: float = 1e-9) -> bool:
 
 
 def variance(values: Iterable[float]) -> float:
-    """About 0, as of noise."""
+    """Returns the variance of values whose expectation is 0."""
     squares = [value**2 for value in values]
     return sum(squares) / len(squares)
 
@@ -241,16 +241,16 @@ def assert_period(times: list[int], period: int) -> None:
     steps = [after - before for before, after in itertools.pairwise(sorted(times))]
     assert all(time % period == 0 for time in times)
     if period == STEP:
-        # Who is slow to read may miss some of what comes in every step.
+        # A slow reader may miss messages that are published in every step.
         assert steps.count(STEP) > 0.6 * LENGTH / STEP
     else:
         assert set(steps) == {period}
         assert len(times) >= LENGTH // period
 
 
-@pytest.mark.parametrize("topic", HEARD)
+@pytest.mark.parametrize("topic", RECORDED)
 def test_rate_type_and_latching(recording: dict[str, Stamped], topic: str) -> None:
-    kind, period = HEARD[topic]
+    kind, period = RECORDED[topic]
     assert_period(list(recording[topic]), period)
     for message in recording[topic].values():
         header = message._connection_header
@@ -264,7 +264,7 @@ def test_rate_of_transforms(recording: dict[str, Stamped], pair: tuple[str, str]
 
 
 def test_no_other_transforms(recording: dict[str, Stamped]) -> None:
-    # None of the tricycle, of excluded bodies, or of who has them switched off.
+    # None of the tricycle, of excluded bodies, or of plugins that do not send transforms.
     sent = {
         (each.header.frame_id, each.child_frame_id)
         for message in recording["/tf"].values()
@@ -283,7 +283,7 @@ def transforms(recording: dict[str, Stamped], parent: str, child: str) -> Stampe
 
 
 def together(first: Stamped, second: Stamped) -> list[tuple[Any, Any]]:
-    """What has the same stamp in two recordings: most of the shorter one."""
+    """Returns the pairs with equal stamps of two recordings: most of the shorter one."""
     pairs = [(first[time], second[time]) for time in sorted(first.keys() & second.keys())]
     assert len(pairs) > 0.6 * min(len(first), len(second))
     return pairs
@@ -301,7 +301,7 @@ def test_diff_drive_ground_truth(recording: dict[str, Stamped]) -> None:
     for truth in recording["/r1/odometry/ground_truth"].values():
         assert (truth.header.frame_id, truth.child_frame_id) == ("world", "r1_base")
         twist = truth.twist.twist
-        # In the body's frame (REP 105), although the robot looks elsewhere by now.
+        # In the frame of the body (REP 105), although the robot has turned.
         assert (twist.linear.x, twist.angular.z) == pytest.approx((SPEED, TURN), abs=1e-6)
         assert twist.linear.y == pytest.approx(0, abs=1e-6)
         assert (twist.linear.z, twist.angular.x, twist.angular.y) == (0, 0, 0)
@@ -309,7 +309,7 @@ def test_diff_drive_ground_truth(recording: dict[str, Stamped]) -> None:
         assert not any(truth.twist.covariance)
 
 
-def test_diff_drive_pose_follows_the_stamps(recording: dict[str, Stamped]) -> None:
+def test_diff_drive_pose_agrees_with_the_stamps(recording: dict[str, Stamped]) -> None:
     truths = recording["/r1/odometry/ground_truth"]
     first, last = min(truths), max(truths)
     (x0, y0, yaw0), (x1, y1, yaw1) = pose(truths[first]), pose(truths[last])
@@ -344,7 +344,7 @@ def test_diff_drive_odometry_is_the_truth_with_noise(recording: dict[str, Stampe
     assert variances == pytest.approx([0.01, 0.02, 0.03, 0.04, 0.05, 0.06], rel=0.4)
 
 
-def test_diff_drive_transform_repeats_the_noisy_odometry(recording: dict[str, Stamped]) -> None:
+def test_diff_drive_transform_equals_the_noisy_odometry(recording: dict[str, Stamped]) -> None:
     sent = transforms(recording, "here", "r1_base")
     for transform, odometry in together(sent, recording["/r1/odometry/filtered"]):
         moved = transform.translation
@@ -352,7 +352,7 @@ def test_diff_drive_transform_repeats_the_noisy_odometry(recording: dict[str, St
         assert transform.rotation == odometry.pose.pose.orientation
 
 
-def test_diff_drive_twist_has_noise_of_its_own(recording: dict[str, Stamped]) -> None:
+def test_diff_drive_twist_has_independent_noise(recording: dict[str, Stamped]) -> None:
     pairs = together(recording["/r1/twist"], recording["/r1/odometry/filtered"])
     forward, turn = [], []
     for measured, odometry in pairs:
@@ -380,16 +380,16 @@ def test_tricycle_drive(recording: dict[str, Stamped], ros: Any) -> None:
     rate = WHEEL_SPEED * math.sin(STEERING) / 0.4
     for odometry, truth in together(odometries, truths):
         assert (truth.header.frame_id, truth.child_frame_id) == ("map", "t1_base")
-        # Unlike the reference, which has the ground truth's frame here.
+        # Unlike the reference: not the frame of the ground truth.
         assert (odometry.header.frame_id, odometry.child_frame_id) == ("odom", "t1_base")
         assert pose(odometry) == pytest.approx(pose(truth), abs=0.01)
         assert pose(odometry) != pose(truth)
         heading, twist = pose(truth)[2], truth.twist.twist
-        # In the world's frame: the rear centre moves along the heading, the origin turns round it.
+        # In the world frame: the rear centre moves along the heading, the origin rotates around it.
         c, s = math.cos(heading), math.sin(heading)
         expected = (c * speed - s * rate * 0.4, s * speed + c * rate * 0.4, rate)
         got = (twist.linear.x, twist.linear.y, twist.angular.z)
-        # The pose is that after the step which the velocity was set for.
+        # The pose is that after the step for which the velocity was set.
         assert got == pytest.approx(expected, abs=2 * rate * 0.005 * WHEEL_SPEED)
         assert odometry.twist.twist == twist
         assert not any(truth.pose.covariance)
@@ -402,7 +402,7 @@ def test_tricycle_drive(recording: dict[str, Stamped], ros: Any) -> None:
 # -- Laser ------------------------------------------------------------------------------------
 
 
-def test_laser_scan_is_that_of_its_stamp(recording: dict[str, Stamped]) -> None:
+def test_laser_scan_agrees_with_its_stamp(recording: dict[str, Stamped]) -> None:
     for scan, truth in together(recording["/r1/scan"], recording["/r1/odometry/ground_truth"]):
         assert scan.header.frame_id == "r1_front"
         got = (scan.angle_min, scan.angle_max, scan.angle_increment, scan.range_max)
@@ -411,7 +411,7 @@ def test_laser_scan_is_that_of_its_stamp(recording: dict[str, Stamped]) -> None:
         x, y, heading = pose(truth)
         c, s = math.cos(heading), math.sin(heading)
         x, y = x + 0.1 * c - 0.05 * s, y + 0.1 * s + 0.05 * c
-        # Upside down, so the first beam, at 0.5, looks to the right.
+        # Upside down, so that the first beam, at 0.5, points to the right.
         expected = [distance_to_wall(x, y, heading + 0.2 + angle) for angle in (-0.5, 0.0, 0.5)]
         assert list(scan.ranges) == pytest.approx(expected, abs=1e-4)
         assert list(scan.intensities) == [0, 0, 0]
@@ -422,7 +422,7 @@ def distance_to_wall(x: float, y: float, angle: float) -> float:
     return min((math.copysign(5, c) - x) / c, (math.copysign(5, s) - y) / s)
 
 
-def test_laser_transform_is_rolled_over(recording: dict[str, Stamped]) -> None:
+def test_laser_transform_contains_the_roll(recording: dict[str, Stamped]) -> None:
     sent = transforms(recording, "r1_base", "r1_front")
     assert is_constant(sent.values())
     transform = next(iter(sent.values()))
@@ -458,8 +458,8 @@ def test_model_tf_publisher(recording: dict[str, Stamped]) -> None:
 # -- Gps --------------------------------------------------------------------------------------
 
 
-def test_gps_is_that_of_its_stamp(recording: dict[str, Stamped]) -> None:
-    # Near the reference point: metres over the radii of curvature of WGS84.
+def test_gps_agrees_with_its_stamp(recording: dict[str, Stamped]) -> None:
+    # Near the reference point, distances divided by the radii of curvature of WGS84.
     latitude = math.radians(REF_LAT)
     w = 1 - 0.0066943799831668 * math.sin(latitude) ** 2
     north_radius = 6378137 * (1 - 0.0066943799831668) / w**1.5
@@ -481,17 +481,17 @@ def test_gps_is_that_of_its_stamp(recording: dict[str, Stamped]) -> None:
 # -- Imu --------------------------------------------------------------------------------------
 
 
-def test_imu_ground_truth_is_that_of_its_stamp(recording: dict[str, Stamped]) -> None:
+def test_imu_ground_truth_agrees_with_its_stamp(recording: dict[str, Stamped]) -> None:
     interval = 0.05
     turned = TURN * interval
-    # Mean acceleration in a circle to the left, seen from the pose after the last step, whose
-    # velocity was along the heading before it.
+    # Mean acceleration in a circle to the left, in the frame of the pose after the last step; the
+    # velocity is along the heading before that step.
     size, angle = 2 * SPEED * math.sin(turned / 2) / interval, turned / 2 + TURN * STEP * 1e-9
     expected = (size * math.sin(angle), size * math.cos(angle))
     truths = recording["/r1/imu/ground_truth"]
     for imu, truth in together(truths, recording["/r1/odometry/ground_truth"]):
         assert imu.header.frame_id == "r1_imu"
-        # After the step that ends at its stamp, where the next one begins.
+        # The state after the step that ends at the stamp.
         assert same_angle(yaw(imu.orientation), pose(truth)[2])
         rate, acceleration = imu.angular_velocity, imu.linear_acceleration
         assert (rate.x, rate.y) == (0, 0)
@@ -521,7 +521,7 @@ def test_imu_with_noise(recording: dict[str, Stamped]) -> None:
                 got.y - true.y,
             )
         )
-    # Some thirty messages say little about a variance, but they tell it from its root.
+    # About thirty messages do not determine a variance, but distinguish it from its square root.
     variances = [variance(column) for column in zip(*errors, strict=True)]
     for value, expected in zip(variances, [0.3, 0.6, 0.7, 0.8], strict=True):
         assert 0.3 * expected < value < 3 * expected
@@ -529,8 +529,8 @@ def test_imu_with_noise(recording: dict[str, Stamped]) -> None:
 
 def test_imu_transform(recording: dict[str, Stamped]) -> None:
     sent = transforms(recording, "r1_base", "r1_imu")
-    # A message on /tf may begin with a laser's transform, one step older than the others in it,
-    # so the recordings of the two topics need not begin and end with the same step.
+    # The first transform in a message on /tf may be that of a laser, one step older than the
+    # others, so that the recordings of the two topics may start and end with different steps.
     first, last = min(sent), max(sent)
     assert last - first > LENGTH / 2
     assert sent.keys() >= {
@@ -545,7 +545,7 @@ def test_imu_transform(recording: dict[str, Stamped]) -> None:
 
 
 def test_bumper_reports_contacts_with_forces(recording: dict[str, Stamped]) -> None:
-    # The drive gives it its speed back in each step, and the wall takes all of it.
+    # The drive restores the speed in each step, and the wall stops the body again.
     force = 10 * math.pi * 0.2**2 * PUSH / 0.005
     for message in recording["/p1/collisions"].values():
         assert message.header.frame_id == "map"
@@ -562,17 +562,17 @@ def test_bumper_reports_contacts_with_forces(recording: dict[str, Stamped]) -> N
         assert (normal.x, normal.y) == pytest.approx((1, 0), abs=1e-4)
 
 
-def test_bumper_at_its_rate_without_excluded_bodies(recording: dict[str, Stamped]) -> None:
+def test_bumper_excludes_bodies(recording: dict[str, Stamped]) -> None:
     for message in recording["/p1/calm"].values():
         assert message.header.frame_id == "world"
         assert [each.body_A for each in message.collisions] == ["base"]
 
 
-# -- what answers to the test -----------------------------------------------------------------
+# -- responses to commands --------------------------------------------------------------------
 
 
 def test_bool_sensor_switches(ros: Any) -> None:
-    # Unlike the reference, the namespace is there once, and the arm's contact does not count.
+    # Unlike the reference: the namespace occurs once, and the contact of the arm does not count.
     topic, arm = ros.topic("/s1/bool_sensor", Bool), ros.topic("/s1/arm", Bool)
     assert topic.next().data is False
     assert arm.next().data is True
@@ -585,7 +585,7 @@ def test_bool_sensor_switches(ros: Any) -> None:
     assert topic.next()._connection_header["latching"] == "0"
 
 
-def test_tween_moves_while_it_is_triggered(ros: Any) -> None:
+def test_tween_moves_while_triggered(ros: Any) -> None:
     def position(message: TFMessage) -> float:
         by_child = {each.child_frame_id: each.transform for each in message.transforms}
         return by_child["d1_leaf"].translation.x if "d1_leaf" in by_child else math.nan
@@ -600,12 +600,12 @@ def test_tween_moves_while_it_is_triggered(ros: Any) -> None:
     tf.until(lambda message: position(message) == pytest.approx(2.0, abs=1e-6))
 
 
-def test_bumper_without_contacts_comes_at_its_rate(ros: Any) -> None:
+def test_bumper_without_contacts_publishes_at_its_rate(ros: Any) -> None:
     drive(ros, "/p1/cmd_vel", 0, 0)
     assert ros.move("pusher", (3, 0, 0)).success
     topic = ros.topic("/p1/collisions", Collisions)
     topic.until(lambda message: not message.collisions)
-    # The first ones may still have been due to contacts.
+    # The first messages may still be caused by contacts.
     topic.until(lambda message: stamp(message) % 100_000_000 == 0)
     messages = topic.take(5)
     assert all(message.collisions == [] for message in messages)

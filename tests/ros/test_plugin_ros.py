@@ -1,4 +1,4 @@
-"""`self.ros` of a plugin, values of its own type, and that all of it ends with the model."""
+"""`self.ros` of a plugin, adapters for values of its own, and their end with the model."""
 
 from __future__ import annotations
 
@@ -51,9 +51,15 @@ class Talker(flatland.ModelPlugin):
 
     def on_message(self, message):
         if message.data == "raise":
-            raise ValueError("as asked for")
+            raise ValueError("expected")
         if message.data == "exit":
-            sys.exit("as asked for")
+            sys.exit("expected")
+        if message.data in ("step", "close"):
+            try:
+                getattr(self.world, message.data)()
+            except flatland.WorldError as error:
+                self.echo.publish(String(str(error)))
+            return
         same = threading.get_ident() == self.thread
         self.echo.publish(String(f"{message.data} {same}"))
 
@@ -62,8 +68,8 @@ class Talker(flatland.ModelPlugin):
 
     def on_fail(self, request):
         if request.data:
-            raise RuntimeError("no such luck")
-        sys.exit("no such luck either")
+            raise RuntimeError("expected error")
+        sys.exit("expected exit")
 
 
 class Stove(flatland.ModelPlugin):
@@ -79,7 +85,7 @@ class Stove(flatland.ModelPlugin):
 class NeedsParam(flatland.ModelPlugin):
     def on_initialize(self, config):
         self.ros.advertise("left_over", String)
-        self.ros.param("not_there")
+        self.ros.param("missing")
 
 
 class WrongType(flatland.ModelPlugin):
@@ -100,13 +106,13 @@ class WrongName(flatland.ModelPlugin):
 
 class Faulty(flatland.ModelPlugin):
     def before_physics_step(self, timekeeper):
-        raise RuntimeError("no more")
+        raise RuntimeError("expected")
 
     def after_physics_step(self, timekeeper):
-        sys.exit("no more of this either")
+        sys.exit("expected")
 
     def on_shutdown(self):
-        raise RuntimeError("will not go")
+        raise RuntimeError("expected")
 
 
 class TakenService(flatland.ModelPlugin):
@@ -150,7 +156,7 @@ def server(module_launcher: Any, write_world: Callable[..., Path]) -> Any:
 
 @pytest.fixture
 def talker(ros: Any) -> Any:
-    """A model with a Talker, in its namespace, for one test."""
+    """A model with a Talker in a namespace, deleted after the test."""
     ros.master.setParam("/t1/town", "Flatville")
     before = ros.registered()
     answer = ros.spawn("Talker.model.yaml", "talker", "t1")
@@ -160,14 +166,14 @@ def talker(ros: Any) -> Any:
     assert ros.registered() == before
 
 
-def test_latched_message_from_the_start_and_parameter(ros: Any, talker: None) -> None:
+def test_latched_message_of_on_initialize_holds_a_parameter(ros: Any, talker: None) -> None:
     del talker
     message = ros.topic("/t1/hello", String).next()
     assert message.data == "from Flatville"
     assert message._connection_header["latching"] == "1"
 
 
-def test_callback_runs_in_the_thread_of_the_simulation(ros: Any, talker: None) -> None:
+def test_callback_runs_in_the_thread_that_steps_the_world(ros: Any, talker: None) -> None:
     del talker
     echo = ros.topic("/t1/echo", String)
     ros.publisher("/t1/listen", String).publish(String("hi"))
@@ -184,33 +190,33 @@ def test_callback_that_raises_is_logged_and_called_again(
         publisher.publish(String(word))
         publisher.publish(String("hi"))
         assert echo.next().data == "hi True"
-        server.wait_for_line(f"{kind}: as asked for")
+        server.wait_for_line(f"{kind}: expected")
 
 
-def test_service_runs_in_the_thread_of_the_simulation(ros: Any, talker: None) -> None:
+def test_service_runs_in_the_thread_that_steps_the_world(ros: Any, talker: None) -> None:
     del talker
     answer = ros.call("/t1/touch", Trigger)
     assert (answer.success, answer.message) == (True, "talker")
 
 
-def test_service_that_raises_answers_with_the_error(ros: Any, talker: None) -> None:
+def test_exception_of_a_service_is_reported_to_the_client(ros: Any, talker: None) -> None:
     del talker
     import rospy
 
-    with pytest.raises(rospy.ServiceException, match="no such luck"):
+    with pytest.raises(rospy.ServiceException, match="expected error"):
         ros.call("/fail", SetBool, True)
-    with pytest.raises(rospy.ServiceException, match=r"SystemExit.*no such luck either"):
+    with pytest.raises(rospy.ServiceException, match=r"SystemExit.*expected exit"):
         ros.call("/fail", SetBool, False)
 
 
-def test_registered_adapter_carries_values_both_ways(ros: Any) -> None:
+def test_registered_adapter_converts_in_both_directions(ros: Any) -> None:
     temperatures = ros.topic("/temperature", Float32)
     assert temperatures.next().data == 20.0
     ros.publisher("/target", Float32).publish(Float32(180.0))
     temperatures.until(lambda message: message.data == 180.0)
 
 
-def test_output_without_an_adapter_is_warned_of(ros: Any, server: Any) -> None:
+def test_output_without_an_adapter_gives_a_warning(ros: Any, server: Any) -> None:
     server.wait_for_line(r'\[WARN\].*output "/secret" is not connected to ROS: no adapter for Unk')
     assert "/secret" not in ros.registered()["publishers"]
 
@@ -218,7 +224,7 @@ def test_output_without_an_adapter_is_warned_of(ros: Any, server: Any) -> None:
 @pytest.mark.parametrize(
     ("model", "reason"),
     [
-        ("NeedsParam", 'ROS parameter "/m/not_there" is not set'),
+        ("NeedsParam", 'ROS parameter "/m/missing" is not set'),
         ("WrongType", 'publisher "/clock" has the type rosgraph_msgs/Clock already'),
         (
             "OtherType",
@@ -229,7 +235,9 @@ def test_output_without_an_adapter_is_warned_of(ros: Any, server: Any) -> None:
         ("TakenService", 'service "/spawn_model" has the type flatland/SpawnModel already'),
     ],
 )
-def test_plugin_that_fails_leaves_nothing(ros: Any, model: str, reason: str) -> None:
+def test_plugin_that_fails_to_start_leaves_nothing_registered(
+    ros: Any, model: str, reason: str
+) -> None:
     before = ros.registered()
     answer = ros.spawn(f"{model}.model.yaml", "m", "m")
     assert answer.success is False
@@ -238,7 +246,7 @@ def test_plugin_that_fails_leaves_nothing(ros: Any, model: str, reason: str) -> 
     assert ros.registered() == before
 
 
-def test_second_model_may_not_take_a_service(ros: Any, talker: None) -> None:
+def test_second_service_of_the_same_name_is_refused(ros: Any, talker: None) -> None:
     del talker
     answer = ros.spawn("Talker.model.yaml", "second", "t2")
     assert answer.success is False
@@ -247,13 +255,22 @@ def test_second_model_may_not_take_a_service(ros: Any, talker: None) -> None:
     assert "/t2/touch" not in ros.registered()["services"]
 
 
-def test_plugin_that_raises_is_disabled_and_the_node_goes_on(ros: Any, server: Any) -> None:
+@pytest.mark.parametrize("method", ["step", "close"])
+def test_callback_may_not_step_or_close_the_world(ros: Any, server: Any, method: str) -> None:
+    assert ros.spawn("Talker.model.yaml", "m").success
+    echo = ros.topic("/echo", String)
+    ros.publisher("/listen", String).publish(String(method))
+    assert f"{method} must not be called from a plugin's hook" in echo.next().data
+    assert ros.delete("m").success
+
+
+def test_plugin_that_raises_is_disabled_and_the_node_continues(ros: Any, server: Any) -> None:
     assert ros.spawn("Faulty.model.yaml", "m").success
     place = 'Model Plugin "p" type "test::Faulty" model "m"'
     server.wait_for_line(rf"\[ERROR\].*{place}: before_physics_step raised$")
-    server.wait_for_line("RuntimeError: no more")
+    server.wait_for_line("RuntimeError: expected")
     server.wait_for_line(rf"\[ERROR\].*{place}: before_physics_step raised 3 times in a row, the")
-    # The others work as before.
+    # The other plugins are not affected.
     assert ros.topic("/temperature", Float32).next()
     assert ros.delete("m").success
     server.wait_for_line(rf"\[ERROR\].*{place}: on_shutdown raised$")

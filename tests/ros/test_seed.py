@@ -1,4 +1,4 @@
-"""A seed makes all noise repeatable; without one it is drawn and logged."""
+"""The seed makes noise reproducible; without one, a seed is drawn and logged."""
 
 from __future__ import annotations
 
@@ -26,10 +26,10 @@ Scans = dict[int, list[float]]
 
 
 def common_scans(first: Any, second: Any) -> list[tuple[list[float], list[float]]]:
-    """Waits for three scans of each of two servers that have the same stamps, and returns them.
+    """Waits for three pairs of scans of two servers with equal stamps, and returns them.
 
-    The servers run side by side at the same rate, the second one behind the first: however late a
-    subscriber connects to either, their scans have stamps in common after a while.
+    The servers run at the same rate, one behind the other, so that their scans have stamps in
+    common after some time, whenever a subscriber connects to either.
     """
     found: tuple[Scans, Scans] = ({}, {})
     while len(common := sorted(found[0].keys() & found[1].keys())) < 3:
@@ -44,13 +44,13 @@ def scans_of(ros: Any, launcher: Any, world: Path, namespace: str, seed: int) ->
     return ros.topic(f"{namespace}/scan", LaserScan)
 
 
-def test_runs_with_one_seed_are_alike(ros: Any, launcher: Any, world: Path) -> None:
+def test_runs_with_equal_seeds_are_equal(ros: Any, launcher: Any, world: Path) -> None:
     first = scans_of(ros, launcher, world, "/first", seed=42)
     second = scans_of(ros, launcher, world, "/second", seed=42)
     assert all(a == b for a, b in common_scans(first, second))
 
 
-def test_runs_with_two_seeds_differ(ros: Any, launcher: Any, world: Path) -> None:
+def test_runs_with_different_seeds_differ(ros: Any, launcher: Any, world: Path) -> None:
     first = scans_of(ros, launcher, world, "/first", seed=42)
     second = scans_of(ros, launcher, world, "/second", seed=43)
     assert all(a != b for a, b in common_scans(first, second))

@@ -1,4 +1,4 @@
-"""The services of a running node: what they do, what they refuse, and in which words."""
+"""The services of a running node: effects, refusals and messages."""
 
 from __future__ import annotations
 
@@ -39,19 +39,19 @@ def server(module_launcher: Any, world: Path) -> Any:
 
 
 @pytest.fixture(autouse=True)
-def tidy(ros: Any) -> Iterator[None]:
-    """Every test finds the one model that the file has, and a running world."""
+def restored_world(ros: Any) -> Iterator[None]:
+    """Resumes the world after each test, and checks that only the model of the file is left."""
     yield
     ros.call("/resume", Empty)
     assert ros.registered()["subscribers"] == {"/first/cmd_vel"}
 
 
 def truth(ros: Any, namespace: str) -> Any:
-    """Where a robot is now."""
+    """Subscribes to the true pose of a robot."""
     return ros.topic(f"/{namespace}/odometry/ground_truth", Odometry)
 
 
-def test_types_are_those_of_the_reference() -> None:
+def test_types_equal_those_of_the_reference() -> None:
     assert SpawnModel._md5sum == "952237af09cbedc354d376afc6d2fc71"
     assert DeleteModel._md5sum == "d82dc6474dd88dad5e1615ab1b2ca74c"
     assert MoveModel._md5sum == "47b5f16cf15e326c7400f4504d3a0f75"
@@ -77,7 +77,7 @@ def test_spawn_move_and_delete(ros: Any) -> None:
     assert not [name for name in registered["publishers"] if name.startswith("/new/")]
 
 
-def test_spawn_takes_an_absolute_path(ros: Any, world: Path) -> None:
+def test_spawn_accepts_an_absolute_path(ros: Any, world: Path) -> None:
     assert ros.spawn(world.parent / "ball.model.yaml", "absolute").success
     assert ros.delete("absolute").success
 
@@ -109,7 +109,7 @@ def test_spawn_takes_an_absolute_path(ros: Any, world: Path) -> None:
         ("ball.model.yaml", "m", "a-" + "/" * 9, (0, 0, 0), "not a legal ROS name"),
     ],
 )
-def test_refused_spawn_says_why_and_leaves_nothing(
+def test_refused_spawn_has_a_reason_and_no_effect(
     ros: Any, path: str, name: str, ns: str, pose: tuple[float, float, float], message: str
 ) -> None:
     before = ros.registered()
@@ -121,7 +121,7 @@ def test_refused_spawn_says_why_and_leaves_nothing(
     assert not ros.delete("m").success
 
 
-def test_delete_and_move_of_an_unknown_model(ros: Any) -> None:
+def test_unknown_model_is_neither_deleted_nor_moved(ros: Any) -> None:
     answer = ros.delete("ghost")
     assert (answer.success, answer.message) == (
         False,
@@ -135,7 +135,7 @@ def test_delete_and_move_of_an_unknown_model(ros: Any) -> None:
 
 
 @pytest.mark.parametrize("name", ["a b", "ä☃", "new\nline", "/", "~", "$(x)", "a\0b", "n" * 9999])
-def test_a_name_may_be_any_text(ros: Any, name: str) -> None:
+def test_name_of_a_model_may_be_any_text(ros: Any, name: str) -> None:
     assert ros.spawn("ball.model.yaml", name).success
     assert "already exists" in ros.spawn("ball.model.yaml", name).message
     assert ros.move(name, (1, 1, 0)).success
@@ -144,7 +144,7 @@ def test_a_name_may_be_any_text(ros: Any, name: str) -> None:
 
 
 @pytest.mark.parametrize("y", [NAN, -INF, 1e300])
-def test_move_to_a_pose_that_is_none(ros: Any, y: float) -> None:
+def test_move_to_an_invalid_pose_is_refused(ros: Any, y: float) -> None:
     odometry = truth(ros, "first")
     answer = ros.move("first", (0, y, 0))
     assert answer.success is False
@@ -154,20 +154,20 @@ def test_move_to_a_pose_that_is_none(ros: Any, y: float) -> None:
 
 
 @pytest.mark.parametrize(
-    ("stop", "go"), [("/pause", "/resume"), ("/toggle_pause", "/toggle_pause")]
+    ("pause", "resume"), [("/pause", "/resume"), ("/toggle_pause", "/toggle_pause")]
 )
-def test_time_stands_still_while_paused(ros: Any, stop: str, go: str) -> None:
+def test_time_does_not_advance_while_paused(ros: Any, pause: str, resume: str) -> None:
     clock = ros.topic("/clock", Clock)
     first = clock.next()
-    ros.call(stop, Empty)
-    # What is on its way when the call returns may be late on a busy machine.
+    ros.call(pause, Empty)
+    # Messages sent before the response may be received after it.
     last = [first, *clock.rest(1.0)][-1].clock.to_nsec()
     assert clock.rest() == []
-    ros.call(go, Empty)
+    ros.call(resume, Empty)
     assert clock.next().clock.to_nsec() == last + 5_000_000
 
 
-def test_pausing_twice_is_pausing_once(ros: Any) -> None:
+def test_second_pause_has_no_effect(ros: Any) -> None:
     clock = ros.topic("/clock", Clock)
     ros.call("/pause", Empty)
     ros.call("/pause", Empty)
@@ -176,7 +176,7 @@ def test_pausing_twice_is_pausing_once(ros: Any) -> None:
     clock.next()
 
 
-def test_calls_while_paused_take_effect_at_once(ros: Any) -> None:
+def test_calls_take_effect_while_paused(ros: Any) -> None:
     ros.call("/pause", Empty)
     assert ros.spawn("robot.model.yaml", "still", "still").success
     assert "/still/cmd_vel" in ros.registered()["subscribers"]
@@ -186,7 +186,7 @@ def test_calls_while_paused_take_effect_at_once(ros: Any) -> None:
     assert "/still/cmd_vel" not in ros.registered()["subscribers"]
 
 
-def test_concurrent_clients_are_all_served(ros: Any) -> None:
+def test_calls_of_concurrent_clients_succeed(ros: Any) -> None:
     problems: list[str] = []
 
     def client(number: int) -> None:
@@ -207,7 +207,7 @@ def test_concurrent_clients_are_all_served(ros: Any) -> None:
     assert problems == []
 
 
-def test_one_name_is_given_to_one_of_many_clients(ros: Any) -> None:
+def test_one_of_many_clients_spawns_a_model_of_the_same_name(ros: Any) -> None:
     answers: list[Any] = []
     threads = [
         threading.Thread(target=lambda: answers.append(ros.spawn("ball.model.yaml", "same")))
@@ -221,7 +221,7 @@ def test_one_name_is_given_to_one_of_many_clients(ros: Any) -> None:
     assert ros.delete("same").success
 
 
-def test_200_models_come_and_go_without_a_trace(ros: Any) -> None:
+def test_spawned_and_deleted_models_leave_nothing_registered(ros: Any) -> None:
     before = ros.registered()
     for i in range(200):
         answer = ros.spawn("robot.model.yaml", f"m{i}", f"m{i}", (i % 20 / 5 - 2, i // 20 / 5, 0))
@@ -235,7 +235,7 @@ def test_200_models_come_and_go_without_a_trace(ros: Any) -> None:
     assert ros.registered() == before
 
 
-def test_persistent_client_gets_all_answers(ros: Any) -> None:
+def test_persistent_client_receives_all_responses(ros: Any) -> None:
     import rospy
 
     rospy.wait_for_service("/move_model")
@@ -251,7 +251,7 @@ def test_set_rate(ros: Any, eventually: Any) -> None:
     clock = ros.topic("/clock", Clock)
 
     def factor() -> float:
-        """How fast the simulated time passes, over half a second."""
+        """Returns the real-time factor over half a second."""
         clock.drop()
         first, start = clock.next().clock.to_sec(), time.monotonic()
         time.sleep(0.5)
@@ -263,14 +263,14 @@ def test_set_rate(ros: Any, eventually: Any) -> None:
             answer = ros.call("/set_rate", SetRate, rate)
             assert (answer.success, answer.message) == (True, "")
             assert rospy.get_param("/flatland_server/update_rate") == (0.0 if rate == INF else rate)
-            # What was on its way when the call returned may still arrive.
+            # Messages sent before the response may be received after it.
             eventually("the rate", lambda: least < factor() < most)  # noqa: B023
     finally:
         ros.call("/set_rate", SetRate, 200.0)
 
 
 @pytest.mark.parametrize("rate", [-1.0, NAN, -INF])
-def test_set_rate_refuses_what_is_no_rate(ros: Any, rate: float) -> None:
+def test_set_rate_refuses_an_invalid_rate(ros: Any, rate: float) -> None:
     answer = ros.call("/set_rate", SetRate, rate)
     assert (answer.success, answer.message) == (
         False,

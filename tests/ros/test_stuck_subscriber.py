@@ -1,4 +1,4 @@
-"""A subscriber that connects and never reads must not hold up the simulation."""
+"""A subscriber that connects and never reads does not block the simulation."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ SCAN_SIZE = 40_000  # bytes, about: 10 001 beams
 
 
 class StuckSubscriber:
-    """Speaks TCPROS as far as the handshake, and then reads nothing until it is told to."""
+    """A subscriber that completes the handshake of TCPROS, and then reads only on demand."""
 
     def __init__(self, master: Any, topic: str, message_type: type[Any]) -> None:
         (publisher,) = next(nodes for name, nodes in master.getSystemState()[0] if name == topic)
@@ -51,7 +51,7 @@ class StuckSubscriber:
         assert b"md5sum" in self.read_frame()
 
     def read_frame(self) -> bytes:
-        """Reads one message, or the header."""
+        """Reads one message or the header."""
         (size,) = struct.unpack("<I", self._read(4))
         return self._read(size)
 
@@ -77,21 +77,21 @@ def stuck(ros: Any) -> Iterator[StuckSubscriber]:
     subscriber.socket.close()
 
 
-def test_others_are_served_while_one_does_not_read(ros: Any, stuck: StuckSubscriber) -> None:
+def test_other_subscribers_receive_all_messages(ros: Any, stuck: StuckSubscriber) -> None:
     del stuck
     clock, scans = ros.topic("/clock", Clock), ros.topic("/scan", LaserScan)
-    # 500 scans of 40 kB are more than any socket takes for a reader that does not read.
+    # 500 scans of 40 kB exceed the buffers of any socket.
     first = clock.next().clock.to_sec()
     clock.until(lambda message: message.clock.to_sec() > first + 500 * 0.005)
     scans.drop()
     scans.take(10)
-    # Services too, and the simulation steps on.
+    # Services and the simulation are not affected either.
     assert ros.spawn("ball.model.yaml", "ball").success
     clock.drop()
     clock.next()
 
 
-def test_slow_reader_gets_whole_messages_and_the_newest_at_last(
+def test_slow_reader_receives_complete_messages_up_to_the_newest(
     ros: Any, stuck: StuckSubscriber
 ) -> None:
     clock = ros.topic("/clock", Clock)
@@ -105,13 +105,13 @@ def test_slow_reader_gets_whole_messages_and_the_newest_at_last(
         scan.deserialize(stuck.read_frame())
         assert len(scan.ranges) == 10_001
         stamps.append(scan.header.stamp.to_nsec())
-    # In order, none twice, and many were dropped in between.
+    # In order, without duplicates, and with gaps of dropped messages.
     assert stamps == sorted(set(stamps))
     steps = [after - before for before, after in itertools.pairwise(stamps)]
     assert max(steps) > 5_000_000
 
 
-def test_subscriber_that_goes_is_forgotten(ros: Any, stuck: StuckSubscriber, server: Any) -> None:
+def test_closed_connection_is_removed(ros: Any, stuck: StuckSubscriber, server: Any) -> None:
     clock = ros.topic("/clock", Clock)
     first = clock.next().clock.to_sec()
     clock.until(lambda message: message.clock.to_sec() > first + 500 * 0.005)

@@ -1,4 +1,4 @@
-"""What a running node publishes: topics, types, rates, frames and contents."""
+"""Topics of a running node: types, rates, frames and contents."""
 
 from __future__ import annotations
 
@@ -90,7 +90,7 @@ SERVICES = {
 
 @pytest.fixture(scope="module", autouse=True)
 def server(module_launcher: Any, write_world: Callable[..., Path]) -> Any:
-    """One server for all tests of this file, started as users do."""
+    """One server for all tests of this file."""
     world = write_world(MODELS, robot=ROBOT, tricycle=TRICYCLE)
     return module_launcher.server(world, seed=1, update_rate=400)
 
@@ -99,7 +99,7 @@ def stamps(messages: list[Any]) -> list[int]:
     return [message.header.stamp.to_nsec() for message in messages]
 
 
-def test_offers_exactly_the_topics_and_services_of_its_world(ros: Any) -> None:
+def test_node_registers_exactly_the_topics_and_services_of_its_world(ros: Any) -> None:
     registered = ros.registered()
     assert registered["publishers"] == set(TOPICS)
     assert registered["subscribers"] == set(COMMANDS)
@@ -109,10 +109,10 @@ def test_offers_exactly_the_topics_and_services_of_its_world(ros: Any) -> None:
     assert {name: types.get(name) for name in expected} == expected
 
 
-def test_clock_shows_every_step_and_starts_from_zero(ros: Any) -> None:
+def test_clock_advances_by_whole_steps_from_zero(ros: Any) -> None:
     times = [message.clock.to_nsec() for message in ros.topic("/clock", Clock).take(50)]
     steps = [after - before for before, after in itertools.pairwise(times)]
-    # A slow reader may miss some, none comes twice or early, and each is a multiple of the step.
+    # A slow reader may miss messages; the others are ordered multiples of the step size.
     assert all(step > 0 and step % 5_000_000 == 0 for step in steps)
     assert 5_000_000 in steps
     assert times[0] % 5_000_000 == 0
@@ -131,7 +131,7 @@ def test_clock_shows_every_step_and_starts_from_zero(ros: Any) -> None:
         ("/odometry/filtered", Odometry, 0.05),
     ],
 )
-def test_rates_hold_in_simulated_time(
+def test_rates_are_exact_in_simulated_time(
     ros: Any, topic: str, message_type: type[Any], period: float
 ) -> None:
     times = stamps(ros.topic(topic, message_type).take(8))
@@ -139,13 +139,13 @@ def test_rates_hold_in_simulated_time(
     assert steps == [round(period * 1e9)] * 7
 
 
-def test_no_topic_of_a_plugin_is_latched(ros: Any) -> None:
+def test_topics_of_plugins_are_not_latched(ros: Any) -> None:
     scan = ros.topic("/r1/scan", LaserScan).next()
     assert scan._connection_header["latching"] == "0"
     assert scan._connection_header["callerid"] == "/flatland_server"
 
 
-def test_scan_holds_all_fields(ros: Any) -> None:
+def test_all_fields_of_a_scan(ros: Any) -> None:
     scan = ros.topic("/r1/scan", LaserScan).next()
     assert scan.header.frame_id == "r1_front"
     assert scan.header.stamp.to_nsec() % 100_000_000 == 0
@@ -159,7 +159,7 @@ def test_scan_holds_all_fields(ros: Any) -> None:
         "range_max": 20,
     }.items():
         assert getattr(scan, field) == pytest.approx(value, abs=1e-6), field
-    # The sensor is at (1.1, 2) and looks along x, the walls are at x = 5 and y = ±5.
+    # The sensor is at (1.1, 2) with yaw 0; the walls are at x = 5 and y = ±5.
     expected = []
     for i in range(7):
         angle = -1.5 + 0.5 * i
@@ -172,11 +172,12 @@ def test_scan_holds_all_fields(ros: Any) -> None:
 def test_scan_without_a_hit_is_nan(ros: Any) -> None:
     scan = ros.topic("/r1/roof", LaserScan).next()
     assert scan.header.frame_id == "up"
-    # Upside down: the first beam, at -1, looks to the left, where the wall is 3 m / sin(1) away.
+    # Upside down, so that the first beam, at -1, points to the left; the wall there is
+    # 3 m / sin(1) away, out of range.
     assert [math.isnan(value) for value in scan.ranges] == [True] * 3
 
 
-def test_odometry_holds_pose_twist_and_covariances(ros: Any) -> None:
+def test_pose_twist_and_covariances_of_odometry(ros: Any) -> None:
     truth = ros.topic("/r1/odometry/ground_truth", Odometry).next()
     assert (truth.header.frame_id, truth.child_frame_id) == ("map", "r1_base")
     position, rotation = truth.pose.pose.position, truth.pose.pose.orientation
@@ -193,7 +194,7 @@ def test_odometry_holds_pose_twist_and_covariances(ros: Any) -> None:
     assert (noisy.x, noisy.y) != (1, 2)
 
 
-def test_gps_imu_switch_and_bumper_hold_their_fields(ros: Any) -> None:
+def test_fields_of_gps_imu_switch_and_bumper(ros: Any) -> None:
     fix = ros.topic("/r1/gps/fix", NavSatFix).next()
     assert fix.header.frame_id == "r1_gps"
     assert fix.latitude == pytest.approx(43.5 + 2 / 111_100, abs=1e-6)
@@ -206,7 +207,7 @@ def test_gps_imu_switch_and_bumper_hold_their_fields(ros: Any) -> None:
     assert (collisions.header.frame_id, collisions.collisions) == ("map", [])
 
 
-def test_tf_sends_all_transforms_of_a_step_in_one_message(ros: Any) -> None:
+def test_all_transforms_of_a_step_are_in_one_message(ros: Any) -> None:
     def pairs(message: TFMessage) -> set[tuple[str, str]]:
         return {(each.header.frame_id, each.child_frame_id) for each in message.transforms}
 
@@ -232,7 +233,7 @@ def test_tf_sends_all_transforms_of_a_step_in_one_message(ros: Any) -> None:
     assert mast.rotation.z == pytest.approx(math.sin(0.25), abs=1e-4)
 
 
-def test_node_does_not_listen_to_its_own_clock(ros: Any) -> None:
+def test_node_does_not_subscribe_to_its_own_clock(ros: Any) -> None:
     assert "/clock" not in ros.registered()["subscribers"]
 
 
@@ -243,14 +244,14 @@ def test_ros_time_of_the_node_is_the_simulated_time(ros: Any, server: Any, event
     eventually("a report", lambda: server.output.count("cycle use") > seen)
     clock.drop()
     after = clock.next().clock.to_sec()
-    # rospy's log lines show its time behind that of the wall clock.
+    # The log lines of rospy contain the wall time and the ROS time.
     report = [line for line in server.output.splitlines() if "cycle use" in line][seen]
     match = re.match(r"\[INFO\] \[[\d.]+, ([\d.]+)\]: ", report)
     assert match is not None, report
     assert before < float(match[1]) <= after
 
 
-def test_server_logs_how_its_cycles_are_used(server: Any) -> None:
+def test_use_of_cycles_is_logged(server: Any) -> None:
     line = server.wait_for_line("cycle use").string
     assert "min " in line
     assert "mean " in line

@@ -1,7 +1,7 @@
-"""Waiting for events: the only place that limits how long a test waits.
+"""Time limits of all tests, and a function that waits for a condition.
 
-The limits exist to end a test whose event never occurs. They are generous on purpose, so that a
-test does not fail because the machine is busy; how fast the simulator is belongs into `bench/`.
+The limits end tests whose event never occurs. They are generous, so that no test fails on a busy
+machine; `bench/` measures speed.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from typing import Any, Final
 
 import pytest
 
-TIMEOUT: Final = 120.0  # s; for any event, and for any program that is expected to end
+TIMEOUT: Final = 120.0  # s; for any event and for the end of any program
 BUILD_TIMEOUT: Final = 1200.0  # s; for a program that compiles the extension
 _POLL_PERIOD: Final = 0.01  # s
 
@@ -24,12 +24,12 @@ def wait_until(
     *,
     poll_period: float = _POLL_PERIOD,
 ) -> Any:
-    """Waits until a condition holds; for states that no event announces.
+    """Waits until a condition holds, for states that are not reported by an event.
 
     Args:
         what: Name of the condition, for the failure.
-        condition: Returns a true value once it holds; an assertion that fails in it means the same
-            as a false value and is shown with the failure.
+        condition: Returns a true value once it holds. A failed assertion in it is equivalent to a
+            false value, and is part of the failure message.
         timeout: Limit [s].
         poll_period: Time between two calls of the condition [s].
 

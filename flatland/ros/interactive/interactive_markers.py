@@ -17,8 +17,8 @@ from flatland.ros.interactive.marker_server import MarkerServer
 from flatland.ros.interactive.model_handle import model_handle, planar_pose, pose_message
 from flatland.ros.markers.packed_markers import FRAME
 from flatland.ros.names import UniqueNames, sendable_text
-from flatland.ros.registrar import Registrar
-from flatland.ros.ticker import Ticker
+from flatland.ros.transport.registrar import Registrar
+from flatland.ros.transport.ticker import Ticker
 from flatland.runtime.observer import WorldObserver
 from flatland.simulation import Simulation
 

@@ -18,8 +18,8 @@ from visualization_msgs.msg import (
 
 from flatland.geometry import Pose
 from flatland.ros.interactive.model_handle import pose_message
-from flatland.ros.publisher import Publisher
-from flatland.ros.registrar import Registrar
+from flatland.ros.transport.publisher import Publisher
+from flatland.ros.transport.registrar import Registrar
 from flatland.ros.transport.state_topic import StateTopic
 from flatland.ros.transport.subscriber import Subscriber
 

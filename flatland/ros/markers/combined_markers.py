@@ -18,9 +18,9 @@ from flatland.entities.model import Model
 from flatland.ros.markers.layer_markers import LayerMarkers
 from flatland.ros.markers.model_markers import ModelMarkers
 from flatland.ros.markers.packed_markers import JoinedMarkers, PackedMarkers
-from flatland.ros.registrar import Registrar
-from flatland.ros.ticker import Ticker
+from flatland.ros.transport.registrar import Registrar
 from flatland.ros.transport.state_topic import StateTopic
+from flatland.ros.transport.ticker import Ticker
 from flatland.runtime.observer import WorldObserver
 from flatland.simulation import Simulation
 

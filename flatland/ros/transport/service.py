@@ -8,7 +8,7 @@ from typing import Any, Final
 
 import rospy
 
-from flatland.ros.registrar import Registrar
+from flatland.ros.transport.registrar import Registrar
 
 _SHUTDOWN_POLL_PERIOD: Final = 0.2  # s
 

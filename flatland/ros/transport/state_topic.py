@@ -9,8 +9,8 @@ from typing import Any
 
 import rospy
 
-from flatland.ros.publisher import Publisher
-from flatland.ros.registrar import Registrar
+from flatland.ros.transport.publisher import Publisher
+from flatland.ros.transport.registrar import Registrar
 
 _LOG = logging.getLogger("flatland")
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import rospy
 
-from flatland.ros.registrar import Registrar
+from flatland.ros.transport.registrar import Registrar
 
 
 class Subscriber:

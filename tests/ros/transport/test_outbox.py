@@ -43,10 +43,10 @@ class Pair:
     """An outbox with small socket buffers, and the reader of its connection."""
 
     def __init__(self, queue_size: int) -> None:
-        ours, self.reader = socket.socketpair()
-        ours.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, 4096)
+        writer, self.reader = socket.socketpair()
+        writer.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, 4096)
         self.reader.settimeout(TIMEOUT)
-        self.transport = Transport(ours)
+        self.transport = Transport(writer)
         self.outbox = Outbox(self.transport, queue_size)
 
     def write(self, number: int, size: int = 1000) -> None:

@@ -12,7 +12,7 @@ from std_msgs.msg import Int32
 from waiting import TIMEOUT
 
 from flatland.errors import FlatlandError
-from flatland.ros.registrar import Registrar
+from flatland.ros.transport.registrar import Registrar
 from flatland.ros.transport.state_topic import StateTopic
 
 TOPIC = "/flatland_tests/state"

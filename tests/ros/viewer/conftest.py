@@ -119,11 +119,11 @@ class Viewer:
         return list(json.loads(self._stream.readline()))
 
     def widget(self, name: str) -> dict[str, Any]:
-        """The one widget of a name or class, waited for."""
+        """Waits for the only widget of a name or class."""
         return self.until(name, lambda widget: True)
 
     def until(self, name: str, accept: Callable[[dict[str, Any]], bool]) -> dict[str, Any]:
-        """Waits until a widget is as wanted."""
+        """Waits until the only widget of a name or class is accepted."""
 
         def accepted() -> dict[str, Any] | None:
             found = self.widgets(name)
@@ -216,10 +216,12 @@ class Picture:
 
 
 @pytest.fixture
-def look(screen: Any, tmp_path: Path) -> Callable[..., Picture]:
-    """Takes pictures until one passes a check, and returns that one; the check may assert."""
+def screenshot(screen: Any, tmp_path: Path) -> Callable[..., Picture]:
+    """Takes screenshots until one is accepted, and returns it; the check may assert."""
 
-    def look(accept: Callable[[Picture], Any], area: Mapping[str, int] | None = None) -> Picture:
+    def screenshot(
+        accept: Callable[[Picture], Any], area: Mapping[str, int] | None = None
+    ) -> Picture:
         image = None
 
         def accepted() -> Picture | None:
@@ -236,4 +238,4 @@ def look(screen: Any, tmp_path: Path) -> Callable[..., Picture]:
             raise
         return picture
 
-    return look
+    return screenshot

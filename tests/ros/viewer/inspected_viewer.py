@@ -35,7 +35,7 @@ class Inspector(QObject):
             server.listen()
             print("the window is up", flush=True)
             connection, _ = server.accept()
-        # rospy sets a default timeout for sockets, but questions may be minutes apart.
+        # rospy sets a default timeout for sockets, but queries may be minutes apart.
         connection.settimeout(None)
         self.stream = connection.makefile("rw")
         for line in self.stream:

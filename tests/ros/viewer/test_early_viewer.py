@@ -43,49 +43,49 @@ def test_simulator_is_started_killed_and_replaced(
     on_screen: Any,
     room: Path,
     elsewhere: Path,
-    look: Any,
+    screenshot: Any,
 ) -> None:
     del bare_master
     viewer = early_viewer
     area = viewer.widget("rviz::RenderPanel")
 
-    def waits() -> None:
+    def assert_waits() -> None:
         viewer.until("rate", lambda widget: widget["text"] == "Waiting for the simulator")
         viewer.until("factor", lambda widget: widget["text"] == "")
         viewer.until("toggle_pause", lambda widget: widget["text"] == "Pause")
         viewer.until("rate_slider", lambda widget: not widget["enabled"])
 
-    def tells_simulated_time(widget: dict[str, Any]) -> bool:
+    def is_simulated_time(widget: dict[str, Any]) -> bool:
         return 0.0 < float(widget["text"].split()[1]) < 1e6
 
     def fits(picture: Any) -> bool:
         return bool(picture.pixels_per_metre * 10 == pytest.approx(area["height"] / 1.06, abs=8))
 
-    def shows_room_and_robot(place: Callable[[Any], Any]) -> None:
+    def assert_shows_room_and_robot(place: Callable[[Any], Any]) -> None:
         viewer.until("rate", lambda widget: widget["text"] == "200 Hz (x1)")
-        viewer.until("time", tells_simulated_time)
-        look(lambda picture: place(picture) and fits(picture), area)
-        look(lambda picture: len(picture.places(RED)) > 30, area)
+        viewer.until("time", is_simulated_time)
+        screenshot(lambda picture: place(picture) and fits(picture), area)
+        screenshot(lambda picture: len(picture.places(RED)) > 30, area)
 
     def robot_is_there(picture: Any) -> bool:
         return len(picture.near(BLUE, -2, 1, 0.6)) > 10
 
-    waits()
+    assert_waits()
     first = on_screen.server(room, show_viz=True)
-    shows_room_and_robot(robot_is_there)
+    assert_shows_room_and_robot(robot_is_there)
     ros.call("/pause", Empty)
     viewer.until("toggle_pause", lambda widget: widget["text"] == "Resume")
     # A killed node stays registered with the master.
     first.send(signal.SIGKILL)
     first.wait()
-    waits()
+    assert_waits()
     viewer.click("toggle_pause")
-    complaint = viewer.until("qt_msgbox_label", lambda widget: widget["active"])
-    assert "service" in complaint["text"]
+    message = viewer.until("qt_msgbox_label", lambda widget: widget["active"])
+    assert "service" in message["text"]
     viewer.screen.key("Return")
     # Another simulator, with another world; nothing of the first one remains visible.
     on_screen.server(elsewhere, show_viz=True)
-    shows_room_and_robot(robot_is_there)
+    assert_shows_room_and_robot(robot_is_there)
     assert viewer.process.running
 
 
@@ -98,15 +98,20 @@ def other_clock() -> Iterator[rospy.Publisher]:
 
 
 def test_walls_are_shown_again_after_the_time_jumps_back(
-    ros: Any, other_clock: rospy.Publisher, early_viewer: Any, on_screen: Any, room: Path, look: Any
+    ros: Any,
+    other_clock: rospy.Publisher,
+    early_viewer: Any,
+    on_screen: Any,
+    room: Path,
+    screenshot: Any,
 ) -> None:
     viewer = early_viewer
     area = viewer.widget("rviz::RenderPanel")
     on_screen.server(room, show_viz=True)
-    look(lambda picture: len(picture.places(RED)) > 30, area)
+    screenshot(lambda picture: len(picture.places(RED)) > 30, area)
     ros.call("/pause", Empty)
     viewer.until("toggle_pause", lambda widget: widget["text"] == "Resume")
     other_clock.publish(Clock(rospy.Time(nsecs=1)))
     viewer.until("time", lambda widget: widget["text"] == "Time: 0.00 s")
     # RViz clears all displays. Paused, the simulator sends no scans, but the walls are latched.
-    look(lambda picture: len(picture.places(RED)) == 0, area)
+    screenshot(lambda picture: len(picture.places(RED)) == 0, area)

@@ -38,19 +38,19 @@ def subscriptions(node: str) -> set[str]:
     return {topic for topic, names in subscribers if node in names}
 
 
-def test_rviz_shows_all_without_being_touched(
+def test_rviz_displays_everything_without_user_input(
     on_screen: Any,
     ros: Any,
     room: Path,
     screen: Any,
-    look: Callable[..., Any],
+    screenshot: Callable[..., Any],
     eventually: Callable[..., Any],
 ) -> None:
     launch = on_screen.launch("flatland", "server.launch", f"world_path:={room}", "use_rviz:=true")
     launch.wait_for_line("started with pid")
 
     def shows_scan_and_robot(picture: Any) -> bool:
-        # From above, with the scan on the walls and the robot at its pose.
+        # Seen from above, the scan is on the walls and the robot is at its pose.
         scan = picture.places(RED)
         assert len(scan) > 30
         assert (np.abs(np.abs(scan).max(axis=1) - 5.0) < 0.15).mean() > 0.9
@@ -60,7 +60,7 @@ def test_rviz_shows_all_without_being_touched(
         assert np.median(ring, axis=0) == pytest.approx((-2, 1), abs=0.1)
         return True
 
-    look(shows_scan_and_robot, RVIZ_PANEL)
+    screenshot(shows_scan_and_robot, RVIZ_PANEL)
     assert "/rviz" in nodes()
     assert "/flatland_viz" not in nodes()
     wanted = {
@@ -68,11 +68,11 @@ def test_rviz_shows_all_without_being_touched(
         *(f"/flatland_server/debug/all_{kind}" for kind in ("layers", "layers_3d", "models")),
     }
     eventually("all subscriptions of RViz", lambda: subscriptions("/rviz") >= wanted)
-    # Below its handle, which goes with the tool that moves the camera, there is the robot.
+    # The tool that moves the camera hides the handle, which covers the robot.
     screen.click(500, 200)
     screen.key("m")
-    look(lambda picture: len(picture.near(BLUE, -2, 1, 0.4)) > 80, RVIZ_PANEL)
-    # Models that come and go do so in the picture.
+    screenshot(lambda picture: len(picture.near(BLUE, -2, 1, 0.4)) > 80, RVIZ_PANEL)
+    # Spawned models appear, and deleted models disappear.
     assert ros.spawn(room.parent / "crate.model.yaml", "crate", "", (2, -2, 0)).success
 
     def shows_crate(picture: Any) -> bool:
@@ -82,9 +82,9 @@ def test_rviz_shows_all_without_being_touched(
         assert crate.max(axis=0) == pytest.approx((2.5, -1.75), abs=0.15)
         return True
 
-    look(shows_crate, RVIZ_PANEL)
+    screenshot(shows_crate, RVIZ_PANEL)
     assert ros.delete("crate").success
-    look(lambda picture: not len(picture.near(CYAN, 2, -2, 0.7)), RVIZ_PANEL)
+    screenshot(lambda picture: not len(picture.near(CYAN, 2, -2, 0.7)), RVIZ_PANEL)
     assert launch.stop() == 0
 
 
@@ -101,20 +101,20 @@ def test_all_displays_are_enabled_in_the_rviz_configuration(ros: Any, checkout: 
         assert (display["Enabled"], display["Value"]) == (True, True), display["Name"]
 
 
-def test_the_viewer_comes_with_the_simulator_and_may_go_alone(
+def test_viewer_starts_with_the_simulator_and_can_be_closed_alone(
     on_screen: Any,
     ros: Any,
     room: Path,
     screen: Any,
-    look: Callable[..., Any],
+    screenshot: Callable[..., Any],
     eventually: Callable[..., Any],
 ) -> None:
     launch = on_screen.launch("flatland", "server.launch", f"world_path:={room}")
-    look(lambda picture: len(picture.places(BLUE)) > 10)
+    screenshot(lambda picture: len(picture.places(BLUE)) > 10)
     assert "/flatland_viz" in nodes()
 
     def has_ended() -> bool:
-        screen.click(600, 600)  # There is no window manager to give the window the keys.
+        screen.click(600, 600)  # Without a window manager, a click gives the window the focus.
         screen.key("ctrl+q")
         return (
             re.search(r"flatland_viz-\d+. process has finished cleanly", launch.output) is not None
@@ -128,10 +128,14 @@ def test_the_viewer_comes_with_the_simulator_and_may_go_alone(
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_viewer_exits_on_a_signal(
-    on_screen: Any, ros: Any, running_room: Any, look: Callable[..., Any], number: signal.Signals
+    on_screen: Any,
+    ros: Any,
+    running_room: Any,
+    screenshot: Callable[..., Any],
+    number: signal.Signals,
 ) -> None:
     viewer = on_screen.program("rosrun", "flatland", "flatland_viz")
-    look(lambda picture: len(picture.places(BLUE)) > 10)
+    screenshot(lambda picture: len(picture.places(BLUE)) > 10)
     viewer.send(number)
     assert viewer.wait() == 0
     assert "Traceback" not in viewer.output

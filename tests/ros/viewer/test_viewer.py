@@ -62,7 +62,9 @@ def choose(viewer: Any, screen: Any, path: Path, *, name: str = "", number: bool
     screen.key("Return")
 
 
-def test_shows_walls_robot_and_scan(look: Callable[..., Any], viewer: Any, panel: Any) -> None:
+def test_shows_walls_robot_and_scan(
+    screenshot: Callable[..., Any], viewer: Any, panel: Any
+) -> None:
     def shows_room_and_scan(picture: Any) -> bool:
         # The whole room is in view, as large as fits.
         assert picture.pixels_per_metre * 10 == pytest.approx(panel["height"] / 1.06, abs=8)
@@ -76,22 +78,22 @@ def test_shows_walls_robot_and_scan(look: Callable[..., Any], viewer: Any, panel
         assert len(set(np.sign(scan[:, 0]))) == len(set(np.sign(scan[:, 1]))) == 2
         return True
 
-    picture = look(shows_room_and_scan, panel)
-    # The ground is dark grey, with a faint line each metre.
+    picture = screenshot(shows_room_and_scan, panel)
+    # The background is dark grey, with a thin line every metre.
     (left, row), (right, _) = picture.at(0.5, 3.5), picture.at(4.5, 3.5)
-    ground = picture.image[int(row), int(left) : int(right)].max(axis=1).astype(int)
-    assert np.median(ground) == 48
-    assert set(ground) <= set(range(48, 80))
-    lines = np.flatnonzero(np.diff((ground > 50).astype(int)) > 0)
+    background = picture.image[int(row), int(left) : int(right)].max(axis=1).astype(int)
+    assert np.median(background) == 48
+    assert set(background) <= set(range(48, 80))
+    lines = np.flatnonzero(np.diff((background > 50).astype(int)) > 0)
     assert len(lines) == 4
     assert np.diff(lines) == pytest.approx(picture.pixels_per_metre, abs=1.5)
 
 
 def test_shows_the_robot_at_its_pose(
-    look: Callable[..., Any], viewer: Any, screen: Any, panel: Any
+    screenshot: Callable[..., Any], viewer: Any, screen: Any, panel: Any
 ) -> None:
     # The handle covers the robot unless the Move camera tool is selected.
-    look(lambda picture: not len(picture.near(BLUE, *START, 0.15)), panel)
+    screenshot(lambda picture: not len(picture.near(BLUE, *START, 0.15)), panel)
     viewer.click("move_camera")
 
     def shows_robot(picture: Any) -> bool:
@@ -102,7 +104,7 @@ def test_shows_the_robot_at_its_pose(
         assert np.hypot(*(robot - START).T).max() == pytest.approx(0.4, abs=0.08)
         return True
 
-    look(shows_robot, panel)
+    screenshot(shows_robot, panel)
     viewer.click("interact")
 
 
@@ -128,20 +130,20 @@ def test_pause_and_resume(ros: Any, viewer: Any, screen: Any) -> None:
 def test_slider_sets_the_rate(
     ros: Any, viewer: Any, screen: Any, eventually: Callable[..., Any]
 ) -> None:
-    def asked(rate: float) -> bool:
+    def is_set(rate: float) -> bool:
         return bool(rospy.get_param("/flatland_server/update_rate", 200.0) == rate)
 
     viewer.until("rate", lambda widget: widget["text"] == "200 Hz (x1)")
     slider = viewer.widget("rate_slider")
     viewer.click("rate_slider")
     screen.key("Home")
-    eventually("slow motion", lambda: asked(10.0))
+    eventually("slow motion", lambda: is_set(10.0))
     viewer.until("rate", lambda widget: widget["text"] == "10 Hz (x0.05)")
     viewer.until("factor", lambda widget: widget["text"] in SLOW_MOTION)
     screen.key("End")
-    eventually("no limit", lambda: asked(0.0))
+    eventually("no limit", lambda: is_set(0.0))
     viewer.until("rate", lambda widget: widget["text"] == "as fast as possible")
-    # It stays where the mouse is, however long the text beside it.
+    # The length of the text beside the slider does not move it.
     assert viewer.widget("rate_slider")["x"] == slider["x"]
     # A rate set by another client.
     assert ros.call("/set_rate", SetRate, 200.0).success
@@ -150,31 +152,31 @@ def test_slider_sets_the_rate(
 
 def test_two_clicks_spawn_a_model(
     ros: Any,
-    look: Callable[..., Any],
+    screenshot: Callable[..., Any],
     viewer: Any,
     screen: Any,
     panel: Any,
     room: Path,
     spawned: Callable[[str], None],
 ) -> None:
-    picture = look(lambda picture: True, panel)
+    picture = screenshot(lambda picture: True, panel)
     choose(viewer, screen, room.parent / "crate.model.yaml")
     x, y = picture.at(2, -1)
     screen.move(x, y)
 
-    # The outline follows the mouse, an arrow tells the heading.
+    # The preview is an outline at the mouse, with an arrow in the direction of the heading.
     def shows_outline_and_arrow(preview: Any) -> bool:
         assert len(preview.near(CYAN, 2, -1, 0.7)) > 50
         assert preview.near(YELLOW, 2.5, -1, 0.6).size
         assert not preview.near(YELLOW, 1.4, -1, 0.3).size
         return True
 
-    look(shows_outline_and_arrow, panel)
-    # No handle is in the way of the mouse.
-    look(lambda picture: len(picture.near(BLUE, *START, 0.15)) > 20, panel)
+    screenshot(shows_outline_and_arrow, panel)
+    # The handles are hidden, so that they do not receive the clicks.
+    screenshot(lambda picture: len(picture.near(BLUE, *START, 0.15)) > 20, panel)
     screen.click(x, y)
     screen.move(*picture.at(2, 2))
-    look(lambda picture: picture.near(YELLOW, 2, -0.4, 0.2).size, panel)
+    screenshot(lambda picture: picture.near(YELLOW, 2, -0.4, 0.2).size, panel)
     screen.click(*picture.at(2, 2))
     spawned("crate_model")
     (marker,) = ros.topic(f"{DEBUG}/model/crate_model", MarkerArray).next().markers
@@ -182,7 +184,7 @@ def test_two_clicks_spawn_a_model(
     yaw = 2 * math.atan2(marker.pose.orientation.z, marker.pose.orientation.w)
     assert yaw == pytest.approx(math.pi / 2, abs=0.05)
 
-    # It is shown where it is, and the preview is gone.
+    # The model is displayed at its pose, and the preview is hidden.
     def shows_crate(picture: Any) -> bool:
         crate = picture.near(CYAN, 2, -1, 0.8)
         assert len(crate) > 50
@@ -191,38 +193,38 @@ def test_two_clicks_spawn_a_model(
         assert crate.min(axis=0) == pytest.approx((1.75, -1.5), abs=0.07)
         return True
 
-    look(shows_crate, panel)
-    # A deleted model is gone from the picture, too.
+    screenshot(shows_crate, panel)
+    # A deleted model disappears.
     assert ros.delete("crate_model").success
-    look(lambda picture: not len(picture.near(CYAN, 2, -1, 0.8)), panel)
+    screenshot(lambda picture: not len(picture.near(CYAN, 2, -1, 0.8)), panel)
 
 
 def test_model_name_is_the_namespace_and_can_be_numbered(
     ros: Any,
-    look: Callable[..., Any],
+    screenshot: Callable[..., Any],
     viewer: Any,
     screen: Any,
     panel: Any,
     room: Path,
     spawned: Callable[[str], None],
 ) -> None:
-    picture = look(lambda picture: True, panel)
+    picture = screenshot(lambda picture: True, panel)
     for count, x in ((1, 0.0), (2, 3.0)):
         choose(viewer, screen, room.parent / "robot.model.yaml", number=True)
         screen.move(*picture.at(x, -3))
-        look(lambda picture, x=x: len(picture.near(YELLOW, x + 0.5, -3, 0.6)), panel)
+        screenshot(lambda picture, x=x: len(picture.near(YELLOW, x + 0.5, -3, 0.6)), panel)
         screen.click(*picture.at(x, -3))
         screen.click(*picture.at(x, -3))
         spawned(f"robot_model{count}")
     assert {"/robot_model1/scan", "/robot_model2/scan"} <= ros.registered()["publishers"]
-    # Each laser has a colour of its own.
-    look(
+    # Each laser has a different colour.
+    screenshot(
         lambda picture: len(picture.places(LIGHT_BLUE)) > 30 and len(picture.places(RED)) > 30,
         panel,
     )
-    # Its points go with it.
+    # The points of a laser disappear with its model.
     assert ros.delete("robot_model1").success
-    look(
+    screenshot(
         lambda picture: not (np.abs(picture.places(LIGHT_BLUE)).max(axis=1) > 4.8).any(),
         panel,
     )
@@ -230,17 +232,17 @@ def test_model_name_is_the_namespace_and_can_be_numbered(
 
 def test_relative_path_and_custom_name(
     ros: Any,
-    look: Callable[..., Any],
+    screenshot: Callable[..., Any],
     viewer: Any,
     screen: Any,
     panel: Any,
     spawned: Callable[[str], None],
 ) -> None:
-    picture = look(lambda picture: True, panel)
+    picture = screenshot(lambda picture: True, panel)
     # Relative to the folder of the world file, as for the service spawn_model.
     choose(viewer, screen, Path("crate.model.yaml"), name="parcel", number=True)
     screen.move(*picture.at(2, 2))
-    look(lambda picture: len(picture.places(YELLOW)), panel)
+    screenshot(lambda picture: len(picture.places(YELLOW)), panel)
     screen.click(*picture.at(2, 2))
     screen.click(*picture.at(2, 2))
     spawned("parcel1")
@@ -262,7 +264,7 @@ def test_file_dialog_sets_the_path(viewer: Any, screen: Any, room: Path) -> None
     viewer.fill_in("fileNameEdit", path)
     screen.key("Return")
     viewer.until("path", lambda widget: widget["text"] == path)
-    viewer.click("path")  # Without a window manager a dialog has the keys when it was clicked on.
+    viewer.click("path")  # Without a window manager, a click gives a dialog the focus.
     viewer.until("path", lambda widget: widget["focus"])
     screen.key("Escape")
     viewer.until("interact", lambda widget: widget["checked"])
@@ -270,7 +272,7 @@ def test_file_dialog_sets_the_path(viewer: Any, screen: Any, room: Path) -> None
 
 def test_menu_deletes_a_model(
     ros: Any,
-    look: Callable[..., Any],
+    screenshot: Callable[..., Any],
     viewer: Any,
     screen: Any,
     panel: Any,
@@ -278,27 +280,27 @@ def test_menu_deletes_a_model(
 ) -> None:
     topics = ros.topic(f"{DEBUG}/topics", DebugTopicList)
     assert ros.spawn("crate.model.yaml", "crate", "", (2, -2, 0)).success
-    picture = look(lambda picture: len(picture.near(GREEN, 2, -2, 0.4)) > 50, panel)
+    picture = screenshot(lambda picture: len(picture.near(GREEN, 2, -2, 0.4)) > 50, panel)
 
     def menu() -> Any:
         # RViz picks the object below the mouse once per frame, and misses a shorter click.
         screen.move(*picture.at(2.1, -2))
         screen.move(*picture.at(2, -2))
-        look(lambda picture: True, panel)
+        screenshot(lambda picture: True, panel)
         screen.press(3)
-        look(lambda picture: True, panel)
+        screenshot(lambda picture: True, panel)
         screen.release(3)
-        look(lambda picture: True, panel)
+        screenshot(lambda picture: True, panel)
         return viewer.widgets("QMenu")
 
     (area,) = eventually("menu", menu)
     screen.click(area["x"] + 30, area["y"] + area["height"] / 2)
     topics.until(lambda message: "model/crate" not in message.topics)
-    look(lambda picture: not len(picture.near(CYAN, 2, -2, 0.8)), panel)
+    screenshot(lambda picture: not len(picture.near(CYAN, 2, -2, 0.8)), panel)
 
 
 def test_view_fits_the_window_until_the_camera_is_moved(
-    look: Callable[..., Any], viewer: Any, screen: Any, panel: Any
+    screenshot: Callable[..., Any], viewer: Any, screen: Any, panel: Any
 ) -> None:
     def resize(width: int, height: int) -> Any:
         screen.resize("flatland", width, height)
@@ -314,49 +316,53 @@ def test_view_fits_the_window_until_the_camera_is_moved(
         return lambda picture: abs(picture.pixels_per_metre - wanted) < 0.8
 
     viewer.click("zoom_to_fit")
-    look(fits(panel), panel)
+    screenshot(fits(panel), panel)
     small = resize(1000, 500)
-    picture = look(fits(small), small)
+    picture = screenshot(fits(small), small)
     screen.click(*picture.at(3, 3), button=5)
-    zoomed = look(lambda seen: seen.pixels_per_metre < 0.98 * picture.pixels_per_metre, small)
+    zoomed = screenshot(lambda seen: seen.pixels_per_metre < 0.98 * picture.pixels_per_metre, small)
     area = resize(1200, 800)
-    look(lambda seen: abs(seen.pixels_per_metre - zoomed.pixels_per_metre) < 0.2, area)
+    screenshot(lambda seen: abs(seen.pixels_per_metre - zoomed.pixels_per_metre) < 0.2, area)
     viewer.click("zoom_to_fit")
-    look(fits(area), area)
+    screenshot(fits(area), area)
 
 
 def test_view_includes_models_outside_the_walls(
-    ros: Any, look: Callable[..., Any], viewer: Any, screen: Any, panel: Any, spawned: Any
+    ros: Any, screenshot: Callable[..., Any], viewer: Any, screen: Any, panel: Any, spawned: Any
 ) -> None:
     def shows(metres: float, pixels: int) -> Callable[[Any], bool]:
         wanted = pixels / (1.06 * metres)
         return lambda picture: abs(picture.pixels_per_metre - wanted) < 0.5
 
     viewer.click("zoom_to_fit")
-    look(shows(10.0, panel["height"]), panel)
-    # From the wall at x = -5 to the end of the crate.
+    screenshot(shows(10.0, panel["height"]), panel)
+    # The view extends from the wall at x = -5 to the end of the crate.
     assert ros.spawn("crate.model.yaml", "far", "", (20, 0, 0)).success
     spawned("far")
     shows_all = shows(25.5, panel["width"])
-    look(lambda picture: shows_all(picture) and len(picture.near(CYAN, 20, 0, 0.7)) > 10, panel)
+    screenshot(
+        lambda picture: shows_all(picture) and len(picture.near(CYAN, 20, 0, 0.7)) > 10, panel
+    )
     assert ros.move("far", (25, 0, 0)).success
     screen.key("f")
-    look(shows(30.5, panel["width"]), panel)
+    screenshot(shows(30.5, panel["width"]), panel)
     assert ros.delete("far").success
-    look(shows(10.0, panel["height"]), panel)
+    screenshot(shows(10.0, panel["height"]), panel)
 
 
 def test_model_is_below_the_mouse_in_a_rotated_view(
-    look: Callable[..., Any], viewer: Any, screen: Any, panel: Any, room: Path
+    screenshot: Callable[..., Any], viewer: Any, screen: Any, panel: Any, room: Path
 ) -> None:
     viewer.click("zoom_to_fit")
     x, y = panel["x"] + panel["width"] / 2, panel["y"] + panel["height"] / 2
-    straight = look(lambda picture: True, panel)
+    straight = screenshot(lambda picture: True, panel)
     for _ in range(4):
         screen.click(x, y, button=5)
-        # Each of the steps has been made before the next one.
+        # RViz must apply each zoom step before the next one.
         nearer = straight.pixels_per_metre
-        straight = look(lambda seen, nearer=nearer: seen.pixels_per_metre < 0.95 * nearer, panel)
+        straight = screenshot(
+            lambda seen, nearer=nearer: seen.pixels_per_metre < 0.95 * nearer, panel
+        )
     assert straight.pixels_per_metre * 10 < 0.8 * panel["height"]
     screen.move(x + 150, y + 100)
     screen.press()
@@ -364,7 +370,7 @@ def test_model_is_below_the_mouse_in_a_rotated_view(
         screen.move(x + 150 + 20 * step, y + 100)
     screen.release()
     # The bounding box of a rotated square is larger.
-    look(lambda picture: picture.pixels_per_metre > 1.2 * straight.pixels_per_metre, panel)
+    screenshot(lambda picture: picture.pixels_per_metre > 1.2 * straight.pixels_per_metre, panel)
     choose(viewer, screen, room.parent / "crate.model.yaml")
     for mouse in ((x + 120, y + 60), (x - 40, y + 130)):
         screen.move(*mouse)
@@ -373,38 +379,38 @@ def test_model_is_below_the_mouse_in_a_rotated_view(
             rows, columns = np.nonzero(picture.mask(CYAN))
             return len(rows) > 30 and math.dist((columns.mean(), rows.mean()), mouse) < 6
 
-        look(is_below_the_mouse, panel)
+        screenshot(is_below_the_mouse, panel)
     screen.key("Escape")
     viewer.click("zoom_to_fit")
-    look(lambda picture: abs(picture.pixels_per_metre * 10.6 - panel["height"]) < 8, panel)
+    screenshot(lambda picture: abs(picture.pixels_per_metre * 10.6 - panel["height"]) < 8, panel)
 
 
 def test_escape_cancels(
-    look: Callable[..., Any],
+    screenshot: Callable[..., Any],
     viewer: Any,
     screen: Any,
     panel: Any,
     room: Path,
     eventually: Callable[..., Any],
 ) -> None:
-    picture = look(lambda picture: True, panel)
+    picture = screenshot(lambda picture: True, panel)
     choose(viewer, screen, room.parent / "crate.model.yaml")
     x, y = picture.at(2, -1)
     screen.click(x, y)
-    look(lambda picture: len(picture.places(YELLOW)), panel)
+    screenshot(lambda picture: len(picture.places(YELLOW)), panel)
     # The camera can still be moved.
     screen.press(2)
     for step in range(1, 6):
         screen.move(x + 20 * step, y)
     screen.release(2)
-    look(lambda seen: abs(seen.center[0] - picture.center[0] - 100) < 8, panel)
+    screenshot(lambda seen: abs(seen.center[0] - picture.center[0] - 100) < 8, panel)
     viewer.click("zoom_to_fit")
-    look(lambda seen: abs(seen.center[0] - picture.center[0]) < 2, panel)
+    screenshot(lambda seen: abs(seen.center[0] - picture.center[0]) < 2, panel)
     screen.key("Escape")
-    look(lambda picture: not len(picture.places(YELLOW)), panel)
+    screenshot(lambda picture: not len(picture.places(YELLOW)), panel)
     viewer.until("interact", lambda widget: widget["checked"])
     viewer.until("spawn", lambda widget: not widget["checked"])
-    # In the dialog, too.
+    # Escape closes the dialog as well.
     viewer.click("spawn")
     viewer.until("path", lambda widget: widget["active"])
     screen.key("Escape")
@@ -413,7 +419,7 @@ def test_escape_cancels(
 
 
 def test_errors_are_shown_in_dialogs(
-    look: Callable[..., Any], viewer: Any, screen: Any, panel: Any, room: Path, spawned: Any
+    screenshot: Callable[..., Any], viewer: Any, screen: Any, panel: Any, room: Path, spawned: Any
 ) -> None:
     choose(viewer, screen, room.parent / "nothing.yaml")
     label = viewer.until(
@@ -424,10 +430,10 @@ def test_errors_are_shown_in_dialogs(
     # The service reports an error: the name is already in use.
     renamed = room.parent / "robot.yaml"
     renamed.write_text((room.parent / "robot.model.yaml").read_text())
-    picture = look(lambda picture: True, panel)
+    picture = screenshot(lambda picture: True, panel)
     choose(viewer, screen, renamed)
     screen.move(*picture.at(2, 2))
-    look(lambda picture: len(picture.places(YELLOW)), panel)
+    screenshot(lambda picture: len(picture.places(YELLOW)), panel)
     screen.click(*picture.at(2, 2))
     screen.click(*picture.at(2, 2))
     label = viewer.until(
@@ -439,7 +445,7 @@ def test_errors_are_shown_in_dialogs(
 
 def test_dragged_robot_moves(
     ros: Any,
-    look: Callable[..., Any],
+    screenshot: Callable[..., Any],
     viewer: Any,
     screen: Any,
     panel: Any,
@@ -450,12 +456,12 @@ def test_dragged_robot_moves(
     assert not paused.next().data
 
     def drags() -> bool:
-        viewer.click("whole_world")
+        viewer.click("zoom_to_fit")
         # The handle covers the robot.
-        picture = look(lambda picture: not len(picture.near(BLUE, *START, 0.15)), panel)
+        picture = screenshot(lambda picture: not len(picture.near(BLUE, *START, 0.15)), panel)
         screen.move(*picture.at(START[0] + 0.1, START[1]))
         screen.move(*picture.at(*START))
-        look(lambda picture: True, panel)
+        screenshot(lambda picture: True, panel)
         screen.press()
         for step in range(1, 11):
             screen.move(*picture.at(START[0] + 0.3 * step, START[1] - 0.2 * step))

@@ -1,4 +1,4 @@
-"""How the node starts and ends: parameters, failures, signals, a master that goes away."""
+"""The start of the node: parameters, invalid worlds, the ROS master, and the launch files."""
 
 from __future__ import annotations
 
@@ -12,40 +12,8 @@ import cv2
 import numpy as np
 import pytest
 from rosgraph_msgs.msg import Clock
-from std_srvs.srv import Empty
 
 from flatland.msg import DebugTopicList
-
-SLOW_PLUGINS = """
-import time
-import flatland
-
-class SlowStart(flatland.WorldPlugin):
-    def on_initialize(self, config):
-        print("initializing", flush=True)
-        time.sleep(3600)  # longer than any test waits
-
-class EndlessStep(flatland.WorldPlugin):
-    def before_physics_step(self, timekeeper):
-        print("stepping", flush=True)
-        while True:
-            pass
-
-class EndlessEnd(flatland.WorldPlugin):
-    def on_shutdown(self):
-        while True:
-            pass
-"""
-MANIFEST = """
-<library path=".">
-  <class name="slow::SlowStart" type="slow_plugins.SlowStart"
-         base_class_type="flatland::WorldPlugin"/>
-  <class name="slow::EndlessStep" type="slow_plugins.EndlessStep"
-         base_class_type="flatland::WorldPlugin"/>
-  <class name="slow::EndlessEnd" type="slow_plugins.EndlessEnd"
-         base_class_type="flatland::WorldPlugin"/>
-</library>
-"""
 
 
 @pytest.fixture(scope="module")
@@ -72,7 +40,7 @@ def assert_stops(process: Any, number: signal.Signals) -> None:
         ("update_rate", ".nan"),
         ("step_size", "0"),
         ("step_size", ".inf"),
-        ("step_size", "5000"),  # beyond what the physics takes
+        ("step_size", "5000"),  # above the limit of the physics
         ("show_viz", "maybe"),
         ("viz_pub_rate", "0"),
         ("viz_pub_rate", "[1, 2]"),
@@ -82,16 +50,17 @@ def assert_stops(process: Any, number: signal.Signals) -> None:
         ("seed", "lucky"),
         ("benchmark_duration", "0"),
         ("plugin_timeout", "0"),
+        ("shutdown_timeout", "-1"),
     ],
 )
-def test_bad_parameter_is_named_in_one_fatal_line(
+def test_invalid_parameter_is_reported_in_one_fatal_line(
     launcher: Any, world: Path, parameter: str, value: str
 ) -> None:
     process = launcher.start(world_path=world, **{parameter: value})
     assert process.wait() == 1
     (line,) = fatal_lines(process)
     assert f'Invalid parameter "~{parameter}"' in line
-    # YAML gives rospy a float where the text has one.
+    # YAML converts some of the texts to floats.
     assert value.lstrip(".") in line or str(float(value)) in line
     assert "Traceback" not in process.output
 
@@ -116,7 +85,7 @@ def test_missing_world_path(launcher: Any, given: dict[str, str]) -> None:
         ),
     ],
 )
-def test_failing_world_is_told_in_one_fatal_line(
+def test_invalid_world_is_reported_in_one_fatal_line(
     launcher: Any, ros: Any, tmp_path: Path, text: str | None, reason: str
 ) -> None:
     path = tmp_path / "world.yaml"
@@ -130,7 +99,7 @@ def test_failing_world_is_told_in_one_fatal_line(
     assert ros.registered() == {"publishers": set(), "subscribers": set(), "services": set()}
 
 
-def test_world_that_fails_late_leaves_no_topics(
+def test_world_with_an_invalid_second_model_leaves_no_topics(
     launcher: Any, ros: Any, write_world: Callable[..., Path]
 ) -> None:
     world = write_world(
@@ -152,46 +121,7 @@ def test_roslaunch_ends_with_a_failed_start(launcher: Any) -> None:
     process.wait()
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-@pytest.mark.parametrize("state", ["running", "paused", "as fast as possible"])
-def test_signal_ends_the_node(
-    launcher: Any, ros: Any, world: Path, number: signal.Signals, state: str
-) -> None:
-    rate = 0 if state == "as fast as possible" else 200
-    process = launcher.server(world, update_rate=rate)
-    ros.topic("/clock", Clock).next()
-    if state == "paused":
-        ros.call("/pause", Empty)
-    assert_stops(process, number)
-    assert ros.registered() == {"publishers": set(), "subscribers": set(), "services": set()}
-
-
-@pytest.mark.parametrize(
-    ("plugin", "line"),
-    [("SlowStart", "initializing"), ("EndlessStep", "stepping"), ("EndlessEnd", "loaded")],
-)
-def test_signal_ends_a_node_that_a_plugin_holds_up(
-    launcher: Any, ros: Any, write_world: Callable[..., Path], plugin: str, line: str
-) -> None:
-    world = write_world(plugins=f"[{{name: slow, type: 'slow::{plugin}'}}]")
-    (world.parent / "slow_plugins.py").write_text(SLOW_PLUGINS)
-    manifest = world.parent / "manifest.xml"
-    manifest.write_text(MANIFEST)
-    launcher.environment = {**launcher.environment, "FLATLAND_PLUGIN_PATH": str(manifest)}
-    process = launcher.start(world_path=world)
-    process.wait_for_line(line)
-    assert_stops(process, signal.SIGINT)
-    assert ros.registered() == {"publishers": set(), "subscribers": set(), "services": set()}
-
-
-def test_rosnode_kill_ends_the_node(launcher: Any, ros: Any, world: Path) -> None:
-    process = launcher.server(world)
-    launcher.program("rosnode", "kill", "/flatland_server").wait()
-    assert process.wait() == 0
-    assert ros.registered() == {"publishers": set(), "subscribers": set(), "services": set()}
-
-
-def test_node_waits_for_a_master_and_can_be_stopped_meanwhile(launcher: Any, world: Path) -> None:
+def test_node_that_waits_for_a_master_can_be_stopped(launcher: Any, world: Path) -> None:
     uri = f"http://127.0.0.1:{free_port()}"
     launcher.environment = {**launcher.environment, "ROS_MASTER_URI": uri}
     process = launcher.start(world_path=world)
@@ -200,8 +130,10 @@ def test_node_waits_for_a_master_and_can_be_stopped_meanwhile(launcher: Any, wor
     assert process.wait() == 0
 
 
-def test_node_says_that_it_waits_for_who_never_answers(launcher: Any, world: Path) -> None:
-    """Something else has the master's port, takes what it is sent, and keeps silent."""
+def test_node_that_waits_for_an_unresponsive_server_can_be_stopped(
+    launcher: Any, world: Path
+) -> None:
+    """A program on the port of the master accepts connections and never responds."""
     with socket.create_server(("127.0.0.1", 0)) as silent:
         uri = f"http://127.0.0.1:{silent.getsockname()[1]}"
         launcher.environment = {**launcher.environment, "ROS_MASTER_URI": uri}
@@ -211,14 +143,14 @@ def test_node_says_that_it_waits_for_who_never_answers(launcher: Any, world: Pat
 
 
 @pytest.mark.parametrize("uri", ["nonsense", "http://", ""])
-def test_node_names_an_address_that_is_none(launcher: Any, world: Path, uri: str) -> None:
+def test_invalid_master_address_is_reported(launcher: Any, world: Path, uri: str) -> None:
     launcher.environment = {**launcher.environment, "ROS_MASTER_URI": uri}
     process = launcher.start(world_path=world)
     assert process.wait() == 1
     assert process.output.strip() == f"invalid master URI: {uri} (from ROS_MASTER_URI)"
 
 
-def test_node_outlives_its_master(launcher: Any, world: Path, eventually: Any) -> None:
+def test_node_continues_without_its_master(launcher: Any, world: Path, eventually: Any) -> None:
     port = free_port()
     uri = f"http://127.0.0.1:{port}"
     launcher.environment = {**launcher.environment, "ROS_MASTER_URI": uri}
@@ -232,7 +164,7 @@ def test_node_outlives_its_master(launcher: Any, world: Path, eventually: Any) -
     assert_stops(process, signal.SIGTERM)
 
 
-def test_show_viz_without_a_display_is_no_failure(launcher: Any, ros: Any, world: Path) -> None:
+def test_markers_are_published_without_a_display(launcher: Any, ros: Any, world: Path) -> None:
     environment = {name: v for name, v in launcher.environment.items() if name != "DISPLAY"}
     launcher.environment = environment
     launcher.launch("flatland", "server.launch", f"world_path:={world}")
@@ -240,7 +172,7 @@ def test_show_viz_without_a_display_is_no_failure(launcher: Any, ros: Any, world
     ros.topic("/flatland_server/debug/topics", DebugTopicList).next()
 
 
-def test_server_launch_sets_all_parameters(launcher: Any, ros: Any, world: Path) -> None:
+def test_server_launch_passes_all_parameters(launcher: Any, ros: Any, world: Path) -> None:
     process = launcher.launch(
         "flatland",
         "server.launch",
@@ -253,6 +185,7 @@ def test_server_launch_sets_all_parameters(launcher: Any, ros: Any, world: Path)
         "simplify_map:=1",
         "seed:=7",
         "plugin_timeout:=30",
+        "shutdown_timeout:=5",
     )
     times = [message.clock.to_nsec() for message in ros.topic("/clock", Clock).take(20)]
     assert {time % 10_000_000 for time in times} == {0}
@@ -267,6 +200,8 @@ def test_server_launch_sets_all_parameters(launcher: Any, ros: Any, world: Path)
         "simplify_map": 1,
         "seed": 7,
         "plugin_timeout": 30,
+        "shutdown_timeout": 5,
+        "if_blocked": "warn",
     }
     assert ros.master.getParam("/use_sim_time") is True
     process.wait_for_line("real-time factor asked inf")
@@ -311,12 +246,12 @@ def test_map_is_simplified_by_a_private_or_global_parameter(
     ("file", "node"),
     [("server.launch", "flatland_server"), ("benchmark.launch", "flatland_benchmark")],
 )
-def test_launch_without_a_seed_forgets_that_of_the_last_launch(
+def test_launch_without_a_seed_replaces_the_seed_of_the_last_launch(
     launcher: Any, ros: Any, world: Path, file: str, node: str
 ) -> None:
-    ros.master.setParam(f"/{node}/seed", 5)  # as the last launch left it on the master
-    shown = ["show_viz:=false"] if file == "server.launch" else ["benchmark_duration:=1"]
-    process = launcher.launch("flatland", file, f"world_path:={world}", *shown)
+    ros.master.setParam(f"/{node}/seed", 5)  # left on the master by an earlier launch
+    arguments = ["show_viz:=false"] if file == "server.launch" else ["benchmark_duration:=1"]
+    process = launcher.launch("flatland", file, f"world_path:={world}", *arguments)
     process.wait_for_line(r"seed \d+ drawn at random")
 
 

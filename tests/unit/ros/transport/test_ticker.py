@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 from waiting import TIMEOUT
 
-from flatland.ros.ticker import Ticker
+from flatland.ros.transport.ticker import Ticker
 
 RATE = 50.0  # Hz
 

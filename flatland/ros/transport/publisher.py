@@ -1,4 +1,4 @@
-"""A publisher that never waits: not for subscribers, and not for the ROS master."""
+"""A publisher that blocks neither on subscribers nor on the ROS master."""
 
 from __future__ import annotations
 
@@ -8,19 +8,19 @@ from typing import Any
 
 import rospy
 
-from flatland.ros.registrar import Registrar
 from flatland.ros.transport.outbox import Outbox
+from flatland.ros.transport.registrar import Registrar
 
 
 class Publisher:
     """Publishes messages on a topic from the thread that steps the world.
 
-    rospy does the registration, the connections and the serialization; only the writing is ours,
-    see `outbox`.
+    Registration, connections and serialization are those of rospy; only the writes to sockets are
+    replaced, see `outbox`.
 
     Attributes:
-        topic: The resolved name of the topic.
-        connected: Whether anybody subscribes.
+        topic: Resolved name of the topic.
+        connected: Whether the topic has subscribers.
     """
 
     def __init__(
@@ -34,17 +34,17 @@ class Publisher:
         on_connection: Callable[[bool], None] | None = None,
         owner: str = "",
     ) -> None:
-        """Advertises a topic, soon.
+        """Advertises a topic asynchronously.
 
         Args:
-            registrar: Talks to the ROS master.
-            topic: Under the node's namespace, global with a leading `/`.
-            message_type: The ROS message class.
-            queue_size: How many messages wait for a subscriber that reads slowly; of more the
-                oldest are dropped.
-            latch: Whether a new subscriber gets the last message at once.
-            on_connection: Told whether anybody subscribes, whenever that may have changed; called
-                in a thread of rospy.
+            registrar: Registers the topic with the ROS master.
+            topic: Name in the namespace of the node, global with a leading `/`.
+            message_type: ROS message class.
+            queue_size: Maximum number of messages queued for a slow subscriber; beyond it, the
+                oldest ones are dropped.
+            latch: Whether a new subscriber receives the last message when it connects.
+            on_connection: Called in a rospy thread whenever a subscriber may have connected or
+                disconnected, with whether there are subscribers.
             owner: Plugin that publishes, for messages.
 
         Raises:
@@ -60,21 +60,22 @@ class Publisher:
         self._owner = owner
         self._closed = False
         self._publisher: rospy.Publisher | None = None
-        self._early_message: Any = None
-        # Neither is held while rospy's own locks may be waited for in another order.
+        self._early_message: Any = None  # latched message of a topic that is not advertised yet
+        # Two locks, because rospy calls `_update` while it holds locks of its own: with one lock,
+        # `publish` of an early message could deadlock with a new connection.
         self._early_lock = threading.Lock()
         self._update_lock = threading.Lock()
-        self._listener = _Listener(self._update)
+        self._listener = _ConnectionListener(self._update)
         registrar.claim("publisher", self.topic, message_type, owner)
         registrar.submit(self._open)
 
     def publish(self, message: Any) -> None:
-        """Sends a message to all subscribers; does nothing once closed or at shutdown."""
+        """Sends a message to all subscribers; has no effect once closed or during a shutdown."""
         if self._closed:
             return
         publisher = self._publisher
         if publisher is None:
-            # Not advertised yet: there is nobody, but a later subscriber may want it.
+            # Not advertised yet, so there are no subscribers; only a latched message is needed.
             with self._early_lock:
                 publisher = self._publisher
                 if publisher is None:
@@ -83,12 +84,12 @@ class Publisher:
         try:
             publisher.publish(message)
         except Exception:
-            # At shutdown rospy takes its topics apart in another thread.
+            # During a shutdown, rospy closes its topics in another thread.
             if not rospy.core.is_shutdown_requested():
                 raise
 
     def close(self) -> None:
-        """Ends the topic, soon, unless this node has another publisher of it."""
+        """Unregisters the topic asynchronously, unless this node has another publisher of it."""
         if self._closed:
             return
         self._closed = True
@@ -101,7 +102,7 @@ class Publisher:
     def _open(self) -> None:
         if self._closed:
             return
-        # Connections that come before `_take_over` get rospy's own queue, which does not block
+        # Connections accepted before `_take_over` use the queue of rospy, which does not block
         # either.
         publisher = rospy.Publisher(self.topic, self._message_type, queue_size=1, latch=self._latch)
         self._take_over(publisher.impl)
@@ -113,7 +114,7 @@ class Publisher:
         self._update()
 
     def _take_over(self, impl: Any) -> None:
-        """Puts an outbox into every connection that is made from now on."""
+        """Gives each further connection an outbox, and observes the connections."""
         if "add_connection" not in vars(impl):  # Publishers of one topic share the connections.
             add_connection = impl.add_connection
 
@@ -138,8 +139,8 @@ class Publisher:
     # -- in rospy's threads ----------------------------------------------------------------
 
     def _update(self) -> None:
-        # The state is read under a lock and not taken from the listener's arguments: a connection
-        # that comes and one that goes are told of by two threads, in any order.
+        # The state is read under a lock instead of taken from the arguments of the listener,
+        # because two threads report a new and a closed connection in any order.
         with self._update_lock:
             publisher = self._publisher
             impl = publisher.impl if publisher is not None else None
@@ -149,17 +150,17 @@ class Publisher:
                 self._on_connection(connected)
 
 
-class _Listener(rospy.SubscribeListener):  # type: ignore[misc]
-    """Tells of every connection that comes or goes."""
+class _ConnectionListener(rospy.SubscribeListener):  # type: ignore[misc]
+    """Reports every new and every closed connection."""
 
-    def __init__(self, changed: Callable[[], None]) -> None:
+    def __init__(self, on_change: Callable[[], None]) -> None:
         super().__init__()
-        self._changed = changed
+        self._on_change = on_change
 
     def peer_subscribe(self, _topic: str, _publish: Any, _publish_single: Any) -> None:
-        """Hears of a new subscriber."""
-        self._changed()
+        """Reports a new subscriber; called by rospy."""
+        self._on_change()
 
     def peer_unsubscribe(self, _topic: str, _num_peers: int) -> None:
-        """Hears that a subscriber is gone."""
-        self._changed()
+        """Reports a closed connection; called by rospy."""
+        self._on_change()

@@ -1,8 +1,8 @@
-"""Talks to the ROS master in a thread of its own, so that nobody else waits for it.
+"""Calls to the ROS master in a separate thread, so that no other thread blocks on it.
 
-Each topic and service costs a call to the master: a millisecond when it answers, and for as long
-as it takes when it does not, since rospy tries again and again. The thread that steps the world
-only says what it wants; things are done in that order.
+Each topic and service costs a call to the master. The call takes a millisecond if the master
+responds, and otherwise blocks until it does, because rospy retries indefinitely. The thread that
+steps the world only queues these calls; they are made in the order in which they were queued.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ _LOG = logging.getLogger("flatland")
 
 
 class Registrar:
-    """Registers and unregisters topics and services, one after the other."""
+    """Registers and unregisters topics and services in order."""
 
     def __init__(self) -> None:
         """Starts the thread."""
@@ -34,17 +34,17 @@ class Registrar:
         self._thread.start()
 
     def submit(self, action: Callable[[], object]) -> None:
-        """Does something after all that was submitted before; returns at once."""
+        """Queues an action and returns immediately."""
         self._actions.put(action)
 
     def flush(self, timeout: float) -> bool:
-        """Waits until all is done that was submitted before.
+        """Waits until all actions queued so far are done.
 
         Args:
-            timeout: How long to wait at most [s].
+            timeout: Limit of wall time [s].
 
         Returns:
-            Whether it is done.
+            Whether they are done.
         """
         done = threading.Event()
         self.submit(done.set)
@@ -53,17 +53,17 @@ class Registrar:
     def claim(
         self, kind: str, name: str, ros_type: type[Any], owner: str, *, shared: bool = True
     ) -> None:
-        """Reserves a name; rospy itself would mix up two types of one name.
+        """Reserves a name, because rospy does not detect two types of the same name.
 
         Args:
             kind: `publisher`, `subscriber` or `service`.
             name: Resolved name.
-            ros_type: The message or service class.
+            ros_type: Message or service class.
             owner: Plugin that uses the name, for messages; empty for the node itself.
-            shared: Whether others of the same type may have it as well.
+            shared: Whether the name may have other owners with the same type.
 
         Raises:
-            FlatlandError: The name has another type, or is taken.
+            FlatlandError: The name has another type, or cannot be shared.
         """
         key = kind, name
         with self._lock:
@@ -80,7 +80,7 @@ class Registrar:
             owners.append(owner)
 
     def release(self, kind: str, name: str, owner: str) -> None:
-        """Gives back what `claim` reserved."""
+        """Releases a name reserved by `claim`."""
         key = kind, name
         with self._lock:
             self._owners[key].remove(owner)
@@ -88,10 +88,10 @@ class Registrar:
                 del self._owners[key], self._types[key]
 
     def close(self, timeout: float) -> None:
-        """Drops what is not done yet and ends; rospy unregisters all at once at shutdown.
+        """Discards the queue and ends the thread; rospy unregisters everything at shutdown.
 
         Args:
-            timeout: How long to wait for what is being done [s].
+            timeout: Limit of wall time for the action in progress [s].
         """
         self._closed = True
         self.submit(lambda: None)
@@ -105,4 +105,4 @@ class Registrar:
             try:
                 action()
             except Exception:
-                _LOG.exception("a topic or service could not be registered")
+                _LOG.exception("cannot register or unregister a topic or service")
