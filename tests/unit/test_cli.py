@@ -236,7 +236,7 @@ class TestCheckModel:
         done = run("check", "robot.yaml", "--param", "/radius=-1", cwd=files.folder)
         assert done.returncode == 1
         assert 'Invalid "radius"' in done.stderr
-        assert f"[{files.folder}/robot.yaml:5]" in done.stderr
+        assert f"[{files.folder}/robot.yaml:6]" in done.stderr
 
     @pytest.mark.parametrize(
         ("old", "new", "message"),
