@@ -203,7 +203,7 @@ def _show(options: argparse.Namespace) -> None:
 
 def _check(options: argparse.Namespace) -> None:
     if is_model_file(options.path, dict(options.param)):
-        with load_model_alone(options.path, dict(options.param)) as world:
+        with load_model_alone(World, options.path, dict(options.param)) as world:
             layers = ", ".join(world.collision_filter.names) or "none"
             _print_contents(options.path, world)
             print(f"checked in an empty world with the layers that the model names: {layers}")

@@ -1,7 +1,7 @@
-"""The exceptions of flatland.
+"""Exceptions of flatland.
 
-A user's mistake in a file or a request is a `FlatlandError` whose text starts with the prefix
-of its class, so that logs and service answers tell at a glance where the fault lies.
+An invalid file or request of a user raises a `FlatlandError`, whose text starts with the prefix of
+its class, so that the origin of the error is visible in logs and service responses.
 """
 
 from __future__ import annotations
@@ -10,59 +10,59 @@ from typing import ClassVar, Final
 
 
 class FlatlandError(Exception):
-    """Base of all errors that flatland raises on purpose."""
+    """Base class of the errors of flatland."""
 
     prefix: ClassVar[str] = ""
 
     def __init__(self, message: str = "") -> None:
-        """Stores the text behind the prefix of the class.
+        """Initializes the error.
 
         Args:
-            message: What is wrong and what was expected, without the prefix.
+            message: Description of the problem and of what was expected, without the prefix.
         """
         super().__init__(f"{self.prefix}{message}")
         self.message = message
 
 
 class YamlError(FlatlandError):
-    """Anything wrong in a YAML file or its values."""
+    """A YAML file, or a value in it, is invalid."""
 
     prefix = "Flatland YAML: "
 
 
 class UnreadableFileError(YamlError):
-    """A YAML file that is not there or cannot be read; who names the file may add where."""
+    """A YAML file does not exist or cannot be read."""
 
 
 class PluginError(FlatlandError):
-    """A plugin that cannot be found, made or initialised."""
+    """A plugin cannot be found, created or initialized."""
 
     prefix = "Flatland plugin: "
 
 
 class MapFileError(FlatlandError):
-    """A map or data file that cannot be read."""
+    """A map or data file cannot be read."""
 
     prefix = "Flatland File: "
 
 
 class WorldError(FlatlandError):
-    """A run-time request that cannot be met, such as an unknown model."""
+    """A request at run time is invalid, for example because the model does not exist."""
 
     prefix = "Flatland World: "
 
 
 class PhysicsError(FlatlandError):
-    """A request that the physics engine refuses."""
+    """The physics engine rejects a request."""
 
 
 class StaleHandleError(PhysicsError):
-    """The object behind a handle was destroyed, or its world was closed."""
+    """The object of a handle has been destroyed, or its world has been closed."""
 
 
 class WorldLockedError(PhysicsError):
-    """The world is stepping: nothing may be created, destroyed or moved now."""
+    """The world is being stepped; objects cannot be created, destroyed or moved."""
 
 
 PLUGIN_FAULTS: Final = (Exception, SystemExit)
-"""What a plugin's code may raise without ending the simulator; `sys.exit` is the plugin's end."""
+"""Exceptions of plugin code that do not end the simulator; `sys.exit` ends only the plugin."""

@@ -1,10 +1,10 @@
-"""ROS graph names, as roscpp cleans and checks them; needs no ROS."""
+"""ROS graph names, cleaned and validated as in roscpp; independent of ROS."""
 
 from __future__ import annotations
 
 import re
 
-# Without the private prefix ~, which has no meaning within a model.
+# Without the private prefix `~`, which has no meaning in a model.
 _LEGAL_NAME = re.compile(r"[A-Za-z/][\w/]*", re.ASCII)
 
 
@@ -20,14 +20,14 @@ def is_legal_namespace(namespace: str) -> bool:
 
 
 def resolve_topic(topic: str, namespace: str = "") -> str:
-    """Puts a topic under a namespace.
+    """Returns the name of a topic in a namespace.
 
     Args:
-        topic: Name of the topic; a leading `/` makes it global. It is cleaned.
-        namespace: Namespace of the model, may be empty. It is cleaned.
+        topic: Name of the topic, global if it starts with `/`; need not be clean.
+        namespace: Namespace of the model, may be empty; need not be clean.
 
     Returns:
-        `/topic` if the topic is global, else `namespace/topic`, which starts with a slash only
+        `/topic` if the topic is global, otherwise `namespace/topic`, which starts with a slash only
         if the namespace does, so that the ROS layer can resolve it in the namespace of the node.
 
     Raises:

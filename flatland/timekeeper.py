@@ -1,38 +1,39 @@
-"""Simulated time, kept as integer nanoseconds so that it never drifts."""
+"""Simulated time, stored as integer nanoseconds to avoid drift."""
 
 from __future__ import annotations
 
 NANOSECONDS = 1_000_000_000
 
-
-# What Box2D's solver can be asked for [s].
-LEAST_STEP, GREATEST_STEP = 1e-6, 1000.0
+MIN_STEP_SIZE = 1e-6
+"""Smallest step of the Box2D solver [s]."""
+MAX_STEP_SIZE = 1000.0
+"""Largest step of the Box2D solver [s]."""
 
 
 class Timekeeper:
-    """Holds the simulated time and the size of a step.
+    """The simulated time and the step size.
 
     Attributes:
         sim_time_ns: Simulated time since the start [ns].
         step_size: Simulated time of one step [s].
-        step_size_ns: The same [ns], exact.
+        step_size_ns: Simulated time of one step [ns], exact.
     """
 
-    # Plain attributes, as they are read many times in every step.
+    # Plain attributes, because they are read many times in every step.
     __slots__ = ("sim_time_ns", "step_size", "step_size_ns")
 
     def __init__(self, step_size: float = 0.005) -> None:
-        """Starts at time 0.
+        """Initializes the time to 0.
 
         Args:
             step_size: Simulated time of one step [s], from 1e-6 to 1000; rounded to nanoseconds.
 
         Raises:
-            ValueError: The step size is out of its range or not a number.
+            ValueError: The step size is out of range or NaN.
         """
-        if not LEAST_STEP <= step_size <= GREATEST_STEP:
+        if not MIN_STEP_SIZE <= step_size <= MAX_STEP_SIZE:
             raise ValueError(
-                f"step_size must be from {LEAST_STEP:g} to {GREATEST_STEP:g} s, got {step_size}"
+                f"step_size must be from {MIN_STEP_SIZE:g} to {MAX_STEP_SIZE:g} s, got {step_size}"
             )
         self.step_size_ns = round(step_size * NANOSECONDS)
         self.step_size = self.step_size_ns / NANOSECONDS
@@ -45,9 +46,9 @@ class Timekeeper:
 
     @property
     def max_step_size(self) -> float:
-        """Longest step that may come [s]; the same as `step_size`, steps being of one size."""
+        """Longest possible step [s]; equal to `step_size`, because all steps have the same size."""
         return self.step_size
 
     def advance(self) -> None:
-        """Moves the time on by one step."""
+        """Advances the time by one step."""
         self.sim_time_ns += self.step_size_ns

@@ -1,7 +1,7 @@
-"""What plugins emit and take: plain, frozen values that know no ROS.
+"""Immutable values that plugins publish and receive, independent of ROS.
 
-Stamps are simulated nanoseconds, angles [rad], lengths [m], frames ROS frame ids. The ROS layer
-turns each type into a message by an adapter.
+Stamps are simulated times [ns], angles are in [rad], lengths in [m], and frames are ROS frame ids.
+The ROS layer converts each type to a message with an adapter.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ ZERO_COVARIANCE_3 = _zeros(3, 3)
 
 @dataclass(frozen=True, slots=True)
 class Twist:
-    """A planar velocity command [m/s], [rad/s]; what it means is the drive's affair."""
+    """A planar velocity command [m/s, m/s, rad/s], interpreted by the drive plugin."""
 
     linear_x: float = 0.0
     linear_y: float = 0.0
@@ -44,8 +44,8 @@ class LaserScan:
         angle_increment: Angle between beams [rad], negative for a clockwise scan.
         time_increment: Time between beams [s].
         scan_time: Time between scans [s].
-        range_min: Least range [m].
-        range_max: Greatest range [m].
+        range_min: Minimum range [m].
+        range_max: Maximum range [m].
         ranges: Range of each beam [m], shape (n,), float32.
         intensities: Intensity of each beam, shape (n,) or (0,), float32.
     """
@@ -65,16 +65,16 @@ class LaserScan:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Odometry:
-    """Where a body is and how it moves, as in `nav_msgs/Odometry`.
+    """Pose and velocity of a body, as in `nav_msgs/Odometry`.
 
     Attributes:
         stamp: Simulated time [ns].
         frame_id: Frame of the pose.
         child_frame_id: Frame of the body.
-        pose: (x, y, yaw) of the body's origin.
-        twist: (vx, vy, omega) of the body's origin.
-        pose_covariance: Shape (6, 6), order x, y, z, roll, pitch, yaw.
-        twist_covariance: Shape (6, 6), the same order.
+        pose: Pose (x, y, yaw) of the origin of the body [m, m, rad].
+        twist: Velocity (vx, vy, omega) of the origin of the body [m/s, m/s, rad/s].
+        pose_covariance: Covariance of x, y, z, roll, pitch, yaw; shape (6, 6).
+        twist_covariance: Covariance of the velocities in the same order; shape (6, 6).
     """
 
     stamp: int
@@ -93,8 +93,8 @@ class TwistWithCovariance:
     Attributes:
         stamp: Simulated time [ns].
         frame_id: Frame of the velocity.
-        twist: (vx, vy, omega).
-        covariance: Shape (6, 6), order x, y, z, roll, pitch, yaw.
+        twist: Velocity (vx, vy, omega) [m/s, m/s, rad/s].
+        covariance: Covariance of the velocities along and about x, y, z; shape (6, 6).
     """
 
     stamp: int
@@ -112,10 +112,10 @@ class Imu:
         frame_id: Frame of the sensor.
         yaw: Orientation about z [rad].
         yaw_rate: Angular velocity about z [rad/s].
-        linear_acceleration: (x, y) in the body frame [m/s²].
-        orientation_covariance: Shape (3, 3).
-        angular_velocity_covariance: Shape (3, 3).
-        linear_acceleration_covariance: Shape (3, 3).
+        linear_acceleration: Acceleration (x, y) in the body frame [m/s²].
+        orientation_covariance: Covariance of roll, pitch, yaw; shape (3, 3).
+        angular_velocity_covariance: Covariance of the angular velocities; shape (3, 3).
+        linear_acceleration_covariance: Covariance of the accelerations; shape (3, 3).
     """
 
     stamp: int
@@ -130,7 +130,7 @@ class Imu:
 
 @dataclass(frozen=True, slots=True)
 class NavSatFix:
-    """A satellite position on WGS84, as in `sensor_msgs/NavSatFix`; [deg], [deg], [m]."""
+    """A satellite position on WGS84 [deg, deg, m], as in `sensor_msgs/NavSatFix`."""
 
     stamp: int
     frame_id: str
@@ -141,14 +141,14 @@ class NavSatFix:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Collision:
-    """One live contact between two entities, seen from entity A.
+    """A current contact between two entities.
 
     Attributes:
-        entity_a: Name of the model that reports.
-        body_a: Its body.
+        entity_a: Name of the model that reports the contact.
+        body_a: Name of the body of entity A.
         entity_b: Name of the other model or layer.
-        body_b: Its body.
-        magnitude_forces: Force at each contact point [N], shape (k,).
+        body_b: Name of the body of entity B.
+        magnitude_forces: Magnitude of the force at each contact point [N], shape (k,).
         contact_positions: Contact points in the world frame [m], shape (k, 2).
         contact_normals: Unit normals from body A to body B, shape (k, 2).
     """
@@ -164,7 +164,7 @@ class Collision:
 
 @dataclass(frozen=True, slots=True)
 class Collisions:
-    """All live contacts of a model at one time."""
+    """All current contacts of a model."""
 
     stamp: int
     frame_id: str
@@ -173,16 +173,16 @@ class Collisions:
 
 @dataclass(frozen=True, slots=True)
 class Transform:
-    """Pose of the frame `child` in the frame `parent`, rolled about x before it is turned.
+    """Pose of the frame `child` in the frame `parent`: a roll, then a yaw, then a translation.
 
     Attributes:
         stamp: Simulated time [ns].
         parent: Frame id of the parent.
         child: Frame id of the child.
-        x: [m].
-        y: [m].
-        yaw: [rad].
-        roll: [rad], pi for a sensor mounted upside down.
+        x: Position of the child along x of the parent [m].
+        y: Position of the child along y of the parent [m].
+        yaw: Angle about z of the parent [rad].
+        roll: Angle about x of the child [rad], pi for a sensor mounted upside down.
     """
 
     stamp: int

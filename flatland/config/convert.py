@@ -1,10 +1,10 @@
-"""Converts the text of a scalar to the type that a parameter asks for."""
+"""Conversion of YAML nodes to the kinds of values that parameters have, and range checks."""
 
 from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import Any, Final, Literal, TypedDict
 
 from flatland.config.node import ListNode, MapNode, Node, ScalarNode
@@ -19,19 +19,43 @@ Key = str | int
 Color = tuple[float, float, float, float]
 
 
-class Sizes(TypedDict, total=False):
-    """How many items a list may have."""
+class Limits(TypedDict, total=False):
+    """Requirements of a number, or of each number of a vector, pose, colour or list.
+
+    Attributes:
+        finite: Whether infinity and NaN are rejected.
+        minimum: Smallest allowed number; NaN is rejected. None for no limit.
+        maximum: Largest allowed number; NaN is rejected. None for no limit.
+    """
+
+    finite: bool
+    minimum: float | None
+    maximum: float | None
+
+
+class ListSizes(TypedDict, total=False):
+    """Requirements of the size of a list.
+
+    Attributes:
+        min_size: Smallest number of items.
+        max_size: Largest number of items, None for no limit.
+        size: Exact number of items, None for any.
+    """
 
     min_size: int
     max_size: int | None
     size: int | None
 
 
+class ListLimits(Limits, ListSizes, total=False):
+    """Requirements of a list of numbers."""
+
+
 _FLOAT: Final = re.compile(r"[-+]?(\.[0-9]+|[0-9]+(\.[0-9]*)?)([eE][-+]?[0-9]+)?")
 _DECIMAL: Final = re.compile(r"[-+]?(0|[1-9][0-9]*)")
 _HEXADECIMAL: Final = re.compile(r"([-+]?)0x([0-9a-fA-F]+)")
 _OCTAL: Final = re.compile(r"([-+]?)0o?([0-7]+)")
-_INT_MIN: Final = -(2**31)  # what the reference, and Box2D behind it, can hold
+_INT_MIN: Final = -(2**31)  # the range of an int in the reference
 _INT_MAX: Final = 2**31 - 1
 
 
@@ -51,7 +75,7 @@ _SPECIAL_FLOATS: Final = {
 
 
 def to_string(text: str) -> str:
-    """Returns the text: any scalar is a string."""
+    """Returns the text unchanged."""
     return text
 
 
@@ -59,7 +83,7 @@ def to_float(text: str) -> float:
     """Converts a decimal number, `.inf` or `.nan` (also `inf`, `-inf`, `nan`).
 
     Raises:
-        ValueError: It is none, or beyond the range of a float.
+        ValueError: The text is not a number, or outside the range of a float.
     """
     if _FLOAT.fullmatch(text):
         number = float(text)
@@ -76,10 +100,10 @@ def to_int(text: str) -> int:
     """Converts a decimal (`12`), hexadecimal (`0x1f`) or octal (`0o17`, `017`) integer.
 
     Raises:
-        ValueError: It is none, or does not fit into 32 bits.
+        ValueError: The text is not an integer, or outside the 32-bit range.
     """
     if _DECIMAL.fullmatch(text):
-        # Longer than any 32-bit number; int() of a huge text would take long.
+        # A longer text is out of range in any case, and int() of a huge text is slow.
         number = int(text) if len(text) < 20 else _INT_MAX + 1
     elif match := _HEXADECIMAL.fullmatch(text):
         number = int(match[1] + match[2], 16)
@@ -96,7 +120,7 @@ def to_bool(text: str) -> bool:
     """Converts `true/false`, `yes/no`, `on/off`, `y/n` in lower, Capitalised or UPPER case.
 
     Raises:
-        ValueError: It is none of them.
+        ValueError: The text is none of these words.
     """
     if text in _TRUE:
         return True
@@ -109,7 +133,7 @@ def to_vector(node: Node) -> tuple[float, float]:
     """Converts a list of two floats.
 
     Raises:
-        ValueError: It is none.
+        ValueError: The node is not a list of two floats.
     """
     if not isinstance(node, ListNode) or len(node.items) != 2:
         raise ValueError("not a list of two")
@@ -117,8 +141,51 @@ def to_vector(node: Node) -> tuple[float, float]:
     return x, y
 
 
+def _numbers(value: Any) -> Iterator[float]:
+    if isinstance(value, (tuple, list)):
+        for item in value:
+            yield from _numbers(item)
+    else:
+        yield value
+
+
+def unmet_limit(
+    value: Any, finite: bool = False, minimum: float | None = None, maximum: float | None = None
+) -> str:
+    """Checks a value against `Limits`.
+
+    Args:
+        value: A number, or a tuple or list of such values; each number is checked.
+        finite: See `Limits`.
+        minimum: See `Limits`.
+        maximum: See `Limits`.
+
+    Returns:
+        The requirement in words, such as `must be finite and at least 1`, if the value violates it;
+        otherwise an empty string.
+    """
+    if all(
+        (not finite or math.isfinite(number))
+        and (minimum is None or number >= minimum)
+        and (maximum is None or number <= maximum)
+        for number in _numbers(value)
+    ):
+        return ""
+    if minimum is not None and maximum is not None:
+        limit = f"from {minimum:.12g} to {maximum:.12g}"
+    elif minimum == 0:
+        if not finite:
+            return "must not be negative or NaN"
+        limit = "not negative"
+    elif minimum is not None:
+        limit = f"at least {minimum:.12g}"
+    else:
+        limit = "" if maximum is None else f"at most {maximum:.12g}"
+    return "must be " + " and ".join(filter(None, ("finite" if finite else "", limit)))
+
+
 def to_plain(node: Node, _done: dict[int, object] | None = None) -> object:
-    """Converts a tree to dict, list, str and None; what an alias shares stays shared."""
+    """Converts a tree to dict, list, str and None; an alias becomes the object of its anchor."""
     done = {} if _done is None else _done
     if isinstance(node, ScalarNode):
         return node.text
@@ -146,7 +213,7 @@ CONVERSIONS: Final[dict[object, tuple[str, Callable[[Node], Any]]]] = {
     **dict.fromkeys(("bool", bool), ("bool", _scalar(to_bool))),
     "vector": ("vector", to_vector),
 }
-"""The name for messages and the conversion of each kind of a single value."""
+"""Name in error messages and conversion function by kind, for kinds that one node converts to."""
 
 TUPLE_SIZES: Final = {"pose": 3, "color": 4}
-"""How many floats each kind of fixed size has."""
+"""Number of floats of each kind that is a list of fixed size."""

@@ -1,9 +1,10 @@
-"""Evaluates the Lua of `$eval` in a sandbox.
+"""Sandboxed evaluation of the Lua expressions of `$eval`.
 
-World and model files come from strangers too, and `$eval` is a program. So each expression gets
-a Lua state of its own that holds no Python object at all: what it needs goes in as plain values,
-its result comes out as text. A parameter that it asks for and does not have yet ends the run; it
-is looked up and the expression starts again. Time and memory are bounded.
+World and model files can come from untrusted sources, and `$eval` is a program. Therefore each
+expression is evaluated in a separate Lua state that contains no Python objects: input is passed as
+plain values, and the result is returned as text. If the expression reads a parameter whose value
+has not been passed, the run ends, the value is looked up, and the expression is evaluated again.
+Time and memory are bounded.
 """
 
 from __future__ import annotations
@@ -18,27 +19,29 @@ from numbers import Real
 from typing import Any, NoReturn
 
 TIME_LIMIT = 1.0
-"""Processor time that an expression may take [s]."""
+"""Limit of the processor time of an expression [s]."""
 MEMORY_LIMIT = 16 * 1024 * 1024
-"""Memory that an expression may use [bytes]."""
-_MAX_INPUT = 1024 * 1024  # pushed into the state outside of any protection, so far below the limit
+"""Limit of the memory of an expression [bytes]."""
+# Far below the memory limit, because the input is copied into the state without protection [bytes].
+_MAX_INPUT = 1024 * 1024
 _MAX_RUNS = 200
 
-# Debian's lupa has a single runtime, LuaJIT; the others have Lua 5.1 and more.
+# The lupa package of Debian contains only LuaJIT; others contain several versions of Lua.
 _RUNTIMES = ("lupa.lua51", "lupa.luajit21", "lupa.luajit20", "lupa")
 
 
 class EvalError(Exception):
-    """An expression that failed; the text is Lua's message."""
+    """The evaluation of an expression failed; the text is the Lua error message."""
 
 
 @dataclass(frozen=True, slots=True)
 class EvalResult:
-    """What an expression gave.
+    """Result of an expression.
 
     Attributes:
-        text: The value in Lua's `tostring` form, empty for nil.
-        unset: What it asked for without a default and is not set, such as `env "HOME"`.
+        text: The value as converted by `tostring` of Lua, empty for nil.
+        unset: Unset variables and parameters that were read without a default, such as
+            `env "HOME"`.
     """
 
     text: str
@@ -49,12 +52,13 @@ def evaluate(expression: str, param: Callable[[str], object]) -> EvalResult:
     """Evaluates an expression in a fresh Lua 5.1 state.
 
     Args:
-        expression: Lua; without a `return ` it is taken for the value itself.
-        param: Value of a ROS parameter by its name: number, string, bool, or None if unset.
+        expression: Lua code; without a `return `, it is the expression of the value.
+        param: Function that returns the value of a ROS parameter: a number, a string or a bool;
+            None if it is not set.
 
     Raises:
-        EvalError: It is no Lua, fails, takes too long or too much memory, or its value is not
-            nil, a boolean, a number or a string.
+        EvalError: The expression is not valid Lua, fails, exceeds the limit of time or memory, or
+            its value is not nil, a boolean, a number or a string.
     """
     code = expression if "return " in expression else "return " + expression
     params: list[object] = []
@@ -69,7 +73,7 @@ def evaluate(expression: str, param: Callable[[str], object]) -> EvalResult:
         if status == b"error":
             raise EvalError(texts[0])
         params += [rest[0], _lua_value(texts[0], param(texts[0]))]
-    raise EvalError(f"asks for more than {_MAX_RUNS} parameters")
+    raise EvalError(f"more than {_MAX_RUNS} parameters are read")
 
 
 def _lua_value(name: str, value: object) -> object:
@@ -98,7 +102,7 @@ def _run(code: str, params: list[object], spent: float) -> tuple[bytes, ...]:
     source = code.encode()
     size = len(source) + sum(len(value) for value in params if isinstance(value, bytes))
     if size > _MAX_INPUT:
-        raise EvalError(f"the expression and its parameters have more than {_MAX_INPUT} bytes")
+        raise EvalError(f"the expression and its parameters exceed {_MAX_INPUT} bytes")
     new_state, interval = _state_factory()
     try:
         result: tuple[bytes, ...] = new_state().execute(
@@ -113,13 +117,13 @@ def _run(code: str, params: list[object], spent: float) -> tuple[bytes, ...]:
 
 @functools.cache
 def _sandbox() -> bytes:
-    """Returns the Lua program that guards and runs an expression."""
+    """Returns the Lua program that sets up the sandbox and runs an expression."""
     return (importlib.resources.files("flatland.config") / "sandbox.lua").read_bytes()
 
 
 @functools.cache
 def _state_factory() -> tuple[Callable[[], Any], int]:
-    """Finds a Lua, and how many of its instructions may pass between two checks."""
+    """Returns the constructor of Lua states and the number of instructions between two checks."""
     options = {"encoding": None, "register_eval": False, "attribute_filter": _refuse}
     more_options = {"register_builtins": False, "max_memory": MEMORY_LIMIT}
     for name in _RUNTIMES:
@@ -129,14 +133,14 @@ def _state_factory() -> tuple[Callable[[], Any], int]:
         try:
             runtime(**options, **more_options)
         except Exception:
-            # An older lupa or LuaJIT, without a bound of its own on the memory: check more often.
+            # An older lupa, or LuaJIT, cannot limit the memory itself: check more often.
             return functools.partial(runtime, **options), 10
         return functools.partial(runtime, **options, **more_options), 100
-    raise EvalError("it needs the Python package lupa with Lua 5.1 or LuaJIT")
+    raise EvalError("the Python package lupa with Lua 5.1 or LuaJIT is required")
 
 
 def _find_runtime(name: str) -> Any:
-    """Returns the class of a Lua 5.1 by its module, None if there is none."""
+    """Returns the Lua 5.1 runtime class of a module, None if the module does not provide one."""
     try:
         runtime = importlib.import_module(name).LuaRuntime
     except ImportError:
@@ -145,4 +149,4 @@ def _find_runtime(name: str) -> Any:
 
 
 def _refuse(_object: object, name: object, _is_setting: bool) -> NoReturn:
-    raise AttributeError(f"access to {name!r} is refused")
+    raise AttributeError(f"access to {name!r} is denied")

@@ -1,4 +1,4 @@
-"""Replaces `$eval` and `$include` in a tree of YAML nodes, before anything reads it."""
+"""Expansion of `$eval` and `$include` in a tree of YAML nodes, before values are read."""
 
 from __future__ import annotations
 
@@ -6,25 +6,19 @@ import logging
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
+from flatland.config.documents import load_documents, parse_documents
 from flatland.config.lua import EvalError, evaluate
-from flatland.config.node import (
-    MAX_NESTING,
-    ListNode,
-    Node,
-    NullNode,
-    ScalarNode,
-    Source,
-    load_documents,
-    parse_documents,
-)
+from flatland.config.node import MAX_NESTING, ListNode, Node, NullNode, ScalarNode, Source
 from flatland.errors import YamlError
 
 _LOG = logging.getLogger("flatland")
 _EVAL = "$eval"
 _INCLUDE = "$include"
 _INCLUDE_ALL = "$[include]"
-_MAX_INCLUDES = 10_000  # of one file; files that include each other twice would never end
-_MAX_SHOWN = 500
+_MAX_INCLUDES = (
+    10_000  # of one run; a chain in which each file includes the next one twice explodes
+)
+_MAX_SHOWN = 500  # characters of an expression or a Lua message in an error message
 
 ParamLookup = Callable[[str], object]
 Params = Mapping[str, object] | ParamLookup | None
@@ -35,14 +29,14 @@ def preprocess_file(path: str, params: Params = None) -> Node:
 
     Args:
         path: The file.
-        params: What `param(NAME)` answers: values by name, or a function of the name that
-            returns None for one that is not set.
+        params: Source of the values of `param(NAME)`: a mapping, or a function that returns None
+            for an unknown name.
 
     Returns:
-        The root, a null node for a file without a document.
+        The root; a null node for a file without a document.
 
     Raises:
-        YamlError: The file cannot be read, is not YAML, or its preprocessing fails.
+        YamlError: The file cannot be read, is not valid YAML, or cannot be preprocessed.
     """
     root = _first(load_documents(path), Source.of_file(path))
     return _Preprocessor(params).expand(root, ((_identity(path), path),), 0)
@@ -57,7 +51,7 @@ def preprocess_text(text: str, base_dir: str, params: Params = None) -> Node:
         params: As for `preprocess_file`.
 
     Raises:
-        YamlError: The text is not YAML, or its preprocessing fails.
+        YamlError: The text is not valid YAML, or cannot be preprocessed.
     """
     source = Source("", str(Path.cwd() / base_dir))
     root = _first(parse_documents(text, source), source)
@@ -72,7 +66,7 @@ def _first(documents: list[Node], source: Source) -> Node:
     if not documents:
         return NullNode(source, 1)
     if len(documents) > 1:
-        second = source.place(documents[1].line)
+        second = source.position(documents[1].line)
         _LOG.warning("Only the first of %d YAML documents is used%s", len(documents), second)
     return documents[0]
 
@@ -82,21 +76,21 @@ def _shorten(text: str) -> str:
 
 
 _Chain = tuple[tuple[str, str], ...]
-"""The files from the outermost to the innermost: real path, path for messages."""
+"""The files from the outermost to the innermost, each as (real path, path for messages)."""
 
 
 class _Preprocessor:
-    """One run over a file and all that it includes."""
+    """Expands one file with all files that it includes."""
 
     def __init__(self, params: Params) -> None:
         self._params = params
         self._includes = 0
-        # An alias is the same node as its anchor, so that it is expanded once. The nodes are
-        # kept: an id is only good while its object lives.
+        # The result for each node by its id, so that a node with aliases is expanded once. The
+        # original node is kept alive because the id of a deleted object can be reused.
         self._done: dict[int, tuple[Node, Node]] = {}
 
     def expand(self, node: Node, chain: _Chain, depth: int) -> Node:
-        """Expands a node in place where it can, and returns what takes its place."""
+        """Expands a node, in place if possible, and returns the expanded node."""
         if isinstance(node, NullNode):
             return node
         done = self._done.get(id(node))
@@ -141,7 +135,7 @@ class _Preprocessor:
             message = f'Failed to evaluate "{_shorten(expression)}", {_shorten(str(error))}'
             raise self._error(node, message) from error
         for name in result.unset:
-            _LOG.warning("%s is not set%s", name, node.source.place(node.line))
+            _LOG.warning("%s is not set%s", name, node.source.position(node.line))
         return result.text
 
     def _param(self, name: str) -> object:
@@ -180,4 +174,4 @@ class _Preprocessor:
 
     @staticmethod
     def _error(node: Node, message: str) -> YamlError:
-        return YamlError(message + node.source.place(node.line))
+        return YamlError(message + node.source.position(node.line))

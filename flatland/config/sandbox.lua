@@ -1,6 +1,6 @@
--- Runs once in each Lua state, as its only chunk, and evaluates one expression. Everything that the
--- guards use is held in locals, so that the expression can neither read nor change it, whatever it
--- does to the globals.
+-- The only chunk that runs in a Lua state; evaluates one expression. All functions that the guards
+-- use are local variables, so that an expression that changes globals can neither read nor replace
+-- them.
 local code, spent, time_limit, memory_limit, interval = ...
 local error, ipairs, pairs, pcall, select, tonumber, tostring, type, unpack =
   error, ipairs, pairs, pcall, select, tonumber, tostring, type, unpack
@@ -9,33 +9,33 @@ local loadstring, create, resume = loadstring, coroutine.create, coroutine.resum
 local byte, find, gsub, rep, sort = string.byte, string.find, string.gsub, string.rep, table.sort
 local concat, insert = table.concat, table.insert
 
-local known = {}  -- parameters: a table with the value, or with nothing for one that is unset
+local known = {}  -- by parameter name: a table that holds the value, empty for an unset parameter
 local given = {select(6, ...)}
 for i = 1, select("#", ...) - 5, 2 do known[given[i]] = {given[i + 1]} end
 
-if jit then jit.off() end  -- compiled code calls no hooks
+if jit then jit.off() end  -- compiled code does not call hooks
 for _, name in ipairs{"execute", "exit", "remove", "rename", "tmpname", "setlocale"} do
   os[name] = nil
 end
 for name in pairs(package.loaded) do package.loaded[name] = nil end
--- newproxy makes finalizers, and those run without hooks
+-- newproxy creates objects with finalizers, which run without hooks
 for _, name in ipairs{"io", "package", "require", "module", "dofile", "loadfile", "debug",
                       "python", "newproxy", "jit", "ffi"} do
   _G[name] = nil
 end
 
--- Stopping: once `stopped` is set, nothing that catches errors lets the expression run on.
-local stopped, wanted
+-- Once `stopped` is set, functions that catch errors raise it again, so that the expression ends.
+local stopped, requested
 local start = clock() - spent
 local check
 function check()
   if not stopped and clock() - start > time_limit then
-    stopped = "it runs for more than " .. time_limit .. " s"
+    stopped = "the time limit of " .. time_limit .. " s is exceeded"
   elseif not stopped and memory_used("count") * 1024 > memory_limit then
     stopped = "not enough memory"
   end
   if stopped then
-    sethook(check, "", interval)  -- LuaJIT does not count anew after an error
+    sethook(check, "", interval)  -- LuaJIT does not restart the count after an error
     error(stopped, 0)
   end
 end
@@ -45,7 +45,7 @@ local function pass(...)
 end
 
 function _G.pcall(...) return pass(pcall(...)) end
--- Lua's own calls the handler inside of the hook that has failed, where no hook stops it.
+-- The built-in xpcall runs the handler inside the hook that failed, where hooks are disabled.
 function _G.xpcall(run, handler)
   local function finish(ok, ...)
     if ok then return true, ... end
@@ -55,7 +55,7 @@ function _G.xpcall(run, handler)
 end
 function coroutine.create(run)
   local thread = create(run)
-  sethook(thread, check, "", interval)  -- each coroutine has its own
+  sethook(thread, check, "", interval)  -- hooks are set per coroutine
   return thread
 end
 local create_hooked = coroutine.create
@@ -69,11 +69,11 @@ function coroutine.wrap(run)
   return function(...) return finish(pass(resume(thread, ...))) end
 end
 
--- Text only: a forged binary chunk can do anything to the process.
+-- Text only: a forged binary chunk can corrupt the memory of the process.
 function _G.loadstring(text, name)
   check()
   if type(text) == "string" and byte(text, 1) == 27 then
-    return nil, "binary chunks are refused"
+    return nil, "binary chunks are not allowed"
   end
   return loadstring(text, name)
 end
@@ -89,12 +89,13 @@ function _G.load(reader, name)
   return load_text(concat(pieces), name or "=(load)")
 end
 
--- One call of these may work for ever, and no hook comes in between: the cost is bounded first.
-local function limit(steps, what)
+-- A single call of one of these functions can take arbitrarily long without running a hook.
+-- Therefore the cost is estimated and limited before the call.
+local function limit(steps, message)
   check()
-  if steps > 2e8 then error(what, 3) end  -- about 1 s
+  if steps > 2e8 then error(message, 3) end  -- about 1 s
 end
--- not tostring: the expression may have changed what that makes of strings
+-- Not tostring, whose result for strings depends on a metatable that the expression can change.
 local function text_of(value)
   local kind = type(value)
   return kind == "string" and value or kind == "number" and tostring(value) or ""
@@ -107,13 +108,13 @@ local function guard(name, plain_allowed)
       limit(n * m / 16, "the text to find is too long")
     else
       if m > 1000 then error("the pattern has more than 1000 characters", 2) end
-      -- %b and %1 go through the text too; sets are single characters
+      -- %b and %1 also scan the text; a set counts as a single character
       local bare = gsub(gsub(text_of(pattern), "%%[b%d]", "x*"), "%%.", "x")
       bare = gsub(bare, "%[%^?.[^%]]*%]", "x")
-      local _, many = gsub(bare, "[*+-]", "")
-      local _, maybe = gsub(bare, "%?", "")
-      local steps = (byte(bare, 1) == 94 and 1 or n + 1) * 2 ^ maybe * (1 + #bare / 8)
-      for i = 1, many do steps = steps * (n + i) / i end
+      local _, repeated = gsub(bare, "[*+-]", "")
+      local _, optional = gsub(bare, "%?", "")
+      local steps = (byte(bare, 1) == 94 and 1 or n + 1) * 2 ^ optional * (1 + #bare / 8)
+      for i = 1, repeated do steps = steps * (n + i) / i end
       limit(steps, "the pattern may take too long for a text of " .. n .. " characters")
     end
     if name == "gsub" and (n + 1) * #text_of(third) > memory_limit then
@@ -133,7 +134,7 @@ end
 local function is_index(number) return number > -1e9 and number < 1e9 end
 function _G.unpack(list, first, last)
   first, last = tonumber(first) or 1, last == nil and #list or tonumber(last) or 0
-  -- Lua 5.1 counts with 32 bits here; where that overflows, it crashes
+  -- Lua 5.1 counts with 32 bits here and crashes on overflow
   if not (is_index(first) and is_index(last) and last - first < 7000) then
     error("too many results to unpack", 2)
   end
@@ -147,14 +148,14 @@ function table.insert(list, ...)
   return insert(list, ...)
 end
 function table.sort(list, less)
-  return sort(list, less or function(a, b) return a < b end)  -- a Lua function lets hooks in
+  return sort(list, less or function(a, b) return a < b end)  -- hooks run inside a Lua function
 end
 
 local unset, seen = {}, {}
 local function bind(kind, read)
   _G[kind] = function(name, default)
     if type(name) ~= "string" then
-      error(kind .. " needs a name, got " .. type(name), 2)
+      error(kind .. " requires a name, got " .. type(name), 2)
     end
     local value = read(name)
     if value ~= nil then return value end
@@ -172,8 +173,8 @@ bind("env", function(name)
 end)
 bind("param", function(name)
   if not known[name] then
-    wanted = name
-    stopped = "parameter"  -- a hook may come in between
+    requested = name
+    stopped = "parameter"  -- set before `error`, because a hook can run in between
     error(stopped, 0)
   end
   return known[name][1]
@@ -182,7 +183,7 @@ end)
 local chunk, value = load_text(code, "=$eval")
 local ok = false
 if chunk then
-  -- a hook that comes right after the expression fails in `attempt`, not here
+  -- A hook that runs right after the expression fails in `attempt`, not here.
   local function attempt()
     ok, value = pcall(chunk)
     sethook()
@@ -191,11 +192,11 @@ if chunk then
   pcall(attempt)
   sethook()
 end
-if wanted then return "param", wanted end
+if requested then return "param", requested end
 if stopped then return "error", stopped end
 local kind = type(value)
 if kind == "nil" and ok then return "value", "", unpack(unset) end
-if value ~= value then value = "nan" end  -- Lua 5.1 adds a sign, LuaJIT does not
+if value ~= value then value = "nan" end  -- Lua 5.1 prints a sign, LuaJIT does not
 if kind == "boolean" then value = value and "true" or "false" end
 if kind == "string" or kind == "number" or kind == "boolean" then
   return ok and "value" or "error", text_of(value), unpack(unset)

@@ -1,1 +1,1 @@
-"""Loaders that build a world or a model from its YAML file."""
+"""Creation of worlds and models from their YAML files."""

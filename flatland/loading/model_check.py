@@ -1,29 +1,32 @@
-"""Loads a model file without a world file, to check it."""
+"""Checking of a model file without a world file."""
 
 from __future__ import annotations
 
 import logging
 from collections.abc import Iterable
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from flatland.config.preprocessor import Params
 from flatland.config.reader import YamlReader
 from flatland.entities.collision_filter import MAX_LAYERS, CollisionFilter
 from flatland.errors import YamlError
-from flatland.world import World
+
+if TYPE_CHECKING:
+    from flatland.world import World
 
 
 def is_model_file(path: Path, params: Params) -> bool:
-    """Reads a file and returns whether it is a model and not a world.
+    """Returns whether a file is a model file, not a world file.
 
-    Warnings about the file are not logged, as they come when it is loaded.
+    Warnings about the file are not logged, because they are logged when the file is loaded.
 
     Args:
         path: The file.
-        params: What `param()` in YAML files answers from.
+        params: Source of the values of `param()` in YAML files.
 
     Raises:
-        YamlError: The file cannot be read, is not YAML, or its preprocessing fails.
+        YamlError: The file cannot be read, is not valid YAML, or cannot be preprocessed.
     """
     log = logging.getLogger("flatland")
     was_disabled, log.disabled = log.disabled, True
@@ -34,20 +37,21 @@ def is_model_file(path: Path, params: Params) -> bool:
     return "bodies" in reader and "layers" not in reader and "properties" not in reader
 
 
-def load_model_alone(path: Path, params: Params) -> World:
-    """Makes a world without layers and spawns one model in it.
+def load_model_alone(world_class: type[World], path: Path, params: Params) -> World:
+    """Creates a world that contains one model and no layers.
 
-    The footprints and plugins of the model may name any layers, up to the number that a world can
-    have; these are the names in the world's collision filter.
+    The footprints and plugins of the model may refer to any layers, up to the number that a world
+    can have. Their names are registered in the collision filter of the world.
 
     Args:
-        path: The model file; the model gets the part of its name before the first dot.
-        params: What `param()` in YAML files answers from.
+        world_class: Class of the world.
+        path: The model file; the name of the model is the file name up to the first dot.
+        params: Source of the values of `param()` in YAML files.
 
     Raises:
-        FlatlandError: Something in the file is wrong; nothing is left behind.
+        FlatlandError: The file is invalid; the world is closed.
     """
-    world = World(seed=0, params=params)
+    world = world_class(seed=0, params=params)
     try:
         world.collision_filter = _LayersOnDemand(path)
         world.spawn_model(path, path.name.split(".")[0] or "model")
@@ -58,30 +62,30 @@ def load_model_alone(path: Path, params: Params) -> World:
 
 
 class _LayersOnDemand(CollisionFilter):
-    """Registers each layer when it is first named, since a model file does not define any."""
+    """A collision filter that registers a layer when its name is first used."""
 
     def __init__(self, path: Path) -> None:
-        """Starts without layers.
+        """Creates a filter without layers.
 
         Args:
-            path: The model file, for the error.
+            path: The model file, for error messages.
         """
         super().__init__()
         self._path = path
 
     def unknown(self, names: Iterable[str]) -> list[str]:
-        """Returns only `all`, which is no layer, where it stands beside other names.
+        """Registers new names; returns only `all`, which is not a name of a layer.
 
         Raises:
-            YamlError: The model names more layers than a world can have.
+            YamlError: The model refers to more layers than a world can have.
         """
         names = list(names)
         new = [name for name in dict.fromkeys(super().unknown(names)) if name != "all"]
         named = [*self.names, *new]
         if len(named) > MAX_LAYERS:
             raise YamlError(
-                f"Model names {len(named)} layers {{{', '.join(named)}}}, max allowed in a world "
-                f"is {MAX_LAYERS} [{self._path}]"
+                f"Model refers to {len(named)} layers {{{', '.join(named)}}}, max allowed in a "
+                f"world is {MAX_LAYERS} [{self._path}]"
             )
         self.register(new)
         return super().unknown(names)

@@ -1,10 +1,10 @@
-"""Reads a model file and makes its bodies, footprints and joints."""
+"""Creation of the bodies, footprints and joints of a model from its file."""
 
 from __future__ import annotations
 
 import logging
-import math
-from typing import Any
+from collections.abc import Callable
+from typing import Any, TypeVar
 
 from flatland.config.reader import YamlReader
 from flatland.entities.body import Body
@@ -12,31 +12,34 @@ from flatland.entities.collision_filter import CollisionFilter
 from flatland.entities.joint import Joint
 from flatland.entities.model import Model
 from flatland.errors import PhysicsError
-from flatland.geometry import Pose, compose
-from flatland.physics import PhysicsWorld
+from flatland.geometry import IDENTITY, Pose, compose
+from flatland.physics import PhysicsJoint, PhysicsWorld
 
 _LOG = logging.getLogger("flatland")
 
 BODY_TYPES = ("static", "kinematic", "dynamic")
 BODY_COLOR = (1.0, 1.0, 1.0, 0.5)
 
+T = TypeVar("T")
+
 
 class ModelLoader:
-    """Fills one model from its file.
+    """Adds the bodies and joints of a model file to a model.
 
-    Whoever calls it takes the model's bodies out of the physics world again when it raises.
+    If a method raises an error, the caller removes the bodies created so far from the physics
+    world.
     """
 
     def __init__(
         self, physics: PhysicsWorld, layers: CollisionFilter, model: Model, reader: YamlReader
     ) -> None:
-        """Prepares to fill a model.
+        """Initializes a loader.
 
         Args:
-            physics: World to make bodies and joints in.
-            layers: Names of the world's layers.
-            model: The model, still empty.
-            reader: Over the whole model file.
+            physics: World to create bodies and joints in.
+            layers: Layer names of the world.
+            model: The model, without bodies and joints.
+            reader: Reader of the root of the model file.
         """
         self._physics = physics
         self._layers = layers
@@ -45,13 +48,13 @@ class ModelLoader:
         self._reader = reader.with_location(self._place)
 
     def load_bodies_and_joints(self, pose: Pose) -> None:
-        """Makes all bodies and joints.
+        """Creates all bodies and joints.
 
         Args:
-            pose: Of the model in the world frame.
+            pose: Pose of the model in the world frame [m, m, rad].
 
         Raises:
-            YamlError: Anything in the file is wrong.
+            YamlError: The file is invalid.
         """
         bodies = self._reader.subnode("bodies", "list")
         for entry in bodies.items():
@@ -65,10 +68,10 @@ class ModelLoader:
             self._load_joint(entry)
 
     def plugin_entries(self) -> list[YamlReader]:
-        """Returns the entries of the enabled plugins, checked for names used twice.
+        """Returns the entries of the enabled plugins.
 
         Raises:
-            YamlError: Two plugins have one name, or the file has unknown keys.
+            YamlError: Two plugins have the same name, or the file has unknown keys.
         """
         entries = []
         names = set()
@@ -96,19 +99,19 @@ class ModelLoader:
                 f'Invalid "bodies" in "{self._model.name}" model, body with name "{name}" '
                 "already exists"
             )
-        pose = _finite(reader, "pose", reader.get("pose", "pose", (0.0, 0.0, 0.0)))
+        pose = reader.get("pose", "pose", IDENTITY, finite=True)
         body_type = reader.get("type", "string", "dynamic")
         if body_type not in BODY_TYPES:
             raise reader.error(
                 f'Invalid "type" in {self._place} body "{name}", must be one of: '
                 f"{', '.join(BODY_TYPES)}"
             )
-        color = _finite(reader, "color", reader.get("color", "color", BODY_COLOR))
-        linear_damping = _not_negative(reader, "linear_damping", 0.0)
-        angular_damping = _not_negative(reader, "angular_damping", 0.0)
+        color = reader.get("color", "color", BODY_COLOR, finite=True)
+        linear_damping = reader.get("linear_damping", "float", 0.0, finite=True, minimum=0)
+        angular_damping = reader.get("angular_damping", "float", 0.0, finite=True, minimum=0)
         footprints = reader.subnode("footprints", "list")
         reader.ensure_accessed_all()
-        physics_body = _made(
+        physics_body = _create(
             reader,
             self._physics.create_body,
             body_type,
@@ -137,24 +140,22 @@ class ModelLoader:
             )
         category_bits = self._layers.category_bits(layers)
         properties: dict[str, Any] = {
-            "density": _not_negative(reader, "density"),
-            "friction": _not_negative(reader, "friction", 0.0),
-            "restitution": _not_negative(reader, "restitution", 0.0),
+            "density": reader.get("density", "float", finite=True, minimum=0),
+            "friction": reader.get("friction", "float", 0.0, finite=True, minimum=0),
+            "restitution": reader.get("restitution", "float", 0.0, finite=True, minimum=0),
             "is_sensor": reader.get("sensor", "bool", False),
             "category_bits": category_bits,
             "mask_bits": category_bits if reader.get("collision", "bool", True) else 0,
         }
         if kind == "circle":
-            radius = _not_negative(reader, "radius")
-            center = _finite(reader, "center", reader.get("center", "vector", (0.0, 0.0)))
+            radius = reader.get("radius", "float", finite=True, minimum=0)
+            center = reader.get("center", "vector", (0.0, 0.0), finite=True)
             reader.ensure_accessed_all()
-            _made(reader, body.physics.create_circle, center, radius, **properties)
+            _create(reader, body.physics.create_circle, center, radius, **properties)
         else:
-            points = reader.get_list("points", "vector", min_size=3, max_size=8)
-            for point in points:
-                _finite(reader, "points", point)
+            points = reader.get_list("points", "vector", min_size=3, max_size=8, finite=True)
             reader.ensure_accessed_all()
-            _made(reader, body.physics.create_polygon, points, **properties)
+            _create(reader, body.physics.create_polygon, points, **properties)
 
     def _load_joint(self, entry: YamlReader) -> None:
         name = entry.get("name", "string")
@@ -172,7 +173,7 @@ class ModelLoader:
             raise reader.error(
                 f'Invalid joint "type" in {place}, supported joints are: revolute, weld'
             )
-        color = _finite(reader, "color", reader.get("color", "color", BODY_COLOR))
+        color = reader.get("color", "color", BODY_COLOR, finite=True)
         collide_connected = reader.get("collide_connected", "bool", False)
         ends = reader.subnode("bodies", "list")
         if len(ends) != 2:
@@ -188,84 +189,50 @@ class ModelLoader:
                     f'Cannot find body with name "{body_name}" in {end.location} {end.name}'
                 )
             bodies.append(body)
-            anchor = end.get_list("anchor", "float", size=2)
-            anchors.append(_finite(end, "anchor", anchor))
+            anchors.append(end.get_list("anchor", "float", size=2, finite=True))
         options: dict[str, Any] = {"collide_connected": collide_connected}
-        make: Any
+        create: Callable[..., PhysicsJoint]
         if kind == "revolute":
-            make = self._physics.create_revolute_joint
+            create = self._physics.create_revolute_joint
             options["limits"] = _read_limits(reader)
         else:
-            make = self._physics.create_weld_joint
-            angle = reader.get("angle", "float", 0.0)
-            options["reference_angle"] = _finite(reader, "angle", (angle,))[0]
-            options["frequency"] = _not_negative(reader, "frequency", 0.0)
-            options["damping"] = _not_negative(reader, "damping", 0.0)
+            create = self._physics.create_weld_joint
+            options["reference_angle"] = reader.get("angle", "float", 0.0, finite=True)
+            options["frequency"] = reader.get("frequency", "float", 0.0, finite=True, minimum=0)
+            options["damping"] = reader.get("damping", "float", 0.0, finite=True, minimum=0)
         reader.ensure_accessed_all()
-        joint = _made(
-            reader, make, bodies[0].physics, bodies[1].physics, anchors[0], anchors[1], **options
+        joint = _create(
+            reader, create, bodies[0].physics, bodies[1].physics, anchors[0], anchors[1], **options
         )
         self._model.joints.append(Joint(joint, name, (bodies[0], bodies[1]), color))
 
 
 def _read_limits(reader: YamlReader) -> tuple[float, float] | None:
-    limits = reader.get_list("limits", "float", [], size=2) if "limits" in reader else []
-    if not limits:
+    limits = reader.get_list("limits", "float", None, size=2, finite=True)
+    if limits is None:
         return None
-    lower, upper = _finite(reader, "limits", limits)
+    lower, upper = limits
     if lower > upper:
-        raise reader.error(
-            f'Invalid "limits" in {reader.location} {reader.name}, the lower limit {lower} must '
-            f"not be above the upper limit {upper}"
+        raise reader.invalid(
+            "limits", f"the lower limit {lower} must not be above the upper limit {upper}"
         )
     return (lower, upper)
 
 
 def _is_enabled(reader: YamlReader, place: str) -> bool:
-    enabled: bool = reader.get("enabled", "bool", True)
+    enabled = reader.get("enabled", "bool", True)
     if not enabled:
         _LOG.info("%s is disabled", place)
     return enabled
 
 
-def _finite(reader: YamlReader, key: str, numbers: Any) -> Any:
-    """Returns the numbers if all are finite.
+def _create(reader: YamlReader, create: Callable[..., T], *arguments: Any, **options: Any) -> T:
+    """Creates a physics object.
 
     Raises:
-        YamlError: One is NaN or infinite.
-    """
-    if not all(math.isfinite(number) for number in numbers):
-        raise reader.error(
-            f'Invalid "{key}" in {reader.location} {reader.name}, must be finite, '
-            f"got {', '.join(map(str, numbers))}"
-        )
-    return numbers
-
-
-def _not_negative(reader: YamlReader, key: str, default: float | None = None) -> float:
-    """Reads a finite number of at least 0.
-
-    Raises:
-        YamlError: It is missing and has no default, is no number, negative, NaN or infinite.
-    """
-    value: float = (
-        reader.get(key, "float") if default is None else reader.get(key, "float", default)
-    )
-    if not (math.isfinite(value) and value >= 0):
-        raise reader.error(
-            f'Invalid "{key}" in {reader.location} {reader.name}, must be finite and not '
-            f"negative, got {value}"
-        )
-    return value
-
-
-def _made(reader: YamlReader, make: Any, *arguments: Any, **options: Any) -> Any:
-    """Makes a physics object; what the physics engine refuses becomes an error of the file.
-
-    Raises:
-        YamlError: The physics engine refused.
+        YamlError: The physics engine rejects an argument.
     """
     try:
-        return make(*arguments, **options)
+        return create(*arguments, **options)
     except (ValueError, PhysicsError) as error:
         raise reader.error(f"Invalid entry in {reader.location} {reader.name}, {error}") from error

@@ -1,19 +1,20 @@
-"""Reads a world file into a world."""
+"""Creation of a world from its file."""
 
 from __future__ import annotations
 
 import logging
-import math
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Iterable
 from contextlib import suppress
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
 from flatland.config.node import Source
+from flatland.config.preprocessor import Params
 from flatland.config.reader import YamlReader
 from flatland.entities.layer import Layer
 from flatland.errors import UnreadableFileError, WorldError, YamlError
+from flatland.geometry import IDENTITY
 from flatland.maps.map_file import load_map
 from flatland.plugin_api.missing_plugins import (
     MissingPluginsError,
@@ -21,7 +22,11 @@ from flatland.plugin_api.missing_plugins import (
     missing_plugins_error,
     read_entries,
 )
-from flatland.world import World
+
+if TYPE_CHECKING:
+    from flatland.runtime.faults import FaultPolicy
+    from flatland.runtime.observer import WorldObserver
+    from flatland.world import World
 
 _LOG = logging.getLogger("flatland")
 
@@ -33,27 +38,33 @@ def load_world(
     world_class: type[World],
     path: str | os.PathLike[str],
     *,
-    params: Mapping[str, object] | Callable[[str], object] | None,
+    seed: int | None,
+    params: Params,
     simplify_map: int,
-    **options: Any,
+    step_size: float,
+    observers: Iterable[WorldObserver],
+    plugin_timeout: float | None,
+    plugin_errors: FaultPolicy,
 ) -> World:
-    """Makes a world from a file; see `World.from_yaml`, where the options are explained."""
+    """Creates a world of the given class from a file; see `World.from_yaml` for the arguments."""
     if simplify_map not in SIMPLIFICATIONS:
         raise ValueError(f"simplify_map must be 0, 1 or 2, got {simplify_map!r}")
     file = Path(Source("", str(Path.cwd())).resolve(os.fspath(path)))
     reader = YamlReader.from_file(file, params)
     properties = reader.subnode("properties", "map")
-    iterations = [
-        _at_least_one(properties, "velocity_iterations"),
-        _at_least_one(properties, "position_iterations"),
-    ]
+    velocity_iterations = properties.get("velocity_iterations", "int", 10, minimum=1)
+    position_iterations = properties.get("position_iterations", "int", 10, minimum=1)
     properties.ensure_accessed_all()
     world = world_class(
+        seed=seed,
         params=params,
-        velocity_iterations=iterations[0],
-        position_iterations=iterations[1],
+        step_size=step_size,
+        velocity_iterations=velocity_iterations,
+        position_iterations=position_iterations,
         base_dir=file.parent,
-        **options,
+        observers=observers,
+        plugin_timeout=plugin_timeout,
+        plugin_errors=plugin_errors,
     )
     world.path = str(file)
     try:
@@ -61,12 +72,12 @@ def load_world(
             _load_layer(world, entry, simplify_map)
         try:
             _load_models(world, reader)
-            # Before any plugin sees the world, so that a typing mistake in the file shows first.
+            # Unknown keys are reported before world plugins are started.
             world_plugins = list(reader.optional_subnode("plugins", "list").items())
             reader.ensure_accessed_all()
             world.plugin_host.require_plugins(world_plugins, None)
         except MissingPluginsError as error:
-            # Only of the first model that has any; a user wants to see those of all.
+            # The error lists the missing plugins of one model; report those of the whole world.
             raise _all_missing_plugins(world, reader) or error from None
         for entry in world_plugins:
             _load_world_plugin(world, entry, reader)
@@ -76,25 +87,14 @@ def load_world(
     return world
 
 
-def _at_least_one(reader: YamlReader, key: str) -> int:
-    value: int = reader.get(key, "int", 10)
-    if value < 1:
-        raise reader.error(f'Invalid "{key}" in {reader.name}, must be at least 1, got {value}')
-    return value
-
-
 def _load_layer(world: World, reader: YamlReader, simplify_map: int) -> None:
     name_node = reader.subnode("name")
     if name_node.is_list:
         names = reader.get_list("name", "string", min_size=1)
     else:
         names = [reader.get("name", "string")]
-    map_path: str = reader.get("map", "string", "")
-    color = reader.get("color", "color", LAYER_COLOR)
-    if not all(math.isfinite(number) for number in color):
-        raise reader.subnode("color").error(
-            f'Invalid "color" in layer "{names[0]}", must be finite, got {list(color)}'
-        )
+    map_path = reader.get("map", "string", "")
+    color = reader.get("color", "color", LAYER_COLOR, finite=True)
     properties = reader.optional_subnode("properties", "map")
     reader.ensure_accessed_all()
     try:
@@ -126,7 +126,7 @@ def _load_layer(world: World, reader: YamlReader, simplify_map: int) -> None:
                 exact_edge_count=layer_map.exact_edge_count,
                 unknown_map_keys=layer_map.unknown_keys,
             )
-        except ValueError as error:  # finite, but beyond what the physics can hold
+        except ValueError as error:  # finite, but outside the range of the physics
             raise YamlError(
                 f'Invalid map in layer "{names[0]}", {error} [{layer_map.path}]'
             ) from error
@@ -138,7 +138,7 @@ def _load_models(world: World, reader: YamlReader) -> None:
     for entry in reader.optional_subnode("models", "list").items():
         name = entry.get("name", "string")
         model_reader = entry.with_location(f'model "{name}"')
-        pose = model_reader.get("pose", "pose", (0.0, 0.0, 0.0))
+        pose = model_reader.get("pose", "pose", IDENTITY, finite=True)
         namespace = model_reader.get("namespace", "string", "")
         path = model_reader.get("model", "string")
         model_reader.ensure_accessed_all()
@@ -148,15 +148,15 @@ def _load_models(world: World, reader: YamlReader) -> None:
         try:
             world.spawn_model(path, name, namespace, pose)
         except WorldError as error:
-            # The request itself is wrong, and it stands in this file.
+            # The entry of the world file is invalid, not the model file.
             raise model_reader.error(error.message) from None
         except UnreadableFileError as error:
             raise model_reader.subnode("model").error(error.message) from error
 
 
 def _all_missing_plugins(world: World, reader: YamlReader) -> MissingPluginsError | None:
-    """Makes one error of all missing plugins of a world, without those in faulty files."""
-    lists: dict[str, YamlReader] = {}  # of the files of models, which many models may share
+    """Returns one error for all missing plugins of a world, except those in invalid files."""
+    lists: dict[str, YamlReader] = {}  # plugins by model file, which many models may share
     entries: list[PluginEntry] = []
     for model in reader.optional_subnode("models", "list").items():
         with suppress(YamlError):

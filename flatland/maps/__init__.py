@@ -1,1 +1,1 @@
-"""Map files and map images, converted to the edges of a layer."""
+"""Reading of map files and map images, and their conversion to the edges of a layer."""

@@ -1,4 +1,4 @@
-"""Data files of line segments, one a line: `x1 y1 x2 y2`."""
+"""Data files with one line segment per line: `x1 y1 x2 y2`."""
 
 from __future__ import annotations
 
@@ -9,14 +9,14 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
+from flatland.config.documents import open_regular
 from flatland.errors import MapFileError
-from flatland.regular_file import open_regular
 
 _COLUMNS = 4
 
 
 def read_line_segments(path: str) -> npt.NDArray[np.float64]:
-    """Reads all segments of a file.
+    """Reads all line segments of a file.
 
     Columns after the fourth, blank lines and lines that start with `#` are ignored.
 
@@ -24,11 +24,11 @@ def read_line_segments(path: str) -> npt.NDArray[np.float64]:
         path: Text file.
 
     Returns:
-        Segments (x1, y1, x2, y2) as written, all finite, shape (n, 4).
+        End points (x1, y1, x2, y2) in the units of the file, finite, shape (n, 4).
 
     Raises:
         OSError: The file cannot be read.
-        MapFileError: A line has fewer than four numbers, or one is NaN or infinite.
+        MapFileError: A line has fewer than four numbers, or a number is NaN or infinite.
     """
     with io.TextIOWrapper(open_regular(path), encoding="utf-8-sig", errors="replace") as file:
         numbered = [
@@ -39,7 +39,7 @@ def read_line_segments(path: str) -> npt.NDArray[np.float64]:
     if not numbered:
         return np.empty((0, _COLUMNS))
     try:
-        # Fast: numpy reads the numbers, but it cannot say in which line of the file it fails.
+        # NumPy is fast, but its errors do not contain the line number in the file.
         lines = [line for _, line in numbered]
         segments = np.loadtxt(lines, comments=None, usecols=range(_COLUMNS), ndmin=2)
         if np.isfinite(segments).all():

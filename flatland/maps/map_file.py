@@ -1,15 +1,14 @@
-"""Map files: the geometry of a layer, from an image or from line segments."""
+"""Map files, which define the geometry of a layer by an image or by line segments."""
 
 from __future__ import annotations
 
 import logging
-import math
-from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 
+from flatland.config.preprocessor import Params
 from flatland.config.reader import YamlReader
 from flatland.errors import MapFileError
 from flatland.geometry import Pose
@@ -18,8 +17,8 @@ from flatland.maps.map_image import image_edges, read_grey_image, threshold_in_p
 
 _LOG = logging.getLogger("flatland")
 
-# Keys of map_server and similar programs, ignored without a message. Other unknown keys are allowed
-# as well, since map files are shared between programs, and logged.
+# Keys of map_server and similar programs, ignored silently. Other unknown keys are logged and
+# ignored, because map files are shared between programs.
 _IGNORED_IMAGE_KEYS = ("negate", "free_thresh", "mode", "frame_id")
 
 
@@ -28,9 +27,9 @@ class LayerMap:
     """Static geometry of one layer.
 
     Attributes:
-        origin: Pose of the layer's body in the world frame [m, m, rad].
-        edges: Edges (x1, y1, x2, y2) in the frame of the layer's body [m], shape (n, 4).
-        exact_edge_count: How many edges there are without simplification.
+        origin: Pose of the body of the layer in the world frame [m, m, rad].
+        edges: Edges (x1, y1, x2, y2) in the frame of the body of the layer [m], shape (n, 4).
+        exact_edge_count: Number of edges without simplification.
         path: The map file.
         unknown_keys: Keys of the map file that flatland does not use, sorted.
     """
@@ -47,23 +46,24 @@ def load_map(
     layer_name: str,
     *,
     simplify: int = 0,
-    params: Mapping[str, object] | Callable[[str], object] | None = None,
+    params: Params = None,
 ) -> LayerMap:
-    """Reads a map file and what it names.
+    """Reads a map file and its image or data file.
 
     Args:
         path: Map file (YAML).
-        layer_name: The layer's first name, for errors and the log.
-        simplify: 0 exact boundary of the image; 1 boundary simplified within a pixel; 2 the same
-            after small features of the free space were removed. Line segments stay as they are.
-        params: What `param()` in the map file answers from.
+        layer_name: First name of the layer, for errors and the log.
+        simplify: 0 exact boundary of the image; 1 boundary simplified with a tolerance of one
+            pixel; 2 the same after the removal of small features of the free space. Line segments
+            are not simplified.
+        params: Source of the values of `param()` in the map file.
 
     Returns:
-        The layer's geometry.
+        The geometry of the layer.
 
     Raises:
-        ValueError: `simplify` is none of 0, 1, 2.
-        YamlError: The map file is wrong, or its image cannot be read.
+        ValueError: `simplify` is not 0, 1 or 2.
+        YamlError: The map file is invalid, or its image cannot be read.
         MapFileError: The data file of line segments cannot be read.
     """
     if simplify not in (0, 1, 2):
@@ -86,7 +86,7 @@ def load_map(
         )
     if layer_map.unknown_keys:
         _LOG.info(
-            'Layer "%s": flatland does not use the keys {%s} of %s',
+            'Layer "%s": unknown keys {%s} of %s ignored',
             layer_name,
             ", ".join(layer_map.unknown_keys),
             path,
@@ -97,15 +97,15 @@ def load_map(
 def _load_image(reader: YamlReader, layer_name: str, simplify: int) -> LayerMap:
     reader = reader.without("type", *_IGNORED_IMAGE_KEYS)
     image_path = reader.resolve_path(reader.get("image", "string"))
-    resolution = _finite(reader, layer_name, "resolution")
-    origin = _finite_origin(reader, layer_name)
-    occupied_thresh = _finite(reader, layer_name, "occupied_thresh")
+    resolution = reader.get("resolution", "float", finite=True)
+    origin = reader.get("origin", "pose", finite=True)
+    occupied_thresh = reader.get("occupied_thresh", "float", finite=True)
     unknown_keys = tuple(sorted(reader.unread_keys()))
     if resolution <= 0:
-        raise _invalid(reader, layer_name, "resolution", f"must be positive, got {resolution}")
+        raise reader.invalid("resolution", f"must be positive, got {resolution}")
     if not 0 <= occupied_thresh <= 1:
         _LOG.warning(
-            'Layer "%s": "occupied_thresh" is %g, but pixels have values from 0 to 1',
+            'Layer "%s": "occupied_thresh" is %g, outside the range of pixel values, 0 to 1',
             layer_name,
             occupied_thresh,
         )
@@ -118,52 +118,34 @@ def _load_image(reader: YamlReader, layer_name: str, simplify: int) -> LayerMap:
         mask = threshold_in_place(image, occupied_thresh)
         edges, exact_edge_count = image_edges(mask, resolution, simplify)
     except ValueError as error:
-        raise _invalid(reader, layer_name, "resolution", str(error)) from error
+        raise reader.invalid("resolution", str(error)) from error
     return LayerMap(origin, edges, exact_edge_count, reader.path, unknown_keys)
 
 
 def _load_line_segments(reader: YamlReader, layer_name: str) -> LayerMap:
     reader = reader.without("type")
     data_path = reader.resolve_path(reader.get("data", "string"))
-    scale = _finite(reader, layer_name, "scale")
-    origin = _finite_origin(reader, layer_name)
+    scale = reader.get("scale", "float", finite=True)
+    origin = reader.get("origin", "pose", finite=True)
     unknown_keys = tuple(sorted(reader.unread_keys()))
     if scale == 0:
-        raise _invalid(reader, layer_name, "scale", "must not be 0")
+        raise reader.invalid("scale", "must not be 0")
     try:
         segments = read_line_segments(data_path)
     except OSError as error:
-        place = reader.subnode("data").error(f'Failed to load "{data_path}"')
-        raise MapFileError(place.message) from error
+        located = reader.subnode("data").error(f'Failed to load "{data_path}"')
+        raise MapFileError(located.message) from error
     with np.errstate(over="ignore"):
         edges = (segments * scale).astype(np.float32)
     if not np.isfinite(edges).all():
-        raise _invalid(reader, layer_name, "scale", "a coordinate does not fit a 32-bit float")
+        raise reader.invalid("scale", "a coordinate does not fit a 32-bit float")
     has_length = (edges[:, :2] != edges[:, 2:]).any(axis=1)
     if not has_length.all():
         _LOG.warning(
-            'Layer "%s": %d line segments of length 0 in %s are left out',
+            'Layer "%s": %d line segments of length 0 in %s ignored',
             layer_name,
             np.count_nonzero(~has_length),
             data_path,
         )
         edges = edges[has_length]
     return LayerMap(origin, edges, len(edges), reader.path, unknown_keys)
-
-
-def _finite(reader: YamlReader, layer_name: str, key: str) -> float:
-    value: float = reader.get(key, "float")
-    if not math.isfinite(value):
-        raise _invalid(reader, layer_name, key, f"must be finite, got {value}")
-    return value
-
-
-def _finite_origin(reader: YamlReader, layer_name: str) -> Pose:
-    origin: Pose = reader.get("origin", "pose")
-    if not all(math.isfinite(value) for value in origin):
-        raise _invalid(reader, layer_name, "origin", f"must be finite, got {list(origin)}")
-    return origin
-
-
-def _invalid(reader: YamlReader, layer_name: str, key: str, why: str) -> Exception:
-    return reader.subnode(key).error(f'Invalid "{key}" in layer "{layer_name}", {why}')

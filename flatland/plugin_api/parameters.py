@@ -82,12 +82,7 @@ def read_not_negative(config: YamlReader, key: str, default: float) -> float:
     Raises:
         YamlError: It is no number, negative or NaN.
     """
-    value: float = config.get(key, "float", default)
-    if not value >= 0:
-        raise at_key(config, key).error(
-            f'Invalid "{key}", must not be negative or NaN, got {value}'
-        )
-    return value
+    return config.get(key, "float", default, minimum=0)
 
 
 def read_finite(config: YamlReader, key: str, default: float) -> float:
@@ -96,10 +91,7 @@ def read_finite(config: YamlReader, key: str, default: float) -> float:
     Raises:
         YamlError: It is no number, infinite or NaN.
     """
-    value: float = config.get(key, "float", default)
-    if not math.isfinite(value):
-        raise at_key(config, key).error(f'Invalid "{key}", must be finite, got {value}')
-    return value
+    return config.get(key, "float", default, finite=True)
 
 
 def read_pose(config: YamlReader, key: str, default: Pose = IDENTITY) -> Pose:
@@ -108,12 +100,9 @@ def read_pose(config: YamlReader, key: str, default: Pose = IDENTITY) -> Pose:
     Raises:
         YamlError: It is no pose, or a number is infinite, NaN or beyond `MAX_COORDINATE`.
     """
-    pose: Pose = config.get(key, "pose", default)
-    if not all(abs(number) <= MAX_COORDINATE for number in pose):
-        raise at_key(config, key).error(
-            f'Invalid "{key}", must be finite and within +-{MAX_COORDINATE:g}, got {list(pose)}'
-        )
-    return pose
+    return config.get(
+        key, "pose", default, finite=True, minimum=-MAX_COORDINATE, maximum=MAX_COORDINATE
+    )
 
 
 def read_variances(config: YamlReader, key: str) -> Triple:
@@ -122,13 +111,9 @@ def read_variances(config: YamlReader, key: str) -> Triple:
     Raises:
         YamlError: There are not three, or one is negative, infinite or NaN.
     """
-    values = config.get_list(key, "float", [0.0, 0.0, 0.0], size=3)
     # Unlike the reference: a negative variance is an error.
-    if not all(math.isfinite(value) and value >= 0 for value in values):
-        raise at_key(config, key).error(
-            f'Invalid "{key}", variances must be finite and not negative, got {values}'
-        )
-    return (values[0], values[1], values[2])
+    x, y, z = config.get_list(key, "float", [0.0, 0.0, 0.0], size=3, finite=True, minimum=0)
+    return (x, y, z)
 
 
 def read_covariance(config: YamlReader, key: str, default_diagonal: Sequence[float]) -> DoubleArray:
@@ -153,7 +138,7 @@ def read_covariance(config: YamlReader, key: str, default_diagonal: Sequence[flo
     values = config.get_list(key, "float", default, size=n * n)
     matrix = np.array(values, dtype=np.float64).reshape(n, n)
     if np.isnan(matrix).any():
-        raise at_key(config, key).error(f'Invalid "{key}", must not hold NaN')
+        raise config.invalid(key, "must not hold NaN")
     matrix.flags.writeable = False
     return matrix
 

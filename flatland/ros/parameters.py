@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from flatland.ros.shutdown import DEFAULT_SHUTDOWN_TIMEOUT
 from flatland.runtime.placement import IF_BLOCKED, IfBlocked
 from flatland.simulation import MAX_LAG
-from flatland.timekeeper import GREATEST_STEP, LEAST_STEP
+from flatland.timekeeper import MAX_STEP_SIZE, MIN_STEP_SIZE
 
 ParameterSource = Callable[[str], object]
 """Returns the value of a parameter, None if it is not set."""
@@ -112,9 +112,9 @@ class _Reader:
         return seconds
 
     def step_size(self, name: str, default: float) -> float:
-        wanted = f"a number of seconds from {LEAST_STEP:g} to {GREATEST_STEP:g}"
+        wanted = f"a number of seconds from {MIN_STEP_SIZE:g} to {MAX_STEP_SIZE:g}"
         size = self._number(name, default, wanted)
-        if not LEAST_STEP <= size <= GREATEST_STEP:
+        if not MIN_STEP_SIZE <= size <= MAX_STEP_SIZE:
             raise _invalid(name, wanted, size)
         return size
 

@@ -1,4 +1,4 @@
-"""The recorded traces that the tests of this folder compare with."""
+"""Fixtures of the conformance tests."""
 
 from __future__ import annotations
 
@@ -9,5 +9,5 @@ import pytest
 
 @pytest.fixture(scope="session")
 def golden_dir() -> Path:
-    """The recorded traces, with their worlds, models and maps; read-only."""
+    """Folder of the recorded traces with their worlds, models and maps; read-only."""
     return Path(__file__).resolve().parent / "data"

@@ -1,4 +1,4 @@
-"""A robot pushes a crate: poses and bumper messages as the reference recorded them."""
+"""Comparison with a recorded trace in which a robot pushes a crate: poses and bumper messages."""
 
 from __future__ import annotations
 
@@ -13,15 +13,15 @@ import pytest
 import flatland
 
 POSE_TOLERANCE = 1e-3  # m and rad
-FORCE_TOLERANCE = 0.05  # of the force
-POINT_TOLERANCE = 1e-3  # m, and for the unit normals
+FORCE_TOLERANCE = 0.05  # relative
+POINT_TOLERANCE = 1e-3  # m, and for components of unit normals
 
 Bodies = dict[str, list[float]]
 Pair = tuple[str, str, str, str]
 
 
 class Run:
-    """The world of the trace, stepped to its end, beside what the trace says."""
+    """Results of a run of the world of the trace, and the records of the trace."""
 
     def __init__(self, golden: Path) -> None:
         trace = json.loads((golden / "contact.trace.json").read_text())
@@ -31,7 +31,7 @@ class Run:
             twist = flatland.Twist(linear_x=float(v), angular_z=float(omega))
             commands[int(step)].append((model, twist))
         self.records: list[dict[str, Any]] = trace["records"]
-        wanted = {record["step"] for record in self.records}
+        recorded = {record["step"] for record in self.records}
         self.bodies: dict[int, Bodies] = {}
         self.messages: dict[int, flatland.Collisions | None] = {}
         with flatland.World.from_yaml(
@@ -39,7 +39,7 @@ class Run:
         ) as world:
             output = world.output("/p/collisions")
             for step in range(trace["steps"] + 1):
-                if step in wanted:
+                if step in recorded:
                     self.bodies[step] = {
                         f"{model.name}/{body.name}": [*body.pose, *body.velocity]
                         for model in world.models
@@ -50,10 +50,10 @@ class Run:
                     world.command(f"/{world.model(model).namespace}/cmd_vel").set(twist)
                 world.step()
 
-    def messages_beside_trace(
+    def paired_messages(
         self,
     ) -> list[tuple[int, flatland.Collisions, list[dict[str, Any]]]]:
-        """Each record that has a message: step, our message, the reference's contacts."""
+        """Returns step, message and contacts of the trace for each record with a message."""
         return [
             (record["step"], message, record["collisions"]["pusher1/bumper"])
             for record in self.records
@@ -66,77 +66,77 @@ def run(golden_dir: Path) -> Run:
     return Run(golden_dir)
 
 
-def our_pairs(message: flatland.Collisions) -> list[Pair]:
+def message_pairs(message: flatland.Collisions) -> list[Pair]:
     return sorted((c.entity_a, c.body_a, c.entity_b, c.body_b) for c in message.collisions)
 
 
-def golden_pairs(contacts: list[dict[str, Any]]) -> list[Pair]:
+def trace_pairs(contacts: list[dict[str, Any]]) -> list[Pair]:
     return sorted(("pusher1", c["body_A"], c["entity_B"], c["body_B"]) for c in contacts)
 
 
-def test_poses(run: Run) -> None:
+def test_poses_match_the_trace(run: Run) -> None:
     for record in run.records:
         for name, values in record["bodies"].items():
-            ours = run.bodies[record["step"]][name]
-            assert ours[:3] == pytest.approx(values[:3], abs=POSE_TOLERANCE), (
+            pose = run.bodies[record["step"]][name]
+            assert pose[:3] == pytest.approx(values[:3], abs=POSE_TOLERANCE), (
                 f"{name} at step {record['step']}"
             )
 
 
-def test_messages_begin_with_the_first_step(run: Run) -> None:
+def test_the_first_message_follows_the_first_step(run: Run) -> None:
     assert run.messages[0] is None
     assert run.records[0]["collisions"] == {}
-    assert len(run.messages_beside_trace()) == len(run.records) - 1
+    assert len(run.paired_messages()) == len(run.records) - 1
 
 
-def test_same_pairs_at_the_same_records(run: Run) -> None:
-    for step, message, contacts in run.messages_beside_trace():
-        assert our_pairs(message) == golden_pairs(contacts), f"step {step}"
-    assert any(len(contacts) == 2 for _, _, contacts in run.messages_beside_trace())
+def test_contact_pairs_match_the_trace(run: Run) -> None:
+    for step, message, contacts in run.paired_messages():
+        assert message_pairs(message) == trace_pairs(contacts), f"step {step}"
+    assert any(len(contacts) == 2 for _, _, contacts in run.paired_messages())
 
 
-def test_stamps(run: Run) -> None:
-    for step, message, _ in run.messages_beside_trace():
+def test_stamps_are_the_time_after_the_step(run: Run) -> None:
+    for step, message, _ in run.paired_messages():
         assert message.stamp == step * 5_000_000
 
 
-def test_forces_positions_and_normals(run: Run) -> None:
+def test_forces_positions_and_normals_match_the_trace(run: Run) -> None:
     compared = 0
-    for step, message, contacts in run.messages_beside_trace():
-        # The same pair touches with its sensor and with its hard fixture: tell them by the points.
-        ours = sorted(message.collisions, key=lambda c: len(c.magnitude_forces))
+    for step, message, contacts in run.paired_messages():
+        # A pair of bodies has a contact of a sensor, without points, and one of a solid fixture.
+        found = sorted(message.collisions, key=lambda c: len(c.magnitude_forces))
         golden = sorted(contacts, key=lambda c: len(c["forces"]))
-        for mine, theirs in zip(ours, golden, strict=True):
+        for actual, expected in zip(found, golden, strict=True):
             where = f"step {step}"
-            forces = np.array(theirs["forces"])
-            assert mine.magnitude_forces.shape == forces.shape, where
-            assert mine.magnitude_forces == pytest.approx(forces, rel=FORCE_TOLERANCE), where
+            forces = np.array(expected["forces"])
+            assert actual.magnitude_forces.shape == forces.shape, where
+            assert actual.magnitude_forces == pytest.approx(forces, rel=FORCE_TOLERANCE), where
             if len(forces):
-                positions, normals = np.array(theirs["positions"]), np.array(theirs["normals"])
-                assert mine.contact_positions == pytest.approx(positions, abs=POINT_TOLERANCE)
-                assert mine.contact_normals == pytest.approx(normals, abs=POINT_TOLERANCE)
+                positions, normals = np.array(expected["positions"]), np.array(expected["normals"])
+                assert actual.contact_positions == pytest.approx(positions, abs=POINT_TOLERANCE)
+                assert actual.contact_normals == pytest.approx(normals, abs=POINT_TOLERANCE)
                 compared += len(forces)
     assert compared > 10
 
 
-def test_differences_are_far_below_the_tolerances(run: Run) -> None:
-    # About twenty times what was reached, so that a change for the worse shows before it breaks a
-    # bound.
+def test_differences_are_much_smaller_than_the_tolerances(run: Run) -> None:
+    # About twenty times the measured differences, to detect regressions before they exceed the
+    # tolerances.
     pose = max(
-        abs(ours - value)
+        abs(actual - value)
         for record in run.records
         for name, values in record["bodies"].items()
-        for ours, value in zip(run.bodies[record["step"]][name][:3], values[:3], strict=True)
+        for actual, value in zip(run.bodies[record["step"]][name][:3], values[:3], strict=True)
     )
     force = max(
-        abs(mine - theirs) / theirs
-        for _, message, contacts in run.messages_beside_trace()
-        for mine, theirs in zip(
+        abs(actual - expected) / expected
+        for _, message, contacts in run.paired_messages()
+        for actual, expected in zip(
             sorted(f for c in message.collisions for f in c.magnitude_forces),
             sorted(f for c in contacts for f in c["forces"]),
             strict=True,
         )
     )
-    print(f"\ncontact: poses within {pose:.2g} m and rad, forces within {force:.2g} of theirs")
+    print(f"\ncontact: poses within {pose:.2g} m and rad, forces within {force:.2g} (relative)")
     assert pose < 5e-5
     assert force < 1e-3

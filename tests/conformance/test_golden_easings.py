@@ -1,4 +1,4 @@
-"""Every easing moves a body as the reference's does, but for exact ends."""
+"""Comparison of all easings with a recorded trace; unlike the reference, the end is exact."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import pytest
 import flatland
 from flatland.plugins._easing import EASINGS
 
-TOLERANCE = 1e-4  # m, of a way of 1 m
+TOLERANCE = 1e-4  # m, for a distance of 1 m
 
 WORLD = """
 properties: {}
@@ -26,8 +26,8 @@ def golden(golden_dir: Path) -> dict[str, Any]:
     return trace
 
 
-def ways(golden: dict[str, Any], easing: str, folder: Path) -> list[float]:
-    """Returns x of the body after each step."""
+def positions(golden: dict[str, Any], easing: str, folder: Path) -> list[float]:
+    """Returns the x coordinate of the body after each step [m]."""
     (folder / "world.yaml").write_text(WORLD)
     (folder / "door.model.yaml").write_text(
         f"""
@@ -49,15 +49,15 @@ def ways(golden: dict[str, Any], easing: str, folder: Path) -> list[float]:
     return found
 
 
-def test_the_reference_knows_the_same_easings(golden: dict[str, Any]) -> None:
+def test_the_trace_contains_all_easings(golden: dict[str, Any]) -> None:
     assert set(golden["x_after_each_step"]) == set(EASINGS)
 
 
 @pytest.mark.parametrize("easing", EASINGS)
-def test_easing(golden: dict[str, Any], easing: str, tmp_path: Path) -> None:
+def test_positions_match_the_trace(golden: dict[str, Any], easing: str, tmp_path: Path) -> None:
     expected = golden["x_after_each_step"][easing]
-    found = ways(golden, easing, tmp_path)
+    found = positions(golden, easing, tmp_path)
     last = round(golden["duration"] / golden["dt"])
     assert found[: last - 1] == pytest.approx(expected[: last - 1], abs=TOLERANCE)
-    # The reference's exponential curves stop a little short of the end.
+    # The exponential curves of the reference do not reach the end exactly.
     assert found[last - 1 :] == [golden["delta_x"]] * (len(expected) - last + 1)

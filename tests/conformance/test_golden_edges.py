@@ -1,4 +1,4 @@
-"""The edges of the golden maps are exactly those that the reference computes."""
+"""Comparison of the edges of maps with those computed by the reference."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from flatland.maps.map_file import load_map
 
 
 def undirected(edges: npt.ArrayLike) -> npt.NDArray[np.float64]:
-    """Brings the ends of each edge, then the edges, into an order of their own."""
+    """Sorts the ends of each edge and then the edges."""
 
     def rounded(values: tuple[float, ...]) -> tuple[float, ...]:
         return tuple(round(value, 4) for value in values)
@@ -27,7 +27,7 @@ def undirected(edges: npt.ArrayLike) -> npt.NDArray[np.float64]:
 @pytest.mark.parametrize(
     ("layer", "map_file"), [("walls", "walls.yaml"), ("low", "low.yaml"), ("lines", "lines.yaml")]
 )
-def test_edges(golden_dir: Path, layer: str, map_file: str) -> None:
+def test_edges_match_the_trace(golden_dir: Path, layer: str, map_file: str) -> None:
     trace = json.loads((golden_dir / "free.trace.json").read_text())
     expected = {entry["name"]: entry["edges"] for entry in trace["layers"]}[layer]
     layer_map = load_map(str(golden_dir / map_file), layer)

@@ -1,4 +1,4 @@
-"""The satellite position of a driving robot, and a sliding door, as the reference recorded them."""
+"""Comparison with a recorded trace: satellite positions of a robot, and a sliding door."""
 
 from __future__ import annotations
 
@@ -23,8 +23,10 @@ def records(golden_dir: Path) -> list[dict[str, Any]]:
     return found
 
 
-def test_gps(golden_dir: Path, records: list[dict[str, Any]]) -> None:
-    # The antenna is put where the trace has the robot: this is about the conversion alone.
+def test_satellite_positions_match_the_trace(
+    golden_dir: Path, records: list[dict[str, Any]]
+) -> None:
+    # The robot is moved to the recorded poses to test the conversion separately from the motion.
     worst = 0.0
     with flatland.World.from_yaml(golden_dir / "free.yaml", seed=1) as world:
         model = world.model("diff1")
@@ -39,7 +41,7 @@ def test_gps(golden_dir: Path, records: list[dict[str, Any]]) -> None:
     assert worst < GPS_TOLERANCE
 
 
-def test_door(golden_dir: Path, records: list[dict[str, Any]]) -> None:
+def test_the_door_matches_the_trace(golden_dir: Path, records: list[dict[str, Any]]) -> None:
     by_step = {record["step"]: record["bodies"]["door1/panel"] for record in records}
     worst = 0.0
     with flatland.World.from_yaml(golden_dir / "free.yaml", seed=1, step_size=0.005) as world:
@@ -50,7 +52,7 @@ def test_door(golden_dir: Path, records: list[dict[str, Any]]) -> None:
                 worst = max(
                     worst, *(abs(a - b) for a, b in zip(panel.pose, expected[:3], strict=True))
                 )
-                # It is moved by poses: no other body feels a velocity of it.
+                # The door is moved by setting its pose, so that it has no velocity.
                 assert panel.velocity == tuple(expected[3:]) == (0.0, 0.0, 0.0)
             world.step()
     print(f"\ndoor within {worst:.2g} m and rad")

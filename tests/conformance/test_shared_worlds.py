@@ -1,7 +1,6 @@
-"""The reference's own worlds load unchanged and run for a minute without a warning.
+"""The worlds of the reference load unchanged and run for a minute without warnings.
 
-The only warnings are those of models that the files put into walls and into each other. None of the
-worlds is rejected by the reference, so there is no other exception to make.
+The only exceptions are warnings about models whose initial pose overlaps walls or other models.
 """
 
 from __future__ import annotations
@@ -19,9 +18,9 @@ import flatland
 
 RATE = 200  # steps in a second of simulated time
 DURATION = 60  # s of simulated time
-SECONDS_PER_COMMAND = 5  # s of simulated time that a command stays
+COMMAND_DURATION = 5  # s of simulated time
 
-# World: the outputs that it has, and how many values each gives in a minute.
+# By world: the number of values that each output publishes in a minute.
 WORLDS: dict[str, dict[str, int]] = {
     "benchmark_world": {
         "/odometry/ground_truth": DURATION * RATE,
@@ -37,7 +36,7 @@ WORLDS: dict[str, dict[str, int]] = {
     "simple_test_A": {},
 }
 
-# World: the models that overlap something where the file puts them, by more than 0.2 m each.
+# By world: the models whose initial poses overlap walls or other models, by more than 0.2 m each.
 OVERLAPS: dict[str, list[str]] = {
     "simple_test_A": [
         'model "turtlebot1" overlaps layer "2d", layer "3d" at (0.000, 0.000, 0.000)',
@@ -49,35 +48,35 @@ OVERLAPS: dict[str, list[str]] = {
 
 
 @pytest.fixture
-def silence(name: str, caplog: pytest.LogCaptureFixture) -> Any:
-    """Fails the test for other warnings in the log; pytest itself raises those of Python."""
+def no_other_warnings(name: str, caplog: pytest.LogCaptureFixture) -> Any:
+    """Fails the test if a warning is logged that is not an expected one."""
     caplog.set_level(logging.WARNING)
     yield
     messages = [record.getMessage() for record in caplog.get_records("call")]
-    # Models that overlap walls or each other from the start may be jammed.
+    # Models that overlap walls or each other initially can be jammed.
     jams = [text for text in messages if "is jammed between walls" in text]
     assert all(re.match(r'model "(spawned\d+|turtlebot2)" is jammed', text) for text in jams)
     assert [text for text in messages if text not in jams] == OVERLAPS.get(name, [])
 
 
-def test_these_are_all_worlds(shared_dir: Path) -> None:
+def test_all_worlds_are_tested(shared_dir: Path) -> None:
     assert {path.parent.name for path in (shared_dir / "worlds").rglob("world.yaml")} == set(WORLDS)
 
 
 @pytest.mark.parametrize("name", WORLDS)
-@pytest.mark.usefixtures("silence")
-def test_world_runs_for_a_minute(shared_dir: Path, name: str) -> None:
+@pytest.mark.usefixtures("no_other_warnings")
+def test_a_world_runs_for_a_minute(shared_dir: Path, name: str) -> None:
     path = shared_dir / "worlds" / name / "world.yaml"
     counts: Counter[str] = Counter()
     with flatland.World.from_yaml(path, seed=1) as world:
         for topic in world.ports.outputs:
             world.output(topic).subscribe(lambda _value, topic=topic: counts.update([topic]))
         start = {model.name: model.pose for model in world.models}
-        # Forward and to either side, and now and then into a wall.
-        for i in range(0, DURATION, SECONDS_PER_COMMAND):
+        # Curves to both sides, partly into walls.
+        for i in range(0, DURATION, COMMAND_DURATION):
             for topic in world.ports.commands:
                 world.command(topic).set(flatland.Twist(0.8, 0.0, 0.4 * (-1) ** i))
-            world.step(SECONDS_PER_COMMAND * RATE)
+            world.step(COMMAND_DURATION * RATE)
             for model in world.models:
                 for body in model.bodies:
                     assert all(map(math.isfinite, (*body.pose, *body.velocity))), body.name
@@ -89,8 +88,8 @@ def test_world_runs_for_a_minute(shared_dir: Path, name: str) -> None:
 
 
 @pytest.mark.parametrize("name", WORLDS)
-@pytest.mark.usefixtures("silence")
-def test_all_model_files_of_the_world_can_be_spawned(shared_dir: Path, name: str) -> None:
+@pytest.mark.usefixtures("no_other_warnings")
+def test_all_models_of_a_world_can_be_spawned(shared_dir: Path, name: str) -> None:
     folder = shared_dir / "worlds" / name
     with flatland.World.from_yaml(folder / "world.yaml", seed=1) as world:
         files = sorted(folder.glob("*.model.yaml"))

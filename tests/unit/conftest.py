@@ -1,4 +1,4 @@
-"""World files made on the spot, for the tests of the simulation core."""
+"""Fixtures of the simulation core: worlds from generated files, and a simulated clock."""
 
 from __future__ import annotations
 
@@ -22,21 +22,21 @@ bodies:
 
 
 class WorldFiles:
-    """Writes world, model and map files into a folder and loads worlds from them."""
+    """A folder in which world, model and map files are written, and worlds loaded from it."""
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
         self._open: list[flatland.World] = []
 
     def write(self, name: str, text: str) -> str:
-        """Writes a file and returns its path."""
+        """Writes a file and returns its path; the text is dedented."""
         path = self.folder / name
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text(dedent(text))
         return str(path)
 
     def write_map(self, name: str, rows: list[str], **keys: object) -> str:
-        """Draws a map from text, `#` for a wall, and writes its YAML file."""
+        """Writes a map file and its image, drawn from text; `#` is a wall. Returns the path."""
         pixels = np.array([[0 if c == "#" else 255 for c in row] for row in rows], np.uint8)
         cv2.imwrite(str(self.folder / f"{name}.png"), pixels)
         values: dict[str, object] = {
@@ -49,13 +49,13 @@ class WorldFiles:
         return self.write(f"{name}.yaml", "\n".join(f"{k}: {v}" for k, v in values.items()))
 
     def load(self, text: str, **options: Any) -> flatland.World:
-        """Writes `world.yaml` and loads it; the world is closed after the test."""
+        """Writes `world.yaml` and loads it; the fixture closes the world after the test."""
         world = flatland.World.from_yaml(self.write("world.yaml", text), **{"seed": 1, **options})
         self._open.append(world)
         return world
 
     def load_model(self, model: str, **options: Any) -> flatland.World:
-        """Loads a world with two layers, `2d` and `3d`, and one model `robot` of the given text."""
+        """Loads a world with the layers `2d` and `3d` and a model `robot` with the given text."""
         self.write("robot.model.yaml", model)
         return self.load(
             """
@@ -67,14 +67,14 @@ class WorldFiles:
         )
 
     def close(self) -> None:
-        """Ends all worlds."""
+        """Closes all worlds."""
         for world in self._open:
             world.close()
 
 
 @pytest.fixture
 def files(tmp_path: Path) -> Iterator[WorldFiles]:
-    """A folder for world files, and worlds loaded from them."""
+    """A folder for world files; worlds that are loaded from it are closed after the test."""
     world_files = WorldFiles(tmp_path)
     world_files.write("minimal.model.yaml", MINIMAL_MODEL)
     yield world_files
@@ -88,7 +88,7 @@ def empty_world(files: WorldFiles) -> flatland.World:
 
 
 class FakeTime:
-    """A wall clock that only moves in waits and where a test spends time."""
+    """A wall clock that advances only in `wait` and `spend`."""
 
     def __init__(self) -> None:
         self.now = 1024.0
@@ -108,5 +108,5 @@ class FakeTime:
 
 @pytest.fixture
 def fake_time() -> FakeTime:
-    """The clock and the wait of a `Simulation` whose wall time passes as a test says."""
+    """A clock and a wait function for a `Simulation`, controlled by the test."""
     return FakeTime()

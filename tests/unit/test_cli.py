@@ -236,7 +236,7 @@ class TestCheckModel:
         done = run("check", "robot.yaml", "--param", "/radius=-1", cwd=files.folder)
         assert done.returncode == 1
         assert 'Invalid "radius"' in done.stderr
-        assert f"[{files.folder}/robot.yaml:5]" in done.stderr
+        assert f"[{files.folder}/robot.yaml:6]" in done.stderr
 
     @pytest.mark.parametrize(
         ("old", "new", "message"),
@@ -263,7 +263,7 @@ class TestCheckModel:
         path = files.write("m.yaml", text)
         assert main("check", path) == 1
         error = capsys.readouterr().err
-        assert "Model names 17 layers {l0, l1, " in error
+        assert "Model refers to 17 layers {l0, l1, " in error
         assert f"max allowed in a world is 16 [{path}]" in error
 
     def test_warnings_of_a_file_come_once(self, files):

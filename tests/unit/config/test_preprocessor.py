@@ -1,4 +1,4 @@
-"""`$eval` and `$include` in files: what they give, which folder counts, and their errors."""
+"""Expansion of `$eval` and `$include`: results, base folders and errors."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from flatland.errors import YamlError
 
 
 class Files:
-    """Files in a folder, the first of which is read."""
+    """YAML files in a folder, of which `main.yaml` is read."""
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
@@ -80,16 +80,16 @@ def files(tmp_path: Path) -> Files:
         (">\n  $eval 1\n  + 2\n", "3"),
     ],
 )
-def test_values_of_expressions(files: Files, text: str, result: str) -> None:
+def test_expressions_are_replaced_by_their_values(files: Files, text: str, result: str) -> None:
     assert files.plain(f"x: {text}") == {"x": result}
 
 
 @pytest.mark.parametrize("text", ["a $eval 1", "' $eval 1'", "$ eval 1", "$Eval 1", "$$eval"])
-def test_what_is_no_expression(files: Files, text: str) -> None:
+def test_text_without_the_marker_at_the_start_is_unchanged(files: Files, text: str) -> None:
     assert files.plain(f"x: {text}") == {"x": text.strip("'")}
 
 
-def test_expressions_anywhere_but_in_keys(files: Files) -> None:
+def test_expressions_are_evaluated_everywhere_except_in_keys(files: Files) -> None:
     text = "a: [$eval 1+1, {b: $eval 2+2}, [$eval 3+3]]\n$eval 4: c\nd: []\ne: {}\nf:\n"
     assert files.plain(text) == {
         "a": ["2", {"b": "4"}, ["6"]],
@@ -101,7 +101,7 @@ def test_expressions_anywhere_but_in_keys(files: Files) -> None:
     assert files.plain("$eval 1+1") == "2"
 
 
-def test_results_are_scalars_like_any_other(files: Files) -> None:
+def test_results_are_converted_like_other_scalars(files: Files) -> None:
     reader = files.read("a: $eval env('NO_SUCH', true)\nb: $eval 6/2\nc: $eval nil\nd: $eval 1/0")
     assert reader.get("a", "bool") is True
     assert reader.get("b", "int") == 3
@@ -109,11 +109,11 @@ def test_results_are_scalars_like_any_other(files: Files) -> None:
     assert reader.get("d", "float") == float("inf")
 
 
-def test_a_result_is_not_looked_at_again(files: Files) -> None:
+def test_a_result_is_not_expanded_again(files: Files) -> None:
     assert files.plain("x: $eval '$' .. 'eval 1'") == {"x": "$eval 1"}
 
 
-def test_an_expression_by_alias_runs_once(files: Files) -> None:
+def test_an_expression_with_aliases_is_evaluated_once(files: Files) -> None:
     counted: list[str] = []
 
     def param(name: str) -> int:
@@ -124,7 +124,7 @@ def test_an_expression_by_alias_runs_once(files: Files) -> None:
     assert reader.plain() == {"a": "1", "b": "1", "c": ["1"]}
 
 
-def test_expressions_share_nothing(files: Files) -> None:
+def test_expressions_do_not_share_state(files: Files) -> None:
     text = "a: |\n  $eval x = 5 string.rep = nil\n  return x\nb: $eval x\nc: $eval ('-'):rep(2)\n"
     assert files.plain(text) == {"a": "5", "b": "", "c": "--"}
 
@@ -145,7 +145,9 @@ def test_expressions_share_nothing(files: Files) -> None:
         ("$eval '\\255'", "'\\255'", "b'\\xff' is not UTF-8 text"),
     ],
 )
-def test_errors_of_expressions(files: Files, text: str, expression: str, why: str) -> None:
+def test_an_error_contains_the_expression_and_the_lua_message(
+    files: Files, text: str, expression: str, why: str
+) -> None:
     message = files.failure(f"a: 1\nx: {text}\n")
     assert message.startswith(f'Flatland YAML: Failed to evaluate "{expression}", ')
     assert message.endswith(f"{why} [{files.path('main')}:2]")
@@ -157,7 +159,7 @@ def test_an_endless_expression_is_stopped(files: Files) -> None:
     assert message.endswith(f" [{files.path('main')}:2]")
 
 
-def test_long_expressions_and_messages_are_shown_in_part(files: Files) -> None:
+def test_long_expressions_and_messages_are_shortened(files: Files) -> None:
     message = files.failure(f"x: $eval {'y' * 1000}.z")
     assert f'Failed to evaluate "{"y" * 500}...", ' in message
     assert len(message) < 1500
@@ -167,7 +169,7 @@ def test_long_expressions_and_messages_are_shown_in_part(files: Files) -> None:
 # env and param
 
 
-def test_env(files: Files, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_env_converts_numbers(files: Files, monkeypatch: pytest.MonkeyPatch) -> None:
     for name, value in {"NUM": "1.50", "EXP": "1e3", "TEXT": "a b", "HEX": "0x10", "NO": "",
                         "NEG": "-.5", "DATE": "2020-01-01"}.items():  # fmt: skip
         monkeypatch.setenv(f"FLATLAND_TEST_{name}", value)
@@ -188,7 +190,9 @@ def test_env(files: Files, monkeypatch: pytest.MonkeyPatch) -> None:
     assert files.plain("x: $eval env('FLATLAND_TEST_NUM', 7) + 1") == {"x": "2.5"}
 
 
-def test_env_unset_is_nil_with_a_warning(files: Files, caplog: pytest.LogCaptureFixture) -> None:
+def test_an_unset_variable_is_nil_and_logged(
+    files: Files, caplog: pytest.LogCaptureFixture
+) -> None:
     with caplog.at_level(logging.WARNING, "flatland"):
         assert files.plain("a: 1\nx: $eval env('FLATLAND_TEST_NO')\n") == {"a": "1", "x": ""}
     (record,) = caplog.records
@@ -200,7 +204,7 @@ def test_env_unset_is_nil_with_a_warning(files: Files, caplog: pytest.LogCapture
     ("default", "result"), [("2.5", "2.5"), ("'a'", "a"), ("true", "true"), ("false", "false")]
 )
 @pytest.mark.parametrize("kind", ["env", "param"])
-def test_defaults(
+def test_defaults_are_used_without_a_warning(
     files: Files, caplog: pytest.LogCaptureFixture, kind: str, default: str, result: str
 ) -> None:
     assert files.plain(f"x: $eval {kind}('FLATLAND_TEST_NO', {default})") == {"x": result}
@@ -231,12 +235,14 @@ PARAMS = {"/a": 5, "b": 2.5, "c": "text", "d": True, "e": False, "f": [1], "g": 
         ("coroutine.wrap(function() coroutine.yield(param('c')) end)()", "text"),
     ],
 )
-def test_param(files: Files, expression: str, result: str) -> None:
+def test_param_returns_the_value(files: Files, expression: str, result: str) -> None:
     assert files.read(f"x: $eval {expression}", PARAMS).get("x", "string") == result
     assert files.read(f"x: $eval {expression}", PARAMS.get).get("x", "string") == result
 
 
-def test_param_unset_is_nil_with_a_warning(files: Files, caplog: pytest.LogCaptureFixture) -> None:
+def test_an_unset_parameter_is_nil_and_logged(
+    files: Files, caplog: pytest.LogCaptureFixture
+) -> None:
     text = "x: $eval param('no') == nil and param('no') == nil"
     for params in (None, {}, PARAMS):
         caplog.clear()
@@ -246,13 +252,13 @@ def test_param_unset_is_nil_with_a_warning(files: Files, caplog: pytest.LogCaptu
         ]
 
 
-def test_params_and_includes_of_a_string(tmp_path: Path) -> None:
+def test_a_text_can_use_parameters_and_includes(tmp_path: Path) -> None:
     (tmp_path / "z.yaml").write_text("$eval param('a') + 1")
     text = "x: $eval param('a')\ny: $include z.yaml"
     assert YamlReader.from_string(text, {"a": 1}, tmp_path).plain() == {"x": "1", "y": "2"}
 
 
-def test_params_that_lua_has_no_value_for(files: Files) -> None:
+def test_parameters_of_unsupported_types_are_rejected(files: Files) -> None:
     assert 'param "f" must be a number, a string or a bool, got list' in files.failure(
         "x: $eval param('f')", PARAMS
     )
@@ -260,13 +266,13 @@ def test_params_that_lua_has_no_value_for(files: Files) -> None:
 
 @pytest.mark.parametrize("call", ["env()", "env(5)", "env({})", "param()", "param(nil, 5)"])
 def test_names_must_be_strings(files: Files, call: str) -> None:
-    assert "needs a name, got" in files.failure(f"x: $eval {call}")
+    assert "requires a name, got" in files.failure(f"x: $eval {call}")
 
 
 # $include
 
 
-def test_include(files: Files) -> None:
+def test_an_included_file_keeps_its_positions(files: Files) -> None:
     reader = files.read("a: $include part.yaml\nb: 1\n", part="\nc: 2\nd:\n  - 3\n")
     assert reader.plain() == {"a": {"c": "2", "d": ["3"]}, "b": "1"}
     inner = reader.subnode("a")
@@ -280,7 +286,7 @@ def test_include(files: Files) -> None:
     assert reader.subnode("b").path == str(files.path("main"))
 
 
-def test_include_of_anything_anywhere(files: Files) -> None:
+def test_any_node_can_be_included_anywhere(files: Files) -> None:
     text = "- $include scalar.yaml\n- {a: $include list.yaml}\n- $include empty.yaml\n"
     plain = files.plain(text, scalar="hello", list="[1, $include scalar.yaml]", empty="# nothing\n")
     assert plain == ["hello", {"a": ["1", "hello"]}, None]
@@ -292,7 +298,7 @@ def test_included_files_are_preprocessed(files: Files) -> None:
     assert reader.plain() == {"a": {"b": "8"}}
 
 
-def test_the_folder_of_the_file_counts_where_the_text_stands(
+def test_paths_are_relative_to_the_file_that_contains_them(
     files: Files, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     (tmp_path / "elsewhere").mkdir()
@@ -316,7 +322,7 @@ def test_absolute_and_home_paths(files: Files, monkeypatch: pytest.MonkeyPatch) 
     assert files.plain(f"[$include {files.path('sub__b')}, $include ~/b.yaml]") == ["1", "1"]
 
 
-def test_a_name_with_spaces(files: Files) -> None:
+def test_file_names_can_contain_spaces(files: Files) -> None:
     files.write(**{"a b": "1"})
     assert files.plain("x: $include   a b.yaml  ") == {"x": "1"}
 
@@ -329,17 +335,17 @@ def test_only_the_first_document_is_included(
     assert caplog.messages == [f"Only the first of 2 YAML documents is used {place}"]
 
 
-def test_include_every_document(files: Files) -> None:
+def test_include_all_inserts_every_document(files: Files) -> None:
     text = "- first\n- $[include] docs.yaml\n- last\n"
     plain = files.plain(text, docs="a: 1\n---\n[b]\n---\n---\nc\n")
     assert plain == ["first", {"a": "1"}, ["b"], None, "c", "last"]
 
 
-def test_include_every_document_of_none(files: Files) -> None:
+def test_include_all_of_a_file_without_documents_inserts_nothing(files: Files) -> None:
     assert files.plain("a: ['$[include] no.yaml']\nb: []", no="# nothing\n") == {"a": [], "b": []}
 
 
-def test_documents_are_preprocessed_in_their_folder(files: Files) -> None:
+def test_included_documents_are_preprocessed_in_their_folder(files: Files) -> None:
     plain = files.plain(
         "- $[include] sub/docs.yaml",
         sub__docs="a: $include x.yaml\n---\n- $[include] more.yaml\n---\n$eval 1+1\n",
@@ -349,12 +355,12 @@ def test_documents_are_preprocessed_in_their_folder(files: Files) -> None:
     assert plain == [{"a": "X"}, ["m", "n"], "2"]
 
 
-def test_lines_of_later_documents(files: Files) -> None:
+def test_line_numbers_of_later_documents(files: Files) -> None:
     reader = files.read("- $[include] docs.yaml", docs="a: 1\n---\nb: 2\n")
     assert [item.line for item in reader.items()] == [1, 3]
 
 
-def test_include_every_document_elsewhere_is_an_error(files: Files) -> None:
+def test_include_all_outside_a_list_is_an_error(files: Files) -> None:
     for text in ("a: $[include] docs.yaml", "$[include] docs.yaml"):
         message = files.failure(text, docs="1")
         assert message == (
@@ -363,7 +369,7 @@ def test_include_every_document_elsewhere_is_an_error(files: Files) -> None:
 
 
 @pytest.mark.parametrize("marker", ["$include", "$[include]"])
-def test_include_of_a_missing_file(files: Files, marker: str) -> None:
+def test_an_included_file_that_does_not_exist_is_an_error(files: Files, marker: str) -> None:
     message = files.failure(f"a: 1\nb:\n  - {marker} sub/no.yaml\n")
     assert message == (
         f"Flatland YAML: File specified in {marker} does not exist, "
@@ -372,7 +378,7 @@ def test_include_of_a_missing_file(files: Files, marker: str) -> None:
     assert f"File specified in {marker} does not exist" in files.failure(f"- {marker}")
 
 
-def test_include_of_a_broken_file(files: Files) -> None:
+def test_an_included_file_that_is_malformed_is_an_error(files: Files) -> None:
     message = files.failure("a: 1\nb: $include part.yaml\n", part="x: 1\ny: [\n")
     assert message == (
         f'Flatland YAML: Malformatted file, path="{files.path("part")}", line 3 col 1, '
@@ -380,23 +386,23 @@ def test_include_of_a_broken_file(files: Files) -> None:
     )
 
 
-def test_include_of_a_folder(files: Files) -> None:
+def test_an_included_folder_is_an_error(files: Files) -> None:
     assert "it is not a regular file" in files.failure("$include .")
 
 
-def test_a_lua_error_names_the_included_file(files: Files) -> None:
+def test_a_lua_error_contains_the_position_in_the_included_file(files: Files) -> None:
     message = files.failure("a: $include part.yaml", part="\n\nx: $eval 1 +\n")
     assert message.endswith(f"[{files.path('part')}:3]")
 
 
 @pytest.mark.parametrize("marker", ["$include", "$[include]"])
-def test_a_file_that_includes_itself(files: Files, marker: str) -> None:
+def test_a_file_that_includes_itself_is_an_error(files: Files, marker: str) -> None:
     message = files.failure(f"a:\n- {marker} main.yaml\n")
     main = files.path("main")
     assert message == f"Flatland YAML: File includes itself, {main} -> {main} [{main}:2]"
 
 
-def test_files_that_include_each_other(files: Files) -> None:
+def test_files_that_include_each_other_are_an_error(files: Files) -> None:
     message = files.failure(
         "a: $include b.yaml",
         b="- 1\n- $[include] sub/../c.yaml\n",
@@ -412,22 +418,22 @@ def test_files_that_include_each_other(files: Files) -> None:
     )
 
 
-def test_a_cycle_by_a_link(files: Files) -> None:
+def test_a_cycle_through_a_symbolic_link_is_an_error(files: Files) -> None:
     files.write(main="$include link.yaml")
     files.path("link").symlink_to(files.path("main"))
     assert "File includes itself" in files.failure("$include link.yaml")
 
 
-def test_the_same_file_twice_is_no_cycle(files: Files) -> None:
+def test_a_file_can_be_included_twice(files: Files) -> None:
     assert files.plain("[$include a.yaml, $include a.yaml]", a="1") == ["1", "1"]
 
 
-def test_a_long_chain_of_files_ends(files: Files) -> None:
+def test_the_depth_of_includes_is_limited(files: Files) -> None:
     files.write(**{f"f{i}": f"[$include f{i + 1}.yaml]" for i in range(300)})
     assert "Nested deeper than 100 levels" in files.failure("$include f0.yaml")
 
 
-def test_files_that_include_many_end(files: Files, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_number_of_includes_is_limited(files: Files, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("flatland.config.preprocessor._MAX_INCLUDES", 50)
     files.write(**{f"f{i}": f"[$include f{i + 1}.yaml, $include f{i + 1}.yaml]" for i in range(30)})
     files.write(f30="x")

@@ -1,4 +1,4 @@
-"""Typed reading: every conversion, every error text with its place, and the record of keys."""
+"""Typed reading: conversions, limits, error messages and the record of keys."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ FLOATS = {
     **dict.fromkeys((".inf", ".Inf", ".INF", "+.inf", "+.Inf", "+.INF", "inf"), math.inf),
     **dict.fromkeys(("-.inf", "-.Inf", "-.INF", "-inf"), -math.inf),
 }
-NO_FLOATS = [
+INVALID_FLOATS = [
     "abc", "1.2.3", "1,5", "1e", "e5", ".", "'-'", "0x10", "1_000", '"5 "', '" 5"', "''", "1e400",
     "-1e400", ".iNF", ".infinity", "infinity", "Inf", "INF", "+inf", "NaN", "+.nan", "-nan", "true",
     "٣", "[1]", "{a: 1}",
@@ -58,18 +58,18 @@ NO_FLOATS = [
 
 
 @pytest.mark.parametrize(("text", "value"), FLOATS.items())
-def test_floats(text: str, value: float) -> None:
+def test_valid_floats(text: str, value: float) -> None:
     assert read(f"x: {text}").get("x", "float") == value
     assert read(f"x: {text}").get("x", float) == value
 
 
 @pytest.mark.parametrize("text", [".nan", ".NaN", ".NAN", "nan"])
-def test_not_a_number_is_a_float(text: str) -> None:
+def test_nan_is_a_float(text: str) -> None:
     assert math.isnan(read(f"x: {text}").get("x", "float"))
 
 
-@pytest.mark.parametrize("text", NO_FLOATS)
-def test_what_is_no_float(text: str) -> None:
+@pytest.mark.parametrize("text", INVALID_FLOATS)
+def test_invalid_floats(text: str) -> None:
     message = failure(read(f"x: {text}").get, "x", "float")
     assert message == 'Flatland YAML: Error converting entry "x" to float [line 1]'
 
@@ -82,7 +82,7 @@ def test_what_is_no_float(text: str) -> None:
         "-2147483648": -(2**31), "0x7fffffff": 2**31 - 1,
     }.items(),
 )  # fmt: skip
-def test_ints(text: str, value: int) -> None:
+def test_valid_ints(text: str, value: int) -> None:
     assert read(f"x: {text}").get("x", "int") == value
     assert type(read(f"x: {text}").get("x", int)) is int
 
@@ -95,13 +95,13 @@ def test_ints(text: str, value: int) -> None:
         "[1]", "[]",
     ],
 )  # fmt: skip
-def test_what_is_no_int(text: str) -> None:
+def test_invalid_ints(text: str) -> None:
     message = failure(read(f"x: {text}").get, "x", "int")
     assert message == 'Flatland YAML: Error converting entry "x" to int [line 1]'
 
 
 @pytest.mark.parametrize("word", ["true", "yes", "on", "y", "false", "no", "off", "n"])
-def test_bools_in_three_cases_only(word: str) -> None:
+def test_bools_in_three_letter_cases(word: str) -> None:
     value = word in ("true", "yes", "on", "y")
     for text in (word, word.capitalize(), word.upper(), f'"{word}"'):
         assert read(f"x: {text}").get("x", "bool") is value
@@ -113,7 +113,7 @@ def test_bools_in_three_cases_only(word: str) -> None:
 
 
 @pytest.mark.parametrize("text", ["1", "0", "t", "''", "truee", "[true]", "{}"])
-def test_what_is_no_bool(text: str) -> None:
+def test_invalid_bools(text: str) -> None:
     assert 'Error converting entry "x" to bool' in failure(read(f"x: {text}").get, "x", "bool")
 
 
@@ -127,12 +127,12 @@ def test_any_scalar_is_a_string(text: str, value: str) -> None:
 
 
 @pytest.mark.parametrize("text", ["[a]", "{a: 1}", "", "~"])
-def test_what_is_no_string(text: str) -> None:
+def test_invalid_strings(text: str) -> None:
     message = failure(read(f"x: {text}").get, "x", "string")
     assert message == 'Flatland YAML: Error converting entry "x" to string [line 1]'
 
 
-def test_vectors() -> None:
+def test_valid_and_invalid_vectors() -> None:
     assert read("x: [1, -2.5]").get("x", "vector") == (1.0, -2.5)
     for text in ("[1]", "[1, 2, 3]", "[]", "[1, a]", "[1, [2]]", "[1, ]", "[1, ~]", "5", "{a: 1}"):
         message = failure(read(f"x: {text}").get, "x", "vector")
@@ -140,7 +140,7 @@ def test_vectors() -> None:
 
 
 @pytest.mark.parametrize(("kind", "size"), [("pose", 3), ("color", 4)])
-def test_poses_and_colors(kind: Any, size: int) -> None:
+def test_valid_and_invalid_poses_and_colors(kind: Any, size: int) -> None:
     numbers = [0.5 * number for number in range(5)]
     assert read(f"x: {numbers[:size]}").get("x", kind) == tuple(numbers[:size])
     for count in (0, size - 1, size + 1):
@@ -152,12 +152,89 @@ def test_poses_and_colors(kind: Any, size: int) -> None:
     assert message == ('Flatland YAML: Error converting entry index=0 to float (in "x") [line 1]')
 
 
-def test_an_unknown_kind_is_the_programmers_mistake() -> None:
+def test_an_unknown_kind_is_a_value_error() -> None:
     with pytest.raises(ValueError, match=r"kind must be one of .*'pose'.*, got 'double'"):
         read("x: 1").get("x", "double")  # type: ignore[call-overload]
 
 
-# The texts, each with the place behind it.
+# Limits of numbers.
+
+
+@pytest.mark.parametrize(
+    ("kind", "text", "limits", "why"),
+    [
+        ("float", ".inf", {"finite": True}, "must be finite, got inf"),
+        ("float", ".nan", {"finite": True}, "must be finite, got nan"),
+        ("float", "-0.5", {"minimum": 0}, "must not be negative or NaN, got -0.5"),
+        ("float", ".nan", {"minimum": 0}, "must not be negative or NaN, got nan"),
+        (
+            "float",
+            "-1",
+            {"finite": True, "minimum": 0},
+            "must be finite and not negative, got -1.0",
+        ),
+        ("float", "-.inf", {"minimum": -2.5}, "must be at least -2.5, got -inf"),
+        ("float", ".nan", {"maximum": 1}, "must be at most 1, got nan"),
+        ("float", ".inf", {"finite": True, "maximum": 1}, "must be finite and at most 1, got inf"),
+        ("float", "91", {"minimum": -90, "maximum": 90}, "must be from -90 to 90, got 91.0"),
+        ("int", "0", {"minimum": 1}, "must be at least 1, got 0"),
+        ("int", "17", {"minimum": 0, "maximum": 16}, "must be from 0 to 16, got 17"),
+        ("vector", "[1, .nan]", {"finite": True}, "must be finite, got [1.0, nan]"),
+        ("pose", "[1, 2, -.inf]", {"finite": True}, "must be finite, got [1.0, 2.0, -inf]"),
+        ("color", "[0, 2, 0, 1]", {"maximum": 1}, "must be at most 1, got [0.0, 2.0, 0.0, 1.0]"),
+    ],
+)
+def test_numbers_that_violate_a_limit(
+    file: Path, kind: Any, text: str, limits: dict[str, Any], why: str
+) -> None:
+    body = read_file(file, f"a: 1\nKey: {text}\n").with_location('model "M"', 'body "B"')
+    expected = f'Flatland YAML: Invalid "Key", {why} (in model "m" body "b") [{file}:2]'
+    assert failure(body.get, "Key", kind, **limits) == expected
+    assert failure(body.get, "Key", kind, 1.0, **limits) == expected
+
+
+def test_limits_are_inclusive() -> None:
+    reader = read("low: -1\nhigh: 2\npose: [-1, 0, 2]\ninf: .inf\nnan: .nan\nlist: [-1, 2]\n")
+    for key in ("low", "high"):
+        for kind in (int, float):
+            reader.get(key, kind, finite=True, minimum=-1, maximum=2)
+    assert reader.get("pose", "pose", finite=True, minimum=-1, maximum=2) == (-1, 0, 2)
+    assert reader.get("inf", "float", minimum=0) == math.inf
+    assert math.isnan(reader.get("nan", "float", finite=False))
+    assert reader.get_list("list", "int", size=2, minimum=-1, maximum=2) == [-1, 2]
+
+
+def test_limits_do_not_apply_to_defaults() -> None:
+    assert read("{}").get("a", "float", -math.inf, finite=True, minimum=0) == -math.inf
+    assert read("a:").get_list("a", "float", None, finite=True) is None
+
+
+@pytest.mark.parametrize(
+    ("kind", "text", "got"),
+    [
+        ("float", "[0, .nan]", "[0.0, nan]"),
+        ("vector", "[[0, 0], [1, .inf]]", "[(0.0, 0.0), (1.0, inf)]"),
+    ],
+)
+def test_lists_that_violate_a_limit(file: Path, kind: Any, text: str, got: str) -> None:
+    reader = read_file(file, f"\nKey: {text}\n")
+    assert failure(reader.get_list, "Key", kind, finite=True) == (
+        f'Flatland YAML: Invalid "Key", must be finite, got {got} [{file}:2]'
+    )
+
+
+def test_invalid_has_the_position_of_the_entry_or_of_the_map(file: Path) -> None:
+    reader = read_file(file, "# comment\na:\n  b: 1\n").with_location('layer "L"')
+    text = "Flatland YAML: Invalid"
+    assert str(reader.subnode("a").invalid("b", "must be even, got 1")) == (
+        f'{text} "b", must be even, got 1 (in layer "l" "a") [{file}:3]'
+    )
+    assert str(reader.invalid("c", "must be even, got 1")) == (
+        f'{text} "c", must be even, got 1 (in layer "l") [{file}:2]'
+    )
+
+
+# Error messages, which end with the position.
 
 
 def test_missing_required_key(file: Path) -> None:
@@ -199,7 +276,7 @@ def test_must_be_a_list(file: Path, text: str) -> None:
         assert failure(action) == f'Flatland YAML: Entry "Key" must be a list [{file}:1]'
 
 
-def test_items_must_be_of_a_kind(file: Path) -> None:
+def test_list_items_must_be_of_the_required_kind(file: Path) -> None:
     items = read_file(file, "a:\n  - []\n  - {}\n").subnode("a")
     assert failure(items.subnode, 0, "map") == (
         f'Flatland YAML: Entry index=0 must be a map (in "a") [{file}:2]'
@@ -209,7 +286,7 @@ def test_items_must_be_of_a_kind(file: Path) -> None:
     )
 
 
-def test_a_file_must_be_a_map(file: Path) -> None:
+def test_the_root_must_be_of_the_required_kind(file: Path) -> None:
     reader = read_file(file, "- 1\n")
     assert failure(reader.get, "a", "int") == f"Flatland YAML: Entry must be a map [{file}:1]"
     assert failure(reader.keys) == f"Flatland YAML: Entry must be a map [{file}:1]"
@@ -229,14 +306,14 @@ def test_a_file_must_be_a_map(file: Path) -> None:
         ({"min_size": 4, "max_size": 8}, ">= 4"),
     ],
 )
-def test_sizes_of_lists(file: Path, sizes: dict[str, int], wanted: str) -> None:
+def test_lists_of_a_wrong_size(file: Path, sizes: dict[str, int], wanted: str) -> None:
     body = read_file(file, "\nPoints: [1, 2, 3]\n").with_location('model "M"', 'body "B"')
     assert failure(body.get_list, "Points", "int", **sizes) == (
         f'Flatland YAML: Entry "points" must have size {wanted} (in model "m" body "b") [{file}:2]'
     )
 
 
-def test_lists_of_a_right_size() -> None:
+def test_lists_of_a_valid_size() -> None:
     reader = read("a: [1, 2, 3]\nb: [[1, 2], [3, 4]]\nc: []\nd: [x, 1]\ne: [[1, 2, 3]]\nf: [on]\n")
     for sizes in ({"size": 3}, {"min_size": 3}, {"max_size": 3}, {"min_size": 1, "max_size": 5}):
         assert reader.get_list("a", "float", **sizes) == [1.0, 2.0, 3.0]  # type: ignore[call-overload]
@@ -264,7 +341,7 @@ def test_wrong_type_of_an_item(file: Path) -> None:
     assert failure(reader.get_list, "Origin", "float") == "Flatland YAML: " + message
 
 
-def test_keys_that_nobody_read(file: Path) -> None:
+def test_unread_keys_are_unknown(file: Path) -> None:
     reader = read_file(file, "a: 1\nb: 3\nZ: 2\n")
     reader.get("a", "int")
     assert failure(reader.ensure_accessed_all) == (
@@ -280,7 +357,7 @@ def test_keys_that_nobody_read(file: Path) -> None:
     body.ensure_accessed_all()
 
 
-def test_a_plugin_config_by_its_place(file: Path) -> None:
+def test_unknown_keys_of_a_nested_map(file: Path) -> None:
     reader = read_file(file, "plugins:\n  - type: X\n    angle: {min: 1,\n      mix: 2}\n")
     plugin = reader.subnode("plugins", "list").subnode(0, "map")
     angle = plugin.with_location('model "M"', 'plugin "P"').subnode("angle", "map")
@@ -297,7 +374,7 @@ def test_only_maps_have_unknown_keys() -> None:
     assert "unrecognized" in failure(read("{a: 1}").ensure_accessed_all)
 
 
-def test_file_not_there(file: Path) -> None:
+def test_a_file_that_does_not_exist(file: Path) -> None:
     assert failure(YamlReader.from_file, file) == (
         f'Flatland YAML: File does not exist, path="{file}"'
     )
@@ -316,11 +393,11 @@ def test_duplicate_keys(file: Path, caplog: pytest.LogCaptureFixture) -> None:
     reader.get("b", "int")
     reader.ensure_accessed_all()
     assert [record.getMessage() for record in caplog.records] == [
-        f'Duplicate key "a" is ignored, its first value in line 1 counts [{file}:3]'
+        f'Duplicate key "a" ignored, the value in line 1 is used [{file}:3]'
     ]
 
 
-# How readers open each other.
+# Navigation.
 
 
 def test_locations_build_up() -> None:
@@ -345,7 +422,7 @@ def test_locations_build_up() -> None:
     )
 
 
-def test_what_a_reader_is() -> None:
+def test_the_kind_of_a_node() -> None:
     reader = read("a: {}\nb: []\nc: x\nd:\n")
     kinds = [
         (r.is_map, r.is_list, r.is_scalar, r.is_null) for r in map(reader.subnode, reader.keys())
@@ -369,7 +446,7 @@ def test_items_of_a_list() -> None:
     assert items[2].get(0, "float") == 2.0
 
 
-def test_a_node_as_a_value(file: Path) -> None:
+def test_conversion_of_the_node_itself(file: Path) -> None:
     reader = read_file(file, "[5, true, [1, 2], [1, 2, 3], [0, 0, 0, 1]]")
     assert reader.subnode(0).value("int") == 5
     assert reader.subnode(0).value(float) == 5.0
@@ -383,7 +460,7 @@ def test_a_node_as_a_value(file: Path) -> None:
 
 
 @pytest.mark.parametrize("text", ["{}", "x:", "x: ~", "x: null"])
-def test_defaults_for_what_is_missing_or_empty(text: str) -> None:
+def test_defaults_of_missing_or_empty_entries(text: str) -> None:
     reader = read(text)
     assert reader.get("x", "float", 2.5) == 2.5
     assert reader.get("x", "pose", None) is None
@@ -401,7 +478,7 @@ def test_defaults_for_what_is_missing_or_empty(text: str) -> None:
     reader.ensure_accessed_all()
 
 
-def test_an_optional_entry_must_be_right_if_it_is_there() -> None:
+def test_an_optional_entry_must_be_valid_if_present() -> None:
     reader = read("a: x\nb: {}\n")
     assert '"a" must be a map' in failure(reader.optional_subnode, "a", "map")
     assert '"b" must be a list' in failure(reader.optional_subnode, "b", "list")
@@ -415,7 +492,7 @@ def test_an_empty_text_is_null() -> None:
         assert read(text).is_null
 
 
-def test_the_record_of_keys_is_shared_by_place_only() -> None:
+def test_with_location_shares_the_record_of_keys_and_without_does_not() -> None:
     reader = read("a: 1\nb: 2\nname: n\n")
     placed = reader.with_location("x")
     placed.get("a", "int")
@@ -433,19 +510,19 @@ def test_the_record_of_keys_is_shared_by_place_only() -> None:
     assert reader.keys() == ["a", "b", "name"]
 
 
-def test_without_keeps_the_place() -> None:
+def test_without_keeps_the_location() -> None:
     rest = read("\na: 1\nc: 2\n").with_location('model "M"', 'plugin "P"').without("a")
     assert (rest.location, rest.name, rest.line) == ('model "M"', 'plugin "P"', 2)
     assert "[line 3]" in failure(rest.ensure_accessed_all)
 
 
-def test_each_opening_of_an_entry_has_its_own_record() -> None:
+def test_each_reader_of_an_entry_has_its_own_record() -> None:
     reader = read("a: {b: 1}")
     reader.subnode("a").get("b", "int")
     assert '{"b"}' in failure(reader.subnode("a").ensure_accessed_all)
 
 
-def test_errors_of_others_get_the_place(file: Path) -> None:
+def test_error_appends_the_position(file: Path) -> None:
     entry = read_file(file, "a: 1\nb: 2\n").subnode("b")
     error = entry.error("Invalid something")
     assert isinstance(error, YamlError)
@@ -464,7 +541,7 @@ def test_path_and_line(file: Path) -> None:
     assert str(file) in repr(reader)
 
 
-def test_paths_start_in_the_folder_of_the_file(
+def test_paths_are_relative_to_the_folder_of_the_file(
     file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     reader = read_file(file, "a: 1\n")
@@ -477,14 +554,14 @@ def test_paths_start_in_the_folder_of_the_file(
     assert YamlReader.from_string("a: 1", base_dir="x").resolve_path("m") == str(tmp_path / "x/m")
 
 
-def test_a_node_kept_as_plain_data() -> None:
+def test_plain_returns_unconverted_data() -> None:
     reader = read("a: &x [1, ~, {b: on}]\nc: *x\nd: ''\n")
     shared = ["1", None, {"b": "on"}]
     assert reader.plain() == {"a": shared, "c": shared, "d": ""}
     assert reader.optional_subnode("no").plain() is None
 
 
-def test_aliases_are_read_like_what_they_name() -> None:
+def test_aliases_are_read_like_their_anchors() -> None:
     reader = read("a: &x {pose: [1, 2, 3]}\nb: *x\n")
     assert reader.subnode("b").get("pose", "pose") == (1.0, 2.0, 3.0)
     assert 'unrecognized entry(s) {"<<"}' in failure(

@@ -1,4 +1,4 @@
-"""Every entry and every error text of model files."""
+"""Model files: all entries and error messages."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ ERRORS = {
     ),
     "body pose nan": (
         body(", pose: [1, 2, .nan]"),
-        'Invalid "pose" in model "robot" body "base", must be finite, got 1.0, 2.0, nan',
+        'Invalid "pose", must be finite, got [1.0, 2.0, nan] (in model "robot" body "base")',
     ),
     "body color size": (
         body(", color: [1, 2, 3]"),
@@ -65,13 +65,13 @@ ERRORS = {
     ),
     "negative damping": (
         body(", linear_damping: -1"),
-        'Invalid "linear_damping" in model "robot" body "base", must be finite and not '
-        "negative, got -1.0",
+        'Invalid "linear_damping", must be finite and not negative, got -1.0 '
+        '(in model "robot" body "base")',
     ),
     "nan damping": (
         body(", angular_damping: .nan"),
-        'Invalid "angular_damping" in model "robot" body "base", must be finite and not '
-        "negative, got nan",
+        'Invalid "angular_damping", must be finite and not negative, got nan '
+        '(in model "robot" body "base")',
     ),
     "unknown body key": (
         body(", colour: [1, 1, 1, 1]"),
@@ -87,7 +87,7 @@ ERRORS = {
     ),
     "negative density": (
         body(footprint="type: circle, radius: 1, density: -1"),
-        f'Invalid "density" in {FOOTPRINT}, must be finite and not negative, got -1.0',
+        f'Invalid "density", must be finite and not negative, got -1.0 (in {FOOTPRINT})',
     ),
     "density no number": (
         body(footprint="type: circle, radius: 1, density: heavy"),
@@ -95,11 +95,11 @@ ERRORS = {
     ),
     "negative friction": (
         body(footprint="type: circle, radius: 1, density: 1, friction: -0.1"),
-        f'Invalid "friction" in {FOOTPRINT}, must be finite and not negative, got -0.1',
+        f'Invalid "friction", must be finite and not negative, got -0.1 (in {FOOTPRINT})',
     ),
     "negative radius": (
         body(footprint="type: circle, radius: -1, density: 1"),
-        f'Invalid "radius" in {FOOTPRINT}, must be finite and not negative, got -1.0',
+        f'Invalid "radius", must be finite and not negative, got -1.0 (in {FOOTPRINT})',
     ),
     "circle without radius": (
         body(footprint="type: circle, density: 1"),
@@ -107,7 +107,7 @@ ERRORS = {
     ),
     "infinite center": (
         body(footprint="type: circle, density: 1, radius: 1, center: [.inf, 0]"),
-        f'Invalid "center" in {FOOTPRINT}, must be finite, got inf, 0.0',
+        f'Invalid "center", must be finite, got [inf, 0.0] (in {FOOTPRINT})',
     ),
     "unknown footprint layer": (
         body(footprint="type: circle, radius: 1, density: 1, layers: [2d, a, b]"),
@@ -140,7 +140,8 @@ ERRORS = {
     ),
     "polygon with nan": (
         body(footprint="type: polygon, density: 1, points: [[0, 0], [1, .nan], [2, 0]]"),
-        f'Invalid "points" in {FOOTPRINT}, must be finite, got 1.0, nan',
+        'Invalid "points", must be finite, got [(0.0, 0.0), (1.0, nan), (2.0, 0.0)] '
+        f"(in {FOOTPRINT})",
     ),
     "unknown footprint key": (
         body(footprint="type: circle, radius: 1, density: 1, points: []"),
@@ -169,8 +170,8 @@ ERRORS = {
     ),
     "infinite anchor": (
         joint(f"type: weld, {ENDS.replace('[0, 0]', '[.inf, 0]', 1)}"),
-        'Invalid "anchor" in model "robot" joint "J" "bodies" index=0, must be finite, '
-        "got inf, 0.0",
+        'Invalid "anchor", must be finite, got [inf, 0.0] '
+        '(in model "robot" joint "j" "bodies" index=0)',
     ),
     "joint color size": (
         joint(f"type: weld, {ENDS}, color: [1, 1, 1]"),
@@ -178,23 +179,23 @@ ERRORS = {
     ),
     "angle nan": (
         joint(f"type: weld, {ENDS}, angle: .nan"),
-        'Invalid "angle" in model "robot" joint "J", must be finite, got nan',
+        'Invalid "angle", must be finite, got nan (in model "robot" joint "j")',
     ),
     "limit nan": (
         joint(f"type: revolute, {ENDS}, limits: [.nan, 1]"),
-        'Invalid "limits" in model "robot" joint "J", must be finite, got nan, 1.0',
+        'Invalid "limits", must be finite, got [nan, 1.0] (in model "robot" joint "j")',
     ),
     "negative joint damping": (
         joint(f"type: weld, {ENDS}, damping: -1"),
-        'Invalid "damping" in model "robot" joint "J", must be finite and not negative, got -1.0',
+        'Invalid "damping", must be finite and not negative, got -1.0 (in model "robot" joint "j")',
     ),
     "negative restitution": (
         body(footprint="type: circle, radius: 1, density: 1, restitution: -0.1"),
-        f'Invalid "restitution" in {FOOTPRINT}, must be finite and not negative, got -0.1',
+        f'Invalid "restitution", must be finite and not negative, got -0.1 (in {FOOTPRINT})',
     ),
     "body color nan": (
         body(", color: [1, 1, 1, .nan]"),
-        'Invalid "color" in model "robot" body "base", must be finite, got 1.0, 1.0, 1.0, nan',
+        'Invalid "color", must be finite, got [1.0, 1.0, 1.0, nan] (in model "robot" body "base")',
     ),
     "joint twice": (
         f"bodies: {TWO_BODIES}\n"
@@ -203,8 +204,8 @@ ERRORS = {
     ),
     "limits upside down": (
         joint(f"type: revolute, {ENDS}, limits: [1, -1]"),
-        'Invalid "limits" in model "robot" joint "J", the lower limit 1.0 must not be '
-        "above the upper limit -1.0",
+        'Invalid "limits", the lower limit 1.0 must not be above the upper limit -1.0 '
+        '(in model "robot" joint "j")',
     ),
     "limits of one": (
         joint(f"type: revolute, {ENDS}, limits: [1]"),
@@ -220,7 +221,8 @@ ERRORS = {
     ),
     "negative frequency": (
         joint(f"type: weld, {ENDS}, frequency: -1"),
-        'Invalid "frequency" in model "robot" joint "J", must be finite and not negative, got -1.0',
+        'Invalid "frequency", must be finite and not negative, got -1.0 '
+        '(in model "robot" joint "j")',
     ),
     "anchor of one number": (
         joint("type: weld, bodies: [{name: base, anchor: [0, 0]}, {name: wheel, anchor: [0]}]"),
@@ -261,16 +263,16 @@ ERRORS = {
 
 
 @pytest.mark.parametrize("case", ERRORS)
-def test_error_text(files, case):
+def test_error_message(files, case):
     model, text = ERRORS[case]
     with pytest.raises(YamlError) as caught:
         files.load_model(model)
-    # The place follows the text, so that the user finds the line.
-    place = f" [{files.folder}/robot.model.yaml:"
-    assert str(caught.value).startswith(f"Flatland YAML: {text}{place}")
+    # The position follows the text.
+    position = f" [{files.folder}/robot.model.yaml:"
+    assert str(caught.value).startswith(f"Flatland YAML: {text}{position}")
 
 
-def test_all_entries_of_a_body(files):
+def test_entries_of_a_body(files):
     world = files.load_model(
         """
         bodies:
@@ -311,13 +313,13 @@ def test_all_entries_of_a_body(files):
     assert (polygon.category_bits, polygon.mask_bits) == (0xFFFF, 0)
 
 
-def test_no_layers_means_no_bits(files):
+def test_a_footprint_without_layers_has_no_category_bits(files):
     world = files.load_model(body(footprint="type: circle, radius: 1, density: 1, layers: []"))
     (fixture,) = world.model("robot").body("base").fixtures
     assert (fixture.category_bits, fixture.mask_bits) == (0, 0)
 
 
-def test_body_pose_is_in_the_model_frame(files):
+def test_the_pose_of_a_body_is_relative_to_the_model(files):
     files.write("robot.model.yaml", body(", pose: [1, 0, 0.25]"))
     world = files.load(
         """
@@ -329,7 +331,7 @@ def test_body_pose_is_in_the_model_frame(files):
     assert world.model("robot").bodies[0].pose == pytest.approx((10, 21, 1.8207963), abs=1e-5)
 
 
-def test_joints(files):
+def test_entries_of_joints(files):
     world = files.load_model(
         f"""
 bodies: {TWO_BODIES}
@@ -358,7 +360,7 @@ joints:
     assert (rigid.collide_connected, rigid.color) == (False, (1, 1, 1, 0.5))
 
 
-def test_the_bodies_of_a_joint_may_have_further_keys(files):
+def test_the_ends_of_a_joint_can_have_other_keys(files):
     end = "bodies: [{name: base, anchor: [0, 0], side: left}, {name: wheel, anchor: [0, 0], n: []}]"
     world = files.load_model(joint(f"type: weld, {end}"))
     assert [body.name for body in world.model("robot").joint("J").bodies] == ["base", "wheel"]
@@ -380,7 +382,7 @@ plugins: [{{name: P, type: NoSuchPlugin, enabled: No}}]
         assert f'model "robot" {what} is disabled' in caplog.text
 
 
-def test_look_ups_name_what_is_missing(files):
+def test_unknown_parts_of_a_model_are_errors(files):
     model = files.load_model(body()).model("robot")
     with pytest.raises(flatland.WorldError, match='Body with name "x" does not exist'):
         model.body("x")
@@ -400,7 +402,7 @@ def test_look_ups_name_what_is_missing(files):
         ("/a//b/", "base", "a/b_base"),
     ],
 )
-def test_frames_take_the_namespace(files, namespace, frame, expected):
+def test_frames_are_prefixed_with_the_namespace(files, namespace, frame, expected):
     files.write("robot.model.yaml", body())
     world = files.load("{properties: {}, layers: []}")
     model = world.spawn_model("robot.model.yaml", "robot", namespace)

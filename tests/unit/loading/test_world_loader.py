@@ -1,4 +1,4 @@
-"""World files: every entry and every error text."""
+"""World files: all entries and error messages."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ ERRORS = {
     ),
     "no iterations": (
         "{properties: {position_iterations: 0}, layers: []}",
-        'Invalid "position_iterations" in "properties", must be at least 1, got 0',
+        'Invalid "position_iterations", must be at least 1, got 0 (in "properties")',
     ),
     "unknown world key": (
         "{properties: {}, layers: [], b: 1, a: 2}",
@@ -67,7 +67,7 @@ ERRORS = {
     ),
     "layer color nan": (
         "{properties: {}, layers: [{name: L, color: [1, .nan, 1, 1]}]}",
-        'Invalid "color" in layer "L", must be finite, got [1.0, nan, 1.0, 1.0]',
+        'Invalid "color", must be finite, got [1.0, nan, 1.0, 1.0] (in "layers" index=0)',
     ),
     "unknown layer key": (
         "{properties: {}, layers: [{name: L, colour: red}]}",
@@ -105,7 +105,7 @@ ERRORS = {
         "{properties: {}, layers: [], models: [{name: M, model: nowhere.yaml}]}",
         'File does not exist, path="FOLDER/nowhere.yaml"',
     ),
-    "model file of nobody": (
+    "model file of an unknown user": (
         "{properties: {}, layers: [], models: [{name: M, model: ~no-such-user/m.yaml}]}",
         'File does not exist, path="FOLDER/~no-such-user/m.yaml"',
     ),
@@ -129,7 +129,7 @@ ERRORS = {
     "model pose nan": (
         "{properties: {}, layers: [], "
         "models: [{name: M, model: minimal.model.yaml, pose: [.nan, 0, 0]}]}",
-        'failed to spawn model "M", pose must be finite, got (nan, 0.0, 0.0)',
+        'Invalid "pose", must be finite, got [nan, 0.0, 0.0] (in model "m")',
     ),
     "model namespace": (
         "{properties: {}, layers: [], "
@@ -150,24 +150,24 @@ ERRORS = {
 
 
 @pytest.mark.parametrize("case", ERRORS)
-def test_error_text(files, case):
+def test_error_message(files, case):
     world, text = ERRORS[case]
     with pytest.raises(YamlError) as caught:
         files.load(world)
-    # The place follows the text, also where the fault is that a file it names is not there.
-    place = f" [{files.folder}/world.yaml:"
+    # The position of the entry follows the text, also if it names a file that does not exist.
+    position = f" [{files.folder}/world.yaml:"
     text = text.replace("FOLDER", str(files.folder))
-    assert str(caught.value).startswith(f"Flatland YAML: {text}{place}")
+    assert str(caught.value).startswith(f"Flatland YAML: {text}{position}")
 
 
-def test_missing_world_file(tmp_path):
+def test_a_world_file_that_does_not_exist(tmp_path):
     path = tmp_path / "nowhere.yaml"
     with pytest.raises(YamlError) as caught:
         flatland.World.from_yaml(path)
     assert str(caught.value).startswith(f'Flatland YAML: File does not exist, path="{path}"')
 
 
-def test_world_file_of_nobody():
+def test_a_world_file_of_an_unknown_user_does_not_exist():
     with pytest.raises(
         YamlError, match=r'File does not exist, path=".*/~no-such-user/world\.yaml"'
     ):
@@ -182,13 +182,13 @@ def test_world_file_of_nobody():
         ({"resolution": 1e30}, r"edges\[0, 0\] must be finite and within"),
     ],
 )
-def test_map_beyond_what_the_physics_holds(files, keys, text):
+def test_a_map_outside_the_range_of_the_physics(files, keys, text):
     files.write_map("map", ["   ", " # ", "   "], **keys)
     with pytest.raises(YamlError, match=rf'Invalid map in layer "L", {text} .* \[/.*map\.yaml\]$'):
         files.load("{properties: {}, layers: [{name: L, map: map.yaml}]}")
 
 
-def test_paths_in_included_files_start_from_the_world_files_folder(files, monkeypatch):
+def test_paths_in_included_files_are_relative_to_the_world_file(files, monkeypatch):
     monkeypatch.chdir("/")
     files.write_map("map", ["###", "#.#", "###"])
     files.write("common/layers.yaml", "[{name: walls, map: map.yaml}]")
@@ -205,14 +205,14 @@ def test_paths_in_included_files_start_from_the_world_files_folder(files, monkey
     assert world.model("m").path == str(files.folder / "minimal.model.yaml")
 
 
-def test_very_many_layer_names_are_refused_at_once(files):
-    """Each name was compared with all before it, which took minutes."""
+def test_a_huge_number_of_layer_names_is_rejected_quickly(files):
+    """Duplicate names are found in linear time."""
     names = [f"l{i}" for i in range(100_000)]
     with pytest.raises(YamlError, match="Unable to add 100000 additional"):
         files.load(f"{{properties: {{}}, layers: [{{name: [{', '.join(names)}]}}]}}")
 
 
-def test_world_plugin_errors_name_the_plugin(files):
+def test_an_error_of_a_world_plugin_contains_its_name(files):
     with pytest.raises(flatland.PluginError) as caught:
         files.load("{properties: {}, layers: [], plugins: [{name: W, type: Nothing}]}")
     assert str(caught.value).startswith(
@@ -221,7 +221,7 @@ def test_world_plugin_errors_name_the_plugin(files):
     assert re.search(r" \[.*world\.yaml:1\]$", str(caught.value))
 
 
-def test_world_plugin_same_name_other_type_is_allowed(files, caplog):
+def test_world_plugins_of_one_type_can_have_different_names(files, caplog):
     caplog.set_level(logging.INFO, "flatland")
     world = files.load(
         "{properties: {}, layers: [], plugins: [{name: W, type: DummyWorldPlugin}, "
@@ -231,7 +231,7 @@ def test_world_plugin_same_name_other_type_is_allowed(files, caplog):
     assert 'world plugin "X" is disabled' in caplog.text
 
 
-def test_defaults(empty_world):
+def test_default_properties(empty_world):
     assert empty_world.velocity_iterations == 10
     assert empty_world.position_iterations == 10
     assert empty_world.layers == []
@@ -239,14 +239,14 @@ def test_defaults(empty_world):
     assert empty_world.time == 0.0
 
 
-def test_properties(files):
+def test_solver_iterations(files):
     world = files.load(
         "{properties: {velocity_iterations: 11, position_iterations: 12}, layers: []}"
     )
     assert (world.velocity_iterations, world.position_iterations) == (11, 12)
 
 
-def test_layers(files):
+def test_entries_of_layers(files):
     files.write_map("map", ["   ", " # ", "   "], origin="[1, 2, 0.5]", resolution=0.5)
     world = files.load(
         """
@@ -310,7 +310,7 @@ def test_sixteen_layers_fit(files):
     assert world.layers[0].category_bits == 0xFFFF
 
 
-def test_paths_start_from_the_world_file(files, monkeypatch, tmp_path):
+def test_paths_are_relative_to_the_world_file(files, monkeypatch, tmp_path):
     files.write("sub/robot.model.yaml", "bodies: [{name: base, footprints: []}]")
     monkeypatch.chdir("/")
     world = files.load(
@@ -329,7 +329,7 @@ def test_paths_start_from_the_world_file(files, monkeypatch, tmp_path):
 
 
 class Recorder(flatland.WorldObserver):
-    """Keeps the names of what is open."""
+    """Records the topics of open outputs and commands."""
 
     def __init__(self):
         self.open = set()
@@ -350,7 +350,7 @@ class Recorder(flatland.WorldObserver):
         self.open.remove(command.topic)
 
 
-def test_a_failure_leaves_nothing_behind(files):
+def test_a_failed_load_closes_all_topics_and_models(files):
     files.write(
         "driven.model.yaml",
         """
@@ -371,22 +371,22 @@ def test_a_failure_leaves_nothing_behind(files):
     assert "/cmd_vel" in recorder.ever
     assert recorder.open == set()
     gc.collect()
-    assert not [thing for thing in gc.get_objects() if isinstance(thing, flatland.Model)]
+    assert not [each for each in gc.get_objects() if isinstance(each, flatland.Model)]
 
 
 @pytest.mark.parametrize("value", [3, -1, True + 5, "0", None])
-def test_simplify_map_is_checked(files, value):
+def test_simplify_map_out_of_range_is_rejected(files, value):
     with pytest.raises(ValueError, match="simplify_map must be 0, 1 or 2"):
         files.load("{properties: {}, layers: []}", simplify_map=value)
 
 
-def test_a_drawn_seed_is_logged(files, caplog):
+def test_a_random_seed_is_logged(files, caplog):
     caplog.set_level(logging.INFO, "flatland")
     world = files.load("{properties: {}, layers: []}", seed=None)
     assert f"seed {world.seed} drawn at random" in caplog.text
 
 
-def test_params_reach_the_files(files):
+def test_parameters_are_available_in_files(files):
     world = files.load(
         """
         properties: {velocity_iterations: '$eval param("/iterations", 3)'}

@@ -1,4 +1,4 @@
-"""Files of line segments."""
+"""Reading of line segment files."""
 
 from __future__ import annotations
 
@@ -29,12 +29,12 @@ def read(tmp_path: Path, text: str | bytes) -> list[list[float]]:
         "\ufeff1 2 3 4\n5 -6 7.5 0.8\n",
     ],
 )
-def test_what_is_allowed(tmp_path: Path, text: str) -> None:
+def test_accepted_formats(tmp_path: Path, text: str) -> None:
     assert read(tmp_path, text) == [[1, 2, 3, 4], [5, -6, 7.5, 0.8]]
 
 
 @pytest.mark.parametrize("text", ["", "\n\n", "# nothing\n"])
-def test_no_segments(tmp_path: Path, text: str) -> None:
+def test_a_file_without_segments(tmp_path: Path, text: str) -> None:
     assert read(tmp_path, text) == []
 
 
@@ -43,7 +43,7 @@ def test_no_segments(tmp_path: Path, text: str) -> None:
     ["1 2 3", "1", "1 2 3 x", "1,2,3,4", "1 2 nan 4", "inf 2 3 4", "1 2 # 3 4", "1 2 3 1e999"],
 )
 @pytest.mark.parametrize("before", [0, 1, 7])
-def test_the_line_of_an_error_is_that_of_the_file(tmp_path: Path, bad: str, before: int) -> None:
+def test_an_error_contains_the_line_number(tmp_path: Path, bad: str, before: int) -> None:
     text = "# head\n\n" + "1 2 3 4\n" * before + bad + "\n1 2 3 4\n"
     line = 3 + before
     with pytest.raises(MapFileError) as caught:
@@ -54,23 +54,23 @@ def test_the_line_of_an_error_is_that_of_the_file(tmp_path: Path, bad: str, befo
     )
 
 
-def test_of_two_bad_lines_the_first_is_named(tmp_path: Path) -> None:
+def test_an_error_refers_to_the_first_invalid_line(tmp_path: Path) -> None:
     with pytest.raises(MapFileError, match="line segment from line 2,"):
         read(tmp_path, "1 2 3 4\n1 2 nan 4\n1 2\n")
 
 
-def test_a_binary_file(tmp_path: Path) -> None:
+def test_a_binary_file_is_rejected(tmp_path: Path) -> None:
     with pytest.raises(MapFileError, match="line segment from line 1,"):
         read(tmp_path, b"\x89PNG\xff\xfe\x00\x01\n")
 
 
 @pytest.mark.parametrize("name", ["missing.dat", "."])
-def test_what_cannot_be_opened(tmp_path: Path, name: str) -> None:
+def test_unreadable_files(tmp_path: Path, name: str) -> None:
     with pytest.raises(OSError, match=r"No such file|not a regular file"):
         read_line_segments(str(tmp_path / name))
 
 
-def test_many_segments_are_exact(tmp_path: Path) -> None:
+def test_numbers_are_read_exactly(tmp_path: Path) -> None:
     segments = np.random.default_rng(3).normal(0, 100, (20_000, 4))
     text = "\n".join(" ".join(map(repr, row)) for row in segments.tolist())
     np.testing.assert_array_equal(read(tmp_path, text), segments)

@@ -1,4 +1,4 @@
-"""Map files: both kinds, and the text of every error."""
+"""Map files of both kinds, and their error messages."""
 
 from __future__ import annotations
 
@@ -35,11 +35,11 @@ Write = Callable[[str], str]
 
 @pytest.fixture
 def write(tmp_path: Path) -> Write:
-    """Writes the map file, beside an image and a data file, and returns its path."""
+    """Returns a function that writes a map file next to an image and a data file."""
     grey = np.full((30, 40), 254, np.uint8)
     grey[5:20, 10:12] = 0
     for column in range(12, 30):
-        grey[column // 2, column] = 100  # a slanted wall: simplification sees it as such
+        grey[column // 2, column] = 100  # a diagonal wall, which can be simplified
     cv2.imwrite(str(tmp_path / "map.png"), grey)
     (tmp_path / "lines.dat").write_text("# x1 y1 x2 y2\n\n0 0 10 0\n10 0 10.5 20.25\n")
 
@@ -51,11 +51,11 @@ def write(tmp_path: Path) -> Write:
     return write_map
 
 
-def place(path: str, line: int) -> str:
+def position(path: str, line: int) -> str:
     return f" [{path}:{line}]"
 
 
-def test_image(write: Write, tmp_path: Path) -> None:
+def test_image_map(write: Write, tmp_path: Path) -> None:
     path = write(IMAGE_MAP)
     layer_map = load_map(path, "2d")
     assert layer_map.origin == (1.5, -2.0, 0.3)
@@ -83,7 +83,7 @@ def test_map_server_keys_are_ignored(write: Write) -> None:
     )
 
 
-def test_the_image_is_looked_for_beside_the_map_file(write: Write, tmp_path: Path) -> None:
+def test_image_paths_are_relative_to_the_map_file(write: Write, tmp_path: Path) -> None:
     folder = tmp_path / "maps"
     folder.mkdir()
     path = folder / "other.yaml"
@@ -93,7 +93,7 @@ def test_the_image_is_looked_for_beside_the_map_file(write: Write, tmp_path: Pat
     assert len(load_map(str(path), "2d").edges) > 0
 
 
-def test_values_may_be_computed(write: Write) -> None:
+def test_values_can_be_expressions(write: Write) -> None:
     text = IMAGE_MAP.replace("0.05", '$eval param("resolution", 0.1)')
     coarse = load_map(write(text), "2d").edges
     fine = load_map(write(text), "2d", params={"resolution": 0.05}).edges
@@ -101,7 +101,9 @@ def test_values_may_be_computed(write: Write) -> None:
 
 
 @pytest.mark.parametrize("simplify", [1, 2])
-def test_simplify(write: Write, caplog: pytest.LogCaptureFixture, simplify: int) -> None:
+def test_simplification_reduces_the_number_of_edges(
+    write: Write, caplog: pytest.LogCaptureFixture, simplify: int
+) -> None:
     caplog.set_level(logging.INFO, logger="flatland")
     path = write(IMAGE_MAP)
     exact = load_map(path, "2d")
@@ -114,7 +116,7 @@ def test_simplify(write: Write, caplog: pytest.LogCaptureFixture, simplify: int)
     ]
 
 
-def test_line_segments(write: Write) -> None:
+def test_line_segment_map(write: Write) -> None:
     layer_map = load_map(write(LINE_MAP.replace("[0, 0, 0]", "[-1.2, -5, 1.23]")), "lines")
     assert layer_map.origin == (-1.2, -5.0, 1.23)
     np.testing.assert_allclose(layer_map.edges, [[0, 0, 1, 0], [1, 0, 1.05, 2.025]], atol=1e-7)
@@ -127,40 +129,45 @@ def test_line_segments_are_never_simplified(write: Write, simplify: int) -> None
     assert len(load_map(write(LINE_MAP), "lines", simplify=simplify).edges) == 2
 
 
-def test_segments_of_no_length_are_left_out(
+def test_segments_of_length_zero_are_ignored(
     write: Write, tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
     (tmp_path / "lines.dat").write_text("1 1 1 1\n0 0 10 0\n1 2 1 2.000000000001\n")
     assert len(load_map(write(LINE_MAP), "lines").edges) == 1
-    assert f"2 line segments of length 0 in {tmp_path / 'lines.dat'} are left out" in caplog.text
+    assert f"2 line segments of length 0 in {tmp_path / 'lines.dat'} ignored" in caplog.text
 
 
-def test_an_empty_data_file(write: Write, tmp_path: Path) -> None:
+def test_an_empty_data_file_has_no_edges(write: Write, tmp_path: Path) -> None:
     (tmp_path / "lines.dat").write_text("")
     edges = load_map(write(LINE_MAP), "lines").edges
     assert edges.shape == (0, 4)
     assert edges.dtype == np.float32
 
 
-def test_a_threshold_that_no_pixel_can_meet(write: Write, caplog: pytest.LogCaptureFixture) -> None:
+def test_a_threshold_outside_the_range_of_pixels_is_logged(
+    write: Write, caplog: pytest.LogCaptureFixture
+) -> None:
     load_map(write(IMAGE_MAP.replace("0.65", "65")), "2d")
-    assert 'Layer "2d": "occupied_thresh" is 65, but pixels have values from 0 to 1' in caplog.text
+    assert (
+        'Layer "2d": "occupied_thresh" is 65, outside the range of pixel values, 0 to 1'
+        in caplog.text
+    )
 
 
 @pytest.mark.parametrize("simplify", [-1, 3])
-def test_unknown_simplification(write: Write, simplify: int) -> None:
+def test_simplify_out_of_range_is_rejected(write: Write, simplify: int) -> None:
     with pytest.raises(ValueError, match=f"simplify must be 0, 1 or 2, got {simplify}"):
         load_map(write(IMAGE_MAP), "2d", simplify=simplify)
 
 
-def fails(path: str, error: type[FlatlandError], text: str) -> None:
-    """Checks that layer "Walls" fails with exactly this text."""
+def assert_fails(path: str, error: type[FlatlandError], text: str) -> None:
+    """Asserts that loading the map of layer "Walls" raises an error with exactly this text."""
     with pytest.raises(error) as caught:
         load_map(path, "Walls")
     assert str(caught.value) == error.prefix + text
 
 
-def test_no_map_file(tmp_path: Path) -> None:
+def test_a_map_file_that_does_not_exist(tmp_path: Path) -> None:
     path = str(tmp_path / "nowhere.yaml")
     with pytest.raises(YamlError, match=re.escape(f'File does not exist, path="{path}"')):
         load_map(path, "Walls")
@@ -170,35 +177,39 @@ def test_no_map_file(tmp_path: Path) -> None:
 def test_missing_key_of_an_image(write: Write, key: str) -> None:
     text = "".join(line for line in IMAGE_MAP.splitlines(True) if not line.startswith(key))
     path = write(text)
-    fails(path, YamlError, f'Entry "{key}" does not exist (in layer "walls"){place(path, 1)}')
+    assert_fails(
+        path, YamlError, f'Entry "{key}" does not exist (in layer "walls"){position(path, 1)}'
+    )
 
 
 @pytest.mark.parametrize("key", ["data", "scale", "origin"])
 def test_missing_key_of_line_segments(write: Write, key: str) -> None:
     text = "".join(line for line in LINE_MAP.splitlines(True) if not line.startswith(key))
     path = write(text)
-    fails(path, YamlError, f'Entry "{key}" does not exist (in layer "walls"){place(path, 1)}')
+    assert_fails(
+        path, YamlError, f'Entry "{key}" does not exist (in layer "walls"){position(path, 1)}'
+    )
 
 
 @pytest.mark.parametrize("text", [IMAGE_MAP, LINE_MAP])
-def test_unknown_keys_are_allowed_and_named(
+def test_unknown_keys_are_ignored_and_logged(
     write: Write, caplog: pytest.LogCaptureFixture, text: str
 ) -> None:
     caplog.set_level(logging.INFO)
     path = write(text + "zoom: 2\nbright: [1, {a: b}]\nnegate: 0\n")
     layer_map = load_map(path, "Walls")
     np.testing.assert_array_equal(layer_map.edges, load_map(write(text), "Walls").edges)
-    # What map_server reads is known, but not to a map of line segments.
+    # Keys of map_server are known in maps of images, but not in maps of line segments.
     unknown = ("bright", "negate", "zoom") if text == LINE_MAP else ("bright", "zoom")
     assert layer_map.unknown_keys == unknown
-    message = f'Layer "Walls": flatland does not use the keys {{{", ".join(unknown)}}} of {path}'
+    message = f'Layer "Walls": unknown keys {{{", ".join(unknown)}}} of {path} ignored'
     assert caplog.text.count(message) == 1
 
 
-def test_origin_of_another_size(write: Write) -> None:
+def test_an_origin_of_a_wrong_size(write: Write) -> None:
     path = write(IMAGE_MAP.replace("[1.5, -2, 0.3]", "[1.5, -2]"))
     text = 'Entry "origin" must have size of exactly 3 (in layer "walls")'
-    fails(path, YamlError, text + place(path, 3))
+    assert_fails(path, YamlError, text + position(path, 3))
 
 
 @pytest.mark.parametrize(
@@ -213,17 +224,19 @@ def test_origin_of_another_size(write: Write) -> None:
         ("0.65", ".nan", "occupied_thresh", "must be finite, got nan", 4),
     ],
 )
-def test_numbers_of_an_image_that_make_no_sense(
+def test_image_map_numbers_out_of_range(
     write: Write, old: str, new: str, key: str, why: str, line: int
 ) -> None:
     path = write(IMAGE_MAP.replace(old, new))
-    fails(path, YamlError, f'Invalid "{key}" in layer "Walls", {why}{place(path, line)}')
+    text = f'Invalid "{key}", {why} (in layer "walls")'
+    assert_fails(path, YamlError, text + position(path, line))
 
 
-def test_resolution_beyond_float32(write: Write) -> None:
+def test_a_resolution_outside_the_32_bit_range(write: Write) -> None:
     path = write(IMAGE_MAP.replace("0.05", "1e38"))
     why = "resolution must be positive, and the size of the map must fit a 32-bit float, got 1e+38"
-    fails(path, YamlError, f'Invalid "resolution" in layer "Walls", {why}{place(path, 2)}')
+    text = f'Invalid "resolution", {why} (in layer "walls")'
+    assert_fails(path, YamlError, text + position(path, 2))
 
 
 @pytest.mark.parametrize(
@@ -235,29 +248,30 @@ def test_resolution_beyond_float32(write: Write) -> None:
         ("[0, 0, 0]", "[0, .nan, 0]", "origin", "must be finite, got [0.0, nan, 0.0]", 4),
     ],
 )
-def test_numbers_of_line_segments_that_make_no_sense(
+def test_line_segment_map_numbers_out_of_range(
     write: Write, old: str, new: str, key: str, why: str, line: int
 ) -> None:
     path = write(LINE_MAP.replace(old, new))
-    fails(path, YamlError, f'Invalid "{key}" in layer "Walls", {why}{place(path, line)}')
+    text = f'Invalid "{key}", {why} (in layer "walls")'
+    assert_fails(path, YamlError, text + position(path, line))
 
 
-def test_a_negative_scale_mirrors(write: Write) -> None:
+def test_a_negative_scale_mirrors_the_segments(write: Write) -> None:
     edges = load_map(write(LINE_MAP.replace("0.1", "-0.1")), "lines").edges
     np.testing.assert_allclose(edges, [[0, 0, -1, 0], [-1, 0, -1.05, -2.025]], atol=1e-7)
 
 
 @pytest.mark.parametrize("map_type", ["indoor", "outdoor", "Line_Segments", '""', "", "3"])
-def test_any_other_type_is_an_image(write: Write, map_type: str) -> None:
+def test_a_map_of_another_type_is_an_image_map(write: Write, map_type: str) -> None:
     layer_map = load_map(write(f"{IMAGE_MAP}type: {map_type}\n"), "Walls")
     np.testing.assert_array_equal(layer_map.edges, load_map(write(IMAGE_MAP), "Walls").edges)
     assert layer_map.unknown_keys == ()
 
 
-def test_a_type_is_text(write: Write) -> None:
+def test_the_type_must_be_a_string(write: Write) -> None:
     path = write(IMAGE_MAP + "type: [indoor]\n")
     text = 'Error converting entry "type" to string (in layer "walls")'
-    fails(path, YamlError, text + place(path, 5))
+    assert_fails(path, YamlError, text + position(path, 5))
 
 
 @pytest.mark.parametrize("image", ["random_path/map.png", "lines.dat", "."])
@@ -265,7 +279,7 @@ def test_unreadable_image(write: Write, tmp_path: Path, image: str) -> None:
     path = write(IMAGE_MAP.replace("map.png", image))
     full = tmp_path if image == "." else tmp_path / image
     text = f'Failed to load "{full}" in layer "Walls"'
-    fails(path, YamlError, text + place(path, 1))
+    assert_fails(path, YamlError, text + position(path, 1))
 
 
 @pytest.mark.parametrize("file", ["pipe", "/dev/zero", '"zero\\0byte"'])
@@ -277,7 +291,7 @@ def test_unreadable_image(write: Write, tmp_path: Path, image: str) -> None:
     ],
     ids=["image", "data"],
 )
-def test_what_is_no_regular_file(
+def test_files_that_are_not_regular_are_rejected(
     write: Write,
     tmp_path: Path,
     text: str,
@@ -287,33 +301,33 @@ def test_what_is_no_regular_file(
     line: int,
     file: str,
 ) -> None:
-    """A pipe would keep the simulator for ever."""
+    """Opening a pipe would block."""
     os.mkfifo(tmp_path / "pipe")
     path = write(text.replace(name, file))
     with pytest.raises(error, match=message) as caught:
         load_map(path, "Walls")
-    assert str(caught.value).endswith(place(path, line))
+    assert str(caught.value).endswith(position(path, line))
 
 
 def test_missing_data_file(write: Write, tmp_path: Path) -> None:
     path = write(LINE_MAP.replace("lines.dat", "random_path/lines.dat"))
     text = f'Failed to load "{tmp_path / "random_path/lines.dat"}"'
-    fails(path, MapFileError, text + place(path, 2))
+    assert_fails(path, MapFileError, text + position(path, 2))
 
 
-def test_bad_line(write: Write, tmp_path: Path) -> None:
+def test_an_invalid_line_of_a_data_file(write: Write, tmp_path: Path) -> None:
     data = tmp_path / "lines.dat"
     data.write_text("1 2 3 4\n" * 5 + "1 2 3 ~\n")
     text = 'Failed to read line segment from line 6, in file "lines.dat"'
-    fails(write(LINE_MAP), MapFileError, text + place(str(data), 6))
+    assert_fails(write(LINE_MAP), MapFileError, text + position(str(data), 6))
 
 
-def test_what_is_no_map(write: Write) -> None:
+def test_a_map_file_must_contain_a_map(write: Write) -> None:
     path = write("- image: map.png\n")
-    fails(path, YamlError, 'Entry must be a map (in layer "walls")' + place(path, 1))
+    assert_fails(path, YamlError, 'Entry must be a map (in layer "walls")' + position(path, 1))
 
 
-def test_a_wall_at_an_angle_stands_where_the_origin_puts_it(write: Write) -> None:
+def test_the_origin_rotates_and_moves_the_edges(write: Write) -> None:
     layer_map = load_map(write(IMAGE_MAP), "2d")
     x, _, theta = layer_map.origin
     left = layer_map.edges[:, 0].min(), layer_map.edges[:, 1].min()

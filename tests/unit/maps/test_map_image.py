@@ -1,4 +1,4 @@
-"""Images of maps: what is read from which format, the threshold and the simplification."""
+"""Map images: formats, threshold and simplification."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ Image = npt.NDArray[np.uint8]
 
 
 def png(width: int, bit_depth: int, color_type: int, row: bytes, palette: bytes = b"") -> bytes:
-    """A PNG file of one row, written by hand: OpenCV writes no grey with alpha and no palette."""
+    """Returns a PNG file of one row, in formats that OpenCV cannot write."""
 
     def chunk(kind: bytes, data: bytes) -> bytes:
         checksum = zlib.crc32(kind + data)
@@ -38,16 +38,16 @@ def png(width: int, bit_depth: int, color_type: int, row: bytes, palette: bytes 
 
 
 def tiff(width: int, row: bytes, extra_samples: int, order: str = "<") -> bytes:
-    """A TIFF file of one row of 8-bit RGBA with the given meaning of the fourth sample."""
+    """Returns a TIFF file of one row of 8-bit RGBA, with the given type of the fourth sample."""
     entry_count, header_size = 10, 8
-    bits_at = header_size + 2 + 12 * entry_count + 4
+    bits_offset = header_size + 2 + 12 * entry_count + 4
     entries = [
         (256, 4, 1, width),
         (257, 4, 1, 1),
-        (258, 3, 4, bits_at),  # bits per sample: four values, elsewhere
+        (258, 3, 4, bits_offset),  # bits per sample, four values at an offset
         (259, 4, 1, 1),  # no compression
         (262, 4, 1, 2),  # RGB
-        (273, 4, 1, bits_at + 8),  # where the row is
+        (273, 4, 1, bits_offset + 8),  # offset of the row
         (277, 4, 1, 4),
         (278, 4, 1, 1),
         (279, 4, 1, len(row)),
@@ -67,15 +67,15 @@ def grey() -> Image:
 
 
 @pytest.mark.parametrize("suffix", ["png", "pgm", "bmp", "tif", "tiff", "webp"])
-def test_formats(tmp_path: Path, grey: Image, suffix: str) -> None:
+def test_supported_formats(tmp_path: Path, grey: Image, suffix: str) -> None:
     path = str(tmp_path / f"map.{suffix}")
     cv2.imwrite(path, grey, [cv2.IMWRITE_WEBP_QUALITY, 101])
     image = read_grey_image(path)
     assert image.dtype == np.uint8
-    np.testing.assert_allclose(image, grey, atol=1)  # WebP stores colours
+    np.testing.assert_allclose(image, grey, atol=1)  # WebP converts grey to colours
 
 
-def test_jpeg(tmp_path: Path) -> None:
+def test_jpeg_within_compression_loss(tmp_path: Path) -> None:
     path = str(tmp_path / "map.jpg")
     walls = np.full((40, 60), 255, np.uint8)
     walls[8:16, 16:40] = 0
@@ -84,7 +84,7 @@ def test_jpeg(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("maximum", [255, 65535])
-def test_pgm_with_comment(tmp_path: Path, maximum: int) -> None:
+def test_pgm_with_a_comment(tmp_path: Path, maximum: int) -> None:
     path = tmp_path / "map.pgm"
     row = struct.pack(">2H", 0xA5FF, 0xA600) if maximum == 65535 else bytes([0xA5, 0xA6])
     path.write_bytes(b"P5\n# written by hand\n2 1\n%d\n" % maximum + row)
@@ -118,7 +118,7 @@ def test_pgm_with_comment(tmp_path: Path, maximum: int) -> None:
         "TIFF associated alpha",
     ],
 )
-def test_alpha_is_dropped_and_colours_become_grey(
+def test_alpha_is_ignored_and_colours_become_grey(
     tmp_path: Path, data: bytes, expected: list[int]
 ) -> None:
     path = tmp_path / "map"
@@ -127,7 +127,7 @@ def test_alpha_is_dropped_and_colours_become_grey(
 
 
 @pytest.mark.parametrize("name", ["nothing", "text", "empty", "cut", "huge", "tiff", "folder"])
-def test_what_is_no_image(tmp_path: Path, grey: Image, name: str) -> None:
+def test_invalid_images(tmp_path: Path, grey: Image, name: str) -> None:
     whole = cv2.imencode(".png", np.random.default_rng(1).integers(0, 255, (64, 64), np.uint8))[1]
     path = tmp_path / name
     contents = {
@@ -148,15 +148,15 @@ def test_what_is_no_image(tmp_path: Path, grey: Image, name: str) -> None:
 @pytest.mark.parametrize(
     "threshold", [0.0, 1e-9, 0.2, 0.4, 0.5, 0.65, 0.196, 102 / 255, 1.0, 1.01, -3.0]
 )
-def test_threshold_is_that_of_the_divided_value(grey: Image, threshold: float) -> None:
+def test_the_threshold_applies_to_the_value_divided_by_255(grey: Image, threshold: float) -> None:
     expected = [[int(value) / 255 >= threshold for value in row] for row in grey]
     mask = threshold_in_place(grey, threshold)
     np.testing.assert_array_equal(mask, expected)
-    assert mask is grey  # a large map is not in memory twice
+    assert mask is grey  # no second large array
 
 
 def drawn_walls() -> Image:
-    """Free space, 1, with a pillar, a wall with a kink and a ragged one."""
+    """Returns free space (1) with a pillar, a bent wall and a wall with a rough surface."""
     mask = np.ones((120, 160), np.uint8)
     mask[:3] = mask[-3:] = 0
     mask[:, :3] = mask[:, -3:] = 0
@@ -177,7 +177,7 @@ def test_without_simplification_the_boundary_is_exact() -> None:
 
 
 def distance_to_edges(points: npt.NDArray[np.floating], edges: npt.NDArray[np.floating]) -> float:
-    """Greatest distance of any point from the edge nearest to it."""
+    """Returns the maximum distance of a point from its nearest edge."""
     start, along = edges[:, :2], edges[:, 2:] - edges[:, :2]
     relative = points[:, None] - start[None]
     fraction = np.clip((relative * along).sum(-1) / (along**2).sum(-1), 0, 1)
@@ -186,45 +186,45 @@ def distance_to_edges(points: npt.NDArray[np.floating], edges: npt.NDArray[np.fl
 
 
 def blobs() -> Image:
-    """Shapes with curved outlines."""
+    """Returns shapes with curved outlines."""
     noise = np.random.default_rng(5).random((120, 160), np.float32)
     smooth: Image = (cv2.GaussianBlur(noise, (0, 0), 5) > 0.5).astype(np.uint8)
     return smooth
 
 
 @pytest.mark.parametrize("mask", [drawn_walls(), blobs()], ids=["walls", "blobs"])
-def test_simplified_boundary(mask: Image) -> None:
+def test_the_simplified_boundary_is_closed_and_within_a_pixel(mask: Image) -> None:
     exact_edges = boundary_edges(mask, 1.0)
     edges, exact = image_edges(mask, 1.0, simplify=1)
     assert edges.dtype == np.float32
     assert exact == len(exact_edges)
     assert len(edges) < exact / 2
-    # No corner of the exact boundary is farther than a pixel from the simplified one.
+    # The distance of the corners of the exact boundary from the simplified one is at most a pixel.
     assert distance_to_edges(exact_edges[:, :2].astype(float), edges.astype(float)) <= 1.0 + 1e-6
-    # The loops are still closed: every point starts one edge and ends another.
+    # The loops are closed: each point is the start of one edge and the end of another.
     starts = sorted(map(tuple, edges[:, :2].tolist()))
     assert starts == sorted(map(tuple, edges[:, 2:].tolist()))
 
 
-def test_loops_that_would_keep_four_points_stay_exact() -> None:
+def test_loops_that_would_be_reduced_to_four_points_stay_exact() -> None:
     mask = np.ones((40, 40), np.uint8)
     mask[5, 5] = 0  # one pixel
     mask[10:20, 10:20] = 0  # a pillar
-    mask[9, 14] = 0  # with a burr, which simplification would take off: 4 points are left
+    mask[9, 14] = 0  # with a burr, whose removal would leave 4 points
     edges, exact = image_edges(mask, 1.0, simplify=1)
     assert exact == len(edges) == 4 + 8
     found = {tuple(sorted(((a, b), (c, d)))) for a, b, c, d in edges.tolist()}
-    wanted = boundary_edges(mask, 1.0).tolist()
-    assert found == {tuple(sorted(((a, b), (c, d)))) for a, b, c, d in wanted}
+    expected = boundary_edges(mask, 1.0).tolist()
+    assert found == {tuple(sorted(((a, b), (c, d)))) for a, b, c, d in expected}
 
 
-def test_opening_removes_what_is_narrow_in_free_space() -> None:
+def test_opening_removes_narrow_free_space() -> None:
     mask = drawn_walls()
-    mask[60:85, 50:53] = 0  # two walls, and between them a slit that is too narrow
+    mask[60:85, 50:53] = 0  # two walls with a narrow slit between them
     mask[60:85, 56:60] = 0
     edges_1, exact_1 = image_edges(mask, 1.0, simplify=1)
     edges_2, exact_2 = image_edges(mask, 1.0, simplify=2)
-    assert exact_1 == exact_2 == len(boundary_edges(mask, 1.0))  # of the map as it is
+    assert exact_1 == exact_2 == len(boundary_edges(mask, 1.0))  # of the original map
     kernel = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (7, 7))
     opened = cv2.morphologyEx(mask, cv2.MORPH_OPEN, kernel)
     expected, _ = image_edges(opened, 1.0, simplify=1)
@@ -239,7 +239,7 @@ def test_opening_removes_what_is_narrow_in_free_space() -> None:
 
 
 @pytest.mark.parametrize("simplify", [0, 1, 2])
-def test_a_map_that_is_all_on_has_no_edges(simplify: int) -> None:
+def test_a_map_without_off_pixels_has_no_edges(simplify: int) -> None:
     edges, exact = image_edges(np.ones((20, 20), np.uint8), 0.05, simplify)
     assert edges.shape == (0, 4)
     assert edges.dtype == np.float32
@@ -254,7 +254,7 @@ class TestPlainGrey:
         return np.random.default_rng(1).integers(0, 256, (37, 53), np.uint8)
 
     @pytest.mark.parametrize("suffix", ["png", "pgm"])
-    def test_needs_no_opencv(
+    def test_opencv_is_not_imported(
         self, tmp_path: Path, pixels: npt.NDArray[np.uint8], suffix: str
     ) -> None:
         pytest.importorskip("PIL")
@@ -271,22 +271,20 @@ class TestPlainGrey:
         on = (pixels / 255.0 >= 0.65).sum()
         assert result.stdout.split() == [str(pixels.sum()), str(on), "False"]
 
-    def test_header_as_map_server_writes_it(
-        self, tmp_path: Path, pixels: npt.NDArray[np.uint8]
-    ) -> None:
+    def test_a_header_of_map_server(self, tmp_path: Path, pixels: npt.NDArray[np.uint8]) -> None:
         path = tmp_path / "map.pgm"
         header = b"P5\n# CREATOR: map_saver.cpp 0.050 m/pix\n53 37\n255\n"
         path.write_bytes(header + pixels.tobytes())
         np.testing.assert_array_equal(read_grey_image(str(path)), pixels)
 
-    def test_grey_of_another_depth_is_left_to_opencv(self, tmp_path: Path) -> None:
+    def test_other_depths_are_read_by_opencv(self, tmp_path: Path) -> None:
         path = tmp_path / "map.pgm"
         path.write_bytes(b"P5\n2 1\n100\n" + bytes([50, 100]))
         expected = cv2.imread(str(path), cv2.IMREAD_GRAYSCALE)
         np.testing.assert_array_equal(read_grey_image(str(path)), expected)
 
     @pytest.mark.parametrize("suffix", ["png", "pgm"])
-    def test_cut_short_it_is_an_error(
+    def test_a_truncated_file_is_an_error(
         self, tmp_path: Path, pixels: npt.NDArray[np.uint8], suffix: str
     ) -> None:
         path = tmp_path / f"map.{suffix}"
@@ -295,7 +293,7 @@ class TestPlainGrey:
         with pytest.raises(OSError, match="cannot read"):
             read_grey_image(str(path))
 
-    def test_without_pillow_opencv_reads_it(
+    def test_opencv_is_used_without_pillow(
         self, tmp_path: Path, pixels: npt.NDArray[np.uint8], monkeypatch: pytest.MonkeyPatch
     ) -> None:
         path = tmp_path / "map.png"

@@ -435,9 +435,9 @@ class TestErrors:
         ("extra", "message"),
         [
             ("pub_rate: -1", 'Invalid "pub_rate", must not be negative'),
-            ("odom_pose_noise: [0, -1, 0]", 'Invalid "odom_pose_noise", variances must be'),
-            ("odom_twist_noise: [0, 0, .nan]", 'Invalid "odom_twist_noise", variances must be'),
-            ("odom_twist_noise: [0, 0, .inf]", 'Invalid "odom_twist_noise", variances must be'),
+            ("odom_pose_noise: [0, -1, 0]", 'Invalid "odom_pose_noise", must be finite'),
+            ("odom_twist_noise: [0, 0, .nan]", 'Invalid "odom_twist_noise", must be finite'),
+            ("odom_twist_noise: [0, 0, .inf]", 'Invalid "odom_twist_noise", must be finite'),
             ("odom_pose_noise: [0, 0]", "odom_pose_noise"),
             ("odom_pose_covariance: [1, 2, 3]", "odom_pose_covariance"),
             (

@@ -263,7 +263,7 @@ def test_covariances_as_given(plugin_world: Any, collect: Collect, kind: str) ->
             '"orientation_noise" must have size of exactly 3',
         ),
         # [fix] The reference takes the root of a negative variance.
-        ("body: base, orientation_noise: [0, 0, -1]", 'Invalid "orientation_noise", variances'),
+        ("body: base, orientation_noise: [0, 0, -1]", 'Invalid "orientation_noise", must be'),
         ("body: base, angular_velocity_noise: [-1, 0, 0]", 'Invalid "angular_velocity_noise"'),
         ("body: base, linear_acceleration_noise: [.nan, 0, 0]", '"linear_acceleration_noise"'),
         ("body: base, orientation_covariance: [1]", "must have size of exactly 9"),

@@ -414,7 +414,7 @@ class TestErrors:
                 'Invalid "max_steer_acceleration", must not be negative',
             ),
             ("pub_rate: -1", 'Invalid "pub_rate", must not be negative'),
-            ("odom_pose_noise: [-1, 0, 0]", 'Invalid "odom_pose_noise", variances must be'),
+            ("odom_pose_noise: [-1, 0, 0]", 'Invalid "odom_pose_noise", must be finite'),
             ("angular_dynamics: {top: 1}", "top"),
             ("linear_dynamics: {velocity_limit: -1}", 'Invalid "velocity_limit"'),
             ("enable_odom_tf_pub: true", "enable_odom_tf_pub"),

@@ -1,0 +1,274 @@
+"""Navigation in YAML trees, with errors that name the file, the line and the entry."""
+
+from __future__ import annotations
+
+import copy
+import os
+from collections.abc import Iterator
+from typing import Any, Self
+
+from flatland.config.convert import Key, NodeKind, to_plain
+from flatland.config.node import ListNode, MapNode, Node, NullNode, ScalarNode
+from flatland.config.preprocessor import Params, preprocess_file, preprocess_text
+from flatland.errors import YamlError
+
+
+class TreeReader:
+    """Base class of `YamlReader`: a node with its location and a record of the keys that were read.
+
+    `ensure_accessed_all` raises an error for keys that have not been read, which are usually
+    misspelled. A reader shares its record with the readers returned by `with_location`.
+
+    Attributes:
+        location: Description of the parent, such as `model "turtlebot" body "base"`.
+        name: Name of the node in its parent, such as `"footprints"` or `index=1`.
+    """
+
+    def __init__(self, node: Node, location: str = "", name: str = "") -> None:
+        """Wraps a node; readers are usually created by `from_file` and `from_string`."""
+        self._node = node
+        self._accessed: set[str] = set()
+        self.location = location
+        self.name = name
+
+    @classmethod
+    def from_file(cls, path: str | os.PathLike[str], params: Params = None) -> Self:
+        """Loads and preprocesses a file.
+
+        Args:
+            path: The file.
+            params: Source of the values of `param(NAME)`: a mapping, or a function that returns
+                None for an unknown name.
+
+        Raises:
+            YamlError: The file cannot be read, is not valid YAML, or cannot be preprocessed.
+        """
+        return cls(preprocess_file(os.fspath(path), params))
+
+    @classmethod
+    def from_string(
+        cls, text: str, params: Params = None, base_dir: str | os.PathLike[str] = "."
+    ) -> Self:
+        """Parses and preprocesses a text.
+
+        Args:
+            text: One YAML document.
+            params: As for `from_file`.
+            base_dir: Folder that relative paths start from.
+
+        Raises:
+            YamlError: The text is not valid YAML, or cannot be preprocessed.
+        """
+        return cls(preprocess_text(text, os.fspath(base_dir), params))
+
+    def __repr__(self) -> str:
+        return f"<{type(self).__name__} {self.location} {self.name}{self._position()}>"
+
+    @property
+    def path(self) -> str:
+        """File that contains the node, empty if it was parsed from a string."""
+        return self._node.source.path
+
+    @property
+    def line(self) -> int:
+        """Line of the node in its file, from 1."""
+        return self._node.line
+
+    @property
+    def is_null(self) -> bool:
+        """Whether the node has no value."""
+        return isinstance(self._node, NullNode)
+
+    @property
+    def is_map(self) -> bool:
+        """Whether the node is a map."""
+        return isinstance(self._node, MapNode)
+
+    @property
+    def is_list(self) -> bool:
+        """Whether the node is a list."""
+        return isinstance(self._node, ListNode)
+
+    @property
+    def is_scalar(self) -> bool:
+        """Whether the node is a single value."""
+        return isinstance(self._node, ScalarNode)
+
+    def with_location(self, location: str, name: str = "") -> Self:
+        """Returns a reader of the same node with another location, and the same record of keys."""
+        reader = copy.copy(self)
+        reader.location = location
+        reader.name = name
+        return reader
+
+    def without(self, *keys: str) -> Self:
+        """Returns a reader of the same map without some keys, with a new record of keys.
+
+        Raises:
+            YamlError: The node is not a map.
+        """
+        node = self._node
+        if not isinstance(node, MapNode):
+            self._check_kind("map")
+            return self
+        entries = {key: value for key, value in node.entries.items() if key not in keys}
+        rest = MapNode(node.source, node.line, entries, node.key_lines)
+        return type(self)(rest, self.location, self.name)
+
+    def subnode(self, key: Key, kind: NodeKind = "any") -> Self:
+        """Returns a reader of a required entry.
+
+        Args:
+            key: Key of a map or index of a list.
+            kind: Required kind of the entry: `any`, `map` or `list`.
+
+        Raises:
+            YamlError: The entry is missing, or of another kind.
+        """
+        entry = self._open(key)
+        entry._check_kind(kind)
+        return entry
+
+    def optional_subnode(self, key: Key, kind: NodeKind = "any") -> Self:
+        """Returns a reader of an entry, whose `is_null` is true if the entry is missing or empty.
+
+        Raises:
+            YamlError: The entry is of another kind.
+        """
+        if self._is_missing(key):
+            return self._reader(NullNode(self._node.source, self._node.line), key)
+        return self.subnode(key, kind)
+
+    def items(self) -> Iterator[Self]:
+        """Iterates over the items of a list; a null node has no items.
+
+        Raises:
+            YamlError: The node is neither a list nor null.
+        """
+        if not self.is_null:
+            self._check_kind("list")
+        for index in range(len(self)):
+            yield self._open(index)
+
+    def plain(self) -> Any:
+        """Returns the unconverted content of the node as dict, list, str or None."""
+        return to_plain(self._node)
+
+    def keys(self) -> list[str]:
+        """Returns the keys of a map in the order of the file; a null node has no keys.
+
+        Raises:
+            YamlError: The node is neither a map nor null.
+        """
+        if not self.is_null:
+            self._check_kind("map")
+        return list(self._node.entries) if isinstance(self._node, MapNode) else []
+
+    def __contains__(self, key: object) -> bool:
+        """Returns whether the node is a map that has a key."""
+        return isinstance(self._node, MapNode) and key in self._node.entries
+
+    def __len__(self) -> int:
+        """Returns the number of items of a list or entries of a map, otherwise 0."""
+        if isinstance(self._node, ListNode):
+            return len(self._node.items)
+        return len(self._node.entries) if isinstance(self._node, MapNode) else 0
+
+    def unread_keys(self) -> list[str]:
+        """Returns the keys of a map that have not been read, in the order of the file."""
+        entries = self._node.entries if isinstance(self._node, MapNode) else ()
+        return [key for key in entries if key not in self._accessed]
+
+    def ensure_accessed_all(self) -> None:
+        """Checks that every key of the map has been read.
+
+        Raises:
+            YamlError: The map has other keys, which are unknown.
+        """
+        unread = self.unread_keys()
+        if unread and isinstance(self._node, MapNode):
+            names = ", ".join(f'"{key}"' for key in sorted(unread))
+            message = f"Entry {self._label()}contains unrecognized entry(s) {{{names}}}"
+            raise self._error(message, self._node.key_lines[unread[0]])
+
+    def error(self, message: str) -> YamlError:
+        """Returns an error whose text ends with the position of the node: ` [model.yaml:12]`."""
+        return YamlError(message + self._position())
+
+    def invalid(self, key: Key, why: str) -> YamlError:
+        """Returns an error about the value of an entry: `Invalid "KEY", WHY (in LOCATION)`.
+
+        Args:
+            key: Key of a map or index of a list; the entry may be missing.
+            why: Violated requirement and value found, such as `must be positive, got -1`.
+        """
+        node = self._find(key)
+        return self._reader(self._node if node is None else node, key)._invalid(why)
+
+    def resolve_path(self, path: str) -> str:
+        """Returns an absolute path.
+
+        Args:
+            path: An absolute path, one that starts with `~`, or one relative to the folder of the
+                file that contains the node.
+        """
+        return self._node.source.resolve(path)
+
+    def _position(self, line: int | None = None) -> str:
+        return self._node.source.position(line or self._node.line)
+
+    def _label(self) -> str:
+        return f"{self.name.lower()} " if self.name else ""
+
+    def _error(self, message: str, line: int | None = None) -> YamlError:
+        where = f" (in {self.location.lower()})" if self.location else ""
+        return YamlError(message + where + self._position(line))
+
+    def _invalid(self, why: str) -> YamlError:
+        return self._error(f"Invalid {self.name}, {why}")
+
+    def _check_kind(self, kind: NodeKind) -> None:
+        if not {"any": True, "map": self.is_map, "list": self.is_list}[kind]:
+            name = f"{self.name} " if self.name else ""
+            raise self._error(f"Entry {name}must be a {kind}")
+
+    def _find(self, key: Key) -> Node | None:
+        """Returns the node of an entry or None, and records that the key was read."""
+        if isinstance(key, str):
+            if isinstance(self._node, MapNode):
+                self._accessed.add(key)
+                return self._node.entries.get(key)
+        elif isinstance(self._node, ListNode):
+            return self._node.items[key] if 0 <= key < len(self._node.items) else None
+        if not self.is_null:
+            self._check_kind("map" if isinstance(key, str) else "list")
+        return None
+
+    def _is_missing(self, key: Key) -> bool:
+        node = self._find(key)
+        return node is None or isinstance(node, NullNode)
+
+    def _open(self, key: Key) -> Self:
+        node = self._find(key)
+        if node is None:
+            missing = self._reader(self._node, key)
+            raise missing._error(f"Entry {missing.name} does not exist")
+        return self._reader(node, key)
+
+    def _reader(self, node: Node, key: Key) -> Self:
+        name = f'"{key}"' if isinstance(key, str) else f"index={key}"
+        return type(self)(node, f"{self.location} {self.name}".strip(), name)
+
+    def _check_size(self, min_size: int, max_size: int | None, size: int | None) -> None:
+        count = len(self)
+        if min_size == max_size:
+            size = min_size
+        if size is not None and count != size:
+            required = f"of exactly {size}"
+        elif count < min_size:
+            required = f">= {min_size}"
+        elif max_size is not None and count > max_size:
+            required = f"<= {max_size}"
+        else:
+            return
+        raise self._error(f"Entry {self._label()}must have size {required}")
