@@ -18,6 +18,7 @@ from flatland.config.node import Source
 from flatland.entities.collision_filter import CollisionFilter
 from flatland.entities.layer import Layer
 from flatland.errors import WorldError
+from flatland.loading.world_loader import load_world
 from flatland.physics import PhysicsWorld
 from flatland.plugin_api.noise import checked_seed
 from flatland.plugin_api.port_registry import PortRegistry
@@ -158,9 +159,6 @@ class World(Contents):
             FlatlandError: A file is invalid; nothing is left behind.
             ValueError: An argument is out of range.
         """
-        # The loader is imported late: a world depends on no file of its own.
-        from flatland.loading.world_loader import load_world
-
         world = load_world(
             cls,
             path,

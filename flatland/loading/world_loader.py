@@ -24,6 +24,7 @@ from flatland.plugin_api.missing_plugins import (
 )
 
 if TYPE_CHECKING:
+    from flatland.runtime.body_monitor import InvalidBodyPolicy
     from flatland.runtime.faults import FaultPolicy
     from flatland.runtime.observer import WorldObserver
     from flatland.world import World
@@ -45,6 +46,7 @@ def load_world(
     observers: Iterable[WorldObserver],
     plugin_timeout: float | None,
     plugin_errors: FaultPolicy,
+    on_invalid_body: InvalidBodyPolicy,
 ) -> World:
     """Creates a world of the given class from a file; see `World.from_yaml` for the arguments."""
     if simplify_map not in SIMPLIFICATIONS:
@@ -65,6 +67,7 @@ def load_world(
         observers=observers,
         plugin_timeout=plugin_timeout,
         plugin_errors=plugin_errors,
+        on_invalid_body=on_invalid_body,
     )
     world.path = str(file)
     try:
