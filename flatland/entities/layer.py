@@ -70,11 +70,11 @@ class Layer(Entity):
     @property
     def edges(self) -> FloatArray:
         """All edges (x1, y1, x2, y2) in the layer body's frame [m], shape (n, 4)."""
-        return self.body.physics.edges()
+        return self.body.edges()
 
     def add_edges(self, edges: FloatArray) -> None:
         """Adds two-sided edges, in the layer body's frame [m], shape (n, 4)."""
-        self.body.physics.create_edges(
+        self.body.create_edges(
             edges,
             friction=WALL_FRICTION,
             category_bits=self.category_bits,

@@ -89,9 +89,7 @@ class PhysicsBody(Handle):
             StaleHandleError: The body is gone.
             WorldLockedError: The world is stepping.
         """
-        fx, fy = force
-        px, py = point
-        self._core.apply_force(self.id, fx, fy, px, py)
+        self._core.apply_force(self.id, force[0], force[1], point[0], point[1])
 
     def apply_torque(self, torque: float) -> None:
         """Applies a torque about z [N m] to a dynamic body for the next step, and wakes it.
