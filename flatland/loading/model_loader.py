@@ -148,13 +148,13 @@ class ModelLoader:
             radius = _not_negative(reader, "radius")
             center = _finite(reader, "center", reader.get("center", "vector", (0.0, 0.0)))
             reader.ensure_accessed_all()
-            _made(reader, body.physics.create_circle, center, radius, **properties)
+            _made(reader, body.create_circle, center, radius, **properties)
         else:
             points = reader.get_list("points", "vector", min_size=3, max_size=8)
             for point in points:
                 _finite(reader, "points", point)
             reader.ensure_accessed_all()
-            _made(reader, body.physics.create_polygon, points, **properties)
+            _made(reader, body.create_polygon, points, **properties)
 
     def _load_joint(self, entry: YamlReader) -> None:
         name = entry.get("name", "string")
@@ -202,9 +202,7 @@ class ModelLoader:
             options["frequency"] = _not_negative(reader, "frequency", 0.0)
             options["damping"] = _not_negative(reader, "damping", 0.0)
         reader.ensure_accessed_all()
-        joint = _made(
-            reader, make, bodies[0].physics, bodies[1].physics, anchors[0], anchors[1], **options
-        )
+        joint = _made(reader, make, bodies[0], bodies[1], anchors[0], anchors[1], **options)
         self._model.joints.append(Joint(joint, name, (bodies[0], bodies[1]), color))
 
 
