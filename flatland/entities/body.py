@@ -29,7 +29,7 @@ class Body(PhysicsBody):
     __slots__ = ("color", "entity", "name")
 
     def __init__(self, physics: PhysicsBody, entity: Entity, name: str, color: Color) -> None:
-        """Names a body of a physics world.
+        """Creates a named handle of a body.
 
         Args:
             physics: Handle of the body.

@@ -20,7 +20,7 @@ class Joint(PhysicsJoint):
     def __init__(
         self, physics: PhysicsJoint, name: str, bodies: tuple[Body, Body], color: Color
     ) -> None:
-        """Names a joint of a physics world.
+        """Creates a named handle of a joint.
 
         Args:
             physics: Handle of the joint.
