@@ -222,7 +222,10 @@ def test_numbers_of_an_image_that_make_no_sense(
 
 def test_resolution_beyond_float32(write: Write) -> None:
     path = write(IMAGE_MAP.replace("0.05", "1e38"))
-    why = "resolution must be positive, and the size of the map must fit a 32-bit float, got 1e+38"
+    why = (
+        "resolution must be positive and the size of the map in the range of a 32-bit float, "
+        "got 1e+38"
+    )
     fails(path, YamlError, f'Invalid "resolution" in layer "Walls", {why}{place(path, 2)}')
 
 

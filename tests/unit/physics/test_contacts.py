@@ -360,7 +360,7 @@ def test_a_contact_is_stale_after_pre_solve(world: PhysicsWorld) -> None:
     world.pre_solve_bodies = {wall.id}
     world.step(STEP, 10, 10)
     assert kept[0].points.shape == (1, 2)
-    with pytest.raises(StaleHandleError, match="only inside of the pre_solve call"):
+    with pytest.raises(StaleHandleError, match="only during the call of pre_solve"):
         kept[0].enabled = False
 
 

@@ -171,7 +171,7 @@ def test_polygons_have_3_to_8_points(body: PhysicsBody, count: int) -> None:
 
 
 def test_polygon_points_must_lie_apart(body: PhysicsBody) -> None:
-    text = "a polygon must have at least 3 points that are 2.5 mm or more from each other, got 2"
+    text = "a polygon must have at least 3 points that are at least 2.5 mm apart, got 2"
     with refused(text):
         body.create_polygon([(0, 0), (0, 0), (1, 0)], density=1)
     # Box2D joins points that are closer than 2.5 mm, each with those kept before it.
@@ -193,7 +193,7 @@ def test_polygon_points_must_lie_apart(body: PhysicsBody) -> None:
     ],
 )
 def test_polygons_must_have_area(body: PhysicsBody, points: list[tuple[float, float]]) -> None:
-    with refused("a polygon must have an area, but its points lie on a line"):
+    with refused("a polygon must have a positive area, but its points are collinear"):
         body.create_polygon(points, density=1)
 
 
@@ -226,9 +226,9 @@ def test_the_hull_of_points_is_taken(body: PhysicsBody) -> None:
     assert sorted(map(tuple, vertices.tolist())) == [(0, 0), (0, 2), (2, 0), (2, 2)]
 
 
-def test_the_inertia_must_not_vanish_beside_that_about_the_origin(world: PhysicsWorld) -> None:
+def test_the_inertia_must_not_be_negligible_compared_to_that_about_the_origin(world: PhysicsWorld) -> None:
     body = world.create_body("dynamic", (0, 0, 0))
-    with refused("is the shape tiny and far from the body's origin?"):
+    with refused("a shape may be too small and too far from the origin of the body"):
         body.create_circle((10000, 0), 0.01, density=1)
     with refused("the mass of a body must be 0 or from 1e-20 to 1e15 kg"):
         body.create_circle((0, 0), 1e6, density=1e9)
@@ -280,13 +280,13 @@ def test_joints_connect_two_bodies_of_the_world(world: PhysicsWorld, body: Physi
 
 def test_joint_limits_are_in_order(world: PhysicsWorld, body: PhysicsBody) -> None:
     other = world.create_body("dynamic", (0, 0, 0))
-    with refused("the lower limit must not be above the upper one, got (1, -1)"):
+    with refused("the lower limit must not be greater than the upper limit, got (1, -1)"):
         world.create_revolute_joint(body, other, (0, 0), (0, 0), limits=(1.0, -1.0))
     joint = world.create_revolute_joint(body, other, (0, 0), (0, 0))
-    with refused("the lower limit must not be above the upper one, got (2, 1.5)"):
+    with refused("the lower limit must not be greater than the upper limit, got (2, 1.5)"):
         joint.set_limits(2, 1.5)
     weld = world.create_weld_joint(body, other, (0, 0), (0, 0))
-    with pytest.raises(PhysicsError, match="only a revolute joint has limits"):
+    with pytest.raises(PhysicsError, match="only revolute joints have limits"):
         weld.set_limits(0, 1)
 
 
