@@ -36,8 +36,7 @@ struct Hull {
 struct ProbePart {
   Hull hull;
   b2Filter filter;
-  const b2Body*
-      body;  // null for a shape without a body, which collides like that of a dynamic body
+  const b2Body* body;  // null for a shape without a body; it collides like a dynamic one
 };
 
 // A rigid set of shapes, and the bodies that they may overlap.

@@ -137,9 +137,8 @@ void check_mass_with(const b2Body& body, const b2Shape& shape, float density) {
   const float central_inertia = inertia - mass * b2Dot(center, center);
   if (!(inertia <= kMax && central_inertia >= kMin && central_inertia > kRounding * inertia)) {
     throw std::invalid_argument(
-        "the moment of inertia of a body about its center of mass must be from 1e-20 to 1e15 kg "
-        "m^2 "
-        "and not negligible compared to that about its origin, got " +
+        "the moment of inertia of a body about its center of mass must be from 1e-20 to "
+        "1e15 kg m^2 and not negligible compared to that about its origin, got " +
         to_text(static_cast<double>(central_inertia)) + " and " +
         to_text(static_cast<double>(inertia)) +
         " (a shape may be too small and too far from the origin of the body)");
