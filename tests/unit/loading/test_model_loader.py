@@ -131,7 +131,8 @@ ERRORS = {
     ),
     "polygon without area": (
         body(footprint="type: polygon, density: 1, points: [[0, 0], [1, 0], [2, 0]]"),
-        f"Invalid entry in {FOOTPRINT}, a polygon must have a positive area, but its points are collinear",
+        f"Invalid entry in {FOOTPRINT}, a polygon must have a positive area, but its points are "
+        "collinear",
     ),
     "polygon of one point": (
         body(footprint="type: polygon, density: 1, points: [[1, 1], [1, 1], [1, 1]]"),
