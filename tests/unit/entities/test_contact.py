@@ -80,7 +80,7 @@ class Modifier(ModelPlugin):
 @pytest.fixture
 def bench(files: Any, monkeypatch: pytest.MonkeyPatch) -> Any:
     """Writes models with the plugins above and loads a world with a slab at x = 0.199."""
-    monkeypatch.setenv("FLATLAND_PLUGIN_PATH", files.write("ears.xml", MANIFEST))
+    monkeypatch.setenv("FLATLAND_PLUGIN_PATH", files.write("plugins.xml", MANIFEST))
     module = SimpleNamespace(Recorder=Recorder, WorldRecorder=WorldRecorder, Modifier=Modifier)
     monkeypatch.setitem(sys.modules, "contact_plugins", module)  # type: ignore[arg-type]
     for name in ("Recorder", "Modifier"):
