@@ -25,7 +25,8 @@ struct EdgeGroup {
 };
 
 // The fixtures of a world for ray casting. Edges are stored in trees that are created on demand,
-// circles and polygons in a list. Moving a single body causes no rebuild.
+// circles and polygons in a list. Moving a body causes no rebuild unless it shares its
+// tree with other bodies.
 class RayScene {
  public:
   void add(b2Fixture* fixture);
