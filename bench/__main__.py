@@ -13,7 +13,7 @@ from dataclasses import asdict
 from pathlib import Path
 
 from curves import plot
-from scans import yardstick
+from scans import time_unit
 from table import as_json, format_table
 
 GROWTH = "growth"  # the module of curves; the others have rows
@@ -39,7 +39,7 @@ def main() -> None:
     if options.baseline is not None:
         earlier = json.loads(options.baseline.read_text())
         baseline = {row["name"]: row["value"] for row in earlier["rows"]}
-    unit = yardstick()
+    unit = time_unit()
     print(f"U = {unit * 1e3:.3f} ms\n")
     rows = []
     for name in MODULES:

@@ -1,4 +1,4 @@
-"""The extension: Box2D behind handles for flatland.physics, and the boundaries of maps."""
+"""The C++ extension: Box2D objects by id, and the boundaries of bitmaps."""
 
 from collections.abc import Callable, Sequence
 
@@ -11,14 +11,15 @@ _Doubles = npt.NDArray[np.float64]
 _Ints = npt.NDArray[np.int64]
 _Bools = npt.NDArray[np.bool_]
 
-# kinds (n,), ids (n, 5) as contact, fixtures, bodies, point counts (n,), points (n, 2, 2),
-# normals (n, 2), normal and tangent impulses (n, 2, 2), sensors (n,)
+# Columns of n contact rows: kinds (n,); ids of contact, fixtures and bodies (n, 5); point counts
+# (n,); points (n, 2, 2); normals (n, 2); normal and tangent impulses (n, 2, 2); whether a fixture
+# is a sensor (n,).
 _ContactColumns = tuple[npt.NDArray[np.uint8], _Ints, _Ints, _Doubles, _Doubles, _Doubles, _Bools]
 
 # ids of limited bodies, ids of invalid bodies
 _StepReport = tuple[list[int], list[int]]
 
-# --- world, bodies, fixtures, joints, contacts, rays (flatland.physics documents them) ---
+# --- world, bodies, fixtures, joints, contacts and rays; documented in flatland.physics ---
 
 class World:
     def __init__(self) -> None: ...
@@ -177,7 +178,7 @@ class World:
     ) -> _Bools: ...
 
 class PreSolveContact:
-    """A contact about to be solved; its changeable parts exist only inside of `pre_solve`."""
+    """A contact before it is solved; its settable attributes expire after `pre_solve`."""
 
     enabled: bool
     friction: float
@@ -199,9 +200,9 @@ class PreSolveContact:
     def normal(self) -> _Doubles: ...
 
 class OldManifold:
-    """Contact points of the step before, in the frames of the two bodies.
+    """Manifold of the previous step, in the local frames of the two bodies.
 
-    `kind` is `circles`, `face_a`, `face_b`, or `none` when there were no points.
+    `kind` is `circles`, `face_a` or `face_b`, or `none` for a manifold without points.
     """
 
     @property
@@ -217,7 +218,7 @@ class OldManifold:
     @property
     def tangent_impulses(self) -> _Doubles: ...
 
-# --- map_edges.cpp: from a bitmap to its boundary (flatland.physics.boundaries documents them) ---
+# --- boundaries of bitmaps; documented in flatland.physics.boundaries ---
 
 def boundary_edges(
     mask: npt.NDArray[np.bool_] | npt.NDArray[np.uint8], resolution: float

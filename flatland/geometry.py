@@ -1,6 +1,7 @@
-"""Planar geometry: poses, points, quaternions.
+"""Planar geometry: poses, points and quaternions.
 
-A pose is `(x, y, theta)` in [m], [m], [rad], x forward, y left, counter-clockwise (REP 103).
+A pose is a tuple `(x, y, theta)` in [m, m, rad] with x forward, y left and theta counter-clockwise
+(REP 103).
 """
 
 from __future__ import annotations
@@ -19,18 +20,20 @@ BoolArray = npt.NDArray[np.bool_]
 
 MAX_MAGNITUDE = 1e9
 """Largest magnitude of the numbers that the physics accepts."""
+
 IDENTITY: Pose = (0.0, 0.0, 0.0)
+"""The pose of a frame in itself."""
 
 
 def compose(outer: Sequence[float], inner: Sequence[float]) -> Pose:
-    """Expresses a pose given in the frame of another pose in that other pose's parent.
+    """Returns the pose of frame C in frame A from the poses of C in B and of B in A.
 
     Args:
         outer: Pose of frame B in frame A.
         inner: Pose of frame C in frame B.
 
     Returns:
-        Pose of frame C in frame A; angles add and are not wrapped.
+        Pose of frame C in frame A; the angles are added and not wrapped.
     """
     x, y, theta = outer
     c, s = math.cos(theta), math.sin(theta)
@@ -38,28 +41,28 @@ def compose(outer: Sequence[float], inner: Sequence[float]) -> Pose:
 
 
 def invert(pose: Sequence[float]) -> Pose:
-    """Gives the pose of frame A in frame B from the pose of frame B in frame A."""
+    """Returns the pose of frame A in frame B from the pose of frame B in frame A."""
     x, y, theta = pose
     c, s = math.cos(theta), math.sin(theta)
     return (-c * x - s * y, s * x - c * y, -theta)
 
 
 def rotate(vector: Sequence[float], theta: float) -> Vector2:
-    """Turns a vector counter-clockwise by `theta` [rad]."""
+    """Returns a vector rotated counter-clockwise by `theta` [rad]."""
     c, s = math.cos(theta), math.sin(theta)
     return (c * vector[0] - s * vector[1], s * vector[0] + c * vector[1])
 
 
 def wrap_angle(theta: float) -> float:
-    """Brings an angle [rad] to the range [-pi, pi]."""
+    """Returns the equivalent angle in [-pi, pi] [rad]."""
     return math.remainder(theta, math.tau)
 
 
 def finite_pose(pose: Sequence[float]) -> Pose:
-    """Converts to a pose of three finite floats.
+    """Converts a sequence of three numbers to a pose.
 
     Raises:
-        ValueError: There are not three numbers, or one is NaN or infinite.
+        ValueError: The sequence does not consist of three numbers, or one is NaN or infinite.
     """
     try:
         x, y, theta = (float(number) for number in pose)
@@ -70,13 +73,11 @@ def finite_pose(pose: Sequence[float]) -> Pose:
     return (x, y, theta)
 
 
-def transform_points(
-    pose: Sequence[float], points: npt.NDArray[np.float64]
-) -> npt.NDArray[np.float64]:
-    """Transforms points from the frame of a pose to the parent frame of the pose.
+def transform_points(pose: Sequence[float], points: DoubleArray) -> DoubleArray:
+    """Transforms points from a frame to the parent of the frame.
 
     Args:
-        pose: Pose of the frame in its parent.
+        pose: Pose of the frame in the parent frame.
         points: Points in the frame [m], shape (..., 2).
 
     Returns:
@@ -84,15 +85,15 @@ def transform_points(
     """
     x, y, theta = pose
     c, s = math.cos(theta), math.sin(theta)
-    transformed: npt.NDArray[np.float64] = points @ np.array([[c, s], [-s, c]]) + np.array([x, y])
+    transformed: DoubleArray = points @ np.array([[c, s], [-s, c]]) + np.array([x, y])
     return transformed
 
 
-def circle_points(center: Sequence[float], radius: float, count: int) -> npt.NDArray[np.float64]:
+def circle_points(center: Sequence[float], radius: float, count: int) -> DoubleArray:
     """Returns evenly spaced points on a circle.
 
     Args:
-        center: Centre of the circle [m].
+        center: Center of the circle [m].
         radius: Radius of the circle [m].
         count: Number of points.
 
@@ -101,7 +102,7 @@ def circle_points(center: Sequence[float], radius: float, count: int) -> npt.NDA
     """
     angles = np.linspace(0.0, math.tau, count, endpoint=False)
     unit_circle = np.stack((np.cos(angles), np.sin(angles)), axis=1)
-    points: npt.NDArray[np.float64] = np.asarray(center, np.float64) + radius * unit_circle
+    points: DoubleArray = np.asarray(center, np.float64) + radius * unit_circle
     return points
 
 

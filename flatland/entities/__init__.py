@@ -1,1 +1,1 @@
-"""What a world is made of: layers, models, bodies, joints and contacts."""
+"""Entities of a world: layers, models, bodies, joints and contacts."""

@@ -1,4 +1,4 @@
-"""Layer names and the collision bits that stand for them."""
+"""Names of layers and the category bits assigned to them."""
 
 from __future__ import annotations
 
@@ -11,28 +11,29 @@ ALL_LAYERS = 0xFFFF
 
 
 class CollisionFilter:
-    """Gives each layer name a bit of Box2D's 16 category bits."""
+    """Assigns one of the 16 category bits of Box2D to each layer name."""
 
     def __init__(self) -> None:
-        """Starts without any name."""
+        """Creates a filter without names."""
         self._ids: dict[str, int] = {}
 
     @property
     def names(self) -> list[str]:
-        """All names in the order of their ids."""
+        """All names in order of their ids."""
         return list(self._ids)
 
     def register(self, names: Iterable[str]) -> list[int]:
-        """Gives each of some new names the lowest free id.
+        """Assigns the lowest free ids to new names.
 
         Args:
-            names: Names of one layer, its aliases included.
+            names: All names of a layer.
 
         Returns:
-            The ids, 0 to 15, in the order of the names.
+            The ids in the order of the names, each from 0 to 15.
 
         Raises:
-            YamlError: A name is taken, or there would be more than 16; nothing is registered then.
+            YamlError: A name already exists, or the number of names would exceed 16. No name is
+                registered in that case.
         """
         names = list(names)
         taken = set(self._ids)
@@ -50,24 +51,25 @@ class CollisionFilter:
         return [self._ids[name] for name in names]
 
     def layer_id(self, name: str) -> int:
-        """Returns the id of a layer name, -1 when there is none."""
+        """Returns the id of a layer name, -1 if no layer has the name."""
         return self._ids.get(name, -1)
 
     def unknown(self, names: Iterable[str]) -> list[str]:
-        """Returns those of some names that no layer has; `all` alone is always known."""
+        """Returns the names that no layer has; the single name `all` is always accepted."""
         names = list(names)
         if names == ["all"]:
             return []
         return [name for name in names if name not in self._ids]
 
     def category_bits(self, names: Iterable[str]) -> int:
-        """Returns the bits that stand for a set of names.
+        """Returns the category bits of a set of names.
 
         Args:
-            names: Layer names; the single name `all` means every layer, none means no bits.
+            names: Layer names; the single name `all` stands for all layers, an empty list for no
+                layer.
 
         Raises:
-            YamlError: A name is not that of a layer.
+            YamlError: No layer has one of the names.
         """
         names = list(names)
         if names == ["all"]:

@@ -1,4 +1,4 @@
-"""Contacts as plugins see them."""
+"""Contacts as they are passed to plugins."""
 
 from __future__ import annotations
 
@@ -18,17 +18,17 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Contact:
-    """Two fixtures that touch, at the moment the physics engine reported it.
+    """A contact of two fixtures, with its state when the physics engine reported it.
 
     Attributes:
-        contact_id: Number that belongs to this contact from `begin_contact` to `end_contact`.
+        contact_id: Id of the contact, the same from `begin_contact` to `end_contact`.
         body_a: First body.
         body_b: Second body.
         fixture_a: Fixture of the first body.
         fixture_b: Fixture of the second body.
-        points: Contact points, world frame [m], shape (k, 2) with k from 0 to 2; none for sensors.
-        normal: Unit normal from A to B, world frame, shape (2,).
-        is_sensor: Whether one of the fixtures is a sensor, so that there is no response.
+        points: Contact points, world frame [m], shape (k, 2), k from 0 to 2; empty for sensors.
+        normal: Unit vector from A to B, world frame, shape (2,); zero without points.
+        is_sensor: Whether one of the fixtures is a sensor; such a contact has no response.
     """
 
     contact_id: int
@@ -44,14 +44,15 @@ class Contact:
     def between(
         cls, bodies: Mapping[int, Body], info: ContactInfo | ContactEvent
     ) -> Contact | None:
-        """Finds the bodies that the physics engine speaks of.
+        """Returns the contact of a report of the physics engine.
 
         Args:
-            bodies: The bodies of the world by the id of their physics body.
-            info: What the physics engine reports.
+            bodies: Bodies of all models and layers by id.
+            info: Contact or contact event reported by the physics engine.
 
         Returns:
-            None when a plugin made one of the bodies in the physics world itself.
+            The contact; None if one of the bodies belongs to no model or layer because a plugin
+            created it in the physics world.
         """
         body_a, body_b = bodies.get(info.body_a), bodies.get(info.body_b)
         if body_a is None or body_b is None:
@@ -60,8 +61,8 @@ class Contact:
             info.contact_id,
             body_a,
             body_b,
-            body_a.physics.fixture(info.fixture_a),
-            body_b.physics.fixture(info.fixture_b),
+            body_a.fixture(info.fixture_a),
+            body_b.fixture(info.fixture_b),
             info.points,
             info.normal,
             info.is_sensor,
@@ -70,11 +71,11 @@ class Contact:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ContactImpulse:
-    """What the solver did to keep two fixtures apart in one step.
+    """Impulses that the solver applied at a contact in one step.
 
     Attributes:
-        normal_impulses: Along the normal at each point [N s], shape (k,).
-        tangent_impulses: Along the surface at each point [N s], shape (k,).
+        normal_impulses: Impulse along the normal at each point [N s], shape (k,).
+        tangent_impulses: Impulse along the surface at each point [N s], shape (k,).
     """
 
     normal_impulses: DoubleArray
@@ -82,7 +83,11 @@ class ContactImpulse:
 
 
 class MutableContact:
-    """A contact about to be solved; only `pre_solve` gets one, only there it may be changed."""
+    """A contact that the solver is about to process.
+
+    Passed to `pre_solve`. `enabled`, `friction`, `restitution` and `tangent_speed` can be accessed
+    only during that call.
+    """
 
     __slots__ = ("_raw", "body_a", "body_b", "fixture_a", "fixture_b")
 
@@ -94,7 +99,7 @@ class MutableContact:
         fixture_a: PhysicsFixture,
         fixture_b: PhysicsFixture,
     ) -> None:
-        """Wraps what the physics engine hands over."""
+        """Wraps a contact of the physics engine."""
         self._raw = raw
         self.body_a = body_a
         self.body_b = body_b
@@ -103,7 +108,7 @@ class MutableContact:
 
     @property
     def contact_id(self) -> int:
-        """Number that belongs to this contact from `begin_contact` to `end_contact`."""
+        """Id of the contact, the same from `begin_contact` to `end_contact`."""
         return self._raw.contact_id
 
     @property
@@ -113,12 +118,12 @@ class MutableContact:
 
     @property
     def normal(self) -> DoubleArray:
-        """Unit normal from A to B, world frame, shape (2,)."""
+        """Unit vector from A to B, world frame, shape (2,)."""
         return np.asarray(self._raw.normal, dtype=np.float64)
 
     @property
     def enabled(self) -> bool:
-        """Whether the contact pushes in this step; set False to let the bodies pass."""
+        """Whether the solver separates the fixtures in this step; reset to True in each step."""
         return self._raw.enabled
 
     @enabled.setter
@@ -127,7 +132,7 @@ class MutableContact:
 
     @property
     def friction(self) -> float:
-        """Mixed friction of the two fixtures; a value set stays while they touch."""
+        """Friction coefficient of the contact; a new value applies until the contact ends."""
         return self._raw.friction
 
     @friction.setter
@@ -136,7 +141,7 @@ class MutableContact:
 
     @property
     def restitution(self) -> float:
-        """Mixed restitution of the two fixtures; a value set stays while they touch."""
+        """Restitution coefficient of the contact; a new value applies until the contact ends."""
         return self._raw.restitution
 
     @restitution.setter
@@ -145,7 +150,7 @@ class MutableContact:
 
     @property
     def tangent_speed(self) -> float:
-        """Speed of the surface along the tangent [m/s], as of a conveyor belt."""
+        """Speed of the surface along the tangent [m/s], as for a conveyor belt."""
         return self._raw.tangent_speed
 
     @tangent_speed.setter
@@ -155,16 +160,15 @@ class MutableContact:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ModelContact:
-    """A contact seen from one model.
+    """A contact from the perspective of one model.
 
     Attributes:
-        other_entity: The model or layer on the other side.
+        other_entity: Model or layer that the model touches.
         this_body: Body of the model.
-        other_body: Body of the other side.
+        other_body: Body of the other entity.
         this_fixture: Fixture of the model.
-        other_fixture: Fixture of the other side.
-        is_a: Whether the model's body is the contact's body A, so that the contact's normal
-            points away from it.
+        other_fixture: Fixture of the other entity.
+        is_a: Whether `this_body` is body A of the contact, from which the normal points away.
     """
 
     other_entity: Entity

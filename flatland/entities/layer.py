@@ -1,4 +1,4 @@
-"""Layers: the static geometry of a world."""
+"""Layers, the static geometry of a world."""
 
 from __future__ import annotations
 
@@ -9,20 +9,20 @@ from flatland.entities.body import Body, Color, Entity
 from flatland.geometry import FloatArray, Pose
 from flatland.physics import PhysicsWorld
 
-WALL_FRICTION = 0.2  # the default of a Box2D fixture
+WALL_FRICTION = 0.2  # default of Box2D fixtures
 
 
 class Layer(Entity):
-    """Static geometry with one name or several, each with a collision bit.
+    """Static geometry with one or several names, each of which has a category bit.
 
     Attributes:
-        name: The first name.
-        names: All names.
-        category_bits: Bits of all names, category and mask of the layer's fixtures.
-        color: (r, g, b, a), each 0 to 1, for pictures.
-        properties: What the file says under `properties`, for pictures.
-        body: The static body at the layer's origin.
-        exact_edge_count: Edges that the map has before it is simplified.
+        name: First name of the layer.
+        names: All names of the layer.
+        category_bits: Bits of all names, used as category and mask of the fixtures.
+        color: Color for drawings as (r, g, b, a), each in [0, 1].
+        properties: Entry `properties` of the world file, used for drawings.
+        body: Static body at the origin of the layer.
+        exact_edge_count: Number of edges of the map before simplification.
         unknown_map_keys: Keys of the map file that flatland does not use, sorted.
     """
 
@@ -39,17 +39,17 @@ class Layer(Entity):
         exact_edge_count: int = 0,
         unknown_map_keys: Sequence[str] = (),
     ) -> None:
-        """Makes the layer's body and its edges.
+        """Creates the body of the layer and its edges.
 
         Args:
-            physics: World to make them in.
-            names: The layer's names, at least one.
+            physics: Physics world of the body.
+            names: Names of the layer, at least one.
             category_bits: Bits of all names.
-            color: For pictures.
-            properties: For pictures.
-            origin: Pose of the layer's body in the world frame.
-            edges: Edges (x1, y1, x2, y2) in the body's frame [m], shape (n, 4).
-            exact_edge_count: Edges before the map was simplified.
+            color: Color for drawings as (r, g, b, a), each in [0, 1].
+            properties: Entry `properties` of the world file.
+            origin: Pose of the body in the world frame [m, rad].
+            edges: Edges (x1, y1, x2, y2) in the frame of the body [m], shape (n, 4).
+            exact_edge_count: Number of edges of the map before simplification.
             unknown_map_keys: Keys of the map file that flatland does not use.
         """
         self.name = names[0]
@@ -64,17 +64,16 @@ class Layer(Entity):
             self.add_edges(edges)
 
     def __repr__(self) -> str:
-        """Names the layer."""
         return f"<Layer {self.name!r}>"
 
     @property
     def edges(self) -> FloatArray:
-        """All edges (x1, y1, x2, y2) in the layer body's frame [m], shape (n, 4)."""
-        return self.body.physics.edges()
+        """All edges (x1, y1, x2, y2) in the frame of the body [m], shape (n, 4)."""
+        return self.body.edges()
 
     def add_edges(self, edges: FloatArray) -> None:
-        """Adds two-sided edges, in the layer body's frame [m], shape (n, 4)."""
-        self.body.physics.create_edges(
+        """Adds two-sided edges (x1, y1, x2, y2) in the frame of the body [m], shape (n, 4)."""
+        self.body.create_edges(
             edges,
             friction=WALL_FRICTION,
             category_bits=self.category_bits,

@@ -1,4 +1,4 @@
-"""Models: the moving things of a world."""
+"""Models, the movable entities of a world."""
 
 from __future__ import annotations
 
@@ -16,22 +16,22 @@ if TYPE_CHECKING:
 
 
 class Model(Entity):
-    """Bodies, the joints between them and the plugins that drive them.
+    """A set of bodies with the joints and plugins attached to them.
 
     Attributes:
-        world: The world that it is in.
-        name: Unique in the world.
-        namespace: Under which its topics and frames live, cleaned, may be empty.
-        path: File that it was read from.
-        bodies: In the order of the file; the first one stands for the model's pose.
-        joints: In the order of the file.
-        plugins: In the order of the file.
-        displacement: (dx, dy) from the pose asked for to the pose that the last spawn or move gave
-            it [m]; (0, 0) unless `if_blocked` was `nearest`.
+        world: World that contains the model.
+        name: Name of the model, unique in the world.
+        namespace: Namespace of the topics and frames of the model, normalized, may be empty.
+        path: Path of the model file.
+        bodies: Bodies in the order of the file; the first one defines the pose of the model.
+        joints: Joints in the order of the file.
+        plugins: Plugins in the order of the file.
+        displacement: Offset (dx, dy) of the actual pose from the requested pose after the last
+            spawn or move [m]; (0, 0) unless `if_blocked` was `nearest`.
     """
 
     def __init__(self, world: World, name: str, namespace: str, path: str) -> None:
-        """Makes a model without bodies; `model_loader` fills it."""
+        """Creates a model without bodies; `ModelLoader` adds them."""
         self.world = world
         self.name = name
         self.namespace = clean_name(namespace)
@@ -42,22 +42,21 @@ class Model(Entity):
         self.displacement: Vector2 = (0.0, 0.0)
 
     def __repr__(self) -> str:
-        """Names the model."""
         return f"<Model {self.name!r}>"
 
     def find_body(self, name: str) -> Body | None:
-        """Returns the body of a name, None when there is none."""
+        """Returns the body with a name, None if it does not exist."""
         return next((body for body in self.bodies if body.name == name), None)
 
     def find_joint(self, name: str) -> Joint | None:
-        """Returns the joint of a name, None when there is none."""
+        """Returns the joint with a name, None if it does not exist."""
         return next((joint for joint in self.joints if joint.name == name), None)
 
     def body(self, name: str) -> Body:
-        """Returns the body of a name.
+        """Returns the body with a name.
 
         Raises:
-            WorldError: There is none; the text is the one that plugins give, too.
+            WorldError: The body does not exist. Plugins use the same error message.
         """
         body = self.find_body(name)
         if body is None:
@@ -65,10 +64,10 @@ class Model(Entity):
         return body
 
     def joint(self, name: str) -> Joint:
-        """Returns the joint of a name.
+        """Returns the joint with a name.
 
         Raises:
-            WorldError: There is none.
+            WorldError: The joint does not exist.
         """
         joint = self.find_joint(name)
         if joint is None:
@@ -76,10 +75,10 @@ class Model(Entity):
         return joint
 
     def plugin(self, name: str) -> ModelPlugin:
-        """Returns the plugin of a name.
+        """Returns the plugin with a name.
 
         Raises:
-            WorldError: There is none.
+            WorldError: The plugin does not exist.
         """
         for plugin in self.plugins:
             if plugin.name == name:
@@ -88,14 +87,14 @@ class Model(Entity):
 
     @property
     def pose(self) -> Pose:
-        """(x, y, theta) of the first body in the world frame [m, rad]."""
+        """Pose (x, y, theta) of the first body in the world frame [m, rad]."""
         return self.bodies[0].pose
 
     def frame(self, frame_id: str) -> str:
-        """Turns a frame of this model into the TF frame id.
+        """Returns the TF frame id of a frame of the model.
 
-        A frame that starts with `/` loses the slash and takes no prefix; any other is prefixed
-        with the namespace and an underscore, if the model has a namespace.
+        A leading slash is removed. A frame without a leading slash is prefixed with the namespace
+        and an underscore if the model has a namespace.
         """
         if frame_id.startswith("/"):
             return frame_id[1:]
@@ -103,13 +102,13 @@ class Model(Entity):
         return f"{namespace}_{frame_id}" if namespace else frame_id
 
     def set_pose(self, x: float, y: float, theta: float) -> None:
-        """Moves the model rigidly so that its first body is at a pose; all velocities become 0.
+        """Moves the model rigidly so that its first body is at a pose, and stops all bodies.
 
         Raises:
-            ValueError: A number is NaN or infinite, or a body would be beyond the range of the
-                physics; no body has moved.
+            ValueError: A number is NaN or infinite, or the new pose of a body is out of range. No
+                body is moved in that case.
         """
-        # Unlike the reference: the bodies keep their angles to each other, and nothing flies on.
+        # Unlike the reference: relative angles are preserved and all velocities are reset.
         target = finite_pose((x, y, theta))
         to_first = invert(self.bodies[0].pose)
         poses = [target]

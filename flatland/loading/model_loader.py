@@ -151,11 +151,11 @@ class ModelLoader:
             radius = reader.get("radius", "float", finite=True, minimum=0)
             center = reader.get("center", "vector", (0.0, 0.0), finite=True)
             reader.ensure_accessed_all()
-            _create(reader, body.physics.create_circle, center, radius, **properties)
+            _create(reader, body.create_circle, center, radius, **properties)
         else:
             points = reader.get_list("points", "vector", min_size=3, max_size=8, finite=True)
             reader.ensure_accessed_all()
-            _create(reader, body.physics.create_polygon, points, **properties)
+            _create(reader, body.create_polygon, points, **properties)
 
     def _load_joint(self, entry: YamlReader) -> None:
         name = entry.get("name", "string")
@@ -201,9 +201,7 @@ class ModelLoader:
             options["frequency"] = reader.get("frequency", "float", 0.0, finite=True, minimum=0)
             options["damping"] = reader.get("damping", "float", 0.0, finite=True, minimum=0)
         reader.ensure_accessed_all()
-        joint = _create(
-            reader, create, bodies[0].physics, bodies[1].physics, anchors[0], anchors[1], **options
-        )
+        joint = _create(reader, create, bodies[0], bodies[1], anchors[0], anchors[1], **options)
         self._model.joints.append(Joint(joint, name, (bodies[0], bodies[1]), color))
 
 

@@ -1,11 +1,12 @@
-"""Box2D behind handles: the physics world, its bodies, fixtures, joints and contacts.
+"""Handles of Box2D objects: the physics world, its bodies, fixtures, joints and contacts.
 
-All of flatland reaches the physics of its C++ core through this package. A handle holds its world
-and an id. The world owns what the id stands for; once that is destroyed, or the world closed, every
-use of the handle raises `StaleHandleError`. While a world steps, or makes edges, any use of it from
-another thread raises `WorldLockedError`; while other threads cast rays, a change waits for them.
+This package is the only interface between flatland and the physics of its C++ extension. A handle
+consists of a world and an id; the world owns the object. Once the object is destroyed or the world
+is closed, every use of the handle raises `StaleHandleError`. While a world is stepping or creating
+edges, every use of it in another thread raises `WorldLockedError`. A change waits until other
+threads have finished casting rays.
 
-All lengths are in metres, angles in radians, times in seconds, masses in kilograms; numbers must
+Lengths are in metres, angles in radians, times in seconds and masses in kilograms. All numbers must
 be finite and within +-1e9. Box2D computes in single precision.
 """
 

@@ -17,95 +17,104 @@ if TYPE_CHECKING:
 
 
 class PhysicsBody(Handle):
-    """Handle of a rigid body; every use raises `StaleHandleError` once it is destroyed.
+    """Handle of a rigid body.
+
+    All members except `alive` raise `StaleHandleError` once the body is destroyed.
 
     Attributes:
-        id: Its number in the world, never used again for another body.
-        world: The world it is in.
+        id: Id of the body, never reused in its world.
+        world: Physics world that contains the body.
     """
 
     __slots__ = ()
 
     @property
     def alive(self) -> bool:
-        """Whether the body is still there."""
+        """Whether the body exists."""
         return self._core.has_body(self.id)
 
     def destroy(self) -> None:
-        """Takes the body out of the world, with its fixtures and joints; contacts end.
+        """Destroys the body with its fixtures and joints, and ends its contacts.
 
         Raises:
-            StaleHandleError: It is gone already.
+            StaleHandleError: The body has already been destroyed.
             WorldLockedError: The world is stepping.
         """
         self._core.destroy_body(self.id)
 
     @property
     def type(self) -> str:
-        """`static`, `kinematic` or `dynamic`."""
+        """Type of the body: `static`, `kinematic` or `dynamic`."""
         return self._core.body_type(self.id)
 
     @property
     def pose(self) -> Pose:
-        """(x, y, theta) of the body's origin in the world frame [m, rad]."""
+        """Pose (x, y, theta) of the origin of the body in the world frame [m, rad]."""
         return self._core.pose(self.id)
 
     def set_pose(self, x: float, y: float, theta: float) -> None:
-        """Puts the body's origin at a pose in the world frame and wakes the body.
+        """Moves the origin of the body to a pose in the world frame and wakes the body.
 
         Raises:
             ValueError: A number is not finite.
-            StaleHandleError: The body is gone.
+            StaleHandleError: The body was destroyed.
             WorldLockedError: The world is stepping.
         """
         self._core.set_pose(self.id, x, y, theta)
 
     @property
     def velocity(self) -> Pose:
-        """(vx, vy, omega) of the body's origin in the world frame [m/s, rad/s]."""
+        """Velocity (vx, vy, omega) of the origin of the body in the world frame [m/s, rad/s]."""
         return self._core.velocity(self.id)
 
     def set_velocity(self, vx: float, vy: float, omega: float) -> None:
-        """Makes the body's origin move at (vx, vy), and the body turn at omega, world frame.
+        """Sets the velocity of the origin of the body in the world frame; static bodies ignore it.
 
-        Without effect on static bodies.
+        Args:
+            vx: Velocity along x [m/s].
+            vy: Velocity along y [m/s].
+            omega: Angular velocity [rad/s].
 
         Raises:
             ValueError: A number is not finite.
-            StaleHandleError: The body is gone.
+            StaleHandleError: The body was destroyed.
             WorldLockedError: The world is stepping.
         """
         self._core.set_velocity(self.id, vx, vy, omega)
 
     def apply_force(self, force: Sequence[float], point: Sequence[float]) -> None:
-        """Applies a force to a dynamic body for the next step, and wakes it.
+        """Applies a force to a dynamic body during the next step and wakes the body.
 
         Args:
-            force: World frame [N].
-            point: Where it acts, world frame [m].
+            force: Force in the world frame [N].
+            point: Point of application in the world frame [m].
 
         Raises:
-            ValueError: A number is not finite, or the force is too large for the body's mass.
-            StaleHandleError: The body is gone.
+            ValueError: A number is not finite, or the force is too large for the mass.
+            StaleHandleError: The body was destroyed.
             WorldLockedError: The world is stepping.
         """
-        fx, fy = force
-        px, py = point
-        self._core.apply_force(self.id, fx, fy, px, py)
+        self._core.apply_force(self.id, force[0], force[1], point[0], point[1])
 
     def apply_torque(self, torque: float) -> None:
-        """Applies a torque about z [N m] to a dynamic body for the next step, and wakes it.
+        """Applies a torque to a dynamic body during the next step and wakes the body.
+
+        Args:
+            torque: Torque about the z axis [N m].
 
         Raises:
-            ValueError: It is not finite, or too large for the body's inertia.
-            StaleHandleError: The body is gone.
+            ValueError: The torque is not finite, or too large for the moment of inertia.
+            StaleHandleError: The body was destroyed.
             WorldLockedError: The world is stepping.
         """
         self._core.apply_torque(self.id, torque)
 
     @property
     def awake(self) -> bool:
-        """Whether the body is simulated; settable. Falling asleep sets its velocity to zero."""
+        """Whether the body is awake; settable. Box2D simulates only bodies that are awake.
+
+        A body that is put to sleep loses its velocity.
+        """
         return self._core.awake(self.id)
 
     @awake.setter
@@ -114,46 +123,46 @@ class PhysicsBody(Handle):
 
     @property
     def mass(self) -> float:
-        """Mass [kg]; 1 for a dynamic body whose fixtures have none, 0 if it is not dynamic."""
+        """Mass [kg]: 1 for a dynamic body without massive fixtures, 0 if it is not dynamic."""
         return self._core.mass(self.id)
 
     @property
     def inertia(self) -> float:
-        """Moment of inertia about the body's origin [kg m^2]."""
+        """Moment of inertia about the origin of the body [kg m^2]."""
         return self._core.inertia(self.id)
 
     @property
     def local_center(self) -> Vector2:
-        """Centre of mass in the body frame [m]."""
+        """Center of mass in the body frame [m]."""
         return self._core.local_center(self.id)
 
     @property
     def world_center(self) -> Vector2:
-        """Centre of mass in the world frame [m]."""
+        """Center of mass in the world frame [m]."""
         return self._core.world_center(self.id)
 
     @property
     def linear_damping(self) -> float:
-        """Linear damping [1/s]."""
+        """Linear damping coefficient [1/s]."""
         return self._core.linear_damping(self.id)
 
     @property
     def angular_damping(self) -> float:
-        """Angular damping [1/s]."""
+        """Angular damping coefficient [1/s]."""
         return self._core.angular_damping(self.id)
 
     @property
     def fixtures(self) -> list[PhysicsFixture]:
-        """All fixtures in the order in which they were made."""
+        """Fixtures of the body in order of creation."""
         return [self.world.fixture(i) for i in self._core.fixtures(self.id)]
 
     def fixture(self, fixture_id: int) -> PhysicsFixture:
-        """Returns the handle of a fixture of this world; it may be stale."""
+        """Returns the handle of a fixture of the same world by its id, without checking the id."""
         return self.world.fixture(fixture_id)
 
     @property
     def joints(self) -> list[PhysicsJoint]:
-        """All joints that hold this body, in the order in which they were made."""
+        """Joints attached to the body in order of creation."""
         return [self.world.joint(i) for i in self._core.joints(self.id)]
 
     def create_circle(
@@ -168,21 +177,24 @@ class PhysicsBody(Handle):
         category_bits: int = ALL_BITS,
         mask_bits: int = ALL_BITS,
     ) -> PhysicsFixture:
-        """Adds a circle.
+        """Adds a circle to the body.
 
         Args:
-            center: In the body frame [m].
-            radius: At least 0 [m]; 0 makes a point without mass.
-            density: At least 0 [kg/m^2].
-            friction: At least 0.
-            restitution: At least 0.
-            is_sensor: Whether it only detects contacts.
-            category_bits: What it is, 16 bits.
-            mask_bits: What it collides with, 16 bits.
+            center: Center in the body frame [m].
+            radius: Radius, at least 0 [m]; a circle of radius 0 is a point without mass.
+            density: Density, at least 0 [kg/m^2].
+            friction: Friction coefficient, at least 0.
+            restitution: Restitution coefficient, at least 0.
+            is_sensor: Whether the fixture detects contacts without responding to them.
+            category_bits: Categories of the fixture, 16 bits.
+            mask_bits: Categories that the fixture collides with, 16 bits.
+
+        Returns:
+            The new fixture.
 
         Raises:
-            ValueError: A number is out of range, or the body's mass would be.
-            StaleHandleError: The body is gone.
+            ValueError: A number, or the resulting mass of the body, is out of range.
+            StaleHandleError: The body was destroyed.
             WorldLockedError: The world is stepping.
         """
         x, y = center
@@ -211,22 +223,25 @@ class PhysicsBody(Handle):
         category_bits: int = ALL_BITS,
         mask_bits: int = ALL_BITS,
     ) -> PhysicsFixture:
-        """Adds the convex hull of some points.
+        """Adds the convex hull of points to the body.
 
         Args:
-            points: 3 to 8 points in the body frame [m], shape (k, 2). Points nearer than 2.5 mm
-                to an earlier one are dropped, as Box2D does it.
-            density: At least 0 [kg/m^2].
-            friction: At least 0.
-            restitution: At least 0.
-            is_sensor: Whether it only detects contacts.
-            category_bits: What it is, 16 bits.
-            mask_bits: What it collides with, 16 bits.
+            points: 3 to 8 points in the body frame [m], shape (k, 2). Box2D drops each point that
+                is less than 2.5 mm from an earlier one.
+            density: Density, at least 0 [kg/m^2].
+            friction: Friction coefficient, at least 0.
+            restitution: Restitution coefficient, at least 0.
+            is_sensor: Whether the fixture detects contacts without responding to them.
+            category_bits: Categories of the fixture, 16 bits.
+            mask_bits: Categories that the fixture collides with, 16 bits.
+
+        Returns:
+            The new fixture.
 
         Raises:
-            ValueError: Wrong shape, too few points apart from each other, no area, a number out
-                of range, or the body's mass would be.
-            StaleHandleError: The body is gone.
+            ValueError: The array has a wrong shape, fewer than 3 points are distinct, the hull has
+                no area, or a number or the resulting mass of the body is out of range.
+            StaleHandleError: The body was destroyed.
             WorldLockedError: The world is stepping.
         """
         fixture = self._core.create_polygon(
@@ -250,22 +265,23 @@ class PhysicsBody(Handle):
         category_bits: int = ALL_BITS,
         mask_bits: int = ALL_BITS,
     ) -> int:
-        """Adds many two-sided edges, each a fixture; other Python threads run meanwhile.
+        """Adds two-sided edges to the body, each as a fixture; releases the GIL.
 
         Args:
-            edges: (x1, y1, x2, y2) in the body frame [m], shape (n, 4), float32. Edges shorter
-                than 1.2e-7 m have no direction and are left out: nothing could ever hit them.
-            friction: At least 0.
-            restitution: At least 0.
-            category_bits: What they are, 16 bits.
-            mask_bits: What they collide with, 16 bits.
+            edges: Edges (x1, y1, x2, y2) in the body frame [m], shape (n, 4), float32. Edges
+                shorter than 1.2e-7 m have no direction and are skipped; nothing can collide with
+                them.
+            friction: Friction coefficient, at least 0.
+            restitution: Restitution coefficient, at least 0.
+            category_bits: Categories of the fixtures, 16 bits.
+            mask_bits: Categories that the fixtures collide with, 16 bits.
 
         Returns:
-            How many were made.
+            The number of edges created.
 
         Raises:
-            ValueError: A shape is wrong or a number out of range; nothing was made.
-            StaleHandleError: The body is gone.
+            ValueError: The array has a wrong shape or a number is out of range; no edge is created.
+            StaleHandleError: The body was destroyed.
             WorldLockedError: The world is stepping.
         """
         return self._core.create_edges(
@@ -278,5 +294,5 @@ class PhysicsBody(Handle):
         )
 
     def edges(self) -> FloatArray:
-        """Returns its edge fixtures (x1, y1, x2, y2) in the body frame [m], shape (n, 4)."""
+        """Returns the edges (x1, y1, x2, y2) of the body in the body frame [m], shape (n, 4)."""
         return self._core.edges(self.id)

@@ -1,8 +1,8 @@
-"""From a bitmap to the boundary between its on and off pixels.
+"""Boundaries between the on and off pixels of a bitmap.
 
-Everything outside the bitmap is on. Corners of pixels have integer coordinates: x counts columns
-from the left edge, y counts rows upwards from the bottom edge; times the resolution that is the
-frame of a layer's body.
+All pixels outside the bitmap are on. The corners of pixels have integer coordinates: x counts
+columns from the left edge, y counts rows upwards from the bottom edge. Multiplied by the
+resolution, they are coordinates in the frame of the body of a layer.
 """
 
 from __future__ import annotations
@@ -19,42 +19,45 @@ Mask = npt.NDArray[np.bool_] | npt.NDArray[np.uint8]
 
 
 def boundary_edges(mask: Mask, resolution: float) -> FloatArray:
-    """Finds the exact boundary as straight edges.
+    """Returns the exact boundary as straight edges.
 
-    Each edge is a maximal run of flipped pixels, horizontal between two rows or vertical between
-    two columns. A run goes on through a corner where only diagonal neighbours are equal.
+    Each edge is a maximal straight run between pixels that differ, horizontal between two rows or
+    vertical between two columns. A run continues through a corner at which only diagonally
+    adjacent pixels are equal.
 
     Args:
-        mask: Pixels, the top row first, non-zero is on; shape (rows, columns), bool or uint8.
+        mask: Pixels with the top row first, on where non-zero; shape (rows, columns), bool or
+            uint8.
         resolution: Size of a pixel [m].
 
     Returns:
-        Edges (x1, y1, x2, y2) [m], origin at the bitmap's lower left corner, shape (n, 4). The
-        order depends on the bitmap alone.
+        Edges (x1, y1, x2, y2) relative to the lower left corner of the bitmap [m], shape (n, 4).
+        The order depends only on the bitmap.
 
     Raises:
-        ValueError: The mask's shape or type is wrong, or the resolution is not positive or so
-            large or small that a coordinate does not fit a 32-bit float.
+        ValueError: The mask has a wrong shape or type, or the resolution is not positive, or a
+            coordinate is outside the range of a 32-bit float.
     """
     return _core.boundary_edges(mask, resolution)
 
 
 def boundary_loops(mask: Mask) -> list[npt.NDArray[np.int32]]:
-    """Finds the exact boundary as closed loops.
+    """Returns the exact boundary as closed loops.
 
-    On pixels lie to the left of a loop; they are connected by their sides only, so where four
-    pieces of boundary meet in a corner each of the two on pixels keeps its own two sides.
+    On pixels lie to the left of a loop. Two on pixels are connected only through a common side, so
+    at a corner where four sides of the boundary meet, the sides of each on pixel belong together.
 
     Args:
-        mask: Pixels, the top row first, non-zero is on; shape (rows, columns), bool or uint8.
+        mask: Pixels with the top row first, on where non-zero; shape (rows, columns), bool or
+            uint8.
 
     Returns:
-        One array of pixel corners (x, y) a loop, shape (k, 2), k even and at least 4: the corners
-        where it turns, from its topmost, then leftmost one. Loops come in the order of that
-        corner, from the top.
+        For each loop, the pixel corners (x, y) at which it turns, shape (k, 2) with k even and at
+        least 4, starting at its topmost, then leftmost corner. The loops are sorted by their first
+        corners, from the top.
 
     Raises:
-        ValueError: The mask's shape or type is wrong.
+        ValueError: The mask has a wrong shape or type.
     """
     points, starts = _core.boundary_loops(mask)
     return [points[start:end] for start, end in pairwise(starts)]

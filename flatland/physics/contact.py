@@ -1,4 +1,4 @@
-"""What happens between fixtures."""
+"""Contacts between fixtures, and contact events."""
 
 from __future__ import annotations
 
@@ -17,19 +17,22 @@ _KINDS: Final[tuple[ContactKind, ContactKind, ContactKind]] = ("begin", "end", "
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ContactEvent:
-    """Something that happened between two fixtures during a step, as it was at that moment.
+    """A contact event between two fixtures, with the state of the contact at that moment.
 
     Attributes:
-        kind: `begin`, `end` or `post_solve`.
-        contact_id: Unique for as long as the two fixtures touch.
-        fixture_a: Id of a fixture.
-        fixture_b: Id of the other one.
-        body_a: Id of the first fixture's body.
-        body_b: Id of the second fixture's body.
-        points: World frame [m], shape (k, 2), k from 0 to 2; none for sensors and shapes apart.
-        normal: Unit vector from A to B, world frame, shape (2,); zeros without points.
-        normal_impulses: Along the normal at each point [N s], shape (k,); 0 unless `post_solve`.
-        tangent_impulses: Along the surface at each point [N s], shape (k,).
+        kind: Kind of the event: `begin`, `end` or `post_solve`.
+        contact_id: Id of the contact, the same for as long as the two fixtures touch.
+        fixture_a: Id of the first fixture.
+        fixture_b: Id of the second fixture.
+        body_a: Id of the body of the first fixture.
+        body_b: Id of the body of the second fixture.
+        points: Contact points, world frame [m], shape (k, 2), k from 0 to 2. Empty for sensors and
+            for shapes that no longer touch.
+        normal: Unit vector from A to B, world frame, shape (2,); zero without points.
+        normal_impulses: Impulse along the normal at each point [N s], shape (k,); zero unless the
+            kind is `post_solve`.
+        tangent_impulses: Impulse along the surface at each point [N s], shape (k,); zero unless
+            the kind is `post_solve`.
         is_sensor: Whether one of the fixtures is a sensor.
     """
 
@@ -48,16 +51,16 @@ class ContactEvent:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ContactInfo:
-    """Two fixtures that touch now.
+    """A contact of two fixtures that currently touch.
 
     Attributes:
-        contact_id: Unique for as long as the two fixtures touch.
-        fixture_a: Id of a fixture.
-        fixture_b: Id of the other one.
-        body_a: Id of the first fixture's body.
-        body_b: Id of the second fixture's body.
-        points: World frame [m], shape (k, 2), k from 0 to 2; none for sensors.
-        normal: Unit vector from A to B, world frame, shape (2,); zeros without points.
+        contact_id: Id of the contact, the same for as long as the two fixtures touch.
+        fixture_a: Id of the first fixture.
+        fixture_b: Id of the second fixture.
+        body_a: Id of the body of the first fixture.
+        body_b: Id of the body of the second fixture.
+        points: Contact points, world frame [m], shape (k, 2), k from 0 to 2; empty for sensors.
+        normal: Unit vector from A to B, world frame, shape (2,); zero without points.
         is_sensor: Whether one of the fixtures is a sensor.
     """
 
@@ -72,7 +75,7 @@ class ContactInfo:
 
 
 def to_events(columns: _ContactColumns) -> list[ContactEvent]:
-    """Makes one event of each row that the core recorded."""
+    """Converts the contact rows of the extension to contact events."""
     kinds, ids, counts, points, normals, impulses, sensors = columns
     rows = zip(kinds.tolist(), ids.tolist(), counts.tolist(), sensors.tolist(), strict=True)
     return [
@@ -96,7 +99,7 @@ def to_events(columns: _ContactColumns) -> list[ContactEvent]:
 
 
 def to_infos(columns: _ContactColumns) -> list[ContactInfo]:
-    """Describes each contact of the rows that the core gave."""
+    """Converts the contact rows of the extension to contacts."""
     _, ids, counts, points, normals, _, sensors = columns
     rows = zip(ids.tolist(), counts.tolist(), sensors.tolist(), strict=True)
     return [

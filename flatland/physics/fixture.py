@@ -14,38 +14,43 @@ ALL_BITS: Final = 0xFFFF
 
 
 class PhysicsFixture(Handle):
-    """Handle of a fixture; every use raises `StaleHandleError` once its body is destroyed.
+    """Handle of a fixture.
+
+    All members except `alive` raise `StaleHandleError` once the body of the fixture is destroyed.
 
     Attributes:
-        id: Its number in the world, never used again for another fixture.
-        world: The world it is in.
+        id: Id of the fixture, never reused in its world.
+        world: Physics world that contains the fixture.
     """
 
     __slots__ = ()
 
     @property
     def alive(self) -> bool:
-        """Whether the fixture is still there."""
+        """Whether the fixture exists."""
         return self._core.has_fixture(self.id)
 
     @property
     def body(self) -> PhysicsBody:
-        """The body it belongs to."""
+        """Body of the fixture."""
         return self.world.body(self._core.fixture_body(self.id))
 
     @property
     def shape(self) -> str:
-        """`circle`, `polygon` or `edge`."""
+        """Type of the shape: `circle`, `polygon` or `edge`."""
         return self._core.fixture_shape(self.id)
 
     @property
     def vertices(self) -> DoubleArray:
-        """Corners of a polygon, counter-clockwise, or ends of an edge, body frame [m], (n, 2)."""
+        """Vertices of the shape in the body frame [m], shape (n, 2).
+
+        The counter-clockwise corners of a polygon, the end points of an edge; empty for a circle.
+        """
         return self._core.fixture_vertices(self.id)
 
     @property
     def center(self) -> Vector2:
-        """Centre of a circle, centroid of a polygon, middle of an edge, body frame [m]."""
+        """Center of a circle, centroid of a polygon or midpoint of an edge, body frame [m]."""
         return self._core.fixture_center(self.id)
 
     @property
@@ -70,7 +75,7 @@ class PhysicsFixture(Handle):
 
     @property
     def is_sensor(self) -> bool:
-        """Whether it only detects contacts and is not seen by rays; settable."""
+        """Whether the fixture is a sensor, which detects contacts but stops no ray; settable."""
         return self._core.fixture_is_sensor(self.id)
 
     @is_sensor.setter
@@ -79,7 +84,7 @@ class PhysicsFixture(Handle):
 
     @property
     def category_bits(self) -> int:
-        """What it is, 16 bits; settable."""
+        """Categories of the fixture, 16 bits; settable."""
         return self._core.fixture_filter(self.id)[0]
 
     @category_bits.setter
@@ -88,7 +93,7 @@ class PhysicsFixture(Handle):
 
     @property
     def mask_bits(self) -> int:
-        """What it collides with, 16 bits; settable."""
+        """Categories that the fixture collides with, 16 bits; settable."""
         return self._core.fixture_filter(self.id)[1]
 
     @mask_bits.setter

@@ -1,4 +1,4 @@
-"""What all handles have in common."""
+"""Base class of handles."""
 
 from __future__ import annotations
 
@@ -9,12 +9,20 @@ if TYPE_CHECKING:
 
 
 class Handle:
-    """Something in a physics world: the world, and an id that is never used twice in it."""
+    """Reference to an object of a physics world, by an id that is unique in the world.
+
+    Two handles are equal if they refer to the same object.
+    """
 
     __slots__ = ("_core", "id", "world")
 
     def __init__(self, world: PhysicsWorld, handle_id: int) -> None:
-        """Names a thing of a world; does not look whether it is there."""
+        """Creates a handle without checking that the object exists.
+
+        Args:
+            world: World that contains the object.
+            handle_id: Id of the object in the world.
+        """
         self.world = world
         self.id = handle_id
         self._core = world._core

@@ -14,47 +14,50 @@ if TYPE_CHECKING:
 
 
 class PhysicsJoint(Handle):
-    """Handle of a joint; every use raises `StaleHandleError` once it or a body is destroyed.
+    """Handle of a joint.
+
+    All members except `alive` raise `StaleHandleError` once the joint or one of its bodies is
+    destroyed.
 
     Attributes:
-        id: Its number in the world, never used again for another joint.
-        world: The world it is in.
+        id: Id of the joint, never reused in its world.
+        world: Physics world that contains the joint.
     """
 
     __slots__ = ()
 
     @property
     def alive(self) -> bool:
-        """Whether the joint is still there."""
+        """Whether the joint exists."""
         return self._core.has_joint(self.id)
 
     def destroy(self) -> None:
-        """Takes the joint out of the world and wakes its bodies.
+        """Destroys the joint and wakes its bodies.
 
         Raises:
-            StaleHandleError: It is gone already.
+            StaleHandleError: The joint has already been destroyed.
             WorldLockedError: The world is stepping.
         """
         self._core.destroy_joint(self.id)
 
     @property
     def type(self) -> str:
-        """`revolute` or `weld`."""
+        """Type of the joint: `revolute` or `weld`."""
         return self._core.joint_type(self.id)
 
     @property
     def body_a(self) -> PhysicsBody:
-        """The first body."""
+        """First body."""
         return self.world.body(self._core.joint_bodies(self.id)[0])
 
     @property
     def body_b(self) -> PhysicsBody:
-        """The second body."""
+        """Second body."""
         return self.world.body(self._core.joint_bodies(self.id)[1])
 
     @property
     def anchors(self) -> DoubleArray:
-        """Anchor of each body in its frame [m], shape (2, 2)."""
+        """Anchor points in the frames of the first and second body [m], shape (2, 2)."""
         return np.array(self._core.joint_anchors(self.id))
 
     @property
@@ -64,41 +67,45 @@ class PhysicsJoint(Handle):
 
     @property
     def limits(self) -> tuple[float, float] | None:
-        """Lower and upper angle of a revolute joint [rad], None without limits and for welds."""
+        """Lower and upper angle [rad]; None without limits, and for a weld joint."""
         return self._core.joint_limits(self.id)
 
     def set_limits(self, lower: float, upper: float) -> None:
-        """Sets the limits of a revolute joint [rad].
+        """Sets the limits of a revolute joint.
+
+        Args:
+            lower: Lower angle [rad].
+            upper: Upper angle [rad].
 
         Raises:
             ValueError: A number is not finite, or the lower limit is above the upper one.
-            PhysicsError: It is a weld joint.
-            StaleHandleError: The joint is gone.
+            PhysicsError: The joint is a weld joint.
+            StaleHandleError: The joint was destroyed.
             WorldLockedError: The world is stepping.
         """
         self._core.set_joint_limits(self.id, (lower, upper))
 
     def clear_limits(self) -> None:
-        """Takes the limits of a revolute joint away.
+        """Removes the limits of a revolute joint.
 
         Raises:
-            PhysicsError: It is a weld joint.
-            StaleHandleError: The joint is gone.
+            PhysicsError: The joint is a weld joint.
+            StaleHandleError: The joint was destroyed.
             WorldLockedError: The world is stepping.
         """
         self._core.set_joint_limits(self.id, None)
 
     @property
     def reference_angle(self) -> float:
-        """Angle of body B relative to body A at rest [rad]."""
+        """Angle of the second body relative to the first one at rest [rad]."""
         return self._core.joint_reference_angle(self.id)
 
     @property
     def frequency(self) -> float:
-        """Spring frequency of a weld joint [Hz], 0 when rigid."""
+        """Spring frequency of a weld joint [Hz]; 0 if the joint is rigid."""
         return self._core.joint_frequency(self.id)
 
     @property
     def damping(self) -> float:
-        """Damping ratio of a weld joint's spring."""
+        """Damping ratio of the spring of a weld joint."""
         return self._core.joint_damping(self.id)

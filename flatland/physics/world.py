@@ -19,14 +19,14 @@ PreSolveHook = Callable[[_core.PreSolveContact, _core.OldManifold], object]
 
 @dataclass(frozen=True, slots=True)
 class RayHit:
-    """Where a ray meets the nearest fixture.
+    """The nearest hit of a ray.
 
     Attributes:
-        fraction: Of the ray's length, from 0 to 1.
-        point: World frame [m].
-        normal: Unit normal of the fixture, world frame.
-        fixture: What was hit.
-        category_bits: Of that fixture.
+        fraction: Distance of the hit as a fraction of the length of the ray, in [0, 1].
+        point: Point of the hit, world frame [m].
+        normal: Unit normal of the fixture at the point, world frame.
+        fixture: Fixture that was hit.
+        category_bits: Categories of the fixture.
     """
 
     fraction: float
@@ -53,28 +53,29 @@ class StepReport:
 class PhysicsWorld:
     """A Box2D world without gravity; owns its bodies, fixtures, joints and contacts.
 
-    Worlds are independent of each other: each may be stepped in a thread of its own.
+    Worlds are independent: different threads may step different worlds at the same time.
 
     Attributes:
-        pre_solve: Called inside `step`, with the GIL, for each contact about to be solved that
-            involves one of `pre_solve_bodies`: `pre_solve(contact, old_manifold)`. It may set
-            `enabled`, `friction`, `restitution` and `tangent_speed` of the contact, and read the
-            world; it may not change anything else. None: nothing is called. What it raises is
-            kept for `take_pre_solve_errors`.
-        pre_solve_bodies: Ids of bodies whose contacts `pre_solve` gets; others cost nothing.
+        pre_solve: Function called as `pre_solve(contact, old_manifold)` within `step`, before the
+            solver processes a contact of one of `pre_solve_bodies`; None for no function. The
+            function may set `enabled`, `friction`, `restitution` and `tangent_speed` of the
+            contact and read the world, but not change the world. `take_pre_solve_errors` returns
+            the exceptions that it raises.
+        pre_solve_bodies: Ids of the bodies whose contacts are passed to `pre_solve`. Contacts of
+            other bodies cause no overhead.
     """
 
     __slots__ = ("_core", "_pre_solve_errors", "pre_solve", "pre_solve_bodies")
 
     def __init__(self) -> None:
-        """Makes an empty world."""
+        """Creates an empty world."""
         self._core = _core.World()
         self.pre_solve: PreSolveHook | None = None
         self.pre_solve_bodies: set[int] = set()
         self._pre_solve_errors: list[BaseException] = []
 
     def close(self) -> None:
-        """Frees all that is in the world; a second call does nothing.
+        """Destroys the world and all objects in it; idempotent.
 
         Raises:
             WorldLockedError: The world is stepping.
@@ -84,13 +85,13 @@ class PhysicsWorld:
 
     @property
     def closed(self) -> bool:
-        """Whether `close` was called."""
+        """Whether the world is closed."""
         return self._core.closed
 
     def step(
         self, dt: float, velocity_iterations: int, position_iterations: int
     ) -> StepReport | None:
-        """Advances the world; other Python threads run meanwhile.
+        """Advances the world by one time step; releases the GIL.
 
         Contacts add no energy: a dynamic body without joints that touches only static bodies is
         at most 1 % and 0.01 m/s faster after a step than before this step or the previous one.
@@ -102,9 +103,9 @@ class PhysicsWorld:
         after 20 in the first ten successive steps.
 
         Args:
-            dt: Simulated time of the step [s], from 1e-6 to 1000.
-            velocity_iterations: Of Box2D's solver, at least 0.
-            position_iterations: Of Box2D's solver, at least 0.
+            dt: Duration of the time step, from 1e-6 to 1000 [s].
+            velocity_iterations: Velocity iterations of the Box2D solver, at least 0.
+            position_iterations: Position iterations of the Box2D solver, at least 0.
 
         Returns:
             None, or which bodies were limited or are invalid. The world does not advance while a
@@ -114,7 +115,7 @@ class PhysicsWorld:
         Raises:
             ValueError: A number is out of range.
             StaleHandleError: The world is closed.
-            WorldLockedError: Another thread uses the world, or this is a `pre_solve` call.
+            WorldLockedError: The world is in use by another thread, or the caller is `pre_solve`.
         """
         if self.pre_solve is None:
             ids = self._core.step(dt, velocity_iterations, position_iterations)
@@ -142,7 +143,7 @@ class PhysicsWorld:
         self._core.find_new_contacts()
 
     def take_pre_solve_errors(self) -> list[BaseException]:
-        """Returns what `pre_solve` raised since the last call, in order."""
+        """Returns the exceptions that `pre_solve` raised since the last call, in order."""
         errors = self._pre_solve_errors
         self._pre_solve_errors = []
         return errors
@@ -157,16 +158,19 @@ class PhysicsWorld:
         linear_damping: float = 0.0,
         angular_damping: float = 0.0,
     ) -> PhysicsBody:
-        """Makes a body without fixtures, awake and at rest.
+        """Creates a body without fixtures, awake and at rest.
 
         Args:
-            body_type: `static`, `kinematic` or `dynamic`.
-            pose: (x, y, theta) of its origin in the world frame [m, rad].
-            linear_damping: At least 0 [1/s].
-            angular_damping: At least 0 [1/s].
+            body_type: Type of the body: `static`, `kinematic` or `dynamic`.
+            pose: Pose (x, y, theta) of the origin of the body in the world frame [m, rad].
+            linear_damping: Linear damping coefficient, at least 0 [1/s].
+            angular_damping: Angular damping coefficient, at least 0 [1/s].
+
+        Returns:
+            The new body.
 
         Raises:
-            ValueError: An unknown type, a number that is not finite, or negative damping.
+            ValueError: The type is unknown, a number is not finite, or a damping is negative.
             StaleHandleError: The world is closed.
             WorldLockedError: The world is stepping.
         """
@@ -184,20 +188,24 @@ class PhysicsWorld:
         limits: tuple[float, float] | None = None,
         collide_connected: bool = False,
     ) -> PhysicsJoint:
-        """Joins two bodies so that they turn about a common point.
+        """Creates a joint that lets two bodies rotate about a common point.
 
         Args:
             body_a: First body.
-            body_b: Second body, another one.
-            anchor_a: The point in the frame of body A [m].
-            anchor_b: The point in the frame of body B [m].
-            limits: Lower and upper angle of B relative to A at creation [rad], None for no limits.
+            body_b: Second body, different from the first one.
+            anchor_a: Common point in the frame of body A [m].
+            anchor_b: Common point in the frame of body B [m].
+            limits: Lower and upper angle of B relative to A, measured from their relative angle at
+                creation [rad]; None for no limits.
             collide_connected: Whether the two bodies collide with each other.
 
+        Returns:
+            The new joint.
+
         Raises:
-            ValueError: The bodies are one or of another world, a number is not finite, or the
-                lower limit is above the upper one.
-            StaleHandleError: A body is gone.
+            ValueError: The bodies are identical or in another world, a number is not finite, or
+                the lower limit is greater than the upper limit.
+            StaleHandleError: A body was destroyed.
             WorldLockedError: The world is stepping.
         """
         self._check_own(body_a, body_b)
@@ -220,22 +228,26 @@ class PhysicsWorld:
         damping: float = 0.0,
         collide_connected: bool = False,
     ) -> PhysicsJoint:
-        """Joins two bodies rigidly, or with an angular spring.
+        """Creates a joint that connects two bodies rigidly or by an angular spring.
 
         Args:
             body_a: First body.
-            body_b: Second body, another one.
-            anchor_a: The common point in the frame of body A [m].
-            anchor_b: The common point in the frame of body B [m].
+            body_b: Second body, different from the first one.
+            anchor_a: Common point in the frame of body A [m].
+            anchor_b: Common point in the frame of body B [m].
             reference_angle: Angle of B relative to A at rest [rad].
-            frequency: Of the spring [Hz], at least 0; 0 is rigid. The spring is tuned to the
-                inertias that the bodies have now.
-            damping: Damping ratio of the spring, at least 0; 1 is critical.
+            frequency: Frequency of the spring, at least 0 [Hz]; 0 for a rigid joint. The stiffness
+                of the spring is computed from the moments of inertia of the bodies at this time.
+            damping: Damping ratio of the spring, at least 0; 1 for critical damping.
             collide_connected: Whether the two bodies collide with each other.
 
+        Returns:
+            The new joint.
+
         Raises:
-            ValueError: The bodies are one or of another world, a number is not finite or negative.
-            StaleHandleError: A body is gone.
+            ValueError: The bodies are identical or in another world, or a number is not finite, or
+                the frequency or damping is negative.
+            StaleHandleError: A body was destroyed.
             WorldLockedError: The world is stepping.
         """
         self._check_own(body_a, body_b)
@@ -261,15 +273,15 @@ class PhysicsWorld:
     # -- handles by id ---------------------------------------------------------------------
 
     def body(self, body_id: int) -> PhysicsBody:
-        """Returns the handle of a body by its id, without a look whether it is there."""
+        """Returns the handle of a body by its id, without checking that the body exists."""
         return PhysicsBody(self, body_id)
 
     def fixture(self, fixture_id: int) -> PhysicsFixture:
-        """Returns the handle of a fixture by its id, without a look whether it is there."""
+        """Returns the handle of a fixture by its id, without checking that the fixture exists."""
         return PhysicsFixture(self, fixture_id)
 
     def joint(self, joint_id: int) -> PhysicsJoint:
-        """Returns the handle of a joint by its id, without a look whether it is there."""
+        """Returns the handle of a joint by its id, without checking that the joint exists."""
         return PhysicsJoint(self, joint_id)
 
     # -- rays ------------------------------------------------------------------------------
@@ -277,17 +289,17 @@ class PhysicsWorld:
     def ray_cast(
         self, start: Sequence[float], end: Sequence[float], mask: int = ALL_BITS
     ) -> RayHit | None:
-        """Casts one ray by `b2World::RayCast`.
+        """Casts one ray with `b2World::RayCast`.
 
-        A ray that starts inside a circle or polygon does not hit it; sensors are never hit.
+        A ray that starts inside a circle or polygon does not hit that shape. Sensors are ignored.
 
         Args:
-            start: World frame [m].
-            end: World frame [m].
-            mask: Category bits that stop the ray.
+            start: Start of the ray, world frame [m].
+            end: End of the ray, world frame [m].
+            mask: Categories that stop the ray.
 
         Returns:
-            The nearest hit, or None; always None for a ray of no length.
+            The nearest hit; None if there is no hit or the ray has zero length.
 
         Raises:
             ValueError: A number is not finite.
@@ -305,24 +317,26 @@ class PhysicsWorld:
     def cast_rays(
         self, pose: Pose, ends: npt.ArrayLike, mask: int, reflect_mask: int = 0
     ) -> tuple[FloatArray, BoolArray]:
-        """Casts one ray from a sensor to each end point; other Python threads run meanwhile.
+        """Casts one ray from a rangefinder to each end point; releases the GIL.
 
-        The nearest fixture counts that is no sensor and has a category in `mask`. A ray that
-        starts inside a circle or polygon does not hit it; edges are hit from both sides.
+        A ray is stopped by the nearest fixture with a category in `mask` that is not a sensor
+        fixture. A ray that starts inside a circle or polygon does not hit that shape. Edges are
+        hit from both sides.
 
         Args:
-            pose: (x, y, theta) of the sensor in the world frame [m, rad].
-            ends: End points in the sensor frame [m], shape (n, 2), float32.
-            mask: Category bits that stop a ray.
-            reflect_mask: Category bits that reflect; 0 when nobody asks.
+            pose: Pose (x, y, theta) of the rangefinder in the world frame [m, rad].
+            ends: End points of the rays in the frame of the rangefinder [m], shape (n, 2), float32.
+            mask: Categories that stop a ray.
+            reflect_mask: Categories that reflect a ray; 0 if reflections are not needed.
 
         Returns:
-            How far each ray got, as a fraction of its length in [0, 1], NaN for a miss and for a
-            ray of no length, shape (n,); and for each ray whether a fixture that stops it and has
-            a category in `reflect_mask` is at that distance, within 1e-4 m + 1e-5 of the length.
+            Distance of each hit as a fraction of the length of the ray in [0, 1], NaN for a miss
+            and for a ray of zero length, shape (n,); and for each ray whether a fixture with
+            categories in both masks is at that distance, within 1e-4 m plus 1e-5 of the length of
+            the ray, shape (n,).
 
         Raises:
-            ValueError: A shape is wrong or a number is not finite.
+            ValueError: An array has a wrong shape or a number is not finite.
             StaleHandleError: The world is closed.
             WorldLockedError: The world is stepping.
         """
@@ -331,7 +345,7 @@ class PhysicsWorld:
     def cast_rays_reference(
         self, pose: Pose, ends: npt.ArrayLike, mask: int, reflect_mask: int = 0
     ) -> tuple[FloatArray, BoolArray]:
-        """Does what `cast_rays` does by one `b2World::RayCast` a ray: slow, for comparison."""
+        """Casts rays like `cast_rays`, with `b2World::RayCast`; slow, for comparison in tests."""
         return self._core.cast_rays_reference(pose, ends, mask, reflect_mask)
 
     # -- overlaps --------------------------------------------------------------------------
@@ -344,22 +358,25 @@ class PhysicsWorld:
         ignored: Iterable[PhysicsBody] = (),
         least_gap: float = 0.0,
     ) -> list[PhysicsBody]:
-        """Returns the other bodies that some bodies would overlap at a pose.
+        """Returns the other bodies that a rigid group of bodies would overlap at a pose.
 
-        Only fixtures that the solver would collide count: no sensors, category and mask bits that
-        match, at least one dynamic body of the two, no joint that excludes the collision. Shapes
-        are measured without the skin that Box2D puts around polygons and edges. Edges have no
-        inside: a closed loop of them overlaps only what crosses it.
+        Only pairs of fixtures that can collide are considered: neither is a sensor, their category
+        and mask bits match, at least one body is dynamic, and no joint prevents the collision. The
+        distance of two shapes excludes the polygon radius of Box2D. Edges have no interior: a
+        closed loop of edges overlaps only shapes that intersect one of the edges.
 
         Args:
-            bodies: They move together, at least one.
-            pose: (x, y, theta) of the first one in the world frame [m, rad].
+            bodies: Bodies of the group, at least one.
+            pose: Pose (x, y, theta) of the first body in the world frame [m, rad].
             ignored: Bodies that may be overlapped.
-            least_gap: Two fixtures that are closer than this overlap [m]; a negative one is how
-                deep they may penetrate.
+            least_gap: Distance below which two fixtures overlap [m]; if negative, the penetration
+                depth that is tolerated.
+
+        Returns:
+            The overlapped bodies, each once, in order of their ids.
 
         Raises:
-            ValueError: There is no body, or a number is not finite.
+            ValueError: There are no bodies, or a number is not finite.
             StaleHandleError: A body was destroyed, or the world is closed.
             WorldLockedError: The world is stepping.
         """
@@ -374,21 +391,21 @@ class PhysicsWorld:
         ignored: Iterable[PhysicsBody] = (),
         least_gap: float = 0.0,
     ) -> BoolArray:
-        """Returns at which poses some bodies would overlap nothing; see `overlapping_bodies`.
+        """Returns the poses at which a rigid group of bodies would not overlap other bodies.
 
-        Other Python threads run meanwhile.
+        See `overlapping_bodies`. Releases the GIL.
 
         Args:
-            bodies: They move together, at least one.
-            poses: (x, y, theta) of the first one in the world frame [m, rad], shape (n, 3).
+            bodies: Bodies of the group, at least one.
+            poses: Poses (x, y, theta) of the first body in the world frame [m, rad], shape (n, 3).
             ignored: Bodies that may be overlapped.
-            least_gap: Two fixtures that are closer than this overlap [m].
+            least_gap: Distance below which two fixtures overlap [m].
 
         Returns:
-            Shape (n,).
+            Whether each pose is free, shape (n,).
 
         Raises:
-            ValueError: There is no body, a shape is wrong or a number is not finite.
+            ValueError: There are no bodies, an array has a wrong shape, or a number is not finite.
             StaleHandleError: A body was destroyed, or the world is closed.
             WorldLockedError: The world is stepping.
         """
@@ -404,21 +421,21 @@ class PhysicsWorld:
         only: Iterable[PhysicsBody] | None = None,
         least_gap: float = 0.0,
     ) -> BoolArray:
-        """Returns where a disc would overlap nothing; see `free_poses`.
+        """Returns the poses at which a disc would not overlap any body; see `free_poses`.
 
         Args:
-            poses: (x, y, theta) of its centre in the world frame [m, rad], shape (n, 3).
-            radius: Of the disc [m], at least 0.
+            poses: Poses (x, y, theta) of the center in the world frame [m, rad], shape (n, 3).
+            radius: Radius of the disc, at least 0 [m].
             bits: Category and mask bits of the disc.
             ignored: Bodies that may be overlapped.
-            only: All other bodies may be overlapped, too; None for no such limit.
-            least_gap: A fixture that is closer to the disc than this overlaps it [m].
+            only: Bodies that are considered; None for all bodies.
+            least_gap: Distance below which a fixture overlaps the disc [m].
 
         Returns:
-            Shape (n,).
+            Whether each pose is free, shape (n,).
 
         Raises:
-            ValueError: A shape is wrong or a number is out of range.
+            ValueError: An array has a wrong shape or a number is out of range.
             StaleHandleError: A body was destroyed, or the world is closed.
             WorldLockedError: The world is stepping.
         """
@@ -437,7 +454,7 @@ class PhysicsWorld:
         self._core.record_contacts = record
 
     def take_contact_events(self) -> list[ContactEvent]:
-        """Returns what happened since the last call, in order.
+        """Returns the contact events since the last call, in order.
 
         Raises:
             StaleHandleError: The world is closed.
@@ -447,7 +464,7 @@ class PhysicsWorld:
         return [] if columns is None else to_events(columns)
 
     def contacts(self) -> list[ContactInfo]:
-        """Returns all pairs of fixtures that touch now.
+        """Returns the contacts of all fixtures that currently touch.
 
         Raises:
             StaleHandleError: The world is closed.

@@ -59,10 +59,10 @@ class DiffDrive(ModelPlugin):
         command = self._command.value
         v = self._velocity = self.linear_dynamics.limit(self._velocity, command.linear_x, dt)
         omega = self._yaw_rate = self.angular_dynamics.limit(self._yaw_rate, command.angular_z, dt)
-        physics = self.body.physics
-        pose = physics.pose
+        body = self.body
+        pose = body.pose
         # In every step, or friction and contacts would slow the robot down.
-        physics.set_velocity(v * math.cos(pose[2]), v * math.sin(pose[2]), omega)
+        body.set_velocity(v * math.cos(pose[2]), v * math.sin(pose[2]), omega)
         if self.timer.check_update(timekeeper):
             self._publish(timekeeper.sim_time_ns, pose)
 
@@ -73,7 +73,7 @@ class DiffDrive(ModelPlugin):
         wants_twist = twist is not None and twist.wanted
         if not (wants_twist or self._sends_transform or odometer.wanted):
             return
-        velocity = self.body.physics.velocity
+        velocity = self.body.velocity
         noisy_pose = odometer.report(stamp, pose, velocity)
         if twist is not None and wants_twist:
             forward = velocity[0] * math.cos(pose[2]) + velocity[1] * math.sin(pose[2])

@@ -201,7 +201,7 @@ class Laser(ModelPlugin):
         return self._compute_ranges(self.rng)
 
     def _compute_ranges(self, rng: np.random.Generator) -> FloatArray:
-        pose = compose(self.body.physics.pose, self.origin)
+        pose = compose(self.body.pose, self.origin)
         fractions, reflects = self.world.physics.cast_rays(
             pose, self.beam_ends, self._mask, self._reflect_mask
         )
@@ -225,6 +225,6 @@ class Laser(ModelPlugin):
             Pose of the sensor in the world frame, and the exact range of each beam [m],
             shape (n,), float32, NaN for a miss.
         """
-        pose = compose(self.body.physics.pose, self.origin)
+        pose = compose(self.body.pose, self.origin)
         fractions, _ = self.world.physics.cast_rays(pose, self.beam_ends, self._mask)
         return pose, fractions * self._length

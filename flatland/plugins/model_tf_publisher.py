@@ -39,11 +39,11 @@ class ModelTfPublisher(ModelPlugin):
         """Sends the transforms when they are due."""
         if not self.timer.check_update(timekeeper):
             return
-        x, y, yaw = self.reference.physics.pose
+        x, y, yaw = self.reference.pose
         c, s = math.cos(yaw), math.sin(yaw)
         reference_frame_id = self._reference_frame_id
         for body, frame_id in self._others:
-            body_x, body_y, body_yaw = body.physics.pose
+            body_x, body_y, body_yaw = body.pose
             dx, dy = body_x - x, body_y - y
             self.send_transform(
                 reference_frame_id, frame_id, c * dx + s * dy, c * dy - s * dx, body_yaw - yaw

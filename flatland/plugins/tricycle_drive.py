@@ -164,12 +164,12 @@ class TricycleDrive(ModelPlugin):
 
     def before_physics_step(self, timekeeper: Timekeeper) -> None:
         """Reports the motion so far, then steers and sets the body's velocity."""
-        physics = self.body.physics
-        pose = physics.pose
+        body = self.body
+        pose = body.pose
         if self.timer.check_update(timekeeper):
             self._odometer.begin_update()
             if self._odometer.wanted:
-                self._odometer.report(timekeeper.sim_time_ns, pose, physics.velocity)
+                self._odometer.report(timekeeper.sim_time_ns, pose, body.velocity)
         dt = timekeeper.step_size
         command = self._command.value
         self._steer(command.angular_z, dt)
@@ -183,7 +183,7 @@ class TricycleDrive(ModelPlugin):
         forward = v * math.cos(steering_angle) + omega * geometry.rear_center[1]
         sideways = -omega * geometry.rear_center[0]
         c, s = math.cos(pose[2]), math.sin(pose[2])
-        physics.set_velocity(c * forward - s * sideways, s * forward + c * sideways, omega)
+        body.set_velocity(c * forward - s * sideways, s * forward + c * sideways, omega)
 
     def _steer(self, target: float, dt: float) -> None:
         """Turns the front wheel towards an angle as fast as the limits allow."""
@@ -203,4 +203,4 @@ class TricycleDrive(ModelPlugin):
         if angle != self._shown_angle:
             self._shown_angle = angle
             shown = angle * self.geometry.steering_sign
-            self.geometry.front_joint.physics.set_limits(shown, shown)
+            self.geometry.front_joint.set_limits(shown, shown)

@@ -38,13 +38,13 @@ class ContactReporter:
 
     def add_bodies(self, bodies: Iterable[Body]) -> None:
         """Reports the contacts of some bodies."""
-        self._bodies.update((body.physics.id, body) for body in bodies)
+        self._bodies.update((body.id, body) for body in bodies)
         self._hooks_version = -1
 
     def remove_bodies(self, bodies: Iterable[Body]) -> None:
         """Reports the contacts of some bodies no longer; their ids may be stale."""
         for body in bodies:
-            self._bodies.pop(body.physics.id, None)
+            self._bodies.pop(body.id, None)
         self._hooks_version = -1
 
     def clear(self) -> None:

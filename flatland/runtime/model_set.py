@@ -149,9 +149,9 @@ class ModelSet:
         """Removes a complete or incomplete model; other plugins are notified of ended contacts."""
         self._host.shut_down(model.plugins)
         for joint in reversed(model.joints):
-            joint.physics.destroy()
+            joint.destroy()
         for body in reversed(model.bodies):
-            body.physics.destroy()
+            body.destroy()
         with self._requests.hooks():
             self._contacts.dispatch()
         self._contacts.remove_bodies(model.bodies)

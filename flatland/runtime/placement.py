@@ -14,7 +14,7 @@ import numpy.typing as npt
 from flatland.entities.layer import Layer
 from flatland.entities.model import Model
 from flatland.errors import WorldError
-from flatland.geometry import Pose, finite_pose
+from flatland.geometry import Pose, finite_pose, transform_points
 from flatland.runtime.free_space import Bounds, FreeSpace, Spread
 from flatland.runtime.nearest_place import SEARCH_RADIUS, nearest_offset
 
@@ -255,10 +255,8 @@ def _bounds_of(walls: DoubleArray) -> Bounds:
 
 def _world_edges(layer: Layer) -> DoubleArray:
     """Returns the edges (x1, y1, x2, y2) of a layer in the world frame [m], shape (n, 4)."""
-    x, y, theta = layer.body.pose
-    turn = np.array([[math.cos(theta), math.sin(theta)], [-math.sin(theta), math.cos(theta)]])
-    edges: DoubleArray = layer.edges.astype(np.float64).reshape(-1, 2) @ turn + (x, y)
-    return edges.reshape(-1, 4)
+    p_layer = layer.edges.astype(np.float64).reshape(-1, 2)
+    return transform_points(layer.body.pose, p_layer).reshape(-1, 4)
 
 
 def _poses(points: DoubleArray, theta: float) -> DoubleArray:

@@ -207,7 +207,7 @@ class PluginHost:
     def pre_solve_bodies(self, bodies: Mapping[int, Body]) -> set[int]:
         """Returns the physics ids of the bodies whose contacts concern a `pre_solve` hook."""
         concerned = self.hooks.bodies_concerned("pre_solve", bodies.values())
-        return {body.physics.id for body in concerned}
+        return {body.id for body in concerned}
 
     def before_physics_step(self, timekeeper: Timekeeper) -> None:
         """Calls `before_physics_step` of all plugins."""
@@ -250,8 +250,8 @@ class PluginHost:
             raw,
             body_a,
             body_b,
-            body_a.physics.fixture(raw.fixture_a),
-            body_b.physics.fixture(raw.fixture_b),
+            body_a.fixture(raw.fixture_a),
+            body_b.fixture(raw.fixture_b),
         )
         hooks = self.hooks.of_contact("pre_solve", body_a, body_b)
         self._call("pre_solve", hooks, contact, old_manifold)

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Collection
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from flatland.geometry import rotate
+from flatland.geometry import transform_points, yaw_from_quaternion
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,12 +43,11 @@ def bounds_of(markers: Any) -> Bounds | None:
     for marker in markers.markers:
         if not marker.points:
             continue
-        points = np.array([(point.x, point.y) for point in marker.points])
-        yaw = 2 * math.atan2(marker.pose.orientation.z, marker.pose.orientation.w)
-        c, s = rotate((1.0, 0.0), yaw)
-        x = marker.pose.position.x + c * points[:, 0] - s * points[:, 1]
-        y = marker.pose.position.y + s * points[:, 0] + c * points[:, 1]
-        part = Bounds(float(x.min()), float(y.min()), float(x.max()), float(y.max()))
+        position, orientation = marker.pose.position, marker.pose.orientation
+        yaw = yaw_from_quaternion(orientation.x, orientation.y, orientation.z, orientation.w)
+        p_marker = np.array([(point.x, point.y) for point in marker.points])
+        p_world = transform_points((position.x, position.y, yaw), p_marker)
+        part = Bounds(*p_world.min(axis=0).tolist(), *p_world.max(axis=0).tolist())
         # A circle is published as a sphere: one point at its center, with the diameter as scale.
         radius = marker.scale.x / 2 if marker.type == marker.SPHERE_LIST else 0.0
         parts.append(part.expanded(radius))

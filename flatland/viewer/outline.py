@@ -12,7 +12,7 @@ from flatland.config.reader import YamlReader
 from flatland.entities.body import Body, Color
 from flatland.entities.collision_filter import ALL_LAYERS, CollisionFilter
 from flatland.entities.model import Model
-from flatland.geometry import IDENTITY, DoubleArray, rotate
+from flatland.geometry import IDENTITY, DoubleArray, circle_points, transform_points
 from flatland.loading.model_loader import ModelLoader
 from flatland.physics import PhysicsFixture, PhysicsWorld
 from flatland.world import World
@@ -78,19 +78,13 @@ def max_radius(outlines: Iterable[Outline]) -> float:
 def _segments(body: Body) -> DoubleArray:
     """Returns the edges of all fixtures of a body in the model's frame [m], shape (2 n, 2)."""
     p_body = np.concatenate([_fixture_segments(fixture) for fixture in body.fixtures])
-    x, y, theta = body.pose
-    c, s = rotate((1.0, 0.0), theta)
-    p_model: DoubleArray = p_body @ np.array([[c, s], [-s, c]])
-    p_model += np.array([x, y])
-    return p_model
+    return transform_points(body.pose, p_body)
 
 
 def _fixture_segments(fixture: PhysicsFixture) -> DoubleArray:
     """Returns the edges of a circle or polygon in the body's frame [m], shape (2 n, 2)."""
     if fixture.shape == "circle":
-        angles = np.linspace(0.0, 2 * np.pi, _CIRCLE_POINTS, endpoint=False)
-        points = fixture.radius * np.column_stack([np.cos(angles), np.sin(angles)])
-        points += fixture.center
+        points = circle_points(fixture.center, fixture.radius, _CIRCLE_POINTS)
     else:
         points = np.asarray(fixture.vertices, dtype=np.float64)
     segments: DoubleArray = np.stack([points, np.roll(points, -1, axis=0)], axis=1)

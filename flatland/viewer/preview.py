@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from typing import Any, Final
 
@@ -43,9 +42,7 @@ def at_pose(markers: Sequence[Any], pose: geometry.Pose) -> Any:
     """Sets the pose of the markers in the world frame and returns them as a MarkerArray."""
     x, y, theta = pose
     for marker in markers:
-        marker.pose = Pose(
-            Point(x, y, 0.0), Quaternion(0.0, 0.0, math.sin(theta / 2), math.cos(theta / 2))
-        )
+        marker.pose = Pose(Point(x, y, 0.0), Quaternion(*geometry.quaternion_from_yaw(theta)))
     return MarkerArray(list(markers))
 
 

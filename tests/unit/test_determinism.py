@@ -1,4 +1,4 @@
-"""Two runs with one seed give the same bytes, whatever else the process and the machine do."""
+"""Determinism: two runs with the same seed have identical results."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ from pathlib import Path
 
 import pytest
 
-# Drives both robots of the office into the furniture, with noise, and prints a digest of all
-# values of all outputs, of all transforms, poses and contacts. With a second argument, that many
-# other threads cast rays in the same world meanwhile.
+# Drives both robots of the office into the furniture, with noise, and prints a digest of the values
+# of all outputs, transforms, poses and contacts. The third argument is the number of other threads
+# that cast rays in the same world during the run. With a fourth argument, the run uses one core.
 RUN = """
 import dataclasses, hashlib, math, os, sys, threading
 import numpy as np
@@ -61,7 +61,7 @@ for _ in range(400):
 stop.set()
 for other in others:
     other.join()
-add([body.physics.pose for model in world.models for body in model.bodies])
+add([body.pose for model in world.models for body in model.bodies])
 add(sorted(world.transforms.items()))
 assert len(counts) == 4 and min(counts.values()) > 10, counts
 print(digest.hexdigest())
@@ -83,22 +83,22 @@ def run(checkout: Path, seed: int, *options: str, hash_seed: int = 0) -> str:
 
 @pytest.fixture(scope="module")
 def digest(checkout: Path) -> str:
-    """What a run with seed 3 gives."""
+    """Digest of a run with seed 3."""
     return run(checkout, 3)
 
 
-def test_two_runs_with_one_seed_give_the_same_bytes(checkout: Path, digest: str) -> None:
+def test_two_runs_with_the_same_seed_have_identical_results(checkout: Path, digest: str) -> None:
     assert run(checkout, 3, hash_seed=7) == digest
 
 
-def test_number_of_cores_does_not_matter(checkout: Path, digest: str) -> None:
+def test_results_are_independent_of_the_number_of_cores(checkout: Path, digest: str) -> None:
     assert run(checkout, 3, "0", "one core") == digest
 
 
 @pytest.mark.threads
-def test_scans_of_other_threads_do_not_matter(checkout: Path, digest: str) -> None:
+def test_results_are_independent_of_scans_in_other_threads(checkout: Path, digest: str) -> None:
     assert run(checkout, 3, "3") == digest
 
 
-def test_another_seed_gives_other_noise(checkout: Path, digest: str) -> None:
+def test_the_noise_depends_on_the_seed(checkout: Path, digest: str) -> None:
     assert run(checkout, 4) != digest

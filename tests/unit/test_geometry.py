@@ -1,4 +1,4 @@
-"""Poses in the plane."""
+"""Planar geometry."""
 
 from __future__ import annotations
 
@@ -25,18 +25,18 @@ numbers = st.floats(-1e3, 1e3)
 poses = st.tuples(numbers, numbers, st.floats(-10, 10))
 
 
-def test_compose_turns_the_inner_position():
+def test_compose_rotates_the_inner_position():
     assert compose((1, 2, math.pi / 2), (3, 0, 0.5)) == pytest.approx((1, 5, math.pi / 2 + 0.5))
     assert rotate((1, 0), math.pi / 2) == pytest.approx((0, 1))
 
 
 @given(poses, poses)
-def test_invert_undoes_compose(outer, inner):
+def test_invert_is_the_inverse_of_compose(outer, inner):
     assert compose(invert(outer), compose(outer, inner)) == pytest.approx(inner, abs=1e-9)
 
 
 @given(st.floats(-1e6, 1e6))
-def test_wrap_angle_keeps_the_direction(angle):
+def test_wrap_angle_preserves_the_direction(angle):
     wrapped = wrap_angle(angle)
     assert -math.pi <= wrapped <= math.pi
     assert math.cos(wrapped) == pytest.approx(math.cos(angle), abs=1e-9)
@@ -45,12 +45,12 @@ def test_wrap_angle_keeps_the_direction(angle):
 @pytest.mark.parametrize(
     "pose", [(1, 2), "abc", None, (1, 2, "x"), (1, 2, math.nan), (1, math.inf, 0)]
 )
-def test_finite_pose_refuses(pose):
+def test_finite_pose_rejects_invalid_poses(pose):
     with pytest.raises(ValueError, match="pose must be"):
         finite_pose(pose)
 
 
-def test_finite_pose_takes_any_sequence():
+def test_finite_pose_accepts_any_sequence():
     assert finite_pose(["1", 2, 3.5]) == (1.0, 2.0, 3.5)
 
 
@@ -61,7 +61,7 @@ def test_transform_points_agrees_with_compose(pose, points):
     assert transformed == pytest.approx(np.array(expected), abs=1e-9)
 
 
-def test_transform_points_keeps_the_shape():
+def test_transform_points_preserves_the_shape():
     assert transform_points((1, 2, 3), np.zeros(2)).shape == (2,)
     assert transform_points((1, 2, 3), np.zeros((4, 2, 2))).shape == (4, 2, 2)
     assert transform_points((1, 2, 3), np.zeros((0, 2))).shape == (0, 2)

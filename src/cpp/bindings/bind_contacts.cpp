@@ -28,8 +28,8 @@ py::array_t<double> to_array(const float* values, std::size_t count) {
   return array;
 }
 
-// A contact as a pre-solve hook sees it. It outlives the contact when Python keeps it, but is
-// refused then.
+// The contact passed to a pre-solve hook. Python code may store a reference beyond the call, but
+// can access the Box2D contact only during the call.
 class PreSolveContact {
  public:
   PreSolveContact(b2Contact* contact, const ContactRow& row) : contact_(contact), row_(row) {}
@@ -39,7 +39,7 @@ class PreSolveContact {
   b2Contact& contact() const {
     if (contact_ == nullptr) {
       throw StaleHandleError(
-          "a contact may be used only inside of the pre_solve call it came with");
+          "a contact can be accessed only during the call of pre_solve that received it");
     }
     return *contact_;
   }
@@ -49,9 +49,9 @@ class PreSolveContact {
   ContactRow row_;
 };
 
-// The manifold of the step before, in the frames of the two bodies.
+// The manifold of the previous step, in the local frames of the two bodies.
 struct OldManifold {
-  // Box2D does not fill in a manifold without points.
+  // Box2D does not initialize the other members of a manifold without points.
   explicit OldManifold(const b2Manifold& given)
       : manifold(given.pointCount > 0 ? given : b2Manifold{}) {}
 
@@ -71,21 +71,21 @@ class PythonHook final : public PreSolveHook {
                  const b2Manifold& old_manifold) noexcept override {
     const py::gil_scoped_acquire locked;
     try {
-      const auto shown = std::make_shared<PreSolveContact>(contact, row);
+      const auto argument = std::make_shared<PreSolveContact>(contact, row);
       try {
-        callback_(shown, OldManifold(old_manifold));
+        callback_(argument, OldManifold(old_manifold));
       } catch (py::error_already_set& error) {
-        keep(error);
+        store(error);
       }
-      shown->expire();
+      argument->expire();
     } catch (const std::exception&) {
-      // Out of memory while an error was to be kept: nothing can be told any more.
+      // Not enough memory to store the error, so it cannot be reported.
       PyErr_Clear();
     }
   }
 
  private:
-  void keep(py::error_already_set& error) {
+  void store(py::error_already_set& error) {
     if (error.trace()) PyException_SetTraceback(error.value().ptr(), error.trace().ptr());
     errors_.append(error.value());
   }
@@ -98,14 +98,14 @@ class PythonHook final : public PreSolveHook {
 py::object step_with_hook(World& world, double dt, int velocity_iterations, int position_iterations,
                           py::function callback, std::unordered_set<Id> bodies, py::list errors) {
   PythonHook hook(std::move(callback), std::move(bodies), std::move(errors));
-  // Safe without the GIL: the world is held for this thread, and the hook takes the GIL for as long
-  // as it touches Python.
+  // Safe without the GIL: the world is in exclusive use by this thread, and the hook holds the GIL
+  // while it accesses Python objects.
   World::ExclusiveUse use(world, World::kStepping);
   return to_python(without_gil(
       use, [&] { return world.step(dt, velocity_iterations, position_iterations, &hook); }));
 }
 
-// The rows as arrays, one for each kind of column; None when there are no rows.
+// Converts rows to a tuple of arrays, one for each column; None if there are no rows.
 py::object to_columns(const std::vector<ContactRow>& rows) {
   if (rows.empty()) return py::none();
   const auto n = static_cast<py::ssize_t>(rows.size());

@@ -9,7 +9,7 @@ namespace py = pybind11;
 namespace flatland {
 namespace {
 
-// The classes are looked up when they are needed, so that nothing global holds them.
+// The classes are imported on demand, so that no global variable references them.
 void raise(const char* class_name, const std::exception& error) {
   const py::object type = py::module_::import("flatland.errors").attr(class_name);
   PyErr_SetString(type.ptr(), error.what());

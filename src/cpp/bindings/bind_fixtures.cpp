@@ -54,10 +54,11 @@ std::size_t py_create_edges(World& world, Id body, const Array<float>& edges, do
   check_shape(edges, 4, "edges");
   const FixtureOptions options =
       options_of(0.0, friction, restitution, false, category_bits, mask_bits);
-  // A copy, as the caller may write to the array while the GIL is free.
+  // A copy, because other threads may write to the array while the GIL is released.
   const std::vector<float> rows(edges.data(), edges.data() + edges.size());
-  // Safe without the GIL: the world is held for this thread, and no Python object is touched.
-  World::ExclusiveUse use(world, "is making edges");
+  // Safe without the GIL: the world is in exclusive use by this thread, and no Python object is
+  // accessed.
+  World::ExclusiveUse use(world, "is creating edges");
   return without_gil(
       use, [&] { return create_edges(world, body, rows.data(), rows.size() / 4, options); });
 }
@@ -102,7 +103,7 @@ void bind_fixtures(WorldClass& world) {
     return std::make_tuple(static_cast<double>(center.x), static_cast<double>(center.y));
   });
   world.def("fixture_radius", [](const World& self, Id id) {
-    // Of other shapes Box2D's radius is the thickness of their skin.
+    // The radius of other shapes is the polygon radius of Box2D.
     const b2Fixture* fixture = self.read_fixture(id);
     return fixture->GetType() == b2Shape::e_circle ? fixture->GetShape()->m_radius : 0.0F;
   });

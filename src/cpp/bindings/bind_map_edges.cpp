@@ -17,7 +17,7 @@ namespace py = pybind11;
 namespace flatland {
 namespace {
 
-// Checks the shape and type of a mask and returns it in C order, without a copy where it is.
+// Checks the shape and type of a mask and returns it in C order, without a copy if possible.
 py::array checked_mask(const py::array& mask) {
   const bool is_byte =
       mask.itemsize() == 1 && (mask.dtype().kind() == 'b' || mask.dtype().kind() == 'u');
@@ -33,7 +33,7 @@ py::array checked_mask(const py::array& mask) {
     }
   }
   py::array contiguous = py::array::ensure(mask, py::array::c_style);
-  if (!contiguous) throw std::bad_alloc();  // the only way in which a copy of bytes can fail
+  if (!contiguous) throw std::bad_alloc();  // the only possible failure of a copy of bytes
   return contiguous;
 }
 
@@ -42,7 +42,7 @@ Bitmap view_of(const py::array& mask) {
           static_cast<std::size_t>(mask.shape(1))};
 }
 
-// Hands rows of `width` scalars to numpy without a copy: the array owns the vector.
+// Converts rows to an array without a copy; the array owns the vector.
 template <typename Scalar, typename Row>
 py::array_t<Scalar> to_array(std::vector<Row> rows) {
   constexpr std::size_t width = sizeof(Row) / sizeof(Scalar);
@@ -64,12 +64,12 @@ py::array_t<float> py_boundary_edges(const py::array& mask, double resolution) {
   if (!(resolution >= static_cast<double>(FLT_MIN)) ||
       resolution * longest > static_cast<double>(FLT_MAX)) {
     throw py::value_error(
-        "resolution must be positive, and the size of the map must fit a 32-bit float, got " +
+        "resolution must be positive and the size of the map in the range of a 32-bit float, got " +
         std::string(py::repr(py::float_(resolution))));
   }
   std::vector<BoundaryEdge> edges;
   {
-    // Safe without the GIL: `pixels` keeps the memory alive, and no Python object is touched.
+    // Safe without the GIL: `pixels` keeps the memory alive, and no Python object is accessed.
     py::gil_scoped_release unlocked;
     edges = boundary_edges(bitmap, resolution);
   }
@@ -81,7 +81,7 @@ py::tuple py_boundary_loops(const py::array& mask) {
   const Bitmap bitmap = view_of(pixels);
   BoundaryLoops loops;
   {
-    // Safe without the GIL: `pixels` keeps the memory alive, and no Python object is touched.
+    // Safe without the GIL: `pixels` keeps the memory alive, and no Python object is accessed.
     py::gil_scoped_release unlocked;
     loops = boundary_loops(bitmap);
   }
@@ -93,9 +93,9 @@ py::tuple py_boundary_loops(const py::array& mask) {
 
 void bind_map_edges(py::module_& module) {
   module.def("boundary_edges", &py_boundary_edges, py::arg("mask"), py::arg("resolution"),
-             "Boundary between on and off pixels as straight edges [m], shape (n, 4).");
+             "Returns the boundary between on and off pixels as straight edges [m], shape (n, 4).");
   module.def("boundary_loops", &py_boundary_loops, py::arg("mask"),
-             "Boundary as closed loops: corners (n, 2), and where each loop starts (m + 1,).");
+             "Returns the boundary as loops: corners (n, 2) and the start of each loop (m + 1,).");
 }
 
 }  // namespace flatland

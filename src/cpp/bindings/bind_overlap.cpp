@@ -42,7 +42,7 @@ Probe complete(Probe probe, const World& world, const Ids& ignored, const std::o
   return probe;
 }
 
-// The bodies of a probe are ignored, too.
+// The bodies of a probe are among the ignored bodies.
 Probe model_probe(const World& world, const Ids& bodies, Ids ignored, double least_gap) {
   Probe probe = probe_of_bodies(world, bodies);
   ignored.insert(ignored.end(), bodies.begin(), bodies.end());
@@ -55,8 +55,8 @@ py::array_t<bool> free_at(World& world, const Probe& probe, const Poses& poses) 
   const double* in = poses.data();
   bool* out = is_free.mutable_data();
   const auto count = static_cast<std::size_t>(poses.shape(0));
-  // Safe without the GIL: `use` keeps the world from changing, so the bodies of the probe stay
-  // valid, nobody else has the result yet, and `poses` keeps its memory.
+  // Safe without the GIL: `use` prevents changes of the world, so the bodies of the probe remain
+  // valid; the result is not shared yet, and `poses` keeps its memory alive.
   World::SharedUse use(world);
   without_gil(use, [&] { find_free_poses(world.engine(), probe, in, count, out); });
   return is_free;

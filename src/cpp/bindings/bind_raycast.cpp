@@ -24,7 +24,7 @@ b2Transform checked_pose(const PyPose& pose) {
   return transform;
 }
 
-// Checks and converts, casts without the GIL, returns (fractions, reflect).
+// Checks and converts the arguments, casts without the GIL and returns (fractions, reflect).
 template <typename Cast>
 py::tuple scan(World& world, const PyPose& pose, const Ends& ends, std::int64_t mask,
                std::int64_t reflect_mask, Cast&& cast) {
@@ -42,8 +42,8 @@ py::tuple scan(World& world, const PyPose& pose, const Ends& ends, std::int64_t 
   py::array_t<float> fractions(ends.shape(0));
   py::array_t<bool> reflect(ends.shape(0));
   const ScanResult result{fractions.mutable_data(), reflect.mutable_data()};
-  // Safe without the GIL: `use` keeps the world from changing, nobody else has the results yet, and
-  // `ends` keeps its memory; whoever writes to it meanwhile gets the ranges of a mixture.
+  // Safe without the GIL: `use` prevents changes of the world, the results are not shared yet, and
+  // `ends` keeps its memory alive. If another thread writes to `ends`, the results are unspecified.
   World::SharedUse use(world);
   without_gil(use, [&] { cast(request, result); });
   return py::make_tuple(std::move(fractions), std::move(reflect));
@@ -65,7 +65,7 @@ py::tuple py_cast_rays_reference(World& world, const PyPose& pose, const Ends& e
               });
 }
 
-// (fraction, point, normal, fixture, category_bits), or None.
+// Returns (fraction, point, normal, fixture, category_bits), or None for a miss.
 py::object py_ray_cast(World& world, double from_x, double from_y, double to_x, double to_y,
                        std::int64_t mask) {
   const b2Vec2 from = checked_vector(from_x, from_y, "start");

@@ -12,15 +12,15 @@ py::object to_python(const StepReport& report) {
 }
 
 WorldClass bind_world(py::module_& module) {
-  WorldClass world(module, "World", "A Box2D world without gravity; owns all that is in it.");
+  WorldClass world(module, "World", "A Box2D world without gravity; owns all objects in it.");
   world.def(py::init<>());
-  world.def("close", &World::close, "Frees everything; all ids are stale from then on.");
+  world.def("close", &World::close, "Destroys all objects; all ids become stale.");
   world.def_property_readonly("closed", &World::closed);
   world.def(
       "step",
       [](World& self, double dt, int velocity_iterations, int position_iterations) {
-        // Safe without the GIL: the world is held for this thread, and the step touches no Python
-        // object as there is no hook.
+        // Safe without the GIL: the world is in exclusive use by this thread, and without a hook
+        // the step accesses no Python object.
         World::ExclusiveUse use(self, World::kStepping);
         return to_python(without_gil(
             use, [&] { return self.step(dt, velocity_iterations, position_iterations, nullptr); }));

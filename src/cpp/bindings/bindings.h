@@ -1,5 +1,5 @@
-// The parts of the extension. Python knows one class of the engine, `_core.World`, and ids;
-// flatland.physics makes handles of them. Engine code never includes this file.
+// The parts of the extension module. It exposes the class `_core.World`, whose methods take ids;
+// flatland.physics wraps the ids in handles. Engine code does not include this file.
 #pragma once
 
 #include <pybind11/pybind11.h>
@@ -23,8 +23,9 @@ void bind_raycast(WorldClass& world);
 void bind_overlap(WorldClass& world);
 void bind_map_edges(pybind11::module_& module);
 
-// Calls work() without the GIL, for as long as the world is held. The use, begun with the GIL, ends
-// before the GIL is asked for again, however work() ends: somebody may wait for the use with it.
+// Calls work() without the GIL while the world is in use. The use, which starts with the GIL held,
+// ends before the GIL is acquired again, even if work() throws: another thread that holds the GIL
+// may be waiting for the end of the use.
 template <typename Use, typename Work>
 auto without_gil(Use& use, Work&& work) {
   const pybind11::gil_scoped_release unlocked;
@@ -38,7 +39,7 @@ auto without_gil(Use& use, Work&& work) {
 // None for an empty report, else the ids of limited and of invalid bodies.
 pybind11::object to_python(const StepReport& report);
 
-// Bits as Python has them: any int, refused with a clear text beyond 16 bits.
+// Converts a Python int to 16 bits; throws a ValueError that names `what` if it is out of range.
 std::uint16_t checked_bits(std::int64_t bits, const char* what);
 
 }  // namespace flatland

@@ -1,7 +1,7 @@
 #include "bindings/bindings.h"
 
 PYBIND11_MODULE(_core, module) {
-  module.doc() = "Box2D behind ids; for flatland.physics only.";
+  module.doc() = "Box2D objects by id; used only by flatland.physics.";
   flatland::bind_errors();
   flatland::WorldClass world = flatland::bind_world(module);
   flatland::bind_bodies(world);

@@ -6,7 +6,7 @@
 namespace flatland {
 namespace {
 
-// Corners that are looked at together, as the bytes of one machine word.
+// Number of corners that are processed together, as the bytes of one machine word.
 constexpr std::size_t kWordSize = sizeof(std::uint64_t);
 
 std::uint64_t load_word(const std::uint8_t* bytes) {
@@ -15,8 +15,8 @@ std::uint64_t load_word(const std::uint8_t* bytes) {
   return word;
 }
 
-// One row of the bitmap as zeros and ones. The pixel left of corner x is at [x], the one right of
-// it at [x + 1]; what lies beyond either end of the row is on.
+// One row of the bitmap as zeros and ones. The pixel to the left of corner x has the index x, the
+// one to the right x + 1. Pixels beyond both ends of the row are on.
 class PaddedRow {
  public:
   explicit PaddedRow(std::size_t cols) : bytes_(cols + 2 + kWordSize, 1), cols_(cols) {}
@@ -34,16 +34,16 @@ class PaddedRow {
   std::size_t cols_;
 };
 
-// A corner that is more than a point on a straight piece of boundary. Three of the four pixels
-// around it are equal, or (`crossing`) only the diagonal ones are.
+// A corner at which the boundary turns: three of the four adjacent pixels are equal, or, if
+// `crossing`, only the diagonally adjacent ones.
 struct Turn {
   std::int32_t x;
   std::int32_t line;  // counted downwards from the top edge
   bool crossing;
-  bool upper_left, lower_right;  // state of two of the pixels
+  bool upper_left, lower_right;  // whether these pixels are on
 };
 
-// Calls visit(Turn) for every turn, line by line from the top, each line from the left.
+// Calls visit(Turn) for each turn, line by line from the top, from left to right.
 template <typename Visit>
 void for_each_turn(const Bitmap& bitmap, Visit&& visit) {
   const std::size_t cols = bitmap.cols;
@@ -61,7 +61,7 @@ void for_each_turn(const Bitmap& bitmap, Visit&& visit) {
       const std::uint64_t flip_above = load_word(a + first) ^ load_word(a + first + 1);
       const std::uint64_t flip_below = load_word(b + first) ^ load_word(b + first + 1);
       const std::uint64_t flip_left = load_word(a + first) ^ load_word(b + first);
-      // Nearly all words of a real map have no turn.
+      // Almost all words of a typical map have no turn.
       if (((flip_above ^ flip_below) | (flip_above & flip_below & flip_left)) == 0) continue;
       for (std::size_t x = first; x < first + kWordSize; ++x) {
         const bool odd = (a[x] ^ a[x + 1] ^ b[x] ^ b[x + 1]) != 0;
@@ -85,7 +85,7 @@ std::vector<BoundaryEdge> boundary_edges(const Bitmap& bitmap, double resolution
   const auto rows = static_cast<std::int32_t>(bitmap.rows);
   constexpr std::int32_t kNone = -1;
 
-  // At an odd corner exactly one horizontal and one vertical run starts or ends.
+  // At a turn without crossing, exactly one horizontal and one vertical run starts or ends.
   std::vector<BoundaryEdge> edges;
   std::vector<std::int32_t> column_start(bitmap.cols + 1, kNone);
   std::int32_t row_start = kNone;
@@ -112,19 +112,19 @@ std::vector<BoundaryEdge> boundary_edges(const Bitmap& bitmap, double resolution
 
 namespace {
 
-// Index of a corner of a loop; a corner where two loops meet has two.
+// Index of a corner of a loop; a crossing has two nodes.
 using Node = std::int64_t;
 constexpr Node kNoNode = -1;
 
-// Corners of the loops, each with the other end of its horizontal and its vertical side.
+// The corners of all loops, each with the other ends of its horizontal and its vertical side.
 struct LoopGraph {
   std::vector<PixelCorner> corners;
   std::vector<Node> along_row;
   std::vector<Node> along_column;
   std::vector<bool> lower_right_on;
 
-  // Adds a corner. An open side (the node where it starts) ends there; where there is none the
-  // corner opens one.
+  // Adds a corner, which ends the open side in each direction, or starts one if no side is open. An
+  // open side is represented by the node at which it starts.
   void add(PixelCorner corner, bool lower_right, Node& open_in_row, Node& open_in_column) {
     const auto node = static_cast<Node>(corners.size());
     corners.push_back(corner);
@@ -157,12 +157,12 @@ LoopGraph connect_corners(const Bitmap& bitmap) {
     if (!turn.crossing) {
       graph.add(corner, turn.lower_right, open_row, open_column);
     } else if (turn.upper_left) {
-      // The upper left pixel's sides end here, then the lower right one's start.
+      // The sides of the upper left pixel end here; those of the lower right pixel start here.
       graph.add(corner, turn.lower_right, open_row, open_column);
       graph.add(corner, turn.lower_right, open_row, open_column);
     } else {
-      // The upper right pixel has the side to the right and the one from above, the lower left
-      // pixel those from the left and to below.
+      // The upper right pixel has the sides to the right and from above, the lower left pixel those
+      // from the left and downwards.
       Node new_row = kNoNode;
       Node new_column = kNoNode;
       graph.add(corner, turn.lower_right, new_row, open_column);
@@ -185,8 +185,8 @@ BoundaryLoops boundary_loops(const Bitmap& bitmap) {
   for (std::size_t first = 0; first < count; ++first) {
     if (visited[first]) continue;
     loops.starts.push_back(static_cast<std::int64_t>(loops.points.size()));
-    // The first corner of a loop is an upper left one: its sides lead right and down. The pixel
-    // between them decides which way round keeps on pixels to the left.
+    // The sides of the first corner of a loop lead to the right and downwards. The pixel between
+    // them determines the orientation with on pixels to the left.
     bool horizontal = !graph.lower_right_on[first];
     std::size_t node = first;
     do {

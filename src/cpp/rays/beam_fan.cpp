@@ -7,7 +7,7 @@
 namespace flatland {
 namespace {
 
-// simd::diamond_angle for one direction, bit by bit.
+// Scalar version of simd::diamond_angle with bit-identical results.
 float diamond_angle(float x, float y) {
   const float q = y / (std::abs(x) + std::abs(y));
   if (x < 0.0F) return 2.0F - q;
@@ -21,14 +21,14 @@ BeamFan::BeamFan(const float* ends, std::size_t count) : ends_(ends, ends + 2 * 
   for (std::size_t i = 0; i < count; ++i) {
     const float x = ends[2 * i];
     const float y = ends[2 * i + 1];
-    if (!(x * x + y * y > 0.0F)) continue;  // as Box2D measures it
+    if (!(x * x + y * y > 0.0F)) continue;  // the test of b2World::RayCast
     angles[i] = diamond_angle(x, y);
     order_.push_back(static_cast<std::uint32_t>(i));
   }
   const auto angle_less = [&](std::uint32_t a, std::uint32_t b) { return angles[a] < angles[b]; };
   std::stable_sort(order_.begin(), order_.end(), angle_less);
 
-  // So that as many may be read or written from any ray on.
+  // Vectors that start at any ray can be loaded and stored completely.
   const std::size_t padded = order_.size() + kPadding;
   x_.assign(padded, 0.0F);
   y_.assign(padded, 0.0F);
@@ -40,12 +40,12 @@ BeamFan::BeamFan(const float* ends, std::size_t count) : ends_(ends, ends + 2 * 
   }
   if (!order_.empty()) {
     const auto end = length_.begin() + static_cast<std::ptrdiff_t>(order_.size());
-    shortest_ = *std::min_element(length_.begin(), end);
-    longest_ = *std::max_element(length_.begin(), end);
+    min_length_ = *std::min_element(length_.begin(), end);
+    max_length_ = *std::max_element(length_.begin(), end);
   }
 
-  constexpr int kMostCellBits = 16;
-  while (cell_bits_ < kMostCellBits && static_cast<std::size_t>(cells()) < 2 * order_.size()) {
+  constexpr int kMaxCellBits = 16;
+  while (cell_bits_ < kMaxCellBits && static_cast<std::size_t>(cells()) < 2 * order_.size()) {
     ++cell_bits_;
   }
   first_.resize(static_cast<std::size_t>(cells()));
@@ -59,7 +59,7 @@ BeamFan::BeamFan(const float* ends, std::size_t count) : ends_(ends, ends + 2 * 
   }
 }
 
-bool BeamFan::has_ends(const float* ends, std::size_t count) const {
+bool BeamFan::matches(const float* ends, std::size_t count) const {
   return ends_.size() == 2 * count &&
          (count == 0 || std::memcmp(ends_.data(), ends, 2 * count * sizeof(float)) == 0);
 }
@@ -67,11 +67,11 @@ bool BeamFan::has_ends(const float* ends, std::size_t count) const {
 std::shared_ptr<const BeamFan> FanCache::get(const float* ends, std::size_t count) {
   const std::lock_guard<std::mutex> lock(mutex_);
   const auto known = std::find_if(fans_.begin(), fans_.end(),
-                                  [&](const auto& fan) { return fan->has_ends(ends, count); });
+                                  [&](const auto& fan) { return fan->matches(ends, count); });
   if (known != fans_.end()) {
     std::rotate(fans_.begin(), known, known + 1);
   } else {
-    if (fans_.size() == kMostFans) fans_.pop_back();
+    if (fans_.size() == kMaxFans) fans_.pop_back();
     fans_.insert(fans_.begin(), std::make_shared<const BeamFan>(ends, count));
   }
   return fans_.front();

@@ -1,4 +1,4 @@
-// The directions of a scan, sorted once and used for many scans.
+// Sorted ray directions, shared by all scans of a rangefinder.
 #pragma once
 
 #include <cstddef>
@@ -9,31 +9,33 @@
 
 namespace flatland {
 
-// Rays from the origin of a sensor to points in its frame, in order of their diamond angle (see
-// simd.h), with a table that finds the rays between two angles. Never changes.
+// Rays from the origin of a rangefinder to points in its frame, sorted by diamond angle (see
+// simd.h), with a lookup table for the rays between two angles. Immutable.
 class BeamFan {
  public:
-  // So many rays of no length come behind the others.
+  // Number of rays of zero length appended to the sorted arrays.
   static constexpr std::size_t kPadding = 7;
 
   BeamFan(const float* ends, std::size_t count);
 
-  bool has_ends(const float* ends, std::size_t count) const;
+  // Whether the fan was made from these end points.
+  bool matches(const float* ends, std::size_t count) const;
 
-  // Rays that have a length; the sorted arrays have `padded_count` entries.
+  // Number of rays of non-zero length; the sorted arrays have `padded_count` entries.
   std::size_t count() const { return order_.size(); }
   std::size_t padded_count() const { return x_.size(); }
   const float* x() const { return x_.data(); }
   const float* y() const { return y_.data(); }
   const float* length() const { return length_.data(); }
-  // Index of each sorted ray among those given.
+  // For each sorted ray, its index in the array of end points.
   const std::vector<std::uint32_t>& order() const { return order_; }
 
-  float shortest() const { return shortest_; }
-  float longest() const { return longest_; }
+  float min_length() const { return min_length_; }
+  float max_length() const { return max_length_; }
 
-  // The circle is cut into a power of two of cells. first_in(cell) is the first ray that is not
-  // before the cell; cells and rays go on counting beyond the full circle in both directions.
+  // The full circle is divided into cells; their number is a power of two. first_in(cell) is the
+  // first ray at or after the start of a cell. The numbers of cells and rays continue beyond the
+  // full circle in both directions.
   int cells() const { return 1 << cell_bits_; }
   std::int32_t first_in(std::int32_t cell) const {
     const std::int32_t turns = cell >> cell_bits_;
@@ -47,20 +49,20 @@ class BeamFan {
   std::vector<float> x_, y_, length_;
   std::vector<std::int32_t> first_;
   int cell_bits_ = 8;
-  float shortest_ = 0.0F;
-  float longest_ = 0.0F;
+  float min_length_ = 0.0F;
+  float max_length_ = 0.0F;
 };
 
-// The fans that were used last, so that a laser pays for sorting once. For use by many threads.
+// The most recently used fans, so that the rays of a laser are sorted only once. Thread-safe.
 class FanCache {
  public:
   std::shared_ptr<const BeamFan> get(const float* ends, std::size_t count);
 
  private:
-  static constexpr std::size_t kMostFans = 16;
+  static constexpr std::size_t kMaxFans = 16;
 
   std::mutex mutex_;
-  std::vector<std::shared_ptr<const BeamFan>> fans_;  // the latest first
+  std::vector<std::shared_ptr<const BeamFan>> fans_;  // most recently used first
 };
 
 }  // namespace flatland

@@ -18,42 +18,44 @@ using simd::kWidth;
 
 namespace {
 
-static_assert(BeamFan::kPadding + 1 == kWidth, "a vector may begin at any ray");
+static_assert(BeamFan::kPadding + 1 == kWidth, "a vector can start at any ray");
 
-// Rays by their number in the fan, which goes on beyond the full circle in both directions.
+// A half-open range of ray numbers, which continue beyond the full circle in both directions.
 struct Interval {
   std::int32_t begin, end;
 };
 
-// Something that waits to be drawn: a node or leaf of a tree.
-struct Pending {
+// A node or leaf that remains to be drawn.
+struct StackEntry {
   float distance;
   Interval rays;
   std::uint32_t child;
 };
 
-// Eight intervals at a time, and how near their contents can be.
+// Rays that may hit each of eight objects, and lower bounds of the distances of the objects.
 struct Candidates {
   std::int32_t begin[kWidth], end[kWidth];
   float distance[kWidth];
 };
 
-// A box nearer than this part of its size is taken to be all around the sensor.
-constexpr float kTouching = 1e-3F;
-// By how much rounding can make the distance of a box too large; and by how much Box2D's formula
-// for circles, which takes the root of a difference of large numbers, may report too small a one.
+// A box is assumed to surround the origin of the rays if its distance is at most this fraction of
+// its size. Also the margin [diamond angle] by which an object must span less than a half circle.
+constexpr float kNearTolerance = 1e-3F;
+// Factors that turn computed distances into lower bounds: the first one covers the rounding of the
+// distance of a box, the second one the error of the formula of Box2D for circles, which takes the
+// square root of a difference of large numbers.
 constexpr float kBoxRounding = 1.0F - 1e-5F;
 constexpr float kCircleRounding = 1.0F - 1e-3F;
 
 }  // namespace
 
-// The inner loops. All are inlined into the functions below, which exist once for each
+// The inner loops. All of them are inlined into functions that are compiled once for each
 // instruction set.
 struct DepthScanKernel {
   DepthScan& scan;
   const BeamFan& fan = scan.fan_;
-  // Position of the sensor in the frame of what is drawn, rotation from there to the sensor's
-  // frame, and by how far a diamond angle may be off.
+  // Origin of the rays in the current frame, rotation from the current frame to the frame of the
+  // fan, and bound of the error of a diamond angle.
   b2Vec2 origin;
   float cos_to_sensor, sin_to_sensor;
   float margin;
@@ -66,11 +68,11 @@ struct DepthScanKernel {
                                sin_to_sensor * x + cos_to_sensor * y);
   }
 
-  // Rays between two angles, all rays where `is_all`.
+  // Finds the rays between two angles, or all rays where `is_all`.
   FLATLAND_INLINE void find_rays(Floats low, Floats high, Ints is_all, Candidates& out) const {
     const float cells_per_unit = static_cast<float>(fan.cells()) / 4.0F;
-    // NaN comes from corners at the sensor itself; those lanes are `is_all`.
-    const Floats zero = simd::all(0.0F);
+    // An angle is NaN if a point coincides with the origin; `is_all` is set in these lanes.
+    const Floats zero = simd::broadcast(0.0F);
     std::int32_t first[kWidth], last[kWidth], all[kWidth];
     simd::store(first, simd::floor(is_all ? zero : (low - margin) * cells_per_unit));
     simd::store(last, simd::floor(is_all ? zero : (high + margin) * cells_per_unit));
@@ -81,20 +83,21 @@ struct DepthScanKernel {
     }
   }
 
-  // Rays that eight boxes cover, and the distance of the boxes.
-  FLATLAND_INLINE void look_at(const float* min_x, const float* min_y, const float* max_x,
-                               const float* max_y, Candidates& out) const {
+  // Finds the rays covered by eight boxes, and the distances of the boxes.
+  FLATLAND_INLINE void find_boxes(const float* min_x, const float* min_y, const float* max_x,
+                                  const float* max_y, Candidates& out) const {
     const Floats x0 = simd::load(min_x) - origin.x;
     const Floats x1 = simd::load(max_x) - origin.x;
     const Floats y0 = simd::load(min_y) - origin.y;
     const Floats y1 = simd::load(max_y) - origin.y;
-    const Floats zero = simd::all(0.0F);
-    const Floats away_x = simd::max(simd::max(x0, -x1), zero);
-    const Floats away_y = simd::max(simd::max(y0, -y1), zero);
-    const Floats distance = simd::sqrt(away_x * away_x + away_y * away_y);
+    const Floats zero = simd::broadcast(0.0F);
+    const Floats outside_x = simd::max(simd::max(x0, -x1), zero);
+    const Floats outside_y = simd::max(simd::max(y0, -y1), zero);
+    const Floats distance = simd::sqrt(outside_x * outside_x + outside_y * outside_y);
     const Floats size = (x1 - x0) + (y1 - y0);
 
-    // Of the corners only the two at which the box ends to the right and to the left matter.
+    // The silhouette of a box consists of two of its corners, its rightmost and its leftmost one
+    // when viewed from the origin.
     const Ints is_right = x0 > 0.0F, is_left = x1 < 0.0F;
     const Ints is_above = y0 > 0.0F, is_below = y1 < 0.0F;
     const Floats near_x = is_right ? x0 : x1;
@@ -105,19 +108,19 @@ struct DepthScanKernel {
     const Floats high_y = is_right ? y1 : (is_left ? y0 : near_y);
     const Floats from = angle_in_sensor(low_x, low_y);
     const Floats turn = simd::wrap_difference(angle_in_sensor(high_x, high_y) - from);
-    const Ints is_near = distance <= kTouching * size;
-    // Written so that NaN counts as all around.
-    const Ints is_beside = simd::abs(turn) <= 2.0F - kTouching;
-    find_rays(from + simd::min(turn, zero), from + simd::max(turn, zero), is_near | ~is_beside,
+    const Ints is_near = distance <= kNearTolerance * size;
+    // False for NaN.
+    const Ints is_partial = simd::abs(turn) <= 2.0F - kNearTolerance;
+    find_rays(from + simd::min(turn, zero), from + simd::max(turn, zero), is_near | ~is_partial,
               out);
     simd::store(out.distance, distance * kBoxRounding);
   }
 
-  // Calls visit(ray) for every eighth of these rays, such that it and the seven after it hold them
-  // all; there is always room for so many. It stops when visit returns true, and returns whether
-  // it did.
+  // Calls visit(ray, count) for consecutive groups of eight rays that together contain the
+  // interval, until visit returns true. `ray` is the first ray of a group and `count` the number of
+  // rays from there to the end of the interval. Returns whether a call returned true.
   template <typename Visit>
-  FLATLAND_INLINE bool any_rays(Interval rays, Visit&& visit) const {
+  FLATLAND_INLINE bool any_of(Interval rays, Visit&& visit) const {
     const std::int32_t count = ray_count();
     if (rays.end - rays.begin >= count) {
       rays = {0, count};
@@ -138,15 +141,15 @@ struct DepthScanKernel {
     return rays.end > count && visit_run(0, rays.end - count);
   }
 
-  // Whether something at a distance can be seen by one of these rays.
+  // Whether one of the rays reaches a distance.
   FLATLAND_INLINE bool is_visible(Interval rays, float distance) const {
-    return any_rays(rays, [&](std::size_t ray, std::int32_t left) {
-      return simd::any((simd::load(&scan.reach_[ray]) >= distance) & simd::first_places(left));
+    return any_of(rays, [&](std::size_t ray, std::int32_t count_left) {
+      return simd::any((simd::load(&scan.reach_[ray]) >= distance) & simd::first_lanes(count_left));
     });
   }
 
-  // Keeps the nearer hits of eight rays. Written so that NaN is no hit.
-  FLATLAND_INLINE void keep_hits(std::size_t ray, Floats fraction, Ints is_hit) const {
+  // Records the hits of eight rays that are nearer than their previous ones; NaN is a miss.
+  FLATLAND_INLINE void record_hits(std::size_t ray, Floats fraction, Ints is_hit) const {
     const Floats before = simd::load(&scan.fractions_[ray]);
     is_hit &= (fraction >= 0.0F) & (fraction < before);
     const Floats after = is_hit ? fraction : before;
@@ -156,7 +159,7 @@ struct DepthScanKernel {
 
   FLATLAND_INLINE void draw_edge(b2Vec2 a, b2Vec2 b, b2Vec2 normal, float numerator,
                                  Interval rays) const {
-    any_rays(rays, [&](std::size_t ray, std::int32_t) {
+    any_of(rays, [&](std::size_t ray, std::int32_t) {
       const Floats d_x = simd::load(&scan.d_x_[ray]);
       const Floats d_y = simd::load(&scan.d_y_[ray]);
       const Floats side_a = d_x * a.y - d_y * a.x;
@@ -164,7 +167,7 @@ struct DepthScanKernel {
       const Ints is_crossed =
           (simd::min(side_a, side_b) <= 0.0F) & (simd::max(side_a, side_b) >= 0.0F);
       const Floats denominator = normal.x * d_x + normal.y * d_y;
-      keep_hits(ray, numerator / denominator, is_crossed & (denominator != 0.0F));
+      record_hits(ray, numerator / denominator, is_crossed & (denominator != 0.0F));
       return false;
     });
   }
@@ -177,42 +180,42 @@ struct DepthScanKernel {
     const Floats numerator = simd::load(leaf.normal_x) * a_x + simd::load(leaf.normal_y) * a_y;
     const Floats from = angle_in_sensor(a_x, a_y);
     const Floats turn = simd::wrap_difference(angle_in_sensor(b_x, b_y) - from);
-    const Floats zero = simd::all(0.0F);
-    const Ints is_beside = simd::abs(turn) < 2.0F - kTouching;
+    const Floats zero = simd::broadcast(0.0F);
+    const Ints is_partial = simd::abs(turn) < 2.0F - kNearTolerance;
     Candidates rays;
-    find_rays(from + simd::min(turn, zero), from + simd::max(turn, zero), ~is_beside, rays);
+    find_rays(from + simd::min(turn, zero), from + simd::max(turn, zero), ~is_partial, rays);
     for (std::uint32_t i = 0; i < leaf.count; ++i) {
-      if (!masks.pass(leaf.category_bits[i]) && !masks.pass(leaf.twin_bits[i])) continue;
+      if (!masks.pass(leaf.category_bits[i]) && !masks.pass(leaf.coincident_bits[i])) continue;
       draw_edge({a_x[i], a_y[i]}, {b_x[i], b_y[i]}, {leaf.normal_x[i], leaf.normal_y[i]},
                 numerator[i], {rays.begin[i], rays.end[i]});
     }
   }
 
   FLATLAND_INLINE void draw_tree(const EdgeTree& tree) const {
-    Pending stack[EdgeTree::kMaxDepth * EdgeTree::kFanOut];
-    std::size_t waiting = 0;
-    stack[waiting++] = {0.0F, {0, ray_count()}, 0};
-    while (waiting > 0) {
-      const Pending next = stack[--waiting];
+    StackEntry stack[EdgeTree::kMaxDepth * EdgeTree::kFanOut];
+    std::size_t size = 0;
+    stack[size++] = {0.0F, {0, ray_count()}, 0};
+    while (size > 0) {
+      const StackEntry next = stack[--size];
       if (!is_visible(next.rays, next.distance)) continue;
       if ((next.child & EdgeTree::kLeafBit) != 0) {
         draw_leaf(tree.leaves()[next.child & ~EdgeTree::kLeafBit]);
         continue;
       }
       const EdgeTree::Node& node = tree.nodes()[next.child];
-      Candidates seen;
-      look_at(node.min_x, node.min_y, node.max_x, node.max_y, seen);
-      const std::size_t first = waiting;
+      Candidates candidates;
+      find_boxes(node.min_x, node.min_y, node.max_x, node.max_y, candidates);
+      const std::size_t first = size;
       for (std::uint32_t i = 0; i < node.count; ++i) {
-        const Interval rays{seen.begin[i], seen.end[i]};
-        const float distance = seen.distance[i];
+        const Interval rays{candidates.begin[i], candidates.end[i]};
+        const float distance = candidates.distance[i];
         if (!masks.pass(node.category_bits[i]) || !is_visible(rays, distance)) continue;
-        // The nearest comes to lie on top.
-        std::size_t place = waiting++;
-        for (; place > first && stack[place - 1].distance < distance; --place) {
-          stack[place] = stack[place - 1];
+        // Insertion sort, with the nearest entry on top of the stack.
+        std::size_t top = size++;
+        for (; top > first && stack[top - 1].distance < distance; --top) {
+          stack[top] = stack[top - 1];
         }
-        stack[place] = {distance, rays, node.child[i]};
+        stack[top] = {distance, rays, node.child[i]};
       }
     }
   }
@@ -222,15 +225,15 @@ struct DepthScanKernel {
     const b2Vec2 position = body.p + b2Mul(body.q, circle.m_p);
     const b2Vec2 s = scan.pose_.p - position;
     const float b = b2Dot(s, s) - circle.m_radius * circle.m_radius;
-    any_rays(rays, [&](std::size_t ray, std::int32_t) {
+    any_of(rays, [&](std::size_t ray, std::int32_t) {
       const Floats r_x = simd::load(&scan.end_x_[ray]) - scan.pose_.p.x;
       const Floats r_y = simd::load(&scan.end_y_[ray]) - scan.pose_.p.y;
       const Floats c = s.x * r_x + s.y * r_y;
       const Floats rr = r_x * r_x + r_y * r_y;
       const Floats sigma = c * c - rr * b;
-      const Floats root = simd::sqrt(simd::max(sigma, simd::all(0.0F)));
+      const Floats root = simd::sqrt(simd::max(sigma, simd::broadcast(0.0F)));
       const Floats a = -(c + root);
-      keep_hits(ray, a / rr, (sigma >= 0.0F) & (rr >= b2_epsilon) & (a <= rr));
+      record_hits(ray, a / rr, (sigma >= 0.0F) & (rr >= b2_epsilon) & (a <= rr));
       return false;
     });
   }
@@ -238,13 +241,13 @@ struct DepthScanKernel {
   FLATLAND_INLINE void draw_polygon(const b2PolygonShape& polygon, const b2Transform& body,
                                     Interval rays) const {
     const b2Vec2 p1 = b2MulT(body.q, scan.pose_.p - body.p);
-    any_rays(rays, [&](std::size_t ray, std::int32_t) {
+    any_of(rays, [&](std::size_t ray, std::int32_t) {
       const Floats world_x = simd::load(&scan.end_x_[ray]) - body.p.x;
       const Floats world_y = simd::load(&scan.end_y_[ray]) - body.p.y;
       const Floats d_x = (body.q.c * world_x + body.q.s * world_y) - p1.x;
       const Floats d_y = (-body.q.s * world_x + body.q.c * world_y) - p1.y;
-      Floats lower = simd::all(0.0F);
-      Floats upper = simd::all(1.0F);
+      Floats lower = simd::broadcast(0.0F);
+      Floats upper = simd::broadcast(1.0F);
       Ints enters = {};
       Ints misses = {};
       for (int32 i = 0; i < polygon.m_count; ++i) {
@@ -252,14 +255,14 @@ struct DepthScanKernel {
         const float numerator = b2Dot(normal, polygon.m_vertices[i] - p1);
         const Floats denominator = normal.x * d_x + normal.y * d_y;
         const Floats fraction = numerator / denominator;
-        const Ints goes_in = (denominator < 0.0F) & (numerator < lower * denominator);
-        const Ints goes_out = (denominator > 0.0F) & (numerator < upper * denominator);
+        const Ints is_entry = (denominator < 0.0F) & (numerator < lower * denominator);
+        const Ints is_exit = (denominator > 0.0F) & (numerator < upper * denominator);
         if (numerator < 0.0F) misses |= denominator == 0.0F;
-        lower = goes_in ? fraction : lower;
-        upper = goes_out ? fraction : upper;
-        enters |= goes_in;
+        lower = is_entry ? fraction : lower;
+        upper = is_exit ? fraction : upper;
+        enters |= is_entry;
       }
-      keep_hits(ray, lower, enters & ~misses & (lower <= upper));
+      record_hits(ray, lower, enters & ~misses & (lower <= upper));
       return false;
     });
   }
@@ -270,19 +273,20 @@ struct DepthScanKernel {
       float min_x[kWidth], min_y[kWidth], max_x[kWidth], max_y[kWidth];
       for (std::size_t i = 0; i < kWidth; ++i) {
         const b2AABB& box = solids[first + std::min(i, count - 1)]->GetAABB(0);
-        // Box2D's own boxes are that much larger, and so are the errors of its circles.
+        // Enlarged like the boxes in the broad phase of Box2D. Due to rounding, Box2D can report a
+        // hit on a circle outside of the box of the circle.
         min_x[i] = box.lowerBound.x - b2_aabbExtension;
         min_y[i] = box.lowerBound.y - b2_aabbExtension;
         max_x[i] = box.upperBound.x + b2_aabbExtension;
         max_y[i] = box.upperBound.y + b2_aabbExtension;
       }
-      Candidates seen;
-      look_at(min_x, min_y, max_x, max_y, seen);
+      Candidates candidates;
+      find_boxes(min_x, min_y, max_x, max_y, candidates);
       for (std::size_t i = 0; i < count; ++i) {
         const b2Fixture& fixture = *solids[first + i];
-        const Interval rays{seen.begin[i], seen.end[i]};
+        const Interval rays{candidates.begin[i], candidates.end[i]};
         if (fixture.IsSensor() || !masks.pass(fixture.GetFilterData().categoryBits) ||
-            !is_visible(rays, seen.distance[i] * kCircleRounding)) {
+            !is_visible(rays, candidates.distance[i] * kCircleRounding)) {
           continue;
         }
         const b2Transform& body = fixture.GetBody()->GetTransform();
@@ -298,11 +302,11 @@ struct DepthScanKernel {
 
 namespace {
 
-// The same code for two instruction sets; which one fits is asked once.
-void draw_tree_anywhere(const DepthScanKernel& kernel, const EdgeTree& tree) {
+// The same code is compiled for two instruction sets, one of which is selected at run time.
+void draw_tree_baseline(const DepthScanKernel& kernel, const EdgeTree& tree) {
   kernel.draw_tree(tree);
 }
-void draw_solids_anywhere(const DepthScanKernel& kernel, const std::vector<b2Fixture*>& solids) {
+void draw_solids_baseline(const DepthScanKernel& kernel, const std::vector<b2Fixture*>& solids) {
   kernel.draw_solids(solids);
 }
 
@@ -320,22 +324,23 @@ bool has_avx2() {
   return has;
 }
 #else
-constexpr auto& draw_tree_avx2 = draw_tree_anywhere;
-constexpr auto& draw_solids_avx2 = draw_solids_anywhere;
+constexpr auto& draw_tree_avx2 = draw_tree_baseline;
+constexpr auto& draw_solids_avx2 = draw_solids_baseline;
 constexpr bool has_avx2() { return false; }
 #endif
 
-// By how far the diamond angle of a ray in the frame of a body may differ from that in the fan:
-// rounding of coordinates matters most for short rays far from the world's origin.
+// Bound of the difference between the diamond angle of a ray in the frame of a body and in the fan.
+// It is caused by the rounding of coordinates and is largest for short rays far from the origin of
+// the world.
 float angle_margin(const BeamFan& fan, const b2Transform& pose, const b2Transform& body) {
-  const float coordinates = pose.p.Length() + body.p.Length() + fan.longest();
-  constexpr float kAllAround = 4.0F;
-  return std::min(4e-6F + 1e-6F * coordinates / fan.shortest(), kAllAround);
+  const float coordinates = pose.p.Length() + body.p.Length() + fan.max_length();
+  constexpr float kFullCircle = 4.0F;
+  return std::min(4e-6F + 1e-6F * coordinates / fan.min_length(), kFullCircle);
 }
 
 }  // namespace
 
-float DepthScan::free_fraction() { return std::nextafter(1.0F, 2.0F); }
+float DepthScan::miss_fraction() { return std::nextafter(1.0F, 2.0F); }
 
 DepthScan::DepthScan(const BeamFan& fan, const b2Transform& pose)
     : fan_(fan),
@@ -344,7 +349,7 @@ DepthScan::DepthScan(const BeamFan& fan, const b2Transform& pose)
       end_y_(fan.padded_count()),
       d_x_(fan.padded_count()),
       d_y_(fan.padded_count()),
-      fractions_(fan.padded_count(), free_fraction()),
+      fractions_(fan.padded_count(), miss_fraction()),
       reach_(fan.length(), fan.length() + fan.padded_count()) {
   for (std::size_t i = 0; i < end_x_.size(); ++i) {
     end_x_[i] = (pose.q.c * fan.x()[i] - pose.q.s * fan.y()[i]) + pose.p.x;
@@ -375,7 +380,7 @@ void DepthScan::draw(const EdgeTree& tree, const b2Transform& body, RayMasks mas
   const b2Rot to_sensor = b2MulT(pose_.q, body.q);
   const DepthScanKernel kernel{
       *this, fan_, origin, to_sensor.c, to_sensor.s, angle_margin(fan_, pose_, body), masks};
-  (has_avx2() ? draw_tree_avx2 : draw_tree_anywhere)(kernel, tree);
+  (has_avx2() ? draw_tree_avx2 : draw_tree_baseline)(kernel, tree);
 }
 
 void DepthScan::draw(const std::vector<b2Fixture*>& solids, RayMasks masks) {
@@ -384,7 +389,7 @@ void DepthScan::draw(const std::vector<b2Fixture*>& solids, RayMasks masks) {
   world.SetIdentity();
   const DepthScanKernel kernel{
       *this, fan_, pose_.p, pose_.q.c, -pose_.q.s, angle_margin(fan_, pose_, world), masks};
-  (has_avx2() ? draw_solids_avx2 : draw_solids_anywhere)(kernel, solids);
+  (has_avx2() ? draw_solids_avx2 : draw_solids_baseline)(kernel, solids);
 }
 
 }  // namespace flatland

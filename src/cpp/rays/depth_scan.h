@@ -1,11 +1,11 @@
-// One scan as a one-dimensional depth buffer: how far each ray of a fan gets.
+// A scan as a one-dimensional depth buffer that holds the range of each ray of a fan.
 //
-// Edges and shapes are drawn into the rays they cover, near ones first as far as that is known;
-// boxes that lie behind what all their rays have met already are left out. Each ray is tested
-// against a candidate with the arithmetic of Box2D's own RayCast functions, in the same order and
-// in single precision, so that the fractions are those of b2World::RayCast. Only where two edges
-// meet is it stricter: a ray crosses an edge when the edge's ends lie on different sides of it,
-// which no rounding can make false for both of two edges with a common end.
+// Edges and shapes are drawn into the rays that they cover, approximately from front to back. Boxes
+// that are hidden behind the hits of all of their rays are culled. The intersection of a ray with a
+// shape is computed with the arithmetic of the RayCast functions of Box2D, in the same order and in
+// single precision, so that the fractions equal those of b2World::RayCast. The only difference is
+// the test for edges: a ray crosses an edge if the end points of the edge lie on different sides of
+// the ray. Despite rounding, a ray therefore cannot pass between two edges with a common end point.
 #pragma once
 
 #include <box2d/b2_collision.h>
@@ -20,34 +20,34 @@
 
 namespace flatland {
 
-// What a fixture's categories must have for a ray to be stopped by it: one of each mask.
+// A fixture stops a ray if it has a category in each of the two masks.
 struct RayMasks {
-  std::uint16_t mask;
-  std::uint16_t also;
+  std::uint16_t stop;
+  std::uint16_t select;
 
   bool pass(std::uint16_t category_bits) const {
-    return (category_bits & mask) != 0 && (category_bits & also) != 0;
+    return (category_bits & stop) != 0 && (category_bits & select) != 0;
   }
 };
 
 class DepthScan {
  public:
-  // The fan must outlive the scan. Rays start out free over their whole length.
+  // The fan must outlive the scan. Initially all rays are misses.
   DepthScan(const BeamFan& fan, const b2Transform& pose);
 
-  // Shortens the rays, by index as sorted: nothing at or beyond a fraction is seen from now on.
+  // Limits the rays, in sorted order: hits at or beyond these fractions are ignored from now on.
   void set_limits(const std::vector<float>& fractions);
 
-  // Draws the edges of a tree whose frame is at `body`.
+  // Draws the edges of a tree; `body` is the pose of the frame of the tree.
   void draw(const EdgeTree& tree, const b2Transform& body, RayMasks masks);
   // Draws circles and polygons.
   void draw(const std::vector<b2Fixture*>& solids, RayMasks masks);
 
-  // Fraction that each ray got, by index as sorted; above 1 for a ray that met nothing.
+  // Fraction of the nearest hit of each ray, in sorted order; greater than 1 for a miss.
   const std::vector<float>& fractions() const { return fractions_; }
 
-  // A fraction that is not seen any more as a hit, the initial one.
-  static float free_fraction();
+  // The smallest fraction of a miss, which is the initial fraction of each ray.
+  static float miss_fraction();
 
  private:
   friend struct DepthScanKernel;
@@ -55,12 +55,12 @@ class DepthScan {
   const BeamFan& fan_;
   b2Transform pose_;
   std::vector<float> end_x_, end_y_;  // world frame
-  // Direction and length of each ray in the frame of what is drawn now.
+  // Vector along each ray in the current frame, that of the tree drawn last.
   std::vector<float> d_x_, d_y_;
   b2Transform frame_;
   bool has_frame_ = false;
   std::vector<float> fractions_;
-  std::vector<float> reach_;  // how far each ray still gets [m]
+  std::vector<float> reach_;  // distance to the nearest hit so far, or length of the ray [m]
 };
 
 }  // namespace flatland

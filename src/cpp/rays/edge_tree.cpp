@@ -38,15 +38,16 @@ Box box_of(const TreeEdge& edge) {
 }
 
 std::uint16_t all_bits(const TreeEdge& edge) {
-  return static_cast<std::uint16_t>(edge.category_bits | edge.twin_bits);
+  return static_cast<std::uint16_t>(edge.category_bits | edge.coincident_bits);
 }
 
-float middle_x(const TreeEdge& edge) { return 0.5F * (edge.x1 + edge.x2); }
-float middle_y(const TreeEdge& edge) { return 0.5F * (edge.y1 + edge.y2); }
+float center_x(const TreeEdge& edge) { return 0.5F * (edge.x1 + edge.x2); }
+float center_y(const TreeEdge& edge) { return 0.5F * (edge.y1 + edge.y2); }
 
 }  // namespace
 
-// Splits the edges top down, where the sum of the boxes' perimeters times their leaves is least.
+// Builds the tree top-down. Splits minimize the sum over both sides of the perimeter of the
+// bounding box times the number of leaves.
 class EdgeTreeBuilder {
  public:
   EdgeTreeBuilder(EdgeTree& tree, std::vector<TreeEdge>& edges) : tree_(tree), edges_(edges) {}
@@ -66,7 +67,7 @@ class EdgeTreeBuilder {
   std::uint32_t make_node(Range range, std::size_t depth) {
     const auto index = static_cast<std::uint32_t>(tree_.nodes_.size());
     tree_.nodes_.emplace_back();
-    // The largest part is split until there are 8, or nothing is left to split.
+    // Split the largest part until there are 8 parts or all of them fit into leaves.
     std::vector<Range> parts{range};
     while (parts.size() < kFanOut) {
       const auto largest =
@@ -84,7 +85,7 @@ class EdgeTreeBuilder {
           parts[i].size() <= kFanOut ? make_leaf(parts[i]) : make_node(parts[i], depth + 1);
       set_child(tree_.nodes_[index], i, parts[i], child);
     }
-    fill_up(tree_.nodes_[index], parts.size());
+    pad(tree_.nodes_[index], parts.size());
     return index;
   }
 
@@ -103,8 +104,8 @@ class EdgeTreeBuilder {
     node.category_bits[i] = bits;
   }
 
-  // Unused places repeat the last child, so that no number in them surprises anyone.
-  static void fill_up(Node& node, std::size_t count) {
+  // Unused entries repeat the last child, so that all numbers are initialized and finite.
+  static void pad(Node& node, std::size_t count) {
     node.count = static_cast<std::uint32_t>(count);
     for (std::size_t i = count; i < kFanOut; ++i) {
       node.min_x[i] = node.min_x[count - 1];
@@ -130,23 +131,23 @@ class EdgeTreeBuilder {
       leaf.normal_x[i] = normal.x;
       leaf.normal_y[i] = normal.y;
       leaf.category_bits[i] = edge.category_bits;
-      leaf.twin_bits[i] = edge.twin_bits;
+      leaf.coincident_bits[i] = edge.coincident_bits;
     }
     tree_.leaves_.push_back(leaf);
     return EdgeTree::kLeafBit | static_cast<std::uint32_t>(tree_.leaves_.size() - 1);
   }
 
-  // Puts the edges of a range in order of two sides; returns where the second begins.
+  // Partitions the edges of a range; returns the index of the first edge on the second side.
   std::size_t split(Range range) {
-    Box middles;
+    Box centers;
     for (std::size_t e = range.begin; e < range.end; ++e) {
-      middles.add(middle_x(edges_[e]), middle_y(edges_[e]));
+      centers.add(center_x(edges_[e]), center_y(edges_[e]));
     }
-    const Cut along_x = best_cut(range, &middle_x, middles.min_x, middles.max_x);
-    const Cut along_y = best_cut(range, &middle_y, middles.min_y, middles.max_y);
-    const Cut& cut = along_x.cost <= along_y.cost ? along_x : along_y;
-    if (!std::isfinite(cut.cost)) return halve(range);
-    const auto is_first = [&](const TreeEdge& edge) { return cut.bin_of(edge) < cut.bin; };
+    const Split split_x = best_split(range, &center_x, centers.min_x, centers.max_x);
+    const Split split_y = best_split(range, &center_y, centers.min_y, centers.max_y);
+    const Split& best = split_x.cost <= split_y.cost ? split_x : split_y;
+    if (!std::isfinite(best.cost)) return halve(range);
+    const auto is_first = [&](const TreeEdge& edge) { return best.bin_of(edge) < best.bin; };
     const auto at = [&](std::size_t i) { return edges_.begin() + static_cast<std::ptrdiff_t>(i); };
     return static_cast<std::size_t>(std::partition(at(range.begin), at(range.end), is_first) -
                                     edges_.begin());
@@ -154,14 +155,14 @@ class EdgeTreeBuilder {
 
   static std::size_t halve(Range range) { return range.begin + range.size() / 2; }
 
-  struct Cut {
-    float (*middle)(const TreeEdge&);
+  struct Split {
+    float (*center)(const TreeEdge&);
     float origin, bins_per_metre;
-    std::size_t bin = 0;  // the first one on the second side
+    std::size_t bin = 0;  // first bin of the second side
     float cost = std::numeric_limits<float>::infinity();
 
     std::size_t bin_of(const TreeEdge& edge) const {
-      const float bin_number = (middle(edge) - origin) * bins_per_metre;
+      const float bin_number = (center(edge) - origin) * bins_per_metre;
       return std::min(static_cast<std::size_t>(std::max(bin_number, 0.0F)), kBins - 1);
     }
   };
@@ -170,17 +171,18 @@ class EdgeTreeBuilder {
     return static_cast<float>((edges + kFanOut - 1) / kFanOut);
   }
 
-  Cut best_cut(Range range, float (*middle)(const TreeEdge&), float lowest, float highest) const {
-    Cut cut{middle, lowest, static_cast<float>(kBins) / (highest - lowest)};
-    if (!(highest > lowest) || !std::isfinite(cut.bins_per_metre)) return cut;
+  Split best_split(Range range, float (*center)(const TreeEdge&), float lowest,
+                   float highest) const {
+    Split best{center, lowest, static_cast<float>(kBins) / (highest - lowest)};
+    if (!(highest > lowest) || !std::isfinite(best.bins_per_metre)) return best;
     std::array<Box, kBins> boxes;
     std::array<std::size_t, kBins> counts{};
     for (std::size_t e = range.begin; e < range.end; ++e) {
-      const std::size_t bin = cut.bin_of(edges_[e]);
+      const std::size_t bin = best.bin_of(edges_[e]);
       boxes[bin].add(box_of(edges_[e]));
       ++counts[bin];
     }
-    std::array<float, kBins> cost_after{};  // of the bins from one on
+    std::array<float, kBins> cost_after{};  // cost of this bin and all later ones
     Box box;
     std::size_t count = 0;
     for (std::size_t bin = kBins; bin-- > 1;) {
@@ -195,19 +197,19 @@ class EdgeTreeBuilder {
       count += counts[bin - 1];
       if (count == 0 || count == range.size()) continue;
       const float cost = box.half_perimeter() * leaves_in(count) + cost_after[bin];
-      if (cost < cut.cost) {
-        cut.cost = cost;
-        cut.bin = bin;
+      if (cost < best.cost) {
+        best.cost = cost;
+        best.bin = bin;
       }
     }
-    return cut;
+    return best;
   }
 
   EdgeTree& tree_;
   std::vector<TreeEdge>& edges_;
 };
 
-void merge_twins(std::vector<TreeEdge>& edges) {
+void merge_coincident(std::vector<TreeEdge>& edges) {
   const auto place = [](const TreeEdge& e) { return std::tie(e.x1, e.y1, e.x2, e.y2); };
   const auto is_before = [&](const TreeEdge& a, const TreeEdge& b) {
     return std::tuple_cat(place(a), std::tie(a.category_bits)) <
@@ -218,11 +220,12 @@ void merge_twins(std::vector<TreeEdge>& edges) {
   for (const TreeEdge& edge : edges) {
     TreeEdge* last = kept == 0 ? nullptr : &edges[kept - 1];
     if (last != nullptr && place(*last) == place(edge)) {
-      if (edge.category_bits == last->category_bits || edge.category_bits == last->twin_bits) {
+      if (edge.category_bits == last->category_bits ||
+          edge.category_bits == last->coincident_bits) {
         continue;
       }
-      if (last->twin_bits == 0) {
-        last->twin_bits = edge.category_bits;
+      if (last->coincident_bits == 0) {
+        last->coincident_bits = edge.category_bits;
         continue;
       }
     }

@@ -1,5 +1,5 @@
-// The edges of bodies with a common frame in a bounding-volume tree for ray casting. Built once,
-// never changed, in that frame and without any pointer into a world, so that worlds may share it.
+// A bounding-volume tree for casting rays at the edges of bodies with a common frame. It is
+// immutable and holds coordinates in that frame, without references to a world.
 #pragma once
 
 #include <array>
@@ -13,39 +13,39 @@ namespace flatland {
 struct TreeEdge {
   float x1, y1, x2, y2;
   std::uint16_t category_bits;
-  std::uint16_t twin_bits = 0;  // categories of another edge at the same place, 0 for none
+  std::uint16_t coincident_bits = 0;  // categories of a coincident edge; 0 without one
 };
 
-// Drops edges that repeat another one in place and category, and puts two that differ in their
-// category only into one: two layers of a world often share most of their walls.
-void merge_twins(std::vector<TreeEdge>& edges);
+// Removes duplicate edges, and merges two coincident edges with different categories into one,
+// because layers of a world often have most of their walls in common.
+void merge_coincident(std::vector<TreeEdge>& edges);
 
 class EdgeTree {
  public:
   static constexpr std::size_t kFanOut = 8;
-  // No path from the root is longer.
+  // Maximum length of a path from the root.
   static constexpr std::size_t kMaxDepth = 48;
 
-  // Up to 8 edges; unused places repeat the last edge.
+  // Up to 8 edges; unused entries repeat the last edge.
   struct Leaf {
     float x1[kFanOut], y1[kFanOut], x2[kFanOut], y2[kFanOut];
-    float normal_x[kFanOut], normal_y[kFanOut];  // as Box2D computes it
-    std::uint16_t category_bits[kFanOut], twin_bits[kFanOut];
+    float normal_x[kFanOut], normal_y[kFanOut];  // computed like in Box2D
+    std::uint16_t category_bits[kFanOut], coincident_bits[kFanOut];
     std::uint32_t count;
   };
 
-  // Up to 8 children, each a node or a leaf, with the boxes around them.
+  // Up to 8 children, each a node or a leaf, with their bounding boxes.
   struct Node {
     float min_x[kFanOut], min_y[kFanOut], max_x[kFanOut], max_y[kFanOut];
-    std::uint32_t child[kFanOut];          // kLeafBit + index of a leaf, or index of a node
-    std::uint16_t category_bits[kFanOut];  // of all edges below
+    std::uint32_t child[kFanOut];          // index of a node, or kLeafBit + index of a leaf
+    std::uint16_t category_bits[kFanOut];  // of all edges in the subtree
     std::uint32_t count = 0;
   };
   static constexpr std::uint32_t kLeafBit = 0x80000000U;
 
   explicit EdgeTree(std::vector<TreeEdge> edges);
 
-  // The root is the first node; a tree of no edges has none.
+  // The first node is the root; a tree without edges has no nodes.
   const std::vector<Node>& nodes() const { return nodes_; }
   const std::vector<Leaf>& leaves() const { return leaves_; }
   std::uint16_t category_bits() const { return category_bits_; }

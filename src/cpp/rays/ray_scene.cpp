@@ -22,7 +22,7 @@ void collect_edges(const b2Body& body, std::vector<TreeEdge>& edges) {
 std::shared_ptr<const EdgeTree> make_tree(const std::vector<const b2Body*>& bodies) {
   std::vector<TreeEdge> edges;
   for (const b2Body* body : bodies) collect_edges(*body, edges);
-  if (bodies.size() > 1) merge_twins(edges);
+  if (bodies.size() > 1) merge_coincident(edges);
   return std::make_shared<const EdgeTree>(std::move(edges));
 }
 
@@ -48,8 +48,8 @@ void RayScene::add(b2Fixture* fixture) {
 void RayScene::remove_body(const b2Body* body) {
   const auto has_solid = [body](const b2Fixture* fixture) { return fixture->GetBody() == body; };
   solids_.erase(std::remove_if(solids_.begin(), solids_.end(), has_solid), solids_.end());
-  const auto is_it = [body](const EdgeBody& candidate) { return candidate.body == body; };
-  const auto rest = std::remove_if(edge_bodies_.begin(), edge_bodies_.end(), is_it);
+  const auto is_same_body = [body](const EdgeBody& candidate) { return candidate.body == body; };
+  const auto rest = std::remove_if(edge_bodies_.begin(), edge_bodies_.end(), is_same_body);
   if (rest != edge_bodies_.end()) is_grouped_ = false;
   edge_bodies_.erase(rest, edge_bodies_.end());
 }
@@ -79,7 +79,7 @@ void RayScene::find_moved_bodies() {
     if (group.bodies.size() == 1) continue;
     for (const b2Body* body : group.bodies) {
       if (is_same(body->GetTransform(), group.pose)) continue;
-      find(body)->is_alone = true;
+      find(body)->is_separate = true;
       is_grouped_ = false;
     }
   }
@@ -87,39 +87,39 @@ void RayScene::find_moved_bodies() {
 
 void RayScene::make_groups() {
   std::vector<EdgeGroup> groups;
-  for (const EdgeBody& each : edge_bodies_) {
-    const b2Transform& pose = each.body->GetTransform();
-    const bool may_join = each.body->GetType() == b2_staticBody && !each.is_alone;
-    const auto takes_it = [&](const EdgeGroup& group) {
+  for (const EdgeBody& edge_body : edge_bodies_) {
+    const b2Transform& pose = edge_body.body->GetTransform();
+    const bool may_join = edge_body.body->GetType() == b2_staticBody && !edge_body.is_separate;
+    const auto is_joinable = [&](const EdgeGroup& group) {
       const b2Body* first = group.bodies.front();
       return is_same(group.pose, pose) && first->GetType() == b2_staticBody &&
-             !find(first)->is_alone;
+             !find(first)->is_separate;
     };
     const auto group =
-        may_join ? std::find_if(groups.begin(), groups.end(), takes_it) : groups.end();
+        may_join ? std::find_if(groups.begin(), groups.end(), is_joinable) : groups.end();
     if (group == groups.end()) {
-      groups.push_back({{each.body}, pose, nullptr});
+      groups.push_back({{edge_body.body}, pose, nullptr});
     } else {
-      group->bodies.push_back(each.body);
+      group->bodies.push_back(edge_body.body);
     }
   }
   for (EdgeGroup& group : groups) {
-    const auto is_it = [&](const EdgeGroup& old) { return old.bodies == group.bodies; };
-    const auto known = std::find_if(edge_groups_.begin(), edge_groups_.end(), is_it);
-    const bool is_old = known != edge_groups_.end() &&
-                        std::none_of(group.bodies.begin(), group.bodies.end(),
-                                     [this](const b2Body* body) { return is_changed(body); });
-    group.tree = is_old ? known->tree : make_tree(group.bodies);
+    const auto has_same_bodies = [&](const EdgeGroup& old) { return old.bodies == group.bodies; };
+    const auto known = std::find_if(edge_groups_.begin(), edge_groups_.end(), has_same_bodies);
+    const bool is_unchanged = known != edge_groups_.end() &&
+                              std::none_of(group.bodies.begin(), group.bodies.end(),
+                                           [this](const b2Body* body) { return is_changed(body); });
+    group.tree = is_unchanged ? known->tree : make_tree(group.bodies);
   }
   edge_groups_ = std::move(groups);
-  for (EdgeBody& each : edge_bodies_) each.is_changed = false;
+  for (EdgeBody& edge_body : edge_bodies_) edge_body.is_changed = false;
   is_grouped_ = true;
 }
 
 bool RayScene::is_changed(const b2Body* body) { return find(body)->is_changed; }
 
 RayScene::EdgeBody* RayScene::find(const b2Body* body) {
-  // The latest first: many edges are added to one body after another.
+  // Backwards, because edges are usually added to the most recent body.
   const auto known = std::find_if(edge_bodies_.rbegin(), edge_bodies_.rend(),
                                   [body](const EdgeBody& e) { return e.body == body; });
   return known == edge_bodies_.rend() ? nullptr : &*known;

@@ -1,4 +1,4 @@
-// What rays can hit.
+// The fixtures of a world, organized for ray casting.
 #pragma once
 
 #include <box2d/b2_math.h>
@@ -16,26 +16,27 @@ class b2Fixture;
 
 namespace flatland {
 
-// The edges of bodies that stand at the same place, in one tree: the layers of a world with one
-// origin, or a single body.
+// The edges of one body, or of several static bodies with the same pose, such as layers with the
+// same origin, in one tree.
 struct EdgeGroup {
   std::vector<const b2Body*> bodies;
-  b2Transform pose;  // of all of them, when the group was made
+  b2Transform pose;  // of all bodies at the creation of the group
   std::shared_ptr<const EdgeTree> tree;
 };
 
-// The fixtures of a world, sorted for ray casting: edges in trees that are made when they are first
-// needed, circles and polygons one by one. Moving a body alone costs nothing here.
+// The fixtures of a world for ray casting. Edges are stored in trees that are created on demand,
+// circles and polygons in a list. Moving a body causes no rebuild unless it shares its
+// tree with other bodies.
 class RayScene {
  public:
   void add(b2Fixture* fixture);
-  // Takes all fixtures of a body out.
+  // Removes all fixtures of a body.
   void remove_body(const b2Body* body);
-  // The category or sensor flag of a fixture is another.
+  // To be called after a change of the category bits or the sensor flag of a fixture.
   void changed(const b2Fixture* fixture);
   void clear();
 
-  // For casting, by several threads at once; nothing above may be called meanwhile.
+  // The members below are thread-safe with respect to each other, but not to those above.
   const std::vector<b2Fixture*>& solids() const { return solids_; }
   const std::vector<EdgeGroup>& edge_groups();
   FanCache& fans() { return fans_; }
@@ -43,13 +44,13 @@ class RayScene {
  private:
   struct EdgeBody {
     const b2Body* body;
-    bool is_changed;  // since it was put into a group
-    bool is_alone;    // left a group by moving away, and joins none again
+    bool is_changed;   // since its group was created
+    bool is_separate;  // was moved out of a group and joins no group again
   };
 
   EdgeBody* find(const b2Body* body);
   bool is_changed(const b2Body* body);
-  // Marks the bodies that are not any more where their group is.
+  // Marks the bodies that were moved since their group was created.
   void find_moved_bodies();
   void make_groups();
 

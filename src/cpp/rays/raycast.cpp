@@ -15,16 +15,17 @@
 namespace flatland {
 namespace {
 
+constexpr std::uint16_t kAnyCategory = 0xFFFF;
+
 class ClosestHit final : public b2RayCastCallback {
  public:
-  // Fixtures must have a category in each of the two masks.
-  ClosestHit(std::uint16_t mask, std::uint16_t also) : mask_(mask), also_(also) {}
+  explicit ClosestHit(RayMasks masks) : masks_(masks) {}
 
   float ReportFixture(b2Fixture* fixture, const b2Vec2& point, const b2Vec2& normal,
                       float fraction) override {
-    constexpr float kGoOn = -1.0F;
+    constexpr float kIgnore = -1.0F;
     const std::uint16_t category = fixture->GetFilterData().categoryBits;
-    if (fixture->IsSensor() || (category & mask_) == 0 || (category & also_) == 0) return kGoOn;
+    if (fixture->IsSensor() || !masks_.pass(category)) return kIgnore;
     hit = RayHit{fraction, point, normal, id_of(fixture), category};
     return fraction;
   }
@@ -32,15 +33,14 @@ class ClosestHit final : public b2RayCastCallback {
   std::optional<RayHit> hit;
 
  private:
-  std::uint16_t mask_;
-  std::uint16_t also_;
+  RayMasks masks_;
 };
 
 std::optional<RayHit> closest(const b2World& world, const b2Vec2& from, const b2Vec2& to,
-                              std::uint16_t mask, std::uint16_t also) {
-  // Box2D aborts on rays of no length, also where only the square of the length vanishes.
+                              RayMasks masks) {
+  // Box2D aborts if the squared length of a ray is zero, which can be due to underflow.
   if (!((to - from).LengthSquared() > 0.0F)) return std::nullopt;
-  ClosestHit callback(mask, also);
+  ClosestHit callback(masks);
   world.RayCast(&callback, from, to);
   return callback.hit;
 }
@@ -49,7 +49,7 @@ std::optional<RayHit> closest(const b2World& world, const b2Vec2& from, const b2
 
 std::optional<RayHit> ray_cast(const b2World& world, const b2Vec2& from, const b2Vec2& to,
                                std::uint16_t mask) {
-  return closest(world, from, to, mask, 0xFFFF);
+  return closest(world, from, to, {mask, kAnyCategory});
 }
 
 void cast_rays_reference(const b2World& world, const ScanRequest& request,
@@ -58,15 +58,15 @@ void cast_rays_reference(const b2World& world, const ScanRequest& request,
   for (std::size_t i = 0; i < request.count; ++i) {
     const b2Vec2 end(request.ends[2 * i], request.ends[2 * i + 1]);
     const b2Vec2 to = b2Mul(request.pose, end);
-    const auto hit = closest(world, from, to, request.mask, 0xFFFF);
+    const auto hit = closest(world, from, to, {request.mask, kAnyCategory});
     result.fractions[i] = hit ? hit->fraction : std::numeric_limits<float>::quiet_NaN();
     result.reflect[i] = false;
     if (!hit || request.reflect_mask == 0) continue;
-    const auto mirror = closest(world, from, to, request.mask, request.reflect_mask);
-    if (!mirror) continue;
+    const auto reflection = closest(world, from, to, {request.mask, request.reflect_mask});
+    if (!reflection) continue;
     const float length = end.Length();
-    const float farther = (mirror->fraction - hit->fraction) * length;
-    result.reflect[i] = farther <= kSameDistance + kSameFraction * length;
+    const float gap = (reflection->fraction - hit->fraction) * length;
+    result.reflect[i] = gap <= kDistanceTolerance + kFractionTolerance * length;
   }
 }
 
@@ -79,20 +79,20 @@ void draw_all(DepthScan& scan, RayScene& scene, RayMasks masks) {
   scan.draw(scene.solids(), masks);
 }
 
-// Casts again, only for what reflects, and only as far as the nearest hits.
+// Casts the rays again at the reflecting fixtures only, up to the distances of the nearest hits.
 void find_reflections(const DepthScan& hits, const BeamFan& fan, RayScene& scene,
                       const ScanRequest& request, bool* reflect) {
   std::vector<float> limits(fan.padded_count(), -1.0F);
   for (std::size_t i = 0; i < fan.count(); ++i) {
     if (hits.fractions()[i] <= 1.0F) {
-      limits[i] = hits.fractions()[i] + kSameFraction + kSameDistance / fan.length()[i];
+      limits[i] = hits.fractions()[i] + kFractionTolerance + kDistanceTolerance / fan.length()[i];
     }
   }
-  DepthScan mirrors(fan, request.pose);
-  mirrors.set_limits(limits);
-  draw_all(mirrors, scene, {request.mask, request.reflect_mask});
+  DepthScan reflections(fan, request.pose);
+  reflections.set_limits(limits);
+  draw_all(reflections, scene, {request.mask, request.reflect_mask});
   for (std::size_t i = 0; i < fan.count(); ++i) {
-    reflect[fan.order()[i]] = mirrors.fractions()[i] < limits[i];
+    reflect[fan.order()[i]] = reflections.fractions()[i] < limits[i];
   }
 }
 
@@ -103,8 +103,7 @@ void cast_rays(RayScene& scene, const ScanRequest& request, const ScanResult& re
   std::fill_n(result.reflect, request.count, false);
   const std::shared_ptr<const BeamFan> fan = scene.fans().get(request.ends, request.count);
   DepthScan scan(*fan, request.pose);
-  constexpr std::uint16_t kAny = 0xFFFF;
-  draw_all(scan, scene, {request.mask, kAny});
+  draw_all(scan, scene, {request.mask, kAnyCategory});
   for (std::size_t i = 0; i < fan->count(); ++i) {
     if (scan.fractions()[i] <= 1.0F) result.fractions[fan->order()[i]] = scan.fractions()[i];
   }

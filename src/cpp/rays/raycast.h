@@ -1,4 +1,4 @@
-// Closest hits of single rays and of whole scans.
+// Nearest hits of single rays and of scans.
 #pragma once
 
 #include <box2d/b2_math.h>
@@ -15,7 +15,7 @@ namespace flatland {
 
 class RayScene;
 
-// Where a ray meets the nearest fixture, in the world frame.
+// The nearest hit of a ray, in the world frame.
 struct RayHit {
   float fraction;
   b2Vec2 point;
@@ -24,37 +24,38 @@ struct RayHit {
   std::uint16_t category_bits;
 };
 
-// Rays from the origin of a sensor to points in its frame.
+// Rays from the origin of a rangefinder to points in its frame.
 struct ScanRequest {
-  b2Transform pose;            // of the sensor, world frame
-  const float* ends;           // x and y of each end
-  std::size_t count;           // of rays
+  b2Transform pose;            // of the rangefinder, world frame
+  const float* ends;           // x and y of each end point
+  std::size_t count;           // number of rays
   std::uint16_t mask;          // categories that stop a ray
-  std::uint16_t reflect_mask;  // categories that reflect; 0: not asked for
+  std::uint16_t reflect_mask;  // categories that reflect; 0 to skip reflections
 };
 
-// `count` entries each. A fraction is NaN for a ray that hits nothing. `reflect` is not 0 where a
-// reflecting fixture that `mask` lets through is at the distance of the nearest hit.
+// Arrays of `count` entries. A fraction is NaN for a miss. `reflect` is true where a fixture with
+// categories in both masks is at the distance of the nearest hit.
 struct ScanResult {
   float* fractions;
   bool* reflect;
 };
 
-// How much farther than the nearest hit a fixture still is "at the same distance" [m], plus that
-// part of the ray's length: what rounding does to two fixtures with one face in common.
-inline constexpr float kSameDistance = 1e-4F;
-inline constexpr float kSameFraction = 1e-5F;
+// Two hits of a ray are at the same distance if they differ by at most kDistanceTolerance [m] plus
+// kFractionTolerance of the length of the ray. This covers the rounding for two fixtures with a
+// common face.
+inline constexpr float kDistanceTolerance = 1e-4F;
+inline constexpr float kFractionTolerance = 1e-5F;
 
-// Nearest fixture that is no sensor and has a category in the mask. A ray of no length hits
-// nothing.
+// The nearest fixture with a category in the mask that is not a sensor. A ray of zero length is a
+// miss.
 std::optional<RayHit> ray_cast(const b2World& world, const b2Vec2& from, const b2Vec2& to,
                                std::uint16_t mask);
 
-// The scan by one b2World::RayCast a ray: slow, the yardstick for `cast_rays`.
+// Performs a scan with b2World::RayCast; slow, the reference for tests of `cast_rays`.
 void cast_rays_reference(const b2World& world, const ScanRequest& request,
                          const ScanResult& result);
 
-// The scan by the fast way.
+// Performs a scan with a depth buffer; see depth_scan.h.
 void cast_rays(RayScene& scene, const ScanRequest& request, const ScanResult& result);
 
 }  // namespace flatland

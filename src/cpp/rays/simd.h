@@ -1,9 +1,9 @@
-// Eight floats at a time, by the compiler's vector types: one instruction with AVX, two with SSE2
-// or NEON. Without contraction to fused operations (see CMakeLists.txt), so that the numbers are
-// the same on every machine.
+// Operations on vectors of eight floats, with the vector extensions of the compiler: one
+// instruction with AVX, two with SSE2 or NEON. Contraction to fused operations is disabled (see
+// CMakeLists.txt), so the results are the same on all machines.
 //
-// All functions are inlined by force: their code then takes the instruction set of the function
-// that calls them, which is how one source serves several processors.
+// All functions are always inlined. They are then compiled for the instruction set of the calling
+// function, so the same source serves several instruction sets.
 #pragma once
 
 #include <cmath>
@@ -22,10 +22,10 @@ using Ints = std::int32_t __attribute__((vector_size(32), aligned(4), may_alias)
 FLATLAND_INLINE Floats load(const float* p) { return *reinterpret_cast<const Floats*>(p); }
 FLATLAND_INLINE void store(float* p, Floats v) { *reinterpret_cast<Floats*>(p) = v; }
 FLATLAND_INLINE void store(std::int32_t* p, Ints v) { *reinterpret_cast<Ints*>(p) = v; }
-FLATLAND_INLINE Floats all(float x) { return Floats{x, x, x, x, x, x, x, x}; }
+FLATLAND_INLINE Floats broadcast(float x) { return Floats{x, x, x, x, x, x, x, x}; }
 
-// Which places are among the first `count`.
-FLATLAND_INLINE Ints first_places(std::int32_t count) {
+// True in the first `count` lanes.
+FLATLAND_INLINE Ints first_lanes(std::int32_t count) {
   return Ints{0, 1, 2, 3, 4, 5, 6, 7} < count;
 }
 
@@ -33,35 +33,35 @@ FLATLAND_INLINE Floats min(Floats a, Floats b) { return a < b ? a : b; }
 FLATLAND_INLINE Floats max(Floats a, Floats b) { return a > b ? a : b; }
 FLATLAND_INLINE Floats abs(Floats a) { return a < 0.0F ? -a : a; }
 
-// Of numbers that are not negative.
+// Square roots of non-negative numbers.
 FLATLAND_INLINE Floats sqrt(Floats a) {
   Floats root;
   for (std::size_t i = 0; i < kWidth; ++i) root[i] = std::sqrt(a[i]);
   return root;
 }
 
-// Whether any is true.
+// Whether any lane is true.
 FLATLAND_INLINE bool any(Ints v) {
   using Longs = std::int64_t __attribute__((vector_size(32)));
   const auto pairs = reinterpret_cast<Longs>(v);
   return ((pairs[0] | pairs[1]) | (pairs[2] | pairs[3])) != 0;
 }
 
-// Greatest whole number that is not above each; of numbers that fit 31 bits.
+// Largest integers not greater than the numbers, which must be in the 32-bit range.
 FLATLAND_INLINE Ints floor(Floats a) {
-  const Ints cut = __builtin_convertvector(a, Ints);
-  return cut + (__builtin_convertvector(cut, Floats) > a);  // true is -1
+  const Ints truncated = __builtin_convertvector(a, Ints);
+  return truncated + (__builtin_convertvector(truncated, Floats) > a);  // true is -1
 }
 
-// A stand-in for the angle of (x, y) that needs no trigonometry: 0 to 4 over the full circle,
-// grows with the angle, and opposite directions differ by 2. NaN for (0, 0).
+// Diamond angle of (x, y): a monotonic function of the angle without trigonometry, from 0 to 4 over
+// the full circle. Opposite directions differ by 2. NaN for (0, 0).
 FLATLAND_INLINE Floats diamond_angle(Floats x, Floats y) {
   const Floats q = y / (abs(x) + abs(y));
   const Floats right = y < 0.0F ? q + 4.0F : q;
   return x < 0.0F ? 2.0F - q : right;
 }
 
-// The same angle difference within -2 to 2.
+// The equivalent angle difference in [-2, 2].
 FLATLAND_INLINE Floats wrap_difference(Floats d) {
   d = d > 2.0F ? d - 4.0F : d;
   return d < -2.0F ? d + 4.0F : d;

@@ -25,7 +25,7 @@ b2FixtureDef checked_definition(const b2Shape& shape, const FixtureOptions& opti
   return definition;
 }
 
-// What must happen after a body was moved or got another shape.
+// Wakes the bodies that are affected by a new pose or shape of a body.
 void wake(World& world, b2Body* body) {
   if (body->GetType() == b2_staticBody) {
     world.wake_neighbours(body);
@@ -43,17 +43,17 @@ Id create_fixture(World& world, Id body_id, const b2Shape& shape, const FixtureO
   return id;
 }
 
-// Box2D keeps fixtures in a list with the newest first.
+// Box2D stores fixtures and joints in lists with the newest first.
 template <typename Value>
 std::vector<Value> reversed(std::vector<Value> values) {
   std::reverse(values.begin(), values.end());
   return values;
 }
 
-// The largest change of velocity that a force may make in a second.
+// Checks that the change of velocity caused by a force in one second is in the valid range.
 void check_acceleration(float acceleration, const char* what) {
   if (!(std::abs(static_cast<double>(acceleration)) <= kMaxMagnitude)) {
-    throw std::invalid_argument(std::string(what) + " is too large for the body's mass");
+    throw std::invalid_argument(std::string(what) + " is too large for the mass of the body");
   }
 }
 
@@ -148,7 +148,7 @@ std::size_t create_edges(World& world, Id body_id, const float* edges, std::size
   const b2FixtureDef definition = checked_definition(shape, options);
   auto* body = const_cast<b2Body*>(world.read_body(body_id));
   world.reserve_fixtures(count);
-  const int32 waiting_before = waiting_fixtures(world.engine());
+  const int32 pending_before = pending_fixtures(world.engine());
   std::size_t made = 0;
   for (std::size_t i = 0; i < count; ++i) {
     if (!make_edge(edges + 4 * i, &shape)) continue;
@@ -157,7 +157,7 @@ std::size_t create_edges(World& world, Id body_id, const float* edges, std::size
   }
   constexpr std::size_t kManyEdges = 10000;
   if (made >= kManyEdges && body->GetType() == b2_staticBody) {
-    world.skip_static_fixtures(waiting_before);
+    world.skip_static_fixtures(pending_before);
   }
   if (made > 0) wake(world, body);
   return made;

@@ -1,5 +1,5 @@
-// What can be done with bodies and fixtures. All numbers are checked; see world.h for what is
-// thrown beyond std::invalid_argument.
+// Operations on bodies and fixtures. They throw std::invalid_argument if a number is invalid, and
+// the exceptions described in world.h.
 #pragma once
 
 #include <array>
@@ -10,7 +10,7 @@
 
 namespace flatland {
 
-// (x, y, theta) or (vx, vy, omega), world frame [m, rad, s].
+// A pose (x, y, theta) [m, rad] or a velocity (vx, vy, omega) [m/s, rad/s] in the world frame.
 using Triple = std::array<double, 3>;
 
 struct FixtureOptions {
@@ -26,10 +26,10 @@ Id create_body(World& world, b2BodyType type, const Triple& pose, double linear_
                double angular_damping);
 
 Triple pose_of(const World& world, Id body);
-// Wakes the body, or those near it when it is static.
+// Wakes the body, or the adjacent dynamic bodies if it is static.
 void set_pose(World& world, Id body, const Triple& pose);
 
-// Velocity of the body's origin, not of its centre of mass.
+// Velocity of the origin of the body, not of its center of mass.
 Triple velocity_of(const World& world, Id body);
 void set_velocity(World& world, Id body, const Triple& velocity);
 
@@ -40,20 +40,21 @@ Id create_circle(World& world, Id body, double x, double y, double radius,
                  const FixtureOptions& options);
 Id create_polygon(World& world, Id body, const std::vector<b2Vec2>& points,
                   const FixtureOptions& options);
-// Makes one fixture for each row (x1, y1, x2, y2) that is not too short to have a direction, and
-// returns how many. The caller holds the world exclusively.
+// Creates a fixture for each row (x1, y1, x2, y2) that is not shorter than kMinEdgeLength, and
+// returns the number of fixtures. The caller has exclusive use of the world.
 std::size_t create_edges(World& world, Id body, const float* edges, std::size_t count,
                          const FixtureOptions& options);
 
-// In order of creation.
+// Ids in order of creation.
 std::vector<Id> fixtures_of(const World& world, Id body);
 std::vector<Id> joints_of(const World& world, Id body);
-// Rows (x1, y1, x2, y2) of the edge fixtures, body frame.
+// Returns the edge fixtures as rows (x1, y1, x2, y2) in the body frame.
 std::vector<std::array<float, 4>> edges_of(const World& world, Id body);
 
-// Corners of a polygon (counter-clockwise) or ends of an edge, body frame; none for a circle.
+// Returns the corners of a polygon (counter-clockwise) or the end points of an edge in the body
+// frame; no points for a circle.
 std::vector<std::array<double, 2>> vertices_of(const b2Fixture& fixture);
-// Centre of a circle, centroid of a polygon, middle of an edge, body frame.
+// Returns the center of a circle, centroid of a polygon or midpoint of an edge in the body frame.
 b2Vec2 center_of(const b2Fixture& fixture);
 
 void set_sensor(World& world, Id fixture, bool is_sensor);

@@ -6,8 +6,8 @@
 namespace flatland {
 namespace {
 
-// Box2D 2.4 offers no other way to its list of fixtures that wait than its private members. The
-// language lets an explicit instantiation name them.
+// Box2D 2.4 has no public access to its list of pending fixtures. An explicit template
+// instantiation may name private members.
 template <typename Member, Member member>
 struct Expose {
   friend Member expose(Member) { return member; }
@@ -31,17 +31,17 @@ const b2BroadPhase& broad_phase_of(const b2World& world) {
 
 }  // namespace
 
-int32 waiting_fixtures(const b2World& world) { return broad_phase_of(world).*expose(kCount); }
+int32 pending_fixtures(const b2World& world) { return broad_phase_of(world).*expose(kCount); }
 
-void skip_static_fixtures(b2World& world, int32 waiting_before) {
+void skip_static_fixtures(b2World& world, int32 pending_before) {
   auto& broad_phase = const_cast<b2BroadPhase&>(broad_phase_of(world));
   int32& count = broad_phase.*expose(kCount);
-  const int32* waiting = broad_phase.*expose(kBuffer);
-  for (int32 i = waiting_before; i < count; ++i) {
-    if (waiting[i] != b2BroadPhase::e_nullProxy)
-      (broad_phase.*expose(kTree)).ClearMoved(waiting[i]);
+  const int32* pending = broad_phase.*expose(kBuffer);
+  for (int32 i = pending_before; i < count; ++i) {
+    if (pending[i] != b2BroadPhase::e_nullProxy)
+      (broad_phase.*expose(kTree)).ClearMoved(pending[i]);
   }
-  count = waiting_before;
+  count = pending_before;
   for (b2Body* body = world.GetBodyList(); body != nullptr; body = body->GetNext()) {
     if (body->GetType() != b2_dynamicBody) continue;
     for (b2Fixture* f = body->GetFixtureList(); f != nullptr; f = f->GetNext()) f->Refilter();

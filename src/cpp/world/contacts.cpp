@@ -10,9 +10,9 @@
 
 namespace flatland {
 
-static_assert(sizeof(uintptr_t) >= sizeof(Id), "ids are kept in Box2D's user data");
+static_assert(sizeof(uintptr_t) >= sizeof(Id), "ids must fit into the user data of Box2D");
 
-// Box2D 2.4 has user data only behind a reference to non-const.
+// In Box2D 2.4, user data can only be accessed through non-const objects.
 Id id_of(const b2Body* body) { return const_cast<b2Body*>(body)->GetUserData().pointer; }
 Id id_of(const b2Fixture* fixture) {
   return const_cast<b2Fixture*>(fixture)->GetUserData().pointer;
@@ -66,7 +66,7 @@ bool ContactRecorder::take_failure() { return std::exchange(failed_, false); }
 
 std::vector<ContactRow> ContactRecorder::touching(const b2World& world) const {
   std::vector<ContactRow> rows;
-  // Making a row only reads the contact; Box2D's list of contacts is not const-correct.
+  // make_row only reads the contact, but the accessors of b2Contact are not const-correct.
   auto* contact = const_cast<b2Contact*>(world.GetContactList());
   for (; contact != nullptr; contact = contact->GetNext()) {
     if (contact->IsTouching()) rows.push_back(make_row(contact, ContactKind::kTouching));

@@ -1,4 +1,4 @@
-// What happened between fixtures during a step, as plain rows.
+// Contacts and contact events as plain rows.
 #pragma once
 
 #include <box2d/b2_world_callbacks.h>
@@ -16,11 +16,11 @@ namespace flatland {
 
 enum class ContactKind : std::uint8_t { kBegin = 0, kEnd = 1, kPostSolve = 2, kTouching = 3 };
 
-// One contact at one moment, in the world frame. The normal points from A to B; it is zero where
-// there are no points, which is so for sensors and after the shapes came apart.
+// State of a contact at one moment, in the world frame. The normal points from A to B. Contacts of
+// sensors and of shapes that no longer touch have no points and a zero normal.
 struct ContactRow {
   Id fixture_a, fixture_b, body_a, body_b;
-  std::uint64_t contact_id;  // unique for as long as the two fixtures touch
+  std::uint64_t contact_id;  // the same for as long as the two fixtures touch
   float points[b2_maxManifoldPoints][2];
   float normal[2];
   float normal_impulses[b2_maxManifoldPoints];
@@ -30,28 +30,28 @@ struct ContactRow {
   bool is_sensor;
 };
 
-// Ids that a body or fixture carries in its user data.
+// Return the id stored in the user data of a body or fixture.
 Id id_of(const b2Body* body);
 Id id_of(const b2Fixture* fixture);
 
-// May change contacts that are about to be solved. Called inside b2World::Step, so it must not
-// throw, nor create, destroy or move anything.
+// Interface for changing contacts before they are solved. It is called within b2World::Step, so it
+// must not throw, nor create, destroy or move objects.
 class PreSolveHook {
  public:
   virtual ~PreSolveHook() = default;
-  // Whether this body's contacts are to be shown.
+  // Whether `pre_solve` is to be called for contacts of this body.
   virtual bool wants(Id body) const noexcept = 0;
   virtual void pre_solve(b2Contact* contact, const ContactRow& row,
                          const b2Manifold& old_manifold) noexcept = 0;
 };
 
-// Listens to Box2D. Never throws: an exception out of b2World::Step would leave the world locked
-// for ever. What could not be recorded for want of memory is reported by `take_failure`.
+// Contact listener that records contact events. It does not throw, because an exception out of
+// b2World::Step would leave the world locked; `take_failure` reports a lack of memory.
 class ContactRecorder final : public b2ContactListener {
  public:
-  // Rows are written only while this is set; contacts keep their ids all the time.
+  // Whether events are recorded. Contacts have ids even if they are not recorded.
   bool recording = false;
-  // Not owned; set for the length of a step.
+  // Not owned; set only during a step.
   PreSolveHook* hook = nullptr;
   StepGuard guard;
 
@@ -60,12 +60,12 @@ class ContactRecorder final : public b2ContactListener {
   void PreSolve(b2Contact* contact, const b2Manifold* old_manifold) override;
   void PostSolve(b2Contact* contact, const b2ContactImpulse* impulse) override;
 
-  // The rows since the last call, in order of time.
+  // Returns the events since the last call, in chronological order.
   std::vector<ContactRow> take_rows();
-  // True once after rows were lost.
+  // Returns whether events were lost since the last call.
   bool take_failure();
 
-  // All contacts that touch now.
+  // Returns the contacts of all fixtures that currently touch.
   std::vector<ContactRow> touching(const b2World& world) const;
 
  private:

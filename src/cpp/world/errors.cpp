@@ -6,10 +6,10 @@
 namespace flatland {
 namespace {
 
-// Written so that NaN is out of range.
+// False for NaN.
 bool in_range(double value) { return std::abs(value) <= kMaxMagnitude; }
 
-[[noreturn]] void refuse(double value, const std::string& what) {
+[[noreturn]] void throw_out_of_range(double value, const std::string& what) {
   throw std::invalid_argument(what + " must be finite and within +-" + to_text(kMaxMagnitude) +
                               ", got " + to_text(value));
 }
@@ -23,7 +23,7 @@ std::string to_text(double value) {
 }
 
 float checked_finite(double value, const std::string& what) {
-  if (!in_range(value)) refuse(value, what);
+  if (!in_range(value)) throw_out_of_range(value, what);
   return static_cast<float>(value);
 }
 
@@ -45,14 +45,16 @@ b2Vec2 checked_vector(double x, double y, const std::string& what) {
 void check_all_finite(const float* values, std::size_t count, std::size_t width,
                       const std::string& what) {
   constexpr float limit = static_cast<float>(kMaxMagnitude);
-  // One pass without branches, so that the compiler can vectorise it; the place is found later.
+  // The first pass has no branches, so that the compiler can vectorize it. The second one finds the
+  // index of the invalid element.
   bool all = true;
   for (std::size_t i = 0; i < count; ++i) all &= std::abs(values[i]) <= limit;
   if (all) return;
   for (std::size_t i = 0; i < count; ++i) {
     if (!in_range(static_cast<double>(values[i]))) {
-      refuse(static_cast<double>(values[i]),
-             what + "[" + std::to_string(i / width) + ", " + std::to_string(i % width) + "]");
+      throw_out_of_range(
+          static_cast<double>(values[i]),
+          what + "[" + std::to_string(i / width) + ", " + std::to_string(i % width) + "]");
     }
   }
 }

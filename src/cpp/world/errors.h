@@ -1,7 +1,8 @@
-// Exception types of the engine and the checks that stand before every call into Box2D.
+// Exception types of the engine, and checks of the arguments of Box2D functions.
 //
-// Debian's Box2D aborts the process on a bad argument, and its solver turns numbers beyond the
-// range of a float into NaN, on which it aborts a little later. So every number is checked here.
+// The Debian package of Box2D is built with assertions: an invalid argument aborts the process, and
+// so does a NaN that results from an overflow in the solver. All numbers are therefore checked
+// before they are passed to Box2D.
 #pragma once
 
 #include <box2d/b2_math.h>
@@ -11,36 +12,38 @@
 
 namespace flatland {
 
-// A request that the engine refuses.
+// A request that cannot be executed.
 class PhysicsError : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
 };
 
-// The object behind an id was destroyed, or its world was closed.
+// The object with the id was destroyed, or its world was closed.
 class StaleHandleError : public PhysicsError {
  public:
   using PhysicsError::PhysicsError;
 };
 
-// The world is stepping or busy otherwise.
+// The world is stepping or otherwise in use.
 class WorldLockedError : public PhysicsError {
  public:
   using PhysicsError::PhysicsError;
 };
 
-// Largest magnitude of any number given to the engine; squares and cubes of it fit a float.
+// Largest magnitude of numbers passed to the engine; its square and cube are in the range of a
+// float.
 inline constexpr double kMaxMagnitude = 1e9;
 
-// Shortest text that tells a number apart from others in an error.
+// Returns the number in up to 9 significant digits, for error messages.
 std::string to_text(double value);
 
-// Each returns its argument as a float, or throws std::invalid_argument that names `what`.
+// Return the argument as a float. Throw std::invalid_argument with the name `what` if it is
+// invalid.
 float checked_finite(double value, const std::string& what);
 float checked_not_negative(double value, const std::string& what);
 b2Vec2 checked_vector(double x, double y, const std::string& what);
 
-// The same for many floats at once, for which `what` is an array of `width` columns.
+// Checks `count` elements of an array named `what` with `width` columns.
 void check_all_finite(const float* values, std::size_t count, std::size_t width,
                       const std::string& what);
 

@@ -28,7 +28,7 @@ std::pair<float, float> checked_limits(const AngleLimits& limits) {
   const float lower = checked_finite(limits.first, "lower limit");
   const float upper = checked_finite(limits.second, "upper limit");
   if (lower > upper) {
-    throw std::invalid_argument("the lower limit must not be above the upper one, got (" +
+    throw std::invalid_argument("the lower limit must not be greater than the upper limit, got (" +
                                 to_text(limits.first) + ", " + to_text(limits.second) + ")");
   }
   return {lower, upper};
@@ -55,9 +55,10 @@ Id create_weld_joint(World& world, const JointBodies& bodies, double reference_a
   if (checked_frequency > 0.0F) {
     b2AngularStiffness(definition.stiffness, definition.damping, checked_frequency, checked_damping,
                        definition.bodyA, definition.bodyB);
-    constexpr float kMost = 1e30F;
-    if (!(definition.stiffness <= kMost && definition.damping <= kMost)) {
-      throw std::invalid_argument("frequency and damping make too stiff a spring for these bodies");
+    constexpr float kMax = 1e30F;
+    if (!(definition.stiffness <= kMax && definition.damping <= kMax)) {
+      throw std::invalid_argument(
+          "frequency and damping result in a spring that is too stiff for the bodies");
     }
   }
   return world.add_joint(definition, checked_frequency, checked_damping);
@@ -74,7 +75,7 @@ std::optional<AngleLimits> limits_of(const World& world, Id joint_id) {
 void set_limits(World& world, Id joint_id, const std::optional<AngleLimits>& limits) {
   b2Joint* joint = world.change_joint(joint_id);
   if (joint->GetType() != e_revoluteJoint) {
-    throw PhysicsError("only a revolute joint has limits, this is a weld joint");
+    throw PhysicsError("only revolute joints have limits, but the joint is a weld joint");
   }
   auto* revolute = static_cast<b2RevoluteJoint*>(joint);
   if (limits) {

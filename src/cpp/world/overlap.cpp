@@ -48,7 +48,7 @@ Hull hull_of(const b2Fixture& fixture) {
       std::copy_n(polygon->m_normals, hull.count, hull.normals);
       break;
     }
-    default:  // no other shape is ever made
+    default:  // no other shapes are created
       break;
   }
   return hull;
@@ -61,12 +61,12 @@ Hull moved(const Hull& hull, const b2Transform& pose) {
   return result;
 }
 
-// The greatest distance between the points of both along a normal of the first, negative when the
-// points of the second lie behind all of its sides.
+// Returns the maximum separation of the points of two hulls along the normals of the first one;
+// negative if no side of the first hull separates them.
 float separation_along_normals(const Hull& first, const Hull& second) {
   float greatest = -std::numeric_limits<float>::infinity();
   for (int32 i = 0; i < first.normal_count; ++i) {
-    // The i-th side begins at the i-th point, also for the two sides of an edge.
+    // Side i starts at point i; this also holds for the two sides of an edge.
     float least = std::numeric_limits<float>::infinity();
     for (int32 k = 0; k < second.count; ++k) {
       least = std::min(least, b2Dot(first.normals[i], second.points[k] - first.points[i]));
@@ -76,13 +76,14 @@ float separation_along_normals(const Hull& first, const Hull& second) {
   return greatest;
 }
 
-// Whether two hulls in one frame have less than `least_gap` between them. A negative gap is a
-// depth: the length of the shortest move that separates them.
+// Returns whether the distance of two hulls in the same frame is less than `least_gap`. A negative
+// distance is a penetration depth, the length of the shortest translation that separates the hulls.
 bool are_closer(const Hull& a, const Hull& b, float least_gap) {
   const float least = least_gap + a.radius + b.radius;
   const float separation = std::max(separation_along_normals(a, b), separation_along_normals(b, a));
-  if (separation >= least) return false;  // the distance is never less
-  // Exact where a polygon overlaps; otherwise corners may be farther apart.
+  if (separation >= least) return false;  // a lower bound of the distance
+  // The separation is exact if a polygon overlaps; otherwise the distance of corners can be
+  // greater.
   if (separation <= 0.0F && std::max(a.count, b.count) > 2) return true;
   b2DistanceInput input;
   input.proxyA.Set(a.points, a.count, 0.0F);
@@ -101,7 +102,7 @@ bool filters_match(const b2Filter& a, const b2Filter& b) {
   return (a.maskBits & b.categoryBits) != 0 && (a.categoryBits & b.maskBits) != 0;
 }
 
-// As b2Body::ShouldCollide, which is private.
+// Equivalent to b2Body::ShouldCollide, which is private.
 bool bodies_collide(const b2Body* probe, const b2Body& other) {
   if (probe == nullptr) return true;
   if (probe->GetType() != b2_dynamicBody && other.GetType() != b2_dynamicBody) return false;
@@ -111,7 +112,7 @@ bool bodies_collide(const b2Body* probe, const b2Body& other) {
   return true;
 }
 
-// Collects the bodies that a part of a probe overlaps, or stops at the first one.
+// Finds all bodies that a part of a probe overlaps, or only the first one.
 class FindOverlaps final : public b2QueryCallback {
  public:
   FindOverlaps(const Probe& probe, bool all) : probe_(probe), all_(all) {}
@@ -132,7 +133,7 @@ class FindOverlaps final : public b2QueryCallback {
 
   bool ReportFixture(b2Fixture* fixture) override {
     const b2Body* body = fixture->GetBody();
-    if (counts(*fixture) &&
+    if (is_relevant(*fixture) &&
         are_closer(hull_, moved(hull_of(*fixture), body->GetTransform()), probe_.least_gap)) {
       found.push_back(id_of(fixture->GetBody()));
       return all_;
@@ -143,16 +144,16 @@ class FindOverlaps final : public b2QueryCallback {
   std::vector<Id> found;
 
  private:
-  bool counts(const b2Fixture& fixture) const {
+  bool is_relevant(const b2Fixture& fixture) const {
     const b2Body* body = fixture.GetBody();
-    const auto has = [body](const std::vector<const b2Body*>& bodies) {
+    const auto contains = [body](const std::vector<const b2Body*>& bodies) {
       return std::binary_search(bodies.begin(), bodies.end(), body);
     };
-    // Edges never collide with edges.
-    const bool are_lines = part_->hull.count == 2 && fixture.GetType() == b2Shape::e_edge;
-    return !fixture.IsSensor() && !are_lines &&
-           filters_match(part_->filter, fixture.GetFilterData()) && !has(probe_.ignored) &&
-           (!probe_.only || has(*probe_.only)) && bodies_collide(part_->body, *body);
+    // Edges do not collide with edges.
+    const bool are_edges = part_->hull.count == 2 && fixture.GetType() == b2Shape::e_edge;
+    return !fixture.IsSensor() && !are_edges &&
+           filters_match(part_->filter, fixture.GetFilterData()) && !contains(probe_.ignored) &&
+           (!probe_.only || contains(*probe_.only)) && bodies_collide(part_->body, *body);
   }
 
   const Probe& probe_;
@@ -210,9 +211,9 @@ void find_free_poses(const b2World& world, const Probe& probe, const double* pos
                      std::size_t count, bool* is_free) {
   FindOverlaps finder(probe, false);
   for (std::size_t i = 0; i < count; ++i) {
-    const double* xyt = poses + 3 * i;
-    const b2Transform pose(b2Vec2(static_cast<float>(xyt[0]), static_cast<float>(xyt[1])),
-                           b2Rot(static_cast<float>(xyt[2])));
+    const double* values = poses + 3 * i;
+    const b2Transform pose(b2Vec2(static_cast<float>(values[0]), static_cast<float>(values[1])),
+                           b2Rot(static_cast<float>(values[2])));
     finder.found.clear();
     for (const ProbePart& part : probe.parts) {
       finder.find(world, part, pose);

@@ -1,8 +1,8 @@
-// Which fixtures a set of shapes would overlap at poses where it does not stand yet.
+// Tests of which bodies a set of shapes would overlap at given poses.
 //
-// Only pairs that the solver would collide count: no sensors, filter bits that match, at least one
-// dynamic body, no joint that excludes the collision. Shapes are measured without the skin that
-// Box2D puts around polygons and edges.
+// Only pairs of fixtures that can collide are considered: neither is a sensor, their filter bits
+// match, at least one body is dynamic, and no joint prevents the collision. The distance of two
+// shapes excludes the polygon radius of Box2D.
 #pragma once
 
 #include <box2d/b2_collision.h>
@@ -23,10 +23,10 @@ namespace flatland {
 
 class World;
 
-// The convex hull of up to 8 points with a radius around it: every shape of Box2D that can collide.
+// The convex hull of up to 8 points, enlarged by a radius; represents circles, edges and polygons.
 struct Hull {
   b2Vec2 points[b2_maxPolygonVertices];
-  b2Vec2 normals[b2_maxPolygonVertices];  // outward, of the sides; both sides of an edge
+  b2Vec2 normals[b2_maxPolygonVertices];  // outward normals of the sides, two for an edge
   int32 count = 0;
   int32 normal_count = 0;
   float radius = 0.0F;
@@ -36,32 +36,32 @@ struct Hull {
 struct ProbePart {
   Hull hull;
   b2Filter filter;
-  const b2Body* body;  // null for a shape that belongs to no body: it collides like a dynamic one
+  const b2Body* body;  // null for a shape without a body; it collides like a dynamic one
 };
 
-// Shapes that move together, and the bodies that they may overlap.
+// A rigid set of shapes, and the bodies that they may overlap.
 struct Probe {
   std::vector<ProbePart> parts;
-  std::vector<const b2Body*> ignored;              // sorted; the bodies of the probe are among them
-  std::optional<std::vector<const b2Body*>> only;  // sorted; all other bodies are ignored, too
-  float least_gap = 0.0F;  // [m] two shapes closer than this overlap; may be negative
+  std::vector<const b2Body*> ignored;              // sorted; includes the bodies of the probe
+  std::optional<std::vector<const b2Body*>> only;  // sorted; bodies that are considered
+  float least_gap = 0.0F;  // [m] distance below which shapes overlap; may be negative
 };
 
-// The solid fixtures of some bodies as they stand to each other now, in the frame of the first one.
-// Throws StaleHandleError, WorldLockedError, and std::invalid_argument when there is no body.
+// Returns the solid fixtures of bodies at their current relative poses, in the frame of the first
+// body. Throws StaleHandleError, WorldLockedError, or std::invalid_argument if there are no bodies.
 Probe probe_of_bodies(const World& world, const std::vector<Id>& bodies);
 
-// A disc around the origin that belongs to some categories and collides with the same ones.
+// Returns a disc around the origin with the same category and mask bits.
 Probe probe_of_disc(float radius, std::uint16_t bits);
 
-// The bodies of some ids, sorted. Throws as above.
+// Returns the bodies with the ids, sorted. Throws StaleHandleError or WorldLockedError.
 std::vector<const b2Body*> sorted_bodies(const World& world, const std::vector<Id>& ids);
 
-// Ids of the bodies that the probe overlaps at a pose, in order of the ids, each once.
+// Returns the sorted, unique ids of the bodies that the probe overlaps at a pose.
 std::vector<Id> overlapping_bodies(const b2World& world, const Probe& probe,
                                    const b2Transform& pose);
 
-// For each of `count` poses (x, y, theta) whether the probe overlaps nothing there.
+// Determines for each of `count` poses (x, y, theta) whether the probe overlaps no body.
 void find_free_poses(const b2World& world, const Probe& probe, const double* poses,
                      std::size_t count, bool* is_free);
 

@@ -13,24 +13,24 @@
 namespace flatland {
 namespace {
 
-// What rounding may do to an area or an inertia, as a part of the largest term in its sum.
+// Bound of the rounding error of an area or a moment of inertia, relative to the largest summand.
 constexpr float kRounding = 4.0F * b2_epsilon;
 
-// Points that Box2D keeps: those nearer to an earlier one than half its slop are dropped.
-std::vector<b2Vec2> join_near_points(const std::vector<b2Vec2>& points) {
-  constexpr float least = 0.5F * b2_linearSlop;
+// Returns the points that Box2D keeps: it drops points closer to an earlier one than half its slop.
+std::vector<b2Vec2> weld_points(const std::vector<b2Vec2>& points) {
+  constexpr float min_distance = 0.5F * b2_linearSlop;
   std::vector<b2Vec2> kept;
   for (const b2Vec2& point : points) {
     const bool is_new = std::none_of(kept.begin(), kept.end(), [&](const b2Vec2& other) {
-      return b2DistanceSquared(point, other) < least * least;
+      return b2DistanceSquared(point, other) < min_distance * min_distance;
     });
     if (is_new) kept.push_back(point);
   }
   return kept;
 }
 
-// Walks round the hull as Box2D will, in float and in its order, to see where it would end.
-// Returns fewer than 3 points when there is no hull, or when rounding keeps it from closing.
+// Computes the hull like b2PolygonShape::Set, with the same rounding. Returns fewer than 3 points
+// if there is no hull, or if the gift wrapping does not terminate due to rounding.
 std::vector<b2Vec2> wrap_hull(const std::vector<b2Vec2>& points) {
   const auto is_more_right = [](const b2Vec2& a, const b2Vec2& b) {
     return a.x < b.x || (a.x == b.x && a.y > b.y);
@@ -86,14 +86,15 @@ b2PolygonShape make_polygon(const std::vector<b2Vec2>& points) {
     throw std::invalid_argument("a polygon must have 3 to 8 points, got " +
                                 std::to_string(points.size()));
   }
-  const std::vector<b2Vec2> distinct = join_near_points(points);
+  const std::vector<b2Vec2> distinct = weld_points(points);
   if (distinct.size() < 3) {
     throw std::invalid_argument(
-        "a polygon must have at least 3 points that are 2.5 mm or more from each other, got " +
+        "a polygon must have at least 3 points that are at least 2.5 mm apart, got " +
         std::to_string(distinct.size()));
   }
   if (!has_area(wrap_hull(distinct))) {
-    throw std::invalid_argument("a polygon must have an area, but its points lie on a line");
+    throw std::invalid_argument(
+        "a polygon must have a positive area, but its points are collinear");
   }
   b2PolygonShape polygon;
   polygon.Set(points.data(), static_cast<int32>(points.size()));
@@ -110,8 +111,8 @@ bool make_edge(const float* x1_y1_x2_y2, b2EdgeShape* edge) {
 
 void check_mass_with(const b2Body& body, const b2Shape& shape, float density) {
   if (body.GetType() != b2_dynamicBody || density == 0.0F) return;
-  constexpr float kLeast = 1e-20F;
-  constexpr float kMost = 1e15F;
+  constexpr float kMin = 1e-20F;
+  constexpr float kMax = 1e15F;
   float mass = 0.0F;
   float inertia = 0.0F;
   b2Vec2 center(0.0F, 0.0F);
@@ -122,25 +123,25 @@ void check_mass_with(const b2Body& body, const b2Shape& shape, float density) {
     center += data.mass * data.center;
     inertia += data.I;
   };
-  // The order in which Box2D adds them up: the newest first.
+  // In the order of summation of Box2D, the newest fixture first.
   add(shape, density);
   for (const b2Fixture* fixture = body.GetFixtureList(); fixture; fixture = fixture->GetNext()) {
     if (fixture->GetDensity() != 0.0F) add(*fixture->GetShape(), fixture->GetDensity());
   }
   if (mass == 0.0F && inertia == 0.0F) return;  // a point
-  if (!(mass >= kLeast && mass <= kMost)) {
+  if (!(mass >= kMin && mass <= kMax)) {
     throw std::invalid_argument("the mass of a body must be 0 or from 1e-20 to 1e15 kg, got " +
                                 to_text(static_cast<double>(mass)));
   }
   center *= 1.0F / mass;
-  const float about_center = inertia - mass * b2Dot(center, center);
-  if (!(inertia <= kMost && about_center >= kLeast && about_center > kRounding * inertia)) {
+  const float central_inertia = inertia - mass * b2Dot(center, center);
+  if (!(inertia <= kMax && central_inertia >= kMin && central_inertia > kRounding * inertia)) {
     throw std::invalid_argument(
-        "the moment of inertia of a body must be from 1e-20 to 1e15 kg m^2 and not vanish beside "
-        "that of its mass about the origin, got " +
-        to_text(static_cast<double>(about_center)) + " and " +
+        "the moment of inertia of a body about its center of mass must be from 1e-20 to "
+        "1e15 kg m^2 and not negligible compared to that about its origin, got " +
+        to_text(static_cast<double>(central_inertia)) + " and " +
         to_text(static_cast<double>(inertia)) +
-        " (is the shape tiny and far from the body's origin?)");
+        " (a shape may be too small and too far from the origin of the body)");
   }
 }
 

@@ -1,4 +1,4 @@
-// Box2D shapes from numbers that have been checked.
+// Creation of Box2D shapes from checked numbers.
 #pragma once
 
 #include <box2d/b2_circle_shape.h>
@@ -11,21 +11,22 @@ class b2Body;
 
 namespace flatland {
 
-// Edges shorter than this have no direction that Box2D can compute; nothing ever hits them.
+// Box2D cannot compute the direction of shorter edges, so nothing can collide with them.
 inline constexpr float kMinEdgeLength = b2_epsilon;
 
-// A circle; a radius of 0 makes a point. Throws std::invalid_argument.
+// Returns a circle; a circle of radius 0 is a point. Throws std::invalid_argument.
 b2CircleShape make_circle(double x, double y, double radius);
 
-// The convex hull of 3 to 8 points. Throws std::invalid_argument when points are too few, too
-// near each other (Box2D joins points closer than 2.5 mm), or without area.
+// Returns the convex hull of 3 to 8 points. Throws std::invalid_argument if there are too few
+// points, too few of them are distinct (Box2D welds points closer than 2.5 mm), or the hull has no
+// area.
 b2PolygonShape make_polygon(const std::vector<b2Vec2>& points);
 
-// A two-sided edge; false when it is too short to have a direction.
+// Sets a two-sided edge. Returns false if it is shorter than kMinEdgeLength.
 bool make_edge(const float* x1_y1_x2_y2, b2EdgeShape* edge);
 
-// Throws std::invalid_argument when a body would get a mass or inertia that a float cannot hold or
-// that Box2D cannot compute with, once this shape is added.
+// Throws std::invalid_argument if the mass or the moment of inertia of a body with this additional
+// shape would be outside the range in which Box2D can compute.
 void check_mass_with(const b2Body& body, const b2Shape& shape, float density);
 
 }  // namespace flatland

@@ -1,4 +1,5 @@
-// Ids for things that come and go: a slot and how often it was used before.
+// A container whose ids consist of a slot and a generation, which counts the earlier uses of the
+// slot.
 #pragma once
 
 #include <cstdint>
@@ -7,13 +8,13 @@
 
 namespace flatland {
 
-// 4 bits of kind, 28 of generation, 32 of slot. Kinds start at 1, so that an id is never 0 and one
-// of a body is never one of a fixture; they end at 7, so that it is positive as a signed number.
+// 4 bits of kind, 28 bits of generation and 32 bits of slot. Kinds are from 1 to 7, so that ids of
+// different kinds differ, no id is 0, and ids are positive as signed integers.
 using Id = std::uint64_t;
 
 enum class IdKind : std::uint64_t { kBody = 1, kFixture = 2, kJoint = 3 };
 
-// Values by id. An id is found until it is erased and never again, also when its slot is reused.
+// Values by id. The id of an erased value is never valid again, even if its slot is reused.
 template <typename Value, IdKind kKind>
 class SlotMap {
  public:
@@ -32,7 +33,7 @@ class SlotMap {
     return make_id(slot);
   }
 
-  // The value, or null when the id is unknown or its value was erased.
+  // Returns the value, or null if the id is unknown or its value was erased.
   Value* find(Id id) {
     const auto slot = static_cast<std::uint32_t>(id);
     if (slot >= slots_.size() || !slots_[slot].used || make_id(slot) != id) return nullptr;
@@ -46,7 +47,7 @@ class SlotMap {
     slots_[slot].value = Value{};
     slots_[slot].used = false;
     --size_;
-    // A slot whose generations are used up is left alone.
+    // A slot without unused generations is not reused.
     if (slots_[slot].generation < kLastGeneration) {
       ++slots_[slot].generation;
       free_.push_back(slot);

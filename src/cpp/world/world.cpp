@@ -13,9 +13,9 @@
 namespace flatland {
 namespace {
 
-// Box2D fills a table of its own when the first contact of the process is made, without a lock.
-// Making one here keeps worlds in different threads from racing for it.
-void fill_contact_table() {
+// Box2D initializes a global table without a lock when the first contact of the process is created.
+// Creating a contact here prevents a race between worlds in different threads.
+void initialize_contact_table() {
   static std::once_flag once;
   std::call_once(once, [] {
     b2World world({0.0F, 0.0F});
@@ -28,9 +28,9 @@ void fill_contact_table() {
   });
 }
 
-// A dynamic body without mass weighs 1 kg and cannot be turned by forces, as it was in Box2D up to
-// 2.3. Box2D 2.4 makes nothing move it: a robot with such a body welded to it would stand still.
-void give_mass(b2Body* body) {
+// Sets the mass of a dynamic body without mass to 1 kg with an infinite moment of inertia, as in
+// Box2D up to 2.3. In Box2D 2.4 such a body cannot be moved, nor can a robot that is welded to it.
+void ensure_mass(b2Body* body) {
   if (body->GetType() != b2_dynamicBody || body->GetMass() > 0.0F) return;
   b2MassData data;
   data.mass = 1.0F;
@@ -50,7 +50,7 @@ class WakeDynamicBodies final : public b2QueryCallback {
 }  // namespace
 
 World::World() : engine_(std::make_unique<b2World>(b2Vec2(0.0F, 0.0F))) {
-  fill_contact_table();
+  initialize_contact_table();
   engine_->SetDestructionListener(this);
   engine_->SetContactListener(&contacts_);
 }
@@ -71,7 +71,7 @@ void World::close() {
 
 StepReport World::step(double dt, int velocity_iterations, int position_iterations,
                        PreSolveHook* hook) {
-  // Bounds beyond which 1 / dt and the solver's sums leave the range of a float.
+  // Outside these bounds, 1 / dt or sums in the solver can exceed the range of a float.
   if (!(dt >= 1e-6 && dt <= 1e3)) {
     throw std::invalid_argument("dt must be from 1e-6 to 1000 s, got " + to_text(dt));
   }
@@ -154,7 +154,7 @@ void World::check_changeable() const {
 }
 
 void World::wait_for_readers() const {
-  // A scan takes microseconds: less than it takes to sleep and to be woken.
+  // A scan takes microseconds, which is less than the time to sleep and wake up.
   while (users_.load() > 0) std::this_thread::yield();
 }
 
@@ -162,13 +162,13 @@ void World::throw_locked() const {
   const char* activity = activity_.load();
   throw WorldLockedError(std::string("the world ") +
                          (activity == nullptr ? "is in use" : activity) +
-                         ": nothing may be created, destroyed or changed now");
+                         " and cannot be changed or used by other threads");
 }
 
 Id World::add_body(const b2BodyDef& definition) {
   check_changeable();
   b2Body* body = engine_->CreateBody(&definition);
-  give_mass(body);
+  ensure_mass(body);
   const Id id = bodies_.insert(body);
   body->GetUserData().pointer = id;
   return id;
@@ -176,15 +176,15 @@ Id World::add_body(const b2BodyDef& definition) {
 
 Id World::add_fixture(b2Body* body, const b2FixtureDef& definition) {
   b2Fixture* fixture = body->CreateFixture(&definition);
-  give_mass(body);
+  ensure_mass(body);
   const Id id = fixtures_.insert(fixture);
   fixture->GetUserData().pointer = id;
   rays_.add(fixture);
   return id;
 }
 
-void World::skip_static_fixtures(int32 waiting_before) {
-  flatland::skip_static_fixtures(*engine_, waiting_before);
+void World::skip_static_fixtures(int32 pending_before) {
+  flatland::skip_static_fixtures(*engine_, pending_before);
 }
 
 Id World::add_joint(const b2JointDef& definition, float frequency, float damping_ratio) {
@@ -204,13 +204,13 @@ void World::find_new_contacts() {
 
 void World::destroy_body(Id id) {
   b2Body* body = change_body(id);
-  // Box2D looks through all fixtures that moved or came since the last search for pairs, for each
-  // fixture that is destroyed: hours for a large map that goes again before the first step. A
-  // search empties that list.
+  // For each destroyed fixture, Box2D searches the list of all fixtures that were created or moved
+  // since the last search for new pairs. For a large map that is destroyed before the first step
+  // this would take hours. FindNewContacts clears the list.
   constexpr int32 kManyFixtures = 2000;
-  if (waiting_fixtures(*engine_) > kManyFixtures) find_new_contacts();
+  if (pending_fixtures(*engine_) > kManyFixtures) find_new_contacts();
   rays_.remove_body(body);
-  engine_->DestroyBody(body);  // says goodbye to its fixtures and joints, and ends its contacts
+  engine_->DestroyBody(body);  // calls SayGoodbye for its fixtures and joints
   bodies_.erase(id);
 }
 

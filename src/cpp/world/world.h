@@ -1,8 +1,9 @@
-// The world: owns Box2D's world and everything in it, hands out ids, steps.
+// The world, which owns a Box2D world and all objects in it and assigns ids to them.
 //
-// A world may be used by one thread at a time, except that several threads may cast rays at once.
-// While it steps, casts rays or makes edges, every other use is refused with WorldLockedError;
-// only a pre-solve hook, in the stepping thread, may read. Worlds share nothing with each other.
+// Only one thread at a time may use a world, except that several threads may cast rays
+// concurrently. While the world is stepping or creating edges, every other use throws
+// WorldLockedError, except that a pre-solve hook may read the world in the stepping thread. Changes
+// wait until all rays are cast. Worlds share no state.
 #pragma once
 
 #include <box2d/b2_body.h>
@@ -22,7 +23,7 @@
 
 namespace flatland {
 
-// A joint with what Box2D does not keep: a weld's spring as it was asked for.
+// A joint with the parameters of the spring of a weld joint, which Box2D does not store.
 struct JointRecord {
   b2Joint* joint = nullptr;
   float frequency = 0.0F;
@@ -36,16 +37,16 @@ class World final : private b2DestructionListener {
   World(const World&) = delete;
   World& operator=(const World&) = delete;
 
-  // Frees everything; all ids are stale from then on. Again: does nothing.
+  // Destroys all objects; all ids become stale. Idempotent.
   void close();
   bool closed() const { return engine_ == nullptr; }
 
-  // Advances by dt > 0 seconds. The hook may be null. The caller holds the world exclusively. While
-  // a body is invalid the world stands still: the report names the body again.
+  // Advances the world by dt > 0 seconds. The hook may be null. The caller has exclusive use of the
+  // world. While a body is invalid the world does not advance, and the report names the body again.
   StepReport step(double dt, int velocity_iterations, int position_iterations, PreSolveHook* hook);
 
-  // Objects by id. Each throws StaleHandleError when the object or the world is gone, and
-  // WorldLockedError when the world is busy. Pointers are good until the next change.
+  // Access to objects by id. Throw StaleHandleError if the object was destroyed or the world is
+  // closed, and WorldLockedError if the world is in use. Pointers are valid until the next change.
   const b2Body* read_body(Id id) const;
   const b2Fixture* read_fixture(Id id) const;
   const JointRecord& read_joint(Id id) const;
@@ -56,25 +57,26 @@ class World final : private b2DestructionListener {
   bool has_fixture(Id id) const { return fixtures_.find(id) != nullptr; }
   bool has_joint(Id id) const { return joints_.find(id) != nullptr; }
 
-  // Throw as above when the world cannot be read or changed now.
+  // Throw the same exceptions if the world cannot be read or changed at present.
   void check_readable() const;
   void check_changeable() const;
 
-  // Creation from checked definitions, and destruction. A body takes its fixtures and joints along.
+  // Creation from checked definitions, and destruction. Destroying a body also destroys its
+  // fixtures and joints.
   Id add_body(const b2BodyDef& definition);
   Id add_fixture(b2Body* body, const b2FixtureDef& definition);
-  // Before and after many fixtures are added to one static body; see broad_phase.h.
+  // To be called before and after adding many fixtures to one static body; see broad_phase.h.
   void reserve_fixtures(std::size_t more) { fixtures_.reserve(more); }
-  void skip_static_fixtures(int32 waiting_before);
+  void skip_static_fixtures(int32 pending_before);
   // Searches for pairs of fixtures that may touch, which the next step would do otherwise.
   void find_new_contacts();
   Id add_joint(const b2JointDef& definition, float frequency, float damping_ratio);
   void destroy_body(Id id);
   void destroy_joint(Id id);
 
-  // Wakes what rests against a body, or would be met by a body that was moved or reshaped.
+  // Wakes the bodies in contact with a body, and the dynamic bodies that its bounding box overlaps.
   void wake_neighbours(const b2Body* body);
-  // To be called after the category, or the sensor flag, of a fixture was changed.
+  // To be called after a change of the filter or the sensor flag of a fixture.
   void fixture_changed(const b2Fixture* fixture);
 
   const b2World& engine() const { return *engine_; }
@@ -84,9 +86,8 @@ class World final : private b2DestructionListener {
 
   static constexpr const char* kStepping = "is stepping";
 
-  // Holds the world for one thread that changes it for longer, without the GIL; made only where it
-  // can be changed. Both kinds of use begin with the GIL, since short changes do not hold the world
-  // and are kept apart by the GIL alone.
+  // Exclusive use of the world by one thread, for long changes without the GIL. Both kinds of use
+  // must start with the GIL held, because short changes are synchronized only by the GIL.
   class ExclusiveUse {
    public:
     ExclusiveUse(World& world, const char* activity);
@@ -99,8 +100,9 @@ class World final : private b2DestructionListener {
     World* world_;
   };
 
-  // Holds the world as it is, for threads that only read. Who wants to change it waits for them,
-  // with the GIL: a use must end before it is asked for again.
+  // Shared use of the world by threads that only read it. Threads that change the world hold the
+  // GIL while they wait for the end of all shared uses, so a use must end before its thread
+  // acquires the GIL.
   class SharedUse {
    public:
     explicit SharedUse(World& world);
@@ -130,7 +132,7 @@ class World final : private b2DestructionListener {
   RayScene rays_;
   std::vector<Id> invalid_;  // bodies that the last step left so
 
-  std::atomic<int> users_{0};  // kExclusive, or how many threads cast rays
+  std::atomic<int> users_{0};  // kExclusive, or the number of shared uses
   std::atomic<std::thread::id> owner_{};
   std::atomic<const char*> activity_{nullptr};
 };

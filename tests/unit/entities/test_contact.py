@@ -1,4 +1,4 @@
-"""Contacts as plugins get them: who hears what, in which order, and what `pre_solve` may change."""
+"""Contact hooks of plugins: recipients, order, arguments, and the changes of `pre_solve`."""
 
 from __future__ import annotations
 
@@ -23,45 +23,47 @@ bodies:
 """
 MANIFEST = """
 <library>
-  <class name="ear::Ear" type="ears_for_tests.Ear" base_class_type="flatland::ModelPlugin"/>
-  <class name="ear::WorldEar" type="ears_for_tests.WorldEar"
+  <class name="test::Recorder" type="contact_plugins.Recorder"
+         base_class_type="flatland::ModelPlugin"/>
+  <class name="test::WorldRecorder" type="contact_plugins.WorldRecorder"
          base_class_type="flatland::WorldPlugin"/>
-  <class name="ear::Hand" type="ears_for_tests.Hand" base_class_type="flatland::ModelPlugin"/>
+  <class name="test::Modifier" type="contact_plugins.Modifier"
+         base_class_type="flatland::ModelPlugin"/>
 </library>
 """
 
 
-class _Listener:
-    """Notes the contact hooks with what they were given."""
+class _Recorder:
+    """Records the calls of contact hooks with their arguments."""
 
-    heard: list[tuple[str, Contact, ContactImpulse | None]]
+    calls: list[tuple[str, Contact, ContactImpulse | None]]
 
     def on_initialize(self, config: Any) -> None:
-        self.heard = []
+        self.calls = []
 
     def begin_contact(self, contact: Contact) -> None:
-        self.heard.append(("begin", contact, None))
+        self.calls.append(("begin", contact, None))
 
     def end_contact(self, contact: Contact) -> None:
-        self.heard.append(("end", contact, None))
+        self.calls.append(("end", contact, None))
 
     def post_solve(self, contact: Contact, impulse: ContactImpulse) -> None:
-        self.heard.append(("post_solve", contact, impulse))
+        self.calls.append(("post_solve", contact, impulse))
 
     def hooks(self) -> list[str]:
-        return [hook for hook, _, _ in self.heard]
+        return [hook for hook, _, _ in self.calls]
 
 
-class Ear(_Listener, ModelPlugin):
+class Recorder(_Recorder, ModelPlugin):
     pass
 
 
-class WorldEar(_Listener, WorldPlugin):
+class WorldRecorder(_Recorder, WorldPlugin):
     pass
 
 
-class Hand(ModelPlugin):
-    """Does in `pre_solve` what the test says, and keeps what it saw."""
+class Modifier(ModelPlugin):
+    """Changes contacts in `pre_solve` as configured, and records its arguments."""
 
     def on_initialize(self, config: Any) -> None:
         self.change: dict[str, Any] = {}
@@ -77,12 +79,12 @@ class Hand(ModelPlugin):
 
 @pytest.fixture
 def bench(files: Any, monkeypatch: pytest.MonkeyPatch) -> Any:
-    """Writes models with the plugins above, and loads a world with a slab at x = 0.199."""
-    monkeypatch.setenv("FLATLAND_PLUGIN_PATH", files.write("ears.xml", MANIFEST))
-    module = SimpleNamespace(Ear=Ear, WorldEar=WorldEar, Hand=Hand)
-    monkeypatch.setitem(sys.modules, "ears_for_tests", module)  # type: ignore[arg-type]
-    for name in ("Ear", "Hand"):
-        files.write(f"{name}.yaml", f"{DISC}\nplugins: [{{name: p, type: 'ear::{name}'}}]\n")
+    """Writes models with the plugins above and loads a world with a slab at x = 0.199."""
+    monkeypatch.setenv("FLATLAND_PLUGIN_PATH", files.write("plugins.xml", MANIFEST))
+    module = SimpleNamespace(Recorder=Recorder, WorldRecorder=WorldRecorder, Modifier=Modifier)
+    monkeypatch.setitem(sys.modules, "contact_plugins", module)  # type: ignore[arg-type]
+    for name in ("Recorder", "Modifier"):
+        files.write(f"{name}.yaml", f"{DISC}\nplugins: [{{name: p, type: 'test::{name}'}}]\n")
     files.write("disc.yaml", DISC)
     files.write("slab.yaml", SLAB)
 
@@ -95,83 +97,85 @@ def bench(files: Any, monkeypatch: pytest.MonkeyPatch) -> Any:
     return SimpleNamespace(load=load, files=files)
 
 
-ROBOT = "  - {name: robot, model: Ear.yaml}"
+ROBOT = "  - {name: robot, model: Recorder.yaml}"
 WALL = "  - {name: wall, model: slab.yaml, pose: [0.199, 0, 0]}"
 
 
-def ear(world: flatland.World, model: str = "robot") -> Any:
+def recorder(world: flatland.World, model: str = "robot") -> Any:
     return world.model(model).plugin("p")
 
 
-def test_events_come_in_order_with_the_points_of_that_moment(bench: Any) -> None:
+def test_events_are_passed_in_order_with_the_points_of_their_time(bench: Any) -> None:
     world = bench.load(f"{ROBOT}\n{WALL}")
     base = world.model("robot").body("base")
     base.set_velocity(0.4, 0.3, 0.0)
     world.step()
-    assert ear(world).hooks() == ["begin", "post_solve"]
-    (_, begun, _), (_, solved, impulse) = ear(world).heard
+    assert recorder(world).hooks() == ["begin", "post_solve"]
+    (_, begun, _), (_, solved, impulse) = recorder(world).calls
     assert begun.contact_id == solved.contact_id
     assert {begun.body_a.name, begun.body_b.name} == {"base", "slab"}
     assert begun.points == pytest.approx(np.array([[0.2, 0.0]]), abs=0.01)
     outward = 1.0 if begun.body_a is base else -1.0
     assert begun.normal == pytest.approx(np.array([outward, 0.0]), abs=1e-4)
     assert begun.is_sensor is False
-    # All of its momentum towards the wall; along it no more than friction can take.
+    # The full momentum along the normal; along the surface at most the friction.
     mass = base.mass
     assert impulse.normal_impulses == pytest.approx([0.4 * mass], rel=1e-3)
     assert abs(impulse.tangent_impulses[0]) == pytest.approx(0.1 * mass, rel=0.05)
     world.step()
-    assert ear(world).hooks()[2:] == ["post_solve"]
+    assert recorder(world).hooks()[2:] == ["post_solve"]
     world.move_model("robot", (-5, 0, 0))
     world.step()
-    assert ear(world).hooks()[3:] == ["end"]
-    assert ear(world).heard[3][1].contact_id == begun.contact_id
+    assert recorder(world).hooks()[3:] == ["end"]
+    assert recorder(world).calls[3][1].contact_id == begun.contact_id
 
 
-def test_end_is_heard_when_the_other_one_is_deleted(bench: Any) -> None:
+def test_end_contact_is_called_if_the_other_model_is_deleted(bench: Any) -> None:
     world = bench.load(f"{ROBOT}\n{WALL}")
     world.step()
     world.delete_model("wall")
-    hook, contact, _ = ear(world).heard[-1]
+    hook, contact, _ = recorder(world).calls[-1]
     assert hook == "end"
-    # Who it was can still be told.
+    # The names of the deleted model are still available.
     assert {contact.body_a.entity.name, contact.body_b.entity.name} == {"robot", "wall"}
 
 
-def test_contacts_of_other_models_reach_world_plugins_and_those_that_ask_for_all(
+def test_contacts_of_other_models_are_passed_to_world_plugins_and_on_request(
     bench: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     world = bench.load(
-        "  - {name: far, model: Ear.yaml, pose: [50, 0, 0]}\n"
+        "  - {name: far, model: Recorder.yaml, pose: [50, 0, 0]}\n"
         f"  - {{name: disc, model: disc.yaml}}\n{WALL}",
-        "[{name: p, type: 'ear::WorldEar'}]",
+        "[{name: p, type: 'test::WorldRecorder'}]",
     )
     world.step()
     [everywhere] = world.plugins
     assert everywhere.hooks() == ["begin", "post_solve"]
-    assert ear(world, "far").hooks() == []
-    monkeypatch.setattr(type(ear(world, "far")), "all_contacts", True)
-    world.spawn_model("Ear.yaml", "farther", pose=(90, 0, 0))
+    assert recorder(world, "far").hooks() == []
+    monkeypatch.setattr(type(recorder(world, "far")), "all_contacts", True)
+    world.spawn_model("Recorder.yaml", "farther", pose=(90, 0, 0))
     world.step()
-    assert ear(world, "farther").hooks() == ["post_solve"]
-    contact = ear(world, "farther").heard[0][1]
-    assert ear(world, "farther").filter_contact(contact) is None
+    assert recorder(world, "farther").hooks() == ["post_solve"]
+    contact = recorder(world, "farther").calls[0][1]
+    assert recorder(world, "farther").filter_contact(contact) is None
 
 
 @pytest.mark.parametrize("side", ["a", "b"])
-def test_filter_puts_the_model_on_the_near_side(bench: Any, side: str) -> None:
-    # Box2D puts polygons before circles.
+def test_filter_contact_returns_the_perspective_of_the_model(bench: Any, side: str) -> None:
+    # In Box2D, polygons precede circles.
     robot_is_a = side == "a"
     if robot_is_a:
         square = DISC.replace("circle, radius: 0.2", "polygon, points: [[-1, -1], [1, -1], [0, 1]]")
-        bench.files.write("Ear.yaml", f"{square}\nplugins: [{{name: p, type: 'ear::Ear'}}]\n")
+        bench.files.write(
+            "Recorder.yaml", f"{square}\nplugins: [{{name: p, type: 'test::Recorder'}}]\n"
+        )
         other = "  - {name: wall, model: disc.yaml, pose: [0, -1.15, 0]}"
     else:
         other = WALL
     world = bench.load(f"{ROBOT}\n{other}")
     world.step()
-    contact = ear(world).heard[0][1]
-    mine = ear(world).filter_contact(contact)
+    contact = recorder(world).calls[0][1]
+    mine = recorder(world).filter_contact(contact)
     base, theirs = world.model("robot").bodies[0], world.model("wall").bodies[0]
     assert (mine.other_entity, mine.is_a) == (world.model("wall"), robot_is_a)
     assert (mine.this_body, mine.other_body) == (base, theirs)
@@ -179,37 +183,37 @@ def test_filter_puts_the_model_on_the_near_side(bench: Any, side: str) -> None:
     assert (contact.body_a is base) is robot_is_a
 
 
-def test_the_other_side_may_be_a_layer_by_its_first_name(bench: Any) -> None:
+def test_the_other_entity_can_be_a_layer_with_its_first_name(bench: Any) -> None:
     path = bench.files.write_map("room", ["...", ".#.", "..."], origin="[0.2, -1.5, 0]")
     world = bench.load(
-        "  - {name: robot, model: Ear.yaml, pose: [1.01, 0, 0]}",
+        "  - {name: robot, model: Recorder.yaml, pose: [1.01, 0, 0]}",
         layers=f"[{{name: [walls, floor], map: {path}}}]",
     )
     world.step()
-    mine = ear(world).filter_contact(ear(world).heard[0][1])
+    mine = recorder(world).filter_contact(recorder(world).calls[0][1])
     assert mine.other_entity is world.layer("floor")
     assert mine.other_entity.name == "walls"
     assert mine.other_fixture.shape == "edge"
 
 
-def test_sensors_begin_and_end_but_are_not_solved(bench: Any) -> None:
+def test_sensors_cause_begin_and_end_but_no_post_solve(bench: Any) -> None:
     bench.files.write("disc.yaml", DISC.replace("density: 10", "density: 10, sensor: true"))
     world = bench.load(f"{ROBOT}\n  - {{name: pad, model: disc.yaml, pose: [0.3, 0, 0]}}")
     world.step(2)
     world.move_model("pad", (5, 0, 0))
     world.step()
-    assert ear(world).hooks() == ["begin", "end"]
-    contact = ear(world).heard[0][1]
+    assert recorder(world).hooks() == ["begin", "end"]
+    contact = recorder(world).calls[0][1]
     assert contact.is_sensor is True
     assert contact.points.shape == (0, 2)
 
 
 class TestPreSolve:
-    """A disc with a plugin is pushed against the slab, and along it."""
+    """A disc with a plugin is pushed against the slab and along it."""
 
     def push(self, bench: Any, **change: Any) -> tuple[flatland.World, Any]:
-        world = bench.load(f"  - {{name: robot, model: Hand.yaml}}\n{WALL}")
-        plugin = ear(world)
+        world = bench.load(f"  - {{name: robot, model: Modifier.yaml}}\n{WALL}")
+        plugin = recorder(world)
         plugin.change = change
         world.model("robot").body("base").set_velocity(0.4, 0.1, 0.0)
         world.step()
@@ -221,7 +225,7 @@ class TestPreSolve:
         velocity: tuple[float, float, float] = world.model("robot").body("base").velocity
         return velocity
 
-    def test_it_sees_the_contact_about_to_be_solved(self, bench: Any) -> None:
+    def test_pre_solve_receives_the_contact(self, bench: Any) -> None:
         world, plugin = self.push(bench)
         mine, points, normal, old_points = plugin.seen[0]
         assert mine.other_entity is world.model("wall")
@@ -232,16 +236,16 @@ class TestPreSolve:
         world.step()
         assert plugin.seen[-1][3] == 1
 
-    def test_left_alone_the_wall_stops_and_brakes(self, bench: Any) -> None:
+    def test_unchanged_contacts_stop_the_disc_with_friction(self, bench: Any) -> None:
         vx, vy, omega = self.velocity(bench)
         assert vx == pytest.approx(0.0, abs=1e-4)
         assert vy < 0.09
         assert omega != 0
 
-    def test_a_disabled_contact_lets_pass(self, bench: Any) -> None:
+    def test_a_disabled_contact_can_be_passed(self, bench: Any) -> None:
         assert self.velocity(bench, enabled=False) == pytest.approx((0.4, 0.1, 0.0), abs=1e-5)
 
-    def test_disabling_holds_for_one_step(self, bench: Any) -> None:
+    def test_a_contact_is_disabled_for_one_step(self, bench: Any) -> None:
         world, plugin = self.push(bench, enabled=False)
         plugin.change = {}
         world.step()
@@ -253,15 +257,15 @@ class TestPreSolve:
         assert (vy, omega) == pytest.approx((0.1, 0.0), abs=1e-5)
 
     def test_restitution(self, bench: Any) -> None:
-        # Box2D gives back only what was faster than 1 m/s.
-        world = bench.load(f"  - {{name: robot, model: Hand.yaml}}\n{WALL}")
-        ear(world).change = {"restitution": 0.5}
+        # Box2D applies restitution only above 1 m/s.
+        world = bench.load(f"  - {{name: robot, model: Modifier.yaml}}\n{WALL}")
+        recorder(world).change = {"restitution": 0.5}
         world.model("robot").body("base").set_velocity(4.0, 0.0, 0.0)
         world.step()
         assert world.model("robot").body("base").velocity[0] == pytest.approx(-2.0, rel=1e-2)
 
     @pytest.mark.parametrize("speed", [1.5, -1.5])
-    def test_tangent_speed_is_that_of_a_belt(self, bench: Any, speed: float) -> None:
+    def test_tangent_speed_moves_the_disc_like_a_belt(self, bench: Any, speed: float) -> None:
         _, without, _ = self.velocity(bench)
         _, along, _ = self.velocity(bench, tangent_speed=speed)
         assert abs(along - without) > 0.05
@@ -269,11 +273,11 @@ class TestPreSolve:
         assert (along - without) * (back - without) < 0
 
 
-def test_a_plugin_that_does_not_change_contacts_is_not_asked(bench: Any) -> None:
+def test_pre_solve_is_not_called_without_plugins_that_override_it(bench: Any) -> None:
     world = bench.load(f"{ROBOT}\n{WALL}")
     world.step()
     assert world.physics.pre_solve is None
-    world.spawn_model("Hand.yaml", "hand", pose=(40, 0, 0))
+    world.spawn_model("Modifier.yaml", "hand", pose=(40, 0, 0))
     world.step()
     assert world.physics.pre_solve is not None
     world.delete_model("hand")
@@ -281,11 +285,11 @@ def test_a_plugin_that_does_not_change_contacts_is_not_asked(bench: Any) -> None
     assert world.physics.pre_solve is None
 
 
-def test_without_listeners_nothing_is_recorded(bench: Any) -> None:
+def test_contacts_are_not_recorded_without_contact_hooks(bench: Any) -> None:
     world = bench.load(f"  - {{name: disc, model: disc.yaml}}\n{WALL}")
     world.step()
     assert world.physics.record_contacts is False
-    world.spawn_model("Ear.yaml", "robot", pose=(40, 0, 0))
+    world.spawn_model("Recorder.yaml", "robot", pose=(40, 0, 0))
     world.step()
     assert world.physics.record_contacts is True
     world.delete_model("robot")

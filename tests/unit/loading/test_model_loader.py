@@ -131,12 +131,13 @@ ERRORS = {
     ),
     "polygon without area": (
         body(footprint="type: polygon, density: 1, points: [[0, 0], [1, 0], [2, 0]]"),
-        f"Invalid entry in {FOOTPRINT}, a polygon must have an area, but its points lie on a line",
+        f"Invalid entry in {FOOTPRINT}, a polygon must have a positive area, but its points are "
+        "collinear",
     ),
     "polygon of one point": (
         body(footprint="type: polygon, density: 1, points: [[1, 1], [1, 1], [1, 1]]"),
         f"Invalid entry in {FOOTPRINT}, a polygon must have at least 3 points that are "
-        "2.5 mm or more from each other, got 1",
+        "at least 2.5 mm apart, got 1",
     ),
     "polygon with nan": (
         body(footprint="type: polygon, density: 1, points: [[0, 0], [1, .nan], [2, 0]]"),

@@ -234,7 +234,10 @@ def test_image_map_numbers_out_of_range(
 
 def test_a_resolution_outside_the_32_bit_range(write: Write) -> None:
     path = write(IMAGE_MAP.replace("0.05", "1e38"))
-    why = "resolution must be positive, and the size of the map must fit a 32-bit float, got 1e+38"
+    why = (
+        "resolution must be positive and the size of the map in the range of a 32-bit float, "
+        "got 1e+38"
+    )
     text = f'Invalid "resolution", {why} (in layer "walls")'
     assert_fails(path, YamlError, text + position(path, 2))
 

@@ -31,7 +31,7 @@ def disc(world: PhysicsWorld, x: float = 0.0, y: float = 0.0, **options: float) 
     return body
 
 
-def test_a_body_is_where_it_was_put(world: PhysicsWorld) -> None:
+def test_a_body_has_the_pose_of_its_creation(world: PhysicsWorld) -> None:
     body = world.create_body("kinematic", (1, 2, 3), linear_damping=0.25, angular_damping=0.5)
     assert body.pose == pytest.approx((1, 2, 3))
     assert body.type == "kinematic"
@@ -49,7 +49,7 @@ def test_there_is_no_gravity(world: PhysicsWorld) -> None:
     assert body.pose == (0, 0, 0)
 
 
-def test_mass_and_centre(world: PhysicsWorld) -> None:
+def test_mass_and_center_of_mass(world: PhysicsWorld) -> None:
     body = world.create_body("dynamic", (1, 0, math.pi / 2))
     body.create_polygon([(0, 0), (2, 0), (2, 1), (0, 1)], density=3)
     assert body.mass == pytest.approx(6)
@@ -60,8 +60,8 @@ def test_mass_and_centre(world: PhysicsWorld) -> None:
     assert world.create_body("kinematic", (0, 0, 0)).mass == 0
 
 
-def test_a_dynamic_body_without_mass_weighs_one_kilogram(world: PhysicsWorld) -> None:
-    """Box2D's rule up to 2.3, by which the reference computes; 2.4 would let nothing move it."""
+def test_a_dynamic_body_without_density_has_a_mass_of_one_kilogram(world: PhysicsWorld) -> None:
+    """The rule of Box2D up to 2.3 and of the reference; in 2.4 such a body cannot be moved."""
     body = world.create_body("dynamic", (1, 0, math.pi / 2))
     assert (body.mass, body.inertia, body.local_center) == (1, 0, (0, 0))
     body.create_circle((0.5, 0.5), 0.3, density=0)
@@ -77,8 +77,10 @@ def test_a_dynamic_body_without_mass_weighs_one_kilogram(world: PhysicsWorld) ->
     assert body.mass == pytest.approx(6)
 
 
-def test_walls_of_a_large_map_hold_what_came_before_and_after(world: PhysicsWorld) -> None:
-    """Maps of many edges take a short cut past Box2D's search for pairs."""
+def test_a_large_map_stops_bodies_created_before_and_after_it(
+    world: PhysicsWorld,
+) -> None:
+    """The edges of large maps are excluded from the search for new pairs in Box2D."""
     before, resting = disc(world, -2, 0), disc(world, -0.4, 5)
     world.step(STEP, 10, 10)
     resting.awake = False
@@ -97,30 +99,32 @@ def test_walls_of_a_large_map_hold_what_came_before_and_after(world: PhysicsWorl
 
 @pytest.mark.parametrize("body_type", ["dynamic", "kinematic"])
 def test_velocity_is_that_of_the_origin(world: PhysicsWorld, body_type: str) -> None:
-    """The centre of mass lies beside the origin, yet the origin moves as it was told."""
+    """The origin has the velocity even if the center of mass is elsewhere."""
     body = world.create_body(body_type, (0, 0, 0.3))
     body.create_circle((2, 0), 0.5, density=1)
     body.set_velocity(0.5, -0.25, 2.0)
     assert body.velocity == pytest.approx((0.5, -0.25, 2.0))
-    # One short step: what remains of the centripetal motion is of second order.
+    # In one short step, the effect of the centripetal acceleration is of second order.
     world.step(1e-4, 10, 10)
     x, y, theta = body.pose
     assert (x, y) == pytest.approx((0.5e-4, -0.25e-4), abs=1e-6)
     assert theta == pytest.approx(0.3 + 2e-4)
 
 
-def test_velocity_of_the_origin_while_the_centre_coasts(world: PhysicsWorld) -> None:
+def test_velocity_of_the_origin_of_a_free_rotating_body(
+    world: PhysicsWorld,
+) -> None:
     body = world.create_body("dynamic", (0, 0, 0))
     body.create_circle((1, 0), 0.5, density=1)
     body.set_velocity(0, 0, math.pi)
-    # v_cm = omega x r = (0, pi); half a turn later the origin is on the centre's other side.
+    # v_cm = omega x r = (0, pi); after half a turn the origin is on the other side of the center.
     for _ in range(1000):
         world.step(0.001, 10, 10)
     assert body.pose == pytest.approx((2, math.pi, math.pi), abs=1e-3)
     assert body.velocity == pytest.approx((0, 2 * math.pi, math.pi), abs=1e-2)
 
 
-def test_static_bodies_do_not_take_a_velocity(world: PhysicsWorld) -> None:
+def test_static_bodies_ignore_velocities(world: PhysicsWorld) -> None:
     body = world.create_body("static", (0, 0, 0))
     body.set_velocity(1, 1, 1)
     run(world, 10)
@@ -139,21 +143,21 @@ def test_force_and_torque_act_for_one_step(world: PhysicsWorld) -> None:
     assert body.velocity == pytest.approx((3 / mass * STEP, 0, 2 / inertia * STEP), rel=1e-5)
 
 
-def test_a_force_beside_the_centre_turns(world: PhysicsWorld) -> None:
+def test_an_eccentric_force_turns_the_body(world: PhysicsWorld) -> None:
     body = disc(world)
     body.apply_force((0, 1), (0.5, 0))
     run(world, 1)
     assert body.velocity[2] == pytest.approx(0.5 / body.inertia * STEP, rel=1e-5)
 
 
-def test_damping_slows_down(world: PhysicsWorld) -> None:
+def test_damping_reduces_the_velocity(world: PhysicsWorld) -> None:
     body = disc(world, linear_damping=2.0, angular_damping=3.0)
     body.set_velocity(1, 0, 1)
     run(world, 1)
     assert body.velocity == pytest.approx((1 / (1 + 2 * STEP), 0, 1 / (1 + 3 * STEP)))
 
 
-def test_bodies_fall_asleep_and_are_woken(world: PhysicsWorld) -> None:
+def test_bodies_fall_asleep_and_wake_up(world: PhysicsWorld) -> None:
     body = disc(world)
     run(world, 100)
     assert not body.awake
@@ -170,8 +174,8 @@ def test_bodies_fall_asleep_and_are_woken(world: PhysicsWorld) -> None:
     assert body.awake
 
 
-def test_a_moved_body_meets_what_is_there(world: PhysicsWorld) -> None:
-    """Box2D alone would leave both asleep, one inside the other."""
+def test_a_moved_body_is_separated_from_bodies_at_its_new_pose(world: PhysicsWorld) -> None:
+    """Box2D alone would leave both bodies asleep and overlapping."""
     mover, sleeper = disc(world), disc(world, 10)
     run(world, 100)
     assert not sleeper.awake
@@ -180,7 +184,7 @@ def test_a_moved_body_meets_what_is_there(world: PhysicsWorld) -> None:
     assert np.hypot(*(np.array(mover.pose) - sleeper.pose)[:2]) == pytest.approx(1, abs=0.02)
 
 
-def test_a_static_body_that_is_moved_wakes_what_it_meets(world: PhysicsWorld) -> None:
+def test_a_moved_static_body_wakes_the_bodies_at_its_new_pose(world: PhysicsWorld) -> None:
     sleeper = disc(world, 10)
     box = world.create_body("static", (0, 0, 0))
     box.create_polygon([(-1, -1), (1, -1), (1, 1), (-1, 1)], density=0)
@@ -191,7 +195,7 @@ def test_a_static_body_that_is_moved_wakes_what_it_meets(world: PhysicsWorld) ->
     assert sleeper.pose[0] > 10.05
 
 
-def test_a_static_body_that_is_taken_away_wakes_what_leant_on_it(world: PhysicsWorld) -> None:
+def test_destroying_a_static_body_wakes_the_bodies_in_contact_with_it(world: PhysicsWorld) -> None:
     leaning = disc(world, 1.49)
     wall = world.create_body("static", (0, 0, 0))
     wall.create_polygon([(-1, -1), (1, -1), (1, 1), (-1, 1)], density=0)
@@ -201,7 +205,7 @@ def test_a_static_body_that_is_taken_away_wakes_what_leant_on_it(world: PhysicsW
     assert leaning.awake
 
 
-def test_new_shapes_wake_what_they_meet(world: PhysicsWorld) -> None:
+def test_new_fixtures_wake_the_bodies_that_they_overlap(world: PhysicsWorld) -> None:
     sleeper = disc(world)
     run(world, 100)
     world.create_body("static", (0, 0, 0)).create_edges([[0.4, -1, 0.4, 1]])
@@ -211,7 +215,7 @@ def test_new_shapes_wake_what_they_meet(world: PhysicsWorld) -> None:
 
 @pytest.mark.parametrize("side", [-1, 1])
 @pytest.mark.parametrize("turned", [False, True])
-def test_edges_hold_from_both_sides(world: PhysicsWorld, side: int, turned: bool) -> None:
+def test_edges_stop_bodies_from_both_sides(world: PhysicsWorld, side: int, turned: bool) -> None:
     edge = [0, 5, 0, -5] if turned else [0, -5, 0, 5]
     world.create_body("static", (0, 0, 0)).create_edges([edge])
     body = disc(world, 2.0 * side)
@@ -228,7 +232,7 @@ def test_fast_bodies_do_not_pass_through_walls(world: PhysicsWorld) -> None:
     assert body.pose[0] < 0
 
 
-def test_fixtures_tell_what_they_are(world: PhysicsWorld) -> None:
+def test_properties_of_fixtures(world: PhysicsWorld) -> None:
     body = world.create_body("dynamic", (0, 0, 0))
     circle = body.create_circle(
         (1, 2),
@@ -259,7 +263,7 @@ def test_fixtures_tell_what_they_are(world: PhysicsWorld) -> None:
     assert (polygon.category_bits, polygon.mask_bits) == (0xFFFF, 0xFFFF)
 
 
-def test_edges_come_back_as_they_went_in(world: PhysicsWorld) -> None:
+def test_edges_are_returned_unchanged(world: PhysicsWorld) -> None:
     body = world.create_body("static", (5, 5, 1))
     edges = np.random.default_rng(1).uniform(-10, 10, (50, 4)).astype(np.float32)
     body.create_circle((0, 0), 1, density=0)
@@ -270,7 +274,7 @@ def test_edges_come_back_as_they_went_in(world: PhysicsWorld) -> None:
 
 
 @pytest.mark.parametrize("bits", [(1, 2), (2, 1), (0, 0xFFFF), (0xFFFF, 0)])
-def test_filters_let_bodies_pass(world: PhysicsWorld, bits: tuple[int, int]) -> None:
+def test_filters_prevent_collisions(world: PhysicsWorld, bits: tuple[int, int]) -> None:
     wall = world.create_body("static", (0, 0, 0))
     wall.create_edges([[0, -5, 0, 5]], category_bits=1, mask_bits=1)
     body = world.create_body("dynamic", (-2, 0, 0))
@@ -280,7 +284,7 @@ def test_filters_let_bodies_pass(world: PhysicsWorld, bits: tuple[int, int]) -> 
     assert body.pose[0] > 2
 
 
-def test_filters_and_sensor_flags_change_for_bodies_at_rest(world: PhysicsWorld) -> None:
+def test_changed_filters_and_sensor_flags_apply_to_sleeping_bodies(world: PhysicsWorld) -> None:
     bodies = [disc(world), disc(world, 0.6)]
     circle = bodies[0].fixtures[0]
     circle.mask_bits = 0

@@ -1,4 +1,4 @@
-"""The boundary of a bitmap against a naive one in numpy."""
+"""The boundary of a bitmap, compared with a naive implementation in numpy."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ CROSSING = np.array([[1, 0, 1], [0, 1, 0], [1, 0, 1]], bool)
 
 
 def naive_pieces(mask: Bits) -> set[Piece]:
-    """All pieces of boundary of one pixel's length: lower or left corner, then the other."""
+    """Returns the boundary in pieces of one pixel, each from its lower or left corner."""
     rows = len(mask)
     padded = np.pad(mask, 1, constant_values=True)
     across = padded[1:, 1:-1] != padded[:-1, 1:-1]
@@ -36,7 +36,7 @@ def naive_pieces(mask: Bits) -> set[Piece]:
 
 
 def unit_pieces(x1: float, y1: float, x2: float, y2: float) -> list[Piece]:
-    """Cuts a straight edge into pieces of one pixel's length."""
+    """Divides a straight edge into pieces of one pixel."""
     low, high = sorted(((round(x1), round(y1)), (round(x2), round(y2))))
     assert (low[0] == high[0]) != (low[1] == high[1])
     if low[1] == high[1]:
@@ -45,7 +45,7 @@ def unit_pieces(x1: float, y1: float, x2: float, y2: float) -> list[Piece]:
 
 
 def is_on(mask: Bits, x: float, y: float) -> bool:
-    """State of the pixel that holds a point, the origin in the lower left corner."""
+    """Returns the state of the pixel at a point relative to the lower left corner."""
     row, column = len(mask) - 1 - int(np.floor(y)), int(np.floor(x))
     inside = 0 <= row < mask.shape[0] and 0 <= column < mask.shape[1]
     return bool(mask[row, column]) if inside else True
@@ -74,7 +74,7 @@ def test_edges_are_maximal(mask: Bits) -> None:
         assert not starts & ends
 
 
-def test_a_run_goes_on_where_only_diagonal_neighbours_are_equal() -> None:
+def test_a_run_continues_where_only_diagonally_adjacent_pixels_are_equal() -> None:
     # Above the line the right pixel is off, below it the left one.
     mask = np.array([[1, 1, 1, 1], [1, 1, 0, 1], [1, 0, 1, 1], [1, 1, 1, 1]], bool)
     edges = {tuple(edge) for edge in boundary_edges(mask, 1.0).tolist()}
@@ -82,7 +82,7 @@ def test_a_run_goes_on_where_only_diagonal_neighbours_are_equal() -> None:
     assert (2.0, 3.0, 2.0, 1.0) in edges
 
 
-def test_the_frame_is_the_lower_left_corner() -> None:
+def test_the_origin_is_the_lower_left_corner() -> None:
     mask = np.ones((4, 5), bool)
     mask[0, 1] = False  # top row, second column
     edges = {tuple(sorted([(a, b), (c, d)])) for a, b, c, d in boundary_edges(mask, 0.5).tolist()}
@@ -116,7 +116,7 @@ def test_loops_are_closed_and_keep_on_pixels_to_the_left(mask: Bits) -> None:
         assert len(loop) % 2 == 0
         following = np.roll(loop, -1, axis=0)
         steps = following - loop
-        # Every corner is a turn: horizontal and vertical sides take turns.
+        # Every corner is a turn: horizontal and vertical sides alternate.
         assert ((steps != 0).sum(axis=1) == 1).all()
         assert ((steps[:, 0] != 0) != (np.roll(steps, -1, axis=0)[:, 0] != 0)).all()
         for (x, y), (dx, dy) in zip(loop.tolist(), np.sign(steps).tolist(), strict=True):
@@ -128,15 +128,15 @@ def test_loops_are_closed_and_keep_on_pixels_to_the_left(mask: Bits) -> None:
         doubled_area += int((loop[:, 0] * following[:, 1] - loop[:, 1] * following[:, 0]).sum())
     assert len(pieces) == len(set(pieces))
     assert set(pieces) == naive_pieces(mask)
-    # What is off lies to the right of all loops together, so their area is negative.
+    # The off pixels lie to the right of the loops, so the sum of their signed areas is negative.
     assert doubled_area == -2 * int((~mask).sum())
 
 
 def test_number_of_loops() -> None:
     mask = np.ones((9, 9), bool)
     mask[1:8, 1:8] = False  # a room
-    mask[3:6, 3:6] = True  # a pillar of free space in it
-    mask[4, 4] = False  # and a hole in that
+    mask[3:6, 3:6] = True  # a pillar in it
+    mask[4, 4] = False  # a hole in the pillar
     loops = boundary_loops(mask)
     assert [loop.tolist() for loop in loops] == [
         [[1, 8], [8, 8], [8, 1], [1, 1]],
@@ -145,7 +145,7 @@ def test_number_of_loops() -> None:
     ]
 
 
-def test_on_pixels_are_connected_by_their_sides_only() -> None:
+def test_on_pixels_are_connected_only_through_sides() -> None:
     on_diagonal = np.zeros((4, 4), bool)
     on_diagonal[1, 1] = on_diagonal[2, 2] = True
     assert sorted(len(loop) for loop in boundary_loops(on_diagonal)) == [4, 4, 4]
@@ -160,7 +160,7 @@ def test_an_empty_bitmap_has_no_boundary(shape: tuple[int, int]) -> None:
     assert boundary_loops(mask) == []
 
 
-def test_types_and_strides_of_the_mask() -> None:
+def test_masks_of_all_types_and_strides_are_accepted() -> None:
     mask = np.arange(48).reshape(6, 8) % 5 == 0
     expected = boundary_edges(mask, 1.0)
     assert expected.dtype == np.float32
@@ -180,7 +180,7 @@ def test_types_and_strides_of_the_mask() -> None:
         (np.zeros((2, 2), np.int8), r"int8 with shape \(2, 2\)"),
     ],
 )
-def test_a_wrong_mask_is_refused(mask: Bits, got: str) -> None:
+def test_an_invalid_mask_is_rejected(mask: Bits, got: str) -> None:
     message = f"mask must be a two-dimensional array of bool or uint8, got {got}"
     with pytest.raises(ValueError, match=message):
         boundary_edges(mask, 1.0)
@@ -189,13 +189,13 @@ def test_a_wrong_mask_is_refused(mask: Bits, got: str) -> None:
 
 
 @pytest.mark.parametrize("resolution", [0.0, -0.05, float("nan"), float("inf"), 1e-50, 1e38])
-def test_a_wrong_resolution_is_refused(resolution: float) -> None:
+def test_an_invalid_resolution_is_rejected(resolution: float) -> None:
     with pytest.raises(ValueError, match="resolution must be positive"):
         boundary_edges(np.zeros((10, 10), bool), resolution)
 
 
 @pytest.mark.threads
-def test_other_threads_run_meanwhile() -> None:
+def test_the_gil_is_released() -> None:
     mask = np.zeros((6000, 6000), bool)
     mask[::2, ::2] = True
     seen: list[float] = []

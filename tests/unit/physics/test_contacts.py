@@ -1,4 +1,4 @@
-"""Contact events, live contacts and the pre-solve hook."""
+"""Contact events, current contacts and the pre-solve hook."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def add_disc(world: PhysicsWorld, x: float, speed: float = 0.0, **options: Any) 
 
 
 def run_until(world: PhysicsWorld, kind: str) -> list[ContactEvent]:
-    """Steps until an event of a kind; returns the events of that step."""
+    """Steps until an event of a kind occurs and returns the events of that step."""
     for _ in range(1000):
         world.step(STEP, 10, 10)
         events = world.take_contact_events()
@@ -53,7 +53,7 @@ def run_until(world: PhysicsWorld, kind: str) -> list[ContactEvent]:
     raise AssertionError(f"no {kind} in 1000 steps")
 
 
-def test_a_bump_from_begin_to_end(world: PhysicsWorld) -> None:
+def test_events_of_a_collision_from_begin_to_end(world: PhysicsWorld) -> None:
     wall = add_wall(world)
     disc = add_disc(world, -2, speed=2)
     begin, *rest = run_until(world, "begin")
@@ -67,7 +67,7 @@ def test_a_bump_from_begin_to_end(world: PhysicsWorld) -> None:
     np.testing.assert_allclose(begin.normal, [towards_b, 0], atol=1e-6)
     assert begin.normal_impulses.tolist() == [0]
 
-    # The wall takes all momentum of the disc, without friction.
+    # The wall absorbs the momentum of the disc, without friction.
     solved = [e for e in rest if e.kind == "post_solve"] or run_until(world, "post_solve")
     impulse = sum(float(e.normal_impulses.sum()) for e in solved)
     assert impulse == pytest.approx(2 * disc.mass, rel=1e-3)
@@ -82,7 +82,7 @@ def test_a_bump_from_begin_to_end(world: PhysicsWorld) -> None:
     assert world.contacts() == []
 
 
-def test_friction_gives_a_tangent_impulse(world: PhysicsWorld) -> None:
+def test_friction_causes_a_tangent_impulse(world: PhysicsWorld) -> None:
     wall = world.create_body("static", (0, 0, 0))
     wall.create_edges([[0, -5, 0, 5]], friction=0.5)
     disc = add_disc(world, -0.505, friction=0.5)
@@ -93,7 +93,7 @@ def test_friction_gives_a_tangent_impulse(world: PhysicsWorld) -> None:
     assert tangent == pytest.approx(0.5 * normal, rel=1e-3)
 
 
-def test_a_face_that_meets_a_face_has_two_points(world: PhysicsWorld) -> None:
+def test_a_contact_of_two_faces_has_two_points(world: PhysicsWorld) -> None:
     wall = add_wall(world)
     box = world.create_body("dynamic", (-1.5, 0, 0))
     box.create_polygon([(-1, -0.5), (1, -0.5), (1, 0.5), (-1, 0.5)], density=1)
@@ -123,7 +123,7 @@ def test_sensors_begin_and_end_without_points(world: PhysicsWorld) -> None:
     assert disc.velocity == pytest.approx((3, 0, 0)), "a sensor does not push"
 
 
-def test_nothing_is_recorded_unless_asked_for(world: PhysicsWorld) -> None:
+def test_events_are_recorded_only_on_request(world: PhysicsWorld) -> None:
     world.record_contacts = False
     add_wall(world)
     disc = add_disc(world, -1, speed=2)
@@ -131,7 +131,7 @@ def test_nothing_is_recorded_unless_asked_for(world: PhysicsWorld) -> None:
         world.step(STEP, 10, 10)
     assert world.take_contact_events() == []
     (live,) = world.contacts()
-    # A contact that began unseen keeps its number when recording starts.
+    # A contact that began before the recording keeps its id.
     world.record_contacts = True
     disc.set_velocity(-1, 0, 0)
     events = run_until(world, "end")
@@ -139,7 +139,7 @@ def test_nothing_is_recorded_unless_asked_for(world: PhysicsWorld) -> None:
     assert "begin" not in {event.kind for event in events}
 
 
-def test_events_come_in_order_and_once(world: PhysicsWorld) -> None:
+def test_events_are_returned_once_and_in_order(world: PhysicsWorld) -> None:
     add_wall(world)
     add_disc(world, -1, speed=2)
     for _ in range(100):
@@ -176,7 +176,7 @@ def test_moving_a_body_away_ends_its_contacts(world: PhysicsWorld) -> None:
     assert end.contact_id == begin.contact_id
 
 
-def test_each_contact_has_a_number_of_its_own(world: PhysicsWorld) -> None:
+def test_each_contact_has_a_unique_id(world: PhysicsWorld) -> None:
     add_wall(world)
     disc = add_disc(world, -1, speed=2)
     numbers = []
@@ -192,7 +192,7 @@ def test_each_contact_has_a_number_of_its_own(world: PhysicsWorld) -> None:
 
 
 @pytest.mark.parametrize(("start", "passes"), [(-2, True), (2, False)])
-def test_a_gate_that_opens_in_one_direction(
+def test_a_gate_that_can_be_passed_in_one_direction(
     world: PhysicsWorld, start: float, passes: bool
 ) -> None:
     gate = add_wall(world)
@@ -209,7 +209,7 @@ def test_a_gate_that_opens_in_one_direction(
     assert world.take_pre_solve_errors() == []
 
 
-def test_only_contacts_of_the_named_bodies_are_shown(world: PhysicsWorld) -> None:
+def test_pre_solve_is_called_only_for_contacts_of_the_given_bodies(world: PhysicsWorld) -> None:
     near, far = add_disc(world, -1, speed=2), add_disc(world, 8, speed=2)
     add_wall(world)
     wall = add_wall(world, 9)
@@ -226,13 +226,13 @@ def test_only_contacts_of_the_named_bodies_are_shown(world: PhysicsWorld) -> Non
     assert near.id in seen[0]
 
 
-def test_what_pre_solve_sees(world: PhysicsWorld) -> None:
+def test_arguments_of_pre_solve(world: PhysicsWorld) -> None:
     wall = world.create_body("static", (0, 0, 0))
     wall.create_edges([[0, -5, 0, 5]], friction=0.25, restitution=0.5)
     disc = add_disc(world, -1, speed=2, friction=1.0)
     seen: list[dict[str, Any]] = []
 
-    def look(contact: PreSolveContact, old: OldManifold) -> None:
+    def record(contact: PreSolveContact, old: OldManifold) -> None:
         seen.append(
             {
                 "id": contact.contact_id,
@@ -247,7 +247,7 @@ def test_what_pre_solve_sees(world: PhysicsWorld) -> None:
             }
         )
 
-    world.pre_solve = look
+    world.pre_solve = record
     world.pre_solve_bodies = {disc.id}
     begin = run_until(world, "begin")[0]
     first = seen[0]
@@ -287,7 +287,7 @@ def test_pre_solve_changes_how_contacts_are_solved(world: PhysicsWorld) -> None:
     assert world.take_pre_solve_errors() == []
 
 
-def test_bad_values_are_refused_in_pre_solve(world: PhysicsWorld) -> None:
+def test_invalid_values_are_rejected_in_pre_solve(world: PhysicsWorld) -> None:
     wall = add_wall(world)
     add_disc(world, -0.505, speed=2)
     world.pre_solve_bodies = {wall.id}
@@ -299,7 +299,7 @@ def test_bad_values_are_refused_in_pre_solve(world: PhysicsWorld) -> None:
         assert all(isinstance(error, ValueError) and name in str(error) for error in errors)
 
 
-def test_errors_in_pre_solve_are_kept(world: PhysicsWorld) -> None:
+def test_errors_in_pre_solve_are_returned_after_the_step(world: PhysicsWorld) -> None:
     wall = add_wall(world)
     disc = add_disc(world, -1, speed=2)
 
@@ -315,7 +315,7 @@ def test_errors_in_pre_solve_are_kept(world: PhysicsWorld) -> None:
     assert world.take_pre_solve_errors() == []
     for _ in range(20):
         world.step(STEP, 10, 10)
-    assert disc.pose[0] < -0.45, "the contact is solved as if nobody had looked"
+    assert disc.pose[0] < -0.45, "the contact must be solved without changes"
 
 
 @pytest.mark.parametrize(
@@ -338,7 +338,7 @@ def test_errors_in_pre_solve_are_kept(world: PhysicsWorld) -> None:
         lambda world, disc: world.close(),
     ],
 )
-def test_pre_solve_may_not_change_the_world(world: PhysicsWorld, change: Any) -> None:
+def test_pre_solve_cannot_change_the_world(world: PhysicsWorld, change: Any) -> None:
     wall = add_wall(world)
     disc = add_disc(world, -0.505, speed=2)
     world.pre_solve = lambda *_: change(world, disc)
@@ -360,11 +360,11 @@ def test_a_contact_is_stale_after_pre_solve(world: PhysicsWorld) -> None:
     world.pre_solve_bodies = {wall.id}
     world.step(STEP, 10, 10)
     assert kept[0].points.shape == (1, 2)
-    with pytest.raises(StaleHandleError, match="only inside of the pre_solve call"):
+    with pytest.raises(StaleHandleError, match="only during the call of pre_solve"):
         kept[0].enabled = False
 
 
-def test_a_hook_that_holds_the_world_does_not_keep_it_alive() -> None:
+def test_a_hook_that_references_the_world_does_not_keep_it_alive() -> None:
     class Owner:
         def __init__(self) -> None:
             self.physics = PhysicsWorld()

@@ -48,7 +48,7 @@ def test_a_revolute_joint_holds_the_anchors_together(world: PhysicsWorld) -> Non
     assert theta > 0.5
 
 
-def test_limits_hold(world: PhysicsWorld) -> None:
+def test_limits_restrict_the_angle(world: PhysicsWorld) -> None:
     post, door = box(world, 0, "static"), box(world, 1)
     joint = world.create_revolute_joint(post, door, (0.5, 0), (-0.5, 0), limits=(-0.25, 0.5))
     assert joint.limits == (-0.25, 0.5)
@@ -68,7 +68,7 @@ def test_limits_hold(world: PhysicsWorld) -> None:
     assert door.pose[2] > 1.5
 
 
-def test_connected_bodies_collide_only_when_asked_to(world: PhysicsWorld) -> None:
+def test_connected_bodies_collide_only_on_request(world: PhysicsWorld) -> None:
     pairs = []
     for i, collide in enumerate((False, True)):
         a = world.create_body("dynamic", (0, 10 * i, 0))
@@ -77,7 +77,7 @@ def test_connected_bodies_collide_only_when_asked_to(world: PhysicsWorld) -> Non
             body.create_circle((0, 0), 0.5, density=1)
         joint = world.create_revolute_joint(a, b, (0, 1), (0, 1), collide_connected=collide)
         assert joint.collide_connected == collide
-        # An anchor apart by what the bodies are apart: the joint itself is satisfied far away.
+        # Replace the joint by one whose anchors coincide, so that it exerts no force.
         joint.destroy()
         joint = world.create_revolute_joint(a, b, (0.3, 0), (-0.3, 0), collide_connected=collide)
         pairs.append((a, b))
@@ -86,7 +86,7 @@ def test_connected_bodies_collide_only_when_asked_to(world: PhysicsWorld) -> Non
     assert touching == {frozenset(body.id for body in pairs[1])}
 
 
-def test_a_rigid_weld_moves_as_one(world: PhysicsWorld) -> None:
+def test_rigidly_welded_bodies_move_as_one(world: PhysicsWorld) -> None:
     a, b = box(world), box(world, 1)
     joint = world.create_weld_joint(a, b, (0.5, 0), (-0.5, 0))
     assert (joint.type, joint.frequency, joint.damping, joint.limits) == ("weld", 0, 0, None)
@@ -98,7 +98,7 @@ def test_a_rigid_weld_moves_as_one(world: PhysicsWorld) -> None:
 
 @pytest.mark.parametrize("frequency", [0, 10])
 def test_a_welded_body_without_mass_is_carried_along(world: PhysicsWorld, frequency: float) -> None:
-    """Wheels and sensors of density 0 are welded to the reference's own robots."""
+    """The robots of the reference have welded wheels and sensors with a density of 0."""
     robot = box(world)
     wheel = world.create_body("dynamic", (1, 0, 0))
     wheel.create_circle((0, 0), 0.2, density=0)
@@ -110,7 +110,7 @@ def test_a_welded_body_without_mass_is_carried_along(world: PhysicsWorld, freque
     assert wheel.pose == pytest.approx((2, 0, 0), abs=0.02)
 
 
-def test_a_weld_holds_its_reference_angle(world: PhysicsWorld) -> None:
+def test_a_weld_maintains_its_reference_angle(world: PhysicsWorld) -> None:
     a = box(world, 0, "static")
     b = world.create_body("dynamic", (0, 5, 0.5))
     b.create_circle((0, 0), 0.3, density=1)
@@ -120,8 +120,8 @@ def test_a_weld_holds_its_reference_angle(world: PhysicsWorld) -> None:
     assert b.pose == pytest.approx((0, 5, 0.5), abs=0.01)
 
 
-def test_a_weld_with_a_frequency_swings_at_it(world: PhysicsWorld) -> None:
-    """Box2D 2.4 wants stiffness; converted for the inertia of the bodies, it is this frequency."""
+def test_a_weld_with_a_spring_oscillates_at_its_frequency(world: PhysicsWorld) -> None:
+    """The frequency is converted to the stiffness that Box2D 2.4 requires."""
     wall = world.create_body("static", (0, 0, 0))
     rotor = world.create_body("dynamic", (0, 0, 0.2))
     rotor.create_circle((0, 0), 0.5, density=3)
@@ -145,7 +145,7 @@ def test_a_damped_weld_comes_to_rest(world: PhysicsWorld) -> None:
     assert rotor.pose[2] == pytest.approx(0, abs=1e-3)
 
 
-def test_a_destroyed_joint_lets_go(world: PhysicsWorld) -> None:
+def test_a_destroyed_joint_releases_its_bodies(world: PhysicsWorld) -> None:
     post, door = box(world, 0, "static"), box(world, 1)
     joint = world.create_weld_joint(post, door, (0.5, 0), (-0.5, 0))
     joint.destroy()

@@ -1,4 +1,4 @@
-"""Handles of things that are gone: an exception, never a crash."""
+"""Lifetimes: the use of a stale handle raises an exception."""
 
 from __future__ import annotations
 
@@ -85,7 +85,7 @@ def make_pair(world: PhysicsWorld) -> tuple[PhysicsBody, PhysicsBody, PhysicsFix
     return a, b, fixture, world.create_revolute_joint(a, b, (0, 0), (0, 0))
 
 
-def test_a_destroyed_body_takes_fixtures_and_joints_along() -> None:
+def test_destroying_a_body_destroys_its_fixtures_and_joints() -> None:
     world = PhysicsWorld()
     a, b, fixture, joint = make_pair(world)
     a.create_edges([[0, 0, 1, 1]])
@@ -126,7 +126,7 @@ def test_all_handles_of_a_closed_world_are_stale() -> None:
             use(subject)
 
 
-def test_ids_are_not_used_again() -> None:
+def test_ids_are_not_reused() -> None:
     world = PhysicsWorld()
     seen = set()
     for _ in range(1000):
@@ -145,7 +145,7 @@ def test_ids_are_not_used_again() -> None:
     world.close()
 
 
-def test_an_id_of_another_kind_finds_nothing() -> None:
+def test_the_id_of_an_object_of_another_kind_is_invalid() -> None:
     world = PhysicsWorld()
     body = world.create_body("static", (0, 0, 0))
     fixture = body.create_circle((0, 0), 1, density=0)
@@ -157,7 +157,7 @@ def test_an_id_of_another_kind_finds_nothing() -> None:
     world.close()
 
 
-def test_handles_compare_by_world_and_id() -> None:
+def test_handles_are_compared_by_world_and_id() -> None:
     worlds = PhysicsWorld(), PhysicsWorld()
     bodies = [world.create_body("static", (0, 0, 0)) for world in worlds]
     assert bodies[0].id == bodies[1].id
@@ -206,9 +206,9 @@ def test_results_outlive_the_world() -> None:
         _ = hit.fixture.shape
 
 
-def test_a_world_that_nobody_holds_is_freed() -> None:
+def test_a_world_without_references_is_freed() -> None:
     class Tracked(PhysicsWorld):
-        """With room for a weak reference."""
+        """A world that supports weak references."""
 
     world = Tracked()
     world.create_body("static", (0, 0, 0)).create_edges(np.random.default_rng(1).random((1000, 4)))
@@ -217,8 +217,8 @@ def test_a_world_that_nobody_holds_is_freed() -> None:
     assert reference() is None, "without help of the garbage collector"
 
 
-def test_many_bodies_come_and_go() -> None:
-    """Slots, contacts, joints and ray structures survive heavy use in random order."""
+def test_many_bodies_are_created_and_destroyed() -> None:
+    """Slots, contacts, joints and ray trees remain consistent under random operations."""
     rng = np.random.default_rng(3)
     world = PhysicsWorld()
     world.record_contacts = True
@@ -246,8 +246,8 @@ def test_many_bodies_come_and_go() -> None:
     world.close()
 
 
-def test_a_large_map_that_never_stepped_goes_quickly() -> None:
-    """Box2D looks through all new fixtures for each one that is destroyed, unless helped."""
+def test_a_large_map_is_destroyed_before_the_first_step() -> None:
+    """Without the optimization, Box2D takes quadratic time for fixtures that are still pending."""
     world = PhysicsWorld()
     wall = world.create_body("static", (0, 0, 0))
     rng = np.random.default_rng(1)

@@ -1,4 +1,4 @@
-"""Overlap queries against closed forms, and against the Minkowski difference of the shapes."""
+"""Overlap queries, compared with closed forms and with the Minkowski difference of shapes."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def wall(world: PhysicsWorld, *edges: tuple[float, float, float, float]) -> Phys
 
 
 def gap(world: PhysicsWorld, body: PhysicsBody, pose: Pose) -> float:
-    """The least gap at which the pose counts as blocked, by bisection."""
+    """Returns the smallest `least_gap` with which the pose is blocked, found by bisection."""
     low, high = -5.0, 5.0
     while high - low > 1e-6:
         middle = (low + high) / 2
@@ -57,9 +57,9 @@ def gap(world: PhysicsWorld, body: PhysicsBody, pose: Pose) -> float:
         ((3.0, 0.0, 0.0), 2.0),  # beside the face
         ((1.0, 0.0, 0.0), 0.0),  # face on face
         ((0.9, 0.0, 0.0), -0.1),
-        ((0.9, 0.95, 0.0), -0.05),  # out by the nearer side
+        ((0.9, 0.95, 0.0), -0.05),  # exit through the nearer side
         ((4.0, 5.0, 0.0), 5.0),  # corner to corner: 3, 4, 5
-        ((0.0, 0.0, 0.0), -1.0),  # one upon the other
+        ((0.0, 0.0, 0.0), -1.0),  # coincident
         ((0.5 + math.sqrt(0.5), 0.0, math.pi / 4), 0.0),  # corner on face
     ],
 )
@@ -73,10 +73,10 @@ def test_gap_between_squares(pose: Pose, expected: float) -> None:
 @pytest.mark.parametrize(
     ("x", "y", "expected"),
     [
-        (2.0, 0.0, 1.2),  # 0.5 to the face, 0.3 to the rim
+        (2.0, 0.0, 1.2),  # face at 0.5, radius 0.3
         (0.8, 0.0, 0.0),
         (0.5 + 3.0, 0.5 + 4.0, 4.7),  # to the corner
-        (0.0, 0.4, -0.4),  # the centre 0.1 below the face
+        (0.0, 0.4, -0.4),  # center 0.1 below the face
         (0.0, 0.0, -0.8),
     ],
 )
@@ -90,11 +90,11 @@ def test_gap_between_disc_and_square(x: float, y: float, expected: float) -> Non
     ("x", "y", "expected"),
     [
         (0.0, 1.0, 0.7),
-        (0.0, -1.0, 0.7),  # from both sides
+        (0.0, -1.0, 0.7),  # from the other side
         (0.5, 0.1, -0.2),
-        (1.0, 0.0, -0.3),  # on the end
-        (4.0, 4.0, 4.7),  # past the end: 3, 4, 5
-        (2.0, 0.0, 0.7),  # on the line, past the end
+        (1.0, 0.0, -0.3),  # on the end point
+        (4.0, 4.0, 4.7),  # beyond the end point: 3, 4, 5
+        (2.0, 0.0, 0.7),  # on the line, beyond the end point
     ],
 )
 def test_gap_between_disc_and_edge(x: float, y: float, expected: float) -> None:
@@ -119,7 +119,7 @@ def test_gap_between_discs(x: float, expected: float) -> None:
     assert gap(world, disc(world, 9, 9, 0.3), (x, 0, 0)) == pytest.approx(expected, abs=1e-5)
 
 
-def test_a_closed_loop_of_edges_has_no_inside() -> None:
+def test_a_closed_loop_of_edges_has_no_interior() -> None:
     world = PhysicsWorld()
     wall(world, (-2, -2, 2, -2), (2, -2, 2, 2), (2, 2, -2, 2), (-2, 2, -2, -2))
     body = box(world, (9, 9, 0))
@@ -127,7 +127,7 @@ def test_a_closed_loop_of_edges_has_no_inside() -> None:
     assert len(world.overlapping_bodies([body], (1.6, 0, 0))) == 1
 
 
-# -- which fixtures count -----------------------------------------------------------------------
+# -- fixtures that are considered ---------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
@@ -143,7 +143,7 @@ def test_a_closed_loop_of_edges_has_no_inside() -> None:
         ({}, {"is_sensor": True}, False),
     ],
 )
-def test_only_what_the_solver_collides_counts(
+def test_only_fixtures_that_can_collide_are_considered(
     mine: dict[str, int], other: dict[str, int], counts: bool
 ) -> None:
     world = PhysicsWorld()
@@ -166,7 +166,7 @@ def test_one_of_two_bodies_must_be_dynamic(mine: str, other: str) -> None:
 
 
 @pytest.mark.parametrize("collide", [False, True])
-def test_a_joint_may_exclude_the_collision(collide: bool) -> None:
+def test_a_joint_can_prevent_the_collision(collide: bool) -> None:
     world = PhysicsWorld()
     first, second = box(world, (0, 0, 0)), box(world, (3, 0, 0))
     world.create_revolute_joint(first, second, (1.5, 0), (-1.5, 0), collide_connected=collide)
@@ -187,7 +187,7 @@ def test_bodies_of_the_probe_move_together_and_ignore_each_other() -> None:
     ).tolist() == [False, True, False]
 
 
-def test_discs_of_layers_and_of_chosen_bodies() -> None:
+def test_discs_consider_their_layers_and_the_given_bodies() -> None:
     world = PhysicsWorld()
     walls = world.create_body("static", (0, 0, 0))
     walls.create_edges([(0, -5, 0, 5)], category_bits=1, mask_bits=1)
@@ -202,11 +202,11 @@ def test_discs_of_layers_and_of_chosen_bodies() -> None:
     assert world.free_discs(poses, 0.3, 3, least_gap=0.25).tolist() == [False, False, False]
 
 
-# -- any shapes ---------------------------------------------------------------------------------
+# -- random shapes ------------------------------------------------------------------------------
 
 
 def core(body: PhysicsBody, fixture: PhysicsFixture) -> Points:
-    """Corners of a fixture, or the centre of a disc, in the world frame, shape (n, 2)."""
+    """Returns the corners of a fixture or the center of a disc in the world frame, shape (n, 2)."""
     points = np.array([fixture.center]) if fixture.shape == "circle" else fixture.vertices
     x, y, theta = body.pose
     turn = np.array([[math.cos(theta), -math.sin(theta)], [math.sin(theta), math.cos(theta)]])
@@ -214,7 +214,7 @@ def core(body: PhysicsBody, fixture: PhysicsFixture) -> Points:
 
 
 def hull(points: Points) -> Points:
-    """Andrew's monotone chain, counter-clockwise."""
+    """Returns the counter-clockwise convex hull, by Andrew's monotone chain."""
     ordered = sorted(map(tuple, points.tolist()))
     chains: list[list[tuple[float, ...]]] = []
     for run in (ordered, ordered[::-1]):
@@ -231,9 +231,9 @@ def hull(points: Points) -> Points:
 
 
 def signed_distance(first: Points, second: Points) -> float:
-    """Distance of two convex hulls, negative: how far one must move to touch from outside.
+    """Returns the distance of two convex hulls, or their negative penetration depth.
 
-    That of the origin to the hull of all differences of their points.
+    This is the distance of the origin from the hull of all differences of their points.
     """
     corners = hull((second[:, np.newaxis] - first).reshape(-1, 2))
     along = np.roll(corners, -1, axis=0) - corners
@@ -301,13 +301,13 @@ def test_queries_agree_with_the_minkowski_difference(seed: int, least_gap: float
                 for mine in body.fixtures
                 for theirs in other.fixtures
             )
-            if abs(least - least_gap) > 1e-4:  # a hair decides otherwise
+            if abs(least - least_gap) > 1e-4:  # within the rounding errors
                 assert (other in overlapped) is (least < least_gap), least
         bodies[0].set_pose(*start)
         bodies[1].set_pose(*rest)
 
 
-# -- bad arguments ------------------------------------------------------------------------------
+# -- invalid arguments --------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
@@ -319,7 +319,7 @@ def test_queries_agree_with_the_minkowski_difference(seed: int, least_gap: float
         ([(1e300, 0, 0)], r"poses\[0, 0\] must be finite and within"),
     ],
 )
-def test_bad_poses(poses: object, text: str) -> None:
+def test_invalid_poses_are_rejected(poses: object, text: str) -> None:
     world = PhysicsWorld()
     body = disc(world, 0, 0, 1)
     with pytest.raises(ValueError, match=text):
@@ -328,7 +328,7 @@ def test_bad_poses(poses: object, text: str) -> None:
         world.free_discs(poses, 1, 1)  # type: ignore[arg-type]
 
 
-def test_bad_numbers_and_bodies() -> None:
+def test_invalid_numbers_and_bodies_are_rejected() -> None:
     world = PhysicsWorld()
     body = disc(world, 0, 0, 1)
     with pytest.raises(ValueError, match="pose must be finite"):
@@ -354,7 +354,7 @@ def test_bad_numbers_and_bodies() -> None:
         world.free_discs([(0, 0, 0)], 1, 1)
 
 
-def test_a_stepping_world_refuses_other_threads() -> None:
+def test_queries_in_other_threads_are_rejected_during_a_step() -> None:
     world = PhysicsWorld()
     first = disc(world, 0, 0, 1)
     disc(world, 0.5, 0, 1)

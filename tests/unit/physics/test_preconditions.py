@@ -1,5 +1,5 @@
-"""Every precondition of Box2D is checked before it: where Debian's build would abort the process,
-an exception with a clear text comes instead, and the world goes on.
+"""Preconditions of Box2D: a violation raises an exception instead of aborting the process, and the
+world remains usable.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ BAD_NUMBERS = [NAN, INF, -INF, 1e30]
 def world() -> Iterator[PhysicsWorld]:
     world = PhysicsWorld()
     yield world
-    # Whatever was refused, the world still steps.
+    # The world can still be stepped after an error.
     world.step(0.01, 10, 10)
     world.close()
 
@@ -35,7 +35,7 @@ def body(world: PhysicsWorld) -> PhysicsBody:
     return body
 
 
-def refused(text: str) -> Any:
+def rejected(text: str) -> Any:
     return pytest.raises(ValueError, match=re.escape(text))
 
 
@@ -84,100 +84,100 @@ def test_numbers_must_be_finite(
 @pytest.mark.parametrize("bad", [NAN, INF])
 def test_joint_numbers_must_be_finite(world: PhysicsWorld, body: PhysicsBody, bad: float) -> None:
     other = world.create_body("dynamic", (0, 0, 0))
-    with refused("anchor_a must be finite"):
+    with rejected("anchor_a must be finite"):
         world.create_revolute_joint(body, other, (bad, 0), (0, 0))
-    with refused("anchor_b must be finite"):
+    with rejected("anchor_b must be finite"):
         world.create_weld_joint(body, other, (0, 0), (0, bad))
-    with refused("lower limit must be finite"):
+    with rejected("lower limit must be finite"):
         world.create_revolute_joint(body, other, (0, 0), (0, 0), limits=(bad, 1.0))
-    with refused("reference_angle must be finite"):
+    with rejected("reference_angle must be finite"):
         world.create_weld_joint(body, other, (0, 0), (0, 0), reference_angle=bad)
-    with refused("frequency must be finite"):
+    with rejected("frequency must be finite"):
         world.create_weld_joint(body, other, (0, 0), (0, 0), frequency=bad)
-    with refused("damping must be finite"):
+    with rejected("damping must be finite"):
         world.create_weld_joint(body, other, (0, 0), (0, 0), damping=bad)
 
 
-def test_the_text_names_the_place_of_a_bad_number(body: PhysicsBody) -> None:
-    with refused("edges[1, 2] must be finite and within +-1e+09, got nan"):
+def test_error_messages_contain_the_index_of_an_invalid_number(body: PhysicsBody) -> None:
+    with rejected("edges[1, 2] must be finite and within +-1e+09, got nan"):
         body.create_edges([[0, 0, 1, 1], [0, 0, NAN, 0]])
-    with refused("points[2] must be finite and within +-1e+09, got (0, inf)"):
+    with rejected("points[2] must be finite and within +-1e+09, got (0, inf)"):
         body.create_polygon([(0, 0), (1, 0), (0, INF)], density=1.0)
 
 
 def test_values_must_not_be_negative(world: PhysicsWorld, body: PhysicsBody) -> None:
     other = world.create_body("dynamic", (0, 0, 0))
-    with refused("linear_damping must not be negative, got -0.5"):
+    with rejected("linear_damping must not be negative, got -0.5"):
         world.create_body("dynamic", (0, 0, 0), linear_damping=-0.5)
-    with refused("angular_damping must not be negative"):
+    with rejected("angular_damping must not be negative"):
         world.create_body("dynamic", (0, 0, 0), angular_damping=-1)
-    with refused("radius must not be negative, got -1"):
+    with rejected("radius must not be negative, got -1"):
         body.create_circle((0, 0), -1, density=1)
-    with refused("density must not be negative"):
+    with rejected("density must not be negative"):
         body.create_circle((0, 0), 1, density=-1)
-    with refused("friction must not be negative"):
+    with rejected("friction must not be negative"):
         body.create_edges([[0, 0, 1, 1]], friction=-1)
-    with refused("restitution must not be negative"):
+    with rejected("restitution must not be negative"):
         body.create_circle((0, 0), 1, density=1, restitution=-1)
-    with refused("frequency must not be negative"):
+    with rejected("frequency must not be negative"):
         world.create_weld_joint(body, other, (0, 0), (0, 0), frequency=-1)
-    with refused("damping must not be negative"):
+    with rejected("damping must not be negative"):
         world.create_weld_joint(body, other, (0, 0), (0, 0), damping=-1)
-    with refused("iterations must not be negative, got -1"):
+    with rejected("iterations must not be negative, got -1"):
         world.step(0.01, -1, 10)
 
 
 @pytest.mark.parametrize("dt", [0.0, -0.01, 1e-9, 1e6])
-def test_time_steps_must_be_sensible(world: PhysicsWorld, dt: float) -> None:
-    with refused("dt must be from 1e-6 to 1000 s, got"):
+def test_time_steps_must_be_in_range(world: PhysicsWorld, dt: float) -> None:
+    with rejected("dt must be from 1e-6 to 1000 s, got"):
         world.step(dt, 10, 10)
 
 
-def test_body_types_are_three(world: PhysicsWorld) -> None:
-    with refused('body_type must be one of: static, kinematic, dynamic, got "soft"'):
+def test_body_types_must_be_known(world: PhysicsWorld) -> None:
+    with rejected('body_type must be one of: static, kinematic, dynamic, got "soft"'):
         world.create_body("soft", (0, 0, 0))
 
 
 @pytest.mark.parametrize("bits", [-1, 0x10000])
-def test_bits_are_sixteen(world: PhysicsWorld, body: PhysicsBody, bits: int) -> None:
-    with refused(f"category_bits must be from 0 to 65535, got {bits}"):
+def test_bits_must_fit_into_16_bits(world: PhysicsWorld, body: PhysicsBody, bits: int) -> None:
+    with rejected(f"category_bits must be from 0 to 65535, got {bits}"):
         body.create_circle((0, 0), 1, density=1, category_bits=bits)
-    with refused(f"mask_bits must be from 0 to 65535, got {bits}"):
+    with rejected(f"mask_bits must be from 0 to 65535, got {bits}"):
         body.create_edges([[0, 0, 1, 1]], mask_bits=bits)
-    with refused(f"mask must be from 0 to 65535, got {bits}"):
+    with rejected(f"mask must be from 0 to 65535, got {bits}"):
         world.cast_rays((0, 0, 0), [[1, 0]], bits)
-    with refused(f"reflect_mask must be from 0 to 65535, got {bits}"):
+    with rejected(f"reflect_mask must be from 0 to 65535, got {bits}"):
         world.cast_rays((0, 0, 0), [[1, 0]], 1, bits)
-    with refused(f"category_bits must be from 0 to 65535, got {bits}"):
+    with rejected(f"category_bits must be from 0 to 65535, got {bits}"):
         body.fixtures[0].category_bits = bits
 
 
-def test_shapes_of_arrays(world: PhysicsWorld, body: PhysicsBody) -> None:
-    with refused("ends must have shape (n, 2), got (5, 3)"):
+def test_arrays_must_have_the_right_shape(world: PhysicsWorld, body: PhysicsBody) -> None:
+    with rejected("ends must have shape (n, 2), got (5, 3)"):
         world.cast_rays((0, 0, 0), np.zeros((5, 3)), 1)
-    with refused("ends must have shape (n, 2), got (4,)"):
+    with rejected("ends must have shape (n, 2), got (4,)"):
         world.cast_rays((0, 0, 0), np.zeros(4), 1)
-    with refused("edges must have shape (n, 4), got (5, 3)"):
+    with rejected("edges must have shape (n, 4), got (5, 3)"):
         body.create_edges(np.zeros((5, 3)))
-    with refused("points must have shape (n, 2), got (5, 3)"):
+    with rejected("points must have shape (n, 2), got (5, 3)"):
         body.create_polygon(np.zeros((5, 3)), density=1)
 
 
 @pytest.mark.parametrize("count", [0, 1, 2, 9, 20])
-def test_polygons_have_3_to_8_points(body: PhysicsBody, count: int) -> None:
+def test_polygons_must_have_3_to_8_points(body: PhysicsBody, count: int) -> None:
     angles = np.linspace(0, 6, count)
-    with refused(f"a polygon must have 3 to 8 points, got {count}"):
+    with rejected(f"a polygon must have 3 to 8 points, got {count}"):
         body.create_polygon(np.stack([np.cos(angles), np.sin(angles)], 1), density=1)
 
 
-def test_polygon_points_must_lie_apart(body: PhysicsBody) -> None:
-    text = "a polygon must have at least 3 points that are 2.5 mm or more from each other, got 2"
-    with refused(text):
+def test_polygon_points_must_be_distinct(body: PhysicsBody) -> None:
+    text = "a polygon must have at least 3 points that are at least 2.5 mm apart, got 2"
+    with rejected(text):
         body.create_polygon([(0, 0), (0, 0), (1, 0)], density=1)
-    # Box2D joins points that are closer than 2.5 mm, each with those kept before it.
-    with refused(text):
+    # Box2D drops points that are closer than 2.5 mm to a point that it has kept.
+    with rejected(text):
         body.create_polygon([(0, 0), (0.0024, 0), (1, 0)], density=1)
-    with refused(text):
+    with rejected(text):
         body.create_polygon([(0, 0), (0.0024, 0), (1, 0), (1.0017, 0.0017)], density=1)
     body.create_polygon([(0, 0), (0.0026, 0), (0, 0.0026)], density=1)
 
@@ -193,12 +193,12 @@ def test_polygon_points_must_lie_apart(body: PhysicsBody) -> None:
     ],
 )
 def test_polygons_must_have_area(body: PhysicsBody, points: list[tuple[float, float]]) -> None:
-    with refused("a polygon must have an area, but its points lie on a line"):
+    with rejected("a polygon must have a positive area, but its points are collinear"):
         body.create_polygon(points, density=1)
 
 
-def test_no_polygon_aborts() -> None:
-    """Nearly degenerate polygons of all sizes: refused or made, but the process lives."""
+def test_no_polygon_aborts_the_process() -> None:
+    """Nearly degenerate polygons of all sizes are either created or rejected."""
     rng = np.random.default_rng(7)
     made = 0
     world = PhysicsWorld()
@@ -220,26 +220,26 @@ def test_no_polygon_aborts() -> None:
     world.close()
 
 
-def test_the_hull_of_points_is_taken(body: PhysicsBody) -> None:
+def test_a_polygon_is_the_convex_hull_of_its_points(body: PhysicsBody) -> None:
     square = [(0, 0), (2, 0), (1, 1), (2, 2), (0, 2), (1, 1)]
     vertices = body.create_polygon(square, density=1).vertices
     assert sorted(map(tuple, vertices.tolist())) == [(0, 0), (0, 2), (2, 0), (2, 2)]
 
 
-def test_the_inertia_must_not_vanish_beside_that_about_the_origin(world: PhysicsWorld) -> None:
+def test_the_central_inertia_must_not_be_negligible(world: PhysicsWorld) -> None:
     body = world.create_body("dynamic", (0, 0, 0))
-    with refused("is the shape tiny and far from the body's origin?"):
+    with rejected("a shape may be too small and too far from the origin of the body"):
         body.create_circle((10000, 0), 0.01, density=1)
-    with refused("the mass of a body must be 0 or from 1e-20 to 1e15 kg"):
+    with rejected("the mass of a body must be 0 or from 1e-20 to 1e15 kg"):
         body.create_circle((0, 0), 1e6, density=1e9)
     assert body.mass == 1
     assert body.fixtures == []
-    # A static body has no mass that could go wrong.
+    # The mass of a static body is irrelevant.
     world.create_body("static", (0, 0, 0)).create_circle((10000, 0), 0.01, density=1)
 
 
 def test_circles_without_radius_are_points(world: PhysicsWorld) -> None:
-    """Such a footprint is allowed: it adds no mass, walls stop it, and the solver is not upset."""
+    """Such footprints are valid: they add no mass, walls stop them, and the solver is stable."""
     wall = world.create_body("static", (0, 0, 0))
     wall.create_edges([[1, -1, 1, 1]])
     wall.create_circle((1.5, 0), 0, density=1)
@@ -255,48 +255,48 @@ def test_circles_without_radius_are_points(world: PhysicsWorld) -> None:
     ]
 
 
-def test_forces_beyond_what_the_mass_can_take(world: PhysicsWorld) -> None:
+def test_forces_must_be_in_range_for_the_mass(world: PhysicsWorld) -> None:
     light = world.create_body("dynamic", (0, 0, 0))
     light.create_circle((0, 0), 0.01, density=1e-9)
-    with refused("force is too large for the body's mass"):
+    with rejected("force is too large for the mass of the body"):
         light.apply_force((1e8, 0), (0, 0))
-    with refused("force is too large for the body's mass"):
+    with rejected("force is too large for the mass of the body"):
         light.apply_force((0, 1e-6), (1e9, 0))
-    with refused("torque is too large for the body's mass"):
+    with rejected("torque is too large for the mass of the body"):
         light.apply_torque(1e8)
 
 
-def test_joints_connect_two_bodies_of_the_world(world: PhysicsWorld, body: PhysicsBody) -> None:
-    with refused("a joint must connect two different bodies"):
+def test_joints_must_connect_two_bodies_of_a_world(world: PhysicsWorld, body: PhysicsBody) -> None:
+    with rejected("a joint must connect two different bodies"):
         world.create_revolute_joint(body, body, (0, 0), (1, 0))
-    with refused("a joint must connect two different bodies"):
+    with rejected("a joint must connect two different bodies"):
         world.create_weld_joint(body, body, (0, 0), (1, 0))
     other_world = PhysicsWorld()
     stranger = other_world.create_body("dynamic", (0, 0, 0))
-    with refused("a joint must connect bodies of its own world"):
+    with rejected("a joint must connect bodies of its own world"):
         world.create_weld_joint(body, stranger, (0, 0), (0, 0))
     other_world.close()
 
 
-def test_joint_limits_are_in_order(world: PhysicsWorld, body: PhysicsBody) -> None:
+def test_joint_limits_must_be_in_order(world: PhysicsWorld, body: PhysicsBody) -> None:
     other = world.create_body("dynamic", (0, 0, 0))
-    with refused("the lower limit must not be above the upper one, got (1, -1)"):
+    with rejected("the lower limit must not be greater than the upper limit, got (1, -1)"):
         world.create_revolute_joint(body, other, (0, 0), (0, 0), limits=(1.0, -1.0))
     joint = world.create_revolute_joint(body, other, (0, 0), (0, 0))
-    with refused("the lower limit must not be above the upper one, got (2, 1.5)"):
+    with rejected("the lower limit must not be greater than the upper limit, got (2, 1.5)"):
         joint.set_limits(2, 1.5)
     weld = world.create_weld_joint(body, other, (0, 0), (0, 0))
-    with pytest.raises(PhysicsError, match="only a revolute joint has limits"):
+    with pytest.raises(PhysicsError, match="only revolute joints have limits"):
         weld.set_limits(0, 1)
 
 
-def test_nothing_is_made_when_one_edge_is_bad(body: PhysicsBody) -> None:
-    with refused("edges[1, 3]"):
+def test_no_edge_is_created_if_one_is_invalid(body: PhysicsBody) -> None:
+    with rejected("edges[1, 3]"):
         body.create_edges([[0, 0, 1, 1], [0, 0, 1, NAN]])
     assert len(body.fixtures) == 1
 
 
-def test_edges_without_length_are_left_out(world: PhysicsWorld) -> None:
+def test_edges_of_zero_length_are_skipped(world: PhysicsWorld) -> None:
     wall = world.create_body("static", (0, 0, 0))
     edges = [[1, 1, 1, 1], [0, 0, 0, 1], [5, 5, 5, 5 + 1e-8]]
     assert wall.create_edges(edges) == 1

@@ -1,4 +1,4 @@
-"""Single rays and scans against what geometry says."""
+"""Single rays and scans, compared with analytic results."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ def test_a_scan_in_a_room(world: PhysicsWorld) -> None:
     assert (reflect.dtype, reflect.any()) == (np.bool_, False)
 
 
-def test_misses_and_rays_without_length_are_nan(world: PhysicsWorld) -> None:
+def test_misses_and_rays_of_zero_length_are_nan(world: PhysicsWorld) -> None:
     add_room(world)
     ends = [[4.9, 0], [5, 0], [0, 0], [5.1, 0], [1e-30, 0]]
     fractions, _ = world.cast_rays((0, 0, 0), ends, ALL)
@@ -78,7 +78,7 @@ def test_any_number_of_rays(world: PhysicsWorld, count: int) -> None:
 
 
 def test_the_order_of_rays_does_not_matter(world: PhysicsWorld) -> None:
-    """Clockwise, upside down, more than once round, shuffled: each ray gets its own answer."""
+    """Rays may be clockwise, rotated, shuffled or over more than a turn."""
     add_room(world)
     world.create_body("dynamic", (2, 1, 0.3)).create_polygon([(0, 0), (1, 0), (0, 1)], density=1)
     ends = fan(500, 20, -7, 7)
@@ -90,7 +90,7 @@ def test_the_order_of_rays_does_not_matter(world: PhysicsWorld) -> None:
         np.testing.assert_array_equal(other, straight[permutation])
 
 
-def test_inputs_of_other_types(world: PhysicsWorld) -> None:
+def test_end_points_of_other_types_are_converted(world: PhysicsWorld) -> None:
     add_room(world)
     ends = fan(20, 20)
     expected, _ = world.cast_rays((0, 0, 0), ends, ALL)
@@ -98,7 +98,7 @@ def test_inputs_of_other_types(world: PhysicsWorld) -> None:
         np.testing.assert_array_equal(world.cast_rays((0, 0, 0), same, ALL)[0], expected)
 
 
-def test_only_categories_in_the_mask_count(world: PhysicsWorld) -> None:
+def test_only_categories_in_the_mask_stop_rays(world: PhysicsWorld) -> None:
     for x, category in ((1, 1), (2, 2), (3, 4)):
         wall = world.create_body("static", (x, 0, 0))
         wall.create_edges([[0, -1, 0, 1]], category_bits=category)
@@ -115,7 +115,7 @@ def test_edges_of_one_body_in_two_categories(world: PhysicsWorld) -> None:
     assert world.cast_rays((0, 0, 0), [[10, 0]], 2)[0][0] == pytest.approx(0.2)
 
 
-def test_sensors_are_not_seen(world: PhysicsWorld) -> None:
+def test_sensors_stop_no_rays(world: PhysicsWorld) -> None:
     wall = world.create_body("static", (0, 0, 0))
     wall.create_edges([[1, -1, 1, 1], [2, -1, 2, 1]])
     ball = world.create_body("dynamic", (3, 0, 0)).create_circle((0, 0), 0.5, density=1)
@@ -131,14 +131,14 @@ def test_sensors_are_not_seen(world: PhysicsWorld) -> None:
     assert np.isnan(world.cast_rays((0, 0, 0), [[10, 0]], 1)[0][0])
 
 
-def test_what_a_ray_starts_in_is_not_hit(world: PhysicsWorld) -> None:
+def test_a_ray_does_not_hit_the_shape_in_which_it_starts(world: PhysicsWorld) -> None:
     body = world.create_body("dynamic", (0, 0, 0))
     body.create_circle((0, 0), 1, density=1)
     body.create_polygon([(-2, -2), (2, -2), (2, 2), (-2, 2)], density=1)
     world.create_body("static", (0, 0, 0)).create_circle((5, 0), 0.5, density=0)
     fractions, _ = world.cast_rays((0.5, 0.1, 0), [[9, 0], [-9, 0]], ALL)
     np.testing.assert_allclose(fractions * 9, [4.01, np.nan], atol=0.01)
-    # From outside both are.
+    # Both are hit from outside.
     assert world.cast_rays((-6, 0, 0), [[10, 0]], ALL)[0][0] == pytest.approx(0.4)
 
 
@@ -161,8 +161,8 @@ def test_edges_are_hit_from_both_sides(world: PhysicsWorld) -> None:
         assert fractions[0] * 9 == pytest.approx(3 if start[0] == 0 else 4)
 
 
-def test_the_ends_of_an_edge_belong_to_it(world: PhysicsWorld) -> None:
-    """Also those of edges that run either way, seen from either side."""
+def test_rays_hit_the_end_points_of_edges(world: PhysicsWorld) -> None:
+    """This holds for edges of both directions, from both sides."""
     wall = world.create_body("static", (0, 0, 0))
     wall.create_edges([[1, -1, 1, 1], [-1, -1, -1, 1]])
     ends = [[2, 2], [2, -2], [-2, 2], [-2, -2]]
@@ -173,7 +173,7 @@ def test_the_ends_of_an_edge_belong_to_it(world: PhysicsWorld) -> None:
 
 
 @pytest.mark.parametrize("edge", [[-5, 0, 5, 0], [0, 3, 0, -3], [-2, -2, 2, 2], [0, 0, 2, 1]])
-def test_a_sensor_upon_an_edge_sees_nothing_else(world: PhysicsWorld, edge: list[float]) -> None:
+def test_a_scan_from_an_edge_hits_only_the_edge(world: PhysicsWorld, edge: list[float]) -> None:
     add_room(world)
     world.create_body("static", (0, 0, 0)).create_edges([edge])
     ends = fan(1000, 20)
@@ -183,8 +183,8 @@ def test_a_sensor_upon_an_edge_sees_nothing_else(world: PhysicsWorld, edge: list
     assert (fractions[~along] == 0).all()
 
 
-def test_scans_see_moved_bodies(world: PhysicsWorld) -> None:
-    """Walls and robots, moved by hand and by stepping."""
+def test_scans_hit_moved_bodies(world: PhysicsWorld) -> None:
+    """Walls and robots, moved by set_pose and by steps."""
     wall = world.create_body("static", (5, 0, 0))
     wall.create_edges([[0, -1, 0, 1]])
     ball = world.create_body("dynamic", (9, 0, 0))
@@ -211,7 +211,7 @@ def test_scans_see_moved_bodies(world: PhysicsWorld) -> None:
     assert ranges()[2] == pytest.approx(2.5)
 
 
-def test_scans_see_what_comes_and_goes(world: PhysicsWorld) -> None:
+def test_scans_reflect_created_and_destroyed_bodies(world: PhysicsWorld) -> None:
     def range_ahead() -> float:
         return float(world.cast_rays((0, 0, 0), [[20, 0]], ALL)[0][0] * 20)
 
@@ -233,8 +233,8 @@ def test_scans_see_what_comes_and_goes(world: PhysicsWorld) -> None:
     assert math.isnan(range_ahead())
 
 
-def test_no_ray_passes_where_edges_meet(world: PhysicsWorld) -> None:
-    """Rays straight at the corners of a ring of many edges, and as near beside them as can be."""
+def test_no_ray_passes_between_edges_with_a_common_end_point(world: PhysicsWorld) -> None:
+    """Casts rays exactly towards the corners of a ring, and in the nearest other directions."""
     corners = 317
     angles = np.linspace(0, 2 * math.pi, corners, endpoint=False)
     ring = (7.3 * np.stack([np.cos(angles), np.sin(angles)], 1)).astype(np.float32)
@@ -247,7 +247,7 @@ def test_no_ray_passes_where_edges_meet(world: PhysicsWorld) -> None:
         np.testing.assert_allclose(fractions, 1 / 3, rtol=1e-4)
 
 
-def test_reflection_is_that_of_the_nearest_hit(world: PhysicsWorld) -> None:
+def test_only_the_nearest_hit_reflects(world: PhysicsWorld) -> None:
     wall = world.create_body("static", (0, 0, 0))
     wall.create_edges([[5, -1, 5, 1]], category_bits=1)
     wall.create_edges([[9, -1, 9, 1], [-5, -1, -5, 1], [0, 5, 1, 5]], category_bits=2)
@@ -256,13 +256,13 @@ def test_reflection_is_that_of_the_nearest_hit(world: PhysicsWorld) -> None:
     fractions, reflect = world.cast_rays((0, 0, 0), ends, 3, 2)
     np.testing.assert_allclose(fractions[:2] * 20, [5, 5], rtol=1e-6)
     assert reflect.tolist() == [False, True, True, False]
-    # What the scan does not see does not reflect either.
+    # Fixtures without a category in the mask do not reflect.
     assert world.cast_rays((0, 0, 0), ends, 1, 2)[1].tolist() == [False] * 4
     assert world.cast_rays((0, 0, 0), ends, 3, 0)[1].tolist() == [False] * 4
 
 
-def test_of_several_fixtures_at_one_distance_any_may_reflect(world: PhysicsWorld) -> None:
-    """A layer drawn over another: the same wall, cut into other pieces."""
+def test_any_of_several_fixtures_at_the_same_distance_reflects(world: PhysicsWorld) -> None:
+    """Two layers contain the same wall, divided at different points."""
     plain = world.create_body("static", (0, 0, 0))
     plain.create_edges([[3, -5, 4, 5]], category_bits=1)
     mirror = world.create_body("static", (0.5, 0.5, 0.5))
@@ -279,7 +279,7 @@ def test_of_several_fixtures_at_one_distance_any_may_reflect(world: PhysicsWorld
 
 @pytest.mark.parametrize("mask", range(1, 8))
 @pytest.mark.parametrize("reflect_mask", [0, 1, 2, 3, 4])
-def test_layers_that_share_walls_count_each(
+def test_each_of_several_layers_with_common_walls_stops_rays(
     world: PhysicsWorld, mask: int, reflect_mask: int
 ) -> None:
     for category in (1, 2, 4, 2):
@@ -290,7 +290,9 @@ def test_layers_that_share_walls_count_each(
     assert reflect.all() == reflect.any() == bool(mask & reflect_mask)
 
 
-def test_one_of_the_layers_at_one_place_moves_changes_and_goes(world: PhysicsWorld) -> None:
+def test_one_of_several_layers_is_moved_changed_and_destroyed(
+    world: PhysicsWorld,
+) -> None:
     wall = [[1, -1, 1, 1]]
     bodies = [world.create_body("static", (0, 0, 0)) for _ in range(3)]
     for body in bodies:
@@ -316,8 +318,8 @@ def test_one_of_the_layers_at_one_place_moves_changes_and_goes(world: PhysicsWor
     assert distance() != distance(), "NaN"
 
 
-def test_many_lasers_are_remembered_apart(world: PhysicsWorld) -> None:
-    """More fans than are kept sorted, in turns."""
+def test_scans_are_correct_with_more_fans_than_are_cached(world: PhysicsWorld) -> None:
+    """Casts the rays of many different fans in turns."""
     add_room(world)
     fans = [fan(30 + i, 20) for i in range(40)]
     for _ in range(2):
@@ -328,7 +330,7 @@ def test_many_lasers_are_remembered_apart(world: PhysicsWorld) -> None:
             )
 
 
-def test_a_fan_that_is_written_to_is_another_fan(world: PhysicsWorld) -> None:
+def test_changed_end_points_are_used(world: PhysicsWorld) -> None:
     add_room(world)
     ends = fan(8, 20)
     world.cast_rays((0, 0, 0), ends, ALL)

@@ -1,11 +1,11 @@
-"""Scans against one `b2World::RayCast` a ray, on random worlds.
+"""Scans in random worlds, compared with `b2World::RayCast`.
 
-A ray must get the same distance within 1e-4 m + 1e-5 of its length. Some rays have no such
-distance: those that graze a corner, run along a wall, or start on one. There, rounding decides
-which of several surfaces a ray hits, or whether it hits one. Its distance must then be the distance
-that Box2D computes for one of the rays beside it: a range between two of those distances would be a
-hit in mid-air. On a slanted surface two of those rays are some tolerances apart, and ten were never
-exceeded in 2.4 million rays.
+The distances must be equal within 1e-4 m plus 1e-5 of the length of the ray. Rays that graze a
+corner, run along a wall or start on one are ill-conditioned: rounding decides which of several
+surfaces they hit, if any. The distance of such a ray must equal that computed by Box2D for one of
+several perturbed rays; any other range would be a hit in mid-air. On slanted surfaces the distances
+of perturbed rays differ by several tolerances. In 2.4 million rays, the difference never exceeded
+ten tolerances.
 """
 
 from __future__ import annotations
@@ -24,8 +24,8 @@ from flatland.physics import PhysicsBody, PhysicsWorld, Pose
 FloatArray = npt.NDArray[np.float64]
 EdgeMaker = Callable[[np.random.Generator, int], FloatArray]
 
-# A failure prints a blob that reproduces it. The scene that it shows belongs into test_raycast.py
-# as a test of its own, since a blob is only valid for one version of hypothesis.
+# A failure prints a blob that reproduces it. A blob is valid for one version of hypothesis only, so
+# add the scene to test_raycast.py as a separate test.
 PROPERTY = settings(
     max_examples=250, deadline=None, print_blob=True, suppress_health_check=list(HealthCheck)
 )
@@ -35,7 +35,7 @@ ANGLES = st.one_of(st.sampled_from([0.0, math.pi / 2, math.pi, -math.pi / 4]), s
 
 @dataclass
 class Scene:
-    """A world, how large what is in it is [m], and where its middle lies."""
+    """A world with the size of its contents [m] and their center."""
 
     world: PhysicsWorld
     size: float
@@ -57,20 +57,20 @@ def scattered(rng: np.random.Generator, count: int) -> FloatArray:
 
 
 def polyline(rng: np.random.Generator, count: int) -> FloatArray:
-    """Edges of all slopes with touching corners, closed."""
+    """Returns closed outlines of edges with arbitrary slopes."""
     corners = rng.uniform(-1, 1, (count, 2))
     return np.hstack([corners, np.roll(corners, -1, axis=0)])
 
 
 def pixels(rng: np.random.Generator, count: int) -> FloatArray:
-    """Straight and upright edges on a grid, many of which meet, cross and lie upon each other."""
+    """Returns horizontal and vertical edges on a grid that touch, cross and overlap each other."""
     start = rng.integers(-5, 6, (count, 2)) / 5
     along = np.eye(2)[rng.integers(0, 2, count)]
     return np.hstack([start, start + along * rng.integers(1, 5, (count, 1)) / 5])
 
 
 def slivers(rng: np.random.Generator, count: int) -> FloatArray:
-    """Short edges among which rays find gaps."""
+    """Returns short edges with gaps between them."""
     start = rng.uniform(-1, 1, (count, 2))
     return np.hstack([start, start + rng.normal(0, 0.02, (count, 2))])
 
@@ -85,7 +85,7 @@ def add_edges(scene: Scene, make_edges: EdgeMaker, body_type: str, turn: float) 
 
 
 def add_twin(scene: Scene) -> None:
-    """Repeats some edges of a body in another one at the same place, as a second layer does."""
+    """Repeats some edges of a body in another one at the same pose, as a second layer does."""
     rng = scene.rng
     original = scene.bodies[rng.integers(len(scene.bodies))]
     edges = original.edges()
@@ -113,7 +113,7 @@ def add_solid(scene: Scene, body_type: str) -> None:
                 corners = rng.uniform(-0.2, 0.2, (rng.integers(3, 9), 2)) * scene.size
                 body.create_polygon(corners, **options)
         except ValueError:
-            # Too small for Box2D: nothing to see.
+            # Rejected because it is too small for Box2D.
             continue
 
 
@@ -122,7 +122,7 @@ def scenes(draw: st.DrawFn) -> Scene:
     body_types = st.sampled_from(["static", "kinematic", "dynamic"])
     rng = np.random.default_rng(draw(st.integers(0, 2**32 - 1)))
     size = draw(st.floats(0.03, 1000))
-    # Single precision is coarse far from the world's origin.
+    # The resolution of single precision is low far from the origin of the world.
     distance = draw(st.sampled_from([0.0, 0.0, 10.0, 1000.0]))
     scene = Scene(PhysicsWorld(), size, rng.uniform(-1, 1, 2) * distance, rng)
     for kind in draw(st.lists(st.sampled_from([scattered, polyline, pixels, slivers]), max_size=3)):
@@ -137,7 +137,7 @@ def scenes(draw: st.DrawFn) -> Scene:
 
 @st.composite
 def fans(draw: st.DrawFn) -> npt.NDArray[np.float32]:
-    """Forwards, backwards, more than once round, at right angles, of one length and of many."""
+    """Returns rays in both directions, over more than a turn, at right angles, and so on."""
     count = draw(st.integers(1, 200))
     length = 10 ** draw(st.floats(-2, 3))
     first, last = draw(ANGLES), draw(ANGLES)
@@ -153,7 +153,7 @@ def fans(draw: st.DrawFn) -> npt.NDArray[np.float32]:
 
 @st.composite
 def sensor_poses(draw: st.DrawFn, scene: Scene) -> Pose:
-    """Anywhere, on grid lines, on the corners and along the lines of edges, inside of shapes."""
+    """Returns random positions, also on grid lines, corners and lines of edges, and in shapes."""
     where = draw(st.sampled_from(["anywhere", "grid", "corner", "edge", "body"]))
     x, y = scene.point(1.2)
     with_edges = [b for b in scene.bodies if len(b.edges())]
@@ -180,15 +180,15 @@ def to_world(body: PhysicsBody, point: FloatArray) -> tuple[float, float]:
 
 
 def ranges(fractions: npt.NDArray[np.float32], lengths: FloatArray) -> FloatArray:
-    """Distances [m], infinite for a miss."""
+    """Returns distances [m], infinite for a miss."""
     return np.where(np.isnan(fractions), np.inf, fractions.astype(np.float64) * lengths)
 
 
-def hairs(pose: Pose, longest: float) -> list[Pose]:
-    """The pose and those beside it, as far away as rounding errors reach.
+def perturbed_poses(pose: Pose, longest: float) -> list[Pose]:
+    """Returns the pose and adjacent poses within the rounding errors.
 
     Box2D computes in single precision, whose errors grow with the coordinates and the length of a
-    ray; nine positions and three headings put a ray on either side of any corner or edge nearby.
+    ray. Nine positions and three headings yield rays on both sides of each corner and edge nearby.
     """
     x, y, theta = pose
     shift = 2e-5 + 1e-6 * (abs(x) + abs(y) + longest)
@@ -203,7 +203,7 @@ def hairs(pose: Pose, longest: float) -> list[Pose]:
 
 @PROPERTY
 @given(st.data())
-def test_scans_are_those_of_box2d(data: st.DataObject) -> None:
+def test_scans_equal_those_of_box2d(data: st.DataObject) -> None:
     scene = data.draw(scenes())
     world = scene.world
     for _ in range(3):
@@ -222,10 +222,10 @@ def test_scans_are_those_of_box2d(data: st.DataObject) -> None:
         expected, expected_reflect = world.cast_rays_reference(pose, ends, mask, reflect_mask)
         same = equal_or_close(got, ranges(expected, lengths), tolerance)
         same_reflect = reflect == expected_reflect
-        for hair in hairs(pose, float(lengths.max())):
+        for hair in perturbed_poses(pose, float(lengths.max())):
             if same.all() and same_reflect.all():
                 break
-            # By how much longer a ray is matters to Box2D's formula for circles.
+            # The error of the formula of Box2D for circles depends on the length of the ray.
             for stretch in (1.0, 1.001):
                 longer = ends * np.float32(stretch)
                 other = world.cast_rays_reference(hair, longer, mask, reflect_mask)
@@ -251,9 +251,10 @@ def equal_or_close(a: FloatArray, b: FloatArray, tolerance: FloatArray) -> npt.N
 def test_no_ray_leaves_a_closed_outline(
     seed: int, count: int, exponent: float, distance: float
 ) -> None:
-    """Never a missed wall: from inside a closed outline no ray gets out, wherever it points.
+    """No wall is missed: every ray from the interior of a closed outline has a hit.
 
-    Far from the world's origin a float has millimetres, and short rays point elsewhere than asked.
+    Far from the origin of the world, the resolution of a float is only millimeters, which changes
+    the directions of short rays.
     """
     length = 10**exponent
     rng = np.random.default_rng(seed)
@@ -266,7 +267,7 @@ def test_no_ray_leaves_a_closed_outline(
     x, y, theta = *rng.uniform(-distance, distance, 2), rng.uniform(-4, 4)
     body = world.create_body("static", (x, y, theta))
     body.create_edges(edges)
-    # Straight at the corners, at points of the edges, and all around.
+    # Rays towards the corners, towards points of the edges, and in all directions.
     part = rng.random((count, 1)).astype(np.float32)
     on_edges = corners + part * (np.roll(corners, -1, axis=0) - corners)
     around = np.linspace(0, 2 * math.pi, 700)

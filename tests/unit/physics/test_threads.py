@@ -1,4 +1,4 @@
-"""Worlds in threads: independent of each other, locked while they step, and repeatable."""
+"""Worlds in threads: they are independent, locked during a step, and deterministic."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ pytestmark = pytest.mark.threads
 
 
 def crowd(seed: int) -> tuple[PhysicsWorld, list[PhysicsBody]]:
-    """Bodies that bump into each other within four walls."""
+    """Creates bodies that collide with each other within four walls."""
     rng = np.random.default_rng(seed)
     world = PhysicsWorld()
     world.record_contacts = True
@@ -38,7 +38,7 @@ def crowd(seed: int) -> tuple[PhysicsWorld, list[PhysicsBody]]:
 
 
 def history(seed: int, steps: int = 150) -> bytes:
-    """All that a run shows, as bytes."""
+    """Returns the observable state of each step of a run as bytes."""
     world, bodies = crowd(seed)
     angles = np.linspace(-np.pi, np.pi, 90)
     ends = 6 * np.stack([np.cos(angles), np.sin(angles)], 1).astype(np.float32)
@@ -55,12 +55,12 @@ def history(seed: int, steps: int = 150) -> bytes:
     return b"".join(seen)
 
 
-def test_two_runs_give_the_same_bytes() -> None:
+def test_two_runs_have_identical_results() -> None:
     assert history(1) == history(1)
     assert history(1) != history(2)
 
 
-def test_worlds_in_parallel_threads_give_the_same_bytes_as_one_by_one() -> None:
+def test_parallel_worlds_have_the_same_results_as_sequential_ones() -> None:
     seeds = range(8)
     alone = [history(seed) for seed in seeds]
     with ThreadPoolExecutor(4) as pool:
@@ -68,8 +68,8 @@ def test_worlds_in_parallel_threads_give_the_same_bytes_as_one_by_one() -> None:
     assert together == alone
 
 
-def test_worlds_made_at_once_in_many_threads() -> None:
-    """Box2D fills a table of its own at the first contact of a process."""
+def test_worlds_can_be_created_in_many_threads_at_once() -> None:
+    """Box2D initializes a global table at the first contact of a process."""
     barrier = threading.Barrier(8)
 
     def run(_: int) -> float:
@@ -84,10 +84,9 @@ def test_worlds_made_at_once_in_many_threads() -> None:
 
 
 class SlowStep:
-    """A world that stays in a step until it is told to go on.
+    """A world that remains in a step until it is released.
 
-    The step itself runs without the GIL; it is held up in a pre-solve hook, which waits for an
-    event, so that other threads find the world stepping for as long as they like.
+    The step runs without the GIL and is blocked in a pre-solve hook, which waits for an event.
     """
 
     def __init__(self) -> None:
@@ -97,14 +96,14 @@ class SlowStep:
         self.wall = self.world.create_body("static", (0, 0, 0))
         self.wall.create_edges([[0.5, -1, 0.5, 1]])
         self.inside = threading.Event()
-        self.go_on = threading.Event()
-        self.world.pre_solve = self._hold
+        self.release = threading.Event()
+        self.world.pre_solve = self._block
         self.world.pre_solve_bodies = {self.disc.id}
         self._thread = threading.Thread(target=self.world.step, args=(0.01, 5, 5))
 
-    def _hold(self, _contact: PreSolveContact, _old: OldManifold) -> None:
+    def _block(self, _contact: PreSolveContact, _old: OldManifold) -> None:
         self.inside.set()
-        assert self.go_on.wait(TIMEOUT)
+        assert self.release.wait(TIMEOUT)
 
     def __enter__(self) -> SlowStep:
         self._thread.start()
@@ -112,7 +111,7 @@ class SlowStep:
         return self
 
     def __exit__(self, *_: object) -> None:
-        self.go_on.set()
+        self.release.set()
         self._thread.join()
 
 
@@ -148,10 +147,10 @@ def test_a_stepping_world_is_locked_for_other_threads(
 ) -> None:
     with pytest.raises(WorldLockedError, match="the world is stepping"):
         use(slow)
-    slow.go_on.set()
+    slow.release.set()
 
 
-def test_changes_wait_for_the_rays_of_other_threads() -> None:
+def test_changes_wait_until_other_threads_have_cast_their_rays() -> None:
     world = PhysicsWorld()
     disc = world.create_body("dynamic", (0, 0, 0))
     disc.create_circle((0, 0), 0.5, density=1)
@@ -167,7 +166,7 @@ def test_changes_wait_for_the_rays_of_other_threads() -> None:
                 world.cast_rays((3, 0, 0), ends, 1)
                 scans += 1
             except WorldLockedError:
-                continue  # The world was stepping.
+                continue  # The world is stepping.
 
     threads = [threading.Thread(target=scan) for _ in range(2)]
     for thread in threads:
@@ -188,14 +187,14 @@ def test_changes_wait_for_the_rays_of_other_threads() -> None:
     world.close()
 
 
-def test_other_worlds_go_on_while_one_steps(slow: SlowStep) -> None:
+def test_other_worlds_can_step_while_one_is_stepping(slow: SlowStep) -> None:
     assert len(history(3, steps=5)) > 0
 
 
-def lets_others_run(work: Callable[[], object]) -> bool:
-    """Whether another Python thread gets to run while `work` does.
+def releases_gil(work: Callable[[], object]) -> bool:
+    """Returns whether another Python thread runs during a call of `work`.
 
-    The interpreter switches threads only where one gives the GIL away, as the interval is so long.
+    With a very long switch interval, the interpreter switches threads only if the GIL is released.
     """
     ticks = 0
     stop = threading.Event()
@@ -223,17 +222,17 @@ def lets_others_run(work: Callable[[], object]) -> bool:
 
 def test_long_calls_release_the_gil() -> None:
     world = PhysicsWorld()
-    # Unlike a static one it makes the step long: Box2D looks for the neighbours of each edge.
+    # Unlike with a static body, the step is long: Box2D searches the neighbors of each edge.
     wall = world.create_body("kinematic", (0, 0, 0))
     rng = np.random.default_rng(1)
     start = rng.uniform(0, 100, (30_000, 2))
     edges = np.hstack([start, start + 0.5]).astype(np.float32)
     ends = rng.uniform(-50, 50, (200_000, 2)).astype(np.float32)
-    assert lets_others_run(lambda: wall.create_edges(edges))
-    assert lets_others_run(lambda: world.step(0.01, 1, 1))
-    assert lets_others_run(lambda: world.cast_rays((50, 50, 0), ends, 0xFFFF))
-    assert lets_others_run(lambda: world.cast_rays_reference((50, 50, 0), ends[:20_000], 0xFFFF))
-    assert not lets_others_run(lambda: sum(range(1000))), "the test can tell"
+    assert releases_gil(lambda: wall.create_edges(edges))
+    assert releases_gil(lambda: world.step(0.01, 1, 1))
+    assert releases_gil(lambda: world.cast_rays((50, 50, 0), ends, 0xFFFF))
+    assert releases_gil(lambda: world.cast_rays_reference((50, 50, 0), ends[:20_000], 0xFFFF))
+    assert not releases_gil(lambda: sum(range(1000))), "the check must be able to fail"
     world.close()
 
 
@@ -244,7 +243,7 @@ def test_several_threads_cast_rays_in_one_world() -> None:
     poses = [body.pose for body in bodies]
     expected = [world.cast_rays_reference(pose, fan, 0xFFFF)[0] for pose in poses for fan in fans]
     jobs = [(pose, fan) for pose in poses for fan in fans]
-    world.create_body("static", (0, 0, 0)).create_edges([[20, 20, 30, 30]])  # trees are made anew
+    world.create_body("static", (0, 0, 0)).create_edges([[20, 20, 30, 30]])  # rebuilds the tree
     with ThreadPoolExecutor(4) as pool:
         got = list(pool.map(lambda job: world.cast_rays(job[0], job[1], 0xFFFF)[0], jobs))
     for fast, slow in zip(got, expected, strict=True):

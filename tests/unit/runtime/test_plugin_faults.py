@@ -604,7 +604,7 @@ def test_a_contact_kept_from_pre_solve_is_of_no_use_later(files, faults):
     kept = []
     plugin.act = lambda plugin, contact: kept.append(contact)
     world.step()
-    with pytest.raises(flatland.StaleHandleError, match="only inside of the pre_solve call"):
+    with pytest.raises(flatland.StaleHandleError, match="only during the call of pre_solve"):
         kept[0].enabled = False
 
 
