@@ -187,8 +187,8 @@ class Simulation:
 
     def _new_window(self, now: float) -> CycleWindow:
         timekeeper, period = self.world.timekeeper, self._period
-        asked = timekeeper.step_size / period if period else math.inf
-        return CycleWindow(period or timekeeper.step_size, asked, now, timekeeper.sim_time_ns)
+        target = timekeeper.step_size / period if period else math.inf
+        return CycleWindow(period or timekeeper.step_size, target, now, timekeeper.sim_time_ns)
 
     def _finish(self, window: CycleWindow, now: float) -> None:
         """Reports a window, unless the world stood still in it."""

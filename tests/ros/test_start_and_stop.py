@@ -269,7 +269,7 @@ def test_server_launch_sets_all_parameters(launcher: Any, ros: Any, world: Path)
         "plugin_timeout": 30,
     }
     assert ros.master.getParam("/use_sim_time") is True
-    process.wait_for_line("real-time factor asked inf")
+    process.wait_for_line("real-time factor: target inf")
     assert "drawn at random" not in process.output
     assert process.stop() == 0
 

@@ -254,4 +254,4 @@ def test_server_logs_how_its_cycles_are_used(server: Any) -> None:
     line = server.wait_for_line("cycle use").string
     assert "min " in line
     assert "mean " in line
-    assert "real-time factor asked 2.00, got " in line
+    assert "real-time factor: target 2.00, actual " in line

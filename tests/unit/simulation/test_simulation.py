@@ -215,19 +215,19 @@ def test_reports_come_in_wall_time_and_not_while_paused(world: flatland.World) -
     first = reports[0]
     assert first.cycles >= 1
     assert 0 < first.use_min <= first.use_mean <= first.use_max
-    assert first.asked == pytest.approx(2.0)  # 200 steps of 0.01 s in a second
-    assert 0 < first.got < 2.5
+    assert first.target == pytest.approx(2.0)  # 200 steps of 0.01 s in a second
+    assert 0 < first.actual < 2.5
 
 
 def test_statistics_of_a_loop_without_a_rate(world: flatland.World) -> None:
     reports: list[CycleStatistics] = []
     Simulation(world, 0, report=reports.append, report_period=0.01).run(100)
     assert reports
-    assert math.isinf(reports[0].asked)
-    assert reports[0].got > 1
+    assert math.isinf(reports[0].target)
+    assert reports[0].actual > 1
     text = str(reports[0])
     assert text.startswith("cycle use min ")
-    assert "real-time factor asked inf, got " in text
+    assert "real-time factor: target inf, actual " in text
 
 
 def test_closed_world_ends_the_loop_with_its_error(world: flatland.World) -> None:
