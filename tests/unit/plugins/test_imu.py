@@ -268,7 +268,7 @@ def test_covariances_as_given(plugin_world: Any, collect: Collect, kind: str) ->
         ("body: base, linear_acceleration_noise: [.nan, 0, 0]", '"linear_acceleration_noise"'),
         ("body: base, orientation_covariance: [1]", "must have size of exactly 9"),
         ("body: base, update_rate: -1", 'Invalid "update_rate", must not be negative'),
-        ("body: base, update_rate: 5, pub_rate: 5", 'Invalid "pub_rate", it is the older spelling'),
+        ("body: base, update_rate: 5, pub_rate: 5", 'Invalid "pub_rate", the older spelling'),
         ("body: base, noise: 1", 'unrecognized entry(s) {"noise"}'),
     ],
 )

@@ -230,7 +230,7 @@ def test_image_maps_too(plugin_world: Any, files: Any) -> None:
         ),
         (
             "layer: 2d, robot_name: robot, num_of_walls: 2",
-            'robot "robot" stands on the line of the wall from (0, 0) to (4, 0) of layer "2d"',
+            'robot "robot" is on the line through the wall from (0, 0) to (4, 0) of layer "2d"',
         ),
         ("layer: 2d, robot_name: robot, num_of_walls: -1", '"num_of_walls", must not be negative'),
         ("layer: 2d, robot_name: robot, wall_wall_dist: 0", '"wall_wall_dist", must be greater'),
