@@ -127,9 +127,9 @@ def test_what_it_opened_ends_after_its_last_hook(load: Any) -> None:
     assert (one.out_at_the_end, two.out_at_the_end) == (False, False)
     assert one.out.closed
     assert (world.ports.outputs, world.ports.commands, world.transforms) == ({}, {}, {})
-    with pytest.raises(PluginError, match='plugin "one" has ended and can open no "late"'):
+    with pytest.raises(PluginError, match='plugin "one" has ended and cannot open "late"'):
         one.output("late", float)
-    with pytest.raises(PluginError, match='plugin "one" has ended and can open no "late"'):
+    with pytest.raises(PluginError, match='plugin "one" has ended and cannot open "late"'):
         one.command("late", float)
     one.send_transform("a", "b", 0.0, 0.0, 0.0)
     world.step()

@@ -66,7 +66,7 @@ def test_outputs_of_one_topic_are_shared_until_the_last_owner_goes():
     ports.close_output(second)
     assert recorder.events[1:] == [("output_closed", first)]
     assert first.closed
-    with pytest.raises(WorldError, match=r'no output "x", there are: none'):
+    with pytest.raises(WorldError, match=r'output "x" does not exist; existing outputs: none'):
         ports.find_output("x")
 
 
@@ -74,9 +74,9 @@ def test_a_topic_has_one_type():
     ports = PortRegistry(Recorder())
     ports.open_output("x", int)
     ports.open_command("c", int, 0)
-    with pytest.raises(FlatlandError, match='topic "/x" carries int already, not float'):
+    with pytest.raises(FlatlandError, match='topic "/x" already carries int, not float'):
         ports.open_output("x", float)
-    with pytest.raises(FlatlandError, match='topic "/c" carries int already, not bool'):
+    with pytest.raises(FlatlandError, match='topic "/c" already carries int, not bool'):
         ports.open_command("c", bool, False)
 
 
@@ -85,12 +85,12 @@ def test_a_type_conflict_names_an_owner_that_is_left():
     output = ports.open_output("x", int, "first")
     assert ports.open_output("x", int, "second") is output
     ports.close_output(output, "first")
-    with pytest.raises(FlatlandError, match='"/x" carries int already, used by second, not float'):
+    with pytest.raises(FlatlandError, match='"/x" already carries int, used by second, not float'):
         ports.open_output("x", float, "third")
     command = ports.open_command("c", int, 0, owner="fourth")
     ports.open_command("c", int, 0, owner="fifth")
     ports.close_command(command)
-    with pytest.raises(FlatlandError, match='"/c" carries int already, used by fifth, not bool'):
+    with pytest.raises(FlatlandError, match='"/c" already carries int, used by fifth, not bool'):
         ports.open_command("c", bool, False)
 
 
@@ -119,7 +119,7 @@ def test_commands_of_one_topic_are_set_together():
     ports.close_command(second)
     ports.close_command(second)
     for use in (lambda: topic.value, lambda: topic.set(Twist())):
-        with pytest.raises(WorldError, match="command /cmd_vel is gone with its model"):
+        with pytest.raises(WorldError, match="command /cmd_vel was closed with its model"):
             use()
 
 

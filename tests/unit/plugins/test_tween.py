@@ -107,7 +107,7 @@ def test_trigger_without_topic_stays_and_says_so(
     world = plugin_world(tween("delta: [1, 0, 0], mode: trigger"))
     assert xs(world, 2) == [0, 0]
     assert world.ports.commands == {}
-    assert "mode trigger needs a trigger_topic" in caplog.text
+    assert "mode trigger requires a trigger_topic" in caplog.text
 
 
 def test_topic_without_trigger_opens_no_port_and_says_so(
@@ -115,7 +115,7 @@ def test_topic_without_trigger_opens_no_port_and_says_so(
 ) -> None:
     world = plugin_world(tween("mode: once, trigger_topic: open"))
     assert world.ports.commands == {}
-    assert "no use for a trigger_topic in mode once" in caplog.text
+    assert "ignores its trigger_topic in mode once" in caplog.text
 
 
 def test_defaults_move_nothing(plugin_world: Any) -> None:

@@ -255,7 +255,7 @@ def test_a_plugin_that_exits_at_the_start_takes_only_its_model_along(files, faul
     with pytest.raises(PluginError, match=r'model "second": SystemExit no engine \['):
         world.spawn_model("bad.yaml", "second")
     importlib.import_module(faults.module).quits_when_made = True
-    with pytest.raises(PluginError, match=r'Quitter" cannot be made: SystemExit: 3 \['):
+    with pytest.raises(PluginError, match=r'Quitter" cannot be instantiated: SystemExit: 3 \['):
         world.spawn_model("bad.yaml", "second")
     live_through_it(world)
     assert all(count > 3 for count in witness(world).values())
@@ -320,7 +320,7 @@ def test_a_plugin_that_never_starts_is_given_up(files, faults, which):
     live_through_it(world)
     assert all(count > 3 for count in witness(world).values())
     [plugin] = importlib.import_module(faults.module).started
-    with pytest.raises(PluginError, match='plugin "bad" has ended and can open no "late"'):
+    with pytest.raises(PluginError, match='plugin "bad" has ended and cannot open "late"'):
         plugin.output("late", float)
     assert world.ports.outputs == {}
 
@@ -372,11 +372,11 @@ def test_a_limit_must_be_positive(files, timeout):
          'module "{module}_quits" of plugin "faults::Quits" (manifest "{manifest}") cannot be '
          "imported: SystemExit: no licence"),
         ("faults::World",
-         'class "{module}.World" of plugin "faults::World" must be a flatland::ModelPlugin here, '
-         "it is a flatland::WorldPlugin"),
+         'class "{module}.World" of plugin "faults::World" must be a flatland::ModelPlugin, '
+         "got a flatland::WorldPlugin"),
         ("faults::Mislabelled",
-         'class "{module}.World" of plugin "faults::Mislabelled" must be a flatland::ModelPlugin '
-         'here, it is a flatland::WorldPlugin (manifest "{manifest}" calls it '
+         'class "{module}.World" of plugin "faults::Mislabelled" must be a flatland::ModelPlugin, '
+         'got a flatland::WorldPlugin (manifest "{manifest}" declares a '
          "flatland::ModelPlugin)"),
     ],
 )  # fmt: skip
