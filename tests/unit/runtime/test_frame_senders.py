@@ -31,7 +31,7 @@ def test_a_drive_and_a_tf_publisher_of_one_model(files, empty_world, caplog):
     assert warnings(caplog) == [
         'TF frame "base" has two parents, "odom" from Model Plugin "drive" type "DiffDrive" '
         'model "m" and "map" from Model Plugin "tf" type "ModelTfPublisher" model "m"; give the '
-        "frames different names, or let one plugin not send it"
+        "frames different names, or disable one of the senders"
     ]
     assert caplog.records[0].levelname == "WARNING"
 

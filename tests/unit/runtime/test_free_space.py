@@ -165,7 +165,7 @@ def test_large_areas_get_larger_cells() -> None:
 @pytest.mark.parametrize(
     ("point", "text"),
     [
-        ((11.0, 3.0), r"connected_to \(11, 3\) is outside of the bounds of the walls"),
+        ((11.0, 3.0), r"connected_to \(11, 3\) is out of bounds"),
         ((0.1, 3.0), r"connected_to \(0.1, 3\) is not free for a disc of radius 0.3 m"),
     ],
 )

@@ -173,7 +173,7 @@ def test_nearest_finds_none(world: flatland.World, files: Any) -> None:
         spawn(world, "giant", "m", (0, 0, 0), if_blocked="nearest")
     assert str(error.value) == (
         'Flatland World: failed to spawn model "m", it overlaps layer "walls", layer "high" at '
-        "(0.000, 0.000, 0.000), and there is no free place within 5 m"
+        "(0.000, 0.000, 0.000), and no place within 5 m is free"
     )
     assert world.models == []
 
@@ -199,7 +199,7 @@ def test_layers_and_sensors_count_as_in_the_physics(world: flatland.World) -> No
 
 def test_bodies_that_belong_to_no_model(world: flatland.World) -> None:
     world.physics.create_body("static", (0, 3, 0)).create_circle((0, 0), 0.5, density=1)
-    with pytest.raises(WorldError, match="it overlaps a body of no model at"):
+    with pytest.raises(WorldError, match="it overlaps a body without a model at"):
         spawn(world, "minimal", "m", (0, 3, 0), if_blocked="refuse")
 
 
@@ -324,8 +324,8 @@ def test_is_free(
 @pytest.mark.parametrize(
     ("pose", "options", "error", "text"),
     [
-        ((0, 0), {}, ValueError, "needs either a radius or a model"),
-        ((0, 0), {"radius": 1, "model": "m"}, ValueError, "needs either a radius or a model"),
+        ((0, 0), {}, ValueError, "requires either a radius or a model"),
+        ((0, 0), {"radius": 1, "model": "m"}, ValueError, "requires either a radius or a model"),
         ((0, math.nan), {"radius": 1}, ValueError, "pose must be finite"),
         ((0, 1, 2, 3), {"radius": 1}, ValueError, "pose must be three numbers"),
         ((0, 0), {"radius": -1}, ValueError, "radius must be finite and not negative"),
@@ -464,7 +464,7 @@ def test_bad_samples(
 
 
 def test_a_world_without_walls_needs_bounds(empty_world: flatland.World) -> None:
-    with pytest.raises(WorldError, match="no walls to sample between: give bounds"):
+    with pytest.raises(WorldError, match="the layers have no walls; bounds are required"):
         empty_world.sample_free(3, 0.3)
     poses = empty_world.sample_free(9, 0.3, 0.0, 1, bounds=(-2, 3, 2, 5), connected_to=(0, 4))
     check_samples(empty_world, poses, 9, 0.3, 0.0)
