@@ -1,4 +1,4 @@
-"""The example plugin Battery: draining, charging, rates, and every parameter that is wrong."""
+"""The example plugin Battery: draining, charging, rate, and invalid parameters."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from flatland import PluginError
 
 
 def robot(parameters):
-    """A model of one disc with a battery."""
+    """Returns a model of one disc with a battery."""
     return f"""
 bodies: [{{name: base, footprints: [{{type: circle, radius: 0.2, density: 1}}]}}]
 plugins:
@@ -23,7 +23,7 @@ def battery(load, parameters):
     return world, world.output("/battery")
 
 
-def test_battery_drains_by_its_idle_power_and_by_speed(load):
+def test_battery_drains_by_idle_power_and_speed(load):
     world, output = battery(load, "capacity: 2, idle_power: 36, power_per_speed: 100")
     body = world.model("robot").body("base")
     world.step(200)
@@ -35,7 +35,7 @@ def test_battery_drains_by_its_idle_power_and_by_speed(load):
     assert output.latest.power == pytest.approx(-86)
 
 
-def test_battery_charges_while_it_is_told_to(load):
+def test_battery_charges_while_the_command_is_true(load):
     world, output = battery(load, "capacity: 1, idle_power: 360, charge_power: 720")
     recharge = world.command("/recharge")
     world.step(1000)
@@ -52,11 +52,11 @@ def test_battery_charges_while_it_is_told_to(load):
     assert output.latest.energy == 0
 
 
-def test_battery_says_how_it_is_at_its_rate(load):
+def test_battery_publishes_at_its_rate(load):
     world = load(robot=robot("update_rate: 4, voltage: 12"))
     output = world.ports.outputs["/battery"]
     world.step(400)
-    assert output.latest is None, "computed for nobody"
+    assert output.latest is None, "computed without a subscriber"
     readings = []
     output.subscribe(readings.append)
     world.step(400)
@@ -67,7 +67,7 @@ def test_battery_says_how_it_is_at_its_rate(load):
     assert readings[0].capacity == 100
 
 
-def test_battery_lives_under_its_models_namespace(load, tmp_path):
+def test_battery_topics_are_in_the_namespace_of_the_model(load, tmp_path):
     world = load(robot=robot("capacity: 1"))
     world.spawn_model("robot.yaml", "other", "r2")
     assert sorted(world.ports.outputs) == ["/battery", "/r2/battery"]
@@ -89,7 +89,7 @@ def test_battery_lives_under_its_models_namespace(load, tmp_path):
         ("capcity: 3", 'contains unrecognized entry(s) {"capcity"}'),
     ],
 )
-def test_battery_refuses_what_makes_no_sense(load, parameters, text):
+def test_battery_rejects_invalid_parameters(load, parameters, text):
     with pytest.raises(PluginError) as caught:
         battery(load, parameters)
     message = str(caught.value)
@@ -100,7 +100,7 @@ def test_battery_refuses_what_makes_no_sense(load, parameters, text):
     assert "robot.yaml:" in message
 
 
-@pytest.mark.filterwarnings("ignore::DeprecationWarning")  # of ROS's own modules
+@pytest.mark.filterwarnings("ignore::DeprecationWarning")  # of ROS modules
 @pytest.mark.parametrize(
     ("energy", "power", "status"),
     [
@@ -110,9 +110,9 @@ def test_battery_refuses_what_makes_no_sense(load, parameters, text):
         (0.0, 0.0, "CHARGING"),
     ],
 )
-def test_battery_state_says_which_way_it_flows(load, energy, power, status):
+def test_battery_state_has_the_direction_of_the_current(load, energy, power, status):
     pytest.importorskip("sensor_msgs.msg", reason="ROS is not installed")
-    battery(load, "capacity: 2")  # puts the package on Python's path
+    battery(load, "capacity: 2")  # adds the package to `sys.path`
     adapter = importlib.import_module("my_robots.battery_ros")
     reading = importlib.import_module("my_robots.battery").BatteryReading
     message = adapter.to_message(reading(3_250_000_000, 20.0, 2.0, energy, power))

@@ -1,4 +1,4 @@
-"""The example package: found where it stands, also on ROS, and apart from flatland's own code."""
+"""The example package: its tests, its independence of flatland, and its use with ROS."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ from textwrap import dedent
 import pytest
 
 
-def test_the_packages_own_test_passes_without_ros(example, environment, tmp_path, run_command):
-    """Nothing of ROS is imported: its modules cannot even be found."""
+def test_the_test_of_the_package_passes_without_ros(example, environment, tmp_path, run_command):
+    """The test imports no ROS module; any import of one raises."""
     blocked = tmp_path / "blocked"
     blocked.mkdir()
     for module in ("rospy", "genpy", "rosgraph", "sensor_msgs", "std_srvs", "std_msgs"):
@@ -25,7 +25,7 @@ def test_the_packages_own_test_passes_without_ros(example, environment, tmp_path
     assert "Ran 3 tests" in printed
 
 
-def test_flatland_alone_does_not_know_the_package(environment, tmp_path):
+def test_the_package_is_not_importable_with_flatland_alone(environment, tmp_path):
     code = "import flatland, importlib.util as u; print(u.find_spec('my_robots'))"
     done = subprocess.run(
         [sys.executable, "-c", code],
@@ -96,13 +96,13 @@ LISTEN = dedent(
     assert (answer.success, answer.message) == (True, "moved: "), answer
     topics = dict(rospy.get_published_topics())
     assert "/battery" not in topics, topics
-    print("all as it should be")
+    print("all checks passed")
     """
 )
 
 
 @pytest.mark.ros
-def test_on_ros_it_only_has_to_stand_on_the_package_path(
+def test_the_package_path_suffices_to_use_the_package_with_ros(
     example, environment, tmp_path, start, run_command
 ):
     pytest.importorskip("rospy", reason="ROS is not installed")
@@ -118,7 +118,7 @@ def test_on_ros_it_only_has_to_stand_on_the_package_path(
     )
     server.wait_for('loaded ".*world.yaml"')
     printed = run_command([sys.executable, "-c", LISTEN], environment, tmp_path)
-    assert printed.endswith("all as it should be\n")
+    assert printed.endswith("all checks passed\n")
     assert "Traceback" not in server.output
     assert "WARN" not in server.output
     server.stop()

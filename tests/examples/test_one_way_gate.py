@@ -1,4 +1,4 @@
-"""The example plugin OneWayGate: who passes, who does not, and for how long that holds."""
+"""The example plugin OneWayGate: which bodies pass, and how long a decision holds."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ bodies:
 
 
 def gate_world(load, robot=DISC, yaw=0.0):
-    """A world with the gate at (0, 0), turned by `yaw`, and a robot 2 m behind it."""
+    """Loads a world with the gate at (0, 0), rotated by `yaw`, and a robot 2 m behind it."""
     world = load(gate=GATE, robot=robot)
     world.move_model("gate", (0, 0, yaw))
     put(world, "robot", -2, 0, yaw)
@@ -36,13 +36,13 @@ def gate_world(load, robot=DISC, yaw=0.0):
 
 
 def put(world, name, x, y, yaw=0.0):
-    """Places a model at a point of the gate's frame, which is turned by `yaw`."""
+    """Places a model at a point in the frame of the gate, which is rotated by `yaw`."""
     c, s = math.cos(yaw), math.sin(yaw)
     world.move_model(name, (c * x - s * y, s * x + c * y, yaw))
 
 
 def drive(world, speed, seconds, name="robot", yaw=0.0):
-    """Pushes a model along the gate's x axis; returns how far it got along it."""
+    """Moves a model along the x axis of the gate and returns its final position on that axis."""
     body = world.model(name).bodies[0]
     for _ in range(round(seconds / 0.005)):
         body.set_velocity(speed * math.cos(yaw), speed * math.sin(yaw), 0)
@@ -60,8 +60,8 @@ def test_gate_opens_from_behind_only(load, robot, yaw):
     assert drive(world, -1.0, 4.0, yaw=yaw) == pytest.approx(0.1 + reach, abs=0.03)
 
 
-def test_gate_keeps_to_its_decision_while_the_robot_touches_it(load):
-    """Half-way, with most of it on the other side, the robot may go on, or back out."""
+def test_gate_keeps_its_decision_during_the_contact(load):
+    """A robot that is mostly on the other side may continue or return."""
     world = gate_world(load, LONG_ROBOT)
     assert drive(world, 1.0, 2.4) == pytest.approx(0.4, abs=0.01)
     assert drive(world, -1.0, 2.4) == pytest.approx(-2.0, abs=0.01)
@@ -70,7 +70,7 @@ def test_gate_keeps_to_its_decision_while_the_robot_touches_it(load):
     assert drive(world, -1.0, 2.0) > 0.7
 
 
-def test_gate_decides_about_each_body_by_itself(load):
+def test_gate_decides_separately_for_each_body(load):
     world = gate_world(load)
     world.spawn_model("robot.yaml", "other")
     put(world, "other", 2, 0.5)
@@ -83,22 +83,22 @@ def test_gate_decides_about_each_body_by_itself(load):
     assert other.pose[0] == pytest.approx(0.3, abs=0.03)
 
 
-def test_gate_is_one_body_of_its_model(load):
+def test_other_bodies_of_the_model_are_not_gates(load):
     world = gate_world(load)
     put(world, "robot", -2, 3)
     assert drive(world, 1.0, 4.0) == pytest.approx(-0.3, abs=0.03)
 
 
-def test_gate_decides_by_what_pushes_not_by_sensors(load):
-    """A sensor that reaches far does not keep the gate open for the way back."""
+def test_gate_ignores_sensor_fixtures(load):
+    """A sensor with a long range does not keep the gate open for the return."""
     sensor = ", {type: circle, radius: 4, density: 0, sensor: true}]"
     world = gate_world(load, DISC.replace("]}", sensor + "}"))
     assert drive(world, 1.0, 4.0) == pytest.approx(2.0, abs=0.01)
-    assert len(world.contacts) >= 1, "the sensor was to touch the gate all the time"
+    assert len(world.contacts) >= 1, "the sensor must touch the gate all the time"
     assert drive(world, -1.0, 4.0) == pytest.approx(0.3, abs=0.03)
 
 
-def test_gate_forgets_who_is_gone(load):
+def test_gate_drops_the_records_of_deleted_models(load):
     world = gate_world(load, LONG_ROBOT)
     plugin = world.model("gate").plugin("g")
     drive(world, 1.0, 2.4)
@@ -108,7 +108,7 @@ def test_gate_forgets_who_is_gone(load):
     assert plugin._may_pass == plugin._contacts == {}
 
 
-def test_gate_holds_on_when_one_contact_ends_as_another_begins(load):
+def test_gate_keeps_its_decision_when_one_contact_replaces_another(load):
     world = gate_world(load, LONG_ROBOT)
     plugin = world.model("gate").plugin("g")
     drive(world, 1.0, 2.4)
@@ -124,7 +124,7 @@ def test_gate_holds_on_when_one_contact_ends_as_another_begins(load):
     assert plugin._contacts == {robot: {12345}}
 
 
-def test_gate_names_a_body_that_is_not_there(load):
+def test_gate_rejects_an_unknown_body(load):
     with pytest.raises(PluginError, match='Body with name "door" does not exist') as caught:
         load(gate=GATE.replace('::OneWayGate"', '::OneWayGate", body: door'))
     assert 'Model Plugin "g" type "my_robots::OneWayGate" model "gate"' in str(caught.value)

@@ -25,7 +25,7 @@ def test_reset_moves_models_back_at_rest(load):
     assert world.model("late").pose == (8, 8, 0)
 
 
-def test_reset_takes_the_models_that_it_is_told(load):
+def test_reset_moves_only_the_configured_models(load):
     world = load(RESET.format(parameters=", models: [b]"), a=PLAIN, b=PLAIN)
     world.move_model("a", (3, 0, 0))
     world.move_model("b", (3, 3, 0))
@@ -40,7 +40,7 @@ def test_reset_takes_the_models_that_it_is_told(load):
         (", modells: [a]", 'contains unrecognized entry(s) {"modells"}'),
     ],
 )
-def test_reset_refuses_what_makes_no_sense(load, parameters, text):
+def test_reset_rejects_invalid_parameters(load, parameters, text):
     with pytest.raises(PluginError) as caught:
         load(RESET.format(parameters=parameters), a=PLAIN)
     assert str(caught.value).startswith(

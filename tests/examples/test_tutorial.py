@@ -1,9 +1,9 @@
-"""Follows docs/write_a_plugin.md: writes its files, types its commands, compares what they print.
+"""Executes docs/write_a_plugin.md: writes its files, runs its commands and compares their output.
 
-How the page is read: a block after ``File `path`:`` is a file, one after ``Add to `path`:`` its
-next part. Each `bash` block is typed in one shell, in order, after the files above it were
-written; one after `<!-- leave running -->` in a terminal of its own, until the next such one. A
-`text` block is what the commands above it print, with `...` for anything.
+A block after ``File `path`:`` is a file, and one after ``Add to `path`:`` is its next part. The
+`bash` blocks run in order in one shell, after the files above them are written; a block after
+`<!-- leave running -->` runs in the background until the next such block. A `text` block is the
+output of the commands above it, in which `...` matches any text.
 """
 
 from __future__ import annotations
@@ -22,18 +22,18 @@ _BLOCK = re.compile(
     r"^```(?P<language>\w+)\n(?P<text>.*?)^```$",
     re.MULTILINE | re.DOTALL,
 )
-_PACKAGE = "robot_ws/src/my_robots"  # in the user's home, as the page's first commands make it
+_PACKAGE = "robot_ws/src/my_robots"  # in the home folder; created by the first commands of the page
 _NOT_IN_THE_PAGE = {"README.md"}
 
 
 @dataclass(frozen=True)
 class Block:
-    """One block of the page.
+    """A block of the page.
 
     Attributes:
         kind: `file`, `part`, `run`, `background` or `prints`.
-        text: What stands in it.
-        path: Of a file or part.
+        text: Contents of the block.
+        path: Path of a file or part.
     """
 
     kind: str
@@ -42,7 +42,7 @@ class Block:
 
 
 def read_page(page: Path) -> list[Block]:
-    """Reads the blocks of the page that mean something here."""
+    """Returns the blocks of the page that are files, commands or outputs."""
     blocks = []
     for match in _BLOCK.finditer(page.read_text()):
         text = match["text"]
@@ -57,7 +57,7 @@ def read_page(page: Path) -> list[Block]:
 
 
 def joined(before: str, part: str) -> str:
-    """Adds a part to a file, with the empty lines that Python's style asks for."""
+    """Returns a file with an additional part, separated by the blank lines of PEP 8."""
     first = part.split("\n", 1)[0]
     if re.match(r"(@|class |def )", first):
         return f"{before}\n\n{part}"
@@ -65,11 +65,11 @@ def joined(before: str, part: str) -> str:
 
 
 def assert_printed(expected: str, printed: str) -> None:
-    """Compares what a command printed with what the page says; trailing blanks do not count."""
+    """Compares the output of a command with the page, ignoring trailing blanks."""
     lines = [line.rstrip() for line in printed.strip().splitlines()]
     pattern = re.escape(expected.strip()).replace(r"\.\.\.", ".*?")
     assert re.fullmatch(pattern, "\n".join(lines), re.DOTALL), (
-        f"the page says\n{expected}\nbut this was printed:\n{printed}"
+        f"expected output of the page:\n{expected}\nactual output:\n{printed}"
     )
 
 
@@ -78,7 +78,7 @@ def blocks(checkout: Path) -> list[Block]:
     return read_page(checkout / "docs" / "write_a_plugin.md")
 
 
-def test_the_page_holds_the_example_package(blocks, example):
+def test_the_page_contains_the_example_package(blocks, example):
     files: dict[str, str] = {}
     for block in blocks:
         if block.kind == "file":
@@ -96,7 +96,7 @@ def test_the_page_holds_the_example_package(blocks, example):
 
 
 class Shell:
-    """A user's shell: where it is and what it exports lives on from one command to the next."""
+    """A shell whose working directory and exports persist between commands."""
 
     def __init__(self, environment: dict[str, str], folder: Path, run) -> None:
         self._folder = folder
@@ -106,15 +106,15 @@ class Shell:
         (folder / "exports").write_text("\n".join(exports))
 
     def script(self, commands: str) -> list[str]:
-        """A command line that runs commands where the last ones have led to."""
+        """Returns a command line that runs commands in the state left by the previous ones."""
         begin = f'. {self._folder}/exports\ncd "$(cat {self._folder}/cwd)"\n'
         end = f"pwd >{self._folder}/cwd\nexport -p >{self._folder}/exports\n"
         path = self._folder / "script"
         path.write_text(f"{begin}set -e\n{commands}{end}")
         return ["env", "-i", "bash", str(path)]
 
-    def type(self, commands: str) -> str:
-        """Runs commands and returns what they printed."""
+    def run(self, commands: str) -> str:
+        """Runs commands and returns their output."""
         printed: str = self._run(self.script(commands), {"PATH": "/usr/bin:/bin"}, self._folder)
         return printed
 
@@ -122,7 +122,7 @@ class Shell:
 @pytest.mark.ros
 @pytest.mark.build
 @pytest.mark.timeout(BUILD_TIMEOUT)
-def test_a_user_who_follows_the_page_gets_what_it_shows(
+def test_the_commands_of_the_page_print_the_shown_output(
     blocks, environment, tmp_path, run_command, start
 ):
     for program in ("roslaunch", "catkin_make", "rospack"):
@@ -139,7 +139,7 @@ def test_a_user_who_follows_the_page_gets_what_it_shows(
         elif block.kind == "part":
             path.write_text(joined(path.read_text(), block.text))
         elif block.kind == "run":
-            printed = shell.type(block.text)
+            printed = shell.run(block.text)
         elif block.kind == "background":
             if background is not None:
                 background.stop()
