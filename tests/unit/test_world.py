@@ -373,9 +373,9 @@ def test_requests_of_a_hook_run_after_the_step(files, probe, hook):
 def test_a_failed_request_of_a_hook_is_logged(files, probe, caplog):
     world = files.load("{properties: {}, layers: []}")
     world.spawn_model("probe.model.yaml", "a")
-    probe.hook, probe.act = "before", staticmethod(lambda p: p.world.delete_model("nobody"))
+    probe.hook, probe.act = "before", staticmethod(lambda p: p.world.delete_model("absent"))
     world.step()
-    assert 'model with name "nobody" does not exist' in caplog.text
+    assert 'model with name "absent" does not exist' in caplog.text
 
 
 def test_step_and_close_raise_in_a_hook(files, probe, caplog):
@@ -415,7 +415,7 @@ def test_requests_of_other_threads_run_between_steps(files):
                 assert pose[1] == pytest.approx(turn)
                 world.delete_model(name)
             with pytest.raises(WorldError):
-                world.delete_model(f"nobody{index}")
+                world.delete_model(f"absent{index}")
         except BaseException as error:
             errors.append(error)
 

@@ -120,7 +120,7 @@ def test_a_refused_model_starts_no_plugin(world: flatland.World, files: Any) -> 
 
 
 @pytest.mark.parametrize(
-    ("asked", "distance"),
+    ("requested", "distance"),
     [
         ((4.9, 1.0, 0.7), 0.1),  # 0.2 from the wall at x = 5, inside
         ((4.9, 4.85, -2.0), math.hypot(0.1, 0.05)),  # both walls of the corner
@@ -128,19 +128,19 @@ def test_a_refused_model_starts_no_plugin(world: flatland.World, files: Any) -> 
     ],
 )
 def test_nearest_to_walls(
-    world: flatland.World, asked: tuple[float, float, float], distance: float
+    world: flatland.World, requested: tuple[float, float, float], distance: float
 ) -> None:
-    model = spawn(world, "minimal", "m", asked, if_blocked="nearest")
-    assert model.pose[2] == pytest.approx(asked[2])
-    assert math.dist(model.pose[:2], asked[:2]) == pytest.approx(distance, abs=0.006)
+    model = spawn(world, "minimal", "m", requested, if_blocked="nearest")
+    assert model.pose[2] == pytest.approx(requested[2])
+    assert math.dist(model.pose[:2], requested[:2]) == pytest.approx(distance, abs=0.006)
     assert model.displacement == pytest.approx(
-        (model.pose[0] - asked[0], model.pose[1] - asked[1]), abs=1e-6
+        (model.pose[0] - requested[0], model.pose[1] - requested[1]), abs=1e-6
     )
     assert world.is_free(model.pose, model=model)
     world.move_model("m", (0, 0, 0), if_blocked="nearest")
     assert model.pose == pytest.approx((0, 0, 0))
     assert model.displacement == (0.0, 0.0)
-    world.move_model("m", asked, if_blocked="nearest")
+    world.move_model("m", requested, if_blocked="nearest")
     assert math.hypot(*model.displacement) == pytest.approx(distance, abs=0.006)
 
 

@@ -177,7 +177,7 @@ WITNESS = 'name: witness, type: "faults::Witness"'
 def crowded(files, *plugins, world_plugins="[]", **options):
     """Loads a world whose robot, which has a `Witness`, overlaps four discs.
 
-    Exceptions of plugins are logged, unless the options say otherwise.
+    Exceptions of plugins are logged, unless `options` contain another policy.
     """
     options.setdefault("plugin_errors", "disable")
     robot(files, *plugins, WITNESS)
