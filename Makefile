@@ -26,6 +26,10 @@ run: setup  ## run the simulator: make run [WORLD=world.yaml] [ARGS="show_viz:=f
 test: setup-dev  ## run all tests: make test [ARGS="-k laser"]
 	@. ./setup.bash && pytest $(ARGS)
 
+.PHONY: fuzz
+fuzz: setup-dev  ## try thousands of random jams against the promises of the physics engine
+	@. ./setup.bash && FLATLAND_FUZZ=1 pytest --timeout 0 tests/unit/physics/test_jammed_bodies.py $(ARGS)
+
 .PHONY: lint
 lint: setup-dev  ## check style, types, and the stubs of the extension against the binary
 	$(VENV)/bin/ruff check

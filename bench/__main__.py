@@ -18,7 +18,10 @@ from table import as_json, format_table
 
 GROWTH = "growth"  # the module of curves; the others have rows
 # Each module has `rows(unit)`, which measures and returns its rows; unit is U in seconds.
-MODULES = ("scans", "steps", "plugin_steps", "node", "real_time", "large_map", "markers")
+MODULES = (
+    *("scans", "steps", "jam", "plugin_steps", "node", "real_time", "large_map", "markers"),
+    "placement",
+)
 
 
 def main() -> None:

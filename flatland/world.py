@@ -4,25 +4,24 @@ from __future__ import annotations
 
 import logging
 import os
+import threading
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import Future
 from pathlib import Path
 from types import TracebackType
-from typing import Any, TypeVar
+from typing import TypeVar
 
 import numpy as np
 import numpy.typing as npt
 
 from flatland.config.node import Source
 from flatland.entities.collision_filter import CollisionFilter
-from flatland.entities.contact import Contact
 from flatland.entities.layer import Layer
 from flatland.errors import WorldError
 from flatland.physics import PhysicsWorld
 from flatland.plugin_api.noise import checked_seed
-from flatland.plugin_api.plugin import WorldPlugin
 from flatland.plugin_api.port_registry import PortRegistry
-from flatland.plugin_api.ports import CommandTopic, Output
+from flatland.runtime.body_monitor import BodyMonitor, InvalidBodyPolicy
 from flatland.runtime.contacts import ContactReporter
 from flatland.runtime.contents import Contents
 from flatland.runtime.faults import FaultPolicy, Faults
@@ -31,9 +30,8 @@ from flatland.runtime.observer import Observers, WorldObserver
 from flatland.runtime.placement import Placement
 from flatland.runtime.plugin_host import PluginHost
 from flatland.runtime.requests import Requests
-from flatland.runtime.transforms import FramePair, TransformBuffer
+from flatland.runtime.transforms import TransformBuffer
 from flatland.timekeeper import Timekeeper
-from flatland.values import Transform
 
 _LOG = logging.getLogger("flatland")
 
@@ -51,10 +49,6 @@ class World(Contents):
         timekeeper: The simulated time.
         physics: The physics world: ray casts, and all that is not part of models and layers.
         collision_filter: Layer names and their bits.
-        layers: The layers in the order of the file.
-        ports: All outputs and commands by resolved topic.
-        transform_buffer: Collects the transforms of plugins.
-        plugin_host: Starts plugins and calls their hooks.
         velocity_iterations: Velocity iterations of the Box2D solver.
         position_iterations: Position iterations of the Box2D solver.
         seed: Seed of all random numbers.
@@ -74,19 +68,21 @@ class World(Contents):
         observers: Iterable[WorldObserver] = (),
         plugin_timeout: float | None = None,
         plugin_errors: FaultPolicy = "raise",
+        on_invalid_body: InvalidBodyPolicy = "raise",
     ) -> None:
-        """Creates an empty world; see `from_yaml` for the arguments that are not listed here.
+        """Creates an empty world; `from_yaml` describes the arguments that both have in common.
 
         Args:
-            seed: Seed of all random numbers.
-            params: Source of the values of `param()` in YAML files.
+            seed: See `from_yaml`, as for all arguments that are not described here.
+            params: Source of the values of `param()`.
             step_size: Simulated time of one step [s].
             velocity_iterations: Velocity iterations of the Box2D solver.
             position_iterations: Position iterations of the Box2D solver.
             base_dir: Folder that relative paths of models and maps start from.
-            observers: Receive notifications of all events.
-            plugin_timeout: Limit of wall time of `on_initialize` of a plugin [s].
-            plugin_errors: What happens to exceptions of hooks, subscribers and observers.
+            observers: Receive notifications.
+            plugin_timeout: Limit of `on_initialize` [s].
+            plugin_errors: Policy for exceptions.
+            on_invalid_body: Policy for invalid bodies.
 
         Raises:
             ValueError: An argument is out of range.
@@ -104,20 +100,24 @@ class World(Contents):
         self.layers: list[Layer] = []
         self.physics = PhysicsWorld()
         self._files = Source("", str(Path(base_dir).absolute()))
-        self._requests = Requests()
+        self.requests = Requests()
         self._observers = Observers(self._faults)
-        self.ports = PortRegistry(self._observers, self._subscriber_raised)
+        self.ports = PortRegistry(self._observers, self._faults.add_of_subscriber)
         self.transform_buffer = TransformBuffer(self._observers)
         self.plugin_host = PluginHost(
-            self, self._observers, self._requests, self._faults, plugin_timeout
+            self, self._observers, self.requests, self._faults, plugin_timeout
         )
         self._contacts = ContactReporter(self.physics, self.plugin_host)
         self._placement = Placement(self, self._contacts)
         self._models = ModelSet(
-            self, self.plugin_host, self._contacts, self._placement, self._observers, self._requests
+            self, self.plugin_host, self._contacts, self._placement, self._observers, self.requests
+        )
+        self._body_monitor = BodyMonitor(
+            self.physics, self._contacts, self._models, on_invalid_body
         )
         self._paused = False
         self._closed = False
+        self.add_observer(self._body_monitor)
         for observer in observers:
             self.add_observer(observer)
 
@@ -132,6 +132,7 @@ class World(Contents):
         observers: Iterable[WorldObserver] = (),
         plugin_timeout: float | None = None,
         plugin_errors: FaultPolicy = "raise",
+        on_invalid_body: InvalidBodyPolicy = "raise",
     ) -> World:
         """Loads a world file: properties, layers, models with their plugins, world plugins.
 
@@ -149,6 +150,9 @@ class World(Contents):
                 them interrupts a step. `raise`: `step` raises the first one when the step is
                 complete. `disable`: they are logged, and a plugin whose hook raises three times in
                 a row is disabled.
+            on_invalid_body: What happens if a step leaves a body with a pose or velocity that is
+                not finite. `raise`: `step` raises, and raises again, until the model is moved or
+                deleted; the time stands still. `remove`: the model is removed with a logged error.
 
         Raises:
             FlatlandError: A file is invalid; nothing is left behind.
@@ -157,7 +161,7 @@ class World(Contents):
         # The loader is imported late: a world depends on no file of its own.
         from flatland.loading.world_loader import load_world
 
-        return load_world(
+        world = load_world(
             cls,
             path,
             params=params,
@@ -167,7 +171,11 @@ class World(Contents):
             observers=observers,
             plugin_timeout=plugin_timeout,
             plugin_errors=plugin_errors,
+            on_invalid_body=on_invalid_body,
         )
+        # Otherwise part of the first step, which would take too long for a loop in real time.
+        world.physics.find_new_contacts()
+        return world
 
     def __enter__(self) -> World:
         """Returns the world, which is closed at the end of the block."""
@@ -198,28 +206,37 @@ class World(Contents):
         """Steps `n` times; has no effect while paused.
 
         Raises:
-            WorldError: The world is closed, or a plugin calls this.
+            WorldError: The world is closed, a plugin calls this, or a body is not finite.
             Exception: Raised by a plugin, subscriber or observer, with `plugin_errors="raise"`.
         """
-        requests = self._requests
+        requests, faults = self.requests, self._faults
         requests.refuse_in_plugin("step")
+        actions, thread = requests.actions, threading.get_ident()
         for _ in range(n):
             with requests.lock:
                 self._check_open()
-                if requests:
+                if actions:
                     requests.process()
                 if not self._paused:
-                    with requests.hooks():
+                    requests.hook_thread = thread
+                    try:
                         self._step_once()
-                if requests:
+                    finally:
+                        requests.hook_thread = None
+                if actions:
                     requests.process()
-            self._faults.raise_first()
+            if faults.first is not None:
+                faults.raise_first()
 
     def _step_once(self) -> None:
         timekeeper, host = self.timekeeper, self.plugin_host
         self._contacts.update()
         host.before_physics_step(timekeeper)
-        self.physics.step(timekeeper.step_size, self.velocity_iterations, self.position_iterations)
+        report = self.physics.step(
+            timekeeper.step_size, self.velocity_iterations, self.position_iterations
+        )
+        if report is not None:
+            self._body_monitor.examine(report, timekeeper)
         self._contacts.dispatch()
         timekeeper.advance()
         self._observers.time_advanced(timekeeper.sim_time_ns)
@@ -245,60 +262,18 @@ class World(Contents):
 
     # -- requests --------------------------------------------------------------------------
 
-    @property
-    def requests(self) -> Requests:
-        """The queue of actions that run between two steps."""
-        return self._requests
-
     def post(self, action: Callable[[], R]) -> Future[R]:
-        """Queues an action that runs between two steps; safe from any thread.
-
-        Returns:
-            Holds what the action returned or raised, once it has run.
-        """
-        return self._requests.post(action)
+        """Queues an action that runs between two steps; see `Requests.post`."""
+        return self.requests.post(action)
 
     def between_steps(self, action: Callable[[], R]) -> R:
         """Returns the result of a function that reads the world, run while no step is in progress.
 
         Safe from any thread; in a plugin's hook it runs at once.
         """
-        return self._requests.read(action)
+        return self.requests.read(action)
 
-    # -- plugins, ports, transforms, contacts, observers -----------------------------------
-
-    @property
-    def plugins(self) -> list[WorldPlugin]:
-        """The world plugins in the order of the file."""
-        return list(self.plugin_host.world_plugins)
-
-    def output(self, topic: str) -> Output[Any]:
-        """Returns the output of a resolved topic, such as `/r1/scan`, and makes it wanted.
-
-        Raises:
-            WorldError: It does not exist.
-        """
-        output = self.ports.find_output(topic)
-        output.want(self)
-        return output
-
-    def command(self, topic: str) -> CommandTopic[Any]:
-        """Returns the commands of a resolved topic, such as `/r1/cmd_vel`.
-
-        Raises:
-            WorldError: It does not exist.
-        """
-        return self.ports.find_command(topic)
-
-    @property
-    def transforms(self) -> dict[FramePair, Transform]:
-        """The latest transform of each (parent, child)."""
-        return self.transform_buffer.latest
-
-    @property
-    def contacts(self) -> list[Contact]:
-        """All pairs of fixtures that touch now."""
-        return self._contacts.touching
+    # -- observers -------------------------------------------------------------------------
 
     def add_observer(self, observer: WorldObserver) -> None:
         """Notifies an observer of all events from now on."""
@@ -311,12 +286,6 @@ class World(Contents):
             ValueError: It was not added, or has been removed.
         """
         self._observers.remove(observer)
-
-    def _subscriber_raised(
-        self, output: Output[Any], callback: Callable[[Any], None], error: BaseException
-    ) -> None:
-        name = getattr(callback, "__qualname__", None) or repr(callback)
-        self._faults.add(callback, f'subscriber {name} of output "{output.topic}"', error)
 
     # -- images ----------------------------------------------------------------------------
 
@@ -344,14 +313,7 @@ class World(Contents):
         from flatland.drawing import draw
 
         return draw(
-            self,
-            size=size,
-            dpi=dpi,
-            view=view,
-            layers=layers,
-            scans=scans,
-            names=names,
-            axes=axes,
+            self, size=size, dpi=dpi, view=view, layers=layers, scans=scans, names=names, axes=axes
         )
 
     # -- end -------------------------------------------------------------------------------
@@ -372,8 +334,8 @@ class World(Contents):
             WorldError: A plugin calls this.
             Exception: Raised by a plugin or observer, with `plugin_errors="raise"`.
         """
-        self._requests.refuse_in_plugin("close")
-        with self._requests.lock:
+        self.requests.refuse_in_plugin("close")
+        with self.requests.lock:
             if self._closed:
                 return
             self.plugin_host.shut_down(list(self.plugin_host.world_plugins))
@@ -384,5 +346,5 @@ class World(Contents):
             self._contacts.clear()
             self.physics.close()
             # Requests that wait fail, since the world is closed.
-            self._requests.process()
+            self.requests.process()
         self._faults.raise_first()

@@ -44,5 +44,5 @@ def shared_dir() -> Path:
     """The folder of reference data (specification, golden traces, worlds)."""
     folder = Path(os.environ.get("FLATLAND_SHARED_DIR") or _CHECKOUT.parent / "shared")
     if not folder.is_dir():
-        pytest.skip(f"no reference data: {folder} is no folder (FLATLAND_SHARED_DIR names another)")
+        pytest.skip(f"no reference data: {folder} is not a folder (set FLATLAND_SHARED_DIR)")
     return folder

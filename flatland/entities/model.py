@@ -116,9 +116,9 @@ class Model(Entity):
         poses += [compose(target, compose(to_first, body.pose)) for body in self.bodies[1:]]
         for body, pose in zip(self.bodies, poses, strict=True):
             if not all(abs(number) <= MAX_MAGNITUDE for number in pose):
+                what = "pose" if pose is target else f'pose of body "{body.name}"'
                 raise ValueError(
-                    f'pose of body "{body.name}" must be finite and within +-{MAX_MAGNITUDE:g}, '
-                    f"got {pose}"
+                    f"{what} must be finite and within +-{MAX_MAGNITUDE:g}, got {pose}"
                 )
         for body, pose in zip(self.bodies, poses, strict=True):
             body.set_pose(*pose)

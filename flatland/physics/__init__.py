@@ -15,7 +15,7 @@ from flatland.physics.body import PhysicsBody
 from flatland.physics.contact import ContactEvent, ContactInfo
 from flatland.physics.fixture import PhysicsFixture
 from flatland.physics.joint import PhysicsJoint
-from flatland.physics.world import PhysicsWorld, RayHit
+from flatland.physics.world import PhysicsWorld, RayHit, StepReport
 
 __all__ = [
     "ContactEvent",
@@ -28,4 +28,5 @@ __all__ = [
     "Pose",
     "PreSolveContact",
     "RayHit",
+    "StepReport",
 ]

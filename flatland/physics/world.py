@@ -36,6 +36,20 @@ class RayHit:
     category_bits: int
 
 
+@dataclass(frozen=True, slots=True)
+class StepReport:
+    """What went wrong in a step; most steps have no report.
+
+    Attributes:
+        limited: Ids of dynamic bodies whose contacts or velocities the engine limited, since they
+            are jammed: they overlap walls and have no room.
+        invalid: Ids of bodies whose pose or velocity is not finite.
+    """
+
+    limited: tuple[int, ...]
+    invalid: tuple[int, ...]
+
+
 class PhysicsWorld:
     """A Box2D world without gravity; owns its bodies, fixtures, joints and contacts.
 
@@ -73,13 +87,29 @@ class PhysicsWorld:
         """Whether `close` was called."""
         return self._core.closed
 
-    def step(self, dt: float, velocity_iterations: int, position_iterations: int) -> None:
+    def step(
+        self, dt: float, velocity_iterations: int, position_iterations: int
+    ) -> StepReport | None:
         """Advances the world; other Python threads run meanwhile.
+
+        Contacts add no energy: a dynamic body without joints that touches only static bodies is
+        at most 1 % and 0.01 m/s faster after a step than before this step or the previous one.
+        Bodies that touch each other or are joined are together at most twice as fast and 0.1 m/s.
+        Forces, springs, restitution above 1 and moving kinematic bodies are allowed for. Box2D
+        alone breaks this where bodies have no room; then they are slowed down and reported. A
+        contact that is updated more than 6 times in one step, while Box2D handles times of impact,
+        has its bodies reported; it is disabled for the rest of the step after 6 updates, and
+        after 20 in the first ten successive steps.
 
         Args:
             dt: Simulated time of the step [s], from 1e-6 to 1000.
             velocity_iterations: Of Box2D's solver, at least 0.
             position_iterations: Of Box2D's solver, at least 0.
+
+        Returns:
+            None, or which bodies were limited or are invalid. The world does not advance while a
+            body is invalid, and each step reports the body again: set its pose and its velocity,
+            or destroy it.
 
         Raises:
             ValueError: A number is out of range.
@@ -87,9 +117,9 @@ class PhysicsWorld:
             WorldLockedError: Another thread uses the world, or this is a `pre_solve` call.
         """
         if self.pre_solve is None:
-            self._core.step(dt, velocity_iterations, position_iterations)
+            ids = self._core.step(dt, velocity_iterations, position_iterations)
         else:
-            self._core.step_with_hook(
+            ids = self._core.step_with_hook(
                 dt,
                 velocity_iterations,
                 position_iterations,
@@ -97,6 +127,19 @@ class PhysicsWorld:
                 self.pre_solve_bodies,
                 self._pre_solve_errors,
             )
+        return None if ids is None else StepReport(tuple(ids[0]), tuple(ids[1]))
+
+    def find_new_contacts(self) -> None:
+        """Searches for pairs of fixtures that may touch, which the next step would do otherwise.
+
+        The first search takes as long as many steps if there are many edges. The results of the
+        next step are the same.
+
+        Raises:
+            StaleHandleError: The world is closed.
+            WorldLockedError: The world is stepping.
+        """
+        self._core.find_new_contacts()
 
     def take_pre_solve_errors(self) -> list[BaseException]:
         """Returns what `pre_solve` raised since the last call, in order."""

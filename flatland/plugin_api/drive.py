@@ -121,6 +121,8 @@ class Odometer:
         self._twist_noise = GaussianNoise(plugin.noise_stream("odometry twist"), twist_variances)
         # The twist output is a separate measurement with the same variances.
         self.twist_noise = GaussianNoise(plugin.noise_stream("twist"), twist_variances)
+        all_noise = (self._pose_noise, self._twist_noise, self.twist_noise)
+        self._active_noise = tuple(noise for noise in all_noise if noise)
         self.child_frame_id = plugin.model.frame(body.name)
         self._truth: Output[Odometry] | None = None
         self._odometry: Output[Odometry] | None = None
@@ -136,9 +138,8 @@ class Odometer:
 
     def begin_update(self) -> None:
         """Advances the noise; to be called for each update due, emitted or not."""
-        self._pose_noise.begin_update()
-        self._twist_noise.begin_update()
-        self.twist_noise.begin_update()
+        for noise in self._active_noise:
+            noise.begin_update()
 
     def report(self, stamp: int, pose: Pose, velocity: Pose) -> Pose:
         """Emits the ground truth and the odometry, each if it is wanted.

@@ -175,6 +175,7 @@ def _load(parameters: NodeParameters, bridge: Any) -> World:
         observers=[bridge],
         plugin_timeout=parameters.plugin_timeout,
         plugin_errors="disable",
+        on_invalid_body="remove",
     )
     _LOG.info(
         'loaded "%s" in %.2f s: %d layers, %d models',

@@ -25,6 +25,7 @@ class ContactReporter:
         """
         self._physics = physics
         self._host = host
+        self._hooks = host.hooks
         self._bodies: dict[int, Body] = {}
         self._is_recording = False
         self._hooks_version = -1  # of the hooks that recording is adapted to
@@ -56,9 +57,9 @@ class ContactReporter:
 
     def update(self) -> None:
         """Adapts to changes of bodies and hooks; to be called before each step."""
-        if self._hooks_version == self._host.hooks_version:
+        if self._hooks_version == self._hooks.version:
             return
-        self._hooks_version = self._host.hooks_version
+        self._hooks_version = self._hooks.version
         self._is_recording = self._physics.record_contacts = self._host.wants_contacts
         if self._host.wants_pre_solve:
             self._physics.pre_solve = self._pre_solve

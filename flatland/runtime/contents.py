@@ -1,10 +1,10 @@
-"""The part of a world that holds its layers and models, changes them and finds free places."""
+"""The contents of a world: layers, models, ports; how they change, and where there is room."""
 
 from __future__ import annotations
 
 import os
 from collections.abc import Callable, Iterable, Sequence
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
@@ -14,34 +14,48 @@ from flatland.runtime.placement import IfBlocked, Models, check_if_blocked
 
 if TYPE_CHECKING:
     from flatland.config.node import Source
+    from flatland.entities.contact import Contact
     from flatland.entities.layer import Layer
     from flatland.entities.model import Model
+    from flatland.plugin_api.plugin import WorldPlugin
+    from flatland.plugin_api.port_registry import PortRegistry
+    from flatland.plugin_api.ports import CommandTopic, Output
     from flatland.runtime.contacts import ContactReporter
     from flatland.runtime.model_set import ModelSet
     from flatland.runtime.observer import Observers
     from flatland.runtime.placement import Placement
+    from flatland.runtime.plugin_host import PluginHost
     from flatland.runtime.requests import Requests
+    from flatland.runtime.transforms import FramePair, TransformBuffer
+    from flatland.values import Transform
 
 R = TypeVar("R")
 
 
 class Contents:
-    """The layers and models of a world; the base class of `World`.
+    """Everything that is in a world; the base class of `World`, which creates and steps it.
 
     Changes that a plugin's hook requests take effect after the step.
 
     Attributes:
         layers: The layers in the order of the file.
+        plugin_host: Starts plugins and calls their hooks.
+        ports: All outputs and commands by resolved topic.
+        requests: The queue of actions that run between two steps.
+        transform_buffer: Collects the transforms of plugins.
     """
 
     layers: list[Layer]
+    plugin_host: PluginHost
+    ports: PortRegistry
+    requests: Requests
+    transform_buffer: TransformBuffer
 
     _contacts: ContactReporter
     _files: Source
     _models: ModelSet
     _observers: Observers
     _placement: Placement
-    _requests: Requests
 
     @property
     def models(self) -> list[Model]:
@@ -156,7 +170,42 @@ class Contents:
             self._check_open()
             return action()
 
-        return self._requests.change(checked, what)
+        return self.requests.change(checked, what)
+
+    # -- plugins, ports, transforms, contacts ----------------------------------------------
+
+    @property
+    def plugins(self) -> list[WorldPlugin]:
+        """The world plugins in the order of the file."""
+        return list(self.plugin_host.world_plugins)
+
+    def output(self, topic: str) -> Output[Any]:
+        """Returns the output of a resolved topic, such as `/r1/scan`, and makes it wanted.
+
+        Raises:
+            WorldError: It does not exist.
+        """
+        output = self.ports.find_output(topic)
+        output.want(self)
+        return output
+
+    def command(self, topic: str) -> CommandTopic[Any]:
+        """Returns the commands of a resolved topic, such as `/r1/cmd_vel`.
+
+        Raises:
+            WorldError: It does not exist.
+        """
+        return self.ports.find_command(topic)
+
+    @property
+    def transforms(self) -> dict[FramePair, Transform]:
+        """The latest transform of each (parent, child)."""
+        return self.transform_buffer.latest
+
+    @property
+    def contacts(self) -> list[Contact]:
+        """All pairs of fixtures that touch now."""
+        return self._contacts.touching
 
     # -- free places -----------------------------------------------------------------------
 
@@ -244,7 +293,7 @@ class Contents:
 
     def _read(self, action: Callable[[], R]) -> R:
         self._check_open()
-        return self._requests.read(action)
+        return self.requests.read(action)
 
     def _check_open(self) -> None:
         raise NotImplementedError

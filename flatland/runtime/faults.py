@@ -5,10 +5,13 @@ from __future__ import annotations
 import logging
 import time
 from collections import Counter
-from collections.abc import Hashable
-from typing import Final, Literal, get_args
+from collections.abc import Callable, Hashable
+from typing import TYPE_CHECKING, Any, Final, Literal, get_args
 
 from flatland.errors import PluginError
+
+if TYPE_CHECKING:
+    from flatland.plugin_api.ports import Output
 
 _LOG = logging.getLogger("flatland")
 
@@ -26,6 +29,10 @@ class Faults:
     the step is complete. With the policy `disable`, exceptions are logged, with one traceback a
     second and source at most, and a plugin is disabled after `MAX_FAULTS` exceptions of one hook
     in a row.
+
+    Attributes:
+        first: The exception that `raise_first` raises, None if there is none.
+        counts: Exceptions in a row of each (plugin, hook) whose last call raised.
     """
 
     def __init__(self, policy: FaultPolicy) -> None:
@@ -37,8 +44,8 @@ class Faults:
         if policy not in get_args(FaultPolicy):
             raise ValueError(f"plugin_errors must be 'raise' or 'disable', got {policy!r}")
         self._raises = policy == "raise"
-        self._first: BaseException | None = None
-        self._counts: Counter[Hashable] = Counter()
+        self.first: BaseException | None = None
+        self.counts: Counter[Hashable] = Counter()
         self._last_log: dict[Hashable, float] = {}
 
     def add(self, source: Hashable, what: str, error: BaseException) -> None:
@@ -50,8 +57,8 @@ class Faults:
             error: The exception.
         """
         if self._raises:
-            if self._first is None:
-                self._first = _raisable(what, error)
+            if self.first is None:
+                self.first = _raisable(what, error)
             return
         now = time.monotonic()
         if now - self._last_log.get(source, -_LOG_PERIOD) >= _LOG_PERIOD:
@@ -73,34 +80,36 @@ class Faults:
         self.add(plugin, f"{name}: {hook}", error)
         if self._raises:
             return False
-        self._counts[plugin, hook] += 1
-        if self._counts[plugin, hook] < MAX_FAULTS:
+        self.counts[plugin, hook] += 1
+        if self.counts[plugin, hook] < MAX_FAULTS:
             return False
         _LOG.error(
             "%s: %s raised %d times in a row, the plugin is disabled", name, hook, MAX_FAULTS
         )
         return True
 
-    @property
-    def any_counted(self) -> bool:
-        """Whether any hook raised in its last call."""
-        return bool(self._counts)
+    def add_of_subscriber(
+        self, output: Output[Any], callback: Callable[[Any], None], error: BaseException
+    ) -> None:
+        """Takes an exception of a subscriber of an output; to be called while it is handled."""
+        name = getattr(callback, "__qualname__", None) or repr(callback)
+        self.add(callback, f'subscriber {name} of output "{output.topic}"', error)
 
     def succeeded(self, plugin: Hashable, hook: str) -> None:
         """Resets the count of a hook that returned."""
-        self._counts.pop((plugin, hook), None)
+        self.counts.pop((plugin, hook), None)
 
     def forget(self, plugins: set[Hashable]) -> None:
         """Drops the records of plugins that no longer exist."""
-        for key in [key for key in self._counts if isinstance(key, tuple) and key[0] in plugins]:
-            del self._counts[key]
-        for plugin in plugins:
-            self._last_log.pop(plugin, None)
+        for records in (self.counts, self._last_log):
+            for key in list(records):
+                if key in plugins or (isinstance(key, tuple) and key[0] in plugins):
+                    del records[key]
 
     def raise_first(self) -> None:
         """Raises the first exception taken since the last call, if there is one."""
-        if self._first is not None:
-            error, self._first = self._first, None
+        if self.first is not None:
+            error, self.first = self.first, None
             raise error
 
 

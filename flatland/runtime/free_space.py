@@ -152,6 +152,52 @@ class FreeSpace:
         return np.trim_zeros(regions)
 
 
+class Spread:
+    """A set of places with a minimum distance from each other.
+
+    Attributes:
+        places: The places (x, y) [m] in the order in which they were added.
+    """
+
+    def __init__(self, distance: float) -> None:
+        """Creates an empty set.
+
+        Args:
+            distance: Minimum distance between two places [m], positive.
+        """
+        self.places: list[tuple[float, float]] = []
+        self._distance = distance
+        # Places by square cells of that width: places within the distance are in adjacent cells.
+        self._cells: dict[tuple[int, int], list[tuple[float, float]]] = {}
+
+    def fill(self, candidates: DoubleArray, n: int) -> bool:
+        """Adds, in order, the candidates whose distance from all places is sufficient.
+
+        Args:
+            candidates: Points (x, y) [m], shape (m, 2).
+            n: Number of places at which no more are added.
+
+        Returns:
+            Whether the set has `n` places.
+        """
+        for x, y in candidates.tolist():
+            if len(self.places) == n:
+                break
+            column, row = math.floor(x / self._distance), math.floor(y / self._distance)
+            if not self._is_near(x, y, column, row):
+                self.places.append((x, y))
+                self._cells.setdefault((column, row), []).append((x, y))
+        return len(self.places) == n
+
+    def _is_near(self, x: float, y: float, column: int, row: int) -> bool:
+        for i in (column, column - 1, column + 1):
+            for j in (row, row - 1, row + 1):
+                for other_x, other_y in self._cells.get((i, j), ()):
+                    if math.hypot(other_x - x, other_y - y) < self._distance:
+                        return True
+        return False
+
+
 def _points_on(ends: DoubleArray, size: IntArray) -> DoubleArray:
     """Returns points at most half a unit apart on the parts of edges that lie in a rectangle.
 
@@ -160,7 +206,7 @@ def _points_on(ends: DoubleArray, size: IntArray) -> DoubleArray:
         size: Width and height of the rectangle, which starts at the origin.
 
     Returns:
-        Shape (m, 2).
+        The points, shape (m, 2).
     """
     start, along = ends[:, 0], ends[:, 1] - ends[:, 0]
     # The part of each edge, from 0 to 1, between the two lines that bound each axis.

@@ -88,6 +88,8 @@ class ModelSet:
             self._remove(model)
             raise
         self.by_name[name] = model
+        if if_blocked == "warn":
+            self._placement.warn_if_blocked(model)
         self._observers.model_added(model)
         return model
 
@@ -98,6 +100,8 @@ class ModelSet:
             self._place(model, finite_pose(pose), if_blocked, "move")
         except ValueError as error:
             raise WorldError(f'failed to move model "{name}", {error}') from None
+        if if_blocked == "warn":
+            self._placement.warn_if_blocked(model)
         self._observers.model_moved(model)
         return model
 

@@ -15,7 +15,7 @@ from flatland.entities.layer import Layer
 from flatland.entities.model import Model
 from flatland.errors import WorldError
 from flatland.geometry import Pose, finite_pose
-from flatland.runtime.free_space import Bounds, FreeSpace
+from flatland.runtime.free_space import Bounds, FreeSpace, Spread
 from flatland.runtime.nearest_place import SEARCH_RADIUS, nearest_offset
 
 if TYPE_CHECKING:
@@ -35,7 +35,6 @@ IF_BLOCKED: Final[tuple[IfBlocked, ...]] = get_args(IfBlocked)
 TOLERANCE: Final = 0.005  # m of penetration that is allowed, as by the Box2D solver
 _ROUNDING: Final = 1e-4  # m of overlap of touching shapes that single precision may cause
 _FIRST_TRIES: Final = 1024
-_BLOCK: Final = 256  # candidates per comparison with the places found
 _MAX_SPACES: Final = 8  # free spaces in the cache
 
 
@@ -77,30 +76,38 @@ class Placement:
                 place near the pose is free.
             ValueError: The pose is out of the range of the physics.
         """
-        if if_blocked == "allow":
+        if if_blocked in ("allow", "warn"):
             return pose
-        physics, bodies = self._world.physics, [body.physics for body in model.bodies]
-        overlapped = physics.overlapping_bodies(bodies, pose, least_gap=-TOLERANCE)
-        if not overlapped:
+        overlap = self._overlap(model, pose)
+        if overlap is None:
             return pose
-        at = "({:.3f}, {:.3f}, {:.3f})".format(*pose)
-        what = f"overlaps {self._describe(overlapped)} at {at}"
-        if if_blocked == "warn":
-            _LOG.warning('model "%s" %s', model.name, what)
-            return pose
+        failure = f'failed to {verb} model "{model.name}", it {overlap}'
         if if_blocked == "refuse":
-            raise WorldError(f'failed to {verb} model "{model.name}", it {what}')
+            raise WorldError(failure)
+        physics, bodies = self._world.physics, [body.physics for body in model.bodies]
         offset = nearest_offset(
             lambda offsets: physics.free_poses(
                 bodies, _poses(offsets + pose[:2], pose[2]), least_gap=-_ROUNDING
             )
         )
         if offset is None:
-            raise WorldError(
-                f'failed to {verb} model "{model.name}", it {what}, and no place within '
-                f"{SEARCH_RADIUS:g} m is free"
-            )
+            raise WorldError(f"{failure}, and no place within {SEARCH_RADIUS:g} m is free")
         return (pose[0] + offset[0], pose[1] + offset[1], pose[2])
+
+    def warn_if_blocked(self, model: Model) -> None:
+        """Logs one line if a model overlaps walls or other models."""
+        overlap = self._overlap(model, model.pose)
+        if overlap is not None:
+            _LOG.warning('model "%s" %s', model.name, overlap)
+
+    def _overlap(self, model: Model, pose: Pose) -> str | None:
+        """Returns a description of the overlaps of a model at a pose, None if there are none."""
+        bodies = [body.physics for body in model.bodies]
+        overlapped = self._world.physics.overlapping_bodies(bodies, pose, least_gap=-TOLERANCE)
+        if not overlapped:
+            return None
+        x, y, theta = pose
+        return f"overlaps {self._describe(overlapped)} at ({x:.3f}, {y:.3f}, {theta:.3f})"
 
     def _describe(self, bodies: list[PhysicsBody]) -> str:
         names = []
@@ -162,7 +169,7 @@ class Placement:
         generator = self._generator(rng)
         space = self._free_space(bits, radius, clearance, bounds)
         cells = space.cells(start)
-        taken = np.empty((0, 2))
+        spread = Spread(2 * radius + clearance)
         # Most calls find enough places among a small part of the cells.
         for tries in (_FIRST_TRIES + 32 * n, len(cells)):
             picked = generator.choice(cells, size=min(tries, len(cells)), replace=False)
@@ -170,13 +177,13 @@ class Placement:
             free = self._world.physics.free_discs(
                 _poses(places, 0.0), radius, bits, ignored=ignored, least_gap=clearance
             )
-            taken = _add_apart(taken, places[free], n, 2 * radius + clearance)
-            if len(taken) == n:
-                return np.column_stack((taken, generator.uniform(-math.pi, math.pi, n)))
+            if spread.fill(places[free], n):
+                points = np.array(spread.places).reshape(-1, 2)
+                return np.column_stack((points, generator.uniform(-math.pi, math.pi, n)))
         where = "" if start is None else f" connected to ({start[0]:g}, {start[1]:g})"
         raise WorldError(
-            f"found only {len(taken)} of {n} free places for discs of radius {radius:g} m with a "
-            f"clearance of {clearance:g} m{where}"
+            f"found only {len(spread.places)} of {n} free places for discs of radius {radius:g} m "
+            f"with a clearance of {clearance:g} m{where}"
         )
 
     def _free_space(
@@ -257,20 +264,3 @@ def _world_edges(layer: Layer) -> DoubleArray:
 
 def _poses(points: DoubleArray, theta: float) -> DoubleArray:
     return np.column_stack((points, np.full(len(points), theta)))
-
-
-def _add_apart(taken: DoubleArray, places: DoubleArray, n: int, least: float) -> DoubleArray:
-    """Adds places with a minimum distance from all others, in order, until there are `n`."""
-    for begin in range(0, len(places), _BLOCK):
-        block = places[begin : begin + _BLOCK]
-        apart = np.hypot(*(block[:, np.newaxis] - taken).transpose(2, 0, 1)) >= least
-        added: list[DoubleArray] = []
-        for place in block[apart.all(axis=1)]:
-            if len(taken) + len(added) == n:
-                break
-            if all(math.dist(place, other) >= least for other in added):
-                added.append(place)
-        taken = np.concatenate((taken, np.array(added).reshape(-1, 2)))
-        if len(taken) == n:
-            break
-    return taken

@@ -41,6 +41,7 @@ class PluginHost:
     Attributes:
         registry: The plugin classes that files can name.
         world_plugins: The world plugins in order of loading.
+        hooks: The hooks of all plugins.
     """
 
     def __init__(
@@ -67,7 +68,7 @@ class PluginHost:
         self._requests = requests
         self._faults = faults
         self._timeout = timeout
-        self._hooks = HookTable()
+        self.hooks = HookTable()
 
     # -- start and end ---------------------------------------------------------------------
 
@@ -153,7 +154,7 @@ class PluginHost:
         except BaseException:
             self._release(plugin)
             raise
-        self._hooks.add(plugin)
+        self.hooks.add(plugin)
 
     def _initialize(self, plugin: FlatlandPlugin, config: YamlReader) -> None:
         try:
@@ -165,7 +166,7 @@ class PluginHost:
     def shut_down(self, plugins: Sequence[FlatlandPlugin]) -> None:
         """Ends plugins, the last one first: no more hooks, `on_shutdown`, then their ports."""
         for plugin in plugins:
-            self._hooks.remove(plugin)
+            self.hooks.remove(plugin)
         for plugin in reversed(plugins):
             if isinstance(plugin, WorldPlugin) and plugin in self.world_plugins:
                 self.world_plugins.remove(plugin)
@@ -173,7 +174,8 @@ class PluginHost:
                 with self._requests.hooks():
                     plugin.on_shutdown()
             except PLUGIN_FAULTS as error:
-                self._faults.add(plugin, f"{describe(plugin)}: on_shutdown", error)
+                name = f"{describe(plugin)}: on_shutdown"
+                self._faults.add((plugin, "on_shutdown"), name, error)
             self._release(plugin)
         self._faults.forget(set(plugins))
 
@@ -190,35 +192,30 @@ class PluginHost:
 
     def measure(self, costs: PluginCosts | None) -> None:
         """Adds the wall time of all hooks to some costs from now on; None ends the measurement."""
-        self._hooks.wrap(None if costs is None else costs.timed)
-
-    @property
-    def hooks_version(self) -> int:
-        """Number that changes when hooks are added or removed."""
-        return self._hooks.version
+        self.hooks.wrap(None if costs is None else costs.timed)
 
     @property
     def wants_contacts(self) -> bool:
         """Whether any plugin overrides a hook for recorded contacts."""
-        return self._hooks.has_any(*CONTACT_HOOKS)
+        return self.hooks.has_any(*CONTACT_HOOKS)
 
     @property
     def wants_pre_solve(self) -> bool:
         """Whether any plugin overrides `pre_solve`."""
-        return self._hooks.has_any("pre_solve")
+        return self.hooks.has_any("pre_solve")
 
     def pre_solve_bodies(self, bodies: Mapping[int, Body]) -> set[int]:
         """Returns the physics ids of the bodies whose contacts concern a `pre_solve` hook."""
-        concerned = self._hooks.bodies_concerned("pre_solve", bodies.values())
+        concerned = self.hooks.bodies_concerned("pre_solve", bodies.values())
         return {body.physics.id for body in concerned}
 
     def before_physics_step(self, timekeeper: Timekeeper) -> None:
         """Calls `before_physics_step` of all plugins."""
-        self._call("before_physics_step", self._hooks.of_step("before_physics_step"), timekeeper)
+        self._call("before_physics_step", self.hooks.of_step("before_physics_step"), timekeeper)
 
     def after_physics_step(self, timekeeper: Timekeeper) -> None:
         """Calls `after_physics_step` of all plugins."""
-        self._call("after_physics_step", self._hooks.of_step("after_physics_step"), timekeeper)
+        self._call("after_physics_step", self.hooks.of_step("after_physics_step"), timekeeper)
 
     def dispatch_contacts(self, events: Sequence[ContactEvent], bodies: Mapping[int, Body]) -> None:
         """Passes recorded contact events to the plugins that they concern, in order.
@@ -232,7 +229,7 @@ class PluginHost:
             if body_a is None or body_b is None:
                 continue  # A plugin created one of them in the physics world itself.
             hook = _EVENT_HOOKS[event.kind]
-            hooks = self._hooks.of_contact(hook, body_a, body_b)
+            hooks = self.hooks.of_contact(hook, body_a, body_b)
             if not hooks:
                 continue
             contact = Contact.between(bodies, event)
@@ -256,17 +253,16 @@ class PluginHost:
             body_a.physics.fixture(raw.fixture_a),
             body_b.physics.fixture(raw.fixture_b),
         )
-        hooks = self._hooks.of_contact("pre_solve", body_a, body_b)
+        hooks = self.hooks.of_contact("pre_solve", body_a, body_b)
         self._call("pre_solve", hooks, contact, old_manifold)
 
     def _call(self, hook: str, hooks: HookList, *arguments: Any) -> None:
-        faults = self._faults
+        counts = self._faults.counts
         for plugin, method in hooks:
             try:
                 method(*arguments)
+                if counts:
+                    self._faults.succeeded(plugin, hook)
             except PLUGIN_FAULTS as error:
-                if faults.add_in_hook(plugin, hook, describe(plugin), error):
-                    self._hooks.remove(plugin)
-            else:
-                if faults.any_counted:
-                    faults.succeeded(plugin, hook)
+                if self._faults.add_in_hook(plugin, hook, describe(plugin), error):
+                    self.hooks.remove(plugin)

@@ -29,22 +29,20 @@ class Requests:
 
     Attributes:
         lock: Held during each step and each batch of actions.
+        actions: The actions that wait.
+        hook_thread: Identifier of the thread that runs hooks of plugins, None if none does.
     """
 
     def __init__(self) -> None:
         """Creates an empty queue."""
         self.lock = threading.RLock()
-        self._actions: deque[Callable[[], None]] = deque()
+        self.actions: deque[Callable[[], None]] = deque()
         self._server: int | None = None
         self._wake: Callable[[], None] | None = None
-        # Identifiers of the thread that runs hooks of plugins, starts a plugin, runs actions.
-        self._hook_thread: int | None = None
+        self.hook_thread: int | None = None
+        # Identifiers of the threads that start a plugin and run actions.
         self._initializing_thread: int | None = None
         self._action_thread: int | None = None
-
-    def __bool__(self) -> bool:
-        """Whether actions are waiting."""
-        return bool(self._actions)
 
     # -- threads ---------------------------------------------------------------------------
 
@@ -70,11 +68,11 @@ class Requests:
     @contextmanager
     def hooks(self) -> Iterator[None]:
         """Marks the current thread as running hooks of plugins, for the time of the block."""
-        previous, self._hook_thread = self._hook_thread, threading.get_ident()
+        previous, self.hook_thread = self.hook_thread, threading.get_ident()
         try:
             yield
         finally:
-            self._hook_thread = previous
+            self.hook_thread = previous
 
     @contextmanager
     def initializing(self) -> Iterator[None]:
@@ -89,7 +87,7 @@ class Requests:
     @property
     def in_hook(self) -> bool:
         """Whether the current thread runs a hook of a plugin."""
-        return self._hook_thread == threading.get_ident()
+        return self.hook_thread == threading.get_ident()
 
     def refuse_in_plugin(self, method: str) -> None:
         """Raises if the current thread executes a plugin's hook or `on_initialize`.
@@ -101,7 +99,7 @@ class Requests:
             WorldError: It does.
         """
         thread = threading.get_ident()
-        if thread in (self._hook_thread, self._initializing_thread):
+        if thread in (self.hook_thread, self._initializing_thread):
             raise WorldError(f"{method} must not be called from a plugin's hook")
 
     # -- actions ---------------------------------------------------------------------------
@@ -122,7 +120,7 @@ class Requests:
             except BaseException as error:
                 future.set_exception(error)
 
-        self._actions.append(run)
+        self.actions.append(run)
         wake = self._wake
         if wake is not None:
             wake()
@@ -133,10 +131,10 @@ class Requests:
         with self.lock:
             previous, self._action_thread = self._action_thread, threading.get_ident()
             try:
-                for _ in range(len(self._actions)):
+                for _ in range(len(self.actions)):
                     # An action may process the queue itself, so it can be empty earlier.
-                    if self._actions:
-                        self._actions.popleft()()
+                    if self.actions:
+                        self.actions.popleft()()
             finally:
                 self._action_thread = previous
 

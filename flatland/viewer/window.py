@@ -326,8 +326,8 @@ class ViewerWindow(QMainWindow):
             choice.name,
             choice.name,
             Pose2D(*pose),
-            on_success=lambda _response: self.status_bar.show_temporary_message(
-                f"Spawned {choice.name}"
+            on_success=lambda response: self.status_bar.show_temporary_message(
+                response.message or f"Spawned {choice.name}"
             ),
             on_failure=lambda reason: self._show_error("Spawn model", reason),
         )

@@ -1,4 +1,4 @@
-"""The example package, the environment of a shell with flatland, and background programs."""
+"""Fixtures: the example package, the environment of a user's shell, background programs."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ import flatland
 
 
 def free_port() -> int:
-    """Returns an unused TCP port."""
+    """Returns an unused TCP port of this machine."""
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         port: int = probe.getsockname()[1]
@@ -32,7 +32,7 @@ def run(
     folder: Path,
     timeout: float = TIMEOUT,
 ) -> str:
-    """Runs a command and returns its output, which a failure of the test shows."""
+    """Runs a command and returns its output; the test fails if the command fails."""
     done = subprocess.run(
         command,
         env=environment,
@@ -48,7 +48,7 @@ def run(
 
 
 class Background:
-    """A program that runs in parallel with the test, such as roslaunch."""
+    """A program that runs concurrently with the test, such as roslaunch."""
 
     def __init__(
         self, command: Sequence[str | Path], environment: Mapping[str, str], folder: Path, log: Path
@@ -67,14 +67,14 @@ class Background:
 
     @property
     def output(self) -> str:
-        """The output of the program so far."""
+        """The output so far."""
         return self._log.read_text(errors="replace")
 
     def wait_for(self, pattern: str) -> None:
-        """Waits until the output contains a pattern."""
+        """Waits until the output matches a pattern."""
 
         def printed() -> bool:
-            # Poll before reading: the output of a program that has ended is complete.
+            # Checked first, because the output is complete once the program has ended.
             ended = self._process.poll() is not None
             found = re.search(pattern, self.output) is not None
             if ended and not found:
@@ -84,7 +84,7 @@ class Background:
         wait_until(f"output with {pattern!r}", printed, poll_period=0.05)
 
     def stop(self) -> None:
-        """Interrupts the program as Control-C does, and waits for its end."""
+        """Stops the program as Ctrl-C does."""
         if self._process.poll() is None:
             os.killpg(self._process.pid, signal.SIGINT)
             try:
@@ -93,18 +93,18 @@ class Background:
                 with contextlib.suppress(ProcessLookupError):
                     os.killpg(self._process.pid, signal.SIGKILL)
                 self._process.wait()
-                pytest.fail(f"did not end after the interrupt:\n{self.output}")
+                pytest.fail(f"did not stop on SIGINT:\n{self.output}")
 
 
 @pytest.fixture(scope="session")
 def example(checkout: Path) -> Path:
-    """The folder of the example package."""
+    """The example package."""
     return checkout / "examples" / "my_robots"
 
 
 @pytest.fixture
 def environment(checkout: Path, tmp_path: Path) -> dict[str, str]:
-    """The environment of a shell after `. setup.bash`, with its own home and ROS master."""
+    """Returns the environment of a shell after `. setup.bash`, with a new home and ROS master."""
     package = Path(flatland.__file__).resolve().parent
     # The package is the installed one, or the source tree after `make dev`.
     share = checkout if package.parent == checkout else Path(sys.prefix) / "share"
@@ -128,7 +128,7 @@ def environment(checkout: Path, tmp_path: Path) -> dict[str, str]:
 
 @pytest.fixture
 def start(tmp_path: Path) -> Iterator[Callable[..., Background]]:
-    """Returns a function that starts programs, which are stopped after the test."""
+    """Starts programs, which are stopped at the end of the test."""
     started: list[Background] = []
 
     def start_program(
@@ -145,13 +145,13 @@ def start(tmp_path: Path) -> Iterator[Callable[..., Background]]:
 
 @pytest.fixture(scope="session")
 def run_command() -> Callable[..., str]:
-    """Returns the function `run`, which runs a command."""
+    """Runs a command, as `run_command(command, environment, folder, timeout=...)`."""
     return run
 
 
 @pytest.fixture
 def found_by_variable(example: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Makes the package available by `FLATLAND_PLUGIN_PATH`, without ROS."""
+    """Makes the package available as in a Python program without ROS."""
     monkeypatch.setenv("FLATLAND_PLUGIN_PATH", str(example / "flatland_plugins.xml"))
     monkeypatch.delenv("ROS_PACKAGE_PATH", raising=False)
     monkeypatch.setattr(sys, "path", list(sys.path))
@@ -159,7 +159,7 @@ def found_by_variable(example: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.fixture
 def load(found_by_variable: None, tmp_path: Path) -> Iterator[Callable[..., flatland.World]]:
-    """Returns a function that loads a world from the texts of model files, by name, and plugins."""
+    """Loads a world with world plugins and with models, given as keyword arguments name=YAML."""
     worlds: list[flatland.World] = []
 
     def load_world(plugins: str = "[]", **models: str) -> flatland.World:

@@ -1,4 +1,4 @@
-"""The example plugin Battery: draining, charging, rate, and invalid parameters."""
+"""The example plugin Battery: discharging, charging, rates, and invalid parameters."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from flatland import PluginError
 
 
 def robot(parameters):
-    """Returns a model of one disc with a battery."""
+    """Returns a model that consists of a disc with a battery."""
     return f"""
 bodies: [{{name: base, footprints: [{{type: circle, radius: 0.2, density: 1}}]}}]
 plugins:
@@ -23,7 +23,7 @@ def battery(load, parameters):
     return world, world.output("/battery")
 
 
-def test_battery_drains_by_idle_power_and_speed(load):
+def test_battery_is_discharged_by_idle_power_and_speed(load):
     world, output = battery(load, "capacity: 2, idle_power: 36, power_per_speed: 100")
     body = world.model("robot").body("base")
     world.step(200)
@@ -56,7 +56,7 @@ def test_battery_publishes_at_its_rate(load):
     world = load(robot=robot("update_rate: 4, voltage: 12"))
     output = world.ports.outputs["/battery"]
     world.step(400)
-    assert output.latest is None, "computed without a subscriber"
+    assert output.latest is None, "computed without subscribers"
     readings = []
     output.subscribe(readings.append)
     world.step(400)
@@ -81,9 +81,9 @@ def test_battery_topics_are_in_the_namespace_of_the_model(load, tmp_path):
         ("capacity: 0", 'Invalid "capacity", must be finite and above 0, got 0.0'),
         ("voltage: -1", 'Invalid "voltage", must be finite and above 0, got -1.0'),
         ("voltage: .inf", 'Invalid "voltage", must be finite and above 0, got inf'),
-        ("idle_power: -1", 'Invalid "idle_power", must be finite and 0 or more, got -1.0'),
-        ("power_per_speed: .nan", 'Invalid "power_per_speed", must be finite and 0 or more, got'),
-        ("charge_power: .inf", 'Invalid "charge_power", must be finite and 0 or more, got inf'),
+        ("idle_power: -1", 'Invalid "idle_power", must be finite and at least 0, got -1.0'),
+        ("power_per_speed: .nan", 'Invalid "power_per_speed", must be finite and at least 0, got'),
+        ("charge_power: .inf", 'Invalid "charge_power", must be finite and at least 0, got inf'),
         ("update_rate: -1", 'Invalid "update_rate"'),
         ("body: wheel", 'Body with name "wheel" does not exist'),
         ("capcity: 3", 'contains unrecognized entry(s) {"capcity"}'),
@@ -100,7 +100,7 @@ def test_battery_rejects_invalid_parameters(load, parameters, text):
     assert "robot.yaml:" in message
 
 
-@pytest.mark.filterwarnings("ignore::DeprecationWarning")  # of ROS modules
+@pytest.mark.filterwarnings("ignore::DeprecationWarning")  # in modules of ROS
 @pytest.mark.parametrize(
     ("energy", "power", "status"),
     [
@@ -110,9 +110,9 @@ def test_battery_rejects_invalid_parameters(load, parameters, text):
         (0.0, 0.0, "CHARGING"),
     ],
 )
-def test_battery_state_has_the_direction_of_the_current(load, energy, power, status):
+def test_battery_state_contains_the_direction_of_the_current(load, energy, power, status):
     pytest.importorskip("sensor_msgs.msg", reason="ROS is not installed")
-    battery(load, "capacity: 2")  # adds the package to `sys.path`
+    battery(load, "capacity: 2")  # adds the package to the Python path
     adapter = importlib.import_module("my_robots.battery_ros")
     reading = importlib.import_module("my_robots.battery").BatteryReading
     message = adapter.to_message(reading(3_250_000_000, 20.0, 2.0, energy, power))

@@ -1,4 +1,4 @@
-"""The example package: its tests, its independence of flatland, and its use with ROS."""
+"""The example package: without ROS, on ROS, and independent of flatland's own code."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import pytest
 
 
 def test_the_test_of_the_package_passes_without_ros(example, environment, tmp_path, run_command):
-    """The test imports no ROS module; any import of one raises."""
+    """Importing a ROS module fails."""
     blocked = tmp_path / "blocked"
     blocked.mkdir()
     for module in ("rospy", "genpy", "rosgraph", "sensor_msgs", "std_srvs", "std_msgs"):
@@ -25,7 +25,7 @@ def test_the_test_of_the_package_passes_without_ros(example, environment, tmp_pa
     assert "Ran 3 tests" in printed
 
 
-def test_the_package_is_not_importable_with_flatland_alone(environment, tmp_path):
+def test_flatland_does_not_contain_the_package(environment, tmp_path):
     code = "import flatland, importlib.util as u; print(u.find_spec('my_robots'))"
     done = subprocess.run(
         [sys.executable, "-c", code],
@@ -102,7 +102,7 @@ LISTEN = dedent(
 
 
 @pytest.mark.ros
-def test_the_package_path_suffices_to_use_the_package_with_ros(
+def test_on_ros_the_package_is_found_on_the_package_path(
     example, environment, tmp_path, start, run_command
 ):
     pytest.importorskip("rospy", reason="ROS is not installed")

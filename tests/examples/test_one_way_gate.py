@@ -1,4 +1,4 @@
-"""The example plugin OneWayGate: which bodies pass, and how long a decision holds."""
+"""The example plugin OneWayGate: directions, and the duration of its decisions."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ bodies:
 
 
 def gate_world(load, robot=DISC, yaw=0.0):
-    """Loads a world with the gate at (0, 0), rotated by `yaw`, and a robot 2 m behind it."""
+    """Returns a world with the gate at (0, 0, yaw) and a robot 2 m away on its -x side."""
     world = load(gate=GATE, robot=robot)
     world.move_model("gate", (0, 0, yaw))
     put(world, "robot", -2, 0, yaw)
@@ -36,13 +36,13 @@ def gate_world(load, robot=DISC, yaw=0.0):
 
 
 def put(world, name, x, y, yaw=0.0):
-    """Places a model at a point in the frame of the gate, which is rotated by `yaw`."""
+    """Moves a model to a point in the frame of the gate, which is rotated by `yaw`."""
     c, s = math.cos(yaw), math.sin(yaw)
     world.move_model(name, (c * x - s * y, s * x + c * y, yaw))
 
 
 def drive(world, speed, seconds, name="robot", yaw=0.0):
-    """Moves a model along the x axis of the gate and returns its final position on that axis."""
+    """Drives a model along the x axis of the gate; returns its final x in that frame [m]."""
     body = world.model(name).bodies[0]
     for _ in range(round(seconds / 0.005)):
         body.set_velocity(speed * math.cos(yaw), speed * math.sin(yaw), 0)
@@ -53,15 +53,15 @@ def drive(world, speed, seconds, name="robot", yaw=0.0):
 
 @pytest.mark.parametrize("yaw", [0.0, 0.7, math.pi / 2, -2.5])
 @pytest.mark.parametrize("robot", [DISC, LONG_ROBOT])
-def test_gate_opens_from_behind_only(load, robot, yaw):
+def test_gate_can_be_passed_in_one_direction_only(load, robot, yaw):
     world = gate_world(load, robot, yaw)
     assert drive(world, 1.0, 4.0, yaw=yaw) == pytest.approx(2.0, abs=0.01)
     reach = 0.2 if robot != LONG_ROBOT else 0.7
     assert drive(world, -1.0, 4.0, yaw=yaw) == pytest.approx(0.1 + reach, abs=0.03)
 
 
-def test_gate_keeps_its_decision_during_the_contact(load):
-    """A robot that is mostly on the other side may continue or return."""
+def test_gate_keeps_its_decision_while_the_robot_touches_it(load):
+    """A robot that has passed half-way can reverse and continue."""
     world = gate_world(load, LONG_ROBOT)
     assert drive(world, 1.0, 2.4) == pytest.approx(0.4, abs=0.01)
     assert drive(world, -1.0, 2.4) == pytest.approx(-2.0, abs=0.01)
@@ -70,7 +70,7 @@ def test_gate_keeps_its_decision_during_the_contact(load):
     assert drive(world, -1.0, 2.0) > 0.7
 
 
-def test_gate_decides_separately_for_each_body(load):
+def test_gate_decides_for_each_body_separately(load):
     world = gate_world(load)
     world.spawn_model("robot.yaml", "other")
     put(world, "other", 2, 0.5)
@@ -83,22 +83,22 @@ def test_gate_decides_separately_for_each_body(load):
     assert other.pose[0] == pytest.approx(0.3, abs=0.03)
 
 
-def test_other_bodies_of_the_model_are_not_gates(load):
+def test_gate_consists_of_one_body_of_its_model(load):
     world = gate_world(load)
     put(world, "robot", -2, 3)
     assert drive(world, 1.0, 4.0) == pytest.approx(-0.3, abs=0.03)
 
 
-def test_gate_ignores_sensor_fixtures(load):
-    """A sensor with a long range does not keep the gate open for the return."""
+def test_gate_ignores_contacts_of_sensors(load):
+    """A large sensor that still touches the gate does not keep it open for the way back."""
     sensor = ", {type: circle, radius: 4, density: 0, sensor: true}]"
     world = gate_world(load, DISC.replace("]}", sensor + "}"))
     assert drive(world, 1.0, 4.0) == pytest.approx(2.0, abs=0.01)
-    assert len(world.contacts) >= 1, "the sensor must touch the gate all the time"
+    assert len(world.contacts) >= 1, "the sensor does not touch the gate"
     assert drive(world, -1.0, 4.0) == pytest.approx(0.3, abs=0.03)
 
 
-def test_gate_drops_the_records_of_deleted_models(load):
+def test_gate_forgets_deleted_models(load):
     world = gate_world(load, LONG_ROBOT)
     plugin = world.model("gate").plugin("g")
     drive(world, 1.0, 2.4)
@@ -108,7 +108,7 @@ def test_gate_drops_the_records_of_deleted_models(load):
     assert plugin._may_pass == plugin._contacts == {}
 
 
-def test_gate_keeps_its_decision_when_one_contact_replaces_another(load):
+def test_gate_keeps_its_decision_if_a_contact_begins_as_another_ends(load):
     world = gate_world(load, LONG_ROBOT)
     plugin = world.model("gate").plugin("g")
     drive(world, 1.0, 2.4)
@@ -124,7 +124,7 @@ def test_gate_keeps_its_decision_when_one_contact_replaces_another(load):
     assert plugin._contacts == {robot: {12345}}
 
 
-def test_gate_rejects_an_unknown_body(load):
+def test_gate_rejects_a_body_that_does_not_exist(load):
     with pytest.raises(PluginError, match='Body with name "door" does not exist') as caught:
         load(gate=GATE.replace('::OneWayGate"', '::OneWayGate", body: door'))
     assert 'Model Plugin "g" type "my_robots::OneWayGate" model "gate"' in str(caught.value)

@@ -10,7 +10,7 @@ RESET = '[{{name: reset, type: "my_robots::ResetPoses"{parameters}}}]'
 PLAIN = "bodies: [{name: base, footprints: [{type: circle, radius: 0.2, density: 1}]}]"
 
 
-def test_reset_moves_models_back_at_rest(load):
+def test_reset_moves_models_to_their_initial_poses_with_zero_velocities(load):
     world = load(RESET.format(parameters=""), a=PLAIN, b=PLAIN)
     world.move_model("b", (3, 0, 0))
     [plugin] = world.plugins
@@ -25,7 +25,7 @@ def test_reset_moves_models_back_at_rest(load):
     assert world.model("late").pose == (8, 8, 0)
 
 
-def test_reset_moves_only_the_configured_models(load):
+def test_reset_moves_only_the_models_in_the_parameter(load):
     world = load(RESET.format(parameters=", models: [b]"), a=PLAIN, b=PLAIN)
     world.move_model("a", (3, 0, 0))
     world.move_model("b", (3, 3, 0))
@@ -36,7 +36,7 @@ def test_reset_moves_only_the_configured_models(load):
 @pytest.mark.parametrize(
     ("parameters", "text"),
     [
-        (", models: [ghost]", 'Invalid "models", there is no model "ghost" at the start'),
+        (", models: [ghost]", 'Invalid "models", model "ghost" does not exist at the start'),
         (", modells: [a]", 'contains unrecognized entry(s) {"modells"}'),
     ],
 )

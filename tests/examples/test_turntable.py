@@ -1,4 +1,4 @@
-"""The example plugin Turntable: turning on command, its rate, and invalid parameters."""
+"""The example plugin Turntable: rotation on command, its rate, and invalid parameters."""
 
 from __future__ import annotations
 
@@ -8,14 +8,14 @@ from flatland import PluginError
 
 
 def table(parameters):
-    """A model of one kinematic disc that turns."""
+    """Returns a model that consists of a kinematic disc with a turntable."""
     return f"""
 bodies: [{{name: disc, type: kinematic, footprints: [{{type: circle, radius: 1, density: 0}}]}}]
 plugins: [{{name: t, type: "my_robots::Turntable", {parameters}}}]
 """
 
 
-def test_turntable_turns_while_it_runs(load):
+def test_turntable_rotates_while_the_command_is_true(load):
     world = load(table=table("body: disc, speed: -0.5"))
     run, turning = world.command("/run"), world.output("/turning")
     world.step(200)

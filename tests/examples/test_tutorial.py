@@ -1,9 +1,9 @@
-"""Executes docs/write_a_plugin.md: writes its files, runs its commands and compares their output.
+"""Follows docs/write_a_plugin.md: writes its files, runs its commands and compares their output.
 
-A block after ``File `path`:`` is a file, and one after ``Add to `path`:`` is its next part. The
-`bash` blocks run in order in one shell, after the files above them are written; a block after
-`<!-- leave running -->` runs in the background until the next such block. A `text` block is the
-output of the commands above it, in which `...` matches any text.
+A block after ``File `path`:`` is a file, a block after ``Add to `path`:`` is its next part. `bash`
+blocks are run in one shell, in order, after the files above them have been written; a block after
+`<!-- leave running -->` is run in a separate terminal until the next such block. A `text` block is
+the output of the commands above it, where `...` matches any text.
 """
 
 from __future__ import annotations
@@ -22,17 +22,17 @@ _BLOCK = re.compile(
     r"^```(?P<language>\w+)\n(?P<text>.*?)^```$",
     re.MULTILINE | re.DOTALL,
 )
-_PACKAGE = "robot_ws/src/my_robots"  # in the home folder; created by the first commands of the page
+_PACKAGE = "robot_ws/src/my_robots"  # in the home folder, created by the first commands of the page
 _NOT_IN_THE_PAGE = {"README.md"}
 
 
 @dataclass(frozen=True)
 class Block:
-    """A block of the page.
+    """One block of the page.
 
     Attributes:
         kind: `file`, `part`, `run`, `background` or `prints`.
-        text: Contents of the block.
+        text: The contents.
         path: Path of a file or part.
     """
 
@@ -42,7 +42,7 @@ class Block:
 
 
 def read_page(page: Path) -> list[Block]:
-    """Returns the blocks of the page that are files, commands or outputs."""
+    """Returns the files, commands and outputs of the page."""
     blocks = []
     for match in _BLOCK.finditer(page.read_text()):
         text = match["text"]
@@ -57,7 +57,7 @@ def read_page(page: Path) -> list[Block]:
 
 
 def joined(before: str, part: str) -> str:
-    """Returns a file with an additional part, separated by the blank lines of PEP 8."""
+    """Appends a part to a file, with the blank lines that PEP 8 requires."""
     first = part.split("\n", 1)[0]
     if re.match(r"(@|class |def )", first):
         return f"{before}\n\n{part}"
@@ -65,11 +65,11 @@ def joined(before: str, part: str) -> str:
 
 
 def assert_printed(expected: str, printed: str) -> None:
-    """Compares the output of a command with the page, ignoring trailing blanks."""
+    """Compares the output of a command with the page; trailing white space is ignored."""
     lines = [line.rstrip() for line in printed.strip().splitlines()]
     pattern = re.escape(expected.strip()).replace(r"\.\.\.", ".*?")
     assert re.fullmatch(pattern, "\n".join(lines), re.DOTALL), (
-        f"expected output of the page:\n{expected}\nactual output:\n{printed}"
+        f"expected by the page:\n{expected}\nprinted:\n{printed}"
     )
 
 
@@ -96,11 +96,11 @@ def test_the_page_contains_the_example_package(blocks, example):
 
 
 class Shell:
-    """A shell whose working directory and exports persist between commands."""
+    """A shell that keeps its working directory and exported variables between commands."""
 
     def __init__(self, environment: dict[str, str], folder: Path, run) -> None:
         self._folder = folder
-        self._run = run
+        self._run_command = run
         (folder / "cwd").write_text(environment["HOME"])
         exports = [f"export {name}={shlex.quote(value)}" for name, value in environment.items()]
         (folder / "exports").write_text("\n".join(exports))
@@ -115,14 +115,16 @@ class Shell:
 
     def run(self, commands: str) -> str:
         """Runs commands and returns their output."""
-        printed: str = self._run(self.script(commands), {"PATH": "/usr/bin:/bin"}, self._folder)
+        printed: str = self._run_command(
+            self.script(commands), {"PATH": "/usr/bin:/bin"}, self._folder
+        )
         return printed
 
 
 @pytest.mark.ros
 @pytest.mark.build
 @pytest.mark.timeout(BUILD_TIMEOUT)
-def test_the_commands_of_the_page_print_the_shown_output(
+def test_the_commands_of_the_page_print_the_documented_output(
     blocks, environment, tmp_path, run_command, start
 ):
     for program in ("roslaunch", "catkin_make", "rospack"):

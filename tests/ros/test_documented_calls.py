@@ -1,4 +1,4 @@
-"""Types the service calls of the documentation, page by page, into a shell beside the office."""
+"""Runs the service calls of each page of the documentation against the office world."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ PAGES = ["README.md", "docs/models.md", "docs/ros.md", "docs/viewer.md"]
 
 
 @pytest.mark.parametrize("page", PAGES)
-def test_calls_do_what_the_page_says(
+def test_the_calls_of_a_page_succeed(
     launcher: Any, ros: Any, checkout: Path, ros_environment: dict[str, str], page: str
 ) -> None:
     del ros
@@ -35,8 +35,10 @@ def test_calls_do_what_the_page_says(
         assert "success: False" not in done.stdout, f"{call}\n{done.stdout}"
 
 
-def test_no_page_is_forgotten(checkout: Path) -> None:
+def test_all_pages_with_calls_are_tested(checkout: Path) -> None:
     pages = [checkout / "README.md", *sorted((checkout / "docs").glob("*.md"))]
-    having = [str(page.relative_to(checkout)) for page in pages if _CALL.search(page.read_text())]
-    # write_a_plugin.md is typed as a whole, by tests/examples.
-    assert set(having) - {"docs/write_a_plugin.md"} == set(PAGES)
+    with_calls = [
+        str(page.relative_to(checkout)) for page in pages if _CALL.search(page.read_text())
+    ]
+    # tests/examples run all commands of write_a_plugin.md.
+    assert set(with_calls) - {"docs/write_a_plugin.md"} == set(PAGES)

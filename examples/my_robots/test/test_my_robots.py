@@ -1,4 +1,4 @@
-"""Tries the plugins in the yard; needs no ROS: python3 -m unittest discover -s test."""
+"""Tests of the plugins, without ROS: python3 -m unittest discover -s test."""
 
 import os
 import unittest
@@ -7,7 +7,7 @@ from pathlib import Path
 import flatland
 
 PACKAGE = Path(__file__).resolve().parent.parent
-# Also found where the package is not built and not on ROS_PACKAGE_PATH.
+# Also finds the plugins if the package is neither built nor on ROS_PACKAGE_PATH.
 os.environ.setdefault("FLATLAND_PLUGIN_PATH", str(PACKAGE / "flatland_plugins.xml"))
 
 
@@ -20,13 +20,13 @@ class YardTest(unittest.TestCase):
         self.addCleanup(self.world.close)
 
     def drive(self, speed: float, seconds: float) -> float:
-        """Drives for a while and returns where the cart is then (x)."""
+        """Drives for some time [s] and returns the x coordinate of the cart [m]."""
         self.world.command("/cmd_vel").set(flatland.Twist(linear_x=speed))
         self.world.step(round(seconds / 0.005))
         return self.world.model("cart").pose[0]
 
     def test_battery(self) -> None:
-        """It drains by 10 W, 60 W at 1 m/s, and charges with 200 W."""
+        """The power is -10 W at rest and -60 W at 1 m/s; the battery is charged with 200 W."""
         battery = self.world.output("/battery")
         self.drive(0.0, 9.0)
         self.assertAlmostEqual(battery.latest.energy, 2.0 - 10 * 9 / 3600)
@@ -37,12 +37,12 @@ class YardTest(unittest.TestCase):
         self.assertEqual(battery.latest.fraction, 1.0)
 
     def test_gate(self) -> None:
-        """The cart passes from behind, and cannot come back."""
+        """The cart passes from the -x side and is blocked on its way back."""
         self.assertGreater(self.drive(1.0, 6.0), 7.9)
         self.assertGreater(self.drive(-1.0, 6.0), 6.3)
 
     def test_reset(self) -> None:
-        """The cart goes back to where it started."""
+        """The cart moves back to its initial pose."""
         start = self.world.model("cart").pose
         self.drive(1.0, 2.0)
         [reset] = self.world.plugins

@@ -95,13 +95,14 @@ class PythonHook final : public PreSolveHook {
   py::list errors_;
 };
 
-void step_with_hook(World& world, double dt, int velocity_iterations, int position_iterations,
-                    py::function callback, std::unordered_set<Id> bodies, py::list errors) {
+py::object step_with_hook(World& world, double dt, int velocity_iterations, int position_iterations,
+                          py::function callback, std::unordered_set<Id> bodies, py::list errors) {
   PythonHook hook(std::move(callback), std::move(bodies), std::move(errors));
   // Safe without the GIL: the world is held for this thread, and the hook takes the GIL for as long
   // as it touches Python.
   World::ExclusiveUse use(world, World::kStepping);
-  without_gil(use, [&] { world.step(dt, velocity_iterations, position_iterations, &hook); });
+  return to_python(without_gil(
+      use, [&] { return world.step(dt, velocity_iterations, position_iterations, &hook); }));
 }
 
 // The rows as arrays, one for each kind of column; None when there are no rows.

@@ -1,8 +1,15 @@
+#include <pybind11/stl.h>
+
 #include "bindings/bindings.h"
 
 namespace py = pybind11;
 
 namespace flatland {
+
+py::object to_python(const StepReport& report) {
+  if (report.empty()) return py::none();
+  return py::make_tuple(report.limited, report.invalid);
+}
 
 WorldClass bind_world(py::module_& module) {
   WorldClass world(module, "World", "A Box2D world without gravity; owns all that is in it.");
@@ -15,9 +22,11 @@ WorldClass bind_world(py::module_& module) {
         // Safe without the GIL: the world is held for this thread, and the step touches no Python
         // object as there is no hook.
         World::ExclusiveUse use(self, World::kStepping);
-        without_gil(use, [&] { self.step(dt, velocity_iterations, position_iterations, nullptr); });
+        return to_python(without_gil(
+            use, [&] { return self.step(dt, velocity_iterations, position_iterations, nullptr); }));
       },
       py::arg("dt"), py::arg("velocity_iterations"), py::arg("position_iterations"));
+  world.def("find_new_contacts", &World::find_new_contacts);
   world.def("destroy_body", &World::destroy_body, py::arg("body"));
   world.def("destroy_joint", &World::destroy_joint, py::arg("joint"));
   world.def("has_body", &World::has_body, py::arg("body"));

@@ -35,6 +35,9 @@ auto without_gil(Use& use, Work&& work) {
   return work();
 }
 
+// None for an empty report, else the ids of limited and of invalid bodies.
+pybind11::object to_python(const StepReport& report);
+
 // Bits as Python has them: any int, refused with a clear text beyond 16 bits.
 std::uint16_t checked_bits(std::int64_t bits, const char* what);
 

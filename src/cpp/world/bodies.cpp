@@ -106,13 +106,18 @@ void apply_force(World& world, Id body_id, double fx, double fy, double px, doub
   const b2Vec2 force = checked_vector(fx, fy, "force");
   const b2Vec2 point = checked_vector(px, py, "point");
   const float mass = body->GetMass();
+  float acceleration = 0.0F;
+  float angular_acceleration = 0.0F;
   if (mass > 0.0F) {
-    check_acceleration(force.Length() / mass, "force");
+    acceleration = force.Length() / mass;
+    check_acceleration(acceleration, "force");
     const float inertia = body->GetInertia() - mass * body->GetLocalCenter().LengthSquared();
     const float torque = b2Cross(point - body->GetWorldCenter(), force);
-    if (inertia > 0.0F) check_acceleration(torque / inertia, "force");
+    if (inertia > 0.0F) angular_acceleration = torque / inertia;
+    check_acceleration(angular_acceleration, "force");
   }
   body->ApplyForce(force, point, true);
+  world.contacts().guard.add_acceleration(body_id, acceleration, std::abs(angular_acceleration));
 }
 
 void apply_torque(World& world, Id body_id, double torque) {
@@ -120,8 +125,10 @@ void apply_torque(World& world, Id body_id, double torque) {
   const float checked = checked_finite(torque, "torque");
   const float mass = body->GetMass();
   const float inertia = body->GetInertia() - mass * body->GetLocalCenter().LengthSquared();
-  if (inertia > 0.0F) check_acceleration(checked / inertia, "torque");
+  const float acceleration = inertia > 0.0F ? checked / inertia : 0.0F;
+  check_acceleration(acceleration, "torque");
   body->ApplyTorque(checked, true);
+  world.contacts().guard.add_acceleration(body_id, 0.0F, std::abs(acceleration));
 }
 
 Id create_circle(World& world, Id body, double x, double y, double radius,

@@ -37,12 +37,13 @@ void ContactRecorder::EndContact(b2Contact* contact) {
 }
 
 void ContactRecorder::PreSolve(b2Contact* contact, const b2Manifold* old_manifold) {
-  if (hook == nullptr) return;
-  const bool is_wanted = hook->wants(id_of(contact->GetFixtureA()->GetBody())) ||
-                         hook->wants(id_of(contact->GetFixtureB()->GetBody()));
+  const bool is_wanted =
+      hook != nullptr && (hook->wants(id_of(contact->GetFixtureA()->GetBody())) ||
+                          hook->wants(id_of(contact->GetFixtureB()->GetBody())));
   if (is_wanted) {
     hook->pre_solve(contact, make_row(contact, ContactKind::kTouching), *old_manifold);
   }
+  guard.pre_solve(contact);
 }
 
 void ContactRecorder::PostSolve(b2Contact* contact, const b2ContactImpulse* impulse) {

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "world/slot_map.h"
+#include "world/step_guard.h"
 
 class b2World;
 
@@ -52,6 +53,7 @@ class ContactRecorder final : public b2ContactListener {
   bool recording = false;
   // Not owned; set for the length of a step.
   PreSolveHook* hook = nullptr;
+  StepGuard guard;
 
   void BeginContact(b2Contact* contact) override;
   void EndContact(b2Contact* contact) override;

@@ -65,10 +65,12 @@ void World::close() {
   fixtures_.clear();
   joints_.clear();
   contacts_ = ContactRecorder();
+  invalid_.clear();
   engine_.reset();
 }
 
-void World::step(double dt, int velocity_iterations, int position_iterations, PreSolveHook* hook) {
+StepReport World::step(double dt, int velocity_iterations, int position_iterations,
+                       PreSolveHook* hook) {
   // Bounds beyond which 1 / dt and the solver's sums leave the range of a float.
   if (!(dt >= 1e-6 && dt <= 1e3)) {
     throw std::invalid_argument("dt must be from 1e-6 to 1000 s, got " + to_text(dt));
@@ -79,10 +81,29 @@ void World::step(double dt, int velocity_iterations, int position_iterations, Pr
                                   std::to_string(iterations));
     }
   }
+  if (!invalid_.empty()) {
+    invalid_ = still_invalid();
+    if (!invalid_.empty()) return {{}, invalid_};
+  }
+  const auto seconds = static_cast<float>(dt);
+  StepGuard& guard = contacts_.guard;
+  guard.begin(*engine_, seconds);
   contacts_.hook = hook;
-  engine_->Step(static_cast<float>(dt), velocity_iterations, position_iterations);
+  engine_->Step(seconds, velocity_iterations, position_iterations);
   contacts_.hook = nullptr;
+  StepReport report = guard.end(*engine_);
+  invalid_ = report.invalid;
   if (contacts_.take_failure()) throw std::bad_alloc();
+  return report;
+}
+
+std::vector<Id> World::still_invalid() const {
+  std::vector<Id> ids;
+  for (const Id id : invalid_) {
+    b2Body* const* body = bodies_.find(id);
+    if (body != nullptr && !is_finite(*body)) ids.push_back(id);
+  }
+  return ids;
 }
 
 const b2Body* World::read_body(Id id) const {
@@ -176,15 +197,18 @@ Id World::add_joint(const b2JointDef& definition, float frequency, float damping
   return id;
 }
 
+void World::find_new_contacts() {
+  check_changeable();
+  const_cast<b2ContactManager&>(engine_->GetContactManager()).FindNewContacts();
+}
+
 void World::destroy_body(Id id) {
   b2Body* body = change_body(id);
   // Box2D looks through all fixtures that moved or came since the last search for pairs, for each
   // fixture that is destroyed: hours for a large map that goes again before the first step. A
   // search empties that list.
   constexpr int32 kManyFixtures = 2000;
-  if (waiting_fixtures(*engine_) > kManyFixtures) {
-    const_cast<b2ContactManager&>(engine_->GetContactManager()).FindNewContacts();
-  }
+  if (waiting_fixtures(*engine_) > kManyFixtures) find_new_contacts();
   rays_.remove_body(body);
   engine_->DestroyBody(body);  // says goodbye to its fixtures and joints, and ends its contacts
   bodies_.erase(id);

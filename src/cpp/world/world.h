@@ -40,8 +40,9 @@ class World final : private b2DestructionListener {
   void close();
   bool closed() const { return engine_ == nullptr; }
 
-  // Advances by dt > 0 seconds. The hook may be null. The caller holds the world exclusively.
-  void step(double dt, int velocity_iterations, int position_iterations, PreSolveHook* hook);
+  // Advances by dt > 0 seconds. The hook may be null. The caller holds the world exclusively. While
+  // a body is invalid the world stands still: the report names the body again.
+  StepReport step(double dt, int velocity_iterations, int position_iterations, PreSolveHook* hook);
 
   // Objects by id. Each throws StaleHandleError when the object or the world is gone, and
   // WorldLockedError when the world is busy. Pointers are good until the next change.
@@ -65,6 +66,8 @@ class World final : private b2DestructionListener {
   // Before and after many fixtures are added to one static body; see broad_phase.h.
   void reserve_fixtures(std::size_t more) { fixtures_.reserve(more); }
   void skip_static_fixtures(int32 waiting_before);
+  // Searches for pairs of fixtures that may touch, which the next step would do otherwise.
+  void find_new_contacts();
   Id add_joint(const b2JointDef& definition, float frequency, float damping_ratio);
   void destroy_body(Id id);
   void destroy_joint(Id id);
@@ -113,6 +116,7 @@ class World final : private b2DestructionListener {
  private:
   void SayGoodbye(b2Joint* joint) override;
   void SayGoodbye(b2Fixture* fixture) override;
+  std::vector<Id> still_invalid() const;
   [[noreturn]] void throw_locked() const;
   void wait_for_readers() const;
 
@@ -124,6 +128,7 @@ class World final : private b2DestructionListener {
   SlotMap<JointRecord, IdKind::kJoint> joints_;
   ContactRecorder contacts_;
   RayScene rays_;
+  std::vector<Id> invalid_;  // bodies that the last step left so
 
   std::atomic<int> users_{0};  // kExclusive, or how many threads cast rays
   std::atomic<std::thread::id> owner_{};

@@ -60,10 +60,10 @@ def test_a_successful_call_resets_the_count_of_faults() -> None:
         assert not take(faults)
         assert not take(faults)
         assert not take(faults, hook="other")
-        assert faults.any_counted
+        assert faults.counts
         faults.succeeded("p", "hook")
         faults.succeeded("p", "other")
-    assert not faults.any_counted
+    assert not faults.counts
 
 
 def test_the_log_has_one_traceback_per_second_and_source(caplog: pytest.LogCaptureFixture) -> None:
@@ -81,5 +81,5 @@ def test_faults_of_removed_plugins_are_dropped() -> None:
     assert not take(faults)
     assert not take(faults)
     faults.forget({"p"})
-    assert not faults.any_counted
+    assert not faults.counts
     assert not take(faults)

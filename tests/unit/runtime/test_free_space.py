@@ -44,8 +44,8 @@ def box(x1: float, y1: float, x2: float, y2: float) -> list[tuple[float, float, 
 
 
 def two_rooms(door: float) -> DoubleArray:
-    """Returns a room of 10 m by 6 m, divided by a wall at x = 5 with a door in the middle."""
-    middle = [(5.0, 0.0, 5.0, 3.0 - door / 2), (5.0, 3.0 + door / 2, 5.0, 6.0)]
+    """Returns a room of 10 m by 6 m, divided by a wall at x = 5 with a door at y = 3.02."""
+    middle = [(5.0, 0.0, 5.0, 3.02 - door / 2), (5.0, 3.02 + door / 2, 5.0, 6.0)]
     return np.array([*box(0, 0, 10, 6), *middle])
 
 

@@ -110,6 +110,15 @@ def test_refuse_leaves_the_world_unchanged(world: flatland.World) -> None:
     assert first.pose == pytest.approx((1.1, 0, 0))
 
 
+def test_a_failed_spawn_logs_no_warning(
+    world: flatland.World, files: Any, caplog: pytest.LogCaptureFixture
+) -> None:
+    files.write("bad.model.yaml", CRATE + "plugins: [{name: p, type: Missing}]\n")
+    with pytest.raises(PluginError):
+        spawn(world, "bad", "m", (5, 0, 0))
+    assert warnings_of(caplog) == []
+
+
 def test_a_refused_model_starts_no_plugin(world: flatland.World, files: Any) -> None:
     files.write("bad.model.yaml", CRATE + "plugins: [{name: p, type: Missing}]\n")
     with pytest.raises(PluginError):
@@ -258,30 +267,6 @@ def test_included_worlds_have_no_overlaps(
 ) -> None:
     with flatland.World.from_yaml(checkout / "worlds" / name / "world.yaml", seed=1):
         assert warnings_of(caplog) == []
-
-
-@pytest.mark.parametrize(
-    ("name", "expected"),
-    [
-        ("benchmark_world", []),
-        ("conestogo_office_test", []),
-        (
-            # Discs of radius 1.78 m and 0.5 m that are 1 m apart, a robot in a wall, ...
-            "simple_test_A",
-            [
-                'model "turtlebot1" overlaps layer "2d", layer "3d" at (0.000, 0.000, 0.000)',
-                'model "turtlebot2" overlaps layer "3d" at (3.000, 4.500, 3.142)',
-                'model "chair1" overlaps model "turtlebot2" at (1.200, 3.500, 2.123)',
-                'model "person1" overlaps model "turtlebot1" at (0.000, 1.000, 2.000)',
-            ],
-        ),
-    ],
-)
-def test_only_true_overlaps_in_worlds_of_the_reference_are_logged(
-    shared_dir: Path, name: str, expected: list[str], caplog: pytest.LogCaptureFixture
-) -> None:
-    with flatland.World.from_yaml(shared_dir / "worlds" / name / "world.yaml", seed=1):
-        assert warnings_of(caplog) == expected
 
 
 # -- is_free ------------------------------------------------------------------------------------

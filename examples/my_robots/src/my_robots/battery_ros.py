@@ -1,4 +1,4 @@
-"""`BatteryReading` as `sensor_msgs/BatteryState`; imported only where there is ROS."""
+"""Converts `BatteryReading` to `sensor_msgs/BatteryState`; imported only with ROS."""
 
 import math
 
@@ -10,7 +10,7 @@ from my_robots.battery import BatteryReading
 
 
 def to_message(reading: BatteryReading) -> BatteryState:
-    """Makes a message from a reading."""
+    """Converts a reading to a message."""
     message = BatteryState()
     message.header.stamp = Time(*divmod(reading.stamp, 1_000_000_000))
     message.voltage = reading.voltage

@@ -1,0 +1,82 @@
+"""Steps of a fleet that was spawned without regard to walls, and the price of the guard."""
+
+from __future__ import annotations
+
+import math
+import time
+
+import numpy as np
+
+import flatland
+from flatland.physics import PhysicsWorld
+
+from scenes import benchmark_world_path  # isort: skip
+from table import Row
+from timing import best_of
+
+ROBOTS = 50
+STEPS = 3000
+WARM_UP = 5  # steps in which Box2D finds the pairs of all new fixtures
+STEP = (0.005, 10, 10)
+SPEED = 0.5  # m/s
+
+
+def _fleet_times(seed: int) -> np.ndarray:
+    """Returns the processor time of each step [s]; other programs do not count."""
+    with flatland.World.from_yaml(benchmark_world_path(), seed=1) as source:
+        edges = source.layers[0].edges
+    world = PhysicsWorld()
+    world.create_body("static", (0, 0, 0)).create_edges(edges)
+    rng = np.random.default_rng(seed)
+    corners = edges.reshape(-1, 2)
+    places = rng.uniform(corners.min(0), corners.max(0), (ROBOTS, 2)).tolist()
+    robots = []
+    for x, y in places:
+        robot = world.create_body("dynamic", (x, y, float(rng.uniform(-3, 3))))
+        robot.create_circle((0, 0), 0.2, density=10)
+        robots.append((robot, float(rng.uniform(-1, 1))))
+    times = []
+    for _ in range(STEPS):
+        for robot, omega in robots:
+            theta = robot.pose[2]
+            robot.set_velocity(SPEED * math.cos(theta), SPEED * math.sin(theta), omega)
+        start = time.thread_time()
+        world.step(*STEP)
+        times.append(time.thread_time() - start)
+    return np.array(times[WARM_UP:])
+
+
+def _plain_step_time() -> float:
+    world = PhysicsWorld()
+    world.create_body("static", (0, 0, 0)).create_edges([(-1, -1, 1, -1)])
+    body = world.create_body("dynamic", (0, 0, 0))
+    body.create_circle((0, 0), 0.2, density=10)
+
+    def steps() -> None:
+        for _ in range(1000):
+            body.set_velocity(0.3, 0, 0.1)
+            world.step(*STEP)
+
+    return best_of(steps, 1.0) / 1000
+
+
+def rows(unit: float) -> list[Row]:
+    """Measures the fleet on three draws, and one robot with room."""
+    fleets = [_fleet_times(seed) for seed in range(3)]
+    worst = max(float(times.max() / np.median(times)) for times in fleets)
+    plain = _plain_step_time()
+    return [
+        Row(
+            f"worst step of {ROBOTS} robots spawned at random over its median",
+            worst,
+            "times",
+            20.0,
+            note="processor time, the worst of three fleets",
+        ),
+        Row(
+            "step of Box2D behind handles, one robot with room",
+            plain / unit,
+            "U",
+            note=f"{plain * 1e6:.2f} µs",
+        ),
+    ]

@@ -1,0 +1,253 @@
+#include "world/step_guard.h"
+
+#include <box2d/b2_contact.h>
+#include <box2d/b2_fixture.h>
+#include <box2d/b2_time_step.h>
+#include <box2d/b2_weld_joint.h>
+#include <box2d/b2_world.h>
+
+#include <algorithm>
+#include <cmath>
+#include <exception>
+
+#include "world/contacts.h"
+
+namespace flatland {
+namespace {
+
+// How often the handling of impacts may update one contact in a step. With room to move it is three
+// times at most; a contact that is updated more often is updated until Box2D's own limit stops it.
+// The first steps of a jam may cost more, so that bodies that overlap can be pushed apart.
+constexpr int kMostUpdates = 6;
+constexpr int kMostUpdatesAtFirst = 20;
+constexpr std::uint64_t kFirstSteps = 10;
+
+// Contacts cannot add energy, but the solver is approximate. A body on its own that gets faster
+// than this is in a jam, and so is a group of bodies; speeds are compared, not energies.
+constexpr double kGainAlone = 1.01;
+constexpr double kSlackAlone = 0.01;  // m/s
+constexpr double kGainOfGroup = 2.0;
+constexpr double kSlackOfGroup = 0.1;  // m/s
+
+bool is_dynamic(const b2Body* body) { return body->GetType() == b2_dynamicBody; }
+
+float inertia_about_center(const b2Body* body) {
+  return body->GetInertia() - body->GetMass() * body->GetLocalCenter().LengthSquared();
+}
+
+// The kinetic energy [J] of a body that was faster by these speeds [m/s, rad/s].
+double energy_of(const b2Body* body, float speed = 0.0F, float spin = 0.0F) {
+  const double v = static_cast<double>(body->GetLinearVelocity().Length() + speed);
+  const double w = static_cast<double>(std::abs(body->GetAngularVelocity()) + spin);
+  return 0.5 * (static_cast<double>(body->GetMass()) * v * v +
+                static_cast<double>(inertia_about_center(body)) * w * w);
+}
+
+// Box2D's stored impulses, which the next step starts from.
+void forget_impulses(b2Contact* contact) {
+  b2Manifold* manifold = contact->GetManifold();
+  for (int32 i = 0; i < manifold->pointCount; ++i) {
+    manifold->points[i].normalImpulse = 0.0F;
+    manifold->points[i].tangentImpulse = 0.0F;
+  }
+}
+
+// The energy [J] that the spring of a weld joint can release, as far as it is one.
+double spring_energy(const b2Joint* joint) {
+  if (joint->GetType() != e_weldJoint) return 0.0;
+  const auto* weld = static_cast<const b2WeldJoint*>(joint);
+  const auto turned = static_cast<double>(const_cast<b2Joint*>(joint)->GetBodyB()->GetAngle() -
+                                          const_cast<b2Joint*>(joint)->GetBodyA()->GetAngle() -
+                                          weld->GetReferenceAngle());
+  return 0.5 * static_cast<double>(weld->GetStiffness()) * turned * turned;
+}
+
+// How fast the surface of a kinematic body moves [m/s] about as far away as another body.
+double surface_speed(const b2Body* kinematic, const b2Body* other) {
+  float reach = (other->GetWorldCenter() - kinematic->GetWorldCenter()).Length();
+  for (const b2Fixture* f = other->GetFixtureList(); f != nullptr; f = f->GetNext()) {
+    reach += f->GetAABB(0).GetPerimeter();
+  }
+  return static_cast<double>(kinematic->GetLinearVelocity().Length() +
+                             std::abs(kinematic->GetAngularVelocity()) * reach);
+}
+
+}  // namespace
+
+bool is_finite(const b2Body* body) {
+  // The sum is finite only if all of its terms are.
+  const b2Vec2& center = body->GetWorldCenter();
+  const b2Vec2& velocity = body->GetLinearVelocity();
+  return std::isfinite(center.x + center.y + body->GetAngle() + velocity.x + velocity.y +
+                       body->GetAngularVelocity());
+}
+
+StepGuard::Start& StepGuard::start_of(const b2Body* body) {
+  return starts_[static_cast<std::uint32_t>(id_of(body))];
+}
+
+void StepGuard::add_acceleration(Id body, float linear, float angular) {
+  const auto slot = static_cast<std::uint32_t>(body);
+  if (slot >= starts_.size()) starts_.resize(slot + 1);
+  starts_[slot].acceleration += linear;
+  starts_[slot].angular_acceleration += angular;
+  has_accelerations_ = true;
+}
+
+void StepGuard::begin(b2World& world, float dt) {
+  world_ = &world;
+  ++step_;
+  failed_ = false;
+  updates_.clear();
+  float mass = 0.0F;
+  for (const b2Body* body = world.GetBodyList(); body != nullptr; body = body->GetNext()) {
+    const auto slot = static_cast<std::uint32_t>(id_of(body));
+    if (slot >= starts_.size()) starts_.resize(slot + 1);
+    Start& start = starts_[slot];
+    if (start.last_jam + 1 != step_) start.jammed_steps = 0;
+    if (is_dynamic(body)) {
+      mass += body->GetMass();
+      // The impulses that this step starts from were computed in the previous one.
+      const double earlier = start.energy;
+      start.energy = energy_of(body, dt * start.acceleration, dt * start.angular_acceleration);
+      start.allowed = std::max(start.energy, earlier);
+    } else if (body->GetType() == b2_staticBody) {
+      start.position = body->GetPosition();
+      start.angle = body->GetAngle();
+    }
+  }
+  // An impulse that would make all bodies together move at Box2D's largest speed.
+  largest_impulse_ = mass * b2_maxTranslation / dt;
+  // Box2D writes this time after it updated all contacts, before it handles impacts.
+  const_cast<b2Profile&>(world.GetProfile()).collide = -1.0F;
+}
+
+void StepGuard::pre_solve(b2Contact* contact) noexcept {
+  b2Manifold* manifold = contact->GetManifold();
+  for (int32 i = 0; i < manifold->pointCount; ++i) {
+    const b2ManifoldPoint& point = manifold->points[i];
+    // Written so that NaN is too large.
+    if (!(point.normalImpulse <= largest_impulse_ &&
+          std::abs(point.tangentImpulse) <= largest_impulse_)) {
+      forget_impulses(contact);
+    }
+  }
+  const bool handles_impacts = world_->GetProfile().collide >= 0.0F;
+  if (!handles_impacts || failed_) return;
+  try {
+    const int updates = ++updates_[contact];
+    if (updates <= kMostUpdates) return;
+    b2Body* body_a = contact->GetFixtureA()->GetBody();
+    b2Body* body_b = contact->GetFixtureB()->GetBody();
+    limit(body_a);
+    limit(body_b);
+    const bool is_first =
+        std::max(start_of(body_a).jammed_steps, start_of(body_b).jammed_steps) < kFirstSteps;
+    if (is_first && updates <= kMostUpdatesAtFirst) return;
+    // The bodies go on without this contact until the next step, which updates all contacts.
+    contact->SetEnabled(false);
+  } catch (const std::exception&) {
+    failed_ = true;
+  }
+}
+
+void StepGuard::limit(b2Body* body) {
+  if (is_dynamic(body) && std::find(limited_.begin(), limited_.end(), body) == limited_.end()) {
+    limited_.push_back(body);
+  }
+}
+
+StepReport StepGuard::end(b2World& world) {
+  StepReport report;
+  for (b2Body* body = world.GetBodyList(); body != nullptr; body = body->GetNext()) {
+    if (!is_finite(body)) {
+      if (body->GetType() == b2_staticBody) {
+        restore_static(body);
+      } else {
+        report.invalid.push_back(id_of(body));
+      }
+    } else if (is_dynamic(body)) {
+      const Start& start = start_of(body);
+      const bool is_faster = energy_of(body) > start.allowed * kGainAlone * kGainAlone;
+      if (is_faster && start.step != step_) examine_group(body);
+    }
+  }
+  for (const b2Body* body : limited_) {
+    report.limited.push_back(id_of(body));
+    Start& start = start_of(body);
+    start.jammed_steps = start.last_jam + 1 == step_ ? start.jammed_steps + 1 : 1;
+    start.last_jam = step_;
+  }
+  limited_.clear();
+  if (has_accelerations_) {
+    for (Start& start : starts_) start.acceleration = start.angular_acceleration = 0.0F;
+    has_accelerations_ = false;
+  }
+  return report;
+}
+
+void StepGuard::examine_group(b2Body* first) {
+  // All bodies that could pass energy to each other in this step, by touching or by a joint.
+  group_.assign(1, first);
+  start_of(first).step = step_;
+  const auto add = [&](b2Body* body) {
+    if (!is_dynamic(body) || start_of(body).step == step_) return;
+    start_of(body).step = step_;
+    group_.push_back(body);
+  };
+  double before = 0.0;
+  double after = 0.0;
+  double mass = 0.0;
+  double pushing_speed = 0.0;  // of what moves whatever meets it: kinematic bodies, conveyor belts
+  double restitution = 1.0;
+  bool has_joints = false;
+  for (std::size_t i = 0; i < group_.size(); ++i) {
+    const b2Body* body = group_[i];
+    before += start_of(body).allowed;
+    after += energy_of(body);
+    mass += static_cast<double>(body->GetMass());
+    for (const b2ContactEdge* edge = body->GetContactList(); edge != nullptr; edge = edge->next) {
+      b2Contact* contact = edge->contact;
+      restitution = std::max(restitution, static_cast<double>(contact->GetRestitution()));
+      pushing_speed =
+          std::max(pushing_speed, static_cast<double>(std::abs(contact->GetTangentSpeed())));
+      if (edge->other->GetType() == b2_kinematicBody) {
+        pushing_speed = std::max(pushing_speed, surface_speed(edge->other, body));
+      }
+      if (contact->IsTouching()) add(edge->other);
+    }
+    for (const b2JointEdge* edge = body->GetJointList(); edge != nullptr; edge = edge->next) {
+      has_joints = true;
+      before += 0.5 * spring_energy(edge->joint);  // both bodies have this joint
+      if (edge->other->GetType() == b2_kinematicBody) {
+        pushing_speed = std::max(pushing_speed, surface_speed(edge->other, body));
+      }
+      add(edge->other);
+    }
+  }
+  const bool is_alone = group_.size() == 1 && !has_joints;
+  const double allowed = restitution * (std::sqrt(2.0 * before / mass) + 2.0 * pushing_speed);
+  const double speed = std::sqrt(2.0 * after / mass);
+  const double most =
+      is_alone ? kGainAlone * allowed + kSlackAlone : kGainOfGroup * allowed + kSlackOfGroup;
+  if (speed <= most || !std::isfinite(speed)) return;
+  const auto ratio = static_cast<float>(allowed / speed);
+  for (b2Body* body : group_) {
+    body->SetLinearVelocity(ratio * body->GetLinearVelocity());
+    body->SetAngularVelocity(ratio * body->GetAngularVelocity());
+    for (const b2ContactEdge* edge = body->GetContactList(); edge != nullptr; edge = edge->next) {
+      forget_impulses(edge->contact);
+    }
+    limit(body);
+  }
+}
+
+void StepGuard::restore_static(b2Body* body) {
+  // Box2D leaves the velocity of a static body alone, unless the body becomes one.
+  body->SetType(b2_kinematicBody);
+  body->SetType(b2_staticBody);
+  const Start& start = start_of(body);
+  body->SetTransform(start.position, start.angle);
+}
+
+}  // namespace flatland

@@ -1,0 +1,174 @@
+"""The internals of rospy and interactive_markers that flatland depends on.
+
+A test that fails here shows what a new version of these packages changed; docs/architecture.md
+lists the modules that are affected.
+"""
+
+from __future__ import annotations
+
+import inspect
+import socket
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import pytest
+import rospy
+from interactive_markers.interactive_marker_server import InteractiveMarkerServer
+from rospy.impl.tcpros_base import TCPROSTransport
+from rospy.impl.tcpros_pubsub import TCPROSHandler, TCPROSPub
+from rospy.topics import _PublisherImpl, _TopicManager
+from std_msgs.msg import String
+
+
+@pytest.fixture
+def publisher() -> Any:
+    """The implementation of a publisher, not registered with a master."""
+    return _PublisherImpl("/pinned", String)
+
+
+@pytest.fixture
+def connect() -> Iterator[Callable[[], tuple[TCPROSTransport, list[bytes]]]]:
+    """Creates connections; returns each with the list of what is written to it."""
+    ends: list[socket.socket] = []
+
+    def create() -> tuple[TCPROSTransport, list[bytes]]:
+        near, far = socket.socketpair()
+        ends.extend((near, far))
+        transport = TCPROSTransport(TCPROSPub("/pinned", String), "pinned")
+        transport.set_socket(near, "http://localhost:1/")
+        written: list[bytes] = []
+        transport.write_data = written.append
+        return transport, written
+
+    yield create
+    for end in ends:
+        end.close()
+
+
+# flatland.ros.bridge: the time of the node is set without a subscription to /clock.
+RUN_CLOCK = """
+import threading
+import rospy
+from rospy import rostime
+
+rostime.set_rostime_initialized(True)
+rostime._rostime_current = rospy.Time(3, 500)
+assert rospy.get_rostime() == rospy.Time(3, 500), rospy.get_rostime()
+waiting = threading.Event()
+woken = threading.Event()
+
+
+def wait():
+    with rostime.get_rostime_cond() as condition:
+        waiting.set()
+        rostime.get_rostime_cond().wait(60)
+    woken.set()
+
+
+threading.Thread(target=wait, daemon=True).start()
+assert waiting.wait(60)
+with rostime.get_rostime_cond():
+    rostime.get_rostime_cond().notify_all()
+assert woken.wait(60)
+"""
+
+
+def test_ros_time_is_a_variable_with_a_condition() -> None:
+    # In a process of its own, since the time belongs to the process.
+    done = subprocess.run([sys.executable, "-c", RUN_CLOCK], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+
+
+def test_publishers_call_add_connection_of_the_instance() -> None:
+    """`Publisher` replaces `add_connection` of one publisher to give each connection an outbox."""
+    source = inspect.getsource(TCPROSHandler.topic_connection_handler)
+    source += inspect.getsource(sys.modules[TCPROSHandler.__module__])
+    assert "topic.add_connection(transport)" in source
+
+
+def test_messages_are_written_by_write_data_of_the_connection(publisher: Any, connect: Any) -> None:
+    """`Outbox` replaces `write_data` of a connection."""
+    connection, written = connect()
+    publisher.set_queue_size(None)
+    assert not publisher.has_connections()
+    assert publisher.add_connection(connection)
+    assert publisher.has_connections()
+    publisher.acquire()
+    try:
+        publisher.publish(String("pinned"))
+    finally:
+        publisher.release()
+    assert b"pinned" in b"".join(written)
+
+
+def test_subscriber_listeners_are_notified_and_can_be_removed(publisher: Any, connect: Any) -> None:
+    """`Publisher` and `StateTopic` use the list of listeners."""
+    events: list[str] = []
+
+    class Listener(rospy.SubscribeListener):  # type: ignore[misc]
+        def peer_subscribe(self, topic: str, publish: Any, publish_single: Any) -> None:
+            events.append(topic)
+            publish_single(String("to one"))
+
+    listener, (connection, written) = Listener(), connect()
+    publisher.add_subscriber_listener(listener)
+    assert listener in publisher.subscriber_listeners
+    publisher.add_connection(connection)
+    assert events == ["/pinned"]
+    assert b"to one" in b"".join(written)
+    publisher.subscriber_listeners.remove(listener)
+    publisher.add_connection(connect()[0])
+    assert len(events) == 1
+
+
+def test_a_topic_can_be_latched_without_storing_a_message(publisher: Any, connect: Any) -> None:
+    """`StateTopic` announces a latched topic and creates its messages itself."""
+    publisher.add_headers({"latching": "1"})
+    publisher.is_latch = False
+    publisher.set_queue_size(None)
+    publisher.acquire()
+    try:
+        publisher.publish(String("outdated"))
+    finally:
+        publisher.release()
+    late, written = connect()
+    publisher.add_connection(late)
+    assert written == []
+    assert publisher.headers["latching"] == "1"
+
+
+def test_publishers_of_one_topic_share_their_implementation() -> None:
+    assert "impl" in inspect.getsource(rospy.Publisher.__init__) + inspect.getsource(
+        rospy.topics.Topic.__init__
+    )
+    assert "rmap" in inspect.getsource(_TopicManager.acquire_impl)
+
+
+def test_connections_have_the_attributes_that_an_outbox_uses(connect: Any) -> None:
+    transport, _ = connect()
+    closed = []
+    transport.set_cleanup_callback(closed.append)
+    assert (transport.done, transport.stat_bytes, transport.stat_num_msg) == (False, 0, 0)
+    assert transport.fileno() == transport.socket.fileno() >= 0
+    transport.close()
+    assert transport.done
+    assert closed == [transport]
+
+
+def test_shutdown_can_be_queried() -> None:
+    assert rospy.core.is_shutdown_requested() is False
+
+
+def test_the_interactive_marker_server_uses_the_attributes_that_flatland_sets() -> None:
+    """`MarkerServer` does not call `__init__` of its base class, which starts a timer."""
+    code = inspect.getsource(InteractiveMarkerServer.__init__)
+    ours = {"topic_ns", "server_id", "seq_num", "mutex", "marker_contexts", "pending_updates"}
+    ours |= {"init_pub", "update_pub"}
+    theirs = {
+        line.split("=")[0].strip().removeprefix("self.")
+        for line in code.splitlines()
+        if line.strip().startswith("self.") and "=" in line.split("(")[0]
+    }
+    assert theirs <= ours
