@@ -267,6 +267,7 @@ def test_server_launch_sets_all_parameters(launcher: Any, ros: Any, world: Path)
         "simplify_map": 1,
         "seed": 7,
         "plugin_timeout": 30,
+        "if_blocked": "warn",
     }
     assert ros.master.getParam("/use_sim_time") is True
     process.wait_for_line("real-time factor: target inf")
