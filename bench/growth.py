@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import tempfile
+import time
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -17,19 +18,22 @@ from scans import add_crowd
 from scenes import beam_ends, benchmark_world_path, ranges_pixels, scan_pose, world_of_edges
 from steps import PERIOD, step_time
 from timing import best_of
+from touching import empty_world, spawn_row
 
 ALL = 0xFFFF
 BEAM_COUNTS = (8, 30, 100, 300, 1081, 3000, 10_000)
 BOX_COUNTS = (250, 1000, 4000, 15_000, 60_000, 250_000)
 MOVING_COUNTS = (1, 10, 30, 100, 300, 1000)
 ROBOT_COUNTS = (1, 2, 5, 10, 20, 50, MOST)
+TOUCHING_COUNTS = (25, 50, 100, 200, 400)
+SPAWNS = 5  # of which the fastest counts
 SIDES = (1000, 2000, 4000, 10_000)
 SCAN, LOOP = "flatland", "b2World::RayCast"
 
 
 def panels() -> list[Panel]:
     """Measures all curves."""
-    return [_beams(), _edges(), _moving(), _robots(), _loading()]
+    return [_beams(), _edges(), _moving(), _robots(), _touching(), _spawning(), _loading()]
 
 
 def _compare(
@@ -94,6 +98,40 @@ def _robots() -> Panel:
     return Panel(
         "A step of robots with a differential drive", "robots", "time of a step [µs]", curves
     )
+
+
+def _touching() -> Panel:
+    curves = []
+    for label, wanted in (("outputs wanted", True), ("outputs not wanted", False)):
+        times = []
+        for count in TOUCHING_COUNTS:
+            with empty_world() as world:
+                spawn_row(world, count)
+                for topic in world.ports.outputs if wanted else ():
+                    world.output(topic)
+                world.step(10)
+                times.append(1e3 * step_time(world, PERIOD, 0.5))
+        curves.append(Curve(label, list(TOUCHING_COUNTS), times))
+    return Panel(
+        "A step of touching robots with Bumper and BoolSensor",
+        "robots",
+        "time of a step [ms]",
+        curves,
+    )
+
+
+def _spawning() -> Panel:
+    times = [min(_spawn_time(count) for _ in range(SPAWNS)) for count in TOUCHING_COUNTS]
+    curves = [Curve("World.spawn_model", list(TOUCHING_COUNTS), times)]
+    return Panel("Spawning robots with Bumper and BoolSensor", "robots", "time [s]", curves)
+
+
+def _spawn_time(count: int) -> float:
+    """Returns the time [s] in which some robots are spawned into an empty world."""
+    with empty_world() as world:
+        start = time.perf_counter()
+        spawn_row(world, count)
+        return time.perf_counter() - start
 
 
 def _loading() -> Panel:

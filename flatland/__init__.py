@@ -1,7 +1,7 @@
 """flatland: a fast and exact 2-D robot simulator.
 
-Make a world with `World.from_yaml`, step it with `World.step`; see `docs/` for the file formats
-and for how to write plugins. Nothing here needs ROS; the ROS node is `flatland.ros`.
+`World.from_yaml` loads a world and `World.step` steps it; `docs/` describes the file formats and
+the plugin interface. This package does not require ROS, except for the ROS node `flatland.ros`.
 """
 
 from flatland.config.reader import YamlReader

@@ -1,4 +1,4 @@
-"""`python3 -m flatland` is the command `flatland`."""
+"""Runs the command `flatland` for `python3 -m flatland`."""
 
 import sys
 

@@ -20,30 +20,30 @@ from flatland.loading.world_loader import SIMPLIFICATIONS
 from flatland.plugin_api.plugin import FlatlandPlugin
 from flatland.world import World
 
-_BROKEN_PIPE = 128 + signal.SIGPIPE  # what a shell reports of a program that SIGPIPE ended
+_BROKEN_PIPE = 128 + signal.SIGPIPE  # exit code in a shell of a program ended by SIGPIPE
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Runs the command.
 
     Args:
-        arguments: Without the command's name; None for those of the process.
+        arguments: Arguments without the name of the command; None for those of the process.
 
     Returns:
-        0, 1 after an error in a file or of the system, which is printed, or 141 when the reader
-        of the output went away, as in `flatland check world.yaml | head -1`.
+        The exit code: 0 for success, 1 for an error of a file or of the system, which is printed,
+        or 141 if the reader closed the output, as in `flatland check world.yaml | head -1`.
 
     Raises:
-        SystemExit: The arguments are wrong (code 2), or ask for help or version only (code 0).
+        SystemExit: The arguments are invalid (code 2), or request the help or version (code 0).
     """
     try:
         return _run(arguments)
     except BrokenPipeError:
-        # What is still in the buffers has no reader, and is written when the interpreter ends.
-        nowhere = os.open(os.devnull, os.O_WRONLY)
+        # The interpreter flushes the buffers at its end; redirect them, as they have no reader.
+        null_device = os.open(os.devnull, os.O_WRONLY)
         for stream in (sys.stdout, sys.stderr):
-            os.dup2(nowhere, stream.fileno())
-        os.close(nowhere)
+            os.dup2(null_device, stream.fileno())
+        os.close(null_device)
         return _BROKEN_PIPE
 
 
@@ -53,7 +53,7 @@ def _run(arguments: Sequence[str] | None) -> int:
             options = _make_parser().parse_args(arguments)
             options.run(options)
         finally:
-            # An error would be printed with a traceback when the interpreter ends.
+            # Flush here: an error at the end of the interpreter is printed with a traceback.
             print(end="", flush=True)
     except BrokenPipeError:
         raise
@@ -71,7 +71,7 @@ def _make_parser() -> argparse.ArgumentParser:
         "show",
         parents=[_file_arguments("WORLD", "world file")],
         help="draw a picture of a world",
-        description="Loads a world, steps it if asked to, and draws a picture of it.",
+        description="Loads a world, optionally steps it, and draws a picture of it.",
     )
     show.add_argument(
         "-o",
@@ -79,42 +79,51 @@ def _make_parser() -> argparse.ArgumentParser:
         required=True,
         type=_picture_path,
         metavar="FILE",
-        help=f"the picture ({', '.join(PICTURE_FORMATS)}); one that is there is overwritten",
+        help=f"picture file ({', '.join(PICTURE_FORMATS)}); an existing file is overwritten",
     )
-    show.add_argument("--steps", type=_count, default=0, help="steps before the picture (0)")
-    show.add_argument("--seed", type=_count, help="of all noise; without, another one each time")
-    show.add_argument("--size", type=_size, metavar="WxH", help="of the picture, in pixels")
-    show.add_argument("--dpi", type=float, default=100.0, help="pixels an inch of letters (100)")
+    show.add_argument(
+        "--steps", type=_count, default=0, help="number of steps before the picture (default: 0)"
+    )
+    show.add_argument("--seed", type=_count, help="seed of all noise (default: random)")
+    show.add_argument("--size", type=_size, metavar="WxH", help="size of the picture in pixels")
+    show.add_argument(
+        "--dpi", type=float, default=100.0, help="pixels per inch, scales the text (default: 100)"
+    )
     show.add_argument(
         "--view",
         type=float,
         nargs=4,
         metavar=("X_MIN", "Y_MIN", "X_MAX", "Y_MAX"),
-        help="part to be seen, in metres; without, all walls and models",
+        help="visible area in metres (default: all walls and models)",
     )
-    show.add_argument("--layer", action="append", metavar="NAME", help="draw this layer only")
-    show.add_argument("--names", action="store_true", help="write the models' names beside them")
-    show.add_argument("--no-scans", action="store_true", help="without what the lasers see")
-    show.add_argument("--no-axes", action="store_true", help="without axes")
+    show.add_argument(
+        "--layer",
+        action="append",
+        metavar="NAME",
+        help="draw only this layer; may be given several times",
+    )
+    show.add_argument("--names", action="store_true", help="draw the names of the models")
+    show.add_argument("--no-scans", action="store_true", help="do not draw the laser scans")
+    show.add_argument("--no-axes", action="store_true", help="do not draw axes")
     show.set_defaults(run=_show, parser=show)
 
     check = commands.add_parser(
         "check",
         parents=[_file_arguments("FILE", "world or model file")],
-        help="load a world or model and say what is in it",
-        description="Loads a world or model and says what is in it, or what is wrong with it. "
-        "A model is put into an empty world that has the layers that the model names.",
+        help="load a world or model and print its contents",
+        description="Loads a world or model and prints its contents, or an error. "
+        "A model is loaded into an empty world with the layers that the model names.",
     )
     check.set_defaults(run=_check)
     return parser
 
 
 def _file_arguments(name: str, kind: str) -> argparse.ArgumentParser:
-    """Makes the arguments of every command that loads a file.
+    """Returns a parser of the arguments of all commands that load a file.
 
     Args:
-        name: Of the file in the usage.
-        kind: What the file may be.
+        name: Name of the file in the usage.
+        kind: Kind of the file, for the help.
     """
     parser = argparse.ArgumentParser(add_help=False)
     parser.add_argument("path", type=Path, metavar=name, help=kind)
@@ -124,14 +133,14 @@ def _file_arguments(name: str, kind: str) -> argparse.ArgumentParser:
         action="append",
         default=[],
         metavar="NAME=VALUE",
-        help="what param() in YAML files answers for a name; may be given several times",
+        help="value of param(NAME) in YAML files; may be given several times",
     )
     parser.add_argument(
         "--simplify-map",
         type=int,
         choices=SIMPLIFICATIONS,
         default=0,
-        help="0 exact, 1 simplified, 2 opened and simplified map boundaries (0)",
+        help="0 exact, 1 simplified, 2 opened and simplified map boundaries (default: 0)",
     )
     return parser
 
@@ -141,7 +150,7 @@ def _file_arguments(name: str, kind: str) -> argparse.ArgumentParser:
 
 def _count(text: str) -> int:
     if not re.fullmatch("[0-9]+", text):
-        raise argparse.ArgumentTypeError(f"must be a whole number, 0 or more, got {text!r}")
+        raise argparse.ArgumentTypeError(f"must be an integer of at least 0, got {text!r}")
     return int(text)
 
 
@@ -157,10 +166,10 @@ def _parameter(text: str) -> tuple[str, object]:
     if not (name and equals):
         raise argparse.ArgumentTypeError(f"must be NAME=VALUE, as in /noise=0.1, got {text!r}")
     try:
-        # As rosparam has it: 1 is a number, true a bool, a b a string.
+        # YAML as in rosparam: 1 is a number, true a bool, a b a string.
         return name, yaml.safe_load(value) if value else ""
     except yaml.YAMLError:
-        raise argparse.ArgumentTypeError(f"the value is no YAML: {text!r}") from None
+        raise argparse.ArgumentTypeError(f"the value is not YAML: {text!r}") from None
 
 
 def _picture_path(text: str) -> Path:
@@ -182,7 +191,7 @@ def _load(options: argparse.Namespace, seed: int | None) -> World:
 
 
 def _show(options: argparse.Namespace) -> None:
-    check_matplotlib()  # before the time that loading and stepping takes
+    check_matplotlib()  # before loading and stepping, which may take long
     with _load(options, options.seed) as world:
         world.step(options.steps)
         try:
@@ -208,7 +217,7 @@ def _check(options: argparse.Namespace) -> None:
             _print_contents(options.path, world)
             print(f"checked in an empty world with the layers that the model names: {layers}")
     else:
-        # Nothing random is shown, so the seed need not be another one each time.
+        # A fixed seed: nothing random is printed, and no log line about a drawn seed is wanted.
         with _load(options, seed=0) as world:
             _print_contents(options.path, world)
 

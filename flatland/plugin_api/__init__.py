@@ -1,1 +1,1 @@
-"""What plugins build on: base classes, ports, the registry, and helpers that plugins share."""
+"""The plugin interface: base classes, ports, the registry, and helpers that plugins share."""

@@ -1,4 +1,4 @@
-"""What the drives share: the velocity command, ground truth and odometry."""
+"""The velocity command, ground truth and odometry of the drive plugins."""
 
 from __future__ import annotations
 
@@ -20,25 +20,25 @@ if TYPE_CHECKING:
 
 _LOG = logging.getLogger("flatland")
 
-WARNING_PERIOD = 1.0  # s of wall time between two warnings of one drive
-# No robot gets there, and what a drive makes of it stays within the bounds of the physics.
+WARNING_PERIOD = 1.0  # s of wall time between two warnings of one drive, at least
+# m/s, rad/s; beyond the speed of any robot, and small enough for the range of the physics.
 MAX_COMMAND = 1e6
 
 
 class TwistGuard:
-    """Refuses commands that are no numbers, so that the last good one stays."""
+    """Rejects commands that are not finite, so that the previous command remains in effect."""
 
     def __init__(self, owner: str) -> None:
-        """Names the drive in its warnings.
+        """Creates a guard.
 
         Args:
-            owner: For the log, such as `plugin "drive" of model "robot"`.
+            owner: Name of the drive for the log, such as `plugin "drive" of model "robot"`.
         """
         self._owner = owner
         self._last_warning = -math.inf
 
     def __call__(self, twist: Twist) -> bool:
-        """Tells whether a command may be followed; warns when not, at most once a second."""
+        """Returns whether a command is valid; otherwise logs a warning, at most one a second."""
         if (
             abs(twist.linear_x) <= MAX_COMMAND
             and abs(twist.linear_y) <= MAX_COMMAND
@@ -49,7 +49,7 @@ class TwistGuard:
         if now - self._last_warning >= WARNING_PERIOD:
             self._last_warning = now
             _LOG.warning(
-                "%s: %s is not finite or beyond all bounds, the last good command stays",
+                "%s: %s is not finite or out of range, the previous command remains in effect",
                 self._owner,
                 twist,
             )
@@ -59,24 +59,27 @@ class TwistGuard:
 def open_twist_command(plugin: ModelPlugin, topic: str) -> Command[Twist]:
     """Declares the velocity command of a drive.
 
-    Unlike the reference: a NaN or infinite command is refused, it would stay in the physics.
+    Unlike the reference: a NaN or infinite command is rejected; it would corrupt the physics state.
 
     Args:
         plugin: The drive.
-        topic: Under the model's namespace, global with a leading `/`.
+        topic: Topic under the namespace of the model, global with a leading `/`.
+
+    Raises:
+        PluginError: The topic is not a legal name.
     """
     guard = TwistGuard(f'plugin "{plugin.name}" of model "{plugin.model.name}"')
     return plugin.command(topic, Twist, accept=guard)
 
 
 class Odometer:
-    """Reads the parameters of odometry and reports a body's motion as ground truth and odometry.
+    """Emits the motion of a body as ground truth and as odometry with noise.
 
     Attributes:
-        frame_id: Frame of the odometry's pose, as written.
+        frame_id: Frame of the odometry pose, as in the YAML file.
         child_frame_id: Frame of the body.
-        twist_covariance: Reported with the twist, shape (6, 6).
-        twist_noise: Noise of vx, vy and the yaw rate of a twist published besides the odometry.
+        twist_covariance: Covariance emitted with the twist, shape (6, 6).
+        twist_noise: Noise of vx, vy and the yaw rate of a twist emitted besides the odometry.
     """
 
     def __init__(
@@ -92,14 +95,14 @@ class Odometer:
 
         Args:
             plugin: The drive.
-            config: Its parameters.
-            body: Whose origin is reported.
+            config: Parameters of the drive.
+            body: Body whose origin is measured.
             twist_in_local_frame: Default of the parameter of that name.
-            publish: Whether there are outputs; the parameters are checked in any case.
+            publish: Whether to declare outputs; the parameters are checked in any case.
 
         Raises:
-            YamlError: A parameter is wrong.
-            PluginError: A topic is no legal name.
+            YamlError: A parameter is invalid.
+            PluginError: A topic is not a legal name.
         """
         truth_topic = config.get("ground_truth_pub", "string", "odometry/ground_truth")
         odometry_topic = config.get("odom_pub", "string", "odometry/filtered")
@@ -116,7 +119,7 @@ class Odometer:
         )
         self._pose_noise = GaussianNoise(plugin.noise_stream("odometry pose"), pose_variances)
         self._twist_noise = GaussianNoise(plugin.noise_stream("odometry twist"), twist_variances)
-        # The measured twist is a sensor of its own, with the variances of the odometry.
+        # The twist output is a separate measurement with the same variances.
         self.twist_noise = GaussianNoise(plugin.noise_stream("twist"), twist_variances)
         all_noise = (self._pose_noise, self._twist_noise, self.twist_noise)
         self._active_noise = tuple(noise for noise in all_noise if noise)
@@ -129,25 +132,25 @@ class Odometer:
 
     @property
     def wanted(self) -> bool:
-        """Whether anybody listens to the ground truth or the odometry."""
+        """Whether the ground truth or the odometry is wanted."""
         truth, odometry = self._truth, self._odometry
         return (truth is not None and truth.wanted) or (odometry is not None and odometry.wanted)
 
     def begin_update(self) -> None:
-        """Advances the noise; to be called for each update due, published or not."""
+        """Advances the noise; to be called for each update due, emitted or not."""
         for noise in self._active_noise:
             noise.begin_update()
 
     def report(self, stamp: int, pose: Pose, velocity: Pose) -> Pose:
-        """Emits the ground truth and the odometry, each if somebody listens.
+        """Emits the ground truth and the odometry, each if it is wanted.
 
         Args:
             stamp: Simulated time [ns].
-            pose: (x, y, yaw) of the body's origin in the world frame.
-            velocity: (vx, vy, omega) of the body's origin in the world frame.
+            pose: (x, y, yaw) of the origin of the body in the world frame [m, rad].
+            velocity: (vx, vy, omega) of the origin of the body in the world frame [m/s, rad/s].
 
         Returns:
-            The pose with the noise that the odometry has it with.
+            The pose with the noise of the odometry.
         """
         noisy_pose = self._noisy(pose, self._pose_noise)
         truth, odometry = self._truth, self._odometry
@@ -183,7 +186,7 @@ class Odometer:
 
 
 def to_local(velocity: Pose, yaw: float) -> Pose:
-    """Expresses a velocity given in the world frame in the frame of a body that has this yaw."""
+    """Transforms a velocity from the world frame to the frame of a body with a yaw angle."""
     vx, vy, omega = velocity
     c, s = math.cos(yaw), math.sin(yaw)
     return (c * vx + s * vy, c * vy - s * vx, omega)

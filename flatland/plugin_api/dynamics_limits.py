@@ -1,4 +1,4 @@
-"""Limits of a velocity and of its change."""
+"""Limits of velocity and acceleration."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ if TYPE_CHECKING:
 
 
 class DynamicsLimits:
-    """Follows a velocity command as fast as the limits allow; 0 stands for no limit.
+    """Limits of a velocity and of its rate of change; 0 means no limit.
 
     Units are [m/s] and [m/s²], or [rad/s] and [rad/s²].
 
     Attributes:
-        velocity_limit: Greatest speed.
-        acceleration_limit: Greatest change of velocity away from zero, per second.
-        deceleration_limit: Greatest change of velocity towards zero, per second.
+        velocity_limit: Maximum speed.
+        acceleration_limit: Maximum rate of change of the velocity away from zero.
+        deceleration_limit: Maximum rate of change of the velocity towards zero.
     """
 
     __slots__ = ("acceleration_limit", "deceleration_limit", "velocity_limit")
@@ -30,11 +30,11 @@ class DynamicsLimits:
         acceleration_limit: float = 0.0,
         deceleration_limit: float | None = None,
     ) -> None:
-        """Sets the limits, 0 or infinity for none.
+        """Creates limits; 0 or infinity means no limit.
 
         Args:
-            velocity_limit: Greatest speed.
-            acceleration_limit: Greatest change of velocity away from zero, per second.
+            velocity_limit: Maximum speed.
+            acceleration_limit: Maximum rate of change of the velocity away from zero.
             deceleration_limit: The same towards zero; None for the acceleration limit.
 
         Raises:
@@ -48,13 +48,13 @@ class DynamicsLimits:
 
     @classmethod
     def from_config(cls, reader: YamlReader) -> DynamicsLimits:
-        """Reads the limits from a map, which may be missing.
+        """Reads the limits from an optional map.
 
         Args:
-            reader: Over the map, as `optional_subnode` gives it.
+            reader: Reader of the map, as returned by `YamlReader.optional_subnode`.
 
         Raises:
-            YamlError: A limit is negative or no number, or there is an unknown key.
+            YamlError: A limit is negative or not a number, or a key is unknown.
         """
         if reader.is_null:
             return cls()
@@ -68,13 +68,13 @@ class DynamicsLimits:
         """Returns the velocity after one step towards a target.
 
         Args:
-            v: Present velocity.
-            target: Velocity asked for.
-            dt: Size of the step [s].
+            v: Current velocity.
+            target: Commanded velocity.
+            dt: Step size [s].
         """
-        top = self.velocity_limit
-        if top:
-            target = min(max(target, -top), top)
+        limit = self.velocity_limit
+        if limit:
+            target = min(max(target, -limit), limit)
         if target == v:
             return target
         acceleration, deceleration = self.acceleration_limit, self.deceleration_limit
@@ -87,7 +87,7 @@ class DynamicsLimits:
         return v + min(max(target - v, -change), change)
 
     def _crossing_change(self, speed: float, dt: float) -> float:
-        """Returns how much a velocity may change in a step that is to turn its sign."""
+        """Returns the maximum change of velocity in a step whose target has the opposite sign."""
         acceleration, deceleration = self.acceleration_limit, self.deceleration_limit
         if deceleration and speed > deceleration * dt:
             return deceleration * dt

@@ -1,4 +1,4 @@
-"""Reads XML manifests of plugins, which have the form of those of pluginlib."""
+"""Reader of XML plugin manifests, in the format of pluginlib."""
 
 from __future__ import annotations
 
@@ -13,20 +13,20 @@ from flatland.errors import PluginError
 INCLUDED_PACKAGE = "flatland_plugins"
 MANIFEST_VARIABLE = "FLATLAND_PLUGIN_PATH"
 BASE_CLASS_TYPES = ("flatland::ModelPlugin", "flatland::WorldPlugin")
-_REFERENCE_PREFIX = "flatland_server::"  # of the base classes of C++ plugins
+_REFERENCE_PREFIX = "flatland_server::"  # namespace of the base classes of C++ plugins
 
 
 @dataclass(frozen=True, slots=True)
 class PluginClass:
-    """One `<class>` of a manifest.
+    """A `<class>` element of a manifest.
 
     Attributes:
-        lookup_name: The name that YAML files use, such as `my_robots::Belt`.
+        lookup_name: Name used in YAML files, such as `my_robots::Belt`.
         class_path: Dotted path of the Python class.
         base_class_type: `flatland::ModelPlugin` or `flatland::WorldPlugin`.
-        manifest: File that it stands in.
-        import_path: Folder to put on `sys.path` first, None when there is none.
-        description: For people.
+        manifest: Path of the manifest.
+        import_path: Folder to insert into `sys.path` before the import, None if not required.
+        description: Description for users.
     """
 
     lookup_name: str
@@ -38,20 +38,21 @@ class PluginClass:
 
 
 def lookup_name(type_name: str) -> str:
-    """Returns the name that manifests use for a `type:` of a YAML file."""
+    """Returns the look-up name in manifests for a `type:` of a YAML file."""
     return type_name if "::" in type_name else f"{INCLUDED_PACKAGE}::{type_name}"
 
 
 def listed_manifests() -> list[str]:
-    """Returns the manifests that the environment variable `FLATLAND_PLUGIN_PATH` lists."""
+    """Returns the manifests listed in the environment variable `FLATLAND_PLUGIN_PATH`."""
     return [path for path in os.environ.get(MANIFEST_VARIABLE, "").split(":") if path]
 
 
 def read_manifest(path: str | os.PathLike[str]) -> list[PluginClass]:
-    """Reads the Python classes of one manifest; C++ plugins of the reference are left out.
+    """Reads the Python classes of a manifest, without the C++ plugins of the reference.
 
     Raises:
-        PluginError: It cannot be read, is not XML, or a class lacks its type or base class.
+        PluginError: The manifest cannot be read or is not XML, or the type or base class of a
+            class is missing or invalid.
     """
     path = os.fspath(path)
     found = []
@@ -78,10 +79,10 @@ def read_manifest(path: str | os.PathLike[str]) -> list[PluginClass]:
 
 
 def read_reference_names(path: str | os.PathLike[str]) -> list[str]:
-    """Reads the look-up names of the C++ plugins of the reference that a manifest holds.
+    """Reads the look-up names of the C++ plugins of the reference in a manifest.
 
     Raises:
-        PluginError: It cannot be read or is not XML.
+        PluginError: The manifest cannot be read or is not XML.
     """
     return [
         element.get("name") or element.get("type") or ""
@@ -91,13 +92,13 @@ def read_reference_names(path: str | os.PathLike[str]) -> list[str]:
 
 
 def _class_elements(path: str) -> Iterator[tuple[str | None, ElementTree.Element]]:
-    """Iterates the `<class>` elements of a manifest with the `path` of their library.
+    """Iterates over the `<class>` elements of a manifest with the `path` of their library.
 
     Raises:
-        PluginError: It cannot be read, is not XML, or holds something else.
+        PluginError: The manifest cannot be read, is not XML, or has an unknown root element.
     """
     try:
-        # A manifest names code that runs: who may write one needs no XML trick to do harm.
+        # Manifests are trusted input: the code that they name is executed anyway.
         root = ElementTree.parse(path).getroot()  # noqa: S314
     except ElementTree.ParseError as error:
         line, column = error.position
@@ -113,7 +114,7 @@ def _class_elements(path: str) -> Iterator[tuple[str | None, ElementTree.Element
         libraries = root.findall("library")
     else:
         raise PluginError(
-            f'manifest "{path}" must hold <library> or <class_libraries>, got <{root.tag}>'
+            f'manifest "{path}" must contain <library> or <class_libraries>, got <{root.tag}>'
         )
     for library in libraries:
         for element in library.findall("class"):

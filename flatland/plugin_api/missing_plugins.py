@@ -1,4 +1,4 @@
-"""Plugins that files name and no manifest declares: finds all of them and explains what to do."""
+"""Errors about plugins that are named in files but declared by no manifest."""
 
 from __future__ import annotations
 
@@ -22,14 +22,14 @@ if TYPE_CHECKING:
     from flatland.plugin_api.registry import PluginRegistry
 
 PORTING_GUIDE = 'section "From a C++ plugin" of docs/write_a_plugin.md'
-# For tests of manifests; they are not what a user misspelled.
+# Plugins for tests of manifests, which are no useful suggestions.
 _UNLISTED = {f"{INCLUDED_PACKAGE}::Dummy{kind}Plugin" for kind in ("Model", "World")}
-_LEAST_SIMILARITY = 0.7  # of a suggestion to the name that is missing
-_MOST_SUGGESTIONS = 3
+_MIN_SIMILARITY = 0.7  # of a suggestion to the missing name
+_MAX_SUGGESTIONS = 3
 
 
 class MissingPluginsError(PluginError):
-    """No manifest declares some of the plugins of a model or world."""
+    """Raised if some plugins of a model or world are declared by no manifest."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,9 +37,9 @@ class PluginEntry:
     """An enabled entry of a `plugins` list.
 
     Attributes:
-        name: Of the plugin.
-        type_name: The `type:`.
-        place: File and line of the entry, as ` [robot.model.yaml:12]`.
+        name: Name of the plugin.
+        type_name: Value of `type:`.
+        place: File and line of the entry, such as ` [robot.model.yaml:12]`.
         model: Name of the model, None for a world plugin.
     """
 
@@ -53,7 +53,7 @@ def read_entries(entries: Iterable[YamlReader], model: str | None) -> list[Plugi
     """Reads the enabled entries of a `plugins` list.
 
     Args:
-        entries: Of the list.
+        entries: Entries of the list.
         model: Name of the model, None for world plugins.
 
     Raises:
@@ -71,16 +71,16 @@ def read_entries(entries: Iterable[YamlReader], model: str | None) -> list[Plugi
 def missing_plugins_error(
     registry: PluginRegistry, entries: Sequence[PluginEntry]
 ) -> MissingPluginsError | None:
-    """Makes one error of all entries whose plugin no manifest declares.
+    """Returns one error about all entries whose plugin is declared by no manifest.
 
-    Models that share a file share its lines.
+    The lines of a model file occur once, with the names of all models that are loaded from it.
 
     Args:
-        registry: Of the known plugins.
-        entries: Of any models and the world.
+        registry: Registry of the known plugins.
+        entries: Entries of any models and of the world.
 
     Returns:
-        None when there is a plugin for each entry.
+        The error, or None if a plugin exists for each entry.
     """
     missing_types = set(registry.find_missing(entry.type_name for entry in entries))
     if not missing_types:
@@ -105,14 +105,14 @@ def missing_plugins_error(
 
 
 class LookupHints:
-    """Texts about plugins that no manifest declares."""
+    """Error texts about plugins that are declared by no manifest."""
 
     def __init__(self, known: Collection[str], problems: Iterable[PluginError]) -> None:
-        """Reads which C++ plugins of the reference are exported.
+        """Reads the names of the exported C++ plugins of the reference.
 
         Args:
             known: Look-up names of all plugins.
-            problems: Why some manifests could not be read.
+            problems: Errors of the manifests that could not be read.
         """
         self._known = set(known) - _UNLISTED
         self._problems = list(problems)
@@ -126,48 +126,49 @@ class LookupHints:
                 for name in read_reference_names(export.manifest):
                     self._reference_plugins.setdefault(name, []).append(place)
             except PluginError as error:
-                if export.tag != PYTHON_TAG:  # the others are among the problems
+                if export.tag != PYTHON_TAG:  # errors of the others are in `problems`
                     self._problems.append(error)
 
     def describe(self, type_name: str) -> str:
         """Returns a text about one `type:` of a YAML file.
 
-        It contains the known names that are near, and where a C++ plugin of that name is exported.
+        It contains similar known names, and the packages that export a C++ plugin of that name.
         """
         name = lookup_name(type_name)
         text = f'no plugin "{name}"'
-        near = [
+        similar = [
             f'"{known.removeprefix(f"{INCLUDED_PACKAGE}::")}"'
-            for known in self._by_similarity([type_name])[:_MOST_SUGGESTIONS]
-            if _similarity(known, type_name) >= _LEAST_SIMILARITY
+            for known in self._by_similarity([type_name])[:_MAX_SUGGESTIONS]
+            if _similarity(known, type_name) >= _MIN_SIMILARITY
         ]
-        if near:
-            text += f" (did you mean {' or '.join(near)}?)"
+        if similar:
+            text += f" (did you mean {' or '.join(similar)}?)"
         places = self._reference_plugins.get(name) or self._reference_plugins.get(type_name)
         if places:
             text += f"; a C++ plugin of that name is exported by {' and '.join(places)}"
         return text
 
     def advise(self, type_names: Collection[str]) -> str:
-        """Returns what a user can do about some missing plugins, with the nearest names first."""
+        """Returns instructions about missing plugins, with the known names by similarity."""
         text = (
-            f"C++ plugins cannot be loaded, {PORTING_GUIDE} shows how to write one in Python; "
-            '"enabled: false" in the entry of a plugin lets the rest load without it; '
-            f"known are: {', '.join(self._by_similarity(type_names))}"
+            f"C++ plugins cannot be loaded, {PORTING_GUIDE} explains how to port them to Python; "
+            '"enabled: false" in the entry of a plugin skips it; '
+            f"known plugins: {', '.join(self._by_similarity(type_names))}"
         )
         if self._problems:
-            text += "; not read: " + "; ".join(problem.message for problem in self._problems)
+            errors = "; ".join(problem.message for problem in self._problems)
+            text += f"; manifests with errors: {errors}"
         return text
 
     def _by_similarity(self, type_names: Collection[str]) -> list[str]:
-        """Lists the known names, the one most similar to any of some names first."""
+        """Returns the known names, the most similar to any of the given names first."""
         return sorted(
             self._known,
-            key=lambda name: (-max(_similarity(name, wanted) for wanted in type_names), name),
+            key=lambda name: (-max(_similarity(name, other) for other in type_names), name),
         )
 
 
-def _similarity(name: str, wanted: str) -> float:
-    """Compares the names of two classes, without their packages and without regard to case."""
-    a, b = (re.split(r"::|[/.]", full)[-1].lower() for full in (name, wanted))
+def _similarity(name: str, other: str) -> float:
+    """Returns the similarity of two class names, ignoring packages and case, in [0, 1]."""
+    a, b = (re.split(r"::|[/.]", full)[-1].lower() for full in (name, other))
     return difflib.SequenceMatcher(None, a, b).ratio()

@@ -1,4 +1,4 @@
-"""Noise of sensors: reproducible, and independent of the listeners of other outputs."""
+"""Sensor noise that is reproducible and independent of subscribers."""
 
 from __future__ import annotations
 
@@ -13,28 +13,28 @@ _LOG = logging.getLogger("flatland")
 
 
 def checked_seed(seed: int | None) -> int:
-    """Returns a seed; None draws one and logs it.
+    """Returns a seed; draws and logs one for None.
 
     Raises:
         ValueError: The seed is negative.
     """
     if seed is None:
         seed = secrets.randbits(31)
-        _LOG.info("seed %d drawn at random, give it again to repeat this run", seed)
+        _LOG.info("seed %d drawn at random; use it as the seed to repeat this run", seed)
     if seed < 0:
         raise ValueError(f"seed must not be negative, got {seed}")
     return seed
 
 
 class NoiseStream:
-    """Random numbers of one output, a function of the seed and of the count of updates due.
+    """Random numbers of one output, a function of the seed and of the number of updates due.
 
     The generator is counter-based (Philox): each update owns a range of counters. The numbers of an
-    update are therefore the same whether or not those of earlier updates were drawn, so that they
-    depend neither on the listeners of an output nor on the time at which they connect.
+    update are therefore the same whether or not those of earlier updates were drawn, and depend
+    neither on the subscribers of an output nor on the time at which they connect.
 
     Attributes:
-        updates: Count of updates that were due.
+        updates: Number of updates that were due.
     """
 
     __slots__ = ("_bits", "_counter", "_is_positioned", "_rng", "_state", "updates")
@@ -53,7 +53,7 @@ class NoiseStream:
         self.updates = 0
 
     def begin_update(self) -> None:
-        """Advances to the next update; to be called for each update due, published or not."""
+        """Advances to the next update; to be called for each update due, emitted or not."""
         self.updates += 1
         self._is_positioned = False
 
@@ -62,7 +62,7 @@ class NoiseStream:
         """The generator, at the start of the current update or after the draws of this update."""
         if not self._is_positioned:
             self._is_positioned = True
-            # The lowest word counts the draws within an update.
+            # The lowest word is the counter of the draws within an update.
             self._counter[1] = self.updates
             self._bits.state = self._state
         return self._rng
@@ -87,11 +87,11 @@ class GaussianNoise:
         self._deviations = tuple(math.sqrt(variance) for variance in variances)
 
     def __bool__(self) -> bool:
-        """Whether any quantity has noise."""
+        """Returns whether any quantity has noise."""
         return any(self._deviations)
 
     def begin_update(self) -> None:
-        """Advances to the next update; to be called for each update due, published or not."""
+        """Advances to the next update; to be called for each update due, emitted or not."""
         self._stream.begin_update()
 
     def sample(self, index: int) -> float:

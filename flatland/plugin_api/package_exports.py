@@ -1,7 +1,7 @@
-"""Finds the plugin manifests that packages on `ROS_PACKAGE_PATH` export.
+"""Finds the plugin manifests exported by packages on `ROS_PACKAGE_PATH`.
 
-Follows the rules of rospack for what a package is, but reads only what matters here: a package
-file without the word `flatland` is not parsed. The result is kept until a folder or file changes.
+Packages are found by the rules of rospack, but a package file without the word `flatland` is not
+parsed. The result is cached until a folder or file changes.
 """
 
 from __future__ import annotations
@@ -20,13 +20,14 @@ PYTHON_TAG = "flatland"
 REFERENCE_TAG = "flatland_server"
 _PACKAGE_FILES = ("package.xml", "manifest.xml")
 _NAME = re.compile(rb"<name>\s*([^<\s]+)\s*</name>")
-# File systems store times in units of up to two seconds: a folder may change without a new time.
-_CLOCK_UNIT = 2_000_000_000  # ns
+# File systems store times with a resolution of up to two seconds: within it, a folder may change
+# without a new modification time.
+_TIME_RESOLUTION = 2_000_000_000  # ns
 
 
 @dataclass(frozen=True, slots=True)
 class Export:
-    """One manifest that a package exports.
+    """A manifest exported by a package.
 
     Attributes:
         package: Name of the package.
@@ -41,11 +42,11 @@ class Export:
 
 @dataclass(frozen=True, slots=True)
 class PackageExports:
-    """What all packages on a package path export.
+    """The exports of all packages on a package path.
 
     Attributes:
-        exports: In the order of the path.
-        problems: Package files that are not XML.
+        exports: Exported manifests in the order of the path.
+        problems: Errors of package files that cannot be read or are not XML.
     """
 
     exports: tuple[Export, ...]
@@ -54,7 +55,7 @@ class PackageExports:
 
 @dataclass(frozen=True, slots=True)
 class _Scan:
-    """One search of a package path; `times` holds the time of all that it depends on."""
+    """The result of one search, with the modification times of all files that it depends on."""
 
     package_path: str
     result: PackageExports
@@ -73,9 +74,9 @@ _last_scan = _Scan("", PackageExports((), ()), {}, True)
 
 
 def package_exports() -> PackageExports:
-    """Returns what the packages on `ROS_PACKAGE_PATH` export now.
+    """Returns the current exports of the packages on `ROS_PACKAGE_PATH`.
 
-    The packages are searched again only when the variable, a folder or a package file changed
+    The packages are searched again only if the variable, a folder or a package file has changed
     since the last call in this process.
     """
     global _last_scan
@@ -87,7 +88,7 @@ def package_exports() -> PackageExports:
 
 
 def modification_time(path: str) -> int | None:
-    """Returns when a file or folder was last changed [ns], None when it cannot be read."""
+    """Returns the modification time of a file or folder [ns], None if it cannot be read."""
     try:
         return os.stat(path).st_mtime_ns  # noqa: PTH116  (half the time of a Path)
     except OSError:
@@ -95,14 +96,14 @@ def modification_time(path: str) -> int | None:
 
 
 def are_settled(times: Mapping[str, int | None], moment: int) -> bool:
-    """Returns whether any change after a moment gives a file or folder a new time.
+    """Returns whether any later change of the files and folders changes their modification time.
 
     Args:
-        times: Of some files and folders [ns], as from `modification_time`.
-        moment: System time [ns], not later than that at which the times were taken.
+        times: Modification times [ns], as returned by `modification_time`.
+        moment: System time [ns] at which the times were read, or an earlier one.
     """
     newest = max((moment for moment in times.values() if moment is not None), default=0)
-    return newest < moment - _CLOCK_UNIT
+    return newest < moment - _TIME_RESOLUTION
 
 
 def _search(package_path: str) -> _Scan:
@@ -127,7 +128,7 @@ def _search(package_path: str) -> _Scan:
         if b"flatland" not in content or name == "flatland":
             continue
         try:
-            # Part of the user's installation, as the code of the plugins is.
+            # Trusted input: part of the installation, like the code of the plugins.
             root = ElementTree.fromstring(content)  # noqa: S314
         except ElementTree.ParseError as error:
             problems.append(PluginError(f'"{package_file}" is not XML, {error}'))
@@ -142,11 +143,11 @@ def _search(package_path: str) -> _Scan:
 
 
 def _package_files(package_path: str, times: dict[str, int | None]) -> Iterator[str]:
-    """Iterates the package files below a package path.
+    """Iterates over the package files below the folders of a package path.
 
     Args:
         package_path: Folders, separated by colons.
-        times: Receives the time of each folder and package file.
+        times: Receives the modification time of each folder and package file.
     """
     searched = set()
     pending = [root for root in reversed(package_path.split(":")) if root]
@@ -157,7 +158,7 @@ def _package_files(package_path: str, times: dict[str, int | None]) -> Iterator[
         except OSError:
             times[folder] = None
             continue
-        if (status.st_dev, status.st_ino) in searched:  # links may make a loop
+        if (status.st_dev, status.st_ino) in searched:  # symbolic links may form a loop
             continue
         searched.add((status.st_dev, status.st_ino))
         times[folder] = status.st_mtime_ns
@@ -174,8 +175,8 @@ def _package_files(package_path: str, times: dict[str, int | None]) -> Iterator[
 
 
 def _subfolders(folder: str) -> list[str]:
-    """Lists the folders to search next, the first one last."""
-    # Debian keeps packages directly in /usr/share, beside folders with thousands of files.
+    """Returns the folders to search next, in reverse order."""
+    # Debian installs packages directly in /usr/share, beside folders with thousands of files.
     if folder.startswith("/usr/share/"):
         return []
     try:

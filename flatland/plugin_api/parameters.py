@@ -1,6 +1,6 @@
-"""Reads the kinds of parameters that several plugins have, and checks them.
+"""Readers of parameters that several plugins share, with checks of the values.
 
-All errors are made by `YamlReader.error`, so they name the file and line.
+All errors are created by `YamlReader.error` and name the file and line.
 """
 
 from __future__ import annotations
@@ -20,16 +20,16 @@ if TYPE_CHECKING:
 
 Triple = tuple[float, float, float]
 
-MAX_COORDINATE = 1e8  # m, rad; added to a pose it stays within what the physics takes, 1e9
+MAX_COORDINATE = 1e8  # m, rad; added to a pose, the sum is within the limit of the physics, 1e9
 
 
 def at_key(config: YamlReader, key: str) -> YamlReader:
-    """Returns the place of a key for an error about it; the map's when the key is missing."""
+    """Returns a reader of a key for errors about its value; the map if the key is missing."""
     return config.subnode(key) if key in config else config
 
 
 def find_body(config: YamlReader, key: str, model: Model, name: str) -> Body:
-    """Finds the body that the parameter `key` names.
+    """Returns the body of a name, which is the value of the parameter `key`.
 
     Raises:
         YamlError: `Body with name "B" does not exist`.
@@ -41,28 +41,28 @@ def find_body(config: YamlReader, key: str, model: Model, name: str) -> Body:
 
 
 def read_body(config: YamlReader, model: Model, key: str = "body") -> Body:
-    """Reads the name of a body, required.
+    """Reads the required name of a body and returns the body.
 
     Raises:
-        YamlError: It is missing, or there is no such body.
+        YamlError: The key is missing, or the body does not exist.
     """
     return find_body(config, key, model, config.get(key, "string"))
 
 
 def read_body_or_first(config: YamlReader, model: Model, key: str) -> Body:
-    """Reads the name of a body, which is the model's first when left out.
+    """Reads the optional name of a body and returns the body, by default the first of the model.
 
     Raises:
-        YamlError: There is no such body.
+        YamlError: The body does not exist.
     """
     return find_body(config, key, model, config.get(key, "string", model.bodies[0].name))
 
 
 def read_bodies(config: YamlReader, model: Model, key: str) -> list[Body]:
-    """Reads a list of bodies, none when left out.
+    """Reads an optional list of names of bodies and returns the bodies.
 
     Raises:
-        YamlError: One does not exist.
+        YamlError: A body does not exist.
     """
     return [find_body(config, key, model, name) for name in config.get_list(key, "string", [])]
 
@@ -71,7 +71,7 @@ def read_rate(config: YamlReader, key: str = "update_rate", default: float = mat
     """Reads a rate [Hz]; infinity is allowed.
 
     Raises:
-        YamlError: It is no number, negative or NaN.
+        YamlError: The value is not a number, negative or NaN.
     """
     return read_not_negative(config, key, default)
 
@@ -80,7 +80,7 @@ def read_not_negative(config: YamlReader, key: str, default: float) -> float:
     """Reads a number of at least 0; infinity is allowed.
 
     Raises:
-        YamlError: It is no number, negative or NaN.
+        YamlError: The value is not a number, negative or NaN.
     """
     return config.get(key, "float", default, minimum=0)
 
@@ -89,7 +89,7 @@ def read_finite(config: YamlReader, key: str, default: float) -> float:
     """Reads a finite number.
 
     Raises:
-        YamlError: It is no number, infinite or NaN.
+        YamlError: The value is not a number, infinite or NaN.
     """
     return config.get(key, "float", default, finite=True)
 
@@ -98,7 +98,7 @@ def read_pose(config: YamlReader, key: str, default: Pose = IDENTITY) -> Pose:
     """Reads a pose (x, y, theta) of finite numbers.
 
     Raises:
-        YamlError: It is no pose, or a number is infinite, NaN or beyond `MAX_COORDINATE`.
+        YamlError: The value is not a pose, or a number is not finite or beyond `MAX_COORDINATE`.
     """
     return config.get(
         key, "pose", default, finite=True, minimum=-MAX_COORDINATE, maximum=MAX_COORDINATE
@@ -106,10 +106,10 @@ def read_pose(config: YamlReader, key: str, default: Pose = IDENTITY) -> Pose:
 
 
 def read_variances(config: YamlReader, key: str) -> Triple:
-    """Reads three variances of noise, 0 when left out.
+    """Reads three variances of noise, by default 0.
 
     Raises:
-        YamlError: There are not three, or one is negative, infinite or NaN.
+        YamlError: The value is not a list of three numbers, or one is negative or not finite.
     """
     # Unlike the reference: a negative variance is an error.
     x, y, z = config.get_list(key, "float", [0.0, 0.0, 0.0], size=3, finite=True, minimum=0)
@@ -119,19 +119,19 @@ def read_variances(config: YamlReader, key: str) -> Triple:
 def read_covariance(config: YamlReader, key: str, default_diagonal: Sequence[float]) -> DoubleArray:
     """Reads a covariance matrix, row by row.
 
-    It is reported, not used: a value such as -1 or a huge one has a meaning for who reads it.
+    The matrix is only emitted and never used in computations, so that special values such as -1
+    are allowed.
 
     Args:
-        config: The plugin's parameters.
-        key: The parameter.
-        default_diagonal: What the diagonal is when the parameter is left out; its length n is
-            that of a row.
+        config: Parameters of the plugin.
+        key: Name of the parameter.
+        default_diagonal: Diagonal of the default matrix; its length n is that of a row.
 
     Returns:
-        Shape (n, n), read-only, as many messages share it.
+        The matrix, shape (n, n), read-only since many messages share it.
 
     Raises:
-        YamlError: There are not n² numbers, or one is NaN.
+        YamlError: The value is not a list of n² numbers, or one is NaN.
     """
     n = len(default_diagonal)
     default = np.diag(np.asarray(default_diagonal, dtype=np.float64)).ravel().tolist()
@@ -144,6 +144,6 @@ def read_covariance(config: YamlReader, key: str, default_diagonal: Sequence[flo
 
 
 def planar_diagonal(variances: Triple) -> list[float]:
-    """Places the variances of x, y and yaw on the diagonal of x, y, z, roll, pitch, yaw."""
+    """Returns the diagonal for x, y, z, roll, pitch, yaw from the variances of x, y and yaw."""
     x, y, yaw = variances
     return [x, y, 0.0, 0.0, 0.0, yaw]

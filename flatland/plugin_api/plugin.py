@@ -1,6 +1,6 @@
-"""Base classes of plugins: what a model or world plugin is, has and may do.
+"""Base classes of model and world plugins.
 
-A plugin declares its ports and hooks and knows no ROS. See `docs/write_a_plugin.md`.
+A plugin declares its ports and hooks and does not depend on ROS. See `docs/write_a_plugin.md`.
 """
 
 from __future__ import annotations
@@ -30,19 +30,19 @@ T = TypeVar("T")
 
 
 class FlatlandPlugin:
-    """What model and world plugins share: a name, ports, random numbers and hooks that do nothing.
+    """The common base class of model and world plugins: a name, ports, random numbers and hooks.
 
-    A subclass overrides the hooks that it needs; one that it leaves alone costs nothing. It needs
-    no `__init__`: all of the attributes below are there when `on_initialize` runs.
+    A subclass overrides the hooks that it needs; hooks that are not overridden cost nothing. It
+    needs no `__init__`: all attributes below are set before `on_initialize` is called.
 
     Attributes:
-        name: As in the YAML file.
-        type: As in the YAML file.
-        world: The world that it acts in.
-        namespace: Under which relative topics and frames live, may be empty.
+        name: Name in the YAML file.
+        type: Type in the YAML file.
+        world: World of the plugin.
+        namespace: Namespace of relative topics and frames, may be empty.
         rng: Generator seeded from the seed of the world and the names of model, plugin and type.
             For the noise of an output, use `noise_stream`.
-        ros: Gives access to ROS (topics, services, parameters), None without ROS.
+        ros: Access to ROS topics, services and parameters, None without ROS.
     """
 
     base_class_type: ClassVar[str] = ""
@@ -85,7 +85,7 @@ class FlatlandPlugin:
         self._label = describe(self)
 
     def _detach(self) -> None:
-        """Closes every port and forgets every transform, also what the plugin forgot itself."""
+        """Closes all ports and removes all transforms that the plugin has not closed or removed."""
         self._detached = True
         for output in self._outputs:
             self.world.ports.close_output(output, self._label)
@@ -100,11 +100,12 @@ class FlatlandPlugin:
         """Declares a stream of values.
 
         Args:
-            topic: Under the model's namespace, global with a leading `/`.
+            topic: Topic under the namespace of the model, global with a leading `/`.
             value_type: Type of the values.
 
         Raises:
-            PluginError: The topic is no legal name, or carries another type.
+            PluginError: The topic is not a legal name, or the plugin has ended.
+            FlatlandError: The topic already carries values of another type.
         """
         output = self.world.ports.open_output(self._resolve(topic), value_type, self._label)
         self._outputs.append(output)
@@ -117,16 +118,17 @@ class FlatlandPlugin:
         default: T | None = None,
         accept: Callable[[T], bool] | None = None,
     ) -> Command[T]:
-        """Declares a value that comes from outside.
+        """Declares a value that is set from outside.
 
         Args:
-            topic: Under the model's namespace, global with a leading `/`.
+            topic: Topic under the namespace of the model, global with a leading `/`.
             value_type: Type of the values.
-            default: Value before the first comes; `value_type()` when left out.
-            accept: Asked with each value; one that it refuses leaves the last good one.
+            default: Value before the first one is received, by default `value_type()`.
+            accept: Returns whether a value is valid; an invalid one is ignored.
 
         Raises:
-            PluginError: The topic is no legal name, or carries another type.
+            PluginError: The topic is not a legal name, or the plugin has ended.
+            FlatlandError: The topic already carries values of another type.
         """
         initial = value_type() if default is None else default
         command = self.world.ports.open_command(
@@ -139,7 +141,7 @@ class FlatlandPlugin:
         """Returns a stream of random numbers for the noise of one output.
 
         The numbers derive from the seed of the world, the names of model, plugin and type, the
-        name of the output, and the count of updates due. They do not depend on other outputs.
+        name of the output, and the number of updates due. They do not depend on other outputs.
 
         Args:
             output: Name of the output or quantity, unique within the plugin.
@@ -148,7 +150,7 @@ class FlatlandPlugin:
 
     def _resolve(self, topic: str) -> str:
         if self._detached:
-            raise PluginError(f'plugin "{self.name}" has ended and can open no "{topic}"')
+            raise PluginError(f'plugin "{self.name}" has ended and cannot open "{topic}"')
         try:
             return resolve_topic(topic, self.namespace)
         except ValueError as error:
@@ -157,18 +159,18 @@ class FlatlandPlugin:
     def send_transform(
         self, parent: str, child: str, x: float, y: float, yaw: float, roll: float = 0.0
     ) -> None:
-        """Hands over the pose of frame `child` in frame `parent`, stamped with the present time.
+        """Sends the pose of frame `child` in frame `parent`, stamped with the current time.
 
-        All transforms of a step go out together. Frame ids are used as they are: pass frames of
-        a model through `Model.frame` first.
+        All transforms of a step are sent in one batch. Frame ids are used as given; use
+        `Model.frame` for the frames of a model.
 
         Args:
-            parent: Frame id.
-            child: Frame id.
-            x: [m].
-            y: [m].
-            yaw: [rad].
-            roll: [rad].
+            parent: Frame id of the parent.
+            child: Frame id of the child.
+            x: Position of the child along x [m].
+            y: Position of the child along y [m].
+            yaw: Rotation of the child about z [rad].
+            roll: Rotation of the child about x [rad].
         """
         if self._detached:
             return
@@ -180,36 +182,36 @@ class FlatlandPlugin:
         world.transform_buffer.send(frames, (world.timekeeper.sim_time_ns, x, y, yaw, roll))
 
     def on_initialize(self, config: YamlReader) -> None:
-        """Reads the parameters and gets ready; called once.
+        """Reads the parameters and initializes the plugin; called once.
 
         Args:
-            config: The plugin's entry without `name`, `type` and `enabled`. Keys that are left
-                unread when this returns are an error.
+            config: Entry of the plugin without `name`, `type` and `enabled`. Keys that are not
+                read before this returns are an error.
 
         Raises:
-            Exception: Whatever it raises makes loading the model or world fail.
+            Exception: Any exception makes loading of the model or world fail.
         """
 
     def before_physics_step(self, timekeeper: Timekeeper) -> None:
-        """Acts before each physics step, at time t."""
+        """Called before each physics step, at time t."""
 
     def after_physics_step(self, timekeeper: Timekeeper) -> None:
-        """Acts after each physics step, at time t + dt."""
+        """Called after each physics step, at time t + dt."""
 
     def begin_contact(self, contact: Contact) -> None:
-        """Hears that two fixtures began to touch; called right after the physics step."""
+        """Called after the physics step in which two fixtures began to touch."""
 
     def end_contact(self, contact: Contact) -> None:
-        """Hears that two fixtures touch no more, or that one of them is gone."""
+        """Called when two fixtures cease to touch, or when one of them is removed."""
 
     def pre_solve(self, contact: MutableContact, old_manifold: OldManifold) -> None:
-        """Changes a contact inside the physics step; may not create, destroy or move anything."""
+        """Called within the physics step; may change the contact but not bodies or joints."""
 
     def post_solve(self, contact: Contact, impulse: ContactImpulse) -> None:
-        """Hears of the impulses that the solver applied to a contact in the step."""
+        """Called after the physics step with the impulses that the solver applied to a contact."""
 
     def on_shutdown(self) -> None:
-        """Releases what the plugin holds; called once, when its model goes or the world ends."""
+        """Releases resources; called once, when the model is removed or the world is closed."""
 
 
 class ModelPlugin(FlatlandPlugin):
@@ -217,8 +219,8 @@ class ModelPlugin(FlatlandPlugin):
 
     Attributes:
         model: The model.
-        all_contacts: Whether the contact hooks receive the contacts of all models, and not only
-            those of this one.
+        all_contacts: Whether the contact hooks receive the contacts of all models instead of only
+            those of this model.
     """
 
     base_class_type = "flatland::ModelPlugin"
@@ -227,10 +229,10 @@ class ModelPlugin(FlatlandPlugin):
     model: Model
 
     def filter_contact(self, contact: Contact | MutableContact) -> ModelContact | None:
-        """Turns a contact so that this model is on the near side.
+        """Returns a contact from the point of view of this model.
 
         Returns:
-            None when this plugin's model is not involved.
+            The contact with this model as the first party, None if this model is not involved.
         """
         if contact.body_a.entity is self.model:
             return ModelContact(
@@ -257,7 +259,7 @@ class WorldPlugin(FlatlandPlugin):
     """A plugin of the world.
 
     Attributes:
-        world_config: Reader over the whole world file.
+        world_config: Reader of the whole world file.
     """
 
     base_class_type = "flatland::WorldPlugin"
@@ -266,7 +268,7 @@ class WorldPlugin(FlatlandPlugin):
 
 
 def describe(plugin: FlatlandPlugin) -> str:
-    """Returns the name, type and model of a plugin in the words of the error messages."""
+    """Returns the name, type and model of a plugin as they occur in error messages."""
     if isinstance(plugin, ModelPlugin):
         return f'Model Plugin "{plugin.name}" type "{plugin.type}" model "{plugin.model.name}"'
     return f'World Plugin "{plugin.name}" type "{plugin.type}"'

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import Any, Protocol, TypeVar
 
 from flatland.errors import FlatlandError, WorldError
@@ -36,7 +36,7 @@ class PortRegistry:
 
         Args:
             observer: Notified when ports open and close.
-            on_fault: Called with what subscribers of outputs raise, see `Output`.
+            on_fault: Called with the exceptions of subscribers of outputs, see `Output`.
         """
         self._observer = observer
         self._on_fault = on_fault
@@ -54,7 +54,7 @@ class PortRegistry:
         return {topic: list(commands) for topic, commands in self._commands.items()}
 
     def open_output(self, name: str, value_type: type[T], owner: str = "") -> Output[T]:
-        """Opens an output; plugins that name the same topic share it.
+        """Opens an output, which is shared by all plugins that open the same topic.
 
         Args:
             name: Resolved topic.
@@ -75,7 +75,7 @@ class PortRegistry:
         return output
 
     def close_output(self, output: Output[Any], owner: str = "") -> None:
-        """Removes one owner of an output; without owners, the output closes."""
+        """Removes one owner of an output, and closes the output if it was the last one."""
         if output.closed:
             return
         output.owners.remove(owner)
@@ -93,7 +93,7 @@ class PortRegistry:
         accept: Callable[[T], bool] | None = None,
         owner: str = "",
     ) -> Command[T]:
-        """Opens a command; plugins that name the same topic have a command each.
+        """Opens a command; each plugin that opens the same topic has a command of its own.
 
         Args:
             name: Resolved topic.
@@ -128,33 +128,37 @@ class PortRegistry:
         """Returns the output of a resolved topic.
 
         Raises:
-            WorldError: It does not exist; the text lists the existing outputs.
+            WorldError: The output does not exist; the text lists the existing ones.
         """
         try:
             return self._outputs[global_name(topic)]
         except KeyError:
             raise WorldError(
-                f'no output "{topic}", there are: {", ".join(sorted(self._outputs)) or "none"}'
+                f'output "{topic}" does not exist; existing outputs: {_names(self._outputs)}'
             ) from None
 
     def find_command(self, topic: str) -> CommandTopic[Any]:
         """Returns all commands of a resolved topic as one.
 
         Raises:
-            WorldError: None exists; the text lists the existing commands.
+            WorldError: The command does not exist; the text lists the existing ones.
         """
         try:
             return CommandTopic(self._commands[global_name(topic)])
         except KeyError:
             raise WorldError(
-                f'no command "{topic}", there are: {", ".join(sorted(self._commands)) or "none"}'
+                f'command "{topic}" does not exist; existing commands: {_names(self._commands)}'
             ) from None
 
 
-def _check_type(port: Output[Any] | Command[Any], owner: str, wanted: type[Any]) -> None:
-    if port.value_type is not wanted:
+def _names(topics: Iterable[str]) -> str:
+    return ", ".join(sorted(topics)) or "none"
+
+
+def _check_type(port: Output[Any] | Command[Any], owner: str, value_type: type[Any]) -> None:
+    if port.value_type is not value_type:
         used_by = f", used by {owner}" if owner else ""
         raise FlatlandError(
-            f'topic "{port.topic}" carries {port.value_type.__name__} already{used_by}, '
-            f"not {wanted.__name__}"
+            f'topic "{port.topic}" already carries {port.value_type.__name__}{used_by}, '
+            f"not {value_type.__name__}"
         )

@@ -26,7 +26,7 @@ class Output(Generic[T]):
         value_type: Type of the values.
         latest: The last value emitted, None before the first.
         owners: Names of the plugins that opened it, for messages.
-        closed: Whether the last of these plugins is gone.
+        closed: Whether the last of these plugins has ended.
     """
 
     __slots__ = (
@@ -55,8 +55,8 @@ class Output(Generic[T]):
             name: Resolved topic.
             value_type: Type of the values.
             owner: Name of the plugin, for messages.
-            on_fault: Called with what a subscriber raises, so that the error does not reach the
-                plugin that emits; None to let it through.
+            on_fault: Called with the exception of a subscriber, which then does not reach the
+                plugin that emits; None to propagate it.
         """
         self.name = name
         self.topic = global_name(name)
@@ -65,8 +65,8 @@ class Output(Generic[T]):
         self.owners = [owner]
         self.closed = False
         self._on_fault = on_fault
-        # Both are replaced and never changed, so other threads may read them at any time; the lock
-        # keeps two replacements apart.
+        # Both are replaced and never modified, so that other threads may read them at any time; the
+        # lock serializes the replacements.
         self._lock = threading.Lock()
         self._subscribers: tuple[tuple[object, Callable[[T], None]], ...] = ()
         self._wanters: frozenset[Hashable] = frozenset()
@@ -125,16 +125,16 @@ class Output(Generic[T]):
 
 
 class Command(Generic[T]):
-    """A value that is set from outside and read by a plugin; the last one counts.
+    """A value that is set from outside and read by a plugin.
 
     Attributes:
         name: Topic under the namespace of the model, with a leading `/` only if it is global.
         topic: The topic with a leading `/`.
         value_type: Type of the values.
         value: The last value accepted, or the default.
-        received: Count of the values accepted.
+        received: Number of values accepted.
         owner: Name of the plugin that opened it, for messages.
-        closed: Whether the plugin is gone.
+        closed: Whether the plugin has ended.
     """
 
     __slots__ = ("accept", "closed", "name", "owner", "received", "topic", "value", "value_type")
@@ -166,7 +166,7 @@ class Command(Generic[T]):
         self.accept = accept
 
     def set(self, value: T) -> None:
-        """Sets the value, unless `accept` refuses it.
+        """Sets the value if `accept` allows it.
 
         Raises:
             TypeError: The value does not have the type of the command.
@@ -179,13 +179,13 @@ class Command(Generic[T]):
 
 
 class CommandTopic(Generic[T]):
-    """All commands of one topic, which are set together, as subscribers of one ROS topic are."""
+    """All commands of one topic; they are set together, like the subscribers of a ROS topic."""
 
     def __init__(self, commands: list[Command[T]]) -> None:
         """Creates a view of the commands of one topic.
 
         Args:
-            commands: The live list of the commands, with at least one.
+            commands: The list of the commands, which the registry updates; not empty.
         """
         self._commands = commands
         self.topic = commands[0].topic
@@ -195,7 +195,7 @@ class CommandTopic(Generic[T]):
     def value(self) -> T:
         """The value of the first command of the topic."""
         if not self._commands:
-            raise WorldError(f"command {self.topic} is gone with its model")
+            raise WorldError(f"command {self.topic} was closed with its model")
         return self._commands[0].value
 
     def set(self, value: T) -> None:
@@ -203,9 +203,9 @@ class CommandTopic(Generic[T]):
 
         Raises:
             TypeError: The value does not have the type of the topic.
-            WorldError: No model has the command any more.
+            WorldError: The command was closed.
         """
         if not self._commands:
-            raise WorldError(f"command {self.topic} is gone with its model")
+            raise WorldError(f"command {self.topic} was closed with its model")
         for command in self._commands:
             command.set(value)

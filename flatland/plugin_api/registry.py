@@ -1,6 +1,6 @@
-"""Finds plugin classes by the names that XML manifests give them.
+"""Finds plugin classes by their names in XML manifests.
 
-Reading manifests imports no plugin; a class is imported when a world first needs it.
+Reading manifests imports no plugin; a class is imported when it is first instantiated.
 """
 
 from __future__ import annotations
@@ -36,20 +36,20 @@ _BASE_CLASSES: dict[str, type[FlatlandPlugin]] = {
 }
 _Times = dict[str, int | None]
 _last_entry_points: tuple[_Times | None, Sequence[importlib.metadata.EntryPoint]] = (None, ())
-# Many worlds may load in threads of one process, and sys.path is shared by all of them.
+# Worlds may load concurrently in several threads, and sys.path is shared by the process.
 _IMPORT_LOCK = threading.RLock()
 
 
 def included_manifest() -> Path:
-    """Returns the manifest of the plugins that flatland itself brings."""
+    """Returns the manifest of the included plugins."""
     return Path(str(importlib.resources.files("flatland.plugins") / "flatland_plugins.xml"))
 
 
 def _entry_point_manifests() -> tuple[list[str], list[PluginError]]:
-    """Lists the manifests that Python distributions export, and the exports that are invalid.
+    """Returns the manifests exported by Python distributions, and the errors of invalid exports.
 
-    The value of an entry point is `package` or `package:file.xml`; the file stands in the
-    package, and is called `flatland_plugins.xml` when it is not named.
+    The value of an entry point is `package` or `package:file.xml`. The file is in the folder of
+    the package; its default name is `flatland_plugins.xml`.
     """
     manifests, problems = [], []
     for entry_point in _entry_points():
@@ -64,7 +64,7 @@ def _entry_point_manifests() -> tuple[list[str], list[PluginError]]:
 
 
 def _entry_points() -> Sequence[importlib.metadata.EntryPoint]:
-    """Returns the entry points of the group; reads them again only when `sys.path` changed."""
+    """Returns the entry points of the group, cached until a folder of `sys.path` changes."""
     global _last_entry_points
     start = time.time_ns()
     times = {folder: modification_time(folder or ".") for folder in sys.path}
@@ -75,14 +75,14 @@ def _entry_points() -> Sequence[importlib.metadata.EntryPoint]:
 
 
 class PluginRegistry:
-    """The plugin classes that manifests declare.
+    """The plugin classes declared by manifests.
 
-    The included manifest is read at the first look-up, all others when a name is not in it. They
+    The included manifest is read at the first look-up, the others when a name is not in it. They
     are read again when a name is not found and a manifest or package has changed since.
     """
 
     def __init__(self) -> None:
-        """Reads nothing yet."""
+        """Creates a registry without reading any manifest."""
         self._classes: dict[str, PluginClass] = {}
         self._problems: list[PluginError] = []
         self._others_read: object = None
@@ -94,10 +94,10 @@ class PluginRegistry:
         return dict(self._classes)
 
     def find(self, type_name: str) -> PluginClass:
-        """Returns what the manifests say about a `type:` of a YAML file.
+        """Returns the entry of a `type:` of a YAML file.
 
         Raises:
-            PluginError: No manifest declares it.
+            PluginError: The plugin is declared by no manifest.
         """
         if self.find_missing([type_name]):
             hints = self.hints()
@@ -105,7 +105,7 @@ class PluginRegistry:
         return self._classes.get(lookup_name(type_name)) or self._classes[type_name]
 
     def find_missing(self, type_names: Iterable[str]) -> list[str]:
-        """Returns those of some `type:` values that no manifest declares."""
+        """Returns the given `type:` values that are declared by no manifest."""
         if not self._classes:
             self._add_manifest(included_manifest())
         missing = [name for name in type_names if not self._is_known(name)]
@@ -114,38 +114,40 @@ class PluginRegistry:
         return [name for name in missing if not self._is_known(name)]
 
     def hints(self) -> LookupHints:
-        """Returns what to write about names that `find_missing` returned."""
+        """Returns the error texts for names that `find_missing` returned."""
         return LookupHints(self._classes, self._problems)
 
-    def make(self, type_name: str, base: type[FlatlandPlugin]) -> FlatlandPlugin:
-        """Makes an instance of a plugin class, importing it if that has not been done.
+    def create(self, type_name: str, base: type[FlatlandPlugin]) -> FlatlandPlugin:
+        """Creates an instance of a plugin class, which is imported if necessary.
 
         Args:
             type_name: The `type:` of a YAML file.
-            base: `ModelPlugin` or `WorldPlugin`: what it must be.
+            base: The required base class, `ModelPlugin` or `WorldPlugin`.
 
         Raises:
-            PluginError: Unknown name, module or class missing, or the wrong base class.
+            PluginError: The name is unknown, the module or class is missing, the base class is
+                wrong, or the constructor raises.
         """
         entry = self.find(type_name)
         plugin_class = _load_class(entry)
         if not issubclass(plugin_class, base) or _BASE_CLASSES[entry.base_class_type] is not base:
             raise PluginError(
                 f'class "{entry.class_path}" of plugin "{entry.lookup_name}" must be a '
-                f"{base.base_class_type} here, it is a {_base_name(entry, plugin_class)}"
+                f"{base.base_class_type}, got a {_base_name(entry, plugin_class)}"
             )
         try:
             return plugin_class()
         except PLUGIN_FAULTS as error:
             raise PluginError(
-                f'class "{entry.class_path}" cannot be made: {type(error).__name__}: {error}'
+                f'class "{entry.class_path}" cannot be instantiated: '
+                f"{type(error).__name__}: {error}"
             ) from error
 
     def _is_known(self, type_name: str) -> bool:
         return lookup_name(type_name) in self._classes or type_name in self._classes
 
     def _read_others(self) -> None:
-        """Reads all manifests, unless none has changed since the last time."""
+        """Reads all manifests if any has changed since the last call."""
         packages = package_exports()
         entry_points, problems = _entry_point_manifests()
         exported = [export.manifest for export in packages.exports if export.tag == PYTHON_TAG]
@@ -161,21 +163,21 @@ class PluginRegistry:
             try:
                 self._add_manifest(path)
             except PluginError as error:
-                # One broken package must not take all others away.
+                # One invalid manifest must not make all others unavailable.
                 _LOG.error("%s", error)
                 self._problems.append(error)
 
     def _add_manifest(self, path: str | os.PathLike[str]) -> None:
-        """Adds the classes of a manifest; a name that is known already keeps its first class.
+        """Adds the classes of a manifest; the first class of a name takes precedence.
 
         Raises:
-            PluginError: The manifest is broken.
+            PluginError: The manifest is invalid.
         """
         for entry in read_manifest(path):
             known = self._classes.setdefault(entry.lookup_name, entry)
             if known is not entry and not Path(known.manifest).samefile(entry.manifest):
                 _LOG.warning(
-                    'plugin "%s" of "%s" is hidden by that of "%s"',
+                    'plugin "%s" of "%s" is hidden by the one of "%s"',
                     entry.lookup_name,
                     entry.manifest,
                     known.manifest,
@@ -198,8 +200,8 @@ def _load_class(entry: PluginClass) -> type[FlatlandPlugin]:
     plugin_class = getattr(module, class_name, None)
     if plugin_class is None:
         raise PluginError(
-            f'module "{module_name}" ({module.__file__}) has no class "{class_name}", which plugin '
-            f'"{entry.lookup_name}" (manifest "{entry.manifest}") names'
+            f'module "{module_name}" ({module.__file__}) has no class "{class_name}", required by '
+            f'plugin "{entry.lookup_name}" (manifest "{entry.manifest}")'
         )
     if not (isinstance(plugin_class, type) and issubclass(plugin_class, FlatlandPlugin)):
         raise PluginError(
@@ -213,4 +215,4 @@ def _base_name(entry: PluginClass, plugin_class: type[FlatlandPlugin]) -> str:
     actual = plugin_class.base_class_type or "flatland::FlatlandPlugin"
     if actual == entry.base_class_type:
         return actual
-    return f'{actual} (manifest "{entry.manifest}" calls it {entry.base_class_type})'
+    return f'{actual} (manifest "{entry.manifest}" declares a {entry.base_class_type})'

@@ -1,4 +1,4 @@
-"""When a plugin that works at a rate is due."""
+"""The timer of plugins that update at a rate."""
 
 from __future__ import annotations
 
@@ -9,19 +9,19 @@ from flatland.timekeeper import NANOSECONDS, Timekeeper
 
 
 class UpdateTimer:
-    """Says in which steps an update at a given rate is due, on average exactly that often.
+    """Determines the steps in which an update is due, on average at exactly the given rate.
 
     Attributes:
-        rate: [Hz]; infinity means every step, 0 at time 0 only.
+        rate: Update rate [Hz]; infinity means every step, 0 only time 0.
     """
 
     __slots__ = ("_always", "_cycle", "_idle_from", "_idle_until", "_per_nanosecond", "rate")
 
     def __init__(self, rate: float = math.inf) -> None:
-        """Makes a timer.
+        """Creates a timer.
 
         Args:
-            rate: [Hz].
+            rate: Update rate [Hz].
 
         Raises:
             ValueError: The rate is negative or NaN.
@@ -35,16 +35,16 @@ class UpdateTimer:
         # No update is due at times [ns] from the first to before the second.
         self._idle_from = self._idle_until = 0
         if not self._always:
-            # The rate as it was written, 0.1 as 1/10: integers, so that nothing drifts in hours.
+            # The decimal value of the rate, 0.1 as 1/10, in integers, so that nothing drifts.
             exact = Fraction(repr(self.rate))
             self._per_nanosecond = exact.numerator
             self._cycle = NANOSECONDS * exact.denominator
 
     def check_update(self, timekeeper: Timekeeper) -> bool:
-        """Tells whether an update is due at the present time.
+        """Returns whether an update is due at the current time.
 
-        The time is asked with a tolerance of half a step on either side, so the answer depends on
-        nothing but the time: two timers of one rate agree, whenever they were made.
+        The time is compared with a tolerance of half a step on either side. The result depends on
+        the time alone: timers of the same rate agree, whenever they were created.
         """
         if self._always:
             return True
@@ -58,7 +58,7 @@ class UpdateTimer:
         step = timekeeper.step_size_ns
         phase = (2 * now + step) * weight % (2 * self._cycle)
         is_due = phase < 2 * step * weight
-        # A step later the phase is past what is due, up to where it starts again.
+        # From the next step on no update is due until the phase wraps around.
         self._idle_from = now + step if is_due else now
         self._idle_until = now + (2 * self._cycle - phase + 2 * weight - 1) // (2 * weight)
         return is_due

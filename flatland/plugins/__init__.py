@@ -1,1 +1,1 @@
-"""The included plugins, one module each; found through `flatland_plugins.xml`."""
+"""The included plugins, one module each, declared in `flatland_plugins.xml`."""

@@ -1,7 +1,7 @@
-"""Penner's easing curves: how a motion speeds up and slows down between its ends.
+"""Penner's easing curves: the acceleration profiles of a motion between two poses.
 
-A curve maps progress in [0, 1] to the part of the way covered, exactly 0 and 1 at the ends; back
-and elastic curves leave [0, 1] in between.
+A curve maps progress in [0, 1] to the covered fraction of the path. It is exactly 0 and 1 at the
+ends; back and elastic curves leave [0, 1] in between.
 """
 
 from __future__ import annotations
@@ -52,8 +52,8 @@ def _elastic(period: float) -> Easing:
     return ease_in
 
 
-# The parabolas of a ball that bounces: until when each holds, when it is at its top, how far the
-# top stays below the first one. Times are in units of 1 / 2.75 of the whole.
+# The parabolas of a bouncing ball: end time, time of the apex, and drop of the apex below that of
+# the first one. Times are in units of 1 / 2.75 of the duration.
 _BOUNCES = ((1.0, 0.0, 0.0), (2.0, 1.5, 0.75), (2.5, 2.25, 0.9375), (math.inf, 2.625, 0.984375))
 
 
@@ -64,17 +64,17 @@ def _bounce(p: float) -> float:
 
 
 def _mirrored(ease_in: Easing) -> Easing:
-    """Makes the Out curve of an In curve."""
+    """Returns the Out curve of an In curve."""
     return lambda p: 1.0 - ease_in(1.0 - p)
 
 
 def _joined(ease_in: Easing) -> Easing:
-    """Makes the InOut curve of an In curve: half of it, then half of its mirror image."""
+    """Returns the InOut curve of an In curve: its scaled copy, then the mirror image of that."""
     return lambda p: ease_in(2.0 * p) / 2.0 if p < 0.5 else 1.0 - ease_in(2.0 - 2.0 * p) / 2.0
 
 
 def _exact(ease: Easing) -> Easing:
-    """Pins a curve to 0 and 1 at its ends, which some formulas only come near."""
+    """Pins a curve to 0 and 1 at its ends, which some formulas only approximate."""
 
     def pinned(p: float) -> float:
         if p <= 0.0:
@@ -84,7 +84,7 @@ def _exact(ease: Easing) -> Easing:
     return pinned
 
 
-# Name: the In curve, and the one that InOut is made of.
+# By name: the In curve, and the In curve from which InOut is composed.
 _FAMILIES: dict[str, tuple[Easing, Easing]] = {
     "quadratic": (_power(2), _power(2)),
     "cubic": (_power(3), _power(3)),

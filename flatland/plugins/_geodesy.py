@@ -1,4 +1,4 @@
-"""From metres around a place to latitude and longitude on WGS84."""
+"""Conversion of local coordinates in metres to latitude and longitude on WGS84."""
 
 from __future__ import annotations
 
@@ -17,19 +17,19 @@ _TOLERANCE = 1e-15  # rad
 
 
 def geodetic_from_ecef(x: float, y: float, z: float) -> tuple[float, float]:
-    """Finds the latitude and longitude below a point that is not deep inside the Earth.
+    """Returns the latitude and longitude of a point that is not deep inside the Earth.
 
     Args:
-        x: Earth-centred, Earth-fixed, towards longitude 0 on the equator [m].
-        y: Towards longitude 90 degrees east on the equator [m].
-        z: Towards the north pole [m].
+        x: Earth-centred, Earth-fixed coordinate towards longitude 0 on the equator [m].
+        y: Coordinate towards longitude 90 degrees east on the equator [m].
+        z: Coordinate towards the north pole [m].
 
     Returns:
-        Geodetic latitude and longitude [rad]; on the axis the longitude is 0.
+        Geodetic latitude and longitude [rad]; the longitude of a point on the axis is 0.
     """
     p = math.hypot(x, y)
-    # Bowring's formula, repeated until the parametric latitude stands still: for points on the
-    # surface once is enough, but a tangent plane leaves the Earth far from its point of contact.
+    # Bowring's formula, iterated until the parametric latitude converges. One iteration suffices
+    # on the surface, but a tangent plane is far above it at a distance from the tangent point.
     beta = math.atan2(z, p * _AXIS_RATIO)
     for _ in range(_MAX_ITERATIONS):
         latitude = math.atan2(
@@ -47,11 +47,11 @@ class TangentPlane:
     """The plane that touches the ellipsoid at a reference point, x east and y north."""
 
     def __init__(self, latitude: float, longitude: float) -> None:
-        """Lays the plane.
+        """Creates the plane.
 
         Args:
-            latitude: Of the reference point [deg], -90 to 90.
-            longitude: Of the reference point [deg].
+            latitude: Latitude of the reference point [deg], -90 to 90.
+            longitude: Longitude of the reference point [deg].
         """
         phi, lam = math.radians(latitude), math.radians(longitude)
         sin_phi, cos_phi = math.sin(phi), math.cos(phi)
@@ -66,7 +66,7 @@ class TangentPlane:
         self._north = (-sin_phi * cos_lam, -sin_phi * sin_lam, cos_phi)
 
     def geodetic(self, east: float, north: float) -> tuple[float, float]:
-        """Finds the latitude and longitude [deg] below a point of the plane [m]."""
+        """Returns the latitude and longitude [deg] of a point of the plane [m]."""
         x, y, z = (
             o + e * east + n * north
             for o, e, n in zip(self._origin, self._east, self._north, strict=True)

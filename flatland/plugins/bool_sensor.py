@@ -1,4 +1,4 @@
-"""A switch that is on while a body touches something."""
+"""A contact switch."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 
 class BoolSensor(ModelPlugin):
-    """Tells whether one body touches anything (`bool`)."""
+    """Emits whether a body is in contact with anything (`bool`)."""
 
     def on_initialize(self, config: YamlReader) -> None:
         """Reads the parameters."""
@@ -25,22 +25,22 @@ class BoolSensor(ModelPlugin):
         self._touching: set[int] = set()
         self._touched_since_last = False
 
-    # Unlike the reference: contacts of the model's other bodies do not count.
+    # Unlike the reference: contacts of other bodies of the model are ignored.
     def begin_contact(self, contact: Contact) -> None:
-        """Counts a contact of the body."""
+        """Records a contact of the body."""
         if contact.body_a is self._body or contact.body_b is self._body:
             self._touching.add(contact.contact_id)
             self._touched_since_last = True
 
     def end_contact(self, contact: Contact) -> None:
-        """Counts a contact no more."""
+        """Removes a contact."""
         self._touching.discard(contact.contact_id)
 
     def after_physics_step(self, timekeeper: Timekeeper) -> None:
-        """Publishes when it is time."""
+        """Emits the state if an update is due."""
         if not self._timer.check_update(timekeeper):
             return
         if self._output.wanted:
             self._output.emit(bool(self._touching) or self._touched_since_last)
-        # Also with nobody listening, or a touch of long ago would greet the first listener.
+        # Reset without subscribers too, so that the first one does not receive an old contact.
         self._touched_since_last = False

@@ -1,4 +1,4 @@
-"""A bumper: all contacts of a model, with their forces."""
+"""A contact sensor: all contacts of a model with their forces."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ _NO_POINTS = np.zeros((0, 2))
 
 @dataclass(frozen=True, slots=True)
 class _Touch:
-    """Who touches whom in a live contact, and whether the contact's normal is to be turned."""
+    """The bodies of a current contact, and the sign that turns its normal away from the model."""
 
     body: str
     other_entity: str
@@ -33,7 +33,7 @@ class _Touch:
 
 
 class Bumper(ModelPlugin):
-    """Reports the live contacts of its model (`flatland.Collisions`)."""
+    """Emits the current contacts of its model (`flatland.Collisions`)."""
 
     def on_initialize(self, config: YamlReader) -> None:
         """Reads the parameters."""
@@ -42,15 +42,15 @@ class Bumper(ModelPlugin):
         self._timer = UpdateTimer(read_rate(config))
         self._excluded = set(read_bodies(config, self.model, "exclude"))
         self._output = self.output(config.get("topic", "string", "collisions"), Collisions)
-        # Kept whether somebody listens or not: who comes later learns of what touches already.
+        # Maintained without subscribers too: the first message must contain existing contacts.
         self._touches: dict[int, _Touch] = {}
-        # What the solver did in the present step, one entry for each time it came to a contact.
+        # Contact and impulse of each solver call of the current step, by contact id.
         self._solved: dict[int, list[tuple[Contact, ContactImpulse]]] = {}
 
     def begin_contact(self, contact: Contact) -> None:
-        """Starts a record."""
+        """Adds a record of the contact, unless one of its bodies is excluded."""
         mine = self.filter_contact(contact)
-        # A contact between two bodies of this model has both on the near side.
+        # Both bodies are checked, as a contact may be between two bodies of this model.
         if mine is None or not self._excluded.isdisjoint((mine.this_body, mine.other_body)):
             return
         self._touches[contact.contact_id] = _Touch(
@@ -61,18 +61,18 @@ class Bumper(ModelPlugin):
         )
 
     def end_contact(self, contact: Contact) -> None:
-        """Ends a record."""
+        """Removes the record of the contact."""
         self._touches.pop(contact.contact_id, None)
 
     def post_solve(self, contact: Contact, impulse: ContactImpulse) -> None:
-        """Notes what the solver did."""
+        """Stores the impulse of a recorded contact."""
         if contact.contact_id in self._touches:
             self._solved.setdefault(contact.contact_id, []).append((contact, impulse))
 
     def after_physics_step(self, timekeeper: Timekeeper) -> None:
-        """Publishes the records when it is time."""
-        at_once = self._publish_all and bool(self._touches)
-        if self._output.wanted and (at_once or self._timer.check_update(timekeeper)):
+        """Emits all records at the update rate, or always if `publish_all_collisions` is set."""
+        every_step = self._publish_all and bool(self._touches)
+        if self._output.wanted and (every_step or self._timer.check_update(timekeeper)):
             self._output.emit(
                 Collisions(
                     timekeeper.sim_time_ns,
@@ -105,10 +105,10 @@ class Bumper(ModelPlugin):
 
 
 def _mean_forces(impulses: list[ContactImpulse], n_points: int, dt: float) -> DoubleArray:
-    """Turns the impulses of all solver calls of a step into one force at each point [N].
+    """Returns the mean force at each contact point over all solver calls of a step [N].
 
-    The number of points may change between two calls; a call has no share in a point that it did
-    not see.
+    The number of points may differ between calls; a call contributes nothing to points that it
+    did not have.
     """
     total = np.zeros((2, n_points))
     for impulse in impulses:

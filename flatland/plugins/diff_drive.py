@@ -1,4 +1,4 @@
-"""A differential drive: follows velocity commands and reports odometry."""
+"""A differential drive that follows velocity commands and emits odometry."""
 
 from __future__ import annotations
 
@@ -20,14 +20,14 @@ if TYPE_CHECKING:
 
 
 class DiffDrive(ModelPlugin):
-    """Makes the origin of a body move forward and turn as commanded."""
+    """Moves the origin of a body with the commanded linear and angular velocity."""
 
     def on_initialize(self, config: YamlReader) -> None:
         """Reads the parameters and declares the ports.
 
         Raises:
-            YamlError: A parameter is wrong.
-            PluginError: A topic is no legal name.
+            YamlError: A parameter is invalid.
+            PluginError: A topic is not a legal name.
         """
         self.body = read_body(config, self.model)
         self.timer = UpdateTimer(read_rate(config, "pub_rate"))
@@ -61,7 +61,7 @@ class DiffDrive(ModelPlugin):
         omega = self._yaw_rate = self.angular_dynamics.limit(self._yaw_rate, command.angular_z, dt)
         body = self.body
         pose = body.pose
-        # In every step, or friction and contacts would slow the robot down.
+        # Set in every step; otherwise friction and contacts would slow the robot down.
         body.set_velocity(v * math.cos(pose[2]), v * math.sin(pose[2]), omega)
         if self.timer.check_update(timekeeper):
             self._publish(timekeeper.sim_time_ns, pose)

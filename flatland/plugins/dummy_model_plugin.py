@@ -1,4 +1,4 @@
-"""A model plugin that only checks its parameters, to test how plugins are found."""
+"""A model plugin that only checks its parameters, for tests of plugin loading."""
 
 from __future__ import annotations
 
@@ -12,19 +12,19 @@ if TYPE_CHECKING:
 
 
 class DummyModelPlugin(ModelPlugin):
-    """Loads if its three parameters have the values that it expects."""
+    """Loads if its three parameters have the expected values."""
 
     def on_initialize(self, config: YamlReader) -> None:
         """Checks the parameters.
 
         Raises:
-            YamlError: One is not as expected; says which.
+            YamlError: A parameter does not have the expected value; the text names it.
         """
-        wanted_float, wanted_string, wanted_int = 0.123456, "dummy_test_123456", 123456
-        for key, value, wanted in (
-            ("dummy_param_float", config.get("dummy_param_float", "float"), wanted_float),
-            ("dummy_param_string", config.get("dummy_param_string", "string"), wanted_string),
-            ("dummy_param_int", config.get("dummy_param_int", "int"), wanted_int),
+        expected_float, expected_string, expected_int = 0.123456, "dummy_test_123456", 123456
+        for key, value, expected in (
+            ("dummy_param_float", config.get("dummy_param_float", "float"), expected_float),
+            ("dummy_param_string", config.get("dummy_param_string", "string"), expected_string),
+            ("dummy_param_int", config.get("dummy_param_int", "int"), expected_int),
         ):
-            if value != wanted:
-                raise at_key(config, key).error(f'Invalid "{key}", must be {wanted}, got {value}')
+            if value != expected:
+                raise at_key(config, key).error(f'Invalid "{key}", must be {expected}, got {value}')

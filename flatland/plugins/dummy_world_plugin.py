@@ -1,4 +1,4 @@
-"""A world plugin that does nothing, to test how plugins are found."""
+"""A world plugin that does nothing, for tests of plugin loading."""
 
 from __future__ import annotations
 
@@ -6,4 +6,4 @@ from flatland.plugin_api.plugin import WorldPlugin
 
 
 class DummyWorldPlugin(WorldPlugin):
-    """Takes no parameters; an entry that has any does not load."""
+    """A world plugin without parameters; an entry with parameters is invalid."""

@@ -1,4 +1,4 @@
-"""A satellite receiver."""
+"""A satellite navigation receiver."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _DEFAULT_RATE = 10.0  # Hz
 
 
 class Gps(ModelPlugin):
-    """Reports where on Earth its antenna is (`flatland.NavSatFix`)."""
+    """Emits the latitude and longitude of its antenna (`flatland.NavSatFix`)."""
 
     def on_initialize(self, config: YamlReader) -> None:
         """Reads the parameters."""
@@ -37,7 +37,7 @@ class Gps(ModelPlugin):
         self._output = self.output(config.get("topic", "string", "gps/fix"), NavSatFix)
 
     def before_physics_step(self, timekeeper: Timekeeper) -> None:
-        """Publishes when it is time."""
+        """Emits the position and sends the transform if an update is due."""
         if not self._timer.check_update(timekeeper):
             return
         if self._output.wanted:
@@ -48,6 +48,6 @@ class Gps(ModelPlugin):
             self.send_transform(parent, self._frame_id, *self._origin)
 
     def compute_position(self) -> tuple[float, float]:
-        """Returns the latitude and longitude [deg] where the antenna is now."""
+        """Returns the current latitude and longitude of the antenna [deg]."""
         east, north, _ = compose(self._body.pose, self._origin)
         return self._plane.geodetic(east, north)

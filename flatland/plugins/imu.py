@@ -26,12 +26,12 @@ if TYPE_CHECKING:
 
 
 class Imu(ModelPlugin):
-    """Reports orientation, yaw rate and acceleration of a body (`flatland.Imu`)."""
+    """Emits the orientation, yaw rate and acceleration of a body (`flatland.Imu`)."""
 
     def on_initialize(self, config: YamlReader) -> None:
         """Reads the parameters."""
         self._body = read_body(config, self.model)
-        # Unlike the reference: the frame is the namespaced one that the transform names, too.
+        # Unlike the reference: messages have the same namespaced frame id as the transform.
         self._frame_id = self.model.frame(config.get("imu_frame_id", "string", "imu"))
         self._parent_frame_id = self.model.frame(self._body.name)
         self._broadcast_tf: bool = config.get("broadcast_tf", "bool", True)
@@ -56,12 +56,12 @@ class Imu(ModelPlugin):
         if config.get("enable_imu_pub", "bool", True):
             self._filtered = self.output(filtered_topic, ImuValue)
             self._ground_truth = self.output(truth_topic, ImuValue)
-        # Stamp and velocity at the last time that a message was due, sent or not: the first
-        # message that somebody hears is as good as any other.
+        # Stamp and velocity at the last update due, emitted or not, so that the first message after
+        # a subscription is correct too.
         self._last: tuple[int, Pose] | None = None
 
     def after_physics_step(self, timekeeper: Timekeeper) -> None:
-        """Publishes when it is time."""
+        """Emits the measurements and sends the transform if an update is due."""
         if not self._timer.check_update(timekeeper):
             return
         self._noise.begin_update()
@@ -78,17 +78,17 @@ class Imu(ModelPlugin):
             if self._filtered is not None and filtered_wanted:
                 self._filtered.emit(self._with_noise(truth))
         self._last = (stamp, velocity)
-        # The body's own frame may serve as the frame of the sensor; TF has no frame within itself.
+        # The sensor may use the frame of its body; TF does not allow a frame to be its own parent.
         if self._broadcast_tf and self._frame_id != self._parent_frame_id:
             self.send_transform(self._parent_frame_id, self._frame_id, 0.0, 0.0, 0.0)
 
     def _acceleration(self, stamp: int, velocity: Pose, yaw: float) -> Vector2:
-        """Mean acceleration since the last message, in the body frame [m/s²]."""
+        """Returns the mean acceleration since the last update due, in the body frame [m/s²]."""
         if self._last is None:
             return (0.0, 0.0)
         last_stamp, last_velocity = self._last
-        # Unlike the reference: the simulated time between, not a product with the rate, which
-        # is infinite by default; and a proper rotation.
+        # Unlike the reference: divides by the elapsed simulated time instead of multiplying by the
+        # rate, which is infinite by default, and rotates both axes with the correct signs.
         dt = (stamp - last_stamp) / NANOSECONDS
         change = ((velocity[0] - last_velocity[0]) / dt, (velocity[1] - last_velocity[1]) / dt)
         return rotate(change, -yaw)
@@ -107,12 +107,11 @@ class Imu(ModelPlugin):
 
 
 def _read_update_rate(config: YamlReader) -> float:
-    """Reads the rate [Hz] under either of its names."""
+    """Reads the rate [Hz] from `update_rate` or its older spelling `pub_rate`."""
     if "pub_rate" not in config:
         return read_rate(config)
     if "update_rate" in config:
         raise at_key(config, "pub_rate").error(
-            'Invalid "pub_rate", it is the older spelling of "update_rate" and must not stand '
-            "beside it"
+            'Invalid "pub_rate", the older spelling of "update_rate", must not be combined with it'
         )
     return read_rate(config, "pub_rate")

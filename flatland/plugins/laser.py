@@ -26,14 +26,14 @@ if TYPE_CHECKING:
     from flatland.timekeeper import Timekeeper
 
 MAX_BEAMS = 1_000_000
-MAX_RANGE = 1e6  # m; a single-precision number has steps of 6 cm there
+MAX_RANGE = 1e6  # m; the spacing of single-precision numbers is 6 cm there
 REFLECTANCE_LAYER = "reflectance"
 REFLECTIVE = 255.0
 
 
 @dataclass(frozen=True, slots=True)
 class BeamAngles:
-    """The fan of a laser [rad]; beam i is at `minimum + i * increment`."""
+    """The beam angles of a laser [rad]; beam i is at `minimum + i * increment`."""
 
     minimum: float
     maximum: float
@@ -42,14 +42,14 @@ class BeamAngles:
 
     @classmethod
     def from_config(cls, reader: YamlReader) -> BeamAngles:
-        """Reads the fan.
+        """Reads the beam angles.
 
         Args:
-            reader: Over the map `angle`.
+            reader: Reader of the map `angle`.
 
         Raises:
-            YamlError: A number is missing or not finite, the increment does not lead from the
-                minimum to the maximum, or there would be absurdly many beams.
+            YamlError: A number is missing or not finite, the sign of the increment does not fit
+                the limits, or there would be more than `MAX_BEAMS` beams.
         """
         numbers = [reader.get(key, "float") for key in ("min", "max", "increment")]
         reader.ensure_accessed_all()
@@ -62,7 +62,7 @@ class BeamAngles:
             raise reader.error('Invalid "angle" params, must have max > min when increment > 0')
         if increment < 0 and minimum < maximum:
             raise reader.error('Invalid "angle" params, must have min > max when increment < 0')
-        # Divided last, as this overflows for an increment next to nothing.
+        # A product, as the quotient overflows for a tiny increment.
         if abs(maximum - minimum) >= (MAX_BEAMS - 0.5) * abs(increment):
             raise reader.error(
                 f'Invalid "angle" params, more than {MAX_BEAMS} beams between {minimum} and '
@@ -71,9 +71,9 @@ class BeamAngles:
         count = math.floor((maximum - minimum) / increment + 0.5) + 1
         return cls(minimum, maximum, increment, count)
 
-    @functools.lru_cache(maxsize=16)  # noqa: B019 - the same for a fleet of robots of one kind
+    @functools.lru_cache(maxsize=16)  # noqa: B019 - shared by all robots of one kind
     def end_points(self, length: float, upside_down: bool) -> FloatArray:
-        """Returns where beams of a length end, sensor frame [m], shape (count, 2), read-only."""
+        """Returns the ends of beams of a length [m], sensor frame, shape (count, 2), read-only."""
         angles = self.minimum + self.increment * np.arange(self.count, dtype=np.float64)
         if upside_down:
             angles = -angles
@@ -87,12 +87,13 @@ class Laser(ModelPlugin):
     """Measures the distance to the nearest fixture along each of its beams.
 
     Attributes:
-        body: The body that it is mounted on.
-        angles: Its fan.
+        body: The body on which the sensor is mounted.
+        angles: Angles of the beams.
         range: Length of a beam [m].
         origin: (x, y, theta) of the sensor in the body frame.
-        intensities: Of the last scan computed: 255 for a beam whose nearest hit is in the layer
-            `reflectance`, else 0; shape (n,), or (0,) in a world without that layer; float32.
+        intensities: Intensities of the last scan computed: 255 for a beam whose nearest hit is in
+            the layer `reflectance`, else 0; shape (n,), or (0,) in a world without that layer;
+            float32.
         beam_ends: End point of each beam in the sensor frame [m], shape (n, 2), read-only.
         last_scan: Pose of the sensor in the world frame and ranges [m], shape (n,), of the last
             scan computed; None before the first one. The ranges are those of the emitted scan.
@@ -102,8 +103,8 @@ class Laser(ModelPlugin):
         """Reads the parameters and declares the output.
 
         Raises:
-            YamlError: A parameter is wrong.
-            PluginError: The topic is no legal name.
+            YamlError: A parameter is invalid.
+            PluginError: The topic is not a legal name.
         """
         self.body = read_body(config, self.model)
         self.range = self._read_range(config)
@@ -164,7 +165,7 @@ class Laser(ModelPlugin):
         return collision_filter.category_bits(layers)
 
     def before_physics_step(self, timekeeper: Timekeeper) -> None:
-        """Sends the transform and, if anybody listens, a scan, when they are due."""
+        """Sends the transform and emits a scan, if it is wanted, when an update is due."""
         if not self.timer.check_update(timekeeper):
             return
         self._noise.begin_update()
@@ -207,7 +208,7 @@ class Laser(ModelPlugin):
         )
         ranges = fractions * self._length
         if self._deviation:
-            # A miss is NaN and stays so.
+            # The range of a miss is NaN and remains NaN.
             noise = rng.standard_normal(ranges.shape, dtype=np.float32)
             noise *= self._deviation
             ranges += noise

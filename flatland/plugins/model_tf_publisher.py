@@ -1,4 +1,4 @@
-"""Sends the transforms between the bodies of a model."""
+"""A publisher of the transforms between the bodies of a model."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ if TYPE_CHECKING:
 
 
 class ModelTfPublisher(ModelPlugin):
-    """Sends the pose of each body relative to one of them, and of that one in the world."""
+    """Sends the poses of the bodies relative to a reference body, and its pose in the world."""
 
     def on_initialize(self, config: YamlReader) -> None:
         """Reads the parameters.
 
         Raises:
-            YamlError: A parameter is wrong.
+            YamlError: A parameter is invalid.
         """
         self.reference = read_body_or_first(config, self.model, "reference")
         excluded = read_bodies(config, self.model, "exclude")
@@ -36,7 +36,7 @@ class ModelTfPublisher(ModelPlugin):
         ]
 
     def before_physics_step(self, timekeeper: Timekeeper) -> None:
-        """Sends the transforms when they are due."""
+        """Sends the transforms if an update is due."""
         if not self.timer.check_update(timekeeper):
             return
         x, y, yaw = self.reference.pose

@@ -1,4 +1,4 @@
-"""Public home of `flatland.plugin_api.parameters`: readers for parameters that plugins share."""
+"""Public module of the parameter readers of `flatland.plugin_api.parameters`."""
 
 from flatland.plugin_api.parameters import (
     MAX_COORDINATE,

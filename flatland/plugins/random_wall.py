@@ -1,4 +1,4 @@
-"""Walls put in front of random edges of a layer, to make one map into many."""
+"""Walls in front of randomly drawn edges of a layer, for variations of one map."""
 
 from __future__ import annotations
 
@@ -15,15 +15,15 @@ if TYPE_CHECKING:
     from flatland.config.reader import YamlReader
     from flatland.entities.layer import Layer
 
-# A robot nearer than this to the line of a wall stands on no side of it [m].
-_ON_THE_LINE = 1e-5
+# A robot closer than this to the line through a wall is on neither side of it [m].
+_LINE_TOLERANCE = 1e-5
 
 
 class RandomWall(WorldPlugin):
-    """Puts a parallel wall in front of edges of a layer that are drawn at random."""
+    """Adds a parallel wall in front of randomly drawn edges of a layer."""
 
     def on_initialize(self, config: YamlReader) -> None:
-        """Reads the parameters and builds the walls."""
+        """Reads the parameters and adds the walls."""
         layer_name = config.get("layer", "string")
         robot_name = config.get("robot_name", "string")
         count = config.get("num_of_walls", "int", 0)
@@ -59,7 +59,7 @@ class RandomWall(WorldPlugin):
             raise PluginError(error.message) from None
 
     def _find_robot(self, name: str) -> Pose:
-        """Looks up the start pose of a model in the world file, world frame."""
+        """Returns the initial pose of a model of the world file, world frame."""
         for entry in self.world_config.optional_subnode("models", "list").items():
             if entry.get("name", "string") == name:
                 pose: Pose = entry.get("pose", "pose", IDENTITY)
@@ -69,7 +69,7 @@ class RandomWall(WorldPlugin):
         )
 
     def _pick_edges(self, layer: Layer, count: int) -> DoubleArray:
-        """Draws edges (x1, y1, x2, y2) in the layer body's frame, all different."""
+        """Draws different edges (x1, y1, x2, y2), layer frame, shape (count, 4)."""
         edges: DoubleArray = layer.edges.astype(np.float64)
         if count > len(edges):
             raise PluginError(
@@ -86,20 +86,20 @@ def _normal(edge: DoubleArray) -> DoubleArray:
 
 
 def _side_of(edge: DoubleArray, robot: Pose, robot_name: str, layer_name: str) -> float:
-    """Tells on which side of an edge's line a robot stands: 1 on the left, -1 on the right."""
+    """Returns the side of the line through an edge on which a robot is: 1 left, -1 right."""
     distance = float(_normal(edge) @ (np.array(robot[:2]) - edge[:2]))
-    if abs(distance) < _ON_THE_LINE:
+    if abs(distance) < _LINE_TOLERANCE:
         x1, y1, x2, y2 = edge
         raise PluginError(
-            f'robot "{robot_name}" stands on the line of the wall from ({x1:g}, {y1:g}) to '
-            f'({x2:g}, {y2:g}) of layer "{layer_name}", so the new wall has no side to go to'
+            f'robot "{robot_name}" is on the line through the wall from ({x1:g}, {y1:g}) to '
+            f'({x2:g}, {y2:g}) of layer "{layer_name}": the side of the new wall is undefined'
         )
     return 1.0 if distance > 0.0 else -1.0
 
 
 def _wall(edge: DoubleArray, offset: float) -> DoubleArray:
-    """Makes a wall parallel to an edge, `offset` [m] to its left, and its two side walls."""
-    # Unlike the reference: along the normal, so that slanted edges get their distance, too.
+    """Returns a wall parallel to an edge, `offset` [m] to its left, and its two side walls."""
+    # Unlike the reference: offset along the normal, so that the distance of slanted edges holds.
     shift = offset * _normal(edge)
     start, end = edge[:2], edge[2:]
     far_start, far_end = start + shift, end + shift

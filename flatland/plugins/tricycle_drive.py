@@ -1,4 +1,4 @@
-"""A tricycle drive: one front wheel that steers and drives, two rear wheels that follow."""
+"""A tricycle drive: a steered and driven front wheel and two passive rear wheels."""
 
 from __future__ import annotations
 
@@ -19,17 +19,17 @@ if TYPE_CHECKING:
     from flatland.geometry import Vector2
     from flatland.timekeeper import Timekeeper
 
-_TOLERANCE = 1e-5  # m, within which anchors are where they must be
+_TOLERANCE = 1e-5  # m between an anchor and its required position
 
 
 class TricycleGeometry:
-    """Where the wheels of a tricycle are, taken from its joints and checked.
+    """The wheel positions of a tricycle, taken from its joints.
 
     Attributes:
         front_joint: The revolute joint of the steered wheel.
-        steering_sign: Of the front joint's angle when the wheel is steered to the left.
-        rear_center: Middle between the rear wheels, body frame [m].
-        wheelbase: Distance from there to the front wheel [m].
+        steering_sign: Sign of the angle of the front joint if the wheel is steered to the left.
+        rear_center: Midpoint between the rear wheels, body frame [m].
+        wheelbase: Distance from the rear center to the front wheel [m].
     """
 
     def __init__(self, config: YamlReader, model: Model, body: Body) -> None:
@@ -37,11 +37,11 @@ class TricycleGeometry:
 
         Args:
             config: The plugin's parameters.
-            model: Whose joints they are.
-            body: The body that the wheels are on.
+            model: Model of the joints.
+            body: Body on which the wheels are mounted.
 
         Raises:
-            YamlError: A joint does not exist, is of the wrong kind or not where it must be.
+            YamlError: A joint does not exist, or its type or anchors are invalid.
         """
         front = _WheelJoint(config, "front_wheel_joint", model)
         rear_left = _WheelJoint(config, "rear_left_wheel_joint", model)
@@ -55,7 +55,7 @@ class TricycleGeometry:
         if _off(front_anchor, (0.0, 0.0)):
             raise front.error("Front wheel joint must have its body anchored at (0, 0)")
         self.front_joint = front.joint
-        # A joint's angle counts from its body A.
+        # The angle of a joint is that of its body B relative to its body A.
         self.steering_sign = 1.0 if front.joint.bodies[0] is body else -1.0
         self.rear_center = (
             (left_anchor[0] + right_anchor[0]) / 2,
@@ -75,7 +75,7 @@ class TricycleGeometry:
 
 
 class _WheelJoint:
-    """A joint that a parameter names, and the place of that parameter for errors."""
+    """A joint named by a parameter, and the place of that parameter for errors."""
 
     def __init__(self, config: YamlReader, key: str, model: Model) -> None:
         name = config.get(key, "string")
@@ -93,7 +93,7 @@ class _WheelJoint:
             raise self.error(text)
 
     def body_anchor(self, body: Body) -> Vector2:
-        """Returns the anchor on the body, after checks of the one on the wheel."""
+        """Returns the anchor on the body; raises if the one on the wheel is not at its origin."""
         (ax, ay), (bx, by) = self.joint.anchors.tolist()
         if self.joint.bodies[0] is body:
             anchor, wheel_anchor = (ax, ay), (bx, by)
@@ -121,9 +121,9 @@ class TricycleDrive(ModelPlugin):
     """Steers and drives the front wheel as commanded; the body follows without slip.
 
     Attributes:
-        geometry: Of the wheels.
-        steering_angle: Of the front wheel, counter-clockwise [rad].
-        steering_velocity: [rad/s].
+        geometry: Positions of the wheels.
+        steering_angle: Angle of the front wheel, counter-clockwise [rad].
+        steering_velocity: Rate of change of the steering angle [rad/s].
         front_velocity: Speed of the front wheel along its heading [m/s].
     """
 
@@ -131,8 +131,8 @@ class TricycleDrive(ModelPlugin):
         """Reads the parameters, checks the joints and declares the ports.
 
         Raises:
-            YamlError: A parameter is wrong.
-            PluginError: A topic is no legal name.
+            YamlError: A parameter is invalid.
+            PluginError: A topic is not a legal name.
         """
         self.body = read_body(config, self.model)
         self.timer = UpdateTimer(read_rate(config, "pub_rate"))
@@ -142,17 +142,17 @@ class TricycleDrive(ModelPlugin):
         )
         self.angular_dynamics = self._read_angular_dynamics(config)
         self.geometry = TricycleGeometry(config, self.model, self.body)
-        # Unlike the reference: odometry is in its own frame, not in that of the ground truth.
+        # Unlike the reference: odometry has its own frame, not that of the ground truth.
         self._odometer = Odometer(self, config, self.body, twist_in_local_frame=False)
         self._command = open_twist_command(self, config.get("twist_sub", "string", "cmd_vel"))
         self.steering_angle = 0.0
         self.steering_velocity = 0.0
         self.front_velocity = 0.0
-        self._shown_angle: float | None = None
+        self._displayed_angle: float | None = None
 
     @staticmethod
     def _read_angular_dynamics(config: YamlReader) -> DynamicsLimits:
-        """Reads the limits of the steering, also from the keys that older files have."""
+        """Reads the limits of the steering, including the keys of older files."""
         limits = DynamicsLimits.from_config(config.optional_subnode("angular_dynamics", "map"))
         velocity = read_not_negative(config, "max_angular_velocity", 0.0)
         acceleration = read_not_negative(config, "max_steer_acceleration", 0.0)
@@ -163,7 +163,7 @@ class TricycleDrive(ModelPlugin):
         return DynamicsLimits(limits.velocity_limit or velocity, acceleration, deceleration)
 
     def before_physics_step(self, timekeeper: Timekeeper) -> None:
-        """Reports the motion so far, then steers and sets the body's velocity."""
+        """Emits the odometry if an update is due, then steers and sets the velocity of the body."""
         body = self.body
         pose = body.pose
         if self.timer.check_update(timekeeper):
@@ -179,28 +179,28 @@ class TricycleDrive(ModelPlugin):
         geometry = self.geometry
         steering_angle = self.steering_angle
         omega = v * math.sin(steering_angle) / geometry.wheelbase
-        # The rear centre moves straight ahead; from there to the origin, in the body frame.
+        # The rear center moves straight ahead; the velocity of the origin follows, body frame.
         forward = v * math.cos(steering_angle) + omega * geometry.rear_center[1]
         sideways = -omega * geometry.rear_center[0]
         c, s = math.cos(pose[2]), math.sin(pose[2])
         body.set_velocity(c * forward - s * sideways, s * forward + c * sideways, omega)
 
     def _steer(self, target: float, dt: float) -> None:
-        """Turns the front wheel towards an angle as fast as the limits allow."""
+        """Turns the front wheel towards an angle within the limits."""
         remaining = target - self.steering_angle
         acceleration = self.angular_dynamics.acceleration_limit
         if acceleration and abs(remaining) < self.steering_velocity**2 / (2 * acceleration):
-            # Braking now just stops there.
+            # Deceleration must start now to stop at the target.
             velocity = 0.0
         else:
             velocity = remaining / dt
         self.steering_velocity = self.angular_dynamics.limit(self.steering_velocity, velocity, dt)
         angle = self.steering_angle + self.steering_velocity * dt
-        most = self.max_steer_angle
-        if most:
-            angle = min(max(angle, -most), most)
+        limit = self.max_steer_angle
+        if limit:
+            angle = min(max(angle, -limit), limit)
         self.steering_angle = angle
-        if angle != self._shown_angle:
-            self._shown_angle = angle
-            shown = angle * self.geometry.steering_sign
-            self.geometry.front_joint.set_limits(shown, shown)
+        if angle != self._displayed_angle:
+            self._displayed_angle = angle
+            joint_angle = angle * self.geometry.steering_sign
+            self.geometry.front_joint.set_limits(joint_angle, joint_angle)

@@ -1,4 +1,4 @@
-"""A motion along a fixed way: doors, lifts, things that go to and fro."""
+"""A prescribed motion between two poses, for doors, lifts and moving obstacles."""
 
 from __future__ import annotations
 
@@ -21,19 +21,19 @@ _LOG = logging.getLogger("flatland")
 
 MODES = ("yoyo", "loop", "once", "trigger")
 
-# How far the 32-bit progress may be from the exact one before it is set right, and from 0 to be
-# there when it comes back.
+# Difference at which the 32-bit progress is corrected to the exact one, and progress below which a
+# backward motion is complete.
 _ROUNDING_TOLERANCE = 1e-5
 
 
 class Tween(ModelPlugin):
-    """Moves a body to and fro between its pose at the start and one `delta` away.
+    """Moves a body between its initial pose and the pose at the offset `delta`.
 
-    The way is prescribed: nothing that the body touches holds it up or pushes it off.
+    The motion is prescribed: contacts neither stop nor deflect the body.
     """
 
     def on_initialize(self, config: YamlReader) -> None:
-        """Reads the parameters and takes the body's pose as the start."""
+        """Reads the parameters; the motion starts at the current pose of the body."""
         self._body = read_body(config, self.model)
         self._delta = read_pose(config, "delta")
         self._duration = read_finite(config, "duration", 1.0)
@@ -63,13 +63,13 @@ class Tween(ModelPlugin):
             if topic:
                 return self.command(topic, bool)
             _LOG.warning(
-                'tween "%s" of model "%s" never moves: mode trigger needs a trigger_topic',
+                'tween "%s" of model "%s" never moves: mode trigger requires a trigger_topic',
                 self.name,
                 self.model.name,
             )
         elif topic:
             _LOG.warning(
-                'tween "%s" of model "%s" has no use for a trigger_topic in mode %s',
+                'tween "%s" of model "%s" ignores its trigger_topic in mode %s',
                 self.name,
                 self.model.name,
                 self._mode,
@@ -77,7 +77,7 @@ class Tween(ModelPlugin):
         return None
 
     def before_physics_step(self, timekeeper: Timekeeper) -> None:
-        """Moves the body on."""
+        """Advances the motion by one step."""
         self._advance(min(timekeeper.step_size / self._duration, 1.0))
         eased = self._ease(float(self._progress))
         start, delta = self._start, self._delta
@@ -89,14 +89,14 @@ class Tween(ModelPlugin):
         self._hold()
 
     def after_physics_step(self, timekeeper: Timekeeper) -> None:
-        """Takes back what the physics step did to the body."""
+        """Reverts the effect of the physics step on the body."""
         self._hold()
 
     def _hold(self) -> None:
-        # Wakes the body, too: Box2D lets what does not move by itself fall asleep, and then finds
-        # no new contacts for it.
+        # Also wakes the body: Box2D puts bodies without velocity to sleep and then finds no new
+        # contacts for them.
         self._body.set_pose(*self._pose)
-        # A dynamic body keeps what others gave it, and would push like a conveyor belt.
+        # A dynamic body would keep the velocity from contacts and act like a conveyor belt.
         if self._is_dynamic:
             self._body.set_velocity(0.0, 0.0, 0.0)
 
@@ -104,22 +104,22 @@ class Tween(ModelPlugin):
         if self._mode == "trigger":
             self._forward = self._trigger is not None and self._trigger.value
         elif self._mode == "loop" and self._progress == 1.0:
-            self._put(0.0)
+            self._set_progress(0.0)
         elif self._mode == "yoyo" and self._progress in (0.0, 1.0):
             self._forward = self._progress == 0.0
         signed = step if self._forward else -step
-        # The reference adds up 32-bit floats, and what they round away decides in which of two
-        # steps the end comes: so they are added up here, too. Unlike there, an exact sum beside
-        # them keeps them in time when the steps are too small or too many for 32 bits.
+        # The reference accumulates 32-bit floats, whose rounding decides in which of two steps the
+        # motion ends; the same sum is used here. Unlike the reference: an additional exact sum
+        # corrects it where the steps are too small or too many for 32 bits.
         self._progress += np.float32(signed)
         self._exact_progress += signed
         if abs(self._progress - self._exact_progress) > _ROUNDING_TOLERANCE:
             self._progress = np.float32(self._exact_progress)
         if self._forward and self._progress >= 1.0:
-            self._put(1.0)
+            self._set_progress(1.0)
         elif not self._forward and self._progress < _ROUNDING_TOLERANCE:
-            self._put(0.0)
+            self._set_progress(0.0)
 
-    def _put(self, progress: float) -> None:
+    def _set_progress(self, progress: float) -> None:
         self._progress = np.float32(progress)
         self._exact_progress = progress

@@ -1,4 +1,4 @@
-"""Which plugins send which coordinate frames, to detect a frame with two parents."""
+"""The senders of coordinate frames, to detect frames with two parents."""
 
 from __future__ import annotations
 
@@ -15,18 +15,18 @@ FramePair: TypeAlias = tuple[str, str]
 class FrameSenders:
     """The plugins that send each child frame.
 
-    In a TF tree a frame has one parent; with two, its place changes with each message.
+    A frame has one parent in a TF tree. With two, its position changes with each message.
     """
 
     def __init__(self) -> None:
-        """Starts without any frame."""
+        """Creates an empty table."""
         self._senders: dict[str, list[tuple[str, FlatlandPlugin]]] = {}
         self._warned: set[tuple[str, frozenset[str]]] = set()
 
     def add(self, plugin: FlatlandPlugin, frames: FramePair) -> None:
-        """Adds a pair of frames that a plugin did not send before.
+        """Adds a pair of frames that a plugin sends for the first time.
 
-        Logs one warning for each child frame and pair of parents that two plugins disagree on.
+        Logs one warning for each child frame and pair of parents of different plugins.
 
         Args:
             plugin: The sender.
@@ -41,7 +41,7 @@ class FrameSenders:
             self._warned.add(conflict)
             _LOG.warning(
                 'TF frame "%s" has two parents, "%s" from %s and "%s" from %s; give the frames '
-                "different names, or let one plugin not send it",
+                "different names, or disable one of the senders",
                 child,
                 other_parent,
                 describe(other),
@@ -51,7 +51,7 @@ class FrameSenders:
         senders.append((parent, plugin))
 
     def remove(self, plugin: FlatlandPlugin, frames: FramePair) -> None:
-        """Removes a pair of frames that was added; its plugin sends it no more."""
+        """Removes a pair of frames that was added."""
         parent, child = frames
         senders = self._senders[child]
         senders.remove((parent, plugin))

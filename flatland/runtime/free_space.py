@@ -1,4 +1,4 @@
-"""The space between walls on a grid: where a disc fits, and which places it can reach."""
+"""The free space between walls on a grid, for a disc, with its connected regions."""
 
 from __future__ import annotations
 
@@ -18,16 +18,16 @@ BoolArray = npt.NDArray[np.bool_]
 Bounds = tuple[float, float, float, float]
 
 _CELLS_PER_RADIUS: Final = 4.0
-_LEAST_CELL: Final = 0.02  # m
-_GREATEST_CELL: Final = 0.05  # m, unless there would be too many
-_MOST_CELLS: Final = 16_000_000
+_MIN_CELL_SIZE: Final = 0.02  # m
+_MAX_CELL_SIZE: Final = 0.05  # m, exceeded only to limit the number of cells
+_MAX_CELLS: Final = 16_000_000
 
 
 class FreeSpace:
-    """Square cells in a rectangle, and how far from the nearest wall each one is.
+    """A rectangle of square cells with their distances to the nearest wall.
 
-    Distances on the grid are estimates. What depends on them is either on the safe side or decided
-    by an exact test.
+    Distances on the grid are estimates. Decisions based on them are either conservative or
+    confirmed by an exact test.
     """
 
     def __init__(
@@ -38,57 +38,58 @@ class FreeSpace:
         clearance: float,
         fits: Callable[[DoubleArray, float], BoolArray],
     ) -> None:
-        """Measures the distances.
+        """Creates the grid.
 
         Args:
             walls: Edges (x1, y1, x2, y2) in the world frame [m], shape (n, 4).
             bounds: (x_min, y_min, x_max, y_max) of the rectangle in the world frame [m].
-            radius: Of the disc [m], positive.
-            clearance: Least distance between the disc and a wall where it stays [m].
-            fits: The exact test: returns for centres (n, 2) and a radius which discs overlap no
-                wall, shape (n,).
+            radius: Radius of the disc [m], positive.
+            clearance: Minimum distance of a placed disc to the walls [m].
+            fits: The exact test: returns for centers, shape (n, 2), and a radius which discs
+                overlap no wall, shape (n,).
         """
         x_min, y_min, x_max, y_max = bounds
         width, height = x_max - x_min, y_max - y_min
         self._radius = radius
         self._fits = fits
         self._cell = max(
-            min(max(radius / _CELLS_PER_RADIUS, _LEAST_CELL), _GREATEST_CELL),
-            math.sqrt(width * height / _MOST_CELLS),
-            max(width, height) / _MOST_CELLS,
+            min(max(radius / _CELLS_PER_RADIUS, _MIN_CELL_SIZE), _MAX_CELL_SIZE),
+            math.sqrt(width * height / _MAX_CELLS),
+            max(width, height) / _MAX_CELLS,
         )
         self._origin = np.array([x_min, y_min])
         self._extent = np.array([width, height])
         self._columns = max(1, math.ceil(width / self._cell))
         self._rows = max(1, math.ceil(height / self._cell))
-        # Walls outside of the bounds count, too, as far as the disc would reach them.
+        # Walls outside the bounds matter as far as a disc within the bounds reaches them.
         margin = math.ceil((radius + clearance) / self._cell) + 2
         distances = self._distances(walls, margin)
-        # A wall may be one cell nearer than estimated, and a place 0.71 cells from the centre.
+        # A wall may be one cell closer or farther than estimated, and a place up to 0.71 cells from
+        # the center of its cell.
         slack = (1.0 + math.sqrt(0.5)) * self._cell
-        self._roomy: IntArray = np.flatnonzero(distances >= radius + clearance - slack)
+        self._candidates: IntArray = np.flatnonzero(distances >= radius + clearance - slack)
         self._regions = self._connected(distances)
 
     def cells(self, connected_to: tuple[float, float] | None) -> IntArray:
-        """Returns the cells that may hold a place for the disc, shape (n,).
+        """Returns the cells that may contain a place for the disc, shape (n,).
 
         Args:
-            connected_to: Only cells that the disc can reach from this point, world frame [m];
-                None for all.
+            connected_to: Point in the world frame [m] from which the disc must be able to reach the
+                cells; None for no such condition.
 
         Raises:
             WorldError: The point is out of bounds, or the disc does not fit there.
         """
         if connected_to is None:
-            return self._roomy
+            return self._candidates
         reached = self._regions_around(np.array(connected_to))
-        return self._roomy[np.isin(self._regions[self._roomy], reached)]
+        return self._candidates[np.isin(self._regions[self._candidates], reached)]
 
     def places_in(self, cells: IntArray, rng: np.random.Generator) -> DoubleArray:
         """Returns a random point of each cell in the world frame [m], shape (n, 2)."""
         corners = np.stack((cells % self._columns, cells // self._columns), axis=1)
         inside = (corners + rng.random((len(cells), 2))) * self._cell
-        # The last row and column may stand out.
+        # The last row and column may extend beyond the rectangle.
         places: DoubleArray = self._origin + np.minimum(inside, self._extent)
         return places
 
@@ -98,14 +99,14 @@ class FreeSpace:
         return centers
 
     def _distances(self, walls: DoubleArray, margin: int) -> DoubleArray:
-        """Estimates the distance of each cell's centre to the nearest wall [m], to within a cell.
+        """Returns the distances of the centers of the cells to the nearest wall, to within a cell.
 
         Args:
-            walls: Edges in the world frame.
-            margin: How many cells around the grid are looked at, too.
+            walls: Edges (x1, y1, x2, y2) in the world frame [m], shape (n, 4).
+            margin: Width of the border around the grid whose walls are included, in cells.
 
         Returns:
-            Row by row, shape (rows * columns,), float32; infinite where there is no wall.
+            The distances [m] row by row, shape (rows * columns,); infinite without any wall.
         """
         shape = (self._rows + 2 * margin, self._columns + 2 * margin)
         ends = (walls.reshape(-1, 2, 2) - self._origin) / self._cell + margin
@@ -122,15 +123,15 @@ class FreeSpace:
         return result
 
     def _connected(self, distances: DoubleArray) -> npt.NDArray[np.int32]:
-        """Numbers the regions within which the disc can move from centre to centre, 0 for none.
+        """Returns for each cell the number of its connected region, 0 if the disc does not fit.
 
-        Between two centres that are L apart and have the distance sqrt(r² + L² / 4) to all walls,
-        the distance is never less than r. Here L is the diagonal of a cell.
+        If two centers at a distance L have at least the distance sqrt(r² + L² / 4) to all walls,
+        all points between them have at least the distance r. Here L is the diagonal of a cell.
         """
         least = math.hypot(self._radius, self._cell * math.sqrt(0.5))
         passable = distances >= least + self._cell
-        unsure = np.flatnonzero((distances >= least - self._cell) & ~passable)
-        passable[unsure] = self._fits(self._centers(unsure), least)
+        undecided = np.flatnonzero((distances >= least - self._cell) & ~passable)
+        passable[undecided] = self._fits(self._centers(undecided), least)
         cv2 = importlib.import_module("cv2")
         grid = passable.view(np.uint8).reshape(self._rows, self._columns)
         regions: npt.NDArray[np.int32] = cv2.connectedComponents(grid, connectivity=8)[1].ravel()
@@ -139,7 +140,7 @@ class FreeSpace:
     def _regions_around(self, point: DoubleArray) -> npt.NDArray[np.int32]:
         where = f"connected_to ({point[0]:g}, {point[1]:g})"
         if not ((point >= self._origin) & (point <= self._origin + self._extent)).all():
-            raise WorldError(f"{where} is outside of the bounds of the walls")
+            raise WorldError(f"{where} is out of bounds")
         if not self._fits(point[np.newaxis], self._radius)[0]:
             raise WorldError(f"{where} is not free for a disc of radius {self._radius:g} m")
         column, row = ((point - self._origin) / self._cell).astype(np.int64).tolist()
@@ -152,32 +153,32 @@ class FreeSpace:
 
 
 class Spread:
-    """Places that keep a distance from each other.
+    """A set of places with a minimum distance from each other.
 
     Attributes:
-        places: (x, y) of each [m], in the order in which they came.
+        places: The places (x, y) [m] in the order in which they were added.
     """
 
     def __init__(self, distance: float) -> None:
-        """Has no place yet.
+        """Creates an empty set.
 
         Args:
-            distance: Least distance between two places [m], positive.
+            distance: Minimum distance between two places [m], positive.
         """
         self.places: list[tuple[float, float]] = []
         self._distance = distance
-        # By square cells of that width: only the neighbouring ones can hold a place too near.
+        # Places by square cells of that width: places within the distance are in adjacent cells.
         self._cells: dict[tuple[int, int], list[tuple[float, float]]] = {}
 
     def fill(self, candidates: DoubleArray, n: int) -> bool:
-        """Adds the candidates, in order, that are far enough from all places.
+        """Adds, in order, the candidates whose distance from all places is sufficient.
 
         Args:
-            candidates: Shape (m, 2) [m].
-            n: Stops when there are so many places.
+            candidates: Points (x, y) [m], shape (m, 2).
+            n: Number of places at which no more are added.
 
         Returns:
-            Whether there are `n` places.
+            Whether the set has `n` places.
         """
         for x, y in candidates.tolist():
             if len(self.places) == n:
@@ -205,7 +206,7 @@ def _points_on(ends: DoubleArray, size: IntArray) -> DoubleArray:
         size: Width and height of the rectangle, which starts at the origin.
 
     Returns:
-        Shape (m, 2).
+        The points, shape (m, 2).
     """
     start, along = ends[:, 0], ends[:, 1] - ends[:, 0]
     # The part of each edge, from 0 to 1, between the two lines that bound each axis.

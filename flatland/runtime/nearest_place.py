@@ -1,4 +1,4 @@
-"""The free place that is nearest to one that is blocked."""
+"""Search for the free place closest to a blocked one."""
 
 from __future__ import annotations
 
@@ -15,23 +15,23 @@ BoolArray = npt.NDArray[np.bool_]
 
 SEARCH_RADIUS: Final = 5.0  # m
 _SPACING: Final = 0.05  # m between the first candidates
-_REFINEMENTS: Final = 5  # times that the spacing is halved: 1.6 mm in the end
-_CHUNK: Final = 1024  # candidates that are tested at once
+_REFINEMENTS: Final = 5  # halvings of the spacing, to 1.6 mm
+_CHUNK: Final = 1024  # candidates per test
 
 
 def nearest_offset(is_free: Callable[[DoubleArray], BoolArray]) -> tuple[float, float] | None:
-    """Finds the shortest offset to a free place.
+    """Returns the shortest offset to a free place.
 
-    Candidates on a square lattice are tested in order of their length. The first free ones are then
-    refined: the result is within a few millimetres of the optimum where the free space around the
-    optimum is at least 5 cm wide, and always free.
+    Candidates on a square lattice are tested in order of their length, and the first free ones are
+    refined. The result is always free, and within a few millimetres of the optimum if the free
+    space around the optimum is at least 5 cm wide.
 
     Args:
         is_free: Returns for offsets [m], shape (n, 2), which of them lead to a free place, shape
             (n,).
 
     Returns:
-        (dx, dy), at most 5 m long, or None when no candidate is free.
+        The offset (dx, dy) [m], at most 5 m long, or None if no candidate is free.
     """
     found = _first_free(is_free)
     spacing = _SPACING
@@ -63,7 +63,7 @@ def _lengths(offsets: DoubleArray) -> DoubleArray:
 
 
 def _first_free(is_free: Callable[[DoubleArray], BoolArray]) -> DoubleArray:
-    """Returns the shortest free offset, and those that may become shorter by a refinement."""
+    """Returns the free offsets whose refinement may be the shortest, shape (n, 2)."""
     lattice = _lattice()
     found: DoubleArray = np.empty((0, 2))
     limit = math.inf
@@ -80,16 +80,16 @@ def _first_free(is_free: Callable[[DoubleArray], BoolArray]) -> DoubleArray:
 def _refined(
     offsets: DoubleArray, spacing: float, is_free: Callable[[DoubleArray], BoolArray]
 ) -> DoubleArray:
-    """Replaces each offset by the shortest free one around it; drops those that fall behind."""
+    """Replaces each offset by the shortest free one near it; drops those that are too long."""
     axis = np.arange(-2, 3) * spacing
     around = np.stack(np.meshgrid(axis, axis), axis=-1).reshape(-1, 2)
     candidates = offsets[:, np.newaxis] + around
     lengths = _lengths(candidates)
-    # The offsets themselves are known to be free; what is longer than they are does not matter.
-    worth = lengths < _lengths(offsets)[:, np.newaxis]
-    lengths[~worth] = math.inf
-    free = is_free(candidates[worth])
-    lengths[worth] = np.where(free, lengths[worth], math.inf)
+    # The offsets themselves are free, so that only shorter candidates are tested.
+    is_shorter = lengths < _lengths(offsets)[:, np.newaxis]
+    lengths[~is_shorter] = math.inf
+    free = is_free(candidates[is_shorter])
+    lengths[is_shorter] = np.where(free, lengths[is_shorter], math.inf)
     best = np.argmin(lengths, axis=1)
     rows = np.arange(len(offsets))
     is_better = np.isfinite(lengths[rows, best])

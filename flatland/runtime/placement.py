@@ -1,4 +1,4 @@
-"""Where models can be put: what blocks a pose, and which places are free."""
+"""Placement of models: overlaps at a pose, and free places."""
 
 from __future__ import annotations
 
@@ -32,47 +32,48 @@ Models: TypeAlias = str | Model | Iterable[str | Model]
 IfBlocked = Literal["allow", "warn", "refuse", "nearest"]
 IF_BLOCKED: Final[tuple[IfBlocked, ...]] = get_args(IfBlocked)
 
-TOLERANCE: Final = 0.005  # m that footprints may penetrate others, as Box2D's solver lets them
-_ROUNDING: Final = 1e-4  # m of overlap that single precision may make of a mere touch
+TOLERANCE: Final = 0.005  # m of penetration that is allowed, as by the Box2D solver
+_ROUNDING: Final = 1e-4  # m of overlap of touching shapes that single precision may cause
 _FIRST_TRIES: Final = 1024
-_MOST_SPACES: Final = 8
+_MAX_SPACES: Final = 8  # free spaces in the cache
 
 
 def check_if_blocked(if_blocked: str) -> None:
-    """Raises ValueError for a value that `if_blocked` cannot have."""
+    """Raises ValueError for an invalid value of `if_blocked`."""
     if if_blocked not in IF_BLOCKED:
         raise ValueError(f"if_blocked must be one of {', '.join(IF_BLOCKED)}, got {if_blocked!r}")
 
 
 class Placement:
-    """Answers what is blocked and what is free in one world, between two steps."""
+    """Finds overlaps and free places in a world, between two steps."""
 
     def __init__(self, world: World, contacts: ContactReporter) -> None:
-        """Prepares for a world.
+        """Creates the placement of a world.
 
         Args:
-            world: World of the layers and models.
-            contacts: Finds the bodies of models and layers.
+            world: The world.
+            contacts: Maps physics bodies to bodies of models and layers.
         """
         self._world = world
         self._contacts = contacts
         self._rng: np.random.Generator | None = None
-        # What does not change with the models, by the arguments that it depends on.
+        # Walls and free spaces by the arguments of the query; they do not depend on models.
         self._spaces: dict[tuple[object, ...], tuple[DoubleArray, FreeSpace]] = {}
 
     # -- models ----------------------------------------------------------------------------
 
     def choose_pose(self, model: Model, pose: Pose, if_blocked: IfBlocked, verb: str) -> Pose:
-        """Returns the pose at which to put a model.
+        """Returns the pose at which a model is to be placed.
 
         Args:
-            model: The model, somewhere in the physics world.
-            pose: The pose asked for, of its first body in the world frame.
-            if_blocked: What to do where the model would overlap walls or other models.
-            verb: What is done to the model, for the text of an error.
+            model: The model, at any pose in the physics world.
+            pose: Requested pose of its first body in the world frame [m, rad].
+            if_blocked: What to do if the model would overlap walls or other models.
+            verb: Name of the operation for error messages, such as `spawn`.
 
         Raises:
-            WorldError: The pose is blocked and must not be, or no place near it is free.
+            WorldError: The pose is blocked and `if_blocked` is `refuse`, or it is `nearest` and no
+                place near the pose is free.
             ValueError: The pose is out of the range of the physics.
         """
         if if_blocked in ("allow", "warn"):
@@ -90,7 +91,7 @@ class Placement:
             )
         )
         if offset is None:
-            raise WorldError(f"{failure}, and there is no free place within {SEARCH_RADIUS:g} m")
+            raise WorldError(f"{failure}, and no place within {SEARCH_RADIUS:g} m is free")
         return (pose[0] + offset[0], pose[1] + offset[1], pose[2])
 
     def warn_if_blocked(self, model: Model) -> None:
@@ -100,7 +101,7 @@ class Placement:
             _LOG.warning('model "%s" %s', model.name, overlap)
 
     def _overlap(self, model: Model, pose: Pose) -> str | None:
-        """Describes what a model overlaps at a pose; None where it is free."""
+        """Returns a description of the overlaps of a model at a pose, None if there are none."""
         bodies = [body.physics for body in model.bodies]
         overlapped = self._world.physics.overlapping_bodies(bodies, pose, least_gap=-TOLERANCE)
         if not overlapped:
@@ -113,7 +114,7 @@ class Placement:
         for physics_body in bodies:
             body = self._contacts.find_body(physics_body)
             if body is None:
-                names.append("a body of no model")
+                names.append("a body without a model")
             else:
                 kind = "layer" if isinstance(body.entity, Layer) else "model"
                 names.append(f'{kind} "{body.entity.name}"')
@@ -143,7 +144,7 @@ class Placement:
             bodies = self._bodies(model)
             free = physics.free_poses(bodies, [(x, y, theta)], ignored=ignored, least_gap=least_gap)
         else:
-            raise ValueError("is_free needs either a radius or a model")
+            raise ValueError("is_free requires either a radius or a model")
         return bool(free[0])
 
     def sample_free(
@@ -169,7 +170,7 @@ class Placement:
         space = self._free_space(bits, radius, clearance, bounds)
         cells = space.cells(start)
         spread = Spread(2 * radius + clearance)
-        # Most calls need a small part of the cells only.
+        # Most calls find enough places among a small part of the cells.
         for tries in (_FIRST_TRIES + 32 * n, len(cells)):
             picked = generator.choice(cells, size=min(tries, len(cells)), replace=False)
             places = space.places_in(picked, generator)
@@ -179,7 +180,7 @@ class Placement:
             if spread.fill(places[free], n):
                 points = np.array(spread.places).reshape(-1, 2)
                 return np.column_stack((points, generator.uniform(-math.pi, math.pi, n)))
-        where = "" if start is None else f" that are connected to ({start[0]:g}, {start[1]:g})"
+        where = "" if start is None else f" connected to ({start[0]:g}, {start[1]:g})"
         raise WorldError(
             f"found only {len(spread.places)} of {n} free places for discs of radius {radius:g} m "
             f"with a clearance of {clearance:g} m{where}"
@@ -193,7 +194,7 @@ class Placement:
         area = _bounds_of(walls) if bounds is None else _checked_bounds(bounds)
         key = (bits, radius, clearance, area)
         known = self._spaces.get(key)
-        # Plugins may have added or moved walls.
+        # Plugins may have added or moved walls since.
         if known is not None and np.array_equal(known[0], walls):
             return known[1]
         bodies = [layer.body.physics for layer in layers]
@@ -202,7 +203,7 @@ class Placement:
             return self._world.physics.free_discs(_poses(points, 0.0), disc, bits, only=bodies)
 
         space = FreeSpace(walls, area, radius, clearance, fits)
-        if len(self._spaces) >= _MOST_SPACES:
+        if len(self._spaces) >= _MAX_SPACES:
             self._spaces.clear()
         self._spaces[key] = (walls, space)
         return space
@@ -247,7 +248,7 @@ def _checked_bounds(bounds: Sequence[float]) -> Bounds:
 
 def _bounds_of(walls: DoubleArray) -> Bounds:
     if not len(walls):
-        raise WorldError("there are no walls to sample between: give bounds")
+        raise WorldError("the layers have no walls; bounds are required")
     points = walls.reshape(-1, 2)
     (x_min, y_min), (x_max, y_max) = points.min(axis=0).tolist(), points.max(axis=0).tolist()
     return (x_min, y_min, x_max, y_max)

@@ -1,4 +1,4 @@
-"""Measures the wall time that plugins spend in their hooks."""
+"""Measurement of the wall time of plugins."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from flatland.runtime.hooks import Hook
 
 
 class PluginCosts:
-    """Wall time of all hooks since the start of a measurement, by plugin.
+    """The wall time of all hooks since the start of a measurement, by plugin.
 
-    Hooks include what they cause: scans, and the messages of the outputs that they write to. See
-    `World.measure_plugins`.
+    The time of a hook includes its scans and the messages of the outputs to which it emits. See
+    `PluginHost.measure`.
     """
 
     def __init__(self, clock: Callable[[], float] = time.perf_counter) -> None:
-        """Starts at zero.
+        """Creates a measurement.
 
         Args:
             clock: Returns the wall time [s].
@@ -28,7 +28,7 @@ class PluginCosts:
         self._seconds: defaultdict[FlatlandPlugin, float] = defaultdict(float)
 
     def timed(self, plugin: FlatlandPlugin, hook: Hook) -> Hook:
-        """Returns a hook that also adds the time of each call to the costs of its plugin."""
+        """Returns a hook that calls the given one and adds its time to the costs of its plugin."""
         clock, seconds = self._clock, self._seconds
 
         def call(*arguments: Any) -> None:
@@ -43,12 +43,12 @@ class PluginCosts:
     def describe(self, elapsed: float, count: int = 3) -> str:
         """Returns the names and shares of the most expensive plugins in one line.
 
-        Where plugins share a type, the shares of the most expensive types follow: each of a
-        hundred lasers may be cheap while all of them together are not.
+        If plugins share a type, the shares of the most expensive types follow, since a hundred
+        lasers may be expensive while each of them is cheap.
 
         Args:
             elapsed: Wall time of the measurement [s], positive.
-            count: Greatest number of plugins and of types.
+            count: Maximum number of plugins and of types.
         """
         percent = 100.0 / elapsed
         plugins = sorted(self._seconds.items(), key=lambda entry: -entry[1])

@@ -131,7 +131,7 @@ class PluginHost:
 
     def _create(self, type_name: str, base: type[Any], what: str, entry: YamlReader) -> Any:
         try:
-            return self.registry.make(type_name, base)
+            return self.registry.create(type_name, base)
         except PluginError as error:
             raise PluginError(entry.error(f"{what}: {error.message}").message) from error
 

@@ -1,4 +1,4 @@
-"""Detects that a loop does not hold its rate and warns with the names of expensive plugins."""
+"""Detects that a loop does not hold its rate, and logs the most expensive plugins."""
 
 from __future__ import annotations
 
@@ -14,42 +14,43 @@ from flatland.world import World
 
 _LOG = logging.getLogger("flatland")
 
-SHORTEST_WATCH: Final = 1.0  # s of wall time that a decision is based on, at least
-LONGEST_WATCH: Final = 10.0  # s of wall time without a decision, after which a watch ends
+MIN_WATCH_TIME: Final = 1.0  # s of wall time before a decision
+MAX_WATCH_TIME: Final = 10.0  # s of wall time without a decision, after which a watch ends
 WARNING_PERIOD: Final = 60.0  # s of wall time from a warning to the next watch
 _NEGLIGIBLE: Final = 0.01  # share of the wall time that may be lost without a warning
 
 
 @dataclass(slots=True)
 class _Watch:
-    """A stretch of time that starts with a loss."""
+    """A time interval that starts with a loss."""
 
     start: float  # s of wall time
     start_ns: int  # simulated time [ns]
-    lost: float = 0.0  # s that were not made up for, without the loss at the start
+    lost: float = 0.0  # s of dropped lag, without the loss at the start
 
 
 @dataclass(slots=True)
 class _Measurement(_Watch):
-    """A watch in which the plugins are measured."""
+    """A watch during which the costs of plugins are measured."""
 
     costs: PluginCosts = field(default_factory=PluginCosts)
-    rate: float = 0.0  # steps in a second of wall time before the measurement
-    start_processor: float = field(default_factory=time.thread_time)  # s
-    worked: float = 0.0  # s spent in steps
+    rate: float = 0.0  # steps per second of wall time before the measurement
+    start_cpu_time: float = field(default_factory=time.thread_time)  # s
+    worked: float = 0.0  # s of wall time spent in steps
 
 
 class RateMonitor:
-    """Warns when a loop keeps losing time.
+    """Logs a warning if a loop repeatedly loses time.
 
-    The first loss starts a watch. Another loss `SHORTEST_WATCH` or more later shows that the rate
-    is not held, whereas a single long load or a stop in a debugger is forgotten. Only then are the
-    plugins measured, which makes a step of cheap plugins some 10 to 30 % slower, until a third loss
-    leads to the warning: a second in a minute when the loop is overloaded, otherwise never.
+    The first loss starts a watch. Another loss `MIN_WATCH_TIME` or more later shows that the rate
+    is not held, whereas a single loss, such as a long load or a breakpoint, is ignored. Plugins are
+    measured only from the second loss until the third one, which leads to the warning: about one
+    second per minute if the loop is overloaded, otherwise never. The measurement makes a step of
+    cheap plugins 10 to 30 % slower.
     """
 
     def __init__(self, world: World, clock: Callable[[], float]) -> None:
-        """Watches nothing yet.
+        """Creates a monitor without a watch.
 
         Args:
             world: The world that the loop steps.
@@ -61,12 +62,12 @@ class RateMonitor:
         self._silent_until = -math.inf
 
     def lose(self, lost: float, period: float, now: float) -> None:
-        """Records a loss of time; called in the thread of the loop between two steps.
+        """Records a loss of time; to be called in the thread of the loop between two steps.
 
         Args:
-            lost: Wall time that is not made up for [s].
-            period: Wall time between two steps that the loop should hold [s].
-            now: The present wall time [s].
+            lost: Dropped lag [s].
+            period: Target wall time between two steps [s].
+            now: Current wall time [s].
         """
         watch = self._watch
         if watch is None:
@@ -75,7 +76,7 @@ class RateMonitor:
             return
         watch.lost += lost
         elapsed = now - watch.start
-        if elapsed < SHORTEST_WATCH or watch.lost <= _NEGLIGIBLE * elapsed:
+        if elapsed < MIN_WATCH_TIME or watch.lost <= _NEGLIGIBLE * elapsed:
             return
         if isinstance(watch, _Measurement):
             self._warn(watch, elapsed, 1.0 / period)
@@ -94,18 +95,18 @@ class RateMonitor:
 
         Args:
             worked: Wall time of the step [s].
-            now: The present wall time [s].
+            now: Current wall time [s].
         """
         watch = self._watch
         if watch is None:
             return
         if isinstance(watch, _Measurement):
             watch.worked += worked
-        if now - watch.start > LONGEST_WATCH:
+        if now - watch.start > MAX_WATCH_TIME:
             self._end()
 
     def reset(self) -> None:
-        """Ends a watch and forgets the last warning; for a change of the rate."""
+        """Ends the watch and allows a new warning; to be called when the rate changes."""
         self._end()
         self._silent_until = -math.inf
 
@@ -118,12 +119,12 @@ class RateMonitor:
     def _warn(measured: _Measurement, elapsed: float, rate: float) -> None:
         percent = 100.0 / elapsed
         _LOG.warning(
-            "the update rate of %g Hz cannot be held: %.1f steps a second. Steps take %.0f %% of "
-            "the wall time, and the loop has a processor for %.0f %% of it. The most expensive "
+            "the update rate of %g Hz cannot be held: %.1f steps per second. Steps take %.0f %% of "
+            "the wall time, and the CPU time of the loop is %.0f %% of it. The most expensive "
             "plugins, in percent of the wall time: %s",
             rate,
             measured.rate,
             measured.worked * percent,
-            (time.thread_time() - measured.start_processor) * percent,
+            (time.thread_time() - measured.start_cpu_time) * percent,
             measured.costs.describe(elapsed),
         )

@@ -16,19 +16,19 @@ from flatland.timekeeper import NANOSECONDS
 from flatland.world import World
 
 MAX_LAG: Final = 0.1
-"""Lost wall time that a loop makes up for unless told otherwise [s]."""
+"""Default of the maximum lag that a loop catches up on [s]."""
 
-_PAUSED_CYCLE: Final = 0.01  # s between two cycles of a paused world that has no rate
-_LONGEST_WAIT: Final = 3600.0  # s; Python refuses to wait for more than some centuries
+_PAUSED_PERIOD: Final = 0.01  # s between two cycles of a paused world without a rate
+_MAX_WAIT: Final = 3600.0  # s; Python raises for a timeout of several centuries
 
 
 @dataclass(frozen=True, slots=True)
 class RunResult:
-    """What one run of the loop did.
+    """The result of one run of the loop.
 
     Attributes:
         steps: Number of steps of the world.
-        wall_time: Their duration [s].
+        wall_time: Wall time of the run [s].
     """
 
     steps: int
@@ -36,19 +36,18 @@ class RunResult:
 
     @property
     def steps_per_second(self) -> float:
-        """Steps in a second of wall time."""
+        """Steps per second of wall time."""
         return self.steps / self.wall_time if self.wall_time > 0 else 0.0
 
 
 class Simulation:
-    """Steps a world at a rate; everything in it happens in the thread that calls `run`.
+    """Steps a world at a rate, in the thread that calls `run`.
 
-    A cycle that starts late is followed by the next ones without a wait until the lost time is
-    made up for. Of a greater lag than `max_lag` only that much is made up for and the rest is
-    dropped, so that no burst of steps is longer, whatever stopped the loop: a slow plugin, a long
-    load, a debugger. A lag of up to one cycle is always made up for. Nothing is made up for across
-    a pause or a change of the rate. When the loop keeps losing time, a warning names the most
-    expensive plugins.
+    After a late cycle, the next cycles follow without a wait until the loop has caught up. The
+    excess of a lag over `max_lag` is dropped, which bounds the burst of steps after a delay of any
+    cause: a slow plugin, a long load, a debugger. A lag of up to one cycle is never dropped. A
+    pause or a change of the rate resets the lag. If the loop repeatedly loses time, a warning names
+    the most expensive plugins.
 
     Attributes:
         world: The world.
@@ -65,13 +64,13 @@ class Simulation:
         clock: Callable[[], float] = time.perf_counter,
         wait: Callable[[threading.Event, float], bool] = threading.Event.wait,
     ) -> None:
-        """Prepares to step a world.
+        """Creates a simulation.
 
         Args:
             world: The world.
-            update_rate: Steps in a second of wall time [Hz]; 0 or inf for as many as possible.
-            max_lag: Lost wall time that is made up for at most [s]; 0 for one cycle at most.
-            report: Called with statistics while the world runs.
+            update_rate: Steps per second of wall time [Hz]; 0 or inf for as many as possible.
+            max_lag: Maximum lag that the loop catches up on [s]; at least one cycle is used.
+            report: Called with statistics while the world is not paused.
             report_period: Wall time between two reports [s].
             clock: Returns the wall time [s].
             wait: Waits for an event for at most some wall time [s]; returns whether it is set.
@@ -97,10 +96,10 @@ class Simulation:
         return self._stopped
 
     def set_rate(self, update_rate: float) -> None:
-        """Changes the rate from the next step on; between two steps, or while nothing runs.
+        """Changes the rate from the next step on; to be called between two steps.
 
         Args:
-            update_rate: Steps in a second of wall time [Hz]; 0 or inf for as many as possible.
+            update_rate: Steps per second of wall time [Hz]; 0 or inf for as many as possible.
 
         Raises:
             ValueError: The rate is negative or not a number.
@@ -115,17 +114,17 @@ class Simulation:
     def post(self, action: Callable[[], object]) -> Future[Any]:
         """Queues an action that runs between two steps; safe from any thread, see `World.post`.
 
-        It runs soon, also while the loop waits or the world is paused.
+        The action runs without delay even if the loop waits or the world is paused.
         """
         return self.world.post(action)
 
     def run(self, duration: float = math.inf) -> RunResult:
-        """Steps the world until `stop` is called or some simulated time has passed.
+        """Steps the world until `stop` is called or a simulated time has elapsed.
 
-        Meanwhile all requests of other threads are carried out in the calling thread.
+        Requests of other threads run in the calling thread meanwhile.
 
         Args:
-            duration: Simulated time to run for [s].
+            duration: Simulated time of the run [s].
 
         Raises:
             WorldError: The world is closed, or another simulation runs it.
@@ -150,7 +149,7 @@ class Simulation:
         while not self._stopped and timekeeper.sim_time_ns < end_ns:
             begin = clock()
             if self._period != period:
-                # What was due at the old rate no longer matters.
+                # Due times of the old rate are void.
                 period, due = self._period, begin
                 window = self._new_window(begin)
                 monitor.reset()
@@ -170,35 +169,35 @@ class Simulation:
                     due = end - max_lag
                 self._wait_until(due, period)
             elif world.paused:
-                self._wait_until(end + _PAUSED_CYCLE, period)
+                self._wait_until(end + _PAUSED_PERIOD, period)
 
     def _wait_until(self, due: float, period: float) -> None:
-        """Waits for a time of the wall clock and carries out requests meanwhile.
+        """Waits until a wall time and runs requests meanwhile.
 
-        Returns early when one of them changes the period.
+        Returns early if one of them changes the period.
         """
         while not self._stopped and self._period == period:
             left = due - self._clock()
             if left <= 0:
                 return
-            if self._wait(self._wake, min(left, _LONGEST_WAIT)):
+            if self._wait(self._wake, min(left, _MAX_WAIT)):
                 self._wake.clear()
                 self.world.requests.process()
 
     def _new_window(self, now: float) -> CycleWindow:
         timekeeper, period = self.world.timekeeper, self._period
-        asked = timekeeper.step_size / period if period else math.inf
-        return CycleWindow(period or timekeeper.step_size, asked, now, timekeeper.sim_time_ns)
+        target = timekeeper.step_size / period if period else math.inf
+        return CycleWindow(period or timekeeper.step_size, target, now, timekeeper.sim_time_ns)
 
     def _finish(self, window: CycleWindow, now: float) -> None:
-        """Reports a window, unless the world stood still in it."""
+        """Reports a window, unless the world was not stepped in it."""
         now_ns = self.world.timekeeper.sim_time_ns
         if self._report is not None and now_ns > window.start_ns:
             self._report(window.statistics(now, now_ns))
 
 
 def _period_of(update_rate: float) -> float:
-    """Returns the wall time between two steps [s], 0 for as little as possible.
+    """Returns the wall time between two steps [s], 0 for no limit of the rate.
 
     Raises:
         ValueError: The rate is negative or not a number.

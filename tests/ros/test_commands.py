@@ -72,13 +72,13 @@ def test_command_that_is_not_finite_is_ignored(ros: Any, bad: float) -> None:
 def test_ignored_command_gives_a_warning_on_rosout(ros: Any, server: Any) -> None:
     log = ros.topic("/rosout", Log)
     server.wait_for_line(
-        r"\[WARN\].*last good command stays"
+        r"\[WARN\].*previous command remains in effect"
     )  # logged in the previous test or in this one
     publisher = ros.publisher("/r1/cmd_vel", Twist)
 
     def warned(message: Log) -> bool:
         publisher.publish(twist(math.nan, 0))
-        return message.level == Log.WARN and "last good" in message.msg
+        return message.level == Log.WARN and "previous command remains" in message.msg
 
     warning = log.until(warned)
     assert warning.name == "/flatland_server"

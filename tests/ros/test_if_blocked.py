@@ -111,7 +111,7 @@ def test_nearest_without_a_free_pose(
     assert (answer.success, answer.message) == (
         False,
         'Flatland World: failed to spawn model "giant", it overlaps layer "2d" at '
-        "(0.000, 0.000, 0.000), and there is no free place within 5 m",
+        "(0.000, 0.000, 0.000), and no place within 5 m is free",
     )
     assert not ros.delete("giant").success
 

@@ -204,7 +204,7 @@ def test_server_launch_passes_all_parameters(launcher: Any, ros: Any, world: Pat
         "if_blocked": "warn",
     }
     assert ros.master.getParam("/use_sim_time") is True
-    process.wait_for_line("real-time factor asked inf")
+    process.wait_for_line("real-time factor: target inf")
     assert "drawn at random" not in process.output
     assert process.stop() == 0
 

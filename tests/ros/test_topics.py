@@ -255,4 +255,4 @@ def test_use_of_cycles_is_logged(server: Any) -> None:
     line = server.wait_for_line("cycle use").string
     assert "min " in line
     assert "mean " in line
-    assert "real-time factor asked 2.00, got " in line
+    assert "real-time factor: target 2.00, actual " in line

@@ -34,7 +34,7 @@ plugins:
 
 @pytest.fixture
 def world_file(files: Any) -> str:
-    """A room with a robot at (3, 5) that a tween takes to (6, 5) in a second."""
+    """A room with a robot at (3, 5) that a tween moves to (6, 5) in one second."""
     files.write_map("room", ["##########", *["#........#"] * 8, "##########"])
     files.write("robot.model.yaml", MODEL)
     return files.write(
@@ -48,7 +48,7 @@ def world_file(files: Any) -> str:
 
 
 def run(*arguments: str | Path, **options: Any) -> subprocess.CompletedProcess[str]:
-    """Runs the command as a process of its own."""
+    """Runs the command in a new process."""
     command = [sys.executable, "-W", "error", "-m", "flatland", *map(str, arguments)]
     return subprocess.run(command, capture_output=True, text=True, timeout=TIMEOUT, **options)
 
@@ -59,7 +59,7 @@ def main(*arguments: str | Path) -> int:
 
 
 def drawn(world_file: str, *, steps: int = 0, **options: Any) -> Any:
-    """What `flatland show` is to draw."""
+    """Returns the expected picture of `flatland show`."""
     load = {key: options.pop(key) for key in ("params", "simplify_map") if key in options}
     with flatland.World.from_yaml(world_file, seed=1, **load) as world:
         world.step(steps)
@@ -111,7 +111,7 @@ class TestShow:
         a, b, c = (path.read_bytes() for path in paths)
         assert a == b != c
 
-    def test_a_picture_that_is_there_is_overwritten(self, world_file, tmp_path):
+    def test_an_existing_picture_is_overwritten(self, world_file, tmp_path):
         path = tmp_path / "picture.png"
         path.write_text("old")
         assert main("show", world_file, "-o", path) == 0
@@ -124,14 +124,14 @@ class TestShow:
             (["-o", "a.gif"], "must end with one of .png, .pdf, .svg, got 'a.gif'"),
             (["-o", "a.png", "--size", "12"], "must be WIDTHxHEIGHT"),
             (["-o", "a.png", "--size", "20x20"], "too small for the axes"),
-            (["-o", "a.png", "--steps", "-1"], "must be a whole number"),
+            (["-o", "a.png", "--steps", "-1"], "must be an integer of at least 0"),
             (["-o", "a.png", "--param", "radius"], "must be NAME=VALUE"),
-            (["-o", "a.png", "--param", "/radius=[1"], "the value is no YAML"),
+            (["-o", "a.png", "--param", "/radius=[1"], "the value is not YAML"),
             (["-o", "a.png", "--view", "1", "0", "0", "1"], "x_min < x_max"),
             (["-o", "a.png", "--simplify-map", "3"], "invalid choice"),
         ],
     )
-    def test_wrong_arguments_exit_with_2(
+    def test_invalid_arguments_exit_with_2(
         self, world_file, capsys, monkeypatch, tmp_path, arguments, message
     ):
         monkeypatch.chdir(tmp_path)
@@ -141,26 +141,26 @@ class TestShow:
         assert message in capsys.readouterr().err
         assert not (tmp_path / "a.png").exists()
 
-    def test_wrong_files_exit_with_1_and_say_why_in_one_line(self, world_file, tmp_path):
+    def test_invalid_files_exit_with_1_and_one_line_of_error(self, world_file, tmp_path):
         done = run("show", "nowhere.yaml", "-o", "a.png", cwd=tmp_path)
         assert done.returncode == 1
         path = tmp_path / "nowhere.yaml"
         assert done.stderr == f'flatland: Flatland YAML: File does not exist, path="{path}"\n'
 
-    def test_a_picture_that_cannot_be_written(self, world_file, tmp_path, capsys):
+    def test_a_picture_that_cannot_be_written_is_an_error(self, world_file, tmp_path, capsys):
         assert main("show", world_file, "-o", tmp_path / "no" / "a.png") == 1
         (line,) = capsys.readouterr().err.splitlines()
         assert line.startswith("flatland: ")
         assert "No such file or directory" in line
 
-    def test_a_layer_that_is_not_there(self, world_file, tmp_path, capsys):
+    def test_an_unknown_layer_is_an_error(self, world_file, tmp_path, capsys):
         assert main("show", world_file, "-o", tmp_path / "a.png", "--layer", "roof") == 1
         (line,) = capsys.readouterr().err.splitlines()
         assert line == 'flatland: Flatland World: layer with name "roof" does not exist'
 
 
 class TestCheck:
-    def test_says_what_is_in_the_world(self, world_file, capsys):
+    def test_prints_the_contents_of_the_world(self, world_file, capsys):
         assert main("check", world_file) == 0
         assert capsys.readouterr().out.splitlines() == [
             f"{world_file}: no errors",
@@ -170,13 +170,13 @@ class TestCheck:
         ]
 
     def test_world_plugins(self, world_file, files, capsys):
-        crates = "{type: RandomWall, name: crates, layer: walls, robot_name: robot}"
+        crates = "{type: RandomWall, name: boxes, layer: walls, robot_name: robot}"
         path = files.write("more.yaml", f"{Path(world_file).read_text()}plugins: [{crates}]")
         assert main("check", path) == 0
-        assert "world; plugins: crates (RandomWall)" in capsys.readouterr().out
+        assert "world; plugins: boxes (RandomWall)" in capsys.readouterr().out
 
     def test_simplify_map(self, files, capsys):
-        """A round column has stairs of pixels; simplified it has few edges."""
+        """The boundary of a round column consists of pixel steps; simplified it has few edges."""
         rows = ["".join(".#"[x * x + y * y < 300] for x in range(-20, 20)) for y in range(-20, 20)]
         files.write_map("column", rows)
         path = files.write("world.yaml", "{properties: {}, layers: [{name: a, map: column.yaml}]}")
@@ -190,7 +190,7 @@ class TestCheck:
         assert main("check", world_file, "--param", "/radius=-1") == 1
         assert main("check", world_file, "--param", "/radius=-1", "--param", "/radius=2") == 0
 
-    def test_says_what_is_wrong(self, files):
+    def test_prints_the_error(self, files):
         path = files.write("world.yaml", "properties: {}\nlayers: [{name: a, colour: red}]\n")
         done = run("check", path)
         assert (done.returncode, done.stdout) == (1, "")
@@ -224,7 +224,7 @@ class TestCheckModel:
             "checked in an empty world with the layers that the model names: low, high, top",
         ]
 
-    def test_a_model_without_layers(self, files, capsys):
+    def test_a_model_without_layers_is_checked(self, files, capsys):
         assert main("check", files.folder / "minimal.model.yaml") == 0
         assert capsys.readouterr().out.splitlines()[-1] == (
             "checked in an empty world with the layers that the model names: none"
@@ -247,7 +247,7 @@ class TestCheckModel:
             ("Laser", "Lasser", 'type "Lasser" model "my": no plugin'),
         ],
     )  # fmt: skip
-    def test_says_what_is_wrong(self, files, capsys, old, new, message):
+    def test_prints_the_error(self, files, capsys, old, new, message):
         path = files.write("my.model.yaml", LAYERED.replace(old, new))
         assert main("check", path) == 1
         captured = capsys.readouterr()
@@ -266,7 +266,7 @@ class TestCheckModel:
         assert "Model refers to 17 layers {l0, l1, " in error
         assert f"max allowed in a world is 16 [{path}]" in error
 
-    def test_warnings_of_a_file_come_once(self, files):
+    def test_warnings_of_a_file_are_logged_once(self, files):
         path = files.write("m.yaml", f"{LAYERED}---\nsecond: document\n")
         done = run("check", path)
         assert (done.returncode, done.stderr.count("YAML documents")) == (0, 1)
@@ -305,7 +305,7 @@ class TestBrokenPipe:
 
 
 def run_into_broken_pipe(arguments, folder, **options):
-    """Runs the command with an output pipe that is closed on the other side."""
+    """Runs the command with an output pipe whose reading end is closed."""
     reading, writing = os.pipe()
     os.close(reading)
     try:
@@ -317,7 +317,7 @@ def run_into_broken_pipe(arguments, folder, **options):
         os.close(writing)
 
 
-def test_version_is_that_of_the_packages(checkout):
+def test_version_equals_that_of_the_packages(checkout):
     project = tomllib.loads((checkout / "pyproject.toml").read_text())["project"]
     package = ElementTree.parse(checkout / "package.xml").getroot()
     assert flatland.__version__ == project["version"] == package.findtext("version")
@@ -326,7 +326,7 @@ def test_version_is_that_of_the_packages(checkout):
     assert (done.returncode, done.stdout) == (0, f"flatland {flatland.__version__}\n")
 
 
-def test_without_a_command_it_says_which_there_are(capsys):
+def test_help_lists_the_commands(capsys):
     with pytest.raises(SystemExit) as caught:
         main()
     assert caught.value.code == 2

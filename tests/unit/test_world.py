@@ -1,4 +1,4 @@
-"""A world at run time: stepping, pause, models that come, move and go, requests of threads."""
+"""A world at run time: steps, pause, changes of models, requests of threads."""
 
 from __future__ import annotations
 
@@ -23,36 +23,36 @@ joints:
 
 
 class Probe(ModelPlugin):
-    """Notes the hooks as they come; `act` runs in the hook that `hook` names."""
+    """Records the calls of hooks; `act` is called in the hook named by `hook`."""
 
     calls: list = []  # noqa: RUF012
     hook = ""
     act = None
 
-    def _note(self, hook):
+    def _record(self, hook):
         type(self).calls.append((self.name, hook, self.world.timekeeper.sim_time_ns))
         if self.hook == hook and type(self).act is not None:
             type(self).act(self)
 
     def before_physics_step(self, timekeeper):
-        self._note("before")
+        self._record("before")
 
     def after_physics_step(self, timekeeper):
-        self._note("after")
+        self._record("after")
 
     def begin_contact(self, contact):
-        self._note("begin")
+        self._record("begin")
 
     def end_contact(self, contact):
-        self._note("end")
+        self._record("end")
 
     def on_shutdown(self):
-        self._note("shutdown")
+        self._record("shutdown")
 
 
 @pytest.fixture
 def probe(files, monkeypatch, request):
-    """The `Probe` class, found by manifest under `test::Probe`."""
+    """The class `Probe`, found by manifest as `test::Probe`."""
     monkeypatch.setenv(
         "FLATLAND_PLUGIN_PATH",
         files.write(
@@ -83,13 +83,13 @@ def probe(files, monkeypatch, request):
 @pytest.mark.parametrize(
     ("iterations", "parted"),
     [
-        # Each position iteration takes away a fifth of the overlap beyond 5 mm; the eighth finds
-        # less than 15 mm of overlap, which is good enough for Box2D.
+        # Each position iteration removes a fifth of the overlap beyond 5 mm. At the eighth the
+        # overlap is below 15 mm, where Box2D stops.
         ("velocity_iterations: 10, position_iterations: 1", 0.2 * 0.045),
         ("velocity_iterations: 1, position_iterations: 10", (1 - 0.8**8) * 0.045),
     ],
 )
-def test_the_solver_does_the_iterations_of_the_file(files, iterations, parted, with_pre_solve):
+def test_the_solver_uses_the_iterations_of_the_file(files, iterations, parted, with_pre_solve):
     world = files.load(
         f"""
         properties: {{{iterations}}}
@@ -117,7 +117,7 @@ def test_time_is_exact_after_many_steps(files):
     assert world.timekeeper.max_step_size == 0.001
 
 
-def test_hooks_run_in_order_and_at_their_times(files, probe):
+def test_hooks_run_in_order_with_the_specified_times(files, probe):
     world = files.load("{properties: {}, layers: []}")
     world.spawn_model("probe.model.yaml", "a")
     world.step(2)
@@ -134,7 +134,7 @@ def test_hooks_run_in_order_and_at_their_times(files, probe):
     ]
 
 
-def test_contact_hooks_see_the_time_before_the_step(files, probe):
+def test_contact_hooks_have_the_time_before_the_step(files, probe):
     world = files.load("{properties: {}, layers: []}")
     world.spawn_model("probe.model.yaml", "a")
     world.spawn_model("minimal.model.yaml", "b", pose=(0.3, 0, 0))
@@ -146,7 +146,7 @@ def test_contact_hooks_see_the_time_before_the_step(files, probe):
     assert world.contacts == []
 
 
-def test_contact_ends_when_a_body_is_moved_away(files, probe):
+def test_a_contact_ends_when_a_body_is_moved_away(files, probe):
     world = files.load("{properties: {}, layers: []}")
     world.spawn_model("probe.model.yaml", "a")
     world.spawn_model("minimal.model.yaml", "b", pose=(0.3, 0, 0))
@@ -179,7 +179,7 @@ def test_gravity_is_zero(files):
     assert model.pose == pytest.approx((1, 2, 3))
 
 
-def test_move_is_rigid_and_stops_everything(files):
+def test_a_move_is_rigid_and_sets_velocities_to_zero(files):
     files.write("two.model.yaml", TWO_BODIES)
     world = files.load("{properties: {}, layers: []}")
     model = world.spawn_model("two.model.yaml", "m", pose=(5, 5, 0.7))
@@ -188,7 +188,7 @@ def test_move_is_rigid_and_stops_everything(files):
     arm.set_velocity(1, 2, 3)
     world.move_model("m", (-1, -2, 0.1 + math.pi / 2))
     assert base.pose == pytest.approx((-1, -2, 0.1 + math.pi / 2), abs=1e-5)
-    # The arm was 1 m to the left of the base (in the model's frame) and turned 0.3 against it.
+    # The arm was 1 m to the left of the base in the model frame, rotated by 0.3 relative to it.
     assert arm.pose == pytest.approx((-2, -2, 0.4 + math.pi / 2), abs=1e-5)
     assert base.velocity == pytest.approx((0, 0, 0))
     assert arm.velocity == pytest.approx((0, 0, 0))
@@ -196,12 +196,12 @@ def test_move_is_rigid_and_stops_everything(files):
     assert base.pose == pytest.approx((-1, -2, 0.1 + math.pi / 2), abs=1e-4)
 
 
-def test_a_move_that_one_body_cannot_follow_moves_no_body(files):
+def test_a_move_that_is_invalid_for_one_body_moves_no_body(files):
     files.write("two.model.yaml", TWO_BODIES)
     world = files.load("{properties: {}, layers: []}")
     model = world.spawn_model("two.model.yaml", "m", pose=(5, 5, 0))
     before = [body.pose for body in model.bodies]
-    # The arm is 1 m to the left of the base, so that it would be beyond the range of the physics.
+    # The arm, 1 m to the left of the base, would be beyond the range of the physics.
     with pytest.raises(ValueError, match=r'pose of body "arm" must be finite and within \+-1e\+09'):
         model.set_pose(0.0, 1e9, 0.0)
     with pytest.raises(WorldError, match=r'failed to move model "m", pose of body "arm" must be'):
@@ -213,7 +213,7 @@ NAN, INF = math.nan, math.inf
 
 
 @pytest.mark.parametrize("pose", [(NAN, 0, 0), (0, INF, 0), (0, 0, -INF), (0, 0), "abc"])
-def test_poses_that_are_none_are_refused(files, pose):
+def test_invalid_poses_raise(files, pose):
     world = files.load("{properties: {}, layers: []}")
     model = world.spawn_model("minimal.model.yaml", "m", pose=(1, 2, 3))
     with pytest.raises(WorldError, match=r'failed to move model "m", pose must be'):
@@ -230,7 +230,7 @@ def test_poses_that_are_none_are_refused(files, pose):
 
 
 @pytest.mark.parametrize("pose", [(1e30, 0, 0), (0, -1e10, 0), (0, 0, 1e300)])
-def test_poses_beyond_what_the_physics_holds_are_refused(files, pose):
+def test_poses_beyond_the_range_of_the_physics_raise(files, pose):
     world = files.load("{properties: {}, layers: []}")
     model = world.spawn_model("minimal.model.yaml", "m", pose=(1, 2, 3))
     with pytest.raises(WorldError, match=r'failed to move model "m", pose .*must be finite and'):
@@ -242,15 +242,15 @@ def test_poses_beyond_what_the_physics_holds_are_refused(files, pose):
 
 
 @pytest.mark.parametrize("path", ["~no-such-user/m.yaml", "a\0b", "x" * 5000, "/dev/zero", "."])
-def test_spawns_from_what_is_no_file(files, path):
+def test_spawning_from_a_path_that_is_not_a_file_raises(files, path):
     world = files.load("{properties: {}, layers: []}")
     with pytest.raises(YamlError, match=r"File does not exist|Failed to read file"):
         world.spawn_model(path, "m")
     assert world.models == []
 
 
-def test_who_waits_for_a_world_that_closes_is_told(files):
-    """A request that came while the world closed was dropped, and its thread waited for ever."""
+def test_a_request_to_a_closing_world_fails(files):
+    """A request that is made while the world is closing must not wait forever."""
     world = files.load("{properties: {}, layers: []}")
     future = world.post(lambda: world.spawn_model("minimal.model.yaml", "m"))
     world.close()
@@ -258,7 +258,7 @@ def test_who_waits_for_a_world_that_closes_is_told(files):
         future.result(timeout=0)
 
 
-def test_unknown_names(files):
+def test_unknown_names_raise(files):
     world = files.load("{properties: {}, layers: []}")
     with pytest.raises(WorldError) as caught:
         world.delete_model("M")
@@ -289,7 +289,7 @@ def test_unknown_names(files):
         (".", "m", "", "Flatland YAML: "),
     ],
 )
-def test_spawns_that_fail_leave_the_world_as_it_was(files, path, name, namespace, error):
+def test_a_failed_spawn_leaves_the_world_unchanged(files, path, name, namespace, error):
     world = files.load("{properties: {}, layers: []}")
     there = world.spawn_model("minimal.model.yaml", "there", pose=(20, 20, 0))
     with pytest.raises((WorldError, YamlError)) as caught:
@@ -300,7 +300,7 @@ def test_spawns_that_fail_leave_the_world_as_it_was(files, path, name, namespace
     world.step()
 
 
-def test_a_spawn_that_fails_late_leaves_nothing(files, probe):
+def test_a_spawn_that_fails_late_leaves_nothing_behind(files, probe):
     files.write(
         "bad.model.yaml",
         """
@@ -327,13 +327,13 @@ def test_a_spawn_that_fails_late_leaves_nothing(files, probe):
     assert world.physics.ray_cast((-5, 0), (5, 0)) is None
     assert world.ports.outputs == {}
     assert world.ports.commands == {}
-    # The plugin that had started was stopped, the one that had not was never called.
+    # The plugin that was started is shut down; the one that was not is never called.
     assert probe.calls == [("good", "shutdown", 0)]
     world.step()
     assert probe.calls == [("good", "shutdown", 0)]
 
 
-def test_delete_stops_plugins_and_frees_all(files, probe):
+def test_delete_shuts_down_plugins_and_releases_everything(files, probe):
     world = files.load("{properties: {}, layers: []}")
     model = world.spawn_model("probe.model.yaml", "a")
     body = model.bodies[0]
@@ -349,7 +349,7 @@ def test_delete_stops_plugins_and_frees_all(files, probe):
 
 
 @pytest.mark.parametrize("hook", ["before", "after", "begin"])
-def test_requests_from_a_hook_act_after_the_step(files, probe, hook):
+def test_requests_of_a_hook_run_after_the_step(files, probe, hook):
     world = files.load("{properties: {}, layers: []}")
     world.spawn_model("probe.model.yaml", "a")
     world.spawn_model("minimal.model.yaml", "b", pose=(0.3, 0, 0))
@@ -370,15 +370,15 @@ def test_requests_from_a_hook_act_after_the_step(files, probe, hook):
     world.step(10)
 
 
-def test_a_failed_request_from_a_hook_is_logged(files, probe, caplog):
+def test_a_failed_request_of_a_hook_is_logged(files, probe, caplog):
     world = files.load("{properties: {}, layers: []}")
     world.spawn_model("probe.model.yaml", "a")
-    probe.hook, probe.act = "before", staticmethod(lambda p: p.world.delete_model("nobody"))
+    probe.hook, probe.act = "before", staticmethod(lambda p: p.world.delete_model("absent"))
     world.step()
-    assert 'model with name "nobody" does not exist' in caplog.text
+    assert 'model with name "absent" does not exist' in caplog.text
 
 
-def test_step_and_close_in_a_hook_are_refused(files, probe, caplog):
+def test_step_and_close_raise_in_a_hook(files, probe, caplog):
     world = files.load("{properties: {}, layers: []}", plugin_errors="disable")
     world.spawn_model("probe.model.yaml", "a")
     probe.hook, probe.act = "before", staticmethod(lambda p: p.world.step())
@@ -393,7 +393,7 @@ def test_step_and_close_in_a_hook_are_refused(files, probe, caplog):
 
 
 @pytest.mark.threads
-def test_other_threads_may_ask_while_the_world_steps(files):
+def test_requests_of_other_threads_run_between_steps(files):
     world = files.load("{properties: {}, layers: []}")
     errors = []
     running = threading.Event()
@@ -404,23 +404,23 @@ def test_other_threads_may_ask_while_the_world_steps(files):
         while not stop.is_set():
             world.step(10)
 
-    def ask(index):
+    def send_requests(index):
         try:
             for turn in range(20):
                 name = f"m{index}"
                 world.spawn_model("minimal.model.yaml", name, pose=(index, 0, 0))
                 world.move_model(name, (index, turn, 0))
-                # A look at a body in the middle of a physics step is refused.
+                # Reading a body during a physics step raises.
                 pose = world.between_steps(lambda: world.model(name).pose)  # noqa: B023
                 assert pose[1] == pytest.approx(turn)
                 world.delete_model(name)
             with pytest.raises(WorldError):
-                world.delete_model(f"nobody{index}")
+                world.delete_model(f"absent{index}")
         except BaseException as error:
             errors.append(error)
 
     driver = threading.Thread(target=drive)
-    askers = [threading.Thread(target=ask, args=(i,)) for i in range(4)]
+    askers = [threading.Thread(target=send_requests, args=(i,)) for i in range(4)]
     driver.start()
     running.wait()
     for thread in askers:
@@ -434,7 +434,7 @@ def test_other_threads_may_ask_while_the_world_steps(files):
     assert world.time > 0
 
 
-def test_posted_actions_run_in_order_also_while_paused(files):
+def test_posted_actions_run_in_order_even_while_paused(files):
     world = files.load("{properties: {}, layers: []}")
     world.pause()
     done = []
@@ -447,7 +447,7 @@ def test_posted_actions_run_in_order_also_while_paused(files):
     assert isinstance(failing.exception(), ZeroDivisionError)
 
 
-def test_closing_is_final_and_may_be_repeated(files, probe):
+def test_a_closed_world_raises_and_may_be_closed_again(files, probe):
     world = files.load("{properties: {}, layers: []}")
     body = world.spawn_model("probe.model.yaml", "a").bodies[0]
     with world as same:
@@ -484,14 +484,14 @@ def test_ports_are_found_by_topic(files):
     world.step(200)
     assert odometry.latest.pose[0] == pytest.approx(0.995, abs=0.01)
     assert world.transforms["odom", "r1_base"].x == odometry.latest.pose[0]
-    with pytest.raises(WorldError, match=r'no output "/scan", there are: /r1/odometry/filtered'):
+    with pytest.raises(WorldError, match=r'"/scan" does not exist; existing outputs: /r1/odom'):
         world.output("/scan")
-    with pytest.raises(WorldError, match=r'no command "/cmd_vel", there are: /r1/cmd_vel'):
+    with pytest.raises(WorldError, match=r'"/cmd_vel" does not exist; existing commands: /r1/'):
         world.command("/cmd_vel")
     command = world.command("/r1/cmd_vel")
     world.delete_model("a")
     assert world.transforms == {}
-    with pytest.raises(WorldError, match="gone"):
+    with pytest.raises(WorldError, match="closed with its model"):
         command.set(flatland.Twist())
 
 
@@ -524,7 +524,7 @@ def test_step_size_is_checked(files, step_size):
         files.load("{properties: {}, layers: []}", step_size=step_size)
 
 
-def test_a_world_can_be_made_without_a_file(tmp_path):
+def test_a_world_can_be_created_without_a_file(tmp_path):
     with World(seed=3, base_dir=tmp_path) as world:
         (tmp_path / "m.yaml").write_text("bodies: [{name: b, footprints: []}]")
         world.spawn_model("m.yaml", "m")
@@ -534,7 +534,7 @@ def test_a_world_can_be_made_without_a_file(tmp_path):
         World(seed=-1)
 
 
-def test_transforms_go_only_to_observers_that_want_them(files):
+def test_transforms_are_sent_only_to_observers_that_want_them(files):
     class Observer(WorldObserver):
         def __init__(self, wants):
             self.wants = wants

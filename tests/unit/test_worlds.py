@@ -1,4 +1,4 @@
-"""The worlds that come with flatland: their maps, their robots, and that they run."""
+"""The included worlds: maps, robots, and stepping."""
 
 from __future__ import annotations
 
@@ -73,7 +73,7 @@ def drawer(worlds: Path) -> ModuleType:
     return module
 
 
-def test_the_maps_are_what_the_script_draws(worlds: Path, tmp_path: Path) -> None:
+def test_the_maps_are_the_output_of_the_script(worlds: Path, tmp_path: Path) -> None:
     module = drawer(worlds)
     module.main(tmp_path)
     assert sorted(path.name for path in tmp_path.iterdir()) == ["office.png", "tables.png"]
@@ -85,13 +85,13 @@ def test_the_maps_are_what_the_script_draws(worlds: Path, tmp_path: Path) -> Non
 
 
 def room_for_disc(free: npt.NDArray[np.bool_], radius: float) -> tuple[int, npt.NDArray[np.int32]]:
-    """Where the centre of a disc may be, as connected parts of the map.
+    """Finds the connected regions of the map in which the center of a disc may be.
 
     Returns:
-        How many parts there are, and the number of its part for each pixel, 0 for none.
+        The number of regions, and for each pixel the number of its region, 0 for none.
     """
     distance = cv2.distanceTransform(free.astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
-    # The distance is to the centre of the nearest occupied pixel, which is not its border.
+    # The distance is that to the center of the nearest occupied pixel, not to its border.
     possible = (distance - 0.75) * 0.05 >= radius
     count, labels = cv2.connectedComponents(possible.astype(np.uint8), connectivity=4)
     return count - 1, labels
@@ -103,7 +103,7 @@ def read(worlds: Path, name: str) -> Image:
 
 
 def labels_of_rooms(labels: npt.NDArray[np.int32]) -> dict[str, int]:
-    """Number of the part of the map that each room's place is in."""
+    """Returns the number of the region of the place in each room."""
     return {
         name: int(labels[499 - int((y + 12.5) / 0.05), int((x + 30) / 0.05)])
         for name, (x, y) in ROOMS.items()
@@ -112,7 +112,7 @@ def labels_of_rooms(labels: npt.NDArray[np.int32]) -> dict[str, int]:
 
 def test_a_robot_of_30_cm_reaches_all_rooms(worlds: Path) -> None:
     count, labels = room_for_disc(read(worlds, "office.png") == 254, 0.3)
-    assert count == 1  # all there is room for, under the tables too
+    assert count == 1  # one region, including the space under the tables
     assert [room for room, label in labels_of_rooms(labels).items() if label != 1] == []
 
 
@@ -125,7 +125,7 @@ def test_a_tall_robot_of_45_cm_reaches_all_rooms(worlds: Path) -> None:
 
 
 @pytest.mark.parametrize("world", ["office", "simple"])
-def test_worlds_run_and_robots_stand_free(worlds: Path, world: str) -> None:
+def test_worlds_can_be_stepped_and_robots_are_free(worlds: Path, world: str) -> None:
     path = str(worlds / world / "world.yaml")
     with flatland.World.from_yaml(path, seed=1) as loaded:
         before = {model.name: model.bodies[0].pose for model in loaded.models}
@@ -137,7 +137,7 @@ def test_worlds_run_and_robots_stand_free(worlds: Path, world: str) -> None:
         assert np.isfinite(scan.latest.ranges).any()
 
 
-def test_the_robots_drive_and_see(office: flatland.World) -> None:
+def test_the_robots_drive_and_scan(office: flatland.World) -> None:
     scan = office.output("/scan")
     tall_scan = office.output("/tricycle/scan")
     office.command("/cmd_vel").set(flatland.Twist(linear_x=0.5))
@@ -150,12 +150,12 @@ def test_the_robots_drive_and_see(office: flatland.World) -> None:
     assert scan.latest.ranges.shape == (1081,)
     assert scan.latest.frame_id == "laser"
     assert tall_scan.latest.frame_id == "tricycle_laser"
-    # The corridor is 2 m wide between its walls' faces.
+    # The corridor is 2 m wide.
     side = scan.latest.ranges[[180, 900]]  # 90 degrees to the right and to the left
     assert side.sum() == pytest.approx(2.0, abs=0.1)
 
 
-def test_only_the_tall_robot_sees_table_tops(office: flatland.World) -> None:
+def test_only_the_laser_of_the_tall_robot_detects_table_tops(office: flatland.World) -> None:
     # In front of the long table of the large meeting room.
     office.move_model("robot", (-16.5, 7.6, math.pi / 2))
     office.move_model("tricycle", (-15.5, 7.8, math.pi / 2))
@@ -181,7 +181,7 @@ def test_each_frame_has_one_parent(office: flatland.World) -> None:
     assert roots == {"map"}
 
 
-def test_the_transform_of_a_localisation_can_be_left_to_one(worlds: Path) -> None:
+def test_one_localization_can_send_the_transform_to_map(worlds: Path) -> None:
     path = str(worlds / "office/world.yaml")
     with flatland.World.from_yaml(path, seed=1, params={"/map_to_odom": False}) as world:
         world.step(100)
@@ -197,7 +197,7 @@ def test_models_can_be_spawned(office: flatland.World, model: str) -> None:
     assert office.model("another").bodies[0].pose[:2] == pytest.approx((14.0, 0.0), abs=1e-5)
 
 
-def test_a_chair_is_pushed_and_rolls_out(office: flatland.World) -> None:
+def test_a_pushed_chair_rolls_to_a_stop(office: flatland.World) -> None:
     office.spawn_model("chair.model.yaml", "chair", pose=(-1.5, -5.5, 0))
     drive = office.command("/cmd_vel")
     drive.set(flatland.Twist(linear_x=0.6))

@@ -43,13 +43,13 @@ def test_deceleration_limit_holds_towards_zero(sign: float) -> None:
     assert limits.limit(sign * 1.2, sign * 1.0, 0.1) == sign * 1.0
 
 
-def test_deceleration_limit_left_out_is_the_acceleration_limit() -> None:
+def test_default_deceleration_limit_is_the_acceleration_limit() -> None:
     limits = DynamicsLimits(acceleration_limit=2.0)
     assert limits.deceleration_limit == 2.0
     assert limits.limit(1.0, 0.0, 0.1) == pytest.approx(0.8)
 
 
-def test_deceleration_limit_of_zero_is_none() -> None:
+def test_deceleration_limit_of_zero_means_no_limit() -> None:
     limits = DynamicsLimits(acceleration_limit=2.0, deceleration_limit=0.0)
     assert limits.limit(1.0, 0.0, 0.1) == 0.0
 
@@ -61,35 +61,35 @@ def test_velocity_above_a_limit_decelerates_to_it() -> None:
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 class TestCrossingZero:
-    def test_without_deceleration_limit_it_starts_from_zero(self, sign: float) -> None:
+    def test_without_deceleration_limit_acceleration_starts_at_zero(self, sign: float) -> None:
         limits = DynamicsLimits(acceleration_limit=2.0, deceleration_limit=0.0)
         assert limits.limit(sign * 3.0, sign * -5.0, 0.1) == pytest.approx(sign * -0.2)
         assert limits.limit(sign * 3.0, sign * -0.1, 0.1) == pytest.approx(sign * -0.1)
 
-    def test_deceleration_alone_while_the_sign_stays(self, sign: float) -> None:
+    def test_deceleration_limit_holds_until_the_sign_changes(self, sign: float) -> None:
         limits = DynamicsLimits(acceleration_limit=2.0, deceleration_limit=5.0)
         assert limits.limit(sign * 0.6, sign * -1.0, 0.1) == pytest.approx(sign * 0.1)
 
-    def test_the_crossing_step_is_shared_by_both_limits(self, sign: float) -> None:
+    def test_both_limits_apply_in_the_crossing_step(self, sign: float) -> None:
         limits = DynamicsLimits(acceleration_limit=2.0, deceleration_limit=5.0)
-        # 0.02 s at 5 m/s² to stand, the other 0.08 s at 2 m/s².
+        # 0.02 s at 5 m/s² until standstill, the remaining 0.08 s at 2 m/s².
         assert limits.limit(sign * 0.1, sign * -1.0, 0.1) == pytest.approx(sign * -0.16)
         assert limits.limit(sign * 0.1, sign * -0.05, 0.1) == pytest.approx(sign * -0.05)
 
-    def test_without_acceleration_limit_the_crossing_step_is_free(self, sign: float) -> None:
+    def test_without_acceleration_limit_the_crossing_step_is_unlimited(self, sign: float) -> None:
         limits = DynamicsLimits(acceleration_limit=0.0, deceleration_limit=5.0)
         assert limits.limit(sign * 0.6, sign * -1.0, 0.1) == pytest.approx(sign * 0.1)
         assert limits.limit(sign * 0.1, sign * -1.0, 0.1) == pytest.approx(sign * -1.0)
 
 
-def test_infinite_limit_is_none() -> None:
+def test_infinite_limit_means_no_limit() -> None:
     limits = DynamicsLimits(math.inf, math.inf, math.inf)
     assert limits.limit(-1.0, 7.0, 0.1) == 7.0
 
 
 @pytest.mark.parametrize("value", [-0.1, math.nan, -math.inf])
 @pytest.mark.parametrize("name", ["velocity_limit", "acceleration_limit", "deceleration_limit"])
-def test_bad_limit_is_refused(name: str, value: float) -> None:
+def test_invalid_limit_raises(name: str, value: float) -> None:
     with pytest.raises(ValueError, match=f"{name} must not be negative or NaN"):
         DynamicsLimits(**{name: value})
 
@@ -99,11 +99,11 @@ class TestFromConfig:
         reader = YamlReader.from_string(text)
         return DynamicsLimits.from_config(reader.optional_subnode("limits", "map"))
 
-    def test_missing_map_limits_nothing(self) -> None:
+    def test_missing_map_means_no_limits(self) -> None:
         limits = self.read("{}")
         assert limits.limit(0.0, 100.0, 0.01) == 100.0
 
-    def test_all_keys(self) -> None:
+    def test_all_keys_are_read(self) -> None:
         limits = self.read(
             "limits: {velocity_limit: 1, acceleration_limit: 2.5, deceleration_limit: 3}"
         )

@@ -1,4 +1,4 @@
-"""Plugins that no manifest declares: all of a world or model in one error, and what to do."""
+"""Plugins that are declared by no manifest: one error for all of a world or model, with advice."""
 
 from __future__ import annotations
 
@@ -77,7 +77,7 @@ def test_all_missing_plugins_of_a_world_are_in_one_error(files):
     assert advice.count("flatland_plugins::") == 10
 
 
-def test_missing_world_plugins_are_found_before_any_of_them_starts(files, caplog):
+def test_missing_world_plugins_are_reported_before_any_world_plugin_starts(files, caplog):
     text = """
     properties: {}
     layers: []
@@ -88,7 +88,7 @@ def test_missing_world_plugins_are_found_before_any_of_them_starts(files, caplog
     assert '"A"' not in message
 
 
-def test_a_faulty_file_hides_no_missing_plugin(files):
+def test_an_invalid_file_does_not_hide_missing_plugins(files):
     write_model(files, "a.yaml", "name: p, type: Pump")
     files.write("broken.yaml", "bodies: [")
     text = """
@@ -104,12 +104,12 @@ def test_a_faulty_file_hides_no_missing_plugin(files):
     """
     message = error_of(files.load, text)
     assert '"p" type "Pump" model "one"' in message
-    assert "Weather" not in message  # its list is faulty
+    assert "Weather" not in message  # its list is invalid
     text = text.replace("{name: x}, ", "")
     assert '"W" type "Weather"' in error_of(files.load, text)
 
 
-def test_a_spawned_model_reports_all_its_missing_plugins_and_starts_none(files, empty_world):
+def test_spawning_reports_all_missing_plugins_of_a_model_and_starts_none(files, empty_world):
     path = write_model(
         files,
         "m.yaml",
@@ -140,7 +140,7 @@ def test_one_missing_plugin_is_reported_in_one_line(files, empty_world):
     assert "\n" not in message
 
 
-def test_advice_holds(files, empty_world, checkout):
+def test_the_advice_of_the_error_is_correct(files, empty_world, checkout):
     path = write_model(files, "m.yaml", "name: p, type: Pump")
     assert '"enabled: false"' in error_of(empty_world.spawn_model, path, "m")
     path = write_model(files, "m.yaml", "name: p, type: Pump, enabled: false")
@@ -150,7 +150,7 @@ def test_advice_holds(files, empty_world, checkout):
 
 
 @pytest.mark.parametrize(
-    ("type_name", "near"),
+    ("type_name", "similar"),
     [
         ("Lasser", '"Laser"'),
         ("laser", '"Laser"'),
@@ -165,14 +165,14 @@ def test_advice_holds(files, empty_world, checkout):
         ("Plugin", ""),
     ],
 )
-def test_near_names(type_name, near):
+def test_similar_names_are_suggested(type_name, similar):
     message = find_error(type_name)
     found = re.search(r" \(did you mean (.*)\?\)", message)
-    assert (found[1] if found else "") == near
-    assert "::Dummy" not in message.split("known are: ")[1]
+    assert (found[1] if found else "") == similar
+    assert "::Dummy" not in message.split("known plugins: ")[1]
 
 
-def test_near_names_of_other_packages(files, monkeypatch):
+def test_similar_names_of_other_packages_are_suggested(files, monkeypatch):
     classes = [
         f'<class name="{name}" type="a.B" base_class_type="flatland::ModelPlugin"/>'
         for name in ("robots::Battery", "carts::Battery", "robots::Wing")
@@ -181,11 +181,13 @@ def test_near_names_of_other_packages(files, monkeypatch):
     monkeypatch.setenv("FLATLAND_PLUGIN_PATH", manifest)
     message = find_error("Batery")
     assert '(did you mean "carts::Battery" or "robots::Battery"?)' in message
-    assert "known are: carts::Battery, robots::Battery, " in message
+    assert "known plugins: carts::Battery, robots::Battery, " in message
 
 
 @pytest.mark.parametrize("tag", ["flatland", "flatland_server"])
-def test_packages_that_export_a_cpp_plugin_of_the_name(files, monkeypatch, tag, caplog):
+def test_packages_that_export_a_cpp_plugin_of_the_same_name_are_named(
+    files, monkeypatch, tag, caplog
+):
     for name in ("hall", "other"):
         files.write(f"{name}/package.xml", CPP_PACKAGE.format(name=name, tag=tag))
         files.write(f"{name}/plugins.xml", CPP_MANIFEST)
@@ -196,18 +198,20 @@ def test_packages_that_export_a_cpp_plugin_of_the_name(files, monkeypatch, tag, 
         assert exported in find_error(type_name)
     for type_name in ("Door", "hall_internal::Door", "x::Elevator"):
         assert "exported" not in find_error(type_name)
-    assert "not read" not in find_error("Door")
+    assert "with errors" not in find_error("Door")
     assert not caplog.records
 
 
-def test_a_cpp_manifest_that_cannot_be_read(files, monkeypatch):
+def test_a_cpp_manifest_that_cannot_be_read_is_reported(files, monkeypatch):
     files.write("hall/package.xml", CPP_PACKAGE.format(name="hall", tag="flatland_server"))
     monkeypatch.setenv("ROS_PACKAGE_PATH", str(files.folder))
     path = f"{files.folder}/hall/plugins.xml"
-    assert f'; not read: manifest "{path}" cannot be read: No such file' in find_error("Door")
+    assert f'; manifests with errors: manifest "{path}" cannot be read: No such file' in find_error(
+        "Door"
+    )
 
 
-def test_a_listed_manifest_with_cpp_plugins(files, monkeypatch):
+def test_cpp_plugins_of_a_listed_manifest_are_named(files, monkeypatch):
     manifest = files.write("cpp.xml", CPP_MANIFEST)
     monkeypatch.setenv("FLATLAND_PLUGIN_PATH", manifest)
     exported = f'a C++ plugin of that name is exported by manifest "{manifest}";'

@@ -18,7 +18,7 @@ def draws(stream: NoiseStream, updates: int, drawn: set[int]) -> dict[int, list[
     return found
 
 
-def test_an_update_has_the_same_numbers_whichever_others_were_drawn() -> None:
+def test_numbers_of_an_update_do_not_depend_on_draws_of_others() -> None:
     every = draws(NoiseStream([1, 2]), 10, set(range(1, 11)))
     some = draws(NoiseStream([1, 2]), 10, {3, 9})
     assert some == {3: every[3], 9: every[9]}
@@ -34,7 +34,7 @@ def test_draws_of_one_update_continue() -> None:
 
 
 def test_single_precision_draws_leave_no_remainder_for_the_next_update() -> None:
-    # Half of a 64-bit number stays in the buffer of the generator after an odd number of draws.
+    # Half of a 64-bit number remains in the buffer of the generator after an odd number of draws.
     stream, other = NoiseStream([5]), NoiseStream([5])
     stream.begin_update()
     stream.rng.standard_normal(3, dtype=np.float32)
@@ -48,7 +48,7 @@ def test_single_precision_draws_leave_no_remainder_for_the_next_update() -> None
 
 
 @pytest.mark.parametrize("entropy", [[1, 3], [2, 2], [1], [1, 2, 1]])
-def test_streams_of_other_entropy_differ(entropy: list[int]) -> None:
+def test_streams_with_different_entropy_differ(entropy: list[int]) -> None:
     assert draws(NoiseStream(entropy), 1, {1}) != draws(NoiseStream([1, 2]), 1, {1})
 
 

@@ -1,4 +1,4 @@
-"""The search of packages on `ROS_PACKAGE_PATH` and when it is repeated."""
+"""The search of packages on `ROS_PACKAGE_PATH` and its cache."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import pytest
 from flatland.plugin_api import package_exports
 from flatland.plugin_api.package_exports import Export
 
-LONG_AGO = 1_000_000_000  # s, a time of files that no clock unit is near to
+LONG_AGO = 1_000_000_000  # s, a modification time far in the past
 
 
 def package(name: str, exports: str) -> str:
@@ -23,7 +23,7 @@ def exported(tag: str = "flatland") -> str:
 
 @pytest.fixture
 def search(files, monkeypatch):
-    """Writes files, makes them old, and returns the exports below some folders."""
+    """Returns a function that writes files, sets old times, and returns the exports of folders."""
 
     def search_folders(contents, folders=(".",)):
         for path, text in contents.items():
@@ -37,7 +37,7 @@ def search(files, monkeypatch):
 
 
 def age(folder: Path) -> None:
-    """Gives a folder and all that it holds an old time."""
+    """Sets an old modification time for a folder and its contents."""
     for path in [*folder.rglob("*"), folder]:
         os.utime(path, (LONG_AGO, LONG_AGO))
 
@@ -77,11 +77,11 @@ def test_exports_of_both_tags(search, files):
          ["x"]),
     ],
 )  # fmt: skip
-def test_what_a_package_is(search, contents, expected):
+def test_packages_are_found_by_the_rules_of_rospack(search, contents, expected):
     assert names(search(contents)) == expected
 
 
-def test_a_package_hides_one_of_that_name_later_on_the_path(search):
+def test_a_package_hides_later_ones_of_the_same_name(search):
     contents = {
         "over/x/package.xml": package("x", ""),
         "under/x/package.xml": package("x", exported()),
@@ -91,14 +91,14 @@ def test_a_package_hides_one_of_that_name_later_on_the_path(search):
     assert names(search(contents, ["under", "over"])) == ["x", "y"]
 
 
-def test_links_in_a_circle(search, files):
+def test_cyclic_links_are_followed_once(search, files):
     files.write("a/package.xml", package("a", exported()))
     (files.folder / "b").mkdir()
     (files.folder / "b" / "up").symlink_to(files.folder)
     assert names(search({})) == ["a"]
 
 
-def test_a_package_file_that_is_not_xml(search, files):
+def test_a_package_file_that_is_not_xml_is_reported(search, files):
     contents = {
         "a/package.xml": "<package><name>a</name><flatland",
         "b/package.xml": "<package><name>b</name><broken, but no plugins",
@@ -113,7 +113,7 @@ def test_a_package_file_that_is_not_xml(search, files):
     assert names(found) == ["c"]
 
 
-def test_no_path_and_folders_that_do_not_exist(search, monkeypatch):
+def test_an_empty_path_and_missing_folders_have_no_exports(search, monkeypatch):
     assert names(search({}, ["absent"])) == []
     for value in ("", ":"):
         monkeypatch.setenv("ROS_PACKAGE_PATH", value)
@@ -124,7 +124,7 @@ def test_no_path_and_folders_that_do_not_exist(search, monkeypatch):
 
 @pytest.fixture
 def searches(monkeypatch):
-    """The package paths that were searched, in order."""
+    """The searched package paths in order."""
     searched = []
     search = package_exports._search
 
@@ -136,7 +136,7 @@ def searches(monkeypatch):
     return searched
 
 
-def test_the_path_is_searched_once_while_nothing_changes(search, searches):
+def test_the_path_is_searched_once_without_changes(search, searches):
     first = search({"a/package.xml": package("a", exported())})
     assert package_exports.package_exports() is first
     assert len(searches) == 1
@@ -155,15 +155,17 @@ def test_the_path_is_searched_once_while_nothing_changes(search, searches):
         (lambda folder: (folder / "a" / "CATKIN_IGNORE").touch(), []),
     ],
 )  # fmt: skip
-def test_a_change_of_a_folder_or_package_file_is_noticed(search, searches, files, change, expected):
+def test_a_change_of_a_folder_or_package_file_repeats_the_search(
+    search, searches, files, change, expected
+):
     assert names(search({"a/package.xml": package("a", exported()), "b/x": ""})) == ["a"]
     change(files.folder)
     assert names(package_exports.package_exports()) == expected
     assert len(searches) == 2
 
 
-def test_a_change_right_after_a_search_is_noticed(search, searches, files):
-    """The change may leave the time of the folder as it is, when its clock is coarse."""
+def test_a_change_right_after_a_search_repeats_the_search(search, searches, files):
+    """With a coarse clock, the change may not affect the modification time of the folder."""
     search({"a/x": ""})
     (files.folder / "a" / "package.xml").write_text(package("a", exported()))
     now = (files.folder / "a").stat().st_mtime_ns

@@ -1,4 +1,4 @@
-"""What a plugin finds in itself, and what ends with it."""
+"""Attributes of plugins, and the end of their ports and transforms."""
 
 from __future__ import annotations
 
@@ -76,12 +76,12 @@ def load(files: Any, monkeypatch: pytest.MonkeyPatch) -> Any:
     return load_world
 
 
-def test_all_is_there_when_it_starts(load: Any) -> None:
+def test_attributes_are_set_before_on_initialize(load: Any) -> None:
     world = load()
     one, two = world.model("m").plugins
     assert one.at_start == ("one", "own::Model", "r1", "m", None)
     assert two.name == "two"
-    # Without name, type and enabled.
+    # The entry without name, type and enabled.
     assert one.keys == ["gain"]
     [plugin] = world.plugins
     assert plugin.at_start == ("w", "own::World", "", None)
@@ -105,13 +105,13 @@ def test_ports_have_resolved_topics(load: Any) -> None:
     assert output.latest == 0.005
 
 
-def test_transforms_bear_the_time_of_the_step(load: Any) -> None:
+def test_transforms_have_the_time_of_the_step(load: Any) -> None:
     world = load()
     world.step(3)
     assert world.transforms["a", "b"] == flatland.Transform(10_000_000, "a", "b", 1.0, 2.0, 0.5)
 
 
-def test_random_numbers_come_from_the_seed_and_the_names(load: Any) -> None:
+def test_random_numbers_depend_on_the_seed_and_the_names(load: Any) -> None:
     def numbers(seed: int) -> list[float]:
         return [float(plugin.rng.random()) for plugin in load(seed=seed).model("m").plugins]
 
@@ -119,7 +119,7 @@ def test_random_numbers_come_from_the_seed_and_the_names(load: Any) -> None:
     assert len({*numbers(5), *numbers(6)}) == 4
 
 
-def test_what_it_opened_ends_after_its_last_hook(load: Any) -> None:
+def test_ports_and_transforms_are_closed_after_the_last_hook(load: Any) -> None:
     world = load()
     one, two = world.model("m").plugins
     world.step()
@@ -127,9 +127,9 @@ def test_what_it_opened_ends_after_its_last_hook(load: Any) -> None:
     assert (one.out_at_the_end, two.out_at_the_end) == (False, False)
     assert one.out.closed
     assert (world.ports.outputs, world.ports.commands, world.transforms) == ({}, {}, {})
-    with pytest.raises(PluginError, match='plugin "one" has ended and can open no "late"'):
+    with pytest.raises(PluginError, match='plugin "one" has ended and cannot open "late"'):
         one.output("late", float)
-    with pytest.raises(PluginError, match='plugin "one" has ended and can open no "late"'):
+    with pytest.raises(PluginError, match='plugin "one" has ended and cannot open "late"'):
         one.command("late", float)
     one.send_transform("a", "b", 0.0, 0.0, 0.0)
     world.step()

@@ -30,30 +30,30 @@ class Recorder:
         self.events.append(("command_closed", command))
 
 
-def test_output_is_wanted_while_someone_listens():
+def test_output_is_wanted_while_it_has_subscribers():
     output = PortRegistry(Recorder()).open_output("r1/x", int)
     assert output.topic == "/r1/x"
     assert not output.wanted
-    got = []
-    unsubscribe = output.subscribe(got.append)
+    received = []
+    unsubscribe = output.subscribe(received.append)
     output.want("bridge")
     assert output.wanted
     output.emit(1)
     unsubscribe()
     output.emit(2)
-    assert (got, output.latest) == ([1], 2)
+    assert (received, output.latest) == ([1], 2)
     assert output.wanted
     output.unwant("bridge")
     assert not output.wanted
 
 
-def test_a_listener_that_does_not_want():
+def test_a_subscription_without_wants_does_not_make_the_output_wanted():
     output = PortRegistry(Recorder()).open_output("x", int)
     output.subscribe(print, wants=False)
     assert not output.wanted
 
 
-def test_outputs_of_one_topic_are_shared_until_the_last_owner_goes():
+def test_an_output_is_shared_until_its_last_owner_closes_it():
     recorder = Recorder()
     ports = PortRegistry(recorder)
     first, second = ports.open_output("x", int), ports.open_output("/x", int)
@@ -66,7 +66,7 @@ def test_outputs_of_one_topic_are_shared_until_the_last_owner_goes():
     ports.close_output(second)
     assert recorder.events[1:] == [("output_closed", first)]
     assert first.closed
-    with pytest.raises(WorldError, match=r'no output "x", there are: none'):
+    with pytest.raises(WorldError, match=r'output "x" does not exist; existing outputs: none'):
         ports.find_output("x")
 
 
@@ -74,27 +74,27 @@ def test_a_topic_has_one_type():
     ports = PortRegistry(Recorder())
     ports.open_output("x", int)
     ports.open_command("c", int, 0)
-    with pytest.raises(FlatlandError, match='topic "/x" carries int already, not float'):
+    with pytest.raises(FlatlandError, match='topic "/x" already carries int, not float'):
         ports.open_output("x", float)
-    with pytest.raises(FlatlandError, match='topic "/c" carries int already, not bool'):
+    with pytest.raises(FlatlandError, match='topic "/c" already carries int, not bool'):
         ports.open_command("c", bool, False)
 
 
-def test_a_type_conflict_names_an_owner_that_is_left():
+def test_a_type_conflict_names_a_remaining_owner():
     ports = PortRegistry(Recorder())
     output = ports.open_output("x", int, "first")
     assert ports.open_output("x", int, "second") is output
     ports.close_output(output, "first")
-    with pytest.raises(FlatlandError, match='"/x" carries int already, used by second, not float'):
+    with pytest.raises(FlatlandError, match='"/x" already carries int, used by second, not float'):
         ports.open_output("x", float, "third")
     command = ports.open_command("c", int, 0, owner="fourth")
     ports.open_command("c", int, 0, owner="fifth")
     ports.close_command(command)
-    with pytest.raises(FlatlandError, match='"/c" carries int already, used by fifth, not bool'):
+    with pytest.raises(FlatlandError, match='"/c" already carries int, used by fifth, not bool'):
         ports.open_command("c", bool, False)
 
 
-def test_topics_are_found_by_any_spelling():
+def test_topics_are_found_with_and_without_leading_slash():
     ports = PortRegistry(Recorder())
     output = ports.open_output("r1/a/b", int)
     assert ports.find_output("/r1//a/b/") is output
@@ -107,7 +107,7 @@ def test_commands_of_one_topic_are_set_together():
     first = ports.open_command("cmd_vel", Twist, Twist())
     ports.find_command("/cmd_vel").set(Twist(1.0))
     second = ports.open_command("cmd_vel", Twist, Twist())
-    # One that comes later knows nothing of what was said before, as a ROS subscriber.
+    # A command that is opened later does not receive earlier values, like a ROS subscriber.
     assert (first.value.linear_x, second.value.linear_x) == (1.0, 0.0)
     topic = ports.find_command("cmd_vel")
     topic.set(Twist(2.0))
@@ -119,11 +119,11 @@ def test_commands_of_one_topic_are_set_together():
     ports.close_command(second)
     ports.close_command(second)
     for use in (lambda: topic.value, lambda: topic.set(Twist())):
-        with pytest.raises(WorldError, match="command /cmd_vel is gone with its model"):
+        with pytest.raises(WorldError, match="command /cmd_vel was closed with its model"):
             use()
 
 
-def test_commands_refuse_what_they_do_not_take():
+def test_commands_reject_invalid_values_and_types():
     command = PortRegistry(Recorder()).open_command("c", int, 7, accept=lambda value: value >= 0)
     command.set(-1)
     assert (command.value, command.received) == (7, 0)
@@ -133,7 +133,7 @@ def test_commands_refuse_what_they_do_not_take():
         command.set("x")
 
 
-def test_an_observer_may_refuse_a_port():
+def test_an_observer_may_reject_a_port():
     class Refusal(Recorder):
         def output_opened(self, output):
             raise FlatlandError("no")
@@ -150,22 +150,22 @@ def test_an_observer_may_refuse_a_port():
 
 def test_a_function_subscribed_twice_has_two_subscriptions():
     output = PortRegistry(Recorder()).open_output("x", int)
-    got = []
-    first, second = output.subscribe(got.append), output.subscribe(got.append)
+    received = []
+    first, second = output.subscribe(received.append), output.subscribe(received.append)
     output.emit(1)
-    assert got == [1, 1]
+    assert received == [1, 1]
     first()
     first()
     output.emit(2)
-    assert got == [1, 1, 2]
+    assert received == [1, 1, 2]
     assert output.wanted
     second()
     output.emit(3)
-    assert got == [1, 1, 2]
+    assert received == [1, 1, 2]
     assert not output.wanted
 
 
-def test_no_update_of_want_is_lost_between_threads():
+def test_concurrent_updates_of_want_are_not_lost():
     output = PortRegistry(Recorder()).open_output("x", int)
     start = threading.Barrier(4)
     interval = sys.getswitchinterval()
@@ -191,8 +191,8 @@ def test_no_update_of_want_is_lost_between_threads():
     assert len(output._subscribers) == len(output._wanters) == 4 * 1500
 
 
-def test_what_a_subscriber_raises_does_not_reach_the_plugin():
-    faults, got = [], []
+def test_an_exception_of_a_subscriber_does_not_reach_the_plugin():
+    faults, received = [], []
     ports = PortRegistry(Recorder(), lambda *fault: faults.append(fault))
     output = ports.open_output("x", int)
 
@@ -200,8 +200,8 @@ def test_what_a_subscriber_raises_does_not_reach_the_plugin():
         raise RuntimeError(f"no use for {value}")
 
     output.subscribe(fail)
-    output.subscribe(got.append)
+    output.subscribe(received.append)
     output.emit(5)
-    assert got == [5]
+    assert received == [5]
     [(where, callback, error)] = faults
     assert (where, callback, str(error)) == (output, fail, "no use for 5")

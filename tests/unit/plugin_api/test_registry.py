@@ -1,4 +1,4 @@
-"""Manifests, the look-up of plugin classes, and the error of each thing that can be wrong."""
+"""Manifests, the look-up of plugin classes, and their errors."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ MANIFEST = """
          base_class_type="flatland::ModelPlugin"/>
   <class name="{package}::Broken" type="{package}.broken.X"
          base_class_type="flatland::ModelPlugin"/>
-  <class name="{package}::Shy" type="{package}.things.Shy"
+  <class name="{package}::Faulty" type="{package}.things.Faulty"
          base_class_type="flatland::ModelPlugin"/>
 </library>
 """
@@ -45,15 +45,15 @@ class World(flatland.WorldPlugin):
 class Plain:
     pass
 
-class Shy(flatland.ModelPlugin):
+class Faulty(flatland.ModelPlugin):
     def __init__(self):
-        raise RuntimeError("not today")
+        raise RuntimeError("no device")
 """
 
 
 @pytest.fixture
 def package(files, request, monkeypatch):
-    """A plugin package on disk, under a name of its own; gives its name and manifest."""
+    """A plugin package on disk with a unique name; yields its name and manifest."""
     name = f"robots_{abs(hash(request.node.nodeid))}"
     files.write(f"src/{name}/__init__.py", "")
     files.write(f"src/{name}/things.py", THINGS)
@@ -73,29 +73,29 @@ def test_included_plugins_need_no_prefix():
     assert registry.find("flatland_plugins::Laser") is registry.find("Laser")
 
 
-def test_every_included_class_can_be_made():
+def test_every_included_class_can_be_instantiated():
     registry = PluginRegistry()
     entries = [e for n, e in registry.classes.items() if n.startswith("flatland_plugins::")]
     assert len(entries) >= 6
     for entry in entries:
         base = ModelPlugin if entry.base_class_type == "flatland::ModelPlugin" else WorldPlugin
-        assert isinstance(registry.make(entry.lookup_name, base), base)
+        assert isinstance(registry.create(entry.lookup_name, base), base)
         assert entry.description
 
 
-def test_a_class_is_imported_only_when_it_is_made(package):
+def test_a_class_is_imported_when_it_is_instantiated(package):
     name, manifest = package
     registry = PluginRegistry()
     entry = registry.find(f"{name}::Good")
     assert (entry.manifest, entry.description) == (manifest, "Does good")
     assert f"{name}.things" not in sys.modules
-    plugin = registry.make(f"{name}::Good", ModelPlugin)
+    plugin = registry.create(f"{name}::Good", ModelPlugin)
     assert type(plugin).__module__ == f"{name}.things"
 
 
 def test_the_name_defaults_to_the_type(package):
     name, _ = package
-    assert isinstance(PluginRegistry().make(f"{name}.things.World", WorldPlugin), WorldPlugin)
+    assert isinstance(PluginRegistry().create(f"{name}.things.World", WorldPlugin), WorldPlugin)
 
 
 @pytest.mark.parametrize(
@@ -108,32 +108,30 @@ def test_the_name_defaults_to_the_type(package):
         ("NoPlugin", r'"{0}.things.Plain" of plugin "{0}::NoPlugin" must be a class derived from '
          "flatland::ModelPlugin"),
         ("Wrong", r'class "{0}.things.World" of plugin "{0}::Wrong" must be a '
-         r"flatland::ModelPlugin here, it is a flatland::WorldPlugin \(manifest .* calls it "
+         r"flatland::ModelPlugin, got a flatland::WorldPlugin \(manifest .* declares a "
          r"flatland::ModelPlugin\)"),
-        ("Shy", r'class "{0}.things.Shy" cannot be made: RuntimeError: not today'),
+        ("Faulty", r'class "{0}.things.Faulty" cannot be instantiated: RuntimeError: no device'),
     ],
 )  # fmt: skip
-def test_what_is_wrong_is_said(package, which, text):
+def test_errors_name_the_class_and_the_cause(package, which, text):
     name, _ = package
     with pytest.raises(PluginError, match=text.format(name)):
-        PluginRegistry().make(f"{name}::{which}", ModelPlugin)
+        PluginRegistry().create(f"{name}::{which}", ModelPlugin)
 
 
-def test_a_model_plugin_is_no_world_plugin(package):
+def test_a_model_plugin_is_not_accepted_as_a_world_plugin(package):
     name, _ = package
-    with pytest.raises(
-        PluginError, match="must be a flatland::WorldPlugin here, it is a flatland::"
-    ):
-        PluginRegistry().make(f"{name}::Good", WorldPlugin)
+    with pytest.raises(PluginError, match="must be a flatland::WorldPlugin, got a flatland::"):
+        PluginRegistry().create(f"{name}::Good", WorldPlugin)
 
 
-def test_unknown_names_list_the_nearest_first(package):
+def test_the_error_of_an_unknown_name_lists_the_most_similar_name_first(package):
     with pytest.raises(PluginError) as caught:
         PluginRegistry().find("Lasser")
     assert str(caught.value).startswith(
         'Flatland plugin: no plugin "flatland_plugins::Lasser" (did you mean "Laser"?); '
     )
-    assert "; known are: flatland_plugins::Laser, " in str(caught.value)
+    assert "; known plugins: flatland_plugins::Laser, " in str(caught.value)
 
 
 @pytest.mark.parametrize(
@@ -141,7 +139,7 @@ def test_unknown_names_list_the_nearest_first(package):
     [
         ("<library", 'manifest "{0}" is not XML, line 1 col 0, unclosed token'),
         ("", 'manifest "{0}" is not XML, line 1 col 0, '),
-        ("<a/>", 'manifest "{0}" must hold <library> or <class_libraries>, got <a>'),
+        ("<a/>", 'manifest "{0}" must contain <library> or <class_libraries>, got <a>'),
         ('<library><class name="X" base_class_type="flatland::ModelPlugin"/></library>',
          'manifest "{0}", class "X": type must be the dotted path of a Python class, got ""'),
         ('<library><class name="X" type="a.b" base_class_type="Y"/></library>',
@@ -149,18 +147,20 @@ def test_unknown_names_list_the_nearest_first(package):
          'flatland::WorldPlugin, got "Y"'),
     ],
 )  # fmt: skip
-def test_broken_manifests(files, monkeypatch, content, text):
+def test_an_invalid_manifest_is_reported_and_does_not_hide_the_others(
+    files, monkeypatch, content, text
+):
     path = files.write("m.xml", content)
     with pytest.raises(PluginError) as caught:
         read_manifest(path)
     assert text.format(path) in str(caught.value)
-    # The others go on, and whoever asks in vain is told of it.
+    # The other manifests are read, and an unsuccessful look-up reports the invalid one.
     monkeypatch.setenv("FLATLAND_PLUGIN_PATH", f"{path}:/nowhere/else.xml")
     registry = PluginRegistry()
     assert registry.find("Laser")
     with pytest.raises(PluginError) as caught:
         registry.find("my::Plugin")
-    assert f"; not read: {text.format(path)}" in str(caught.value)
+    assert f"; manifests with errors: {text.format(path)}" in str(caught.value)
     assert 'manifest "/nowhere/else.xml" cannot be read: No such file or directory' in str(
         caught.value
     )
@@ -200,7 +200,7 @@ def test_packages_on_the_ros_package_path_are_found(package, files, monkeypatch)
     assert PluginRegistry().find(f"{name}::Good").manifest == manifest
 
 
-def test_a_broken_package_does_not_hide_the_others(package, files, monkeypatch):
+def test_an_invalid_package_does_not_hide_the_others(package, files, monkeypatch):
     name, manifest = package
     files.write("package.xml", PACKAGE.format(name=name))
     other = files.write("other/package.xml", PACKAGE.format(name="other").replace("<exp", "<<"))
@@ -208,11 +208,11 @@ def test_a_broken_package_does_not_hide_the_others(package, files, monkeypatch):
     monkeypatch.setenv("ROS_PACKAGE_PATH", f"{files.folder / 'other'}:{files.folder}")
     registry = PluginRegistry()
     assert registry.find(f"{name}::Good").manifest == manifest
-    with pytest.raises(PluginError, match=rf'not read: "{other}" is not XML, not well-formed'):
+    with pytest.raises(PluginError, match=rf'with errors: "{other}" is not XML, not well-formed'):
         registry.find("other::Good")
 
 
-def test_a_package_that_comes_later_is_found(package, files, monkeypatch):
+def test_a_package_that_is_added_later_is_found(package, files, monkeypatch):
     name, manifest = package
     monkeypatch.delenv("FLATLAND_PLUGIN_PATH")
     monkeypatch.setenv("ROS_PACKAGE_PATH", str(files.folder))
@@ -220,7 +220,7 @@ def test_a_package_that_comes_later_is_found(package, files, monkeypatch):
     assert registry.find_missing([f"{name}::Good", "Laser"]) == [f"{name}::Good"]
     files.write("package.xml", PACKAGE.format(name=name))
     assert registry.find(f"{name}::Good").manifest == manifest
-    # Its manifest gets another class, while the folders stay as they are.
+    # A class is renamed in the manifest; the folders are unchanged.
     assert registry.find_missing([f"{name}::New"]) == [f"{name}::New"]
     text = MANIFEST.format(package=name).replace("::Good", "::New")
     files.write("plugins.xml", text)
@@ -239,7 +239,7 @@ def test_manifests_are_read_again_only_after_a_change(package, files, monkeypatc
     assert registry.find_missing([f"{name}::Late"]) == []
 
 
-def test_cpp_classes_of_a_manifest_are_left_out(files):
+def test_cpp_classes_of_a_manifest_are_skipped(files):
     path = files.write(
         "m.xml",
         """
@@ -266,15 +266,15 @@ def test_python_distributions_are_found(package, files, monkeypatch):
     assert found.manifest == str(files.folder / "src" / name / "flatland_plugins.xml")
 
 
-def test_a_hidden_class_is_warned_of(package, files, monkeypatch, caplog):
+def test_a_hidden_class_causes_a_warning(package, files, monkeypatch, caplog):
     name, manifest = package
     other = files.write("other.xml", MANIFEST.format(package=name))
     monkeypatch.setenv("FLATLAND_PLUGIN_PATH", f"{manifest}:{other}")
     assert PluginRegistry().find(f"{name}::Good").manifest == manifest
-    assert f'plugin "{name}::Good" of "{other}" is hidden by that of "{manifest}"' in caplog.text
+    assert f'plugin "{name}::Good" of "{other}" is hidden by the one of "{manifest}"' in caplog.text
 
 
-def test_finding_imports_no_plugin():
+def test_reading_manifests_imports_no_plugin():
     code = (
         "import sys, flatland.plugin_api.registry as r;"
         "r.PluginRegistry().classes;"

@@ -64,7 +64,7 @@ def test_rate_above_the_step_rate_fires_in_every_step() -> None:
     assert fired_steps(201.0, 0.005, 1000) == list(range(1000))
 
 
-def test_timers_of_one_rate_agree_whenever_they_were_made() -> None:
+def test_timers_of_one_rate_agree_whenever_they_were_created() -> None:
     timekeeper = Timekeeper(0.005)
     early = UpdateTimer(30.0)
     for _ in range(500):
@@ -74,6 +74,6 @@ def test_timers_of_one_rate_agree_whenever_they_were_made() -> None:
 
 
 @pytest.mark.parametrize("rate", [-1.0, -math.inf, math.nan])
-def test_negative_or_nan_rate_is_refused(rate: float) -> None:
+def test_negative_or_nan_rate_raises(rate: float) -> None:
     with pytest.raises(ValueError, match="rate must not be negative or NaN"):
         UpdateTimer(rate)

@@ -1,4 +1,4 @@
-"""Worlds with one robot that carries the plugins under test."""
+"""Worlds with one robot that has the plugins under test."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ LAYERS = "[{name: 2d}, {name: 3d}]"
 
 
 def section(key: str, text: str) -> str:
-    """Puts a block of YAML under a key."""
+    """Returns a block of YAML under a key."""
     return f"{key}:\n{indent(dedent(text).strip(), '  ')}\n" if text.strip() else f"{key}: []\n"
 
 
 class PluginWorld:
-    """Loads a world that holds one model, `robot`."""
+    """Loads worlds with one model, `robot`."""
 
     def __init__(self, files: Any) -> None:
         self.files = files
@@ -45,14 +45,14 @@ class PluginWorld:
         """Writes the files and loads them.
 
         Args:
-            plugins: The model's list of plugins, as YAML; of its bodies and joints likewise.
-            bodies: One body `base`, a disc of 0.2 m, when left out.
-            joints: None when left out.
-            namespace: Of the model.
-            pose: Of the model.
-            layers: Two layers without walls, `2d` and `3d`, when left out.
-            world_plugins: The world's list of plugins.
-            options: For `World.from_yaml`.
+            plugins: List of plugins of the model, as YAML.
+            bodies: List of bodies; by default one body `base`, a disc with a radius of 0.2 m.
+            joints: List of joints, by default empty.
+            namespace: Namespace of the model.
+            pose: Pose of the model.
+            layers: List of layers; by default two layers without walls, `2d` and `3d`.
+            world_plugins: List of world plugins.
+            options: Arguments of `World.from_yaml`.
         """
         self.files.write(
             "robot.model.yaml",
@@ -67,7 +67,7 @@ class PluginWorld:
         return world
 
     def error(self, plugins: str, **options: Any) -> str:
-        """Loads what must not load because of its plugin, and returns the error's text."""
+        """Loads a world whose plugin is invalid and returns the text of the error."""
         with pytest.raises(flatland.PluginError) as caught:
             self(plugins, **options)
         return str(caught.value)
@@ -75,13 +75,13 @@ class PluginWorld:
 
 @pytest.fixture
 def plugin_world(files: Any) -> PluginWorld:
-    """Loads worlds with one robot that carries given plugins; they are closed after the test."""
+    """Loads worlds with one robot with given plugins; they are closed after the test."""
     return PluginWorld(files)
 
 
 @pytest.fixture
 def collect() -> Callable[[flatland.World, str], list[Any]]:
-    """Subscribes to an output and returns the list that its values go to."""
+    """Returns a function that subscribes to an output and returns the list of its values."""
 
     def subscribe(world: flatland.World, topic: str) -> list[Any]:
         values: list[Any] = []

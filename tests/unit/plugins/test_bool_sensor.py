@@ -1,4 +1,4 @@
-"""BoolSensor: which touches count, when it publishes."""
+"""BoolSensor: detected contacts, and the times of its messages."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ bodies:
     footprints:
       - {type: polygon, density: 1, points: [[0, -1], [0.2, -1], [0.2, 1], [0, 1]]}
 """
-# The arm is well above the base, and does not reach the wall at x = 0.199 from its place.
+# The arm is far from the base, and does not touch the wall at x = 0.199.
 TWO_BODIES = """
 - name: base
   footprints: [{type: circle, radius: 0.2, density: 1}]
@@ -34,7 +34,7 @@ def put_wall(world: flatland.World, files: Any, x: float = 0.199) -> None:
 
 
 def test_defaults(plugin_world: Any, files: Any, collect: Collect) -> None:
-    # [fix] The reference doubles the namespace in the topic.
+    # The reference doubles the namespace in the topic.
     world = plugin_world(SENSOR, namespace="r1")
     assert list(world.ports.outputs) == ["/r1/bool_sensor"]
     messages = collect(world, "/r1/bool_sensor")
@@ -45,12 +45,14 @@ def test_defaults(plugin_world: Any, files: Any, collect: Collect) -> None:
     assert all(type(message) is bool for message in messages)
 
 
-def test_topic(plugin_world: Any) -> None:
+def test_topic_parameter(plugin_world: Any) -> None:
     world = plugin_world("[{type: BoolSensor, name: switch, topic: /pressed}]", namespace="r1")
     assert list(world.ports.outputs) == ["/pressed"]
 
 
-def test_off_again_when_the_contact_ends(plugin_world: Any, files: Any, collect: Collect) -> None:
+def test_false_after_the_end_of_the_contact(
+    plugin_world: Any, files: Any, collect: Collect
+) -> None:
     world = plugin_world(SENSOR)
     put_wall(world, files)
     messages = collect(world, "/bool_sensor")
@@ -60,7 +62,7 @@ def test_off_again_when_the_contact_ends(plugin_world: Any, files: Any, collect:
     assert messages == [True, False, False]
 
 
-def test_off_again_when_the_other_model_goes(plugin_world: Any, files: Any) -> None:
+def test_false_after_the_other_model_is_deleted(plugin_world: Any, files: Any) -> None:
     world = plugin_world(SENSOR)
     put_wall(world, files)
     output = world.output("/bool_sensor")
@@ -72,8 +74,10 @@ def test_off_again_when_the_other_model_goes(plugin_world: Any, files: Any) -> N
 
 
 @pytest.mark.parametrize(("body", "expected"), [("base", True), ("arm", False)])
-def test_only_that_body_counts(plugin_world: Any, files: Any, body: str, expected: bool) -> None:
-    # [fix] The reference counts the contacts of every body of the model.
+def test_contacts_of_other_bodies_are_ignored(
+    plugin_world: Any, files: Any, body: str, expected: bool
+) -> None:
+    # The reference counts the contacts of every body of the model.
     world = plugin_world(f"[{{type: BoolSensor, name: switch, body: {body}}}]", bodies=TWO_BODIES)
     put_wall(world, files)
     output = world.output("/bool_sensor")
@@ -81,7 +85,7 @@ def test_only_that_body_counts(plugin_world: Any, files: Any, body: str, expecte
     assert output.latest is expected
 
 
-def test_the_first_body_is_the_default(plugin_world: Any, files: Any) -> None:
+def test_the_default_body_is_the_first_one(plugin_world: Any, files: Any) -> None:
     world = plugin_world(SENSOR, bodies=TWO_BODIES)
     output = world.output("/bool_sensor")
     put_wall(world, files)
@@ -94,7 +98,7 @@ def test_the_first_body_is_the_default(plugin_world: Any, files: Any) -> None:
 
 
 @pytest.mark.parametrize("body", ["base", "arm"])
-def test_other_bodies_of_the_model_count_as_anything(plugin_world: Any, body: str) -> None:
+def test_contacts_with_other_bodies_of_the_model_are_detected(plugin_world: Any, body: str) -> None:
     world = plugin_world(
         f"[{{type: BoolSensor, name: switch, body: {body}}}]",
         bodies=TWO_BODIES.replace("-0.5", "-0.39"),
@@ -117,7 +121,7 @@ def test_fixtures_of_one_body_do_not_touch_each_other(plugin_world: Any) -> None
     assert output.latest is False
 
 
-def test_sensor_fixtures_count(plugin_world: Any, files: Any) -> None:
+def test_contacts_with_sensor_fixtures_are_detected(plugin_world: Any, files: Any) -> None:
     sensor = """
     - name: base
       footprints: [{type: circle, radius: 0.2, density: 1, sensor: true}]
@@ -129,7 +133,7 @@ def test_sensor_fixtures_count(plugin_world: Any, files: Any) -> None:
     assert output.latest is True
 
 
-def test_walls_count(plugin_world: Any, files: Any) -> None:
+def test_contacts_with_walls_are_detected(plugin_world: Any, files: Any) -> None:
     map_path = files.write_map("room", ["...", ".#.", "..."])
     world = plugin_world(SENSOR, pose=(0.9, 1.5, 0), layers=f"[{{name: 2d, map: {map_path}}}]")
     output = world.output("/bool_sensor")
@@ -148,7 +152,7 @@ def test_several_contacts_end_one_by_one(plugin_world: Any, files: Any) -> None:
     assert output.latest is True
 
 
-def test_touch_between_two_messages_is_told_once(
+def test_a_contact_between_two_messages_is_reported_once(
     plugin_world: Any, files: Any, collect: Collect
 ) -> None:
     world = plugin_world("[{type: BoolSensor, name: switch, update_rate: 20}]")
@@ -162,14 +166,14 @@ def test_touch_between_two_messages_is_told_once(
     assert messages == [False, True, False, False]
 
 
-def test_rate(plugin_world: Any, collect: Collect) -> None:
+def test_messages_are_published_at_the_update_rate(plugin_world: Any, collect: Collect) -> None:
     world = plugin_world("[{type: BoolSensor, name: switch, update_rate: 40}]")
     messages = collect(world, "/bool_sensor")
     world.step(200)
     assert len(messages) == 40
 
 
-def test_late_listener_hears_of_a_contact_that_is_old(plugin_world: Any, files: Any) -> None:
+def test_a_late_subscriber_receives_an_existing_contact(plugin_world: Any, files: Any) -> None:
     world = plugin_world(SENSOR)
     put_wall(world, files)
     world.step(10)
@@ -179,7 +183,7 @@ def test_late_listener_hears_of_a_contact_that_is_old(plugin_world: Any, files: 
     assert output.latest is True
 
 
-def test_late_listener_hears_nothing_of_a_touch_that_is_over(plugin_world: Any, files: Any) -> None:
+def test_a_late_subscriber_does_not_receive_a_past_contact(plugin_world: Any, files: Any) -> None:
     world = plugin_world(SENSOR)
     put_wall(world, files)
     world.step()
@@ -198,5 +202,5 @@ def test_late_listener_hears_nothing_of_a_touch_that_is_over(plugin_world: Any, 
         ("rate: 3", 'unrecognized entry(s) {"rate"}'),
     ],
 )
-def test_errors(plugin_world: Any, entry: str, text: str) -> None:
+def test_invalid_parameters_are_errors(plugin_world: Any, entry: str, text: str) -> None:
     assert text in plugin_world.error(f"[{{type: BoolSensor, name: switch, {entry}}}]")

@@ -1,4 +1,4 @@
-"""Bumper: what it records, when it publishes, forces and directions."""
+"""Bumper: recorded contacts, times of messages, forces and directions."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def put(world: flatland.World, files: Any, text: str, x: float, y: float = 0.0) 
 
 
 def touching(plugin_world: Any, files: Any, plugins: str = BUMPER, **options: Any) -> Any:
-    """A robot that overlaps a wall to its right by a hair, with the wall's surface at x = 0.199."""
+    """Returns a world whose robot overlaps a wall to its right by 1 mm, at x = 0.199."""
     world = plugin_world(plugins, **{"bodies": DISC, **options})
     put(world, files, WALL, 0.199)
     return world
@@ -54,7 +54,7 @@ def test_defaults(plugin_world: Any, files: Any, collect: Collect) -> None:
     messages = collect(world, "/r1/collisions")
     world.step(2)
     assert [type(message) for message in messages] == [Collisions, Collisions]
-    # The world's frame takes no namespace.
+    # World frames have no namespace.
     assert messages[0].frame_id == "map"
     (collision,) = messages[0].collisions
     assert (collision.entity_a, collision.body_a) == ("robot", "base")
@@ -77,7 +77,7 @@ def test_stamp_is_the_time_after_the_step(plugin_world: Any, collect: Collect) -
     assert [message.stamp for message in messages] == [5_000_000, 10_000_000, 15_000_000]
 
 
-def test_contact_of_a_step_is_in_the_message_of_that_step(
+def test_a_contact_is_in_the_message_of_the_same_step(
     plugin_world: Any, files: Any, collect: Collect
 ) -> None:
     world = touching(plugin_world, files)
@@ -86,7 +86,7 @@ def test_contact_of_a_step_is_in_the_message_of_that_step(
     assert len(messages[0].collisions) == 1
 
 
-def test_without_contact_an_empty_list_at_the_rate(plugin_world: Any, collect: Collect) -> None:
+def test_empty_lists_are_published_at_the_update_rate(plugin_world: Any, collect: Collect) -> None:
     world = plugin_world("[{type: Bumper, name: bumper, update_rate: 20}]")
     messages = collect(world, "/collisions")
     world.step(200)
@@ -94,14 +94,16 @@ def test_without_contact_an_empty_list_at_the_rate(plugin_world: Any, collect: C
     assert all(message.collisions == () for message in messages)
 
 
-def test_with_contact_every_step(plugin_world: Any, files: Any, collect: Collect) -> None:
+def test_contacts_are_published_in_every_step(
+    plugin_world: Any, files: Any, collect: Collect
+) -> None:
     world = touching(plugin_world, files, "[{type: Bumper, name: bumper, update_rate: 20}]")
     messages = collect(world, "/collisions")
     world.step(40)
     assert len(messages) == 40
 
 
-def test_publish_all_collisions_false_keeps_to_the_rate(
+def test_without_publish_all_collisions_the_update_rate_holds(
     plugin_world: Any, files: Any, collect: Collect
 ) -> None:
     world = touching(
@@ -115,13 +117,13 @@ def test_publish_all_collisions_false_keeps_to_the_rate(
     assert all(len(message.collisions) == 1 for message in messages)
 
 
-def test_nothing_is_published_that_nobody_wants(plugin_world: Any, files: Any) -> None:
+def test_nothing_is_emitted_without_subscribers(plugin_world: Any, files: Any) -> None:
     world = touching(plugin_world, files)
     world.step(5)
     assert world.ports.find_output("/collisions").latest is None
 
 
-def test_late_listener_hears_of_contacts_that_are_old(plugin_world: Any, files: Any) -> None:
+def test_a_late_subscriber_receives_existing_contacts(plugin_world: Any, files: Any) -> None:
     world = touching(plugin_world, files)
     world.step(20)
     output = world.output("/collisions")
@@ -142,14 +144,14 @@ def test_walls_of_a_layer(plugin_world: Any, files: Any) -> None:
     output = world.output("/collisions")
     world.step()
     (collision,) = output.latest.collisions
-    # A layer goes by its first name, and so does its body.
+    # A layer and its body have the first name of the layer.
     assert (collision.entity_b, collision.body_b) == ("room", "room")
     assert collision.contact_normals == pytest.approx(np.array([[1.0, 0.0]]))
 
 
 @pytest.mark.parametrize(
     ("bodies", "obstacle", "x"),
-    # Box2D puts polygons before circles, so that the robot is once its body B and once its A.
+    # In Box2D polygons precede circles: the robot is body B of one contact and body A of the other.
     [(DISC, WALL, 0.199), (SQUARE, PILLAR, 0.399)],
 )
 def test_normals_point_from_this_body_to_the_other(
@@ -162,13 +164,13 @@ def test_normals_point_from_this_body_to_the_other(
     (collision,) = output.latest.collisions
     assert collision.body_a == "base"
     assert collision.contact_normals == pytest.approx(np.array([[1.0, 0.0]]), abs=1e-5)
-    # Box2D's polygons have a skin of 1 cm, and a point lies in the middle of the overlap.
+    # Box2D polygons have a skin of 1 cm, and a contact point is in the middle of the overlap.
     assert collision.contact_positions == pytest.approx(np.array([[0.2, 0.0]]), abs=0.01)
     (contact,) = world.contacts
     assert (contact.body_a.name == "base") == (bodies is SQUARE)
 
 
-def test_force_at_rest_is_what_pushes(plugin_world: Any, files: Any) -> None:
+def test_force_at_rest_equals_the_applied_force(plugin_world: Any, files: Any) -> None:
     world = touching(plugin_world, files)
     output = world.output("/collisions")
     base = world.model("robot").body("base")
@@ -191,8 +193,8 @@ def test_force_at_impact_stops_the_body(plugin_world: Any, files: Any) -> None:
 
 @pytest.mark.parametrize(
     ("wall_at", "solver_calls"),
-    # Box2D solves a second time at the time of impact if the step would end in the wall; the first
-    # call has taken all momentum by then, and the mean is half of it.
+    # Box2D solves a second time at the time of impact if the step would end within the wall. The
+    # first call has removed all momentum by then, so that the mean is half of it.
     [(0.199, 1), (0.2005, 2)],
 )
 def test_two_corners_share_the_force(
@@ -225,7 +227,7 @@ def test_sensor_contacts_have_empty_lists(plugin_world: Any, files: Any) -> None
     assert collision.contact_normals.shape == (0, 2)
 
 
-def test_each_pair_of_fixtures_has_its_record(plugin_world: Any, files: Any) -> None:
+def test_each_pair_of_fixtures_has_a_record(plugin_world: Any, files: Any) -> None:
     two = """
     - name: base
       footprints:
@@ -239,7 +241,7 @@ def test_each_pair_of_fixtures_has_its_record(plugin_world: Any, files: Any) -> 
     assert lengths == [0, 1]
 
 
-def test_record_ends_with_the_contact(plugin_world: Any, files: Any) -> None:
+def test_a_record_is_removed_at_the_end_of_the_contact(plugin_world: Any, files: Any) -> None:
     world = touching(plugin_world, files)
     output = world.output("/collisions")
     world.step()
@@ -249,7 +251,7 @@ def test_record_ends_with_the_contact(plugin_world: Any, files: Any) -> None:
     assert output.latest.collisions == ()
 
 
-def test_record_ends_with_the_other_model(plugin_world: Any, files: Any) -> None:
+def test_a_record_is_removed_when_the_other_model_is_deleted(plugin_world: Any, files: Any) -> None:
     world = touching(plugin_world, files)
     output = world.output("/collisions")
     world.step()
@@ -282,7 +284,7 @@ TWO_BODIES = """
 """
 
 
-def test_bodies_of_the_model_among_themselves(plugin_world: Any) -> None:
+def test_contacts_between_bodies_of_the_model_are_recorded(plugin_world: Any) -> None:
     world = plugin_world(BUMPER, bodies=TWO_BODIES)
     output = world.output("/collisions")
     world.step()
@@ -294,7 +296,9 @@ def test_bodies_of_the_model_among_themselves(plugin_world: Any) -> None:
 
 
 @pytest.mark.parametrize(("exclude", "left"), [("[]", 3), ("[arm]", 1), ("[base]", 1)])
-def test_exclude(plugin_world: Any, files: Any, exclude: str, left: int) -> None:
+def test_contacts_of_excluded_bodies_are_ignored(
+    plugin_world: Any, files: Any, exclude: str, left: int
+) -> None:
     world = touching(
         plugin_world,
         files,
@@ -306,7 +310,7 @@ def test_exclude(plugin_world: Any, files: Any, exclude: str, left: int) -> None
     assert len(output.latest.collisions) == left
 
 
-def test_other_models_are_no_affair_of_it(plugin_world: Any, files: Any) -> None:
+def test_contacts_between_other_models_are_ignored(plugin_world: Any, files: Any) -> None:
     world = plugin_world(BUMPER, bodies=DISC, pose=(0, 5, 0))
     files.write("mover.model.yaml", "bodies:" + DISC.replace("\n", "\n  "))
     world.spawn_model("mover.model.yaml", "mover")
@@ -318,7 +322,7 @@ def test_other_models_are_no_affair_of_it(plugin_world: Any, files: Any) -> None
 
 
 def contact_of(world: flatland.World, points: list[list[float]], normal: list[float]) -> Contact:
-    """A made-up contact of the robot with the wall, as the physics would report it."""
+    """Returns a synthetic contact of the robot with the wall."""
     base = world.model("robot").body("base")
     other = world.model("obstacle").body("slab")
     return Contact(
@@ -345,16 +349,14 @@ def test_mean_over_the_solver_calls_of_a_step(plugin_world: Any, files: Any) -> 
     bumper.post_solve(last, ContactImpulse(np.array([0.04]), np.array([0.08])))
     bumper.after_physics_step(world.timekeeper)
     (collision,) = output.latest.collisions
-    # Means 0.03 and 0.04, so 0.05 in all.
+    # The means 0.03 and 0.04 add up to 0.05.
     assert collision.magnitude_forces == pytest.approx([0.05 / DT])
     assert collision.contact_positions.tolist() == [[5.0, 6.0]]
-    # The contact runs from the wall to the robot, the message the other way.
+    # The normal of the contact points from the wall to the robot, that of the message away from it.
     assert collision.contact_normals.tolist() == [[-1.0, 0.0]]
 
 
-def test_point_that_one_call_did_not_see_counts_as_zero_there(
-    plugin_world: Any, files: Any
-) -> None:
+def test_a_point_missing_in_a_solver_call_contributes_zero(plugin_world: Any, files: Any) -> None:
     world = plugin_world(BUMPER, bodies=DISC)
     put(world, files, WALL, 5.0)
     output = world.output("/collisions")
@@ -369,7 +371,7 @@ def test_point_that_one_call_did_not_see_counts_as_zero_there(
     assert collision.magnitude_forces == pytest.approx([0.03 / DT, 0.03 / DT])
 
 
-def test_solver_calls_for_strangers_are_passed_over(plugin_world: Any, files: Any) -> None:
+def test_solver_calls_of_unknown_contacts_are_ignored(plugin_world: Any, files: Any) -> None:
     world = plugin_world(BUMPER, bodies=DISC)
     put(world, files, WALL, 5.0)
     output = world.output("/collisions")
@@ -391,7 +393,7 @@ def test_solver_calls_for_strangers_are_passed_over(plugin_world: Any, files: An
         ("topic: 'a b'", '"a b" is not a legal topic name'),
     ],
 )
-def test_errors(plugin_world: Any, entry: str, text: str) -> None:
+def test_invalid_parameters_are_errors(plugin_world: Any, entry: str, text: str) -> None:
     error = plugin_world.error(f"[{{type: Bumper, name: bumper, {entry}}}]")
     assert text in error
     assert 'Model Plugin "bumper" type "Bumper" model "robot"' in error

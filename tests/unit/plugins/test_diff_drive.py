@@ -14,7 +14,7 @@ from flatland.values import Odometry, TwistWithCovariance
 
 Collect = Callable[[flatland.World, str], list[Any]]
 
-# Its centre of mass is 0.3 m ahead of and 0.2 m beside its origin.
+# The center of mass is 0.3 m ahead of and 0.2 m to the left of the origin.
 LOPSIDED = """
 - name: base
   footprints: [{type: circle, radius: 0.2, center: [0.3, 0.2], density: 1}]
@@ -36,19 +36,19 @@ def base(world: flatland.World) -> flatland.Body:
 
 
 class TestMotion:
-    def test_it_stands_without_a_command(self, plugin_world: Any) -> None:
+    def test_robot_is_at_rest_without_a_command(self, plugin_world: Any) -> None:
         world = plugin_world(drive(), pose=(1.0, 2.0, 0.5))
         world.step(20)
         assert base(world).pose == pytest.approx((1.0, 2.0, 0.5), abs=1e-6)
 
-    def test_it_drives_along_its_heading(self, plugin_world: Any) -> None:
+    def test_robot_drives_along_its_heading(self, plugin_world: Any) -> None:
         world = plugin_world(drive(), pose=(1.0, 2.0, 0.5))
         command(world, 0.8, 0.0)
         world.step(200)
         expected = (1.0 + 0.8 * math.cos(0.5), 2.0 + 0.8 * math.sin(0.5), 0.5)
         assert base(world).pose == pytest.approx(expected, abs=1e-4)
 
-    def test_the_origin_not_the_centre_of_mass_has_the_velocity(self, plugin_world: Any) -> None:
+    def test_the_commanded_velocity_is_that_of_the_origin(self, plugin_world: Any) -> None:
         world = plugin_world(drive(), bodies=LOPSIDED, pose=(0.0, 0.0, 0.7))
         command(world, 0.5, 2.0)
         plugin = world.model("robot").plugin("wheels")
@@ -57,7 +57,7 @@ class TestMotion:
             (0.5 * math.cos(0.7), 0.5 * math.sin(0.7), 2.0), abs=1e-5
         )
 
-    def test_it_turns_about_its_origin(self, plugin_world: Any) -> None:
+    def test_robot_turns_about_its_origin(self, plugin_world: Any) -> None:
         world = plugin_world(drive(), bodies=LOPSIDED, pose=(3.0, 4.0, 0.0))
         command(world, 0.0, 1.0)
         world.step(400)
@@ -65,7 +65,7 @@ class TestMotion:
         assert (x, y) == pytest.approx((3.0, 4.0), abs=5e-3)
         assert theta == pytest.approx(2.0, abs=1e-4)
 
-    def test_the_velocity_acts_in_every_step(self, plugin_world: Any) -> None:
+    def test_the_velocity_is_set_in_every_step(self, plugin_world: Any) -> None:
         bodies = """
         - name: base
           linear_damping: 5
@@ -75,10 +75,10 @@ class TestMotion:
         world = plugin_world(drive("pub_rate: 1"), bodies=bodies)
         command(world, 1.0, 0.0)
         world.step(100)
-        # Damping takes its share of each step, but does not add up.
+        # Damping reduces the velocity within each step, but does not accumulate.
         assert base(world).pose[0] == pytest.approx(0.5 / (1 + 5 * 0.005), rel=1e-3)
 
-    def test_sideways_part_of_a_command_is_not_used(self, plugin_world: Any) -> None:
+    def test_the_lateral_component_of_a_command_is_ignored(self, plugin_world: Any) -> None:
         world = plugin_world(drive())
         world.command("/cmd_vel").set(flatland.Twist(linear_y=3.0))
         world.step(10)
@@ -114,7 +114,7 @@ class TestDynamics:
         assert rates == pytest.approx([-0.01, -0.02, -0.03], abs=1e-6)
 
     @pytest.mark.parametrize("name", ["linear_dynamics", "angular_dynamics"])
-    def test_wrong_limits_are_errors(self, plugin_world: Any, name: str) -> None:
+    def test_invalid_limits_are_errors(self, plugin_world: Any, name: str) -> None:
         text = plugin_world.error(drive(f"{name}: {{velocity_limit: -1}}"))
         assert 'Invalid "velocity_limit", must not be negative' in text
         assert "top" in plugin_world.error(drive(f"{name}: {{top: 1}}"))
@@ -156,9 +156,7 @@ class TestGroundTruth:
         assert odometry[0].twist == pytest.approx(expected, abs=1e-5)
 
     @pytest.mark.parametrize("frame", ["world", "/world"])
-    def test_frame_is_used_as_written(
-        self, plugin_world: Any, collect: Collect, frame: str
-    ) -> None:
+    def test_frame_has_no_namespace(self, plugin_world: Any, collect: Collect, frame: str) -> None:
         world = plugin_world(drive(f"ground_truth_frame_id: {frame}"), namespace="r1")
         truths = collect(world, "/r1" + TRUTH)
         world.step()
@@ -166,7 +164,7 @@ class TestGroundTruth:
 
 
 class TestOdometry:
-    def test_without_noise_it_is_the_ground_truth(
+    def test_without_noise_odometry_equals_the_ground_truth(
         self, plugin_world: Any, collect: Collect
     ) -> None:
         world = plugin_world(drive(), namespace="r1", pose=(1.0, 2.0, 0.5))
@@ -179,7 +177,7 @@ class TestOdometry:
             assert measured.pose == exact.pose
             assert measured.twist == exact.twist
 
-    def test_noise_is_given_by_variances(self, plugin_world: Any, collect: Collect) -> None:
+    def test_noise_has_the_configured_variances(self, plugin_world: Any, collect: Collect) -> None:
         extra = (
             "odom_pose_noise: [0.04, 0.09, 0.16], odom_twist_noise: [0.25, 0.36, 0.49], "
             "twist_in_local_frame: false"
@@ -195,7 +193,7 @@ class TestOdometry:
         correlation = np.corrcoef(error.T) - np.eye(6)
         assert np.abs(correlation).max() < 0.1
 
-    def test_noise_does_not_move_the_robot(self, plugin_world: Any) -> None:
+    def test_noise_does_not_affect_the_motion(self, plugin_world: Any) -> None:
         world = plugin_world(drive("odom_pose_noise: [1, 1, 1], odom_twist_noise: [1, 1, 1]"))
         world.output(ODOMETRY)
         world.step(20)
@@ -211,9 +209,7 @@ class TestOdometry:
         world.step(5)
         assert world.output("/twist").latest is not None
 
-    def test_noise_of_an_output_does_not_depend_on_listeners_of_others(
-        self, plugin_world: Any
-    ) -> None:
+    def test_noise_does_not_depend_on_subscribers_of_other_outputs(self, plugin_world: Any) -> None:
         noise = "odom_pose_noise: [1, 1, 1], odom_twist_noise: [1, 1, 1]"
 
         def last_odometry(others: Sequence[str], connects_at: int = 0) -> Odometry:
@@ -232,7 +228,7 @@ class TestOdometry:
         assert last_odometry([TRUTH, "/twist"]).twist == alone.twist
         assert last_odometry(["/twist"], connects_at=9).pose == alone.pose
 
-    def test_the_seed_decides(self, plugin_world: Any, collect: Collect) -> None:
+    def test_noise_is_determined_by_the_seed(self, plugin_world: Any, collect: Collect) -> None:
         def poses(seed: int) -> list[Any]:
             world = plugin_world(drive("odom_pose_noise: [1, 1, 1]"), seed=seed)
             odometry = collect(world, ODOMETRY)
@@ -242,7 +238,9 @@ class TestOdometry:
         assert poses(1) == poses(1)
         assert poses(1) != poses(2)
 
-    def test_covariance_has_the_variances(self, plugin_world: Any, collect: Collect) -> None:
+    def test_default_covariance_has_the_variances(
+        self, plugin_world: Any, collect: Collect
+    ) -> None:
         extra = "odom_pose_noise: [1, 2, 3], odom_twist_noise: [4, 5, 6]"
         world = plugin_world(drive(extra))
         odometry, truths = collect(world, ODOMETRY), collect(world, TRUTH)
@@ -252,7 +250,7 @@ class TestOdometry:
         assert not truths[0].pose_covariance.any()
         assert not truths[0].twist_covariance.any()
 
-    def test_covariance_as_written(self, plugin_world: Any, collect: Collect) -> None:
+    def test_configured_covariance_is_published(self, plugin_world: Any, collect: Collect) -> None:
         pose, twist = list(range(36)), list(range(100, 136))
         extra = (
             f"odom_pose_covariance: {pose}, odom_twist_covariance: {twist}, "
@@ -265,9 +263,7 @@ class TestOdometry:
         assert odometry[0].twist_covariance.ravel().tolist() == twist
 
     @pytest.mark.parametrize("frame", ["wheel_odom", "/wheel_odom"])
-    def test_frame_is_used_as_written(
-        self, plugin_world: Any, collect: Collect, frame: str
-    ) -> None:
+    def test_frame_has_no_namespace(self, plugin_world: Any, collect: Collect, frame: str) -> None:
         world = plugin_world(drive(f"odom_frame_id: {frame}"), namespace="r1")
         odometry = collect(world, "/r1" + ODOMETRY)
         world.step()
@@ -287,7 +283,9 @@ class TestTwist:
         assert twist.frame_id == "r1_base"
         assert twist.twist == pytest.approx((-0.6, 0.0, 0.4), abs=1e-5)
 
-    def test_it_has_noise_of_its_own(self, plugin_world: Any, collect: Collect) -> None:
+    def test_noise_of_the_twist_is_independent_of_the_odometry(
+        self, plugin_world: Any, collect: Collect
+    ) -> None:
         world = plugin_world(drive("odom_twist_noise: [0.04, 0.09, 0.16]"))
         odometry, twists = collect(world, ODOMETRY), collect(world, "/twist")
         world.step(1500)
@@ -305,7 +303,9 @@ class TestTwist:
 
 
 class TestTransform:
-    def test_it_repeats_the_noisy_pose(self, plugin_world: Any, collect: Collect) -> None:
+    def test_transform_equals_the_noisy_odometry_pose(
+        self, plugin_world: Any, collect: Collect
+    ) -> None:
         world = plugin_world(drive("odom_pose_noise: [1, 1, 1]"), namespace="r1")
         odometry = collect(world, "/r1" + ODOMETRY)
         for step in range(3):
@@ -316,15 +316,15 @@ class TestTransform:
             assert sent.roll == 0
             assert sent.stamp == odometry[-1].stamp == step * 5_000_000
 
-    def test_sent_although_nobody_wants_the_odometry(self, plugin_world: Any) -> None:
+    def test_transform_is_sent_without_subscribers(self, plugin_world: Any) -> None:
         world = plugin_world(drive("enable_odom_pub: false, enable_twist_pub: false"))
         command(world, 1.0, 0.0)
         world.step(11)
         assert world.transforms["odom", "base"].x == pytest.approx(0.05, abs=1e-5)
 
 
-class TestSwitches:
-    def test_all_topics(self, plugin_world: Any) -> None:
+class TestEnableParameters:
+    def test_topic_parameters(self, plugin_world: Any) -> None:
         extra = "odom_pub: a, ground_truth_pub: b/c, twist_pub: /d"
         world = plugin_world(drive(extra), namespace="r1")
         outputs = world.ports.outputs
@@ -351,7 +351,7 @@ class TestSwitches:
         world.step(10)
         assert base(world).pose[0] == pytest.approx(0.05, abs=1e-5)
 
-    def test_transform_off(self, plugin_world: Any) -> None:
+    def test_no_transform_if_disabled(self, plugin_world: Any) -> None:
         world = plugin_world(drive("enable_odom_tf_pub: false"))
         world.step()
         assert world.transforms == {}
@@ -365,14 +365,14 @@ class TestSwitches:
         assert world.transforms["odom", "base"].stamp == 80_000_000
 
     @pytest.mark.parametrize("topic", [TRUTH, ODOMETRY, "/twist"])
-    def test_only_what_is_wanted_is_emitted(self, plugin_world: Any, topic: str) -> None:
+    def test_only_wanted_outputs_are_emitted(self, plugin_world: Any, topic: str) -> None:
         world = plugin_world(drive())
         world.output(topic)
         world.step()
         emitted = {name for name, port in world.ports.outputs.items() if port.latest is not None}
         assert emitted == {topic}
 
-    def test_nothing_is_read_or_emitted_when_nobody_listens(
+    def test_nothing_is_computed_without_subscribers(
         self, plugin_world: Any, monkeypatch: pytest.MonkeyPatch
     ) -> None:
         world = plugin_world(drive("enable_odom_tf_pub: false, odom_pose_noise: [1, 1, 1]"))
@@ -383,7 +383,7 @@ class TestSwitches:
         assert all(output.latest is None for output in world.ports.outputs.values())
 
 
-class TestBadCommands:
+class TestInvalidCommands:
     @pytest.mark.parametrize(
         "bad",
         [
@@ -396,7 +396,7 @@ class TestBadCommands:
         ],
         ids=str,
     )
-    def test_the_last_good_one_stays(
+    def test_the_previous_command_remains_in_effect(
         self, plugin_world: Any, caplog: pytest.LogCaptureFixture, bad: flatland.Twist
     ) -> None:
         world = plugin_world(drive())
@@ -409,25 +409,25 @@ class TestBadCommands:
         assert 'plugin "wheels" of model "robot"' in caplog.text
         assert world.command("/cmd_vel").value.linear_x == 1.0
 
-    def test_the_warning_is_throttled(
+    def test_warnings_are_throttled(
         self, plugin_world: Any, caplog: pytest.LogCaptureFixture, monkeypatch: Any
     ) -> None:
         now = [100.0]
         monkeypatch.setattr("flatland.plugin_api.drive.time.monotonic", lambda: now[0])
         world = plugin_world(drive())
 
-        def warnings_of_ten_bad_commands() -> int:
+        def warnings_of_ten_invalid_commands() -> int:
             caplog.clear()
             with caplog.at_level(logging.WARNING, "flatland"):
                 for _ in range(10):
                     command(world, math.nan, 0.0)
             return len(caplog.records)
 
-        assert warnings_of_ten_bad_commands() == 1
+        assert warnings_of_ten_invalid_commands() == 1
         now[0] += 0.5
-        assert warnings_of_ten_bad_commands() == 0
+        assert warnings_of_ten_invalid_commands() == 0
         now[0] += 0.6
-        assert warnings_of_ten_bad_commands() == 1
+        assert warnings_of_ten_invalid_commands() == 1
 
 
 class TestErrors:

@@ -34,7 +34,7 @@ def test_model_plugin_is_found_and_started(plugin_world: Any, type_name: str) ->
         ("dummy_param_int", "123457"),
     ],
 )
-def test_model_plugin_says_which_parameter_is_wrong(
+def test_error_of_the_model_plugin_names_the_parameter(
     plugin_world: Any, key: str, value: str
 ) -> None:
     text = plugin_world.error(dummy({**GOOD, key: value}))
@@ -44,7 +44,7 @@ def test_model_plugin_says_which_parameter_is_wrong(
     )
 
 
-def test_model_plugin_takes_nothing_else(plugin_world: Any) -> None:
+def test_model_plugin_rejects_other_parameters(plugin_world: Any) -> None:
     assert "more" in plugin_world.error(dummy({**GOOD, "more": "1"}))
 
 
@@ -55,7 +55,7 @@ def test_world_plugin_is_found_and_started(plugin_world: Any, type_name: str) ->
     assert [type(plugin) for plugin in world.plugins] == [DummyWorldPlugin]
 
 
-def test_world_plugin_takes_nothing(plugin_world: Any) -> None:
+def test_world_plugin_rejects_parameters(plugin_world: Any) -> None:
     text = plugin_world.error("", world_plugins="- {type: DummyWorldPlugin, name: d, more: 1}")
     assert 'World Plugin "d" type "DummyWorldPlugin": ' in text
     assert "more" in text

@@ -1,4 +1,4 @@
-"""Easing curves: names, ends, shapes."""
+"""Easing curves: names, end values and shapes."""
 
 from __future__ import annotations
 
@@ -34,19 +34,19 @@ def test_there_are_28_easings() -> None:
 
 
 @pytest.mark.parametrize("name", EASINGS)
-def test_the_ends_are_exact(name: str) -> None:
+def test_end_values_are_exact(name: str) -> None:
     assert EASINGS[name](0.0) == 0.0
     assert EASINGS[name](1.0) == 1.0
 
 
 @pytest.mark.parametrize("family", FAMILIES)
-def test_out_is_in_turned_round(family: str) -> None:
+def test_out_is_the_mirror_image_of_in(family: str) -> None:
     for p in (0.05, 0.3, 0.5, 0.77, 0.95):
         assert EASINGS[f"{family}Out"](p) == pytest.approx(1 - EASINGS[f"{family}In"](1 - p))
 
 
 @pytest.mark.parametrize("family", FAMILIES)
-def test_in_out_is_symmetric_about_the_middle(family: str) -> None:
+def test_in_out_is_point_symmetric(family: str) -> None:
     ease = EASINGS[f"{family}InOut"]
     assert ease(0.5) == pytest.approx(0.5)
     for p in (0.05, 0.2, 0.4):
@@ -54,7 +54,7 @@ def test_in_out_is_symmetric_about_the_middle(family: str) -> None:
 
 
 @pytest.mark.parametrize("name", MONOTONOUS)
-def test_ordinary_curves_only_rise(name: str) -> None:
+def test_curves_without_overshoot_are_monotonic(name: str) -> None:
     values = [EASINGS[name](i / 200) for i in range(201)]
     assert values == sorted(values)
 
@@ -72,7 +72,7 @@ def test_ordinary_curves_only_rise(name: str) -> None:
         ("exponentialOut", 0.5, 1 - 2**-5),
         ("circularIn", 0.6, 0.2),
         ("circularOut", 0.4, 0.8),
-        # Overshoot: 10 % below 0 at its lowest.
+        # The overshoot of 10 %, at the minimum.
         ("backIn", 0.5, 0.25 * (2.70158 * 0.5 - 1.70158)),
         ("backInOut", 0.25, 0.125 * (3.5949095 * 0.5 - 2.5949095)),
         ("elasticIn", 0.7, 2**-3 * 1.0),

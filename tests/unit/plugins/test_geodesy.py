@@ -1,4 +1,4 @@
-"""WGS84: against the forward conversion and the geometry of the ellipsoid."""
+"""WGS84 conversions, compared with the forward conversion and the geometry of the ellipsoid."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ LONGITUDES = [-180.0, -80.4925, 0.0, 1e-8, 90.0, 179.9999999]
 
 
 def up(latitude: float, longitude: float) -> np.ndarray:
-    """Unit normal of the ellipsoid."""
+    """Returns the unit normal of the ellipsoid."""
     phi, lam = math.radians(latitude), math.radians(longitude)
     return np.array([math.cos(phi) * math.cos(lam), math.cos(phi) * math.sin(lam), math.sin(phi)])
 
 
 def surface(latitude: float, longitude: float) -> np.ndarray:
-    """Point of the ellipsoid with a given normal, from its implicit equation."""
+    """Returns the point of the ellipsoid with a given normal, from its implicit equation."""
     normal = up(latitude, longitude)
     squares = np.array([A * A, A * A, A * A * (1 - E2)])
     return squares * normal / math.sqrt(float(squares @ normal**2))
@@ -42,7 +42,7 @@ def test_inverse_of_the_forward_conversion(latitude: float, height: float) -> No
             assert turn == pytest.approx(0.0, abs=TOLERANCE)
 
 
-def test_poles_exactly() -> None:
+def test_poles_are_exact() -> None:
     b = A * math.sqrt(1 - E2)
     assert geodetic_from_ecef(0.0, 0.0, b) == (math.pi / 2, 0.0)
     assert geodetic_from_ecef(0.0, 0.0, -b) == (-math.pi / 2, 0.0)
@@ -50,10 +50,10 @@ def test_poles_exactly() -> None:
 
 @pytest.mark.parametrize("latitude", LATITUDES)
 @pytest.mark.parametrize("reach", [0.5, 1e3, 1e5, 5e6])
-def test_points_of_the_plane_stand_over_the_place_found(latitude: float, reach: float) -> None:
+def test_points_of_the_plane_are_on_the_normal_of_the_result(latitude: float, reach: float) -> None:
     longitude = -80.4925
     plane = TangentPlane(latitude, longitude)
-    # Axes of the plane from differences of the normal, which are exact enough for directions.
+    # Axes of the plane from differences of the normal, which suffice for directions.
     lam = math.radians(longitude)
     east = np.array([-math.sin(lam), math.cos(lam), 0.0])
     north = np.cross(up(latitude, longitude), east)
@@ -63,29 +63,29 @@ def test_points_of_the_plane_stand_over_the_place_found(latitude: float, reach: 
         foot, normal = surface(*found), up(*found)
         height = float((point - foot) @ normal)
         aside = np.linalg.norm(point - foot - height * normal)
-        # As an angle seen from the centre of curvature.
+        # The angle at the center of curvature.
         assert math.degrees(aside / (A + height)) < TOLERANCE
         assert height > -1e-6
 
 
-def test_reference_point_is_found_again() -> None:
+def test_reference_point_maps_to_itself() -> None:
     for latitude in LATITUDES:
         for longitude in LONGITUDES:
             found = TangentPlane(latitude, longitude).geodetic(0.0, 0.0)
             assert found[0] == pytest.approx(latitude, abs=TOLERANCE)
 
 
-def test_along_the_equator_the_longitude_is_a_plain_arc_tangent() -> None:
+def test_longitude_along_the_equator_is_an_arc_tangent() -> None:
     latitude, longitude = TangentPlane(0.0, 0.0).geodetic(100.0, 0.0)
     assert latitude == 0.0
     assert longitude == pytest.approx(math.degrees(math.atan2(100.0, A)), abs=1e-14)
 
 
-def test_over_the_pole() -> None:
+def test_plane_at_the_pole() -> None:
     plane = TangentPlane(90.0, 0.0)
-    # North of the pole, as the reference's meridian runs on, lies the other side of the Earth.
+    # North of the pole, the meridian of the reference point continues on the opposite longitude.
     latitude, longitude = plane.geodetic(0.0, 1000.0)
     assert latitude < 90.0
     assert abs(longitude) == pytest.approx(180.0, abs=TOLERANCE)
-    # East of it, with the meridian of 0 going away behind, is 90 degrees east.
+    # East of the pole, as seen along the meridian of 0 degrees, is 90 degrees east.
     assert plane.geodetic(1000.0, 0.0)[1] == pytest.approx(90.0, abs=TOLERANCE)

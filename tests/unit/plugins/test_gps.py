@@ -25,12 +25,12 @@ def test_defaults(plugin_world: Any, collect: Collect) -> None:
     assert list(world.ports.outputs) == ["/r1/gps/fix"]
     messages = collect(world, "/r1/gps/fix")
     world.step(201)
-    # 10 Hz, from time 0 on, stamped with the time before the step.
+    # 10 Hz from time 0 on, stamped with the time before the step.
     assert [message.stamp for message in messages] == [100_000_000 * i for i in range(11)]
     fix = messages[0]
     assert type(fix) is NavSatFix
     assert fix.frame_id == "r1_antenna"
-    # The reference point is where equator and prime meridian cross; x is east, y north.
+    # The default reference point is on the equator and the prime meridian; x is east, y north.
     assert fix.longitude == pytest.approx(100 / A / DEGREE, rel=1e-9)
     assert fix.latitude == pytest.approx(200 / (A * (1 - E2)) / DEGREE, rel=1e-8)
     assert fix.altitude == 0.0
@@ -46,7 +46,7 @@ def test_reference_point(plugin_world: Any) -> None:
     )
     output = world.output("/gps/fix")
     world.step()
-    # Radii of curvature at the reference point; good to the square of 50 m over the Earth's.
+    # Radii of curvature at the reference point; the error is of the order of (50 m / radius)².
     sin_phi = math.sin(43.4516 * DEGREE)
     root = math.sqrt(1 - E2 * sin_phi**2)
     east_radius = A / root * math.cos(43.4516 * DEGREE)
@@ -79,7 +79,9 @@ def test_position_is_that_before_the_step(plugin_world: Any) -> None:
 
 
 @pytest.mark.parametrize(("latitude", "longitude"), [(90, 0), (-90, 0), (0, 180), (0, 0)])
-def test_poles_and_equator(plugin_world: Any, latitude: float, longitude: float) -> None:
+def test_reference_points_at_poles_and_equator(
+    plugin_world: Any, latitude: float, longitude: float
+) -> None:
     world = plugin_world(
         f"[{{type: Gps, name: gps, body: base, ref_lat: {latitude}, ref_lon: {longitude}}}]"
     )
@@ -100,13 +102,13 @@ def test_parameters(plugin_world: Any, collect: Collect) -> None:
     assert (transform.x, transform.y, transform.yaw, transform.roll) == (0.1, 0.2, 0.3, 0.0)
 
 
-def test_global_frame(plugin_world: Any) -> None:
+def test_a_global_frame_has_no_namespace(plugin_world: Any) -> None:
     world = plugin_world("[{type: Gps, name: g, body: base, frame: /gps}]", namespace="r1")
     world.step()
     assert list(world.transforms) == [("r1_base", "gps")]
 
 
-def test_transform_goes_out_at_the_rate_without_listeners(plugin_world: Any) -> None:
+def test_transform_is_sent_at_the_update_rate_without_subscribers(plugin_world: Any) -> None:
     world = plugin_world(GPS)
     world.step()
     assert world.transforms["base", "antenna"].stamp == 0
@@ -117,7 +119,7 @@ def test_transform_goes_out_at_the_rate_without_listeners(plugin_world: Any) -> 
     assert world.ports.find_output("/gps/fix").latest is None
 
 
-def test_broadcast_tf_off(plugin_world: Any) -> None:
+def test_no_transform_without_broadcast_tf(plugin_world: Any) -> None:
     world = plugin_world("[{type: Gps, name: gps, body: base, broadcast_tf: false}]")
     output = world.output("/gps/fix")
     world.step()
@@ -135,9 +137,9 @@ def test_broadcast_tf_off(plugin_world: Any) -> None:
         ("body: base, ref_lon: .inf", 'Invalid "ref_lon", must be finite'),
         ("body: base, origin: [0, 0]", 'Entry "origin" must have size of exactly 3'),
         ("body: base, update_rate: -2", 'Invalid "update_rate", must not be negative'),
-        # [fix] The reference does not check the keys of this plugin.
+        # The reference does not check the keys of this plugin.
         ("body: base, lat: 3", 'unrecognized entry(s) {"lat"}'),
     ],
 )
-def test_errors(plugin_world: Any, entry: str, text: str) -> None:
+def test_invalid_parameters_are_errors(plugin_world: Any, entry: str, text: str) -> None:
     assert text in plugin_world.error(f"[{{type: Gps, name: gps, {entry}}}]".replace(", }", "}"))

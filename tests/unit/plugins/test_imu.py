@@ -23,7 +23,7 @@ def imu(entry: str) -> str:
 
 
 def accelerate(world: flatland.World, steps: int, ax: float, ay: float) -> None:
-    """Speeds the robot up from rest, evenly, in the world frame."""
+    """Accelerates the robot from rest at a constant rate in the world frame."""
     base = world.model("robot").body("base")
     for _ in range(steps):
         vx, vy, omega = base.velocity
@@ -39,7 +39,7 @@ def test_defaults(plugin_world: Any, collect: Collect) -> None:
     world.model("robot").body("base").set_velocity(0.0, 0.0, 2.0)
     world.step(2)
     for messages in (filtered, truth):
-        # [fix] Simulated time after the step, and a frame with the namespace.
+        # Unlike the reference: simulated time after the step, and a namespaced frame.
         assert [message.stamp for message in messages] == [5_000_000, 10_000_000]
         assert type(messages[1]) is Imu
         assert messages[1].frame_id == "r1_imu"
@@ -65,7 +65,7 @@ def test_first_message_has_no_acceleration(plugin_world: Any, collect: Collect) 
 
 
 def test_acceleration_at_the_default_rate(plugin_world: Any, collect: Collect) -> None:
-    # [fix] The reference multiplies by the rate, which is infinite by default: NaN.
+    # The reference multiplies by the rate, which is infinite by default, and publishes NaN.
     world = plugin_world(IMU)
     messages = collect(world, "/imu/filtered")
     accelerate(world, 5, 2.0, -1.0)
@@ -73,10 +73,10 @@ def test_acceleration_at_the_default_rate(plugin_world: Any, collect: Collect) -
 
 
 @pytest.mark.parametrize("yaw", [0.3, math.pi / 2, 2.5, -1.0])
-def test_acceleration_is_turned_into_the_body_frame(
+def test_acceleration_is_rotated_into_the_body_frame(
     plugin_world: Any, collect: Collect, yaw: float
 ) -> None:
-    # [fix] The reference turns with a wrong sign: the y axis comes out as sin and cos summed.
+    # The reference has a wrong sign in the rotation of the y axis.
     world = plugin_world(IMU, pose=(0, 0, yaw))
     messages = collect(world, "/imu/filtered")
     ahead, left = 3.0, 0.5
@@ -90,10 +90,10 @@ def test_acceleration_is_turned_into_the_body_frame(
 
 
 @pytest.mark.parametrize("rate", [100, 30])
-def test_acceleration_over_the_true_interval(
+def test_acceleration_uses_the_elapsed_time(
     plugin_world: Any, collect: Collect, rate: float
 ) -> None:
-    # At 30 Hz and 5 ms the messages are 30 or 35 ms apart, never 1/30 s.
+    # At 30 Hz and steps of 5 ms the interval between messages is 30 or 35 ms, never 1/30 s.
     world = plugin_world(imu(f"update_rate: {rate}"))
     messages = collect(world, "/imu/filtered")
     accelerate(world, 60, 2.0, 0.0)
@@ -102,7 +102,9 @@ def test_acceleration_over_the_true_interval(
         assert message.linear_acceleration == pytest.approx((2.0, 0.0), abs=2e-3)
 
 
-def test_circular_motion_points_to_the_centre(plugin_world: Any, collect: Collect) -> None:
+def test_acceleration_of_circular_motion_points_to_the_center(
+    plugin_world: Any, collect: Collect
+) -> None:
     world = plugin_world(
         "[{type: DiffDrive, name: drive, body: base}, {type: Imu, name: imu, body: base}]"
     )
@@ -110,12 +112,12 @@ def test_circular_motion_points_to_the_centre(plugin_world: Any, collect: Collec
     world.command("/cmd_vel").set(flatland.Twist(linear_x=1.0, angular_z=0.5))
     world.step(20)
     ahead, left = messages[-1].linear_acceleration
-    # v * omega to the left; the velocity is half a step behind the heading.
+    # v * omega to the left; the velocity lags behind the heading by half a step.
     assert left == pytest.approx(0.5, abs=1e-3)
     assert ahead == pytest.approx(0.0, abs=5e-3)
 
 
-def test_it_measures_the_origin_not_the_centre_of_mass(plugin_world: Any, collect: Collect) -> None:
+def test_acceleration_is_that_of_the_origin(plugin_world: Any, collect: Collect) -> None:
     lopsided = """
     - name: base
       footprints: [{type: circle, radius: 0.2, center: [0.5, 0], density: 1}]
@@ -126,12 +128,12 @@ def test_it_measures_the_origin_not_the_centre_of_mass(plugin_world: Any, collec
     world.step()
     base.apply_torque(1.0)
     world.step()
-    # The centre stays where it is, the origin is 0.5 m behind it: it goes to the right.
+    # The center of mass is at rest; the origin, 0.5 m behind it, moves to the right.
     yaw_acceleration = base.velocity[2] / DT
     assert messages[-1].linear_acceleration[1] == pytest.approx(-0.5 * yaw_acceleration, rel=1e-2)
 
 
-def test_late_listener_gets_the_acceleration_of_the_last_interval(
+def test_a_late_subscriber_receives_the_acceleration_of_the_last_interval(
     plugin_world: Any, collect: Collect
 ) -> None:
     world = plugin_world(IMU)
@@ -143,7 +145,7 @@ def test_late_listener_gets_the_acceleration_of_the_last_interval(
     assert messages[0].linear_acceleration == pytest.approx((4.0, 0.0), abs=1e-3)
 
 
-def test_names(plugin_world: Any) -> None:
+def test_topic_and_frame_parameters(plugin_world: Any) -> None:
     world = plugin_world(
         imu("imu_pub: /a, ground_truth_pub: b/c, imu_frame_id: box"), namespace="r1"
     )
@@ -154,7 +156,7 @@ def test_names(plugin_world: Any) -> None:
     assert list(world.transforms) == [("r1_base", "r1_box")]
 
 
-def test_only_what_is_wanted_goes_out(plugin_world: Any) -> None:
+def test_only_wanted_outputs_are_emitted(plugin_world: Any) -> None:
     world = plugin_world(IMU)
     truth = world.output("/imu/ground_truth")
     world.step()
@@ -162,14 +164,14 @@ def test_only_what_is_wanted_goes_out(plugin_world: Any) -> None:
     assert world.ports.find_output("/imu/filtered").latest is None
 
 
-def test_without_messages(plugin_world: Any) -> None:
+def test_no_outputs_without_enable_imu_pub(plugin_world: Any) -> None:
     world = plugin_world(imu("enable_imu_pub: false"))
     world.step()
     assert world.ports.outputs == {}
     assert list(world.transforms) == [("base", "imu")]
 
 
-def test_broadcast_tf_off(plugin_world: Any) -> None:
+def test_no_transform_without_broadcast_tf(plugin_world: Any) -> None:
     world = plugin_world(imu("broadcast_tf: false"))
     world.step()
     assert world.transforms == {}
@@ -182,7 +184,9 @@ def test_no_transform_of_a_frame_to_itself(plugin_world: Any) -> None:
 
 
 @pytest.mark.parametrize("key", ["update_rate", "pub_rate"])
-def test_rate(plugin_world: Any, collect: Collect, key: str) -> None:
+def test_messages_are_published_at_the_update_rate(
+    plugin_world: Any, collect: Collect, key: str
+) -> None:
     world = plugin_world(imu(f"{key}: 40"))
     messages = collect(world, "/imu/filtered")
     sent = []
@@ -191,11 +195,11 @@ def test_rate(plugin_world: Any, collect: Collect, key: str) -> None:
         sent.append(world.transforms.get(("base", "imu")))
     assert len(messages) == 40
     assert [m.stamp for m in messages][:2] == [25_000_000, 50_000_000]
-    # The transform keeps to the rate, too.
+    # The transform is sent at the same rate.
     assert len({transform.stamp for transform in sent if transform}) == 40
 
 
-def test_noise(plugin_world: Any, collect: Collect) -> None:
+def test_noise_has_the_configured_variances(plugin_world: Any, collect: Collect) -> None:
     world = plugin_world(
         imu(
             "orientation_noise: [9, 9, 0.01], angular_velocity_noise: [9, 9, 0.04], "
@@ -208,10 +212,10 @@ def test_noise(plugin_world: Any, collect: Collect) -> None:
     assert all(m.yaw == 0 and m.yaw_rate == 0 for m in truth)
     assert all(m.linear_acceleration == (0, 0) for m in truth)
     samples = np.array([(m.yaw, m.yaw_rate, *m.linear_acceleration) for m in filtered])
-    # Variances, of which the yaw, the yaw rate, x and y are used.
+    # The variances of yaw, yaw rate, x and y are used.
     assert samples.std(axis=0) == pytest.approx([0.1, 0.2, 0.3, 0.5], rel=0.08)
     assert samples.mean(axis=0) == pytest.approx(np.zeros(4), abs=0.04)
-    # Independent of each other.
+    # The noises are independent.
     assert np.corrcoef(samples.T) == pytest.approx(np.eye(4), abs=0.1)
 
 
@@ -225,7 +229,7 @@ def test_noise_is_repeatable(plugin_world: Any, collect: Collect) -> None:
     assert runs[0] == runs[1] != runs[2]
 
 
-def test_covariances_come_from_the_noises(plugin_world: Any, collect: Collect) -> None:
+def test_default_covariances_have_the_variances(plugin_world: Any, collect: Collect) -> None:
     world = plugin_world(
         imu(
             "orientation_noise: [1, 2, 3], angular_velocity_noise: [4, 5, 6], "
@@ -243,7 +247,9 @@ def test_covariances_come_from_the_noises(plugin_world: Any, collect: Collect) -
 
 
 @pytest.mark.parametrize("kind", ["orientation", "angular_velocity", "linear_acceleration"])
-def test_covariances_as_given(plugin_world: Any, collect: Collect, kind: str) -> None:
+def test_configured_covariances_are_published(
+    plugin_world: Any, collect: Collect, kind: str
+) -> None:
     world = plugin_world(
         imu(f"{kind}_noise: [1, 1, 1], {kind}_covariance: [1, 2, 3, 4, 5, 6, 7, 8, 9]")
     )
@@ -262,15 +268,15 @@ def test_covariances_as_given(plugin_world: Any, collect: Collect, kind: str) ->
             "body: base, orientation_noise: [0, 0]",
             '"orientation_noise" must have size of exactly 3',
         ),
-        # [fix] The reference takes the root of a negative variance.
+        # The reference computes the square root of a negative variance.
         ("body: base, orientation_noise: [0, 0, -1]", 'Invalid "orientation_noise", must be'),
         ("body: base, angular_velocity_noise: [-1, 0, 0]", 'Invalid "angular_velocity_noise"'),
         ("body: base, linear_acceleration_noise: [.nan, 0, 0]", '"linear_acceleration_noise"'),
         ("body: base, orientation_covariance: [1]", "must have size of exactly 9"),
         ("body: base, update_rate: -1", 'Invalid "update_rate", must not be negative'),
-        ("body: base, update_rate: 5, pub_rate: 5", 'Invalid "pub_rate", it is the older spelling'),
+        ("body: base, update_rate: 5, pub_rate: 5", 'Invalid "pub_rate", the older spelling'),
         ("body: base, noise: 1", 'unrecognized entry(s) {"noise"}'),
     ],
 )
-def test_errors(plugin_world: Any, entry: str, text: str) -> None:
+def test_invalid_parameters_are_errors(plugin_world: Any, entry: str, text: str) -> None:
     assert text in plugin_world.error(f"[{{type: Imu, name: imu, {entry}}}]".replace(", }", "}"))

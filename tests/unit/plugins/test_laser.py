@@ -30,7 +30,7 @@ def laser(extra: str = "", angle: str = CROSS) -> str:
 
 
 class Walls:
-    """Worlds with walls, and a robot with a laser in them."""
+    """Loads worlds with walls and a robot with a laser."""
 
     def __init__(self, plugin_world: Any) -> None:
         self.load = plugin_world
@@ -65,17 +65,17 @@ class TestRanges:
         assert ranges.dtype == np.float32
         assert ranges == pytest.approx([6.0, 5.0, 2.0, 3.0], abs=1e-4)
 
-    def test_the_sensor_turns_with_its_body(self, walls: Walls) -> None:
+    def test_the_sensor_rotates_with_its_body(self, walls: Walls) -> None:
         ranges = eye(walls.room(pose=(3.0, 4.0, math.pi / 2))).compute_ranges()
         assert ranges == pytest.approx([5.0, 2.0, 3.0, 6.0], abs=1e-4)
 
     def test_origin_is_a_pose_in_the_body_frame(self, walls: Walls) -> None:
         world = walls.room("origin: [0.5, 0.25, 3.141592653589793]", pose=(3.0, 4.0, math.pi / 2))
-        # Body at (3, 4) looking up, sensor at (2.75, 4.5) looking down.
+        # The body is at (3, 4) and faces up, the sensor is at (2.75, 4.5) and faces down.
         ranges = eye(world).compute_ranges()
         assert ranges == pytest.approx([3.5, 6.25, 4.5, 1.75], abs=1e-4)
 
-    def test_upside_down_turns_the_other_way(self, walls: Walls) -> None:
+    def test_upside_down_negates_the_angles(self, walls: Walls) -> None:
         ranges = eye(walls.room("upside_down: true")).compute_ranges()
         assert ranges == pytest.approx([6.0, 3.0, 2.0, 5.0], abs=1e-4)
 
@@ -105,19 +105,19 @@ class TestRanges:
         angles = -0.3 + 0.01 * np.arange(61)
         assert ranges == pytest.approx(6.0 / np.cos(angles), abs=1e-4)
 
-    def test_scan_follows_a_moved_body_at_once(self, walls: Walls) -> None:
+    def test_a_scan_uses_the_current_pose_of_the_body(self, walls: Walls) -> None:
         world = walls.room()
         world.model("robot").body("base").set_pose(5.0, 5.0, 0.0)
         assert eye(world).compute_ranges() == pytest.approx([4.0] * 4, abs=1e-4)
 
-    def test_each_call_gives_a_new_array(self, walls: Walls) -> None:
+    def test_each_call_returns_a_new_array(self, walls: Walls) -> None:
         plugin = eye(walls.room())
         first = plugin.compute_ranges()
         first[:] = 0
         assert plugin.compute_ranges()[0] == pytest.approx(6.0, abs=1e-4)
 
 
-class TestWhatItSees:
+class TestVisibility:
     def bodies(self, footprint: str) -> str:
         return f"""
         - name: base
@@ -127,32 +127,32 @@ class TestWhatItSees:
           footprints: [{footprint}]
         """
 
-    def ahead(self, walls: Walls, footprint: str, extra: str = "") -> float:
+    def range_ahead(self, walls: Walls, footprint: str, extra: str = "") -> float:
         return float(eye(walls.room(extra, bodies=self.bodies(footprint))).compute_ranges()[0])
 
-    def test_other_body_of_its_own_model_counts(self, walls: Walls) -> None:
-        seen = self.ahead(walls, "{type: circle, radius: 0.5, density: 1}")
+    def test_other_bodies_of_the_model_are_visible(self, walls: Walls) -> None:
+        seen = self.range_ahead(walls, "{type: circle, radius: 0.5, density: 1}")
         assert seen == pytest.approx(1.5, abs=1e-4)
 
-    def test_body_that_collides_with_nothing_is_seen(self, walls: Walls) -> None:
-        seen = self.ahead(walls, "{type: circle, radius: 0.5, density: 1, collision: false}")
+    def test_fixtures_without_collision_are_visible(self, walls: Walls) -> None:
+        seen = self.range_ahead(walls, "{type: circle, radius: 0.5, density: 1, collision: false}")
         assert seen == pytest.approx(1.5, abs=1e-4)
 
-    def test_sensor_fixture_is_not_seen(self, walls: Walls) -> None:
-        seen = self.ahead(walls, "{type: circle, radius: 0.5, density: 1, sensor: true}")
+    def test_sensor_fixtures_are_invisible(self, walls: Walls) -> None:
+        seen = self.range_ahead(walls, "{type: circle, radius: 0.5, density: 1, sensor: true}")
         assert seen == pytest.approx(6.0, abs=1e-4)
 
     def test_ray_that_starts_inside_a_shape_does_not_hit_it(self, walls: Walls) -> None:
         polygon = "{type: polygon, density: 1, points: [[-3, -1], [1, -1], [1, 1], [-3, 1]]}"
-        assert self.ahead(walls, polygon) == pytest.approx(6.0, abs=1e-4)
+        assert self.range_ahead(walls, polygon) == pytest.approx(6.0, abs=1e-4)
 
-    def test_only_the_given_layers_count(self, walls: Walls) -> None:
+    def test_fixtures_of_other_layers_are_invisible(self, walls: Walls) -> None:
         post = "{type: circle, radius: 0.5, density: 1, layers: [3d]}"
-        assert self.ahead(walls, post, "layers: [3d]") == pytest.approx(1.5, abs=1e-4)
-        assert self.ahead(walls, post, "layers: [2d]") == pytest.approx(6.0, abs=1e-4)
-        assert self.ahead(walls, post, "layers: [3d, 2d]") == pytest.approx(1.5, abs=1e-4)
-        assert self.ahead(walls, post, "layers: [all]") == pytest.approx(1.5, abs=1e-4)
-        assert math.isnan(self.ahead(walls, post, "layers: []"))
+        assert self.range_ahead(walls, post, "layers: [3d]") == pytest.approx(1.5, abs=1e-4)
+        assert self.range_ahead(walls, post, "layers: [2d]") == pytest.approx(6.0, abs=1e-4)
+        assert self.range_ahead(walls, post, "layers: [3d, 2d]") == pytest.approx(1.5, abs=1e-4)
+        assert self.range_ahead(walls, post, "layers: [all]") == pytest.approx(1.5, abs=1e-4)
+        assert math.isnan(self.range_ahead(walls, post, "layers: []"))
 
 
 class TestNoHit:
@@ -170,11 +170,11 @@ class TestNoHit:
         np.testing.assert_array_equal(ranges, np.full(4, value, np.float32))
 
     @pytest.mark.parametrize("length", [0.5, 1e6])
-    def test_shortest_and_longest_beams(self, walls: Walls, length: float) -> None:
+    def test_minimum_and_maximum_range(self, walls: Walls, length: float) -> None:
         plugin = laser("no_hit: range").replace("range: 20", f"range: {length}")
         assert eye(walls.load(plugin)).compute_ranges().tolist() == [length] * 4
 
-    def test_wall_beyond_the_range_is_no_hit(self, walls: Walls) -> None:
+    def test_a_wall_beyond_the_range_is_a_miss(self, walls: Walls) -> None:
         walls.files.write_map("room", ROOM)
         plugin = laser().replace("range: 20", "range: 4")
         world = walls.load(plugin, layers=ROOM_LAYERS, pose=(3.0, 4.0, 0.0))
@@ -186,7 +186,7 @@ class TestNoHit:
 class TestNoise:
     ANGLE = "{min: -0.5, max: 0.5, increment: 0.0005}"
 
-    def test_standard_deviation_is_as_asked(self, walls: Walls) -> None:
+    def test_noise_has_the_configured_standard_deviation(self, walls: Walls) -> None:
         exact = eye(walls.room(angle=self.ANGLE)).compute_ranges()
         noisy = eye(walls.room("noise_std_dev: 0.2", angle=self.ANGLE)).compute_ranges()
         error = noisy - exact
@@ -202,7 +202,7 @@ class TestNoise:
         plugin = eye(walls.room("noise_std_dev: 0.2"))
         assert (plugin.compute_ranges() != plugin.compute_ranges()).all()
 
-    def test_the_seed_decides(self, walls: Walls) -> None:
+    def test_noise_is_determined_by_the_seed(self, walls: Walls) -> None:
         def scan(seed: int) -> list[float]:
             world = walls.room("noise_std_dev: 0.2", seed=seed)
             return eye(world).compute_ranges().tolist()  # type: ignore[no-any-return]
@@ -210,7 +210,7 @@ class TestNoise:
         assert scan(3) == scan(3)
         assert scan(3) != scan(4)
 
-    def test_without_noise_nothing_is_drawn(self, walls: Walls) -> None:
+    def test_no_random_numbers_are_drawn_without_noise(self, walls: Walls) -> None:
         plugin = eye(walls.room())
         before = plugin.rng.bit_generator.state
         plugin.compute_ranges()
@@ -230,7 +230,7 @@ class TestNoise:
 
 class TestIntensities:
     def load(self, walls: Walls, near: str, far: str, layers: str = "[all]") -> Any:
-        """A segment 2 m ahead in the layer `plain`, one 4 m ahead in `reflectance`."""
+        """A segment 2 m range_ahead in the layer `plain`, one 4 m range_ahead in `reflectance`."""
         maps = (walls.segments("near", near), walls.segments("far", far))
         text = f"[{{name: plain, map: {maps[0]}}}, {{name: reflectance, map: {maps[1]}}}]"
         return eye(walls.load(laser(f"layers: {layers}"), layers=text))
@@ -241,34 +241,34 @@ class TestIntensities:
         assert plugin.intensities.shape == (0,)
         assert plugin.intensities.dtype == np.float32
 
-    def test_255_where_the_hit_is_in_the_layer(self, walls: Walls) -> None:
+    def test_hits_in_the_layer_have_intensity_255(self, walls: Walls) -> None:
         plugin = self.load(walls, "-2 -1 -2 1", "4 -1 4 1")
         plugin.compute_ranges()
         assert plugin.intensities.dtype == np.float32
         assert plugin.intensities.tolist() == [255.0, 0.0, 0.0, 0.0]
 
-    def test_a_farther_hit_does_not_shine_through(self, walls: Walls) -> None:
+    def test_a_farther_hit_has_no_effect(self, walls: Walls) -> None:
         plugin = self.load(walls, "2 -1 2 1", "4 -1 4 1")
         assert plugin.compute_ranges()[0] == pytest.approx(2.0, abs=1e-4)
         assert plugin.intensities.tolist() == [0.0] * 4
 
-    def test_any_of_several_hits_at_one_distance(self, walls: Walls) -> None:
+    def test_one_of_several_hits_at_the_same_distance_suffices(self, walls: Walls) -> None:
         plugin = self.load(walls, "4 -1 4 1", "4 -1 4 1")
         plugin.compute_ranges()
         assert plugin.intensities[0] == 255.0
 
-    def test_the_layer_may_be_the_first(self, walls: Walls) -> None:
+    def test_the_reflectance_layer_may_be_the_first_one(self, walls: Walls) -> None:
         layers = f"[{{name: reflectance, map: {walls.segments('near', '2 -1 2 1')}}}]"
         plugin = eye(walls.load(laser(), layers=layers))
         plugin.compute_ranges()
         assert plugin.intensities.tolist() == [255.0, 0.0, 0.0, 0.0]
 
-    def test_layer_that_the_laser_does_not_see(self, walls: Walls) -> None:
+    def test_a_reflectance_layer_that_is_invisible_has_no_effect(self, walls: Walls) -> None:
         plugin = self.load(walls, "-2 -1 -2 1", "4 -1 4 1", "[plain]")
         assert math.isnan(plugin.compute_ranges()[0])
         assert plugin.intensities.tolist() == [0.0] * 4
 
-    def test_they_are_part_of_the_message(self, walls: Walls) -> None:
+    def test_intensities_are_part_of_the_message(self, walls: Walls) -> None:
         plugin = self.load(walls, "-2 -1 -2 1", "4 -1 4 1")
         output = plugin.world.output("/scan")
         plugin.world.step()
@@ -312,7 +312,7 @@ class TestMessage:
         assert output.latest.frame_id == frame_id
         assert list(world.transforms) == [("r1_base", frame_id)]
 
-    def test_scan_is_of_the_pose_before_the_step(self, walls: Walls) -> None:
+    def test_a_scan_has_the_pose_before_the_step(self, walls: Walls) -> None:
         world = walls.room()
         world.model("robot").body("base").set_velocity(1.0, 0.0, 0.0)
         output = world.output("/scan")
@@ -322,7 +322,7 @@ class TestMessage:
         assert output.latest.ranges[0] == pytest.approx(5.995, abs=1e-4)
 
 
-class TestWhenItWorks:
+class TestUpdates:
     def count_scans(self, world: flatland.World, steps: int, monkeypatch: Any) -> int:
         calls: list[int] = []
         cast = world.physics.cast_rays
@@ -335,12 +335,12 @@ class TestWhenItWorks:
         world.step(steps)
         return len(calls)
 
-    def test_nothing_is_computed_when_nobody_listens(
+    def test_nothing_is_computed_without_subscribers(
         self, walls: Walls, monkeypatch: pytest.MonkeyPatch
     ) -> None:
         assert self.count_scans(walls.room(), 10, monkeypatch) == 0
 
-    def test_a_listener_makes_it_compute(
+    def test_scans_are_computed_for_a_subscriber(
         self, walls: Walls, monkeypatch: pytest.MonkeyPatch
     ) -> None:
         world = walls.room()
@@ -366,7 +366,7 @@ class TestWhenItWorks:
 
 
 class TestTransform:
-    def test_sent_although_nobody_wants_the_scan(self, walls: Walls) -> None:
+    def test_transform_is_sent_without_subscribers(self, walls: Walls) -> None:
         world = walls.room("origin: [0.1, 0.2, 0.3]", namespace="r1")
         world.step(2)
         sent = world.transforms["r1_base", "r1_eye"]
@@ -377,12 +377,12 @@ class TestTransform:
         world.step()
         assert world.transforms["base", "eye"].roll == pytest.approx(math.pi)
 
-    def test_broadcast_tf_false(self, walls: Walls) -> None:
+    def test_no_transform_without_broadcast_tf(self, walls: Walls) -> None:
         world = walls.room("broadcast_tf: false")
         world.step()
         assert world.transforms == {}
 
-    def test_sent_at_the_update_rate(self, walls: Walls) -> None:
+    def test_transform_is_sent_at_the_update_rate(self, walls: Walls) -> None:
         world = walls.room("update_rate: 40")
         stamps = []
         for _ in range(20):

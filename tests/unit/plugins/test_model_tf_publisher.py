@@ -37,7 +37,7 @@ def pose(transform: flatland.Transform) -> tuple[float, float, float]:
     return (transform.x, transform.y, transform.yaw)
 
 
-def test_from_the_first_body_to_all_others(tf: Any) -> None:
+def test_transforms_from_the_first_body_to_all_others(tf: Any) -> None:
     world = tf()
     world.step(3)
     assert set(world.transforms) == {("base", "arm"), ("base", "hand")}
@@ -52,7 +52,7 @@ def test_reference_body(tf: Any) -> None:
     world = tf("reference: arm")
     world.step()
     assert set(world.transforms) == {("arm", "base"), ("arm", "hand")}
-    # The arm is where its inverse says that the base is not.
+    # The transform is the inverse of the pose of the arm relative to the base.
     back = compose((1.0, 2.0, 0.5), pose(world.transforms["arm", "base"]))
     assert back == pytest.approx((0.0, 0.0, 0.0), abs=1e-5)
 
@@ -75,19 +75,19 @@ def test_world_transform(tf: Any) -> None:
 
 
 @pytest.mark.parametrize("frame", ["earth", "/earth"])
-def test_world_frame_is_used_as_written(tf: Any, frame: str) -> None:
+def test_world_frame_has_no_namespace(tf: Any, frame: str) -> None:
     world = tf(f"publish_tf_world: true, world_frame_id: {frame}", namespace="r1")
     world.step()
     assert (frame, "r1_base") in world.transforms
 
 
-def test_exclude(tf: Any) -> None:
+def test_no_transforms_of_excluded_bodies(tf: Any) -> None:
     world = tf("exclude: [hand], publish_tf_world: true")
     world.step()
     assert set(world.transforms) == {("base", "arm"), ("map", "base")}
 
 
-def test_it_follows_the_bodies(tf: Any) -> None:
+def test_transforms_follow_the_bodies(tf: Any) -> None:
     world = tf()
     world.step()
     world.model("robot").body("arm").set_pose(4.0, 5.0, 0.8 + math.pi / 2)
@@ -113,7 +113,7 @@ def test_update_rate(tf: Any) -> None:
         ("rate: 1", "rate"),
     ],
 )
-def test_errors(plugin_world: Any, extra: str, message: str) -> None:
+def test_invalid_parameters_are_errors(plugin_world: Any, extra: str, message: str) -> None:
     text = plugin_world.error(f"- {{type: ModelTfPublisher, name: tf, {extra}}}", bodies=BODIES)
     assert 'Model Plugin "tf" type "ModelTfPublisher" model "robot": ' in text
     assert message in text

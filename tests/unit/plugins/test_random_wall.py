@@ -1,4 +1,4 @@
-"""RandomWall: where the new walls stand, and which edges they belong to."""
+"""RandomWall: positions of the new walls, and the choice of edges."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def wall(entry: str = "") -> str:
 
 
 def lines(files: Any, *segments: str, origin: str = "[0, 0, 0]") -> str:
-    """Writes a map of line segments and returns the layers' text."""
+    """Writes a map of line segments and returns the YAML of the layers."""
     files.write("lines.dat", "\n".join(segments))
     path = files.write(
         "lines.yaml", f"{{type: line_segments, data: lines.dat, scale: 1, origin: {origin}}}"
@@ -29,14 +29,14 @@ def lines(files: Any, *segments: str, origin: str = "[0, 0, 0]") -> str:
 
 
 def edge_set(edges: Any) -> set[tuple[tuple[float, float], ...]]:
-    """Edges without order or direction, rounded."""
+    """Returns rounded edges without order or direction."""
     return {
         tuple(sorted(((round(x1, 4), round(y1, 4)), (round(x2, 4), round(y2, 4)))))
         for x1, y1, x2, y2 in np.asarray(edges, dtype=float).tolist()
     }
 
 
-def test_one_wall_on_the_robots_side(plugin_world: Any, files: Any) -> None:
+def test_wall_is_on_the_side_of_the_robot(plugin_world: Any, files: Any) -> None:
     layers = lines(files, "0 0 4 0")
     world = plugin_world(
         pose=(2, 3, 0), layers=layers, world_plugins=wall("num_of_walls: 1, wall_wall_dist: 0.5")
@@ -46,7 +46,7 @@ def test_one_wall_on_the_robots_side(plugin_world: Any, files: Any) -> None:
     )
 
 
-def test_other_side(plugin_world: Any, files: Any) -> None:
+def test_wall_is_on_the_other_side_if_the_robot_is_there(plugin_world: Any, files: Any) -> None:
     layers = lines(files, "0 0 4 0")
     world = plugin_world(
         pose=(2, -3, 0), layers=layers, world_plugins=wall("num_of_walls: 1, wall_wall_dist: 0.5")
@@ -64,7 +64,9 @@ def test_direction_of_the_edge_does_not_matter(plugin_world: Any, files: Any) ->
     assert ((0.0, 0.5), (4.0, 0.5)) in edge_set(world.layer("2d").edges)
 
 
-def test_default_distance_is_a_metre_and_default_count_none(plugin_world: Any, files: Any) -> None:
+def test_default_distance_is_one_metre_and_default_count_zero(
+    plugin_world: Any, files: Any
+) -> None:
     layers = lines(files, "0 0 4 0")
     world = plugin_world(pose=(2, 3, 0), layers=layers, world_plugins=wall("num_of_walls: 1"))
     assert ((0.0, 1.0), (4.0, 1.0)) in edge_set(world.layer("2d").edges)
@@ -72,7 +74,7 @@ def test_default_distance_is_a_metre_and_default_count_none(plugin_world: Any, f
     assert len(world.layer("2d").edges) == 1
 
 
-def test_double_wall(plugin_world: Any, files: Any) -> None:
+def test_double_wall_adds_walls_on_both_sides(plugin_world: Any, files: Any) -> None:
     layers = lines(files, "0 0 4 0")
     world = plugin_world(
         pose=(2, 3, 0), layers=layers, world_plugins=wall("num_of_walls: 1, double_wall: true")
@@ -86,8 +88,10 @@ def test_double_wall(plugin_world: Any, files: Any) -> None:
 
 
 @pytest.mark.parametrize(("x", "y"), [(0, 0), (7, -5)])
-def test_slanted_edges_get_their_distance(plugin_world: Any, files: Any, x: int, y: int) -> None:
-    # [fix] The reference moves them along x and along y at once, too far and slanting.
+def test_walls_of_slanted_edges_have_the_configured_distance(
+    plugin_world: Any, files: Any, x: int, y: int
+) -> None:
+    # The reference offsets slanted edges along x and y at once, which is too far.
     layers = lines(files, f"{x} {y} {x + 4} {y + 3}")
     world = plugin_world(
         pose=(x + 1.82, y + 1.74, 0),  # 0.3 m to its left
@@ -98,13 +102,13 @@ def test_slanted_edges_get_their_distance(plugin_world: Any, files: Any, x: int,
     assert edge_set(world.layer("2d").edges[1:]) == edge_set(np.add(expected, [x, y, x, y]))
 
 
-def test_robot_is_looked_for_in_the_layers_frame(plugin_world: Any, files: Any) -> None:
-    # Turned by 90 degrees and moved, the edge runs from (10, 0) up to (10, 4).
+def test_side_of_the_robot_is_determined_in_the_layer_frame(plugin_world: Any, files: Any) -> None:
+    # Rotated by 90 degrees and translated, the edge is from (10, 0) to (10, 4).
     layers = lines(files, "0 0 4 0", origin=f"[10, 0, {math.pi / 2}]")
     world = plugin_world(
         pose=(11, 2, 0), layers=layers, world_plugins=wall("num_of_walls: 1, wall_wall_dist: 0.5")
     )
-    # East of it, as the robot is, is to the right when one looks along it.
+    # East of the edge, where the robot is, is to its right.
     assert ((0.0, -0.5), (4.0, -0.5)) in edge_set(world.layer("2d").edges)
     robot = world.model("robot").body("base")
     hit = world.physics.ray_cast(robot.pose[:2], (0.0, 2.0), world.layer("2d").category_bits)
@@ -112,7 +116,7 @@ def test_robot_is_looked_for_in_the_layers_frame(plugin_world: Any, files: Any) 
     assert hit.point == pytest.approx((10.5, 2.0), abs=1e-5)
 
 
-def test_start_pose_counts_not_where_the_first_body_is(plugin_world: Any, files: Any) -> None:
+def test_the_pose_of_the_model_determines_the_side(plugin_world: Any, files: Any) -> None:
     body = """
     - name: base
       pose: [0, -10, 0]
@@ -143,7 +147,7 @@ def test_new_walls_have_the_friction_of_the_layer_and_its_bits(
 
 
 def test_lasers_see_the_new_wall(plugin_world: Any, files: Any) -> None:
-    # Two beams, to the right and ahead.
+    # Two beams: to the right and ahead.
     angle = "{min: -1.570796, max: 0, increment: 1.570796}"
     laser = f"[{{type: Laser, name: l, body: base, range: 9, angle: {angle}}}]"
     world = plugin_world(
@@ -165,7 +169,7 @@ def test_robots_collide_with_the_new_wall(plugin_world: Any, files: Any) -> None
     assert base.pose[1] == pytest.approx(1.2, abs=0.02)
 
 
-def test_observers_are_told(plugin_world: Any, files: Any) -> None:
+def test_observers_are_notified(plugin_world: Any, files: Any) -> None:
     class Watcher(flatland.WorldObserver):
         def __init__(self) -> None:
             self.changes: list[tuple[str, int]] = []
@@ -181,12 +185,12 @@ def test_observers_are_told(plugin_world: Any, files: Any) -> None:
         world_plugins=wall("num_of_walls: 1"),
         observers=[watcher],
     )
-    # Once new each, and once more with the wall in it.
+    # One notification for each new layer, and one for the new wall.
     assert watcher.changes == ["2d", "3d", "2d"]
 
 
 def pick(plugin_world: Any, files: Any, count: int, seed: int) -> set[int]:
-    """Which of twelve parallel edges get a wall."""
+    """Returns which of twelve parallel edges have a new wall."""
     layers = lines(files, *(f"{10 * i} 0 {10 * i + 1} 0" for i in range(12)))
     world = plugin_world(
         pose=(0, 3, 0), layers=layers, world_plugins=wall(f"num_of_walls: {count}"), seed=seed
@@ -196,19 +200,19 @@ def pick(plugin_world: Any, files: Any, count: int, seed: int) -> set[int]:
     return {int(edge[0] // 10) for edge in new}
 
 
-def test_different_edges_are_picked(plugin_world: Any, files: Any) -> None:
+def test_picked_edges_are_distinct(plugin_world: Any, files: Any) -> None:
     assert pick(plugin_world, files, 12, 1) == set(range(12))
     for seed in range(5):
         assert len(pick(plugin_world, files, 6, seed)) == 6
 
 
-def test_seed_decides(plugin_world: Any, files: Any) -> None:
+def test_picked_edges_are_determined_by_the_seed(plugin_world: Any, files: Any) -> None:
     picked = [pick(plugin_world, files, 4, seed) for seed in (1, 1, 2, 3)]
     assert picked[0] == picked[1]
     assert len({frozenset(p) for p in picked}) > 1
 
 
-def test_image_maps_too(plugin_world: Any, files: Any) -> None:
+def test_edges_of_image_maps_can_be_picked(plugin_world: Any, files: Any) -> None:
     path = files.write_map("room", ROOM)
     world = plugin_world(
         pose=(3.3, 2.2, 0),
@@ -230,7 +234,7 @@ def test_image_maps_too(plugin_world: Any, files: Any) -> None:
         ),
         (
             "layer: 2d, robot_name: robot, num_of_walls: 2",
-            'robot "robot" stands on the line of the wall from (0, 0) to (4, 0) of layer "2d"',
+            'robot "robot" is on the line through the wall from (0, 0) to (4, 0) of layer "2d"',
         ),
         ("layer: 2d, robot_name: robot, num_of_walls: -1", '"num_of_walls", must not be negative'),
         ("layer: 2d, robot_name: robot, wall_wall_dist: 0", '"wall_wall_dist", must be greater'),
@@ -240,7 +244,9 @@ def test_image_maps_too(plugin_world: Any, files: Any) -> None:
         ("layer: 2d, robot_name: robot, walls: 1", 'unrecognized entry(s) {"walls"}'),
     ],
 )
-def test_errors(plugin_world: Any, files: Any, plugin: str, text: str) -> None:
+def test_invalid_parameters_are_errors(
+    plugin_world: Any, files: Any, plugin: str, text: str
+) -> None:
     layers = lines(files, "0 0 4 0", "0 1 4 1")
     with pytest.raises(flatland.PluginError) as caught:
         plugin_world(
@@ -252,7 +258,7 @@ def test_errors(plugin_world: Any, files: Any, plugin: str, text: str) -> None:
     assert 'World Plugin "walls" type "RandomWall"' in str(caught.value)
 
 
-def test_on_the_line_is_no_matter_for_double_walls(plugin_world: Any, files: Any) -> None:
+def test_a_robot_on_the_line_is_allowed_with_double_wall(plugin_world: Any, files: Any) -> None:
     world = plugin_world(
         pose=(9, 0, 0),
         layers=lines(files, "0 0 4 0"),

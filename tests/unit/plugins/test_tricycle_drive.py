@@ -14,7 +14,7 @@ from flatland.values import Odometry
 Collect = Callable[[flatland.World, str], list[Any]]
 
 WHEEL = "footprints: [{type: circle, radius: 0.05, density: 1, collision: false}]"
-# Rear axle 1 m behind the front wheel, which is at the origin; the centre of mass is elsewhere.
+# The rear axle is 1 m behind the front wheel at the origin; the center of mass is elsewhere.
 BODIES = f"""
 - name: base
   footprints: [{{type: circle, radius: 0.3, center: [-0.4, 0.1], density: 100}}]
@@ -96,11 +96,11 @@ class TestMotion:
         omega = 0.6 * math.sin(0.5) / 1.0
         vx, vy, rate = base(world).velocity
         assert rate == pytest.approx(omega, abs=1e-5)
-        # The front wheel, at the origin, moves at 0.6 m/s where it points to.
+        # The front wheel, at the origin, moves at 0.6 m/s along its heading.
         assert (vx, vy) == pytest.approx((0.6 * math.cos(1.2), 0.6 * math.sin(1.2)), abs=1e-5)
 
-    def test_rear_centre_moves_along_the_heading(self, trike: Any) -> None:
-        # A slanted axle whose middle is the foot of the perpendicular from the origin.
+    def test_rear_center_moves_along_the_heading(self, trike: Any) -> None:
+        # A slanted axle whose midpoint is the foot of the perpendicular from the origin.
         line = joints(
             left=joint("left_j", "weld", "left", "[-1.76, 1.4]"),
             right=joint("right_j", "weld", "right", "[-2.24, -0.2]"),
@@ -119,14 +119,14 @@ class TestMotion:
         forward = 0.6 * math.cos(0.5)
         assert rear == pytest.approx((forward * c, forward * s), abs=1e-5)
 
-    def test_it_drives_a_circle_about_the_rear_axle(self, trike: Any) -> None:
+    def test_robot_drives_a_circle_about_a_point_on_the_rear_axle_line(self, trike: Any) -> None:
         world = trike()
         command(world, 0.5, math.pi / 4)
         world.step(2)
         for _ in range(50):
             world.step(20)
             x, y, theta = base(world).pose
-            # Turning centre: on the axle's line, 1 m to the left of the rear centre.
+            # The center of rotation is on the line of the axle, 1 m to the left of the rear center.
             rear = (x - math.cos(theta), y - math.sin(theta))
             centre = (rear[0] - math.sin(theta), rear[1] + math.cos(theta))
             assert centre == pytest.approx((-1.0, 1.0), abs=0.02)
@@ -148,10 +148,10 @@ class TestSteering:
             angles.append(plugin(world).steering_angle)
         return angles
 
-    def test_without_limits_at_once(self, trike: Any) -> None:
+    def test_without_limits_the_angle_is_reached_in_one_step(self, trike: Any) -> None:
         assert self.steps(trike(), 1.2, 2) == pytest.approx([1.2, 1.2])
 
-    def test_max_steer_angle_of_zero_is_no_bound(self, trike: Any) -> None:
+    def test_max_steer_angle_of_zero_means_no_limit(self, trike: Any) -> None:
         assert self.steps(trike("max_steer_angle: 0"), 3.0, 1) == pytest.approx([3.0])
 
     @pytest.mark.parametrize("sign", [1.0, -1.0])
@@ -177,16 +177,16 @@ class TestSteering:
         assert angles == pytest.approx([step, 3 * step, 6 * step])
         assert plugin(world).steering_velocity == pytest.approx(0.06)
 
-    def test_the_wheel_brakes_before_its_target(self, trike: Any) -> None:
+    def test_steering_decelerates_before_the_target(self, trike: Any) -> None:
         world = trike("angular_dynamics: {acceleration_limit: 4.0}")
         angles = self.steps(world, 0.5, 300)
-        assert max(angles) < 0.51  # unbraked it would stop at 1.0
+        assert max(angles) < 0.51  # without braking it would stop at 1.0
         assert angles[-1] == pytest.approx(0.5, abs=0.01)
 
-    def test_braking_starts_where_it_still_suffices(self, trike: Any) -> None:
+    def test_steering_deceleration_starts_at_the_stopping_distance(self, trike: Any) -> None:
         world = trike("angular_dynamics: {acceleration_limit: 4.0}")
         drive = plugin(world)
-        drive.steering_velocity = 1.0  # needs 0.125 rad to stop
+        drive.steering_velocity = 1.0  # the stopping distance is 0.125 rad
         command(world, 0.0, 0.125)
         world.step()
         assert drive.steering_velocity == pytest.approx(1.0 + 4.0 * 0.005)
@@ -195,7 +195,7 @@ class TestSteering:
         world.step()
         assert drive.steering_velocity == pytest.approx(1.0 - 4.0 * 0.005)
 
-    def test_older_keys_give_way_to_the_newer(self, trike: Any) -> None:
+    def test_angular_dynamics_take_precedence_over_older_keys(self, trike: Any) -> None:
         world = trike(
             "max_angular_velocity: 1, max_steer_acceleration: 2, "
             "angular_dynamics: {velocity_limit: 3, acceleration_limit: 4, deceleration_limit: 5}"
@@ -205,17 +205,17 @@ class TestSteering:
         assert limits.acceleration_limit == 4
         assert limits.deceleration_limit == 5
 
-    def test_older_acceleration_is_the_deceleration_too(self, trike: Any) -> None:
+    def test_max_steer_acceleration_also_limits_the_deceleration(self, trike: Any) -> None:
         world = trike("max_steer_acceleration: 2, angular_dynamics: {deceleration_limit: 5}")
         limits = plugin(world).angular_dynamics
         assert (limits.acceleration_limit, limits.deceleration_limit) == (2, 2)
 
-    def test_deceleration_limit_alone_is_not_forgotten(self, trike: Any) -> None:
+    def test_a_deceleration_limit_without_acceleration_limit_holds(self, trike: Any) -> None:
         limits = plugin(trike("angular_dynamics: {deceleration_limit: 5}")).angular_dynamics
         assert (limits.acceleration_limit, limits.deceleration_limit) == (0, 5)
 
     @pytest.mark.parametrize(("base_first", "sign"), [(True, 1.0), (False, -1.0)])
-    def test_the_front_wheel_is_seen_to_turn(
+    def test_the_front_joint_has_the_steering_angle(
         self, trike: Any, base_first: bool, sign: float
     ) -> None:
         front = joint("front_j", "revolute", "front", "[0, 0]", base_first=base_first)
@@ -238,7 +238,7 @@ class TestSteering:
 
 
 class TestOdometry:
-    def test_messages_show_the_state_before_the_command(self, trike: Any, collect: Collect) -> None:
+    def test_messages_have_the_state_before_the_command(self, trike: Any, collect: Collect) -> None:
         world = trike(pose=(1.0, 2.0, 0.5))
         truths, odometry = collect(world, TRUTH), collect(world, ODOMETRY)
         command(world, 0.6, 0.0)
@@ -251,7 +251,7 @@ class TestOdometry:
         assert truths[1].pose[0] == pytest.approx(1.0 + 0.003 * math.cos(0.5), abs=1e-4)
 
     @pytest.mark.parametrize(("extra", "heading"), [("", 0.5), ("twist_in_local_frame: true", 0.0)])
-    def test_twist_is_in_the_world_frame_unless_asked(
+    def test_twist_is_in_the_world_frame_by_default(
         self, trike: Any, collect: Collect, extra: str, heading: float
     ) -> None:
         world = trike(extra, pose=(0.0, 0.0, 0.5))
@@ -262,14 +262,14 @@ class TestOdometry:
         assert odometry[-1].twist == pytest.approx(expected, abs=1e-3)
         assert truths[-1].twist == pytest.approx(expected, abs=1e-3)
 
-    def test_odometry_is_in_its_own_frame(self, trike: Any, collect: Collect) -> None:
+    def test_odometry_has_its_own_frame(self, trike: Any, collect: Collect) -> None:
         world = trike()
         truths, odometry = collect(world, TRUTH), collect(world, ODOMETRY)
         world.step()
         assert (odometry[0].frame_id, odometry[0].child_frame_id) == ("odom", "base")
         assert (truths[0].frame_id, truths[0].child_frame_id) == ("map", "base")
 
-    def test_frames_as_written(self, plugin_world: Any, collect: Collect) -> None:
+    def test_frames_have_no_namespace(self, plugin_world: Any, collect: Collect) -> None:
         world = plugin_world(
             drive("odom_frame_id: o, ground_truth_frame_id: /w, odom_pub: a, ground_truth_pub: b"),
             bodies=BODIES,
@@ -303,7 +303,7 @@ class TestOdometry:
         assert [value.stamp for value in truths] == [k * 20_000_000 for k in range(5)]
 
 
-def test_bad_command_is_refused(trike: Any, caplog: pytest.LogCaptureFixture) -> None:
+def test_an_invalid_command_is_rejected(trike: Any, caplog: pytest.LogCaptureFixture) -> None:
     world = trike()
     command(world, 0.5, 0.0)
     world.step(5)
@@ -329,7 +329,7 @@ class TestErrors:
         "key",
         ["body", "front_wheel_joint", "rear_left_wheel_joint", "rear_right_wheel_joint"],
     )
-    def test_required(self, plugin_world: Any, key: str) -> None:
+    def test_required_parameters(self, plugin_world: Any, key: str) -> None:
         text = drive().replace(f"{key}:", "unused:")
         assert f'"{key}"' in self.error(plugin_world, text)
 
@@ -350,7 +350,7 @@ class TestErrors:
             ("right", "revolute", "Rear right wheel joint must be a weld joint"),
         ],
     )
-    def test_kind_of_joint(self, plugin_world: Any, name: str, kind: str, message: str) -> None:
+    def test_type_of_joint(self, plugin_world: Any, name: str, kind: str, message: str) -> None:
         anchor = {"front": "[0, 0]", "left": "[-1, 0.4]", "right": "[-1, -0.4]"}[name]
         changed = joints(**{name: joint(f"{name}_j", kind, name, anchor)})
         assert message in self.error(plugin_world, drive(), changed)
@@ -374,12 +374,12 @@ class TestErrors:
         text = self.error(plugin_world, drive(), joints(**{name: wrong}))
         assert f'Joint "{name}_j" must be anchored at (0, 0) on the wheel' in text
 
-    def test_front_wheel_away_from_the_origin(self, plugin_world: Any) -> None:
+    def test_front_wheel_not_at_the_origin(self, plugin_world: Any) -> None:
         changed = joints(front=joint("front_j", "revolute", "front", "[0.1, 0]"))
         text = self.error(plugin_world, drive(), changed)
         assert "Front wheel joint must have its body anchored at (0, 0)" in text
 
-    def test_rear_wheels_not_in_line(self, plugin_world: Any) -> None:
+    def test_rear_axle_not_perpendicular(self, plugin_world: Any) -> None:
         changed = joints(left=joint("left_j", "weld", "left", "[-1, 0.5]"))
         assert (
             "The mid point between the rear wheel anchors on the body must equal the "
@@ -387,11 +387,11 @@ class TestErrors:
             "anchors) and the front wheel anchor"
         ) in self.error(plugin_world, drive(), changed)
 
-    def test_rear_wheels_in_line_within_tolerance(self, trike: Any) -> None:
+    def test_rear_axle_perpendicular_within_tolerance(self, trike: Any) -> None:
         world = trike(joints=joints(left=joint("left_j", "weld", "left", "[-1, 0.400005]")))
         assert plugin(world).geometry.rear_center == pytest.approx((-1.0, 0.0), abs=1e-4)
 
-    def test_rear_wheels_in_one_place(self, plugin_world: Any) -> None:
+    def test_rear_wheels_at_the_same_anchor(self, plugin_world: Any) -> None:
         changed = joints(left=joint("left_j", "weld", "left", "[-1, -0.4]"))
         text = self.error(plugin_world, drive(), changed)
         assert "The rear wheel joints must not have the same anchor" in text

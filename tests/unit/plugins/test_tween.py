@@ -1,4 +1,4 @@
-"""Tween: modes, timing, the last word over the physics."""
+"""Tween: modes, timing, and precedence over the physics."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def tween(entry: str) -> str:
 
 
 def poses(world: flatland.World, steps: int) -> list[tuple[float, float, float]]:
-    """Poses of the body after each step."""
+    """Returns the poses of the body after each step."""
     found = []
     for _ in range(steps):
         world.step()
@@ -69,7 +69,7 @@ def test_yoyo_is_the_default_mode(plugin_world: Any) -> None:
     assert xs(world, 5) == pytest.approx([5, 10, 5, 0, 5], abs=1e-5)
 
 
-def test_ends_are_reached_when_the_steps_do_not_fit(plugin_world: Any) -> None:
+def test_ends_are_reached_if_the_duration_is_not_a_multiple_of_the_step(plugin_world: Any) -> None:
     world = plugin_world(tween("delta: [1, 0, 0], mode: yoyo"), step_size=0.3)
     assert xs(world, 9) == pytest.approx([0.3, 0.6, 0.9, 1, 0.7, 0.4, 0.1, 0, 0.3], abs=1e-5)
     world = plugin_world(tween("delta: [1, 0, 0], mode: loop"), step_size=0.3)
@@ -83,7 +83,7 @@ def test_trigger(plugin_world: Any) -> None:
         namespace="gate",
     )
     command = world.command("/gate/open")
-    # Shut until told otherwise.
+    # No motion before the first message.
     assert xs(world, 2) == [0, 0]
     command.set(True)
     assert xs(world, 3) == pytest.approx([0.25, 0.5, 0.75], abs=1e-5)
@@ -95,30 +95,30 @@ def test_trigger(plugin_world: Any) -> None:
     assert xs(world, 5) == pytest.approx([0.75, 0.5, 0.25, 0, 0], abs=1e-5)
 
 
-def test_trigger_takes_booleans_only(plugin_world: Any) -> None:
+def test_trigger_accepts_booleans_only(plugin_world: Any) -> None:
     world = plugin_world(tween("mode: trigger, trigger_topic: open"))
     with pytest.raises(TypeError, match="takes bool"):
         world.command("/open").set(1)
 
 
-def test_trigger_without_topic_stays_and_says_so(
+def test_trigger_without_topic_does_not_move_and_logs_a_warning(
     plugin_world: Any, caplog: pytest.LogCaptureFixture
 ) -> None:
     world = plugin_world(tween("delta: [1, 0, 0], mode: trigger"))
     assert xs(world, 2) == [0, 0]
     assert world.ports.commands == {}
-    assert "mode trigger needs a trigger_topic" in caplog.text
+    assert "mode trigger requires a trigger_topic" in caplog.text
 
 
-def test_topic_without_trigger_opens_no_port_and_says_so(
+def test_topic_without_trigger_opens_no_port_and_logs_a_warning(
     plugin_world: Any, caplog: pytest.LogCaptureFixture
 ) -> None:
     world = plugin_world(tween("mode: once, trigger_topic: open"))
     assert world.ports.commands == {}
-    assert "no use for a trigger_topic in mode once" in caplog.text
+    assert "ignores its trigger_topic in mode once" in caplog.text
 
 
-def test_defaults_move_nothing(plugin_world: Any) -> None:
+def test_default_delta_is_zero(plugin_world: Any) -> None:
     world = plugin_world("[{type: Tween, name: tween, body: base}]", pose=(1, 2, 0.5))
     assert poses(world, 2) == [pytest.approx((1, 2, 0.5), abs=1e-6)] * 2
 
@@ -134,8 +134,8 @@ def test_easing(plugin_world: Any) -> None:
     assert poses(world, 4) == [pytest.approx(pose, abs=1e-6) for pose in expected]
 
 
-def test_way_starts_at_the_pose_in_the_world(plugin_world: Any) -> None:
-    # The delta is along the axes of the world, whichever way the body looks.
+def test_motion_starts_at_the_initial_world_pose(plugin_world: Any) -> None:
+    # The delta is in the world frame, whatever the heading of the body.
     world = plugin_world(
         tween("delta: [1, 0, 0.5], mode: once"), pose=(3, 4, math.pi / 2), step_size=0.5
     )
@@ -143,10 +143,10 @@ def test_way_starts_at_the_pose_in_the_world(plugin_world: Any) -> None:
 
 
 @pytest.mark.parametrize(("duration", "dt"), [(0.1, 1 / 30), (1.5, 0.005), (0.7, 0.1)])
-def test_ends_are_exact_and_at_most_a_step_late(
+def test_ends_are_exact_and_at_most_one_step_late(
     plugin_world: Any, duration: float, dt: float
 ) -> None:
-    # The sum of many steps may miss the end by some rounding, and then one step more is needed.
+    # The sum of many steps may fall short of the end by rounding, which takes one more step.
     world = plugin_world(tween(f"delta: [1, 0, 0], duration: {duration}"), step_size=dt)
     n = round(duration / dt)
     found = xs(world, 3 * n + 2)
@@ -159,13 +159,13 @@ def test_ends_are_exact_and_at_most_a_step_late(
 
 
 @pytest.mark.parametrize("duration", ["0.004", "1e-300", "5e-324"])
-def test_ways_shorter_than_a_step_take_one(plugin_world: Any, duration: str) -> None:
+def test_a_duration_below_one_step_takes_one_step(plugin_world: Any, duration: str) -> None:
     world = plugin_world(tween(f"delta: [1, 0, 0], duration: {duration}"))
     assert xs(world, 4) == [1.0, 0.0, 1.0, 0.0]
 
 
-def test_slow_way_back_ends_at_the_start(plugin_world: Any) -> None:
-    # Here a step is so small that 0.001 of the way is 20 of them.
+def test_slow_backward_motion_ends_at_the_initial_pose(plugin_world: Any) -> None:
+    # 0.001 of the path corresponds to 20 steps here.
     world = plugin_world(tween("delta: [1, 0, 0], duration: 100"), step_size=0.005)
     world.step(20_000)
     found = xs(world, 20_010)
@@ -174,19 +174,19 @@ def test_slow_way_back_ends_at_the_start(plugin_world: Any) -> None:
 
 
 def test_steps_under_a_millisecond(plugin_world: Any) -> None:
-    # [fix] The reference counts whole milliseconds: it would stand still.
+    # The reference counts whole milliseconds and would not move.
     world = plugin_world(tween("delta: [1, 0, 0], mode: once"), step_size=0.0001)
     assert xs(world, 5000)[-1] == pytest.approx(0.5, abs=1e-5)
 
 
-def test_part_of_a_millisecond_is_not_lost(plugin_world: Any) -> None:
-    # [fix] The reference would take 2.5 ms for 2.
+def test_fractions_of_a_millisecond_are_not_truncated(plugin_world: Any) -> None:
+    # The reference would truncate 2.5 ms to 2 ms.
     world = plugin_world(tween("delta: [1, 0, 0], mode: once"), step_size=0.0025)
     assert xs(world, 200)[-1] == pytest.approx(0.5, abs=1e-5)
 
 
-def test_long_ways_in_fine_steps_keep_time(plugin_world: Any) -> None:
-    # A sum of 32-bit floats alone would miss 5 cm here.
+def test_long_motions_in_small_steps_are_on_time(plugin_world: Any) -> None:
+    # The error of a sum of 32-bit floats alone would be 5 cm.
     world = plugin_world(tween("delta: [100, 0, 0], duration: 6, mode: once"), step_size=0.0001)
     world.step(59_000)
     assert world.model("robot").body("base").pose[0] == pytest.approx(59_000 / 600, abs=2e-3)
@@ -199,8 +199,8 @@ def test_every_type_of_body_moves(plugin_world: Any, body_type: str) -> None:
     assert xs(world, 4) == pytest.approx([0.25, 0.5, 0.75, 1], abs=1e-6)
 
 
-def test_wall_does_not_hold_it_up(plugin_world: Any, files: Any) -> None:
-    # Box2D would push the body out of the wall within the same step.
+def test_a_wall_does_not_stop_the_motion(plugin_world: Any, files: Any) -> None:
+    # Box2D alone would push the body out of the wall in the same step.
     world = plugin_world(tween("delta: [1, 0, 0], mode: once"), step_size=0.05)
     world.spawn_model(files.write("wall.model.yaml", WALL), "wall", pose=(0.4, 0, 0))
     found = poses(world, 20)
@@ -208,13 +208,13 @@ def test_wall_does_not_hold_it_up(plugin_world: Any, files: Any) -> None:
     assert [pose[1:] for pose in found] == [(0.0, 0.0)] * 20
 
 
-def test_velocity_does_not_carry_it_off(plugin_world: Any) -> None:
+def test_a_velocity_does_not_deflect_the_motion(plugin_world: Any) -> None:
     world = plugin_world(tween("delta: [1, 0, 0], mode: once"), step_size=0.25)
     world.model("robot").body("base").set_velocity(5.0, 5.0, 5.0)
     assert poses(world, 1)[0] == pytest.approx((0.25, 0, 0), abs=1e-6)
 
 
-def test_pushing_gives_it_no_velocity(plugin_world: Any, files: Any) -> None:
+def test_contacts_do_not_change_the_velocity(plugin_world: Any, files: Any) -> None:
     world = plugin_world(tween("delta: [0, 0, 0]"))
     world.spawn_model(files.write("crate.model.yaml", CRATE), "crate", pose=(-0.31, 0, 0))
     box = world.model("crate").body("box")
@@ -225,17 +225,17 @@ def test_pushing_gives_it_no_velocity(plugin_world: Any, files: Any) -> None:
     assert world.model("robot").body("base").velocity == (0.0, 0.0, 0.0)
 
 
-def test_it_pushes_what_is_in_its_way(plugin_world: Any, files: Any) -> None:
+def test_obstacles_are_pushed(plugin_world: Any, files: Any) -> None:
     world = plugin_world(tween("delta: [1, 0, 0], duration: 2, mode: once"), bodies=STATIC)
     world.spawn_model(files.write("crate.model.yaml", CRATE), "crate", pose=(0.35, 0, 0))
     world.step(400)
     x, y, _ = world.model("crate").body("box").pose
-    # The disc's edge is at 1.2 at the end, the crate's half width is 0.1.
+    # The edge of the disc is at 1.2 at the end, and half the width of the crate is 0.1.
     assert x == pytest.approx(1.3, abs=0.02)
     assert y == pytest.approx(0.0, abs=0.02)
 
 
-def test_it_pushes_what_has_fallen_asleep(plugin_world: Any, files: Any) -> None:
+def test_sleeping_obstacles_are_pushed(plugin_world: Any, files: Any) -> None:
     world = plugin_world(
         tween("delta: [1, 0, 0], duration: 2, mode: trigger, trigger_topic: go"), bodies=STATIC
     )
@@ -248,20 +248,20 @@ def test_it_pushes_what_has_fallen_asleep(plugin_world: Any, files: Any) -> None
     assert box.pose[0] == pytest.approx(1.3, abs=0.02)
 
 
-def test_it_stays_awake(plugin_world: Any) -> None:
+def test_body_remains_awake(plugin_world: Any) -> None:
     world = plugin_world(tween("delta: [1, 0, 0], duration: 0.1, mode: once"))
     world.step(400)
     assert world.model("robot").body("base").awake
 
 
-def test_a_body_without_tween_would_sleep(plugin_world: Any) -> None:
+def test_a_body_without_tween_falls_asleep(plugin_world: Any) -> None:
     world = plugin_world("")
     world.step(400)
     assert not world.model("robot").body("base").awake
 
 
-def test_touching_is_heard_at_the_end_of_the_way(plugin_world: Any, files: Any) -> None:
-    # Needs contacts of a body that was put there and has stood still for long.
+def test_contacts_at_the_end_of_the_motion_are_reported(plugin_world: Any, files: Any) -> None:
+    # Requires contacts of a body that was set to its pose and has been at rest for long.
     world = plugin_world(
         "[{type: Tween, name: tween, body: base, delta: [1, 0, 0], duration: 0.1, mode: once}, "
         "{type: BoolSensor, name: switch}]"
@@ -274,7 +274,7 @@ def test_touching_is_heard_at_the_end_of_the_way(plugin_world: Any, files: Any) 
     assert output.latest is True
 
 
-def test_moved_model_comes_back(plugin_world: Any) -> None:
+def test_a_moved_model_returns_to_its_path(plugin_world: Any) -> None:
     world = plugin_world(tween("delta: [1, 0, 0], mode: once"), step_size=0.25)
     world.step()
     world.move_model("robot", (5, 5, 5))
@@ -298,6 +298,6 @@ def test_moved_model_comes_back(plugin_world: Any) -> None:
         ("body: base, rate: 3", 'unrecognized entry(s) {"rate"}'),
     ],
 )
-def test_errors(plugin_world: Any, entry: str, text: str) -> None:
+def test_invalid_parameters_are_errors(plugin_world: Any, entry: str, text: str) -> None:
     error = plugin_world.error(f"[{{type: Tween, name: tween, {entry}}}]".replace(", }", "}"))
     assert text in error

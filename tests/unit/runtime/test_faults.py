@@ -1,4 +1,4 @@
-"""What happens to exceptions of plugins, subscribers and observers."""
+"""Handling of exceptions of plugins, subscribers and observers."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ def take(faults: Faults, hook: str = "hook", plugin: object = "p", text: str = "
         return faults.add_in_hook(plugin, hook, "Plugin P", error)
 
 
-def test_an_unknown_policy_is_refused() -> None:
+def test_an_unknown_policy_raises() -> None:
     wrong: Any = "ignore"
     with pytest.raises(ValueError, match=r"must be 'raise' or 'disable', got 'ignore'"):
         Faults(wrong)
@@ -54,7 +54,7 @@ def test_three_faults_of_one_hook_in_a_row_disable_a_plugin(
     faults.raise_first()
 
 
-def test_faults_that_are_not_in_a_row_are_forgiven() -> None:
+def test_a_successful_call_resets_the_count_of_faults() -> None:
     faults = Faults("disable")
     for _ in range(5):
         assert not take(faults)
@@ -66,7 +66,7 @@ def test_faults_that_are_not_in_a_row_are_forgiven() -> None:
     assert not faults.counts
 
 
-def test_the_log_has_one_traceback_a_second_and_source(caplog: pytest.LogCaptureFixture) -> None:
+def test_the_log_has_one_traceback_per_second_and_source(caplog: pytest.LogCaptureFixture) -> None:
     caplog.set_level(logging.ERROR, "flatland")
     faults = Faults("disable")
     for plugin in ("p", "q"):
@@ -76,7 +76,7 @@ def test_the_log_has_one_traceback_a_second_and_source(caplog: pytest.LogCapture
     assert caplog.text.count("Plugin P: hook raised\n") == 2
 
 
-def test_faults_of_plugins_that_are_gone_do_not_count_for_new_ones() -> None:
+def test_faults_of_removed_plugins_are_dropped() -> None:
     faults = Faults("disable")
     assert not take(faults)
     assert not take(faults)

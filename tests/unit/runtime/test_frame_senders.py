@@ -1,4 +1,4 @@
-"""Frames with two parents are logged once, with the plugins that send them."""
+"""Warnings about frames with two parents."""
 
 from __future__ import annotations
 
@@ -25,18 +25,18 @@ def warnings(caplog):
     return [r.getMessage() for r in caplog.records if "has two parents" in r.getMessage()]
 
 
-def test_a_drive_and_a_tf_publisher_of_one_model(files, empty_world, caplog):
+def test_a_drive_and_a_tf_publisher_of_one_model_conflict(files, empty_world, caplog):
     empty_world.spawn_model(model(files, "m", DRIVE, TF), "m")
     empty_world.step(50)
     assert warnings(caplog) == [
         'TF frame "base" has two parents, "odom" from Model Plugin "drive" type "DiffDrive" '
         'model "m" and "map" from Model Plugin "tf" type "ModelTfPublisher" model "m"; give the '
-        "frames different names, or let one plugin not send it"
+        "frames different names, or disable one of the senders"
     ]
     assert caplog.records[0].levelname == "WARNING"
 
 
-def test_two_models(files, empty_world, caplog):
+def test_two_models_with_the_same_frames_conflict(files, empty_world, caplog):
     empty_world.spawn_model(model(files, "a", DRIVE), "a")
     empty_world.spawn_model(model(files, "b", TF), "b")
     empty_world.step(3)
@@ -68,7 +68,7 @@ def test_each_pair_of_parents_of_a_frame_is_logged_once(files, empty_world, capl
         [DRIVE, DRIVE.replace("drive,", "same,")],
     ],
 )
-def test_no_warning_where_each_frame_has_one_parent(files, empty_world, caplog, plugins):
+def test_no_warning_if_each_frame_has_one_parent(files, empty_world, caplog, plugins):
     empty_world.spawn_model(model(files, "m", *plugins), "m")
     empty_world.spawn_model("m.yaml", "other", "ns")
     empty_world.step(3)
@@ -76,7 +76,7 @@ def test_no_warning_where_each_frame_has_one_parent(files, empty_world, caplog, 
     assert empty_world.transforms
 
 
-def test_a_sender_that_ended_does_not_count(files, empty_world, caplog):
+def test_a_removed_sender_causes_no_conflict(files, empty_world, caplog):
     empty_world.spawn_model(model(files, "a", DRIVE), "a")
     empty_world.spawn_model(model(files, "b", TF), "b", "ns")
     empty_world.step(3)
@@ -89,7 +89,7 @@ def test_a_sender_that_ended_does_not_count(files, empty_world, caplog):
     assert len(warnings(caplog)) == 1
 
 
-def test_a_plugin_may_move_a_frame_to_another_parent(files, empty_world, caplog):
+def test_a_plugin_may_change_the_parent_of_a_frame(files, empty_world, caplog):
     empty_world.spawn_model(model(files, "m", DRIVE), "m")
     (plugin,) = empty_world.model("m").plugins
     for parent in ("shelf", "gripper", "shelf"):

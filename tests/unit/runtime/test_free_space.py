@@ -1,4 +1,4 @@
-"""The space between walls: estimates that never lose a place, and paths that hold."""
+"""The free space between walls: no place is missed, and connected places have a path."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ BoolArray = npt.NDArray[np.bool_]
 
 
 def distance_to(walls: DoubleArray, points: DoubleArray) -> DoubleArray:
-    """Distance of each point to the nearest edge, shape (n,)."""
+    """Returns the distance of each point to the nearest edge, shape (n,)."""
     start, along = walls[:, :2], walls[:, 2:] - walls[:, :2]
     to_point = points[:, np.newaxis] - start
     fraction = np.clip((to_point * along).sum(-1) / (along**2).sum(-1), 0, 1)
@@ -44,7 +44,7 @@ def box(x1: float, y1: float, x2: float, y2: float) -> list[tuple[float, float, 
 
 
 def two_rooms(door: float) -> DoubleArray:
-    """A room of 10 m by 6 m, cut in two by a wall at x = 5 with a door at y = 3.02."""
+    """Returns a room of 10 m by 6 m, divided by a wall at x = 5 with a door at y = 3.02."""
     middle = [(5.0, 0.0, 5.0, 3.02 - door / 2), (5.0, 3.02 + door / 2, 5.0, 6.0)]
     return np.array([*box(0, 0, 10, 6), *middle])
 
@@ -53,7 +53,7 @@ def places(free_space: FreeSpace, connected_to: tuple[float, float] | None) -> D
     return free_space.places_in(free_space.cells(connected_to), np.random.default_rng(1))
 
 
-def test_no_place_is_lost() -> None:
+def test_no_place_is_missed() -> None:
     rng = np.random.default_rng(3)
     walls = np.concatenate((rng.uniform((0, 0, 0, 0), (10, 6, 10, 6), (12, 4)), two_rooms(1.0)))
     radius, clearance = 0.3, 0.11
@@ -63,20 +63,20 @@ def test_no_place_is_lost() -> None:
     assert len(fitting) > 200
     cells = (fitting // 0.05).astype(int)
     assert np.isin(cells[:, 1] * 200 + cells[:, 0], free_space.cells(None)).all()
-    # A cell that cannot hold a place is not offered: no point is much too near to a wall.
+    # Cells without a place are excluded: no point is far too close to a wall.
     slack = 0.05 * (1 + 2 * math.sqrt(0.5) + 1)
     found = places(free_space, None)
     assert (distance_to(walls, found) >= radius + clearance - slack).all()
 
 
 @pytest.mark.parametrize(("door", "is_open"), [(0.595, False), (0.68, True), (0.9, True)])
-def test_a_door_lets_a_disc_through_or_not(door: float, is_open: bool) -> None:
+def test_a_door_connects_the_rooms_if_the_disc_fits(door: float, is_open: bool) -> None:
     found = places(space(two_rooms(door), 0.3), (2.0, 3.0))
     assert (found[:, 0] < 4.7).sum() > 1000
     assert (found[:, 0] > 5.3).any() == is_open
 
 
-def test_a_slanted_passage() -> None:
+def test_a_slanted_passage_connects() -> None:
     """A corridor at 30° that is 10 cm wider than the disc."""
     turn = math.radians(30)
     along, normal = np.array([math.cos(turn), math.sin(turn)]), (-math.sin(turn), math.cos(turn))
@@ -94,15 +94,15 @@ def test_a_slanted_passage() -> None:
     assert (np.hypot(*(found - (start + 7 * along)).T) < 0.1).any()
 
 
-def test_paths_exist() -> None:
-    """Random mazes: each place offered is reached by a search over steps of 1 cm."""
+def test_connected_places_have_a_path() -> None:
+    """Each place in random mazes is reached by a search with steps of 1 cm."""
     for seed in range(3):
         rng = np.random.default_rng(seed)
         walls = np.array([*box(0, 0, 4, 4), *rng.uniform(0, 4, (9, 4))])
         radius, step = 0.2, 0.02
         axis = np.arange(0, 4 + step / 2, step)
         grid = np.stack(np.meshgrid(axis, axis, indexing="ij"), axis=-1)
-        # What a disc on the fine grid can pass for certain, and what it cannot at all.
+        # Cells of the fine grid that a disc can certainly pass, and cells that it may pass.
         distances = distance_to(walls, grid.reshape(-1, 2)).reshape(len(axis), len(axis))
         free_space = space(walls, radius, 0.0, (0.0, 0.0, 4.0, 4.0))
         row, column = np.unravel_index(np.argmax(distances), distances.shape)
@@ -114,7 +114,7 @@ def test_paths_exist() -> None:
         assert len(fitting) > 50
         nearest = np.rint(fitting / step).astype(int)
         assert perhaps[nearest[:, 0], nearest[:, 1]].all()
-        # And what is reached with a cell to spare is offered.
+        # Conversely, all places that are reached with a margin of one cell are returned.
         roomy = flood(distances >= radius + 0.1, (int(row), int(column)))
         assert (roomy <= certainly).all()
         offered = set(free_space.cells(start).tolist())
@@ -124,7 +124,7 @@ def test_paths_exist() -> None:
 
 
 def flood(passable: BoolArray, start: tuple[int, int]) -> BoolArray:
-    """What can be reached from a cell over passable cells, by their sides."""
+    """Returns the cells that are connected to a cell by the sides of passable cells."""
     reached = np.zeros_like(passable)
     heap = [start]
     while heap:
@@ -141,7 +141,7 @@ def flood(passable: BoolArray, start: tuple[int, int]) -> BoolArray:
     return reached
 
 
-def test_walls_outside_of_the_bounds_count_and_far_ones_do_no_harm() -> None:
+def test_walls_near_the_bounds_are_included_and_distant_ones_ignored() -> None:
     walls = np.array([(-0.1, -1, -0.1, 7), (-1e9, 3, 1e9, 3), (1e8, 1e8, 1e8 + 1, 1e8)])
     free_space = space(walls, 0.5)
     found = places(free_space, (5.0, 1.0))
@@ -150,14 +150,14 @@ def test_walls_outside_of_the_bounds_count_and_far_ones_do_no_harm() -> None:
     assert places(free_space, None)[:, 1].max() > 5.9
 
 
-def test_no_walls() -> None:
+def test_without_walls_all_cells_are_free() -> None:
     found = places(space(np.empty((0, 4)), 0.5), (1.0, 1.0))
     assert len(found) == 200 * 120
     assert found.min(axis=0) == pytest.approx((0, 0), abs=0.05)
     assert found.max(axis=0) == pytest.approx((10, 6), abs=0.05)
 
 
-def test_large_areas_get_larger_cells() -> None:
+def test_large_areas_have_larger_cells() -> None:
     free_space = space(np.array([(0.0, 0.0, 1e6, 1e6)]), 0.1, 0.0, (0.0, 0.0, 1e6, 1e6))
     assert 1e6 < len(free_space.cells(None)) <= 16_100_000
 
@@ -165,10 +165,10 @@ def test_large_areas_get_larger_cells() -> None:
 @pytest.mark.parametrize(
     ("point", "text"),
     [
-        ((11.0, 3.0), r"connected_to \(11, 3\) is outside of the bounds of the walls"),
+        ((11.0, 3.0), r"connected_to \(11, 3\) is out of bounds"),
         ((0.1, 3.0), r"connected_to \(0.1, 3\) is not free for a disc of radius 0.3 m"),
     ],
 )
-def test_bad_starts(point: tuple[float, float], text: str) -> None:
+def test_an_invalid_start_raises(point: tuple[float, float], text: str) -> None:
     with pytest.raises(WorldError, match=text):
         space(two_rooms(1.0), 0.3).cells(point)

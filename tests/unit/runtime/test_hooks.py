@@ -1,4 +1,4 @@
-"""The table of hooks: which plugins are called, in which order, for which contacts."""
+"""The table of hooks: called plugins, their order, and the contacts that concern them."""
 
 from __future__ import annotations
 
@@ -69,15 +69,15 @@ def test_world_plugins_come_after_model_plugins_that_are_loaded_later() -> None:
 
 def test_a_removed_plugin_is_not_called() -> None:
     table, model = HookTable(), object()
-    gone, kept = OfModel(model), OfModel(model)
-    table.add(gone)
+    removed, kept = OfModel(model), OfModel(model)
+    table.add(removed)
     table.add(kept)
     running = table.of_step("before_physics_step")
-    table.remove(gone)
-    table.remove(gone)
+    table.remove(removed)
+    table.remove(removed)
     assert plugins(table.of_step("before_physics_step")) == [kept]
     assert plugins(table.of_contact("begin_contact", body_of(model), body_of(model))) == [kept]
-    assert plugins(running) == [gone, kept]  # a loop over the hooks is not disturbed
+    assert plugins(running) == [removed, kept]  # a loop over the hooks is not affected
 
 
 @pytest.mark.parametrize("swapped", [False, True])
@@ -102,7 +102,7 @@ def test_a_contact_within_one_model_is_reported_once() -> None:
     assert plugins(hooks) == [plugin]
 
 
-def test_bodies_whose_contacts_concern_nobody_are_left_out() -> None:
+def test_only_bodies_whose_contacts_concern_a_plugin_are_returned() -> None:
     table, model = HookTable(), object()
     bodies = [body_of(model), body_of(object())]
     assert list(table.bodies_concerned("begin_contact", bodies)) == []

@@ -1,4 +1,4 @@
-"""The nearest free place against closed forms."""
+"""The nearest free place, compared with closed forms."""
 
 from __future__ import annotations
 
@@ -10,46 +10,46 @@ import pytest
 from flatland.runtime.nearest_place import SEARCH_RADIUS, BoolArray, DoubleArray, nearest_offset
 
 
-def test_out_of_a_disc() -> None:
+def test_offset_out_of_a_disc() -> None:
     def is_free(offsets: DoubleArray) -> BoolArray:
         return np.hypot(offsets[:, 0] - 0.3, offsets[:, 1] + 0.1) >= 1.0
 
     offset = nearest_offset(is_free)
     assert offset is not None
-    # Straight away from the centre: the distance is what is left to the rim.
+    # The shortest offset is radial; its length is the distance to the rim.
     assert math.hypot(*offset) == pytest.approx(1 - math.hypot(0.3, 0.1), abs=0.005)
     assert is_free(np.array([offset]))[0]
 
 
 @pytest.mark.parametrize("angle", np.linspace(0, math.tau, 12, endpoint=False))
-def test_out_of_a_half_plane(angle: float) -> None:
+def test_offset_out_of_a_half_plane(angle: float) -> None:
     normal = np.array([math.cos(angle), math.sin(angle)])
     offset = nearest_offset(lambda offsets: offsets @ normal >= 1.234)
     assert offset is not None
     assert math.hypot(*offset) == pytest.approx(1.234, abs=0.005)
 
 
-def test_the_nearer_of_two_sides() -> None:
-    # The first free candidates lie on the left, at 0.30 m, but the right side is nearer.
+def test_the_closer_of_two_sides_is_found() -> None:
+    # The first free candidates are on the left, at 0.30 m, but the right side is closer.
     offset = nearest_offset(lambda o: (o[:, 0] <= -0.299) | (o[:, 0] >= 0.255))
     assert offset is not None
     assert offset[0] == pytest.approx(0.255, abs=0.003)
     assert offset[1] == pytest.approx(0.0, abs=0.05)
 
 
-def test_a_corner() -> None:
+def test_offset_out_of_a_corner() -> None:
     offset = nearest_offset(lambda o: (o[:, 0] >= 0.777) & (o[:, 1] >= -0.31) & (o[:, 1] <= -0.2))
     assert offset is not None
     assert offset == pytest.approx((0.777, -0.2), abs=0.005)
 
 
 @pytest.mark.parametrize(("distance", "is_found"), [(4.95, True), (5.01, False)])
-def test_the_search_radius(distance: float, is_found: bool) -> None:
+def test_the_search_radius_is_limited(distance: float, is_found: bool) -> None:
     offset = nearest_offset(lambda o: np.hypot(*o.T) >= distance)
     assert (offset is not None) is is_found
     if offset is not None:
         assert math.hypot(*offset) <= SEARCH_RADIUS
 
 
-def test_no_place() -> None:
+def test_none_is_returned_without_a_free_place() -> None:
     assert nearest_offset(lambda o: np.zeros(len(o), bool)) is None

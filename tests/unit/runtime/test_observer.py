@@ -1,4 +1,4 @@
-"""Observers: what they are notified of, and what their exceptions do."""
+"""Observers: notifications, and the effect of exceptions."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ EVENTS = (
 
 
 class Recorder(WorldObserver):
-    """Records the names of events; raises in one of them if asked to."""
+    """Records the names of events; optionally raises in one of them."""
 
     def __init__(self, bad: str = "") -> None:
         self.bad = bad
@@ -63,7 +63,7 @@ def live(world: World) -> None:
     world.close()
 
 
-def test_an_observer_is_notified_of_everything_between_attached_and_detached(files: Any) -> None:
+def test_an_observer_receives_all_notifications_between_attached_and_detached(files: Any) -> None:
     observer = Recorder()
     world = load(files, observer)
     assert observer.attached_to is world
@@ -73,7 +73,7 @@ def test_an_observer_is_notified_of_everything_between_attached_and_detached(fil
     assert observer.events.count("detached") == 1
 
 
-def test_a_removed_observer_is_notified_of_nothing_more(files: Any) -> None:
+def test_a_removed_observer_receives_no_more_notifications(files: Any) -> None:
     removed, kept = Recorder(), Recorder()
     world = load(files, removed, kept)
     world.remove_observer(removed)
@@ -90,7 +90,7 @@ CONTAINED = [event for event in EVENTS if event not in ("attached", "output_open
 
 
 @pytest.mark.parametrize("event", [e for e in CONTAINED if e != "command_opened"])
-def test_an_exception_of_an_observer_is_logged_and_changes_nothing(
+def test_an_exception_of_an_observer_is_logged_and_has_no_effect(
     files: Any, caplog: pytest.LogCaptureFixture, event: str
 ) -> None:
     bad, good = Recorder(event), Recorder()
@@ -126,7 +126,7 @@ def test_an_exception_of_an_observer_is_raised_by_the_next_step_or_close(
 
 
 @pytest.mark.parametrize("event", ["output_opened", "command_opened"])
-def test_an_observer_that_refuses_a_port_fails_the_model_and_the_others_are_notified(
+def test_a_rejected_port_fails_the_model_and_other_observers_are_notified(
     files: Any, event: str
 ) -> None:
     good, bad = Recorder(), Recorder(event)

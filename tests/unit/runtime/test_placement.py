@@ -1,4 +1,4 @@
-"""Blocked poses in a world: what `if_blocked` does, and which places are free."""
+"""Placement: blocked poses with each value of `if_blocked`, and free places."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ joints:
 
 @pytest.fixture
 def world(files: Any) -> flatland.World:
-    """A room of 10 m by 10 m in one layer, and a shelf at x = 2 in another."""
+    """A room of 10 m by 10 m in one layer, and a shelf at x = 2 in another layer."""
     files.write("room.dat", ROOM)
     files.write("high.dat", "2 -1 2 1\n")
     for name in ("room", "high"):
@@ -67,7 +67,7 @@ def warnings_of(caplog: pytest.LogCaptureFixture) -> list[str]:
 # -- if_blocked ---------------------------------------------------------------------------------
 
 
-def test_warn_is_the_default_and_names_all_that_is_overlapped(
+def test_warn_is_the_default_and_names_all_overlapped_models_and_layers(
     world: flatland.World, caplog: pytest.LogCaptureFixture
 ) -> None:
     spawn(world, "minimal", "first", (4.5, 0, 0))
@@ -82,14 +82,14 @@ def test_warn_is_the_default_and_names_all_that_is_overlapped(
     assert model.displacement == (0.0, 0.0)
 
 
-def test_allow_says_nothing(world: flatland.World, caplog: pytest.LogCaptureFixture) -> None:
+def test_allow_logs_nothing(world: flatland.World, caplog: pytest.LogCaptureFixture) -> None:
     model = spawn(world, "minimal", "m", (5, 0, 0), if_blocked="allow")
     world.move_model("m", (-5, 0, 0), if_blocked="allow")
     assert model.pose == pytest.approx((-5, 0, 0))
     assert warnings_of(caplog) == []
 
 
-def test_refuse_leaves_the_world_as_it_was(world: flatland.World) -> None:
+def test_refuse_leaves_the_world_unchanged(world: flatland.World) -> None:
     first = spawn(world, "minimal", "first", (1, 0, 0), if_blocked="refuse")
     first.bodies[0].set_velocity(0.1, 0.2, 0.3)
     fixtures = len(world.physics.contacts())
@@ -105,11 +105,12 @@ def test_refuse_leaves_the_world_as_it_was(world: flatland.World) -> None:
         world.move_model("first", (1, 4.9, 0), if_blocked="refuse")
     assert first.pose == pytest.approx((1, 0, 0))
     assert first.bodies[0].velocity == pytest.approx((0.1, 0.2, 0.3))
-    world.move_model("first", (1.1, 0, 0), if_blocked="refuse")  # overlaps only where it was
+    # The new pose overlaps only the previous pose of the model itself.
+    world.move_model("first", (1.1, 0, 0), if_blocked="refuse")
     assert first.pose == pytest.approx((1.1, 0, 0))
 
 
-def test_a_spawn_that_fails_gives_no_warning(
+def test_a_failed_spawn_logs_no_warning(
     world: flatland.World, files: Any, caplog: pytest.LogCaptureFixture
 ) -> None:
     files.write("bad.model.yaml", CRATE + "plugins: [{name: p, type: Missing}]\n")
@@ -118,7 +119,7 @@ def test_a_spawn_that_fails_gives_no_warning(
     assert warnings_of(caplog) == []
 
 
-def test_a_model_that_is_refused_starts_no_plugin(world: flatland.World, files: Any) -> None:
+def test_a_refused_model_starts_no_plugin(world: flatland.World, files: Any) -> None:
     files.write("bad.model.yaml", CRATE + "plugins: [{name: p, type: Missing}]\n")
     with pytest.raises(PluginError):
         spawn(world, "bad", "m", (0, 0, 0), if_blocked="refuse")
@@ -128,43 +129,43 @@ def test_a_model_that_is_refused_starts_no_plugin(world: flatland.World, files: 
 
 
 @pytest.mark.parametrize(
-    ("asked", "distance"),
+    ("requested", "distance"),
     [
         ((4.9, 1.0, 0.7), 0.1),  # 0.2 from the wall at x = 5, inside
         ((4.9, 4.85, -2.0), math.hypot(0.1, 0.05)),  # both walls of the corner
-        ((5.1, 0.0, 0.0), 0.1),  # outside is nearer
+        ((5.1, 0.0, 0.0), 0.1),  # the outside is closer
     ],
 )
 def test_nearest_to_walls(
-    world: flatland.World, asked: tuple[float, float, float], distance: float
+    world: flatland.World, requested: tuple[float, float, float], distance: float
 ) -> None:
-    model = spawn(world, "minimal", "m", asked, if_blocked="nearest")
-    assert model.pose[2] == pytest.approx(asked[2])
-    assert math.dist(model.pose[:2], asked[:2]) == pytest.approx(distance, abs=0.006)
+    model = spawn(world, "minimal", "m", requested, if_blocked="nearest")
+    assert model.pose[2] == pytest.approx(requested[2])
+    assert math.dist(model.pose[:2], requested[:2]) == pytest.approx(distance, abs=0.006)
     assert model.displacement == pytest.approx(
-        (model.pose[0] - asked[0], model.pose[1] - asked[1]), abs=1e-6
+        (model.pose[0] - requested[0], model.pose[1] - requested[1]), abs=1e-6
     )
     assert world.is_free(model.pose, model=model)
     world.move_model("m", (0, 0, 0), if_blocked="nearest")
     assert model.pose == pytest.approx((0, 0, 0))
     assert model.displacement == (0.0, 0.0)
-    world.move_model("m", asked, if_blocked="nearest")
+    world.move_model("m", requested, if_blocked="nearest")
     assert math.hypot(*model.displacement) == pytest.approx(distance, abs=0.006)
 
 
 def test_nearest_among_crates_is_between_them(world: flatland.World) -> None:
-    """A ring of crates around a hole: the next free place is in the hole."""
+    """The nearest free place in a ring of crates is the hole in its middle."""
     for i, (x, y) in enumerate(
         [(-1, -1), (0, -1), (1, -1), (-1, 0), (1, 0), (-1, 1), (0, 1), (1, 1)]
     ):
         spawn(world, "crate", f"c{i}", (x, y, 0), if_blocked="refuse")
     model = spawn(world, "minimal", "m", (0.4, 0.4, 0), if_blocked="nearest")
-    # A disc of radius 0.2 in a hole from -0.5 to 0.5
+    # A disc of radius 0.2 in a hole from -0.5 to 0.5.
     assert model.pose == pytest.approx((0.3, 0.3, 0), abs=0.005)
 
 
 def test_nearest_moves_all_bodies(world: flatland.World) -> None:
-    """The rear body is the one that is blocked; the pose of the model is that of the front."""
+    """The rear body is blocked, while the pose of the model is that of the front body."""
     model = spawn(world, "cart", "m", (-4.9, 0, 0), if_blocked="nearest")
     front, rear = model.body("front").pose, model.body("rear").pose
     assert rear == pytest.approx((-4.8, 0, 0), abs=0.006)
@@ -172,8 +173,8 @@ def test_nearest_moves_all_bodies(world: flatland.World) -> None:
     assert model.displacement == pytest.approx((0.1, 0), abs=0.006)
 
 
-def test_nearest_finds_none(world: flatland.World, files: Any) -> None:
-    """A disc that is larger than the room overlaps the walls within 5 m of the middle."""
+def test_nearest_raises_without_a_free_place(world: flatland.World, files: Any) -> None:
+    """A disc larger than the room overlaps the walls at all places within 5 m of the middle."""
     files.write(
         "giant.model.yaml",
         "bodies: [{name: b, footprints: [{type: circle, radius: 5.5, density: 1}]}]",
@@ -182,13 +183,13 @@ def test_nearest_finds_none(world: flatland.World, files: Any) -> None:
         spawn(world, "giant", "m", (0, 0, 0), if_blocked="nearest")
     assert str(error.value) == (
         'Flatland World: failed to spawn model "m", it overlaps layer "walls", layer "high" at '
-        "(0.000, 0.000, 0.000), and there is no free place within 5 m"
+        "(0.000, 0.000, 0.000), and no place within 5 m is free"
     )
     assert world.models == []
 
 
 def test_touching_is_not_blocked(world: flatland.World, caplog: pytest.LogCaptureFixture) -> None:
-    """A row of crates from wall to wall, and a stack of two."""
+    """A row of crates from wall to wall, and two adjacent crates."""
     for i in range(10):
         spawn(world, "crate", f"c{i}", (-4.5 + i, -4.5, 0))
     spawn(world, "crate", "top", (0.3, -3.5, math.pi / 2))
@@ -198,21 +199,21 @@ def test_touching_is_not_blocked(world: flatland.World, caplog: pytest.LogCaptur
     assert len(warnings_of(caplog)) == 1
 
 
-def test_layers_and_sensors_count_as_in_the_physics(world: flatland.World) -> None:
-    """A crate is in the layer of the walls only, and the sensor of a cart reaches the wall."""
+def test_layers_and_sensors_are_treated_as_in_the_physics(world: flatland.World) -> None:
+    """The crate is only in the layer of the walls; the sensor of the cart reaches a wall."""
     spawn(world, "crate", "c", (2, 0, 0), if_blocked="refuse")
     spawn(world, "cart", "cart", (3.5, 3, math.pi), if_blocked="refuse")
     with pytest.raises(WorldError, match='overlaps layer "high"'):
         spawn(world, "minimal", "m", (2, 0.9, 0), if_blocked="refuse")
 
 
-def test_bodies_that_belong_to_no_model(world: flatland.World) -> None:
+def test_bodies_without_a_model_block(world: flatland.World) -> None:
     world.physics.create_body("static", (0, 3, 0)).create_circle((0, 0), 0.5, density=1)
-    with pytest.raises(WorldError, match="it overlaps a body of no model at"):
+    with pytest.raises(WorldError, match="it overlaps a body without a model at"):
         spawn(world, "minimal", "m", (0, 3, 0), if_blocked="refuse")
 
 
-def test_unknown_choice(world: flatland.World) -> None:
+def test_an_unknown_value_of_if_blocked_raises(world: flatland.World) -> None:
     text = "if_blocked must be one of allow, warn, refuse, nearest, got 'stop'"
     with pytest.raises(ValueError, match=text):
         spawn(world, "minimal", "m", (0, 0, 0), if_blocked="stop")
@@ -221,7 +222,7 @@ def test_unknown_choice(world: flatland.World) -> None:
         world.move_model("m", (0, 0, 0), if_blocked="stop")  # type: ignore[arg-type]
 
 
-def test_a_hook_that_is_refused_gets_one_error_in_the_log(
+def test_a_refused_request_of_a_hook_logs_one_error(
     world: flatland.World, caplog: pytest.LogCaptureFixture
 ) -> None:
     spawn(world, "minimal", "m", (0, 0, 0))
@@ -241,7 +242,7 @@ def test_a_hook_that_is_refused_gets_one_error_in_the_log(
     assert ["failed to move" in line for line in warnings_of(caplog)] == [True]
 
 
-def test_models_of_a_world_file_warn_once_each(
+def test_each_overlapping_model_of_a_world_file_is_logged_once(
     world: flatland.World, files: Any, caplog: pytest.LogCaptureFixture
 ) -> None:
     models = """
@@ -257,7 +258,7 @@ def test_models_of_a_world_file_warn_once_each(
     ]
 
 
-# -- worlds that people have --------------------------------------------------------------------
+# -- included worlds and worlds of the reference ------------------------------------------------
 
 
 @pytest.mark.parametrize("name", ["office", "simple"])
@@ -275,7 +276,7 @@ def test_included_worlds_have_no_overlaps(
     ("pose", "options", "free"),
     [
         ((4.69, 0), {"radius": 0.3}, True),
-        ((4.704, 0, 2.0), {"radius": 0.3}, True),  # less than 5 mm deep
+        ((4.704, 0, 2.0), {"radius": 0.3}, True),  # penetrates by less than 5 mm
         ((4.706, 0), {"radius": 0.3}, False),
         ((4.6, 0), {"radius": 0.3, "clearance": 0.05}, True),
         ((4.6, 0), {"radius": 0.3, "clearance": 0.15}, False),
@@ -309,8 +310,8 @@ def test_is_free(
 @pytest.mark.parametrize(
     ("pose", "options", "error", "text"),
     [
-        ((0, 0), {}, ValueError, "needs either a radius or a model"),
-        ((0, 0), {"radius": 1, "model": "m"}, ValueError, "needs either a radius or a model"),
+        ((0, 0), {}, ValueError, "requires either a radius or a model"),
+        ((0, 0), {"radius": 1, "model": "m"}, ValueError, "requires either a radius or a model"),
         ((0, math.nan), {"radius": 1}, ValueError, "pose must be finite"),
         ((0, 1, 2, 3), {"radius": 1}, ValueError, "pose must be three numbers"),
         ((0, 0), {"radius": -1}, ValueError, "radius must be finite and not negative"),
@@ -320,7 +321,7 @@ def test_is_free(
         ((0, 0), {"radius": 1, "layers": "x"}, WorldError, 'layer with name "x" does not exist'),
     ],
 )
-def test_bad_questions(
+def test_invalid_arguments_of_is_free_raise(
     world: flatland.World,
     pose: tuple[float, ...],
     options: dict[str, Any],
@@ -332,7 +333,7 @@ def test_bad_questions(
         world.is_free(pose, **options)
 
 
-def test_is_free_in_a_closed_world(world: flatland.World) -> None:
+def test_is_free_raises_in_a_closed_world(world: flatland.World) -> None:
     world.close()
     with pytest.raises(WorldError, match="the world is closed"):
         world.is_free((0, 0), radius=1)
@@ -353,18 +354,20 @@ def check_samples(
             assert math.dist((x, y), other[:2]) >= 2 * radius + clearance - 1e-9
 
 
-def test_samples_are_free_apart_and_repeatable(world: flatland.World) -> None:
+def test_samples_are_free_separate_and_repeatable(world: flatland.World) -> None:
     spawn(world, "crate", "c", (0, 0, 0.5))
     poses = world.sample_free(60, 0.3, 0.1, np.random.default_rng(5))
     check_samples(world, poses, 60, 0.3, 0.1)
     assert np.abs(poses[:, :2]).max() <= 5 - 0.4 + 1e-4
-    assert len(np.unique(np.sign(poses[:, :2]), axis=0)) == 4  # in all corners of the room
+    assert len(np.unique(np.sign(poses[:, :2]), axis=0)) == 4  # in all quadrants of the room
     assert np.array_equal(poses, world.sample_free(60, 0.3, 0.1, np.random.default_rng(5)))
     assert np.array_equal(poses, world.sample_free(60, 0.3, 0.1, 5))
     assert not np.array_equal(poses, world.sample_free(60, 0.3, 0.1, 6))
 
 
-def test_the_generator_of_the_world_follows_its_seed(world: flatland.World, files: Any) -> None:
+def test_the_default_generator_depends_on_the_seed_of_the_world(
+    world: flatland.World, files: Any
+) -> None:
     first, second = (world.sample_free(5, 0.3) for _ in range(2))
     assert not np.array_equal(first, second)
     again = files.load(WORLD)
@@ -373,7 +376,7 @@ def test_the_generator_of_the_world_follows_its_seed(world: flatland.World, file
     assert not np.array_equal(first, other.sample_free(5, 0.3))
 
 
-def test_samples_can_be_spawned_at_without_a_warning(
+def test_spawning_at_samples_logs_no_warning(
     world: flatland.World, caplog: pytest.LogCaptureFixture
 ) -> None:
     for index, pose in enumerate(world.sample_free(40, 0.2, rng=3)):
@@ -393,8 +396,8 @@ def test_samples_in_bounds_and_layers(world: flatland.World) -> None:
     assert (np.abs(through[:, 0] - 2) < 0.1).any()
 
 
-def test_walls_that_come_later_count(world: flatland.World) -> None:
-    """A wall at x = 0 cuts the room in two; what was cached is not used any more."""
+def test_walls_that_are_added_later_are_respected(world: flatland.World) -> None:
+    """A wall at x = 0 divides the room, and the cached free space is not used."""
     before = world.sample_free(40, 0.3, 0.0, 1, connected_to=(-3, 0))
     assert (before[:, 0] > 0).any()
     world.layer("walls").add_edges(np.array([[0, -5, 0, 5]], np.float32))
@@ -403,7 +406,7 @@ def test_walls_that_come_later_count(world: flatland.World) -> None:
     assert (world.sample_free(40, 0.3, 0.0, 1)[:, 0] > 0).any()
 
 
-def test_moved_walls_count(world: flatland.World) -> None:
+def test_moved_walls_are_respected(world: flatland.World) -> None:
     world.layer("walls").body.set_pose(20, 0, math.pi / 4)
     poses = world.sample_free(20, 0.3, 0.0, 1, connected_to=(20, 0))
     assert np.abs(poses[:, 0] - 20).max() <= 5 * math.sqrt(2)
@@ -412,7 +415,7 @@ def test_moved_walls_count(world: flatland.World) -> None:
     assert max(np.abs(x + y).max(), np.abs(x - y).max()) <= (5 - 0.3) * math.sqrt(2) + 1e-4
 
 
-def test_too_few_places(world: flatland.World) -> None:
+def test_too_few_free_places_raise(world: flatland.World) -> None:
     with pytest.raises(
         WorldError, match=r"found only [1-9] of 20 free places for discs of radius 2 m"
     ):
@@ -425,7 +428,7 @@ def test_too_few_places(world: flatland.World) -> None:
 
 
 def test_a_place_that_just_fits_is_found(world: flatland.World) -> None:
-    """4.98 m of radius leave a square of 4 cm in the middle of the room."""
+    """With a radius of 4.98 m, a square of 4 cm in the middle of the room is free."""
     poses = world.sample_free(1, 4.98, rng=1, layers="walls")
     assert np.abs(poses[0, :2]).max() <= 0.0201
 
@@ -441,22 +444,22 @@ def test_a_place_that_just_fits_is_found(world: flatland.World) -> None:
         ((1, 0.3), {"connected_to": (0, math.inf)}, "must be finite"),
     ],
 )
-def test_bad_samples(
+def test_invalid_arguments_of_sample_free_raise(
     world: flatland.World, arguments: Any, options: dict[str, Any], text: str
 ) -> None:
     with pytest.raises(ValueError, match=text):
         world.sample_free(*arguments, **options)
 
 
-def test_a_world_without_walls_needs_bounds(empty_world: flatland.World) -> None:
-    with pytest.raises(WorldError, match="no walls to sample between: give bounds"):
+def test_a_world_without_walls_requires_bounds(empty_world: flatland.World) -> None:
+    with pytest.raises(WorldError, match="the layers have no walls; bounds are required"):
         empty_world.sample_free(3, 0.3)
     poses = empty_world.sample_free(9, 0.3, 0.0, 1, bounds=(-2, 3, 2, 5), connected_to=(0, 4))
     check_samples(empty_world, poses, 9, 0.3, 0.0)
 
 
 def test_samples_in_the_office_are_all_in_rooms(checkout: Path) -> None:
-    """All that a robot reaches is inside of the building, and beside its tables."""
+    """All places that a robot can reach are inside the building and beside its tables."""
     with flatland.World.from_yaml(checkout / "worlds/office/world.yaml", seed=1) as world:
         x, y, _ = world.model("robot").pose
         poses = world.sample_free(50, 0.25, 0.1, rng=2, connected_to=(x, y))
@@ -469,5 +472,5 @@ def test_samples_in_the_office_are_all_in_rooms(checkout: Path) -> None:
         assert world.is_free(poses[0], radius=0.25)
         everywhere = world.sample_free(400, 0.05, rng=2)
         reached = world.sample_free(400, 0.05, rng=2, connected_to=(x, y))
-        # Without a start, places within thick walls and in shafts are drawn, too.
+        # Without `connected_to`, places within thick walls and shafts are drawn too.
         assert not np.array_equal(everywhere, reached)

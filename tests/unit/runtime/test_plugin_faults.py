@@ -1,4 +1,4 @@
-"""Plugins that fail: each gives the error that is specified; the world and the others go on."""
+"""Plugins that fail: the specified errors; the world and other plugins are not affected."""
 
 from __future__ import annotations
 
@@ -32,11 +32,11 @@ from flatland import ModelPlugin, WorldPlugin
 HOOKS = {hooks}
 woken = threading.Event()
 started = []
-quits_when_made = False
+exits_when_created = False
 
 
 class _Faulty:
-    """Raises in the hook that its parameter names, and counts how often."""
+    """Raises in the hook named by its parameter, and counts the exceptions."""
 
     start_fault, fault = ValueError, RuntimeError
 
@@ -44,7 +44,7 @@ class _Faulty:
         self.calls = 0
         hook = config.get("hook", "string")
         if hook == "on_initialize":
-            raise self.start_fault("no engine")
+            raise self.start_fault("no device")
         setattr(self, hook, self.fail)
 
     def fail(self, *arguments):
@@ -60,14 +60,14 @@ class World(_Faulty, WorldPlugin):
     pass
 
 
-class Quitter(_Faulty, ModelPlugin):
-    """Takes itself for the program: what it raises is that of `sys.exit`."""
+class Exiting(_Faulty, ModelPlugin):
+    """Raises the exception of `sys.exit`."""
 
     start_fault = fault = SystemExit
 
     def __init__(self):
         super().__init__()
-        if quits_when_made:
+        if exits_when_created:
             sys.exit(3)
 
 
@@ -86,12 +86,12 @@ class Witness(ModelPlugin):
         self.calls = None
 
 
-class Goodbye(ModelPlugin):
+class FaultyShutdown(ModelPlugin):
     def on_shutdown(self):
-        raise RuntimeError("will not go")
+        raise RuntimeError("cannot shut down")
 
 
-class Here(ModelPlugin):
+class ThreadRecorder(ModelPlugin):
     def on_initialize(self, config):
         self.thread = threading.current_thread()
 
@@ -123,7 +123,7 @@ class Blocking(ModelPlugin):
 
 
 class Acting(ModelPlugin):
-    """Does in `pre_solve` what the test puts into `act`, and keeps the error."""
+    """Calls the function `act` of the test in `pre_solve`, and stores its exception."""
 
     def on_initialize(self, config):
         self.errors = []
@@ -137,14 +137,14 @@ class Acting(ModelPlugin):
                 self.errors.append(error)
                 raise
 '''
-BASES = {"World": "World"}  # of the classes above; all others are plugins of models
+BASES = {"World": "World"}  # of the classes above; all others are model plugins
 ENTRY = '<class name="faults::{name}" type="{type}" base_class_type="flatland::{base}Plugin"/>'
 ROBOT = "bodies: [{name: base, footprints: [{type: circle, radius: 0.5, density: 1}]}]\nplugins:\n"
 
 
 @pytest.fixture
 def faults(files, monkeypatch, request, caplog):
-    """Faulty plugins under `faults::`, found by manifest; gives their module's name."""
+    """Faulty plugins named `faults::...`, found by manifest; returns the name of their module."""
     module = f"faults_{abs(hash(request.node.nodeid))}"
     files.write(f"src/{module}.py", PLUGINS.format(hooks=HOOKS))
     entries = [
@@ -167,7 +167,7 @@ def faults(files, monkeypatch, request, caplog):
 
 
 def robot(files, *plugins, name="robot.model.yaml"):
-    """Writes a model of one disc with plugins; returns its file."""
+    """Writes a model of one disc with plugins and returns its path."""
     return files.write(name, ROBOT + "".join(f"  - {{{entry}}}\n" for entry in plugins))
 
 
@@ -175,9 +175,9 @@ WITNESS = 'name: witness, type: "faults::Witness"'
 
 
 def crowded(files, *plugins, world_plugins="[]", **options):
-    """Loads a world where the robot, which has a witness, overlaps four discs.
+    """Loads a world whose robot, which has a `Witness`, overlaps four discs.
 
-    Exceptions of plugins are logged, unless the options say otherwise.
+    Exceptions of plugins are logged, unless `options` contain another policy.
     """
     options.setdefault("plugin_errors", "disable")
     robot(files, *plugins, WITNESS)
@@ -196,8 +196,8 @@ def witness(world, model="robot"):
     return world.model(model).plugin("witness").calls
 
 
-def live_through_it(world):
-    """Makes every hook run more than three times."""
+def run_all_hooks(world):
+    """Runs every hook more than three times."""
     world.step(4)
     world.move_model("robot", (20, 0, 0))
     world.step(4)
@@ -216,20 +216,20 @@ def test_a_hook_that_always_raises_is_called_three_times(files, faults, caplog, 
         )
         [bad] = world.plugins
         place = 'World Plugin "bad" type "faults::World"'
-    live_through_it(world)
+    run_all_hooks(world)
     assert bad.calls == 3
     errors = [record.getMessage() for record in caplog.records if record.name == "flatland"][-2:]
     assert errors == [
         f"{place}: {hook} raised",
         f"{place}: {hook} raised 3 times in a row, the plugin is disabled",
     ]
-    # The traceback says where; throttled, so the first of the three only.
+    # The traceback of the first exception; the other two are throttled.
     assert "RuntimeError: fault 1" in caplog.text
     assert "in fail" in caplog.text
     assert "fault 2" not in caplog.text
     assert all(count > 3 for count in witness(world).values())
     assert world.time == pytest.approx(8 * 0.005)
-    # Box2D is not left locked, and the faulty plugin goes as any other.
+    # Box2D is not locked, and the faulty plugin is removed like any other.
     world.spawn_model("minimal.model.yaml", "new", pose=(0, 9, 0))
     world.delete_model("robot")
     world.step()
@@ -237,9 +237,9 @@ def test_a_hook_that_always_raises_is_called_three_times(files, faults, caplog, 
 
 @pytest.mark.parametrize("hook", [*HOOKS, "on_shutdown"])
 def test_a_plugin_that_exits_does_not_end_the_program(files, faults, caplog, hook):
-    world = crowded(files, f'name: bad, type: "faults::Quitter", hook: {hook}')
+    world = crowded(files, f'name: bad, type: "faults::Exiting", hook: {hook}')
     bad = world.model("robot").plugin("bad")
-    live_through_it(world)
+    run_all_hooks(world)
     assert bad.calls == (0 if hook == "on_shutdown" else 3)
     assert all(count > 3 for count in witness(world).values())
     world.delete_model("robot")
@@ -248,55 +248,56 @@ def test_a_plugin_that_exits_does_not_end_the_program(files, faults, caplog, hoo
 
 
 @pytest.mark.parametrize("timeout", [None, 10])
-def test_a_plugin_that_exits_at_the_start_takes_only_its_model_along(files, faults, timeout):
+def test_a_plugin_that_exits_during_initialization_fails_only_its_model(files, faults, timeout):
     world = crowded(files, plugin_timeout=timeout)
-    entry = 'name: bad, type: "faults::Quitter", hook: on_initialize'
+    entry = 'name: bad, type: "faults::Exiting", hook: on_initialize'
     robot(files, WITNESS, entry, name="bad.yaml")
-    with pytest.raises(PluginError, match=r'model "second": SystemExit no engine \['):
+    with pytest.raises(PluginError, match=r'model "second": SystemExit no device \['):
         world.spawn_model("bad.yaml", "second")
-    importlib.import_module(faults.module).quits_when_made = True
-    with pytest.raises(PluginError, match=r'Quitter" cannot be made: SystemExit: 3 \['):
+    importlib.import_module(faults.module).exits_when_created = True
+    with pytest.raises(PluginError, match=r'Exiting" cannot be instantiated: SystemExit: 3 \['):
         world.spawn_model("bad.yaml", "second")
-    live_through_it(world)
+    run_all_hooks(world)
     assert all(count > 3 for count in witness(world).values())
 
 
-def test_a_plugin_that_raises_at_the_start_takes_only_its_model_along(files, faults):
+def test_a_plugin_that_raises_in_on_initialize_fails_only_its_model(files, faults):
     world = crowded(files)
     robot(files, WITNESS, 'name: bad, type: "faults::Model", hook: on_initialize', name="bad.yaml")
     with pytest.raises(PluginError) as caught:
         world.spawn_model("bad.yaml", "second")
     assert re.fullmatch(
-        'Flatland plugin: Model Plugin "bad" type "faults::Model" model "second": no engine'
+        'Flatland plugin: Model Plugin "bad" type "faults::Model" model "second": no device'
         r" \[.*bad\.yaml:\d+\]",
         str(caught.value),
     )
     assert isinstance(caught.value.__cause__, ValueError)
     assert [model.name for model in world.models if "disc" not in model.name] == ["robot"]
-    live_through_it(world)
+    run_all_hooks(world)
     assert all(count > 3 for count in witness(world).values())
 
 
-def test_a_world_plugin_that_raises_at_the_start_fails_the_world(files, faults):
+def test_a_world_plugin_that_raises_in_on_initialize_fails_the_world(files, faults):
     with pytest.raises(PluginError) as caught:
         crowded(files, world_plugins='[{name: bad, type: "faults::World", hook: on_initialize}]')
     assert re.fullmatch(
-        'Flatland plugin: World Plugin "bad" type "faults::World": no engine'
+        'Flatland plugin: World Plugin "bad" type "faults::World": no device'
         r" \[.*world\.yaml:\d+\]",
         str(caught.value),
     )
     assert isinstance(caught.value.__cause__, ValueError)
 
 
-def test_a_plugin_that_raises_at_the_end_goes_all_the_same(files, faults, caplog):
-    world = crowded(files, 'name: bad, type: "faults::Goodbye"')
+def test_a_plugin_that_raises_in_on_shutdown_is_removed(files, faults, caplog):
+    world = crowded(files, 'name: bad, type: "faults::FaultyShutdown"')
     body = world.model("robot").body("base")
     other = world.model("robot").plugin("witness")
     world.delete_model("robot")
     assert (
-        'Model Plugin "bad" type "faults::Goodbye" model "robot": on_shutdown raised' in caplog.text
+        'Model Plugin "bad" type "faults::FaultyShutdown" model "robot": on_shutdown raised'
+        in caplog.text
     )
-    assert "RuntimeError: will not go" in caplog.text
+    assert "RuntimeError: cannot shut down" in caplog.text
     assert other.calls is None
     assert not body.physics.alive
     world.step()
@@ -304,7 +305,7 @@ def test_a_plugin_that_raises_at_the_end_goes_all_the_same(files, faults, caplog
 
 
 @pytest.mark.parametrize("which", ["Looping", "Blocking"])
-def test_a_plugin_that_never_starts_is_given_up(files, faults, which):
+def test_a_plugin_whose_on_initialize_does_not_return_is_interrupted(files, faults, which):
     world = crowded(files, plugin_timeout=0.2)
     robot(files, WITNESS, f'name: bad, type: "faults::{which}"', name="bad.yaml")
     start = time.monotonic()
@@ -317,22 +318,22 @@ def test_a_plugin_that_never_starts_is_given_up(files, faults, which):
     )
     assert world.ports.outputs == {}
     assert [model.name for model in world.models if "disc" not in model.name] == ["robot"]
-    live_through_it(world)
+    run_all_hooks(world)
     assert all(count > 3 for count in witness(world).values())
     [plugin] = importlib.import_module(faults.module).started
-    with pytest.raises(PluginError, match='plugin "bad" has ended and can open no "late"'):
+    with pytest.raises(PluginError, match='plugin "bad" has ended and cannot open "late"'):
         plugin.output("late", float)
     assert world.ports.outputs == {}
 
 
-def test_loading_gives_up_a_plugin_that_never_starts(files, faults):
+def test_loading_fails_if_on_initialize_does_not_return(files, faults):
     with pytest.raises(PluginError, match=r'"robot": on_initialize did not return within 0\.1 s'):
         crowded(files, 'name: bad, type: "faults::Looping"', plugin_timeout=0.1)
 
 
 @pytest.mark.parametrize("timeout", [None, 10])
-def test_a_plugin_starts_in_the_thread_that_loads(files, faults, timeout):
-    robot(files, 'name: here, type: "faults::Here"')
+def test_on_initialize_runs_in_the_loading_thread(files, faults, timeout):
+    robot(files, 'name: here, type: "faults::ThreadRecorder"')
     text = "{properties: {}, layers: [], models: [{name: r, model: robot.model.yaml}]}"
     plugin = files.load(text, plugin_timeout=timeout).model("r").plugin("here")
     assert plugin.thread is threading.current_thread()
@@ -348,15 +349,15 @@ def test_on_initialize_may_not_step_or_close_the_world(files, faults):
         assert world.time == 0.0
 
 
-def test_a_limit_may_be_as_long_as_one_likes(files, faults):
-    robot(files, 'name: here, type: "faults::Here"')
+def test_a_time_limit_may_be_arbitrarily_long(files, faults):
+    robot(files, 'name: here, type: "faults::ThreadRecorder"')
     text = "{properties: {}, layers: [], models: [{name: r, model: robot.model.yaml}]}"
     for timeout in (1e300, float("inf")):
         assert files.load(text, plugin_timeout=timeout).model("r").plugin("here").thread
 
 
 @pytest.mark.parametrize("timeout", [0, -1, float("nan")])
-def test_a_limit_must_be_positive(files, timeout):
+def test_a_time_limit_must_be_positive(files, timeout):
     with pytest.raises(ValueError, match=r"plugin_timeout must be positive \[s\] or None, got"):
         files.load("{properties: {}, layers: []}", plugin_timeout=timeout)
 
@@ -372,15 +373,15 @@ def test_a_limit_must_be_positive(files, timeout):
          'module "{module}_quits" of plugin "faults::Quits" (manifest "{manifest}") cannot be '
          "imported: SystemExit: no licence"),
         ("faults::World",
-         'class "{module}.World" of plugin "faults::World" must be a flatland::ModelPlugin here, '
-         "it is a flatland::WorldPlugin"),
+         'class "{module}.World" of plugin "faults::World" must be a flatland::ModelPlugin, '
+         "got a flatland::WorldPlugin"),
         ("faults::Mislabelled",
-         'class "{module}.World" of plugin "faults::Mislabelled" must be a flatland::ModelPlugin '
-         'here, it is a flatland::WorldPlugin (manifest "{manifest}" calls it '
+         'class "{module}.World" of plugin "faults::Mislabelled" must be a flatland::ModelPlugin, '
+         'got a flatland::WorldPlugin (manifest "{manifest}" declares a '
          "flatland::ModelPlugin)"),
     ],
 )  # fmt: skip
-def test_a_plugin_that_cannot_be_made_takes_only_its_model_along(files, faults, type_name, text):
+def test_a_plugin_that_cannot_be_created_fails_only_its_model(files, faults, type_name, text):
     world = crowded(files)
     robot(files, WITNESS, f'name: bad, type: "{type_name}"', name="bad.yaml")
     with pytest.raises(PluginError) as caught:
@@ -389,14 +390,14 @@ def test_a_plugin_that_cannot_be_made_takes_only_its_model_along(files, faults, 
     message, _, found = str(caught.value).rpartition(" ")
     assert message == place + text.format(**vars(faults))
     assert re.fullmatch(r"\[.*bad\.yaml:\d+\]", found)
-    live_through_it(world)
+    run_all_hooks(world)
     assert all(count > 3 for count in witness(world).values())
 
 
-def test_a_manifest_that_is_not_xml_hides_only_itself(files, faults, caplog):
+def test_a_manifest_that_is_not_xml_does_not_hide_others(files, faults, caplog):
     world = crowded(files)
     problem = f'manifest "{faults.broken}" is not XML, line 2 col 14, not well-formed'
-    # In the log at once; and whoever asks for a plugin in vain is told of it.
+    # The log has the error immediately, and an unsuccessful look-up repeats it.
     assert f"Flatland plugin: {problem}" in caplog.text
     robot(files, 'name: bad, type: "broken::Plugin"', name="bad.yaml")
     with pytest.raises(PluginError) as caught:
@@ -406,7 +407,7 @@ def test_a_manifest_that_is_not_xml_hides_only_itself(files, faults, caplog):
         'no plugin "broken::Plugin"; '
     )
     assert problem in str(caught.value)
-    live_through_it(world)
+    run_all_hooks(world)
     assert all(count > 3 for count in witness(world).values())
 
 
@@ -414,7 +415,7 @@ def test_a_manifest_that_is_not_xml_hides_only_itself(files, faults, caplog):
 
 
 @pytest.mark.parametrize("hook", HOOKS)
-def test_step_raises_what_a_hook_raised_when_the_step_is_complete(files, faults, hook):
+def test_step_raises_the_exception_of_a_hook_after_completing_the_step(files, faults, hook):
     world = crowded(files, f'name: bad, type: "faults::Model", hook: {hook}', plugin_errors="raise")
     if hook == "end_contact":
         world.step()
@@ -425,7 +426,7 @@ def test_step_raises_what_a_hook_raised_when_the_step_is_complete(files, faults,
     place = 'Model Plugin "bad" type "faults::Model" model "robot"'
     assert caught.value.__notes__ == [f"raised by {place}: {hook}"]
     assert world.time == pytest.approx(time + 0.005)
-    # The hooks of the other plugins ran, too, and the plugin is not disabled.
+    # The hooks of the other plugins ran too, and the plugin is not disabled.
     assert witness(world)["after_physics_step"] == calls["after_physics_step"] + 1
     bad = world.model("robot").plugin("bad")
     before = bad.calls
@@ -436,25 +437,25 @@ def test_step_raises_what_a_hook_raised_when_the_step_is_complete(files, faults,
         assert bad.calls >= before + 4
 
 
-def test_sys_exit_of_a_plugin_is_raised_as_an_error(files, faults):
+def test_sys_exit_of_a_plugin_is_raised_as_a_plugin_error(files, faults):
     hook = "before_physics_step"
     world = crowded(
-        files, f'name: bad, type: "faults::Quitter", hook: {hook}', plugin_errors="raise"
+        files, f'name: bad, type: "faults::Exiting", hook: {hook}', plugin_errors="raise"
     )
     with pytest.raises(PluginError, match=f"{hook} raised SystemExit"):
         world.step()
 
 
-def test_close_raises_what_on_shutdown_raised_and_closes(files, faults):
-    world = crowded(files, 'name: bad, type: "faults::Goodbye"', plugin_errors="raise")
-    with pytest.raises(RuntimeError, match="will not go"):
+def test_close_raises_the_exception_of_on_shutdown_after_closing(files, faults):
+    world = crowded(files, 'name: bad, type: "faults::FaultyShutdown"', plugin_errors="raise")
+    with pytest.raises(RuntimeError, match="cannot shut down"):
         world.close()
     assert world.closed
     world.close()
 
 
 def test_an_exception_of_a_with_block_is_not_replaced_by_one_of_a_plugin(files, faults):
-    world = crowded(files, 'name: bad, type: "faults::Goodbye"', plugin_errors="raise")
+    world = crowded(files, 'name: bad, type: "faults::FaultyShutdown"', plugin_errors="raise")
     with pytest.raises(KeyError), world:
         raise KeyError
     assert world.closed
@@ -465,11 +466,11 @@ def test_an_exception_of_a_subscriber_is_raised_by_step_and_not_blamed_on_the_pl
     output = world.output("/scan")
 
     def fail(scan):
-        raise ValueError("no use for it")
+        raise ValueError("broken subscriber")
 
     unsubscribe = output.subscribe(fail)
     for _ in range(5):
-        with pytest.raises(ValueError, match="no use for it") as caught:
+        with pytest.raises(ValueError, match="broken subscriber") as caught:
             world.step()
     [note] = caught.value.__notes__
     assert note.startswith("raised by subscriber ")
@@ -487,29 +488,29 @@ def test_an_exception_of_a_subscriber_is_logged_and_never_disables_the_plugin(
     output = world.output("/scan")
 
     def fail(scan):
-        raise ValueError("no use for it")
+        raise ValueError("broken subscriber")
 
     output.subscribe(fail)
     world.step(10)
     assert output.latest.stamp == 9 * world.timekeeper.step_size_ns
-    assert caplog.text.count("ValueError: no use for it") == 1
+    assert caplog.text.count("ValueError: broken subscriber") == 1
     assert 'fail of output "/scan" raised' in caplog.text
     assert "disabled" not in caplog.text
 
 
 def laser_world(files, **options):
-    """Loads a world with one robot that has a laser which scans in each step."""
+    """Loads a world with one robot whose laser scans in each step."""
     laser = "type: Laser, name: laser, body: base, range: 5, angle: {min: 0, max: 1, increment: 1}"
     robot(files, laser)
     text = "{properties: {}, layers: [{name: 2d}], models: [{name: r, model: robot.model.yaml}]}"
     return files.load(text, **options)
 
 
-# -- inside the physics step -----------------------------------------------------------------
+# -- within the physics step -----------------------------------------------------------------
 
 
 def acting(files):
-    """A world whose robot acts in `pre_solve`."""
+    """A world whose robot calls a function in `pre_solve`."""
     world = crowded(files, 'name: acting, type: "faults::Acting"')
     return world, world.model("robot").plugin("acting")
 
@@ -540,10 +541,10 @@ def test_pre_solve_may_not_change_the_world(files, faults, caplog, what):
     assert 'Model Plugin "acting" type "faults::Acting" model "robot": pre_solve raised' in (
         caplog.text
     )
-    # Box2D came out of it whole: the step was made, and the next ones are.
+    # Box2D is intact: this step was completed, and so are the next ones.
     assert len(world.models) == 5
     assert len(world.contacts) == 4
-    live_through_it(world)
+    run_all_hooks(world)
     assert all(count > 3 for count in witness(world).values())
 
 
@@ -564,7 +565,7 @@ def test_pre_solve_may_not_step_or_close_the_world(files, faults, act, text):
     world.step()
 
 
-def test_requests_from_pre_solve_act_after_the_step(files, faults):
+def test_requests_in_pre_solve_run_after_the_step(files, faults):
     world, plugin = acting(files)
     seen = []
 
@@ -584,8 +585,8 @@ def test_requests_from_pre_solve_act_after_the_step(files, faults):
     world.step(3)
 
 
-def test_a_fault_in_pre_solve_leaves_the_contact_as_it_is(files, faults):
-    """The discs push each other apart as if the plugin were not there."""
+def test_an_exception_in_pre_solve_does_not_change_the_contact(files, faults):
+    """The discs push each other apart as they do without the plugin."""
     quiet, _ = acting(files)
     quiet.step(20)
     loud, plugin = acting(files)
@@ -599,7 +600,7 @@ def test_a_fault_in_pre_solve_leaves_the_contact_as_it_is(files, faults):
     assert [model.pose for model in loud.models] == [model.pose for model in quiet.models]
 
 
-def test_a_contact_kept_from_pre_solve_is_of_no_use_later(files, faults):
+def test_a_contact_of_pre_solve_is_invalid_after_the_call(files, faults):
     world, plugin = acting(files)
     kept = []
     plugin.act = lambda plugin, contact: kept.append(contact)
@@ -608,8 +609,8 @@ def test_a_contact_kept_from_pre_solve_is_of_no_use_later(files, faults):
         kept[0].enabled = False
 
 
-def test_bodies_that_the_world_does_not_know_of_are_no_fault(files, faults):
-    """A plugin may make bodies of its own in the physics world; no hook hears of them."""
+def test_contacts_of_bodies_without_a_model_are_ignored(files, faults):
+    """A plugin may create bodies in the physics world; hooks are not called for them."""
     world, plugin = acting(files)
     stranger = world.physics.create_body("dynamic", (0.2, 0.2, 0))
     stranger.create_circle((0, 0), 0.1, density=1)
@@ -621,8 +622,8 @@ def test_bodies_that_the_world_does_not_know_of_are_no_fault(files, faults):
     assert len(world.contacts) == 4
 
 
-def test_an_interrupt_in_pre_solve_ends_the_step_with_it(files, faults):
-    """Control-C often lands in the hook, as the rest of a step runs no Python."""
+def test_an_interrupt_in_pre_solve_is_raised_by_the_step(files, faults):
+    """Control-C often interrupts the hook, as the rest of a step runs no Python code."""
     world, plugin = acting(files)
 
     def act(plugin, contact):

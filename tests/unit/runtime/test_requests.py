@@ -1,4 +1,4 @@
-"""Requests of other threads and of plugins: when and in which thread they run."""
+"""Requests of other threads and of plugins: their order, times and threads."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def test_actions_run_in_order_of_arrival_and_later_ones_wait() -> None:
     assert done == [1, 2, 3]
 
 
-def test_an_action_that_raises_is_the_affair_of_who_posted_it() -> None:
+def test_an_exception_of_an_action_is_set_on_its_future() -> None:
     requests = Requests()
     failing = requests.post(lambda: 1 / 0)
     good = requests.post(lambda: 7)
@@ -106,7 +106,7 @@ def test_while_a_simulation_runs_all_requests_run_in_its_thread(
     assert len(threads) == 80
 
 
-def test_a_request_that_waits_when_the_simulation_ends_is_carried_out(files: Any) -> None:
+def test_a_request_that_is_queued_when_the_simulation_ends_runs(files: Any) -> None:
     world = files.load(EMPTY)
     simulation = Simulation(world, 0)
     entered, release = threading.Event(), threading.Event()
@@ -122,7 +122,7 @@ def test_a_request_that_waits_when_the_simulation_ends_is_carried_out(files: Any
         assert late.result(60) is world.model("late")
 
 
-def test_a_world_is_run_by_one_simulation_at_a_time(files: Any) -> None:
+def test_a_world_cannot_be_run_by_two_simulations(files: Any) -> None:
     world = files.load(EMPTY)
     inner = Simulation(world, 0)
     outer = Simulation(world, 0)
@@ -134,7 +134,7 @@ def test_a_world_is_run_by_one_simulation_at_a_time(files: Any) -> None:
     assert world.time == pytest.approx(0.02)
 
 
-# -- plugins that react to the end of a model ------------------------------------------------
+# -- plugins that react to the removal of a model --------------------------------------------
 
 PLUGIN = """
 from flatland import ModelPlugin
@@ -158,7 +158,7 @@ class Reacting(ModelPlugin):
 
 @pytest.fixture
 def reacting(files: Any, monkeypatch: pytest.MonkeyPatch, request: Any) -> Callable[..., Any]:
-    """Loads a world with a plugin that acts in one of its hooks."""
+    """Returns a function that loads a world with a plugin that calls a function in a hook."""
     name = f"reacting_{abs(hash(request.node.nodeid))}"
     files.write(f"src/{name}.py", PLUGIN)
     manifest = files.write(
@@ -184,7 +184,7 @@ def reacting(files: Any, monkeypatch: pytest.MonkeyPatch, request: Any) -> Calla
 
 
 @pytest.mark.parametrize(("hook", "deleted"), [("end_contact", "b"), ("on_shutdown", "a")])
-def test_a_spawn_of_a_hook_that_runs_while_a_model_is_deleted_comes_later(
+def test_a_spawn_in_a_hook_during_the_removal_of_a_model_is_deferred(
     reacting: Callable[..., Any], hook: str, deleted: str
 ) -> None:
     world, plugin = reacting(
@@ -198,7 +198,7 @@ def test_a_spawn_of_a_hook_that_runs_while_a_model_is_deleted_comes_later(
 
 
 @pytest.mark.parametrize(("hook", "deleted"), [("end_contact", "b"), ("on_shutdown", "a")])
-def test_a_hook_that_runs_while_a_model_is_deleted_may_not_step(
+def test_a_hook_during_the_removal_of_a_model_may_not_step(
     reacting: Callable[..., Any], hook: str, deleted: str
 ) -> None:
     world, plugin = reacting(hook, lambda world: world.step())

@@ -1,4 +1,4 @@
-"""Limits of wall time: what is interrupted, and what is left behind."""
+"""Limits of wall time: interruption of code, and its effects."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def receive() -> None:
 
 
 def in_thread(run: Callable[[], object]) -> BaseException | None:
-    """Returns what a function raises in a thread of its own."""
+    """Runs a function in a new thread and returns its exception."""
     done: Future[None] = Future()
 
     def call() -> None:
@@ -77,7 +77,7 @@ def test_python_code_in_another_thread_is_interrupted(block: Callable[[], object
 
 
 @pytest.mark.parametrize("in_main_thread", [False, True])
-def test_code_that_returns_in_time_is_not_disturbed(in_main_thread: bool) -> None:
+def test_code_that_returns_in_time_is_not_interrupted(in_main_thread: bool) -> None:
     def run() -> None:
         for _ in range(20):
             with time_limit(10):
@@ -91,6 +91,6 @@ def test_code_that_returns_in_time_is_not_disturbed(in_main_thread: bool) -> Non
         assert in_thread(run) is None
 
 
-def test_no_limit() -> None:
+def test_without_a_limit_nothing_is_interrupted() -> None:
     with time_limit(None):
         assert signal.getitimer(signal.ITIMER_REAL) == (0.0, 0.0)

@@ -1,4 +1,4 @@
-"""The warning of a loop that does not hold its rate, in a time of its own."""
+"""The warning of a loop that does not hold its rate, with a fake clock."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from flatland.runtime.plugin_costs import PluginCosts
 from flatland.runtime.plugin_host import PluginHost
 from flatland.simulation import Simulation, rate_monitor
 
-# Powers of two, so that sums of times are exact.
+# Powers of two: sums of times are exact.
 RATE = 128.0
 PERIOD = 1 / RATE
 LAG = 16 * PERIOD
@@ -39,7 +39,7 @@ DRIVE_COST = 0.25  # periods in each of its two hooks
 def fleet(
     files: Any, fake_time: Any, monkeypatch: pytest.MonkeyPatch
 ) -> Callable[..., flatland.World]:
-    """Loads robots whose plugins spend a known time: drives little, lasers by their robots."""
+    """Returns a function that loads robots whose drives and lasers spend given wall times."""
 
     def loaded(*scan_costs: float) -> flatland.World:
         def scan(laser: Laser, _timekeeper: object) -> None:
@@ -90,8 +90,8 @@ def test_one_warning_names_the_most_expensive_plugins(
     run_fleet(world, fake_time, rate_monitor.WARNING_PERIOD - 1)
     (text,) = warnings(caplog)
     assert text.startswith(
-        "the update rate of 128 Hz cannot be held: 32.0 steps a second. Steps take "
-        "100 % of the wall time, and the loop has a processor for "
+        "the update rate of 128 Hz cannot be held: 32.0 steps per second. Steps take "
+        "100 % of the wall time, and the CPU time of the loop is "
     )
     assert text.endswith(
         "% of it. The most expensive plugins, in percent of the wall time: "
@@ -102,7 +102,7 @@ def test_one_warning_names_the_most_expensive_plugins(
     )
 
 
-def test_types_are_only_added_where_plugins_share_one(
+def test_types_are_listed_only_if_plugins_share_a_type(
     fleet: Any, fake_time: Any, caplog: pytest.LogCaptureFixture
 ) -> None:
     run_fleet(fleet(3.5), fake_time, 10)
@@ -113,7 +113,7 @@ def test_types_are_only_added_where_plugins_share_one(
     )
 
 
-def test_warning_comes_again_after_a_while_and_after_a_change_of_the_rate(
+def test_the_warning_is_repeated_after_its_period_and_after_a_change_of_the_rate(
     fleet: Any, fake_time: Any, caplog: pytest.LogCaptureFixture
 ) -> None:
     world = fleet(3.5)
@@ -145,8 +145,8 @@ def test_no_warning_while_the_rate_is_held(
     assert not warnings(caplog)
 
 
-class Stops(flatland.WorldObserver):
-    """Stops the loop for some wall time at some simulated times [s]."""
+class Delays(flatland.WorldObserver):
+    """Delays the loop for some wall time at given simulated times [s]."""
 
     def __init__(self, fake_time: Any, *when: float, duration: float = 1.0) -> None:
         self._time = fake_time
@@ -160,7 +160,7 @@ class Stops(flatland.WorldObserver):
 
 @pytest.fixture
 def measured(monkeypatch: pytest.MonkeyPatch) -> list[bool]:
-    """Whether plugins are measured, after each change."""
+    """The changes of the measurement: whether plugins are measured."""
     changes = []
     measure = PluginHost.measure
 
@@ -172,37 +172,37 @@ def measured(monkeypatch: pytest.MonkeyPatch) -> list[bool]:
     return changes
 
 
-def test_single_stop_gives_no_warning_and_no_measurement(
+def test_a_single_delay_causes_no_warning_and_no_measurement(
     fleet: Any, fake_time: Any, measured: list[bool], caplog: pytest.LogCaptureFixture
 ) -> None:
     world = fleet(0.0)
-    # Several stops within a second count as one; it is forgotten before the last one comes.
-    world.add_observer(Stops(fake_time, 1, 1.25, 1.5, duration=0.25))
-    world.add_observer(Stops(fake_time, 3 + rate_monitor.LONGEST_WATCH))
+    # Several delays within a second count as one loss, which is dropped before the last delay.
+    world.add_observer(Delays(fake_time, 1, 1.25, 1.5, duration=0.25))
+    world.add_observer(Delays(fake_time, 3 + rate_monitor.MAX_WATCH_TIME))
     run_fleet(world, fake_time, 20)
     assert not warnings(caplog)
     assert not measured
 
 
-def test_measurement_ends_when_the_loop_keeps_up_again(
+def test_the_measurement_ends_when_the_loop_holds_its_rate_again(
     fleet: Any, fake_time: Any, measured: list[bool], caplog: pytest.LogCaptureFixture
 ) -> None:
     world = fleet(0.0)
-    world.add_observer(Stops(fake_time, 1, 3))
+    world.add_observer(Delays(fake_time, 1, 3))
     run_fleet(world, fake_time, 6)
-    assert measured == [True, False]  # by the end of the loop
+    assert measured == [True, False]  # at the end of the loop
     run_fleet(world, fake_time, 30)
-    world.add_observer(Stops(fake_time, world.time + 1, world.time + 3))
-    run_fleet(world, fake_time, 5 + rate_monitor.LONGEST_WATCH)
+    world.add_observer(Delays(fake_time, world.time + 1, world.time + 3))
+    run_fleet(world, fake_time, 5 + rate_monitor.MAX_WATCH_TIME)
     assert measured == [True, False] * 2
     assert not warnings(caplog)
 
 
-def test_measurement_ends_with_the_warning(
+def test_the_measurement_ends_with_the_warning(
     fleet: Any, fake_time: Any, measured: list[bool], caplog: pytest.LogCaptureFixture
 ) -> None:
     world = fleet(0.0)
-    world.add_observer(Stops(fake_time, 1, 3, 5, 7, 9))
+    world.add_observer(Delays(fake_time, 1, 3, 5, 7, 9))
     run_fleet(world, fake_time, 20)
     (text,) = warnings(caplog)
     assert "DiffDrive" in text
@@ -223,7 +223,7 @@ def test_costs_include_contacts(
     costs = PluginCosts(fake_time.clock)
     world.plugin_host.measure(costs)
     world.step()
-    # Both robots are at the origin and touch each other.
+    # Both robots are at the origin and in contact.
     assert costs.describe(1000.0, 1).startswith(
         'Model Plugin "laser" type "Laser" model "0" 32.1 %; by type: 2 x Laser 64.2 %'
     )
@@ -236,7 +236,7 @@ def test_no_warning_at_full_speed(
     assert not warnings(caplog)
 
 
-def test_loop_without_plugins_is_reported_as_well(
+def test_an_overloaded_loop_without_plugins_is_reported(
     fleet: Any, fake_time: Any, caplog: pytest.LogCaptureFixture
 ) -> None:
     class Slow(flatland.WorldObserver):

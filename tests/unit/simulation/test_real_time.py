@@ -1,4 +1,4 @@
-"""The pace of the loop in a time of its own: what is made up for and what is dropped."""
+"""The timing of the loop with a fake clock: lag that is caught up on, and lag that is dropped."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ import pytest
 import flatland
 from flatland.simulation import MAX_LAG, Simulation
 
-# Powers of two, so that sums of times are exact.
+# Powers of two: sums of times are exact.
 RATE = 128.0
 PERIOD = 1 / RATE
 LAG = 16 * PERIOD
 
 
 class Load(flatland.WorldObserver):
-    """Spends time in each step and records when it started, relative to the first one [periods]."""
+    """Spends time in each step and records its start, relative to the first one [periods]."""
 
     def __init__(self, fake_time: Any) -> None:
         self.cost: Callable[[int], float] = lambda step: 0.0  # periods
@@ -58,18 +58,16 @@ def run(simulation: Simulation, steps: int) -> float:
     return result.wall_time / PERIOD
 
 
-def test_lost_time_is_made_up_for_exactly(simulate: Any, load: Load) -> None:
+def test_the_loop_catches_up_exactly(simulate: Any, load: Load) -> None:
     load.cost = lambda step: 12.0 if step == 10 else 0.0
     assert run(simulate(), 100) == 100
     expected: list[float] = list(range(100))
-    expected[11:23] = [22] * 12  # steps 11 to 22 are due while step 10 lasts
+    expected[11:23] = [22] * 12  # steps 11 to 22 are due during step 10
     assert load.starts == expected
 
 
-def test_work_that_comes_all_in_one_step_does_not_change_the_rate(
-    simulate: Any, load: Load
-) -> None:
-    # As a hundred lasers at a tenth of the rate; 90 % of the time are spent.
+def test_work_concentrated_in_one_step_does_not_change_the_rate(simulate: Any, load: Load) -> None:
+    # Like a hundred lasers at a tenth of the rate; the load is 90 %.
     load.cost = lambda step: 7.125 if step % 10 == 0 else 0.1875
     assert run(simulate(), 1000) == 1000
 
@@ -77,13 +75,13 @@ def test_work_that_comes_all_in_one_step_does_not_change_the_rate(
 def test_burst_is_not_longer_than_max_lag(simulate: Any, load: Load) -> None:
     load.cost = lambda step: 1000.0 if step == 10 else 0.0
     total = run(simulate(), 100)
-    # Of the 999 periods that are lost, 16 are made up for; one more step is due at that time.
+    # Of the lag of 999 periods, 16 are caught up on; one more step is due at that time.
     assert load.starts[11:28] == [1010] * 17
     assert load.starts[28:] == [1010 + step for step in range(1, 73)]
     assert total == 100 + 999 - 16
 
 
-def test_overload_leaves_a_burst_of_max_lag_at_most(simulate: Any, load: Load) -> None:
+def test_an_overload_is_followed_by_a_burst_of_max_lag_at_most(simulate: Any, load: Load) -> None:
     load.cost = lambda step: 2.0 if step < 200 else 0.0
     run(simulate(), 300)
     assert load.starts[:201] == [2 * step for step in range(201)]
@@ -92,7 +90,9 @@ def test_overload_leaves_a_burst_of_max_lag_at_most(simulate: Any, load: Load) -
 
 
 @pytest.mark.parametrize("lost", [1, 12, 1000])
-def test_without_lag_one_cycle_is_made_up_for(simulate: Any, load: Load, lost: int) -> None:
+def test_without_max_lag_the_loop_catches_up_on_one_cycle(
+    simulate: Any, load: Load, lost: int
+) -> None:
     load.cost = lambda step: 1.0 + lost if step == 10 else 0.0
     total = run(simulate(max_lag=0), 100)
     made_up = 1 if lost == 1 else 0
@@ -139,7 +139,7 @@ def test_pause_drops_the_lag(simulate: Any, world: flatland.World, load: Load) -
     assert load.starts[13:] == [resumed + step for step in range(7)]
 
 
-def test_long_request_is_made_up_for_like_a_long_step(
+def test_the_loop_catches_up_after_a_long_request(
     simulate: Any, fake_time: Any, load: Load
 ) -> None:
     simulation = simulate()
@@ -157,12 +157,12 @@ def test_long_request_is_made_up_for_like_a_long_step(
 
 
 @pytest.mark.parametrize("lag", [-1e-9, math.nan, math.inf, -math.inf])
-def test_invalid_lag_is_refused(world: flatland.World, lag: float) -> None:
+def test_an_invalid_lag_raises(world: flatland.World, lag: float) -> None:
     with pytest.raises(ValueError, match=r"^max_lag must be finite and not negative \[s\], got "):
         Simulation(world, max_lag=lag)
 
 
-def test_default_lag(world: flatland.World, fake_time: Any, load: Load) -> None:
+def test_default_max_lag(world: flatland.World, fake_time: Any, load: Load) -> None:
     load.cost = lambda step: 1000.0 if step == 10 else 0.0
     run(Simulation(world, RATE, clock=fake_time.clock, wait=fake_time.wait), 100)
     assert load.starts.count(1010) == math.floor(MAX_LAG / PERIOD) + 1

@@ -1,4 +1,4 @@
-"""The loop: its rate, pauses, requests, reports and ends; without ROS."""
+"""The loop: rate, pause, requests, reports and end, without ROS."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ pytestmark = pytest.mark.threads
 
 
 class Counter(flatland.WorldObserver):
-    """Counts steps and lets others wait for them."""
+    """Records the times of steps; other threads can wait for a number of steps."""
 
     def __init__(self) -> None:
         self.times: list[float] = []
@@ -48,7 +48,7 @@ def world(counter: Counter) -> Iterator[flatland.World]:
 
 
 class Running:
-    """A simulation that runs in a thread for the length of a with block."""
+    """A simulation that runs in a thread during a with block."""
 
     def __init__(self, simulation: Simulation) -> None:
         self.simulation = simulation
@@ -65,12 +65,12 @@ class Running:
 
 
 @pytest.mark.parametrize("rate", [-1.0, math.nan, -math.inf])
-def test_bad_rate_is_refused(world: flatland.World, rate: float) -> None:
+def test_an_invalid_rate_raises(world: flatland.World, rate: float) -> None:
     with pytest.raises(ValueError, match="update_rate must not be negative"):
         Simulation(world, rate)
 
 
-def test_runs_for_an_exact_simulated_time(world: flatland.World) -> None:
+def test_run_ends_after_an_exact_simulated_time(world: flatland.World) -> None:
     result = Simulation(world, 0).run(2.5)
     assert result.steps == 250
     assert world.time == 2.5
@@ -79,28 +79,30 @@ def test_runs_for_an_exact_simulated_time(world: flatland.World) -> None:
     assert world.time == 2.6
 
 
-def test_is_never_faster_than_its_rate(world: flatland.World) -> None:
+def test_the_loop_is_never_faster_than_its_rate(world: flatland.World) -> None:
     result = Simulation(world, 500).run(0.5)
     assert result.steps == 50
-    # The first step is due at once, the other 49 follow in steps of 2 ms.
+    # The first step is due immediately, the other 49 at intervals of 2 ms.
     assert result.wall_time >= 49 * 0.002
 
 
-def test_rate_changes_at_once(world: flatland.World, counter: Counter) -> None:
+def test_a_change_of_the_rate_takes_effect_immediately(
+    world: flatland.World, counter: Counter
+) -> None:
     simulation = Simulation(world, 0.001, max_lag=0)
     with Running(simulation):
-        counter.wait_for(1)  # The next step would be due in a quarter of an hour.
+        counter.wait_for(1)  # The next step is due after 1000 s.
         simulation.post(lambda: simulation.set_rate(50)).result(TIMEOUT)
         counter.wait_for(12)
         simulation.post(lambda: simulation.set_rate(math.inf)).result(TIMEOUT)
         counter.wait_for(400)
     steps = counter.times
-    # At 50 Hz no cycle is made up for here but the first; as fast as possible it takes no time.
+    # The loop does not catch up on the cycles at 50 Hz; without a limit they take no time.
     assert steps[11] - steps[2] >= 9 * 0.02 - 0.02
     assert steps[399] - steps[20] < 379 * 0.02
 
 
-def test_bad_rate_changes_nothing(world: flatland.World) -> None:
+def test_an_invalid_rate_has_no_effect(world: flatland.World) -> None:
     simulation = Simulation(world, 500)
     for rate in (-1.0, math.nan):
         with pytest.raises(ValueError, match="update_rate must not be negative"):
@@ -108,17 +110,17 @@ def test_bad_rate_changes_nothing(world: flatland.World) -> None:
     assert simulation.run(0.3).wall_time >= 29 * 0.002
 
 
-def test_late_loop_without_lag_catches_up_with_one_cycle_at_most(
+def test_without_max_lag_the_loop_catches_up_on_one_cycle_at_most(
     world: flatland.World, counter: Counter
 ) -> None:
     simulation = Simulation(world, 100, max_lag=0)
     with Running(simulation):
         counter.wait_for(3)
-        simulation.post(lambda: time.sleep(0.2)).result(TIMEOUT)  # 20 cycles are lost
+        simulation.post(lambda: time.sleep(0.2)).result(TIMEOUT)  # a lag of 20 cycles
         counter.wait_for(len(counter.times) + 8)
     gaps = [after - before for before, after in itertools.pairwise(counter.times)]
     late = gaps.index(max(gaps))
-    # Had it made up for the lost time, the steps behind the gap would have come all at once.
+    # If the loop caught up, the steps after the gap would follow without a wait.
     assert sum(gaps[late + 1 : late + 7]) > 0.03
 
 
@@ -135,7 +137,7 @@ def test_pause_and_resume_by_requests(world: flatland.World, counter: Counter) -
             counter.wait_for(steps + 3)
 
 
-def test_requests_run_in_order_in_the_loops_thread(world: flatland.World) -> None:
+def test_requests_run_in_order_in_the_thread_of_the_loop(world: flatland.World) -> None:
     seen: list[int] = []
     running = Running(Simulation(world, 200))
     with running as simulation:
@@ -146,13 +148,13 @@ def test_requests_run_in_order_in_the_loops_thread(world: flatland.World) -> Non
     assert ident == running.thread.ident
 
 
-def test_models_come_and_go_in_the_order_of_the_requests(
+def test_models_are_spawned_and_deleted_in_the_order_of_the_requests(
     world: flatland.World, tmp_path: Path
 ) -> None:
     path = tmp_path / "ball.yaml"
     path.write_text("bodies: [{name: b, footprints: []}]\n")
     simulation = Simulation(world, 0)
-    # All wait for the first step: a later one must not overtake an earlier one.
+    # All requests wait for the first step and must run in order.
     futures = [
         simulation.post(action)
         for _ in range(5)
@@ -169,7 +171,7 @@ def test_models_come_and_go_in_the_order_of_the_requests(
 
 
 def test_request_does_not_wait_for_a_slow_cycle(world: flatland.World, counter: Counter) -> None:
-    simulation = Simulation(world, 0.001)  # one step in 1000 s
+    simulation = Simulation(world, 0.001)  # one step per 1000 s
     with Running(simulation):
         counter.wait_for(1)
         start = time.monotonic()
@@ -180,10 +182,10 @@ def test_request_does_not_wait_for_a_slow_cycle(world: flatland.World, counter: 
 
 def test_failing_request_does_not_stop_the_loop(world: flatland.World, counter: Counter) -> None:
     def fail() -> None:
-        raise RuntimeError("as asked for")
+        raise RuntimeError("intended")
 
     with Running(Simulation(world, 200)) as simulation:
-        with pytest.raises(RuntimeError, match="as asked for"):
+        with pytest.raises(RuntimeError, match="intended"):
             simulation.post(fail).result(TIMEOUT)
         counter.wait_for(len(counter.times) + 2)
 
@@ -195,7 +197,7 @@ def test_stop_before_run(world: flatland.World) -> None:
     assert simulation.run().steps == 0
 
 
-def test_reports_come_in_wall_time_and_not_while_paused(world: flatland.World) -> None:
+def test_reports_are_periodic_in_wall_time_and_not_sent_while_paused(world: flatland.World) -> None:
     reports: list[CycleStatistics] = []
     came = threading.Event()
 
@@ -209,28 +211,28 @@ def test_reports_come_in_wall_time_and_not_while_paused(world: flatland.World) -
         simulation.post(world.pause).result(TIMEOUT)
         simulation.post(lambda: time.sleep(0.1)).result(TIMEOUT)
         count = len(reports)
-        for _ in range(3):  # several reports would be due
+        for _ in range(3):  # several reports are due meanwhile
             simulation.post(lambda: time.sleep(0.06)).result(TIMEOUT)
-        assert len(reports) <= count + 1  # the one of the cycle in which the pause came
+        assert len(reports) <= count + 1  # that of the cycle in which the pause took effect
     first = reports[0]
     assert first.cycles >= 1
     assert 0 < first.use_min <= first.use_mean <= first.use_max
-    assert first.asked == pytest.approx(2.0)  # 200 steps of 0.01 s in a second
-    assert 0 < first.got < 2.5
+    assert first.target == pytest.approx(2.0)  # 200 steps of 0.01 s per second
+    assert 0 < first.actual < 2.5
 
 
 def test_statistics_of_a_loop_without_a_rate(world: flatland.World) -> None:
     reports: list[CycleStatistics] = []
     Simulation(world, 0, report=reports.append, report_period=0.01).run(100)
     assert reports
-    assert math.isinf(reports[0].asked)
-    assert reports[0].got > 1
+    assert math.isinf(reports[0].target)
+    assert reports[0].actual > 1
     text = str(reports[0])
     assert text.startswith("cycle use min ")
-    assert "real-time factor asked inf, got " in text
+    assert "real-time factor: target inf, actual " in text
 
 
-def test_closed_world_ends_the_loop_with_its_error(world: flatland.World) -> None:
+def test_a_closed_world_ends_the_loop_with_an_error(world: flatland.World) -> None:
     simulation = Simulation(world, 0)
     world.close()
     with pytest.raises(flatland.WorldError, match="closed"):

@@ -1,0 +1,77 @@
+"""Contact hooks are called for the contacts of the plugin's own model and for no others."""
+
+from __future__ import annotations
+
+import sys
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+import flatland
+from flatland import Contact, ModelPlugin
+
+HOOKS = ("begin_contact", "pre_solve", "post_solve", "end_contact")
+SPACING = 0.398  # m between discs of 0.4 m: each touches its neighbors
+MANIFEST = """
+<library>
+  <class name="calls::Recorder" type="contact_recorder_for_tests.Recorder"
+         base_class_type="flatland::ModelPlugin"/>
+</library>
+"""
+ROBOT = """
+bodies: [{name: base, footprints: [{type: circle, radius: 0.2, density: 1}]}]
+plugins: [{name: recorder, type: 'calls::Recorder'}]
+"""
+
+
+class Recorder(ModelPlugin):
+    """Records the names of the models of each contact, by hook."""
+
+    def on_initialize(self, config: Any) -> None:
+        self.calls: dict[str, list[set[str]]] = {hook: [] for hook in HOOKS}
+        for hook in HOOKS:
+            setattr(self, hook, lambda contact, *_, hook=hook: self._record(hook, contact))
+
+    def _record(self, hook: str, contact: Contact) -> None:
+        self.calls[hook].append({contact.body_a.entity.name, contact.body_b.entity.name})
+
+
+@pytest.fixture
+def row(files: Any, monkeypatch: pytest.MonkeyPatch) -> Any:
+    """Returns a function that runs a row of touching robots and returns their recorders."""
+    module = SimpleNamespace(Recorder=Recorder)
+    monkeypatch.setitem(sys.modules, "contact_recorder_for_tests", module)
+    monkeypatch.setenv("FLATLAND_PLUGIN_PATH", files.write("calls.xml", MANIFEST))
+    files.write("robot.model.yaml", ROBOT)
+
+    def run(count: int) -> list[Recorder]:
+        world: flatland.World = files.load("{properties: {}, layers: [{name: 2d}]}")
+        for index in range(count):
+            world.spawn_model("robot.model.yaml", str(index), pose=(SPACING * index, 0, 0))
+        world.step()
+        recorders: list[Any] = [model.plugins[0] for model in world.models]
+        for model in world.models[1::2]:
+            world.move_model(model.name, (SPACING * int(model.name), 50, 0))
+        world.step()
+        return recorders
+
+    return run
+
+
+def test_plugins_receive_the_contacts_of_their_own_model_only(row: Any) -> None:
+    for index, recorder in enumerate(row(5)):
+        neighbors = [other for other in (index - 1, index + 1) if 0 <= other < 5]
+        expected = [{str(index), str(other)} for other in neighbors]
+        for hook in HOOKS:
+            assert sorted(recorder.calls[hook], key=sorted) == sorted(expected, key=sorted), hook
+
+
+@pytest.mark.parametrize("count", [2, 10, 40])
+def test_the_number_of_calls_is_proportional_to_the_number_of_contacts(
+    row: Any, count: int
+) -> None:
+    recorders = row(count)
+    for hook in HOOKS:
+        calls = sum(len(recorder.calls[hook]) for recorder in recorders)
+        assert calls == 2 * (count - 1), hook
