@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import argparse
+import logging
 import os
 import re
 import signal
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 
 import yaml
@@ -31,7 +33,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
     Returns:
         The exit code: 0 for success, 1 for an error of a file or of the system, which is printed,
-        or 141 if the reader closed the output, as in `flatland check world.yaml | head -1`.
+        or for problems that `flatland check` found, or 141 if the reader closed the output, as in
+        `flatland check world.yaml | head -1`.
 
     Raises:
         SystemExit: The arguments are invalid (code 2), or request the help or version (code 0).
@@ -51,7 +54,7 @@ def _run(arguments: Sequence[str] | None) -> int:
     try:
         try:
             options = _make_parser().parse_args(arguments)
-            options.run(options)
+            code: int = options.run(options)
         finally:
             # Flush here: an error at the end of the interpreter is printed with a traceback.
             print(end="", flush=True)
@@ -60,7 +63,7 @@ def _run(arguments: Sequence[str] | None) -> int:
     except (FlatlandError, OSError) as error:
         print(f"flatland: {error}", file=sys.stderr)
         return 1
-    return 0
+    return code
 
 
 def _make_parser() -> argparse.ArgumentParser:
@@ -190,7 +193,7 @@ def _load(options: argparse.Namespace, seed: int | None) -> World:
     )
 
 
-def _show(options: argparse.Namespace) -> None:
+def _show(options: argparse.Namespace) -> int:
     check_matplotlib()  # before loading and stepping, which may take long
     with _load(options, options.seed) as world:
         world.step(options.steps)
@@ -208,24 +211,60 @@ def _show(options: argparse.Namespace) -> None:
             )
         except ValueError as error:
             options.parser.error(str(error))
+    return 0
 
 
-def _check(options: argparse.Namespace) -> None:
-    if is_model_file(options.path, dict(options.param)):
-        with load_model_alone(World, options.path, dict(options.param)) as world:
+def _check(options: argparse.Namespace) -> int:
+    with _collected_warnings() as problems:
+        is_model = is_model_file(options.path, dict(options.param))
+        if is_model:
+            world = load_model_alone(World, options.path, dict(options.param))
+        else:
+            # A fixed seed: nothing random is printed, and no log line about a drawn seed is wanted.
+            world = _load(options, seed=0)
+    with world:
+        if problems:
+            print(f"{options.path}: {_counted(len(problems), 'problem')}")
+            for problem in problems:
+                print(f"problem: {problem}")
+        else:
+            print(f"{options.path}: no errors")
+        _print_contents(world)
+        if is_model:
             layers = ", ".join(world.collision_filter.names) or "none"
-            _print_contents(options.path, world)
             print(f"checked in an empty world with the layers that the model names: {layers}")
-    else:
-        # A fixed seed: nothing random is printed, and no log line about a drawn seed is wanted.
-        with _load(options, seed=0) as world:
-            _print_contents(options.path, world)
+    return 1 if problems else 0
 
 
-def _print_contents(path: Path, world: World) -> None:
-    print(f"{path}: no errors")
+@contextmanager
+def _collected_warnings() -> Iterator[list[str]]:
+    """Collects the warnings that are logged in the block; prints them if it raises."""
+    texts: list[str] = []
+
+    class Collector(logging.Handler):
+        def emit(self, record: logging.LogRecord) -> None:
+            texts.append(record.getMessage())
+
+    log, handler = logging.getLogger("flatland"), Collector(logging.WARNING)
+    propagate, log.propagate = log.propagate, False
+    log.addHandler(handler)
+    try:
+        yield texts
+    except FlatlandError:
+        for text in texts:
+            print(f"problem: {text}", file=sys.stderr)
+        raise
+    finally:
+        log.removeHandler(handler)
+        log.propagate = propagate
+
+
+def _print_contents(world: World) -> None:
     for layer in world.layers:
-        print(f"layer {', '.join(layer.names)}: {_counted(len(layer.edges), 'edge')}")
+        text = f"layer {', '.join(layer.names)}: {_counted(len(layer.edges), 'edge')}"
+        if layer.unknown_map_keys:
+            text += f"; unknown keys in the map file: {', '.join(layer.unknown_map_keys)}"
+        print(text)
     for model in world.models:
         parts = [
             _counted(len(model.bodies), "body", "bodies"),

@@ -214,6 +214,36 @@ plugins:
 """
 
 
+class TestProblems:
+    """Problems that `flatland check` prints for files that can be loaded."""
+
+    def test_a_duplicate_key_is_a_problem(self, files: Any) -> None:
+        path = files.write("w.yaml", "properties: {}\nlayers: []\nlayers: [{name: 2d}]\n")
+        done = run("check", path)
+        assert done.returncode == 1
+        assert done.stdout.splitlines()[:2] == [
+            f"{path}: 1 problem",
+            f'problem: Duplicate key "layers" ignored, the value in line 2 is used [{path}:3]',
+        ]
+        assert done.stderr == ""
+
+    def test_problems_are_printed_together_with_an_error(self, files: Any) -> None:
+        path = files.write("w.yaml", "properties: {}\nproperties: {}\nlayers: 7\n")
+        done = run("check", path)
+        assert done.returncode == 1
+        assert done.stdout == ""
+        duplicate, error = done.stderr.splitlines()
+        assert duplicate.startswith('problem: Duplicate key "properties"')
+        assert error.startswith("flatland: Flatland YAML: ")
+
+    def test_unknown_keys_of_a_map_file_are_listed_and_no_problem(self, files: Any) -> None:
+        map_path = files.write_map("room", ["...", ".#.", "..."], colour="blue", author="me")
+        path = files.write("w.yaml", f"properties: {{}}\nlayers: [{{name: 2d, map: {map_path}}}]\n")
+        done = run("check", path)
+        assert done.returncode == 0
+        assert "layer 2d: 4 edges; unknown keys in the map file: author, colour\n" in done.stdout
+
+
 class TestCheckModel:
     def test_accepts_any_layer(self, files, capsys):
         path = files.write("my.robot.model.yaml", LAYERED)
@@ -266,10 +296,10 @@ class TestCheckModel:
         assert "Model refers to 17 layers {l0, l1, " in error
         assert f"max allowed in a world is 16 [{path}]" in error
 
-    def test_warnings_of_a_file_are_logged_once(self, files):
+    def test_warnings_of_a_file_are_reported_once(self, files):
         path = files.write("m.yaml", f"{LAYERED}---\nsecond: document\n")
         done = run("check", path)
-        assert (done.returncode, done.stderr.count("YAML documents")) == (0, 1)
+        assert (done.returncode, done.stdout.count("YAML documents")) == (1, 1)
 
     @pytest.mark.parametrize("key", ["layers", "properties"])
     def test_a_world_file_with_bodies_is_a_world(self, files, capsys, key):
