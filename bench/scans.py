@@ -1,4 +1,4 @@
-"""Scans: the batch call against a loop in C++ over `b2World::RayCast`, in the same run."""
+"""Scans: `cast_rays`, compared with a C++ loop over `b2World::RayCast` in the same run."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from scenes import (  # isort: skip
     BEAMS,
     beam_ends,
     benchmark_world_path,
-    ranges_pixels,
+    random_map,
     scan_pose,
     world_of_edges,
 )
@@ -25,7 +25,7 @@ ALL = 0xFFFF
 
 
 def compare(physics: PhysicsWorld, pose: tuple[float, float, float]) -> tuple[float, float]:
-    """Returns the times [s] of one scan by the batch call and by `b2World::RayCast`."""
+    """Returns the times of one scan with `cast_rays` and with `b2World::RayCast` [s]."""
     ends = beam_ends()
     return best_pair(
         lambda: physics.cast_rays(pose, ends, ALL),
@@ -33,22 +33,22 @@ def compare(physics: PhysicsWorld, pose: tuple[float, float, float]) -> tuple[fl
     )
 
 
-def yardstick() -> float:
-    """Returns U [s]: one scan of 1081 beams by `b2World::RayCast` on the benchmark world."""
+def time_unit() -> float:
+    """Returns U [s]: a scan of 1081 beams with `b2World::RayCast` in the benchmark world."""
     with flatland.World.from_yaml(benchmark_world_path(), seed=1) as world:
         world.step()
         return compare(world.physics, scan_pose(world))[1]
 
 
 def add_crowd(world: flatland.World, count: int) -> None:
-    """Puts moving robots of circles and polygons around the first model."""
+    """Adds moving robots, each with a circle and a polygon, around the first model."""
     x, y, _ = scan_pose(world)
     rng = np.random.default_rng(2)
     for index in range(count):
         angle = 2 * math.pi * index / count
         distance = rng.uniform(1.5, 8.0)
-        place = (x + distance * math.cos(angle), y + distance * math.sin(angle), angle)
-        body = world.physics.create_body("dynamic", place)
+        pose = (x + distance * math.cos(angle), y + distance * math.sin(angle), angle)
+        body = world.physics.create_body("dynamic", pose)
         body.create_circle((0.1, 0.0), 0.2, density=1.0)
         body.create_polygon([(-0.2, -0.1), (0.0, -0.1), (0.0, 0.1), (-0.2, 0.1)], density=1.0)
         body.set_velocity(*rng.uniform(-0.1, 0.1, 3))
@@ -56,30 +56,30 @@ def add_crowd(world: flatland.World, count: int) -> None:
 
 def _row(name: str, times: tuple[float, float], bar: float) -> Row:
     batch, reference = times
-    note = f"{BEAMS / batch / 1e6:.1f} against {BEAMS / reference / 1e6:.2f} million rays a second"
+    note = f"{BEAMS / batch / 1e6:.1f} and {BEAMS / reference / 1e6:.2f} million rays per second"
     return Row(name, reference / batch, "times b2World::RayCast", bar, True, note)
 
 
 def rows(_unit: float) -> list[Row]:
-    """Measures scans on a static map, among moving robots and on a large map."""
+    """Measures scans in a static map, among moving robots and in a large map."""
     found = []
     with flatland.World.from_yaml(benchmark_world_path(), seed=1) as world:
         world.step()
         times = compare(world.physics, scan_pose(world))
         found.append(
             Row(
-                "scan of 1081 beams, share of the time of b2World::RayCast",
+                "scan of 1081 beams, relative to b2World::RayCast",
                 times[0] / times[1],
                 "",
                 1.05,
-                note=f"{times[0] * 1e6:.0f} µs against {times[1] * 1e6:.0f} µs",
+                note=f"{times[0] * 1e6:.0f} µs and {times[1] * 1e6:.0f} µs",
             )
         )
         found.append(_row("rays, static map", times, 25.0))
         add_crowd(world, 50)
         world.step()
         found.append(_row("rays, 50 moving robots", compare(world.physics, scan_pose(world)), 15.0))
-    edges = boundary_edges(ranges_pixels(4000, 60_000), 0.05)
+    edges = boundary_edges(random_map(4000, 60_000), 0.05)
     physics = world_of_edges(edges)
     physics.step(0.005, 8, 3)
     times = compare(physics, (100.0, 100.0, 0.0))
