@@ -1,4 +1,4 @@
-"""What `make setup` leaves and `setup.bash` exports: the environment of a user."""
+"""The environment of a user, as installed by `make setup` and exported by `setup.bash`."""
 
 from __future__ import annotations
 
@@ -83,7 +83,7 @@ def test_what_the_shell_had_is_kept(shell):
 def test_run_names_a_world_that_is_not_there(shell, installed):
     done = shell(f"'{installed}/tools/run.sh' nowhere.yaml")
     assert done.returncode == 1
-    assert "there is no world file nowhere.yaml" in done.stderr
+    assert "world file not found: nowhere.yaml" in done.stderr
 
 
 def test_server_starts_by_launcher_whatever_python_is_first(shell, world_file, tmp_path):
