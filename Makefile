@@ -1,4 +1,4 @@
-# Everything by one command; `make` alone says which there are.
+# All tasks of users and developers; `make` prints the list.
 SHELL := /bin/bash
 .DEFAULT_GOAL := help
 
@@ -7,15 +7,15 @@ PYTHON := $(VENV)/bin/python
 CPP_FILES = $(shell find src/cpp $(wildcard bench) -name '*.h' -o -name '*.cpp')
 
 .PHONY: help
-help:  ## say which commands there are
+help:  ## list the commands
 	@sed -n 's/^\([a-z-]*\):.*## /  make \1\t/p' $(MAKEFILE_LIST) | expand -t 18
 
 .PHONY: setup
-setup:  ## install what is missing (Debian packages, .venv) and build; seconds when nothing changed
+setup:  ## install missing Debian packages, create .venv, build and install flatland
 	@tools/setup.sh run
 
 .PHONY: setup-dev
-setup-dev:  ## the same, with what tests, linters and catkin need
+setup-dev:  ## set up, including the requirements of tests, linters and catkin
 	@tools/setup.sh dev
 
 .PHONY: run
@@ -27,11 +27,11 @@ test: setup-dev  ## run all tests: make test [ARGS="-k laser"]
 	@. ./setup.bash && pytest $(ARGS)
 
 .PHONY: fuzz
-fuzz: setup-dev  ## try thousands of random jams against the promises of the physics engine
+fuzz: setup-dev  ## test the physics engine with thousands of random jams
 	@. ./setup.bash && FLATLAND_FUZZ=1 pytest --timeout 0 tests/unit/physics/test_jammed_bodies.py $(ARGS)
 
 .PHONY: lint
-lint: setup-dev  ## check style, types, and the stubs of the extension against the binary
+lint: setup-dev  ## check formatting, types, and the stubs of the extension
 	$(VENV)/bin/ruff check
 	$(VENV)/bin/ruff format --check
 	$(VENV)/bin/mypy
@@ -39,37 +39,37 @@ lint: setup-dev  ## check style, types, and the stubs of the extension against t
 	clang-format --dry-run -Werror $(CPP_FILES)
 
 .PHONY: format
-format: setup-dev  ## bring Python and C++ sources into shape
+format: setup-dev  ## format Python and C++ sources
 	$(VENV)/bin/ruff check --fix-only --exit-zero
 	$(VENV)/bin/ruff format
 	clang-format -i $(CPP_FILES)
 
 .PHONY: bench
-bench: setup-dev  ## measure speed into build/bench.json, .png: make bench [BASELINE=earlier.json]
+bench: setup-dev  ## measure performance, write build/bench.json and .png: make bench [BASELINE=earlier.json]
 	@. ./setup.bash && python bench --json build/bench.json --plot build/bench.png \
 	  $(if $(BASELINE),--baseline "$(BASELINE)") $(ARGS)
 
 .PHONY: docs
-docs: setup  ## check that every link and picture of README.md and docs/ leads somewhere
+docs: setup  ## check the links and images of README.md and docs/
 	@$(PYTHON) tools/check_links.py README.md docs
 
 .PHONY: pictures
-pictures: setup-dev  ## make the pictures of README.md and docs/ anew, on a virtual screen
+pictures: setup-dev  ## generate the images of README.md and docs/, on a virtual screen
 	@. ./setup.bash && python tools/draw_pictures.py && python tools/show_pictures.py
 
 .PHONY: dev
-dev:  ## build the extension and the messages into the source tree (PYTHONPATH=. then runs it)
+dev:  ## build the extension and the messages in the source tree, for use with PYTHONPATH=.
 	@mkdir -p build
 	@cmake --preset dev >build/dev.log || { cat build/dev.log; exit 1; }
 	cmake --build build/dev
 
 .PHONY: coverage
-coverage: setup-dev  ## measure which lines the tests run, into build/coverage: make coverage [ARGS="tests/unit"]
+coverage: setup-dev  ## measure test coverage, write build/coverage/html: make coverage [ARGS="tests/unit"]
 	@cmake --preset coverage >build/coverage.log || { cat build/coverage.log; exit 1; }
 	cmake --build build/coverage
 	@. ./setup.bash && tools/coverage.sh $(or $(ARGS),tests/unit tests/conformance tests/examples tests/ros)
 
-# address, undefined or thread; without one the first two together.
+# address, undefined or thread; the default is address and undefined together.
 SANITIZER :=
 sanitize_preset := sanitize$(addprefix -,$(SANITIZER))
 libraries_ := libasan.so libubsan.so
@@ -78,7 +78,7 @@ libraries_undefined := libubsan.so
 libraries_thread := libtsan.so
 
 .PHONY: sanitize
-sanitize: setup-dev  ## run the unit tests with sanitizers in the extension: make sanitize [SANITIZER=address|undefined|thread]
+sanitize: setup-dev  ## run unit tests with sanitizers in the extension: make sanitize [SANITIZER=address|undefined|thread]
 	@$(if $(filter-out address undefined thread,$(SANITIZER)),$(error SANITIZER must be address, undefined or thread))
 	@cmake --preset $(sanitize_preset) >build/sanitize.log || { cat build/sanitize.log; exit 1; }
 	cmake --build build/$(sanitize_preset)
@@ -91,5 +91,5 @@ sanitize: setup-dev  ## run the unit tests with sanitizers in the extension: mak
 	  pytest --capture=sys tests/unit $(if $(filter thread,$(SANITIZER)),-m threads) $(ARGS)
 
 .PHONY: clean
-clean:  ## remove all that was built, .venv too
+clean:  ## remove all build results and .venv
 	rm -rf $(VENV) build flatland/_core*.so flatland/msg flatland/srv

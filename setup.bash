@@ -1,14 +1,14 @@
-# Puts a shell into flatland's environment:   . ./setup.bash
-# Then roslaunch flatland ..., rosservice, rosmsg show flatland/Collisions and `import flatland` work.
+# Sets the environment variables of flatland in a shell:   . ./setup.bash
+# Enables roslaunch flatland ..., rosservice, rosmsg show flatland/Collisions and `import flatland`.
 
 _flatland_root=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
 if [ ! -f "$_flatland_root/.venv/share/flatland/package.xml" ]; then
-  echo "flatland is not set up yet: run 'make setup' in $_flatland_root" >&2
+  echo "flatland: not set up, run 'make setup' in $_flatland_root" >&2
   unset _flatland_root
   return 1
 fi
 
-# _flatland_prepend VARIABLE ENTRY...: in front of a list of paths, each once.
+# _flatland_prepend VARIABLE ENTRY...: prepends entries to a list of paths, unless they are already in it.
 _flatland_prepend() {
   local name=$1 list entry
   shift
@@ -24,9 +24,9 @@ _flatland_prepend() {
 
 _flatland_prepend PATH "$_flatland_root/.venv/bin"
 export VIRTUAL_ENV=$_flatland_root/.venv
-# /usr/share holds Debian's own ROS packages.
+# /usr/share contains the ROS packages of Debian.
 _flatland_prepend ROS_PACKAGE_PATH /usr/share "$_flatland_root/.venv/share"
-# Debian's rosservice, rostopic and rviz run on the system's Python, whatever PATH says.
+# rosservice, rostopic and rviz of Debian use the Python of the system, independently of PATH.
 _flatland_prepend PYTHONPATH "$("$_flatland_root/.venv/bin/python" -c 'import sysconfig; print(sysconfig.get_path("platlib"))')"
 
 export ROS_DISTRO=${ROS_DISTRO:-Debian}

@@ -1,7 +1,8 @@
-"""Measures flatland: `make bench`, or `python bench` in its environment.
+"""Measures the performance of flatland: `make bench`, or `python bench` in its environment.
 
-Prints one table; every figure is a ratio, or a multiple of U, one scan of 1081 beams by
-`b2World::RayCast` on the benchmark world in the same run. Draws how cost grows, too.
+Prints a table. Most figures are ratios or multiples of U, the time of one scan of 1081 beams with
+`b2World::RayCast` in the benchmark world, measured in the same run. With --json or --plot, the
+cost is also measured over the problem size.
 """
 
 from __future__ import annotations
@@ -16,23 +17,39 @@ from curves import plot
 from scans import time_unit
 from table import as_json, format_table
 
-GROWTH = "growth"  # the module of curves; the others have rows
-# Each module has `rows(unit)`, which measures and returns its rows; unit is U in seconds.
+GROWTH = "growth"  # the module that measures curves
+# Each module defines `rows(unit)`, which measures and returns its rows; `unit` is U [s].
 MODULES = (
-    *("scans", "steps", "jam", "plugin_steps", "node", "real_time", "large_map", "markers"),
+    "scans",
+    "steps",
+    "jam",
+    "plugin_steps",
+    "node",
+    "real_time",
+    "large_map",
+    "markers",
     "placement",
 )
 
 
 def main() -> None:
-    """Measures, prints the table and writes JSON."""
+    """Measures the selected groups, prints the table and writes the requested files."""
     parser = argparse.ArgumentParser(prog="bench", description=__doc__)
-    parser.add_argument("--json", type=Path, metavar="FILE", help="write the rows as JSON")
-    parser.add_argument("--baseline", type=Path, metavar="FILE", help="JSON of an earlier run")
-    parser.add_argument("--plot", type=Path, metavar="FILE", help="draw how cost grows")
+    parser.add_argument("--json", type=Path, metavar="FILE", help="write all results as JSON")
+    parser.add_argument(
+        "--baseline", type=Path, metavar="FILE", help="compare with the JSON file of an earlier run"
+    )
+    parser.add_argument(
+        "--plot", type=Path, metavar="FILE", help="plot the cost over the problem size"
+    )
     groups = (*MODULES, GROWTH)
     parser.add_argument(
-        "--only", nargs="+", choices=groups, default=groups, metavar="GROUP", help="some groups"
+        "--only",
+        nargs="+",
+        choices=groups,
+        default=groups,
+        metavar="GROUP",
+        help=f"measure only these groups: {', '.join(groups)}",
     )
     options = parser.parse_args()
     baseline = {}
@@ -51,7 +68,7 @@ def main() -> None:
         panels = importlib.import_module(GROWTH).panels()
     if panels and options.plot is not None:
         plot(panels, options.plot)
-        print(f"\nhow cost grows: {options.plot}")
+        print(f"\ncost over the problem size: {options.plot}")
     if options.json is not None:
         growth = [asdict(panel) for panel in panels]
         report = {"unit": unit, "rows": as_json(rows), "growth": growth}

@@ -1,8 +1,8 @@
-"""A node that connects to a simulator: python connector.py model.yaml robot...
+"""Measures how fast a node connects to a simulator: python connector.py model.yaml robot...
 
-Prints the time from the creation of a publisher of `cmd_vel`, of a subscriber to `scan`, to its
-connection, for each robot, and the time of as many calls of /spawn_model until the topics of the
-new model are registered [s]: `publisher 0.01 0.02`, `subscriber ...`, `spawn ...`.
+For each robot, measures the time in which a publisher of `cmd_vel` and a subscriber to `scan`
+connect, and the time from a call of /spawn_model until the topics of the new model are registered.
+Prints one line of times [s] for each: `publisher 0.01 0.02`, `subscriber ...`, `spawn ...`.
 """
 
 from __future__ import annotations
@@ -22,7 +22,11 @@ TIMEOUT = 30.0  # s
 
 
 def wait_until(condition: Callable[[], object]) -> float:
-    """Returns the time until a condition holds [s]."""
+    """Waits until a condition holds and returns the waiting time [s].
+
+    Raises:
+        RuntimeError: The condition does not hold within `TIMEOUT`.
+    """
     start = time.perf_counter()
     while not condition():
         if time.perf_counter() - start > TIMEOUT:
@@ -32,7 +36,7 @@ def wait_until(condition: Callable[[], object]) -> float:
 
 
 def publish(robot: str) -> float:
-    """Returns the time that a publisher takes to connect [s]."""
+    """Returns the time in which a publisher connects [s]."""
     start = time.perf_counter()
     publisher = rospy.Publisher(f"/{robot}/cmd_vel", Twist, queue_size=1)
     wait_until(publisher.get_num_connections)
@@ -40,7 +44,7 @@ def publish(robot: str) -> float:
 
 
 def subscribe(robot: str) -> float:
-    """Returns the time that a subscriber takes to connect [s]."""
+    """Returns the time in which a subscriber connects [s]."""
     start = time.perf_counter()
     subscriber = rospy.Subscriber(f"/{robot}/scan", LaserScan)
     wait_until(subscriber.get_num_connections)
@@ -50,22 +54,22 @@ def subscribe(robot: str) -> float:
 
 
 def spawn(path: str, name: str) -> float:
-    """Returns the time until a new model and its topics are there [s]."""
+    """Returns the time from the call to the registration of the topics of the model [s]."""
     master = rosgraph.Master("/bench_connector")
     start = time.perf_counter()
-    answer = rospy.ServiceProxy("/spawn_model", SpawnModel)(path, name, name, Pose2D())
-    if not answer.success:
-        raise RuntimeError(answer.message)
+    response = rospy.ServiceProxy("/spawn_model", SpawnModel)(path, name, name, Pose2D())
+    if not response.success:
+        raise RuntimeError(response.message)
     wait_until(lambda: f"/{name}/scan" in dict(master.getPublishedTopics("")))
     return time.perf_counter() - start
 
 
 def main() -> None:
-    """Measures and prints."""
+    """Measures all times and prints them."""
     path, *robots = sys.argv[1:]
     rospy.init_node("bench_connector", disable_signals=True, disable_rostime=True)
     rospy.wait_for_service("/toggle_pause", TIMEOUT)
-    time.sleep(2.0)  # until the simulator has settled
+    time.sleep(2.0)  # until the start of the simulator is complete
     for name, times in (
         ("publisher", [publish(robot) for robot in robots]),
         ("subscriber", [subscribe(robot) for robot in robots]),

@@ -1,4 +1,4 @@
-"""Worlds of robots with a differential drive and a laser, written into a temporary folder."""
+"""Generated worlds of many robots with a differential drive and a laser."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ import flatland
 
 from scenes import benchmark_world_path  # isort: skip
 
-CLEARANCE = 0.5  # m from the walls, at least
-SPACING = 0.9  # m between two robots, at least
-MOST = 100  # robots
+CLEARANCE = 0.5  # minimum distance of a robot from the walls [m]
+SPACING = 0.9  # minimum distance of two robots [m]
+MAX_ROBOTS = 100
 
 ROBOT = """
 bodies:
@@ -31,12 +31,20 @@ plugins:
 """
 
 
-def free_places(world_path: Path, count: int) -> list[tuple[float, float]]:
-    """Returns where robots can stand on the first layer of a world, connected to its first model.
+def free_positions(world_path: Path, count: int) -> list[tuple[float, float]]:
+    """Returns random free positions in a world that are reachable from its first model.
+
+    The positions do not change from run to run.
 
     Args:
-        world_path: A world whose first layer is an image.
-        count: How many places.
+        world_path: World file whose first layer is an image map.
+        count: Number of positions.
+
+    Returns:
+        Positions (x, y) in the world frame [m].
+
+    Raises:
+        ValueError: The world has room for fewer robots.
     """
     world = yaml.safe_load(world_path.read_text())
     map_path = world_path.parent / world["layers"][0]["map"]
@@ -63,14 +71,18 @@ def free_places(world_path: Path, count: int) -> list[tuple[float, float]]:
 
 @contextmanager
 def crowd_file(which: slice, *, scans: bool) -> Iterator[Path]:
-    """A world file with robots on the map of the benchmark world.
+    """Writes a temporary world file with robots on the map of the benchmark world.
 
     Args:
-        which: Of the `MOST` places that there are, so that few robots see what many see.
-        scans: Whether their lasers scan without a subscriber.
+        which: Selection of the `MAX_ROBOTS` positions. A small selection from the whole range
+            has scans of the same average cost as a large one.
+        scans: Whether the lasers scan without subscribers.
+
+    Yields:
+        Path of the world file, which is removed at the end.
     """
     base = benchmark_world_path()
-    places = free_places(base, MOST)[which]
+    positions = free_positions(base, MAX_ROBOTS)[which]
     world = yaml.safe_load(base.read_text())
     for layer in world["layers"]:
         layer["map"] = str(base.parent / layer["map"])
@@ -79,9 +91,9 @@ def crowd_file(which: slice, *, scans: bool) -> Iterator[Path]:
             "name": f"robot{index}",
             "namespace": f"robot{index}",
             "model": "robot.model.yaml",
-            "pose": [*place, float(index)],
+            "pose": [*position, float(index)],
         }
-        for index, place in enumerate(places)
+        for index, position in enumerate(positions)
     ]
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
@@ -92,7 +104,7 @@ def crowd_file(which: slice, *, scans: bool) -> Iterator[Path]:
 
 @contextmanager
 def crowd(which: slice, *, scans: bool) -> Iterator[flatland.World]:
-    """The loaded world of `crowd_file`, whose robots drive in circles."""
+    """Loads a world of `crowd_file`, and drives all robots in circles."""
     with crowd_file(which, scans=scans) as path, flatland.World.from_yaml(path, seed=1) as loaded:
         for index in range(len(loaded.models)):
             turn = flatland.Twist(linear_x=0.2, angular_z=1.0 if index % 2 else -1.0)

@@ -1,4 +1,4 @@
-"""Curves of a cost over a size, and the picture of them."""
+"""Curves of cost over problem size, and their plot."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from pathlib import Path
 
 @dataclass(frozen=True, slots=True)
 class Curve:
-    """A line of a panel."""
+    """One curve of a panel."""
 
     label: str
     x: list[float]
@@ -18,7 +18,7 @@ class Curve:
 
 @dataclass(frozen=True, slots=True)
 class Panel:
-    """Curves over the same sizes."""
+    """Axes with one or more curves."""
 
     title: str
     x_label: str
@@ -31,7 +31,7 @@ PANEL_SIZE = (5.0, 3.6)  # inches
 
 
 def plot(panels: Sequence[Panel], path: Path) -> None:
-    """Draws all panels into one picture, both axes logarithmic."""
+    """Draws all panels into one image file, with logarithmic axes."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
@@ -39,7 +39,7 @@ def plot(panels: Sequence[Panel], path: Path) -> None:
     figure = Figure(figsize=(COLUMNS * PANEL_SIZE[0], rows * PANEL_SIZE[1]), layout="constrained")
     FigureCanvasAgg(figure)
     grid = figure.subplots(rows, COLUMNS, squeeze=False).ravel()
-    for axes, panel in zip(grid, panels):  # noqa: B905 - the last place may stay empty
+    for axes, panel in zip(grid, panels):  # noqa: B905 - the last axes can remain empty
         for curve in panel.curves:
             axes.loglog(curve.x, curve.y, marker="o", markersize=4, label=curve.label)
         axes.set(title=panel.title, xlabel=panel.x_label, ylabel=panel.y_label)

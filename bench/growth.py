@@ -1,4 +1,4 @@
-"""How cost grows with beams, edges, robots and map size: curves for docs/performance.md."""
+"""Cost over the number of beams, edges, robots and pixels: the curves of docs/performance.md."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ import flatland
 from flatland.physics import PhysicsWorld
 from flatland.physics.boundaries import boundary_edges
 
-from crowd import MOST, crowd  # isort: skip
+from crowd import MAX_ROBOTS, crowd  # isort: skip
 from curves import Curve, Panel
 from large_map import load, write_world
 from scans import add_crowd
-from scenes import beam_ends, benchmark_world_path, ranges_pixels, scan_pose, world_of_edges
+from scenes import beam_ends, benchmark_world_path, random_map, scan_pose, world_of_edges
 from steps import PERIOD, step_time
 from timing import best_of
 from touching import empty_world, spawn_row
@@ -24,7 +24,7 @@ ALL = 0xFFFF
 BEAM_COUNTS = (8, 30, 100, 300, 1081, 3000, 10_000)
 BOX_COUNTS = (250, 1000, 4000, 15_000, 60_000, 250_000)
 MOVING_COUNTS = (1, 10, 30, 100, 300, 1000)
-ROBOT_COUNTS = (1, 2, 5, 10, 20, 50, MOST)
+ROBOT_COUNTS = (1, 2, 5, 10, 20, 50, MAX_ROBOTS)
 TOUCHING_COUNTS = (25, 50, 100, 200, 400)
 SPAWNS = 5  # of which the fastest counts
 SIDES = (1000, 2000, 4000, 10_000)
@@ -39,7 +39,7 @@ def panels() -> list[Panel]:
 def _compare(
     physics: PhysicsWorld, pose: tuple[float, float, float], beams: int
 ) -> tuple[float, float]:
-    """Returns the times [µs] of one scan by the batch call and by `b2World::RayCast`."""
+    """Returns the times of one scan with `cast_rays` and with `b2World::RayCast` [µs]."""
     ends = beam_ends(beams)
     batch = best_of(lambda: physics.cast_rays(pose, ends, ALL), 0.2)
     loop = best_of(lambda: physics.cast_rays_reference(pose, ends, ALL), 0.2, 3)
@@ -65,15 +65,15 @@ def _beams() -> Panel:
 def _edges() -> Panel:
     counts, pairs = [], []
     for boxes in BOX_COUNTS:
-        # As many boxes to the area each time: what grows is what lies behind what is seen.
+        # The density of boxes is constant: only the number of occluded edges grows.
         side = int(4000 * (boxes / 60_000) ** 0.5)
-        edges = boundary_edges(ranges_pixels(side, boxes), 0.05)
+        edges = boundary_edges(random_map(side, boxes), 0.05)
         physics = world_of_edges(edges)
         middle = 0.025 * side
         pairs.append(_compare(physics, (middle, middle, 0.0), 1081))
         counts.append(len(edges))
         physics.close()
-    return _scan_panel("1081 beams, larger and larger maps", "edges", counts, pairs)
+    return _scan_panel("1081 beams, maps of increasing size", "edges", counts, pairs)
 
 
 def _moving() -> Panel:
@@ -83,13 +83,13 @@ def _moving() -> Panel:
             add_crowd(world, count)
             world.physics.step(1e-6, 1, 1)
             pairs.append(_compare(world.physics, scan_pose(world), 1081))
-    title = "1081 beams, moving things of two shapes around"
-    return _scan_panel(title, "things", MOVING_COUNTS, pairs)
+    title = "1081 beams, moving bodies with two shapes nearby"
+    return _scan_panel(title, "bodies", MOVING_COUNTS, pairs)
 
 
 def _robots() -> Panel:
     curves = []
-    for label, scans in (("with 360-beam laser at 10 Hz", True), ("nobody wants the laser", False)):
+    for label, scans in (("with a 360-beam laser at 10 Hz", True), ("laser not wanted", False)):
         times = []
         for count in ROBOT_COUNTS:
             with crowd(slice(count), scans=scans) as world:
@@ -143,4 +143,4 @@ def _loading() -> Panel:
         times.append(loading)
         peaks.append(peak / 1000)
     curves = [Curve("time [s]", pixels, times), Curve("peak memory [GB]", pixels, peaks)]
-    return Panel("Loading a world", "million pixels of the map", "", curves)
+    return Panel("Loading a world", "map size [million pixels]", "", curves)

@@ -1,4 +1,4 @@
-"""A map of 10 000 x 10 000 pixels: the benchmark's map tiled, loaded by a process of its own."""
+"""Loading of a map of 10 000 x 10 000 pixels, tiled from the benchmark map, in a new process."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from table import Row
 SIDE = 10_000  # pixels
 RUNS = 3
 
-# Prints: time to load [s], time of the first step [s], peak memory [MB], edges.
+# Prints the loading time [s], the time of the first step [s], the peak memory [MB] and the edges.
 LOAD = r"""
 import json, re, sys, time
 import flatland
@@ -27,14 +27,22 @@ world = flatland.World.from_yaml(sys.argv[1], seed=1)
 loaded = time.perf_counter()
 world.step()
 stepped = time.perf_counter()
-# Not getrusage, which counts what the parent had before exec.
+# getrusage would include the memory of the parent process before exec.
 peak = int(re.search(r"VmHWM:\s+(\d+) kB", open("/proc/self/status").read())[1]) / 1024
 print(json.dumps([loaded - start, stepped - loaded, peak, len(world.layers[0].edges)]))
 """
 
 
 def write_world(folder: Path, side: int) -> Path:
-    """Writes a world whose map is that of the benchmark world, repeated to a square [px]."""
+    """Writes a world whose map is that of the benchmark world, tiled to a square.
+
+    Args:
+        folder: Folder of the new files.
+        side: Side of the square [px].
+
+    Returns:
+        Path of the world file.
+    """
     base = benchmark_world_path()
     map_path = base.parent / yaml.safe_load(base.read_text())["layers"][0]["map"]
     entry = yaml.safe_load(map_path.read_text())
@@ -57,7 +65,11 @@ def write_world(folder: Path, side: int) -> Path:
 
 
 def load(world: Path) -> tuple[float, float, float, int]:
-    """Returns the times to load and to step once [s], the peak memory [MB] and the edges."""
+    """Loads a world in a new process.
+
+    Returns:
+        Loading time [s], time of the first step [s], peak memory [MB], number of edges.
+    """
     command = [sys.executable, "-c", LOAD, str(world)]
     result = subprocess.run(command, check=True, capture_output=True, text=True)
     loading, stepping, peak, edges = json.loads(result.stdout.splitlines()[-1])
@@ -65,16 +77,16 @@ def load(world: Path) -> tuple[float, float, float, int]:
 
 
 def rows(_unit: float) -> list[Row]:
-    """Measures loading."""
+    """Measures time and memory of loading and the time of the first step."""
     with tempfile.TemporaryDirectory() as folder:
         world = write_world(Path(folder), SIDE)
         runs = [load(world) for _ in range(RUNS)]
     loading, _, _, edges = min(runs)
     stepping = min(run[1] for run in runs)
     peak = max(run[2] for run in runs)
-    note = f"{edges} edges; the reference 1.8 to 2.7 s"
+    note = f"{edges} edges; reference simulator: 1.8 to 2.7 s"
     return [
-        Row(f"load a map of {SIDE} x {SIDE} px", loading, "s", 2.5, note=note),
-        Row("peak memory with that map", peak, "MB", 700.0, note="the reference 330 to 450 MB"),
+        Row(f"loading of a map of {SIDE} x {SIDE} px", loading, "s", 2.5, note=note),
+        Row("peak memory with that map", peak, "MB", 700.0, note="reference simulator: 330 to 450"),
         Row("first step on that map, one robot", stepping, "s"),
     ]

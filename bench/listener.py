@@ -1,7 +1,7 @@
-"""A node that subscribes to topics and takes what comes: python listener.py topic:package/Type ...
+"""A node that subscribes to topics: python listener.py topic:package/Type...
 
-Says `ready` when it has asked for all of them, then the time of the monotonic clock [s] at which
-the first message of each topic came, and the number of messages when it ends.
+Prints `ready` after all subscriptions, then the arrival time of the first message of each topic on
+the monotonic clock [s], and at exit the number of messages of each topic.
 """
 
 from __future__ import annotations
@@ -18,21 +18,23 @@ import rospy
 counts: Counter[str] = Counter()
 
 
-def take(_message: object, topic: str) -> None:
-    """Counts a message."""
+def count_message(_message: object, topic: str) -> None:
+    """Counts a message of a topic, and prints the arrival time of the first one."""
     if not counts[topic]:
         print(f"first {topic} {time.monotonic()}", flush=True)
     counts[topic] += 1
 
 
 def main() -> None:
-    """Listens until it is interrupted."""
+    """Counts messages until SIGINT."""
     stopped = threading.Event()
     rospy.init_node("bench_listener", anonymous=True, disable_signals=True, disable_rostime=True)
     signal.signal(signal.SIGINT, lambda *_: stopped.set())
     for argument in sys.argv[1:]:
         topic, message_type = argument.split(":")
-        rospy.Subscriber(topic, roslib.message.get_message_class(message_type), take, topic)
+        rospy.Subscriber(
+            topic, roslib.message.get_message_class(message_type), count_message, topic
+        )
     print("ready", flush=True)
     stopped.wait()
     print(f"counts {dict(counts)}", flush=True)

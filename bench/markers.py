@@ -1,4 +1,4 @@
-"""Debug markers of a large layer."""
+"""Markers of a large layer."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ EDGES = 50_000
 
 
 def rows(_unit: float) -> list[Row]:
-    """Measures building the lines and the walls of a layer, and writing both as bytes."""
+    """Measures the creation and serialization of the line and wall markers of a layer."""
     edges = np.random.default_rng(1).uniform(-100, 100, (EDGES, 4)).astype(np.float32)
     color = (0.1, 0.2, 0.3, 0.4)
     layer = Layer(PhysicsWorld(), ["walls"], 1, color, {}, origin=(0, 0, 0), edges=edges)

@@ -1,4 +1,4 @@
-"""The node: steps on ROS, processor use, start, memory, services."""
+"""The ROS node: time of a step, processor use, start, memory and services."""
 
 from __future__ import annotations
 
@@ -22,8 +22,8 @@ from ros_session import (  # isort: skip
 from scenes import benchmark_world_path
 from table import Row
 
-RUNS = 3  # of each figure, the best of which counts
-SIMULATED = 100.0  # s of a benchmark run
+RUNS = 3  # repetitions of each measurement; the best one counts
+SIMULATED = 100.0  # simulated time of a benchmark run [s]
 CLOCK = "/clock:rosgraph_msgs/Clock"
 SCAN = "/scan:sensor_msgs/LaserScan"
 ODOMETRY = "/odometry/filtered:nav_msgs/Odometry"
@@ -40,34 +40,34 @@ plugins:
 
 
 def rows(unit: float) -> list[Row]:
-    """Measures the node on the benchmark world."""
+    """Measures the node in the benchmark world."""
     world = benchmark_world_path()
     with ros_session() as session, _quiet(world) as quiet_world:
         laser = _fastest(session, world)
         quiet = _fastest(session, quiet_world)
-        listened = _fastest(session, world, CLOCK, SCAN, ODOMETRY)
+        subscribed = _fastest(session, world, CLOCK, SCAN, ODOMETRY)
         use = min(_processor_use(session, quiet_world) for _ in range(RUNS))
         starts, peaks = zip(*(_start(session, world) for _ in range(RUNS)), strict=True)
         spawn = _spawn(session, quiet_world)
     return [
-        _step_row("step of the node, laser computed, no subscriber", laser, unit, 0.03),
-        _step_row("step of the node, nobody wants the laser", quiet, unit, 0.009),
-        _step_row("step of the node, /scan, /odometry, /clock subscribed", listened, unit, 0.06),
-        Row("processor use at 200 Hz, one /scan subscriber", 100 * use, "%", 12.0),
-        Row("start of the node to the first /clock", min(starts), "s", 1.0),
+        _step_row("step of the node, laser computed, no subscribers", laser, unit, 0.03),
+        _step_row("step of the node, laser not wanted", quiet, unit, 0.009),
+        _step_row("step of the node, /scan, /odometry, /clock subscribed", subscribed, unit, 0.06),
+        Row("processor use at 200 Hz, one subscriber of /scan", 100 * use, "%", 12.0),
+        Row("time from the start of the node to the first /clock", min(starts), "s", 1.0),
         Row("peak memory of the node", max(peaks), "MB", 150.0),
-        Row("spawn of a model by service while running", 1e3 * spawn, "ms", 10.0),
+        Row("call of /spawn_model while the simulation runs", 1e3 * spawn, "ms", 10.0),
     ]
 
 
 def _step_row(name: str, seconds: float, unit: float, bar: float) -> Row:
-    note = f"{seconds * 1e6:.1f} µs, {1 / seconds:.0f} steps a second"
+    note = f"{seconds * 1e6:.1f} µs, {1 / seconds:.0f} steps per second"
     return Row(name, seconds / unit, "U", bar, note=note)
 
 
 @contextmanager
 def _quiet(world_path: Path) -> Iterator[Path]:
-    """A copy of a world whose lasers scan only for those who listen."""
+    """Copies a world, without the `always_publish` of its plugins, and yields the path."""
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         for file in world_path.parent.iterdir():
@@ -85,8 +85,8 @@ def _quiet(world_path: Path) -> Iterator[Path]:
 
 
 def _fastest(session: RosSession, world: Path, *topics: str) -> float:
-    """Returns the time of a step [s] in `benchmark.launch`, as the node itself tells."""
-    listener = _listen(session, *topics) if topics else None
+    """Returns the time of a step [s] as logged by the node in `benchmark.launch`."""
+    listener = _subscribe(session, *topics) if topics else None
     rates = []
     for _ in range(RUNS):
         program = session.launch(
@@ -100,18 +100,19 @@ def _fastest(session: RosSession, world: Path, *topics: str) -> float:
     return 1.0 / max(rates)
 
 
-def _listen(session: RosSession, *topics: str) -> Program:
+def _subscribe(session: RosSession, *topics: str) -> Program:
+    """Starts `listener.py` and waits until it has subscribed to the topics."""
     listener = session.start(sys.executable, str(Path(__file__).with_name("listener.py")), *topics)
     listener.wait_for("ready")
     return listener
 
 
 def _processor_use(session: RosSession, world: Path) -> float:
-    """Returns the share of a core that the node uses in real time with one subscriber."""
-    listener = _listen(session, SCAN)
+    """Returns the fraction of a core that the node uses in real time with one subscriber."""
+    listener = _subscribe(session, SCAN)
     server = session.server(world_path=world, update_rate=200, seed=1)
     listener.wait_for(r"first /scan")
-    time.sleep(1.0)  # until it has settled
+    time.sleep(1.0)  # until the start of the node is complete
     before, start = processor_time(server.pid), time.monotonic()
     time.sleep(5.0)
     use = (processor_time(server.pid) - before) / (time.monotonic() - start)
@@ -121,11 +122,11 @@ def _processor_use(session: RosSession, world: Path) -> float:
 
 
 def _start(session: RosSession, world: Path) -> tuple[float, float]:
-    """Returns the time to the first /clock [s], and the node's peak memory [MB]."""
-    listener = _listen(session, CLOCK)
+    """Returns the time to the first /clock [s] and the peak memory of the node [MB]."""
+    listener = _subscribe(session, CLOCK)
     server = session.server(world_path=world, update_rate=200, seed=1)
     match = listener.wait_for(r"first /clock ([\d.]+)")
-    time.sleep(2.0)  # the interactive markers come a little later
+    time.sleep(2.0)  # until the interactive markers have been created
     peak = peak_memory(server.pid)
     session.stop(server)
     session.stop(listener)
@@ -133,7 +134,7 @@ def _start(session: RosSession, world: Path) -> tuple[float, float]:
 
 
 def _spawn(session: RosSession, world: Path) -> float:
-    """Returns the time of a call of /spawn_model [s], connection and answer included."""
+    """Returns the time of a call of /spawn_model [s], including connection and response."""
     os.environ.update({k: v for k, v in session.environment.items() if k.startswith("ROS_")})
     import rospy
     from geometry_msgs.msg import Pose2D
@@ -149,11 +150,11 @@ def _spawn(session: RosSession, world: Path) -> float:
         for index in range(10):
             start = time.perf_counter()
             name = f"spawned{index}"
-            answer = rospy.ServiceProxy("/spawn_model", SpawnModel)(
+            response = rospy.ServiceProxy("/spawn_model", SpawnModel)(
                 str(model), name, name, Pose2D(8.0 + index, 0.0, 0.0)
             )
             times.append(time.perf_counter() - start)
-            if not answer.success:
-                raise RuntimeError(f"the model was not spawned: {answer.message}")
+            if not response.success:
+                raise RuntimeError(f"the model was not spawned: {response.message}")
     session.stop(server)
     return min(times)

@@ -1,4 +1,4 @@
-"""Free places: drawing poses for a fleet, and the nearest free place of a blocked model."""
+"""Placement: random free poses, and the nearest free pose of a blocked model."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ POSES = 50
 
 
 def rows(unit: float) -> list[Row]:
-    """Measures on the benchmark world, once what does not change is cached."""
+    """Measures placement in the benchmark world with warm caches."""
     with flatland.World.from_yaml(benchmark_world_path(), seed=1) as world:
         x, y, _ = scan_pose(world)
         sampled = best_of(lambda: world.sample_free(POSES, 0.3, 0.1, rng=1, connected_to=(x, y)))
@@ -22,14 +22,14 @@ def rows(unit: float) -> list[Row]:
         moved = best_of(lambda: world.move_model(model.name, wall, if_blocked="nearest"))
     return [
         Row(
-            f"{POSES} free poses that are connected, benchmark world",
+            f"{POSES} random free poses in one connected area, benchmark world",
             sampled / unit,
             "U",
             40.0,
             note=f"{sampled * 1e3:.1f} ms",
         ),
         Row(
-            "a model moved onto a wall, if_blocked nearest",
+            "move of a model onto a wall with if_blocked: nearest",
             moved / unit,
             "U",
             10.0,

@@ -1,7 +1,7 @@
-"""What one step costs with each included plugin alone, as a multiple of an empty Box2D step.
+"""Cost of a step with each included plugin, as a multiple of a Box2D step of one body.
 
-The robot is on the benchmark's map and turns, so that Box2D never lets it sleep. All plugins work
-in every step, whatever their default rate.
+The robot is on the benchmark map and rotates, so that its body never falls asleep. All plugins are
+updated in every step, regardless of their default rate.
 """
 
 from __future__ import annotations
@@ -23,12 +23,12 @@ from scenes import BEAMS, RANGE, benchmark_world_path  # isort: skip
 from table import Row
 from timing import best_pair
 
-STEPS = 200  # in one measurement
-SECONDS = 0.4  # for each pair of measurements
+STEPS = 200  # per measurement
+SECONDS = 0.4  # minimum duration of each comparison
 TURN = 0.5  # rad/s
 BASE = {"name": "base", "footprints": [{"type": "circle", "radius": 0.2, "density": 50}]}
 WHEELS = {"front": (0.0, 0.0), "left": (-0.4, 0.2), "right": (-0.4, -0.2)}
-# What a plugin needs beyond its type and the body.
+# Parameters of each plugin besides its name and type.
 PARAMETERS: dict[str, dict[str, Any]] = {
     "Laser": {
         "body": "base",
@@ -60,20 +60,20 @@ NOTES = {
     "Laser": f"{BEAMS} beams",
     "TricycleDrive": "4 bodies, 3 joints",
     "ModelTfPublisher": "4 bodies, 3 joints",
-    "Bumper": "touching a post",
-    "BoolSensor": "touching a post",
+    "Bumper": "in contact with a post",
+    "BoolSensor": "in contact with a post",
 }
 
 
 class TransformListener(WorldObserver):
-    """Takes all transforms, as a ROS node with a TF listener makes the bridge do."""
+    """Receives all transforms, as the bridge does if /tf has subscribers."""
 
     def transforms_sent(self, transforms: Sequence[flatland.Transform]) -> None:
         self.last = transforms
 
 
 def _wheels() -> tuple[list[Any], list[Any]]:
-    """Bodies and joints of a tricycle's wheels."""
+    """Returns the bodies and joints of the wheels of a tricycle."""
     bodies, joints = [], []
     shape = {"type": "circle", "radius": 0.05, "density": 1, "layers": []}
     for name, (x, y) in WHEELS.items():
@@ -85,12 +85,13 @@ def _wheels() -> tuple[list[Any], list[Any]]:
 
 
 def _model(plugin: str | None) -> dict[str, Any]:
+    """Returns the model file for a plugin."""
     bodies, joints = [BASE], []
     if plugin in ("TricycleDrive", "ModelTfPublisher"):
         wheels, joints = _wheels()
         bodies = [BASE, *wheels]
     elif plugin in ("Bumper", "BoolSensor"):
-        # It overlaps a little: there is a contact in every step.
+        # The post overlaps the base slightly, so that there is a contact in every step.
         post = {"type": "circle", "radius": 0.1, "center": [0.295, 0], "density": 0}
         bodies = [BASE, {"name": "post", "type": "static", "footprints": [post]}]
     return {"bodies": bodies, "joints": joints}
@@ -98,7 +99,7 @@ def _model(plugin: str | None) -> dict[str, Any]:
 
 @contextlib.contextmanager
 def world_with(plugin: str | None, observers: Sequence[WorldObserver] = ()) -> Iterator[Any]:
-    """A world with one robot, and one plugin or none."""
+    """Loads a world with one robot and at most one plugin."""
     base = benchmark_world_path()
     given = yaml.safe_load(base.read_text())
     layer = {**given["layers"][0], "name": "2d"}
@@ -124,8 +125,9 @@ def world_with(plugin: str | None, observers: Sequence[WorldObserver] = ()) -> I
             yield loaded
 
 
-def _stepper(world: flatland.World, listens: bool) -> Callable[[], None]:
-    outputs = [world.output(topic) for topic in world.ports.outputs] if listens else []
+def _stepper(world: flatland.World, outputs_wanted: bool) -> Callable[[], None]:
+    """Returns a function that makes `STEPS` steps and reads the latest value of each output."""
+    outputs = [world.output(topic) for topic in world.ports.outputs] if outputs_wanted else []
 
     def run() -> None:
         for _ in range(STEPS):
@@ -137,32 +139,30 @@ def _stepper(world: flatland.World, listens: bool) -> Callable[[], None]:
 
 
 def rows(unit: float) -> list[Row]:
-    """Measures the step with each plugin of the manifest, alone and listened to."""
+    """Measures the step with each included plugin, with and without subscribers."""
     included = [name for name in PluginRegistry().classes if name.startswith(INCLUDED_PACKAGE)]
     found = []
     with world_with(None) as empty:
         physics, dt = empty.physics, empty.timekeeper.step_size
 
-        def empty_steps() -> None:
+        def box2d_steps() -> None:
             for _ in range(STEPS):
                 physics.step(dt, empty.velocity_iterations, empty.position_iterations)
 
         def row(name: str, action: Callable[[], None], note: str = "") -> None:
-            box2d, whole = best_pair(empty_steps, action, SECONDS)
+            box2d, whole = best_pair(box2d_steps, action, SECONDS)
             text = f"{whole / STEPS * 1e6:.1f} µs"
             found.append(
-                Row(name, whole / box2d, "empty steps", note=f"{text}, {note}" if note else text)
+                Row(name, whole / box2d, "Box2D steps", note=f"{text}, {note}" if note else text)
             )
 
-        box2d, _ = best_pair(empty_steps, empty_steps, SECONDS)
+        box2d, _ = best_pair(box2d_steps, box2d_steps, SECONDS)
         microseconds = f"{box2d / STEPS * 1e6:.1f} µs"
-        found.append(
-            Row("empty Box2D step, one body", box2d / STEPS / unit, "U", note=microseconds)
-        )
-        row("step without a plugin", _stepper(empty, listens=False))
+        found.append(Row("Box2D step, one body", box2d / STEPS / unit, "U", note=microseconds))
+        row("step without plugins", _stepper(empty, outputs_wanted=False))
         for name in (full.partition("::")[2] for full in included):
-            for listens in (False, True):
-                who = "listened to" if listens else "nobody listening"
-                with world_with(name, [TransformListener()] if listens else []) as world:
-                    row(f"step with {name}, {who}", _stepper(world, listens), NOTES.get(name, ""))
+            for wanted in (False, True):
+                which = "outputs wanted" if wanted else "outputs not wanted"
+                with world_with(name, [TransformListener()] if wanted else []) as world:
+                    row(f"step with {name}, {which}", _stepper(world, wanted), NOTES.get(name, ""))
     return found

@@ -1,4 +1,4 @@
-"""A plugin that records the start of each cycle; its model has to be the first one of the world."""
+"""A plugin that records the start of each cycle. Its model must be the first one of the world."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ plugins: [{{name: recorder, type: "bench::Recorder", file: "{file}"}}]
 
 
 class Recorder(flatland.ModelPlugin):
-    """Writes the wall time of all cycle starts [s] into a file when it ends."""
+    """Records the wall time of each cycle start [s], and saves all of them on shutdown."""
 
     def on_initialize(self, config: flatland.YamlReader) -> None:
         self._file: str = config.get("file", "string")

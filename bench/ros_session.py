@@ -1,4 +1,4 @@
-"""A ROS master of our own on a free port, and programs that run beside it."""
+"""A separate ROS master on a free port, and the programs that use it."""
 
 from __future__ import annotations
 
@@ -6,28 +6,29 @@ import contextlib
 import os
 import re
 import select
+import shlex
 import signal
 import socket
 import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 import flatland
 
 CHECKOUT = Path(__file__).resolve().parent.parent
-TIMEOUT = 60.0  # s, for any event
+TIMEOUT = 60.0  # s
 
 _TICKS = os.sysconf("SC_CLK_TCK")
 
 
 class Program:
-    """A running program and what it prints."""
+    """A running program and its output."""
 
     def __init__(self, command: list[str], environment: Mapping[str, str]) -> None:
-        """Starts it in a process group of its own."""
+        """Starts the program in a new process group."""
         self.started = time.monotonic()
         self._text = ""
         self._popen = subprocess.Popen(
@@ -41,14 +42,21 @@ class Program:
 
     @property
     def pid(self) -> int:
-        """Its process id."""
+        """The process id."""
         return self._popen.pid
 
     def wait_for(self, pattern: str, timeout: float = TIMEOUT) -> re.Match[str]:
-        """Reads what it prints until a pattern is there.
+        """Waits until the output of the program contains a pattern.
+
+        Args:
+            pattern: Regular expression.
+            timeout: Time limit [s].
+
+        Returns:
+            The first match.
 
         Raises:
-            RuntimeError: It ended, or took too long.
+            RuntimeError: The program has ended, or the time limit has expired.
         """
         end = time.monotonic() + timeout
         stream = self._popen.stdout
@@ -61,11 +69,12 @@ class Program:
             ready = left > 0 and select.select([stream], [], [], left)[0]
             data = os.read(stream.fileno(), 65536) if ready else b""
             if not data:
-                raise RuntimeError(f"no {pattern!r} in what {self._popen.args} said:\n{self._text}")
+                command = shlex.join(self._popen.args)
+                raise RuntimeError(f"{pattern!r} not in the output of {command}:\n{self._text}")
             self._text += data.decode(errors="replace")
 
     def stop(self) -> None:
-        """Asks it to end, and makes it end when it does not; its children with it."""
+        """Interrupts the program, and kills what remains of its process group."""
         if self._popen.poll() is None:
             self._popen.send_signal(signal.SIGINT)
             with contextlib.suppress(subprocess.TimeoutExpired):
@@ -81,41 +90,41 @@ class RosSession:
     """A running ROS master and the environment of its nodes."""
 
     def __init__(self, environment: dict[str, str]) -> None:
-        """Knows how programs are started; see `ros_session`."""
+        """Creates a session without programs; see `ros_session`."""
         self.environment = environment
         self._programs: list[Program] = []
 
     def start(self, *command: str) -> Program:
-        """Starts a program that ends with the session."""
+        """Starts a program, which is stopped at the end of the session."""
         program = Program(list(command), self.environment)
         self._programs.append(program)
         return program
 
     def launch(self, launch_file: str, **arguments: object) -> Program:
-        """Starts one of flatland's launch files."""
+        """Starts a launch file of flatland."""
         given = [f"{name}:={value}" for name, value in arguments.items()]
         return self.start("roslaunch", "flatland", launch_file, *given)
 
     def server(self, **parameters: object) -> Program:
-        """Starts the node alone, as rosrun would, with private parameters."""
+        """Starts the node without roslaunch, with private parameters."""
         given = [f"_{name}:={value}" for name, value in parameters.items()]
         script = CHECKOUT / "scripts" / "flatland_server"
         return self.start(sys.executable, str(script), *given)
 
     def stop(self, program: Program) -> None:
-        """Ends a program."""
+        """Stops a program of the session."""
         program.stop()
         self._programs.remove(program)
 
     def close(self) -> None:
-        """Ends all that still runs, the latest first."""
+        """Stops all programs, in reverse order of their start."""
         while self._programs:
             self._programs.pop().stop()
 
 
 @contextlib.contextmanager
 def ros_session() -> Iterator[RosSession]:
-    """Starts a ROS master; ends it and all nodes in the end."""
+    """Runs a ROS master; stops it and all programs at the end."""
     with tempfile.TemporaryDirectory() as folder:
         session = RosSession(_environment(Path(folder)))
         try:
@@ -145,7 +154,7 @@ def _environment(folder: Path) -> dict[str, str]:
     environment.pop("ROS_HOSTNAME", None)
     package = Path(flatland.__file__).resolve().parent.parent
     if (package / "launch").is_dir():
-        # A source tree with the extension built into it: laid out as an install would be.
+        # flatland was imported from a source tree, which gets the layout of an installation.
         environment["PYTHONPATH"] = f"{package}:{os.environ.get('PYTHONPATH', '')}"
         environment["ROS_PACKAGE_PATH"] = f"{_overlay(package, folder)}:/usr/share"
     elif "ROS_PACKAGE_PATH" not in environment:
@@ -154,38 +163,26 @@ def _environment(folder: Path) -> dict[str, str]:
 
 
 def _overlay(package: Path, folder: Path) -> Path:
+    """Creates a package path with the installed layout of a source tree, and returns it."""
     share = folder / "share" / "flatland"
     (share / "scripts").mkdir(parents=True)
     for name in ("package.xml", "flatland_plugins.xml", "launch", "msg", "srv", "worlds"):
         (share / name).symlink_to(package / name)
-    starter = share / "scripts" / "flatland_server"
+    launcher = share / "scripts" / "flatland_server"
     script = package / "scripts" / "flatland_server"
-    starter.write_text(f'#!/bin/sh\nexec "{sys.executable}" "{script}" "$@"\n')
-    starter.chmod(0o755)
+    launcher.write_text(f'#!/bin/sh\nexec "{sys.executable}" "{script}" "$@"\n')
+    launcher.chmod(0o755)
     return share.parent
 
 
-def wait_until(what: str, condition: Callable[[], bool], timeout: float = TIMEOUT) -> None:
-    """Waits until a condition holds.
-
-    Raises:
-        RuntimeError: It does not.
-    """
-    end = time.monotonic() + timeout
-    while not condition():
-        if time.monotonic() > end:
-            raise RuntimeError(f"{what} did not come true in {timeout:g} s")
-        time.sleep(0.005)
-
-
 def processor_time(pid: int) -> float:
-    """Returns the processor time that a process used so far, all threads [s]."""
+    """Returns the processor time used by all threads of a process [s]."""
     fields = Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()
     return (int(fields[11]) + int(fields[12])) / _TICKS
 
 
 def peak_memory(pid: int) -> float:
-    """Returns the most memory that a process held so far [MB]."""
+    """Returns the peak resident memory of a process [MB]."""
     status = Path(f"/proc/{pid}/status").read_text()
     match = re.search(r"VmHWM:\s+(\d+) kB", status)
     return int(match[1]) / 1024 if match else 0.0

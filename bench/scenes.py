@@ -1,4 +1,4 @@
-"""The worlds that are measured in: the reference's where they are there, else our own."""
+"""Worlds, maps and beams that several modules use."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ RANGE = 20.0
 
 
 def shared_dir() -> Path | None:
-    """Returns the folder of the reference's worlds, None where it is missing."""
+    """Returns the folder with the worlds of the reference simulator, None if it is missing."""
     folder = Path(os.environ.get("FLATLAND_SHARED_DIR", CHECKOUT.parent / "shared"))
     return folder if (folder / "worlds").is_dir() else None
 
 
 def benchmark_world_path() -> Path:
-    """Returns the reference's benchmark world, or our office where that is missing."""
+    """Returns the benchmark world of the reference simulator, or the bundled office."""
     shared = shared_dir()
     if shared is None:
         return CHECKOUT / "worlds" / "office" / "world.yaml"
@@ -31,19 +31,28 @@ def benchmark_world_path() -> Path:
 
 
 def scan_pose(world: flatland.World) -> tuple[float, float, float]:
-    """Returns where the scans are taken: at the first model."""
+    """Returns the pose of the scans in the world frame, that of the first model."""
     return world.models[0].pose
 
 
 def beam_ends(beams: int = BEAMS, length: float = RANGE) -> np.ndarray:
-    """Returns the ends of the beams of a 270° laser in its own frame, shape (beams, 2)."""
+    """Returns the end points of a 270° laser in its frame [m], shape (beams, 2)."""
     angles = np.linspace(-0.75 * math.pi, 0.75 * math.pi, beams)
     ends = length * np.stack([np.cos(angles), np.sin(angles)], axis=1)
     return np.ascontiguousarray(ends, dtype=np.float32)
 
 
-def ranges_pixels(side: int, edges: int, seed: int = 1) -> np.ndarray:
-    """Draws a map of `side` pixels with about so many edges: scattered boxes; True is free."""
+def random_map(side: int, edges: int, seed: int = 1) -> np.ndarray:
+    """Returns a square map of randomly placed boxes.
+
+    Args:
+        side: Side of the map [px].
+        edges: Approximate number of edges.
+        seed: Seed of the random numbers.
+
+    Returns:
+        Whether each pixel is free, shape (side, side).
+    """
     rng = np.random.default_rng(seed)
     free = np.ones((side, side), dtype=bool)
     for _ in range(edges // 4):
@@ -56,7 +65,7 @@ def ranges_pixels(side: int, edges: int, seed: int = 1) -> np.ndarray:
 
 
 def world_of_edges(edges: np.ndarray) -> PhysicsWorld:
-    """Makes a physics world with one static body of edges."""
+    """Creates a physics world with one static body that consists of edges."""
     world = PhysicsWorld()
     body = world.create_body("static", (0.0, 0.0, 0.0))
     body.create_edges(edges, category_bits=1, mask_bits=1)

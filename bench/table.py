@@ -1,4 +1,4 @@
-"""One row of the benchmark, and the table of all rows."""
+"""Rows and table of the results."""
 
 from __future__ import annotations
 
@@ -9,15 +9,16 @@ from typing import Any
 
 @dataclass(frozen=True, slots=True)
 class Row:
-    """One figure.
+    """The result of one measurement.
 
     Attributes:
-        name: What was measured; the key by which a baseline is compared.
-        value: The figure.
-        unit: Its unit; `U` is one scan of 1081 beams by `b2World::RayCast`, measured in this run.
-        bar: What it should be, None where there is no bar.
-        at_least: Whether the bar is a least value; else it is a greatest one.
-        note: The same in other units, or how it was measured.
+        name: Name of the measurement, also the key of the comparison with a baseline.
+        value: Measured value.
+        unit: Unit of the value; `U` is the time of one scan of 1081 beams with
+            `b2World::RayCast`, measured in the same run.
+        bar: Limit of the value, None for no limit.
+        at_least: Whether the bar is a lower limit; otherwise it is an upper limit.
+        note: The value in other units, or conditions of the measurement.
     """
 
     name: str
@@ -29,12 +30,12 @@ class Row:
 
     @property
     def ratio(self) -> float | None:
-        """The figure as a share of its bar."""
+        """The value divided by the bar, None without a bar."""
         return None if self.bar is None else self.value / self.bar
 
     @property
     def met(self) -> bool | None:
-        """Whether the bar is met, None without a bar."""
+        """Whether the value is within its limit, None without a bar."""
         if self.bar is None:
             return None
         return self.value >= self.bar if self.at_least else self.value <= self.bar
@@ -45,8 +46,13 @@ def _number(value: float | None) -> str:
 
 
 def format_table(rows: Iterable[Row], baseline: Mapping[str, float]) -> str:
-    """Writes rows as a table, with the change against a baseline where there is one."""
-    lines = [("", "figure", "bar", "figure/bar", "", "against baseline", "")]
+    """Returns rows as a text table.
+
+    Args:
+        rows: The rows.
+        baseline: Values of an earlier run by row name; empty for a table without comparison.
+    """
+    lines = [("", "value", "bar", "value/bar", "", "value/baseline", "")]
     for row in rows:
         verdict = {True: "met", False: "MISSED", None: ""}[row.met]
         sign = "" if row.bar is None else ("≥ " if row.at_least else "≤ ")
@@ -72,5 +78,5 @@ def format_table(rows: Iterable[Row], baseline: Mapping[str, float]) -> str:
 
 
 def as_json(rows: Iterable[Row]) -> list[dict[str, Any]]:
-    """Returns rows as plain data."""
+    """Returns rows as JSON-compatible data."""
     return [{**asdict(row), "ratio": row.ratio, "met": row.met} for row in rows]

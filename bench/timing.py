@@ -1,4 +1,4 @@
-"""How times are taken on a noisy machine."""
+"""Measurement of execution times on a shared machine."""
 
 from __future__ import annotations
 
@@ -6,26 +6,34 @@ import time
 from collections.abc import Callable
 
 
-def best_of(action: Callable[[], object], seconds: float = 0.5, least: int = 5) -> float:
-    """Returns the least time [s] that an action took, tried for so many seconds.
+def best_of(action: Callable[[], object], seconds: float = 0.5, min_runs: int = 5) -> float:
+    """Returns the minimum execution time of an action [s].
 
-    What disturbs a measurement on a shared machine only ever makes it longer.
+    The minimum is used because disturbances by other programs only increase the time.
+
+    Args:
+        action: The measured function.
+        seconds: Minimum total duration [s].
+        min_runs: Minimum number of runs.
     """
     best = float("inf")
     end = time.perf_counter() + seconds
-    tries = 0
-    while tries < least or time.perf_counter() < end:
+    runs = 0
+    while runs < min_runs or time.perf_counter() < end:
         start = time.perf_counter()
         action()
         best = min(best, time.perf_counter() - start)
-        tries += 1
+        runs += 1
     return best
 
 
 def best_pair(
     first: Callable[[], object], second: Callable[[], object], seconds: float = 1.0
 ) -> tuple[float, float]:
-    """Returns the least times [s] of two actions that take turns, so that both see one machine."""
+    """Returns the minimum execution times of two actions [s].
+
+    The actions alternate, so that both are measured under the same load of the machine.
+    """
     best_first = best_second = float("inf")
     end = time.perf_counter() + seconds
     while time.perf_counter() < end:

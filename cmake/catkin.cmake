@@ -1,13 +1,14 @@
-# catkin_make and catkin_make install.
+# Build with catkin_make, for the devel and install spaces.
 #
-# No setup.py: Debian's setuptools cannot read modern metadata, and catkin_python_setup() would put the
-# repository's root on sys.path. Instead the devel space's package is a relay to the source package.
+# There is no setup.py: setuptools of Debian does not support the metadata of pyproject.toml, and
+# catkin_python_setup() would add the root of the repository to sys.path. Instead, the package in the devel
+# space is a relay to the source package.
 find_package(catkin REQUIRED COMPONENTS geometry_msgs message_generation std_msgs)
 
-# The extension must be for the Python that ROS runs on, which catkin chose.
+# Build the extension for the Python interpreter of ROS, selected by catkin.
 set(Python_EXECUTABLE ${PYTHON_EXECUTABLE})
 
-# Says that flatland/__init__.py exists, so that generate_messages() neither writes nor installs one.
+# flatland/__init__.py exists: generate_messages() must neither write nor install one.
 set(${PROJECT_NAME}_CATKIN_PYTHON_SETUP_HAS_PACKAGE_INIT TRUE)
 add_message_files(DIRECTORY msg FILES ${FLATLAND_MSG_FILES})
 add_service_files(DIRECTORY srv FILES ${FLATLAND_SRV_FILES})
@@ -20,7 +21,7 @@ set(FLATLAND_CORE_OUTPUT_DIR ${FLATLAND_DEVEL_PACKAGE_DIR})
 configure_file(${CMAKE_CURRENT_LIST_DIR}/devel_relay.py.in ${FLATLAND_DEVEL_PACKAGE_DIR}/__init__.py @ONLY)
 
 set(FLATLAND_CORE_INSTALL_DIR ${CATKIN_PACKAGE_PYTHON_DESTINATION})
-# msg, srv and _core in the source tree are what `make dev` left there; catkin installs its own.
+# msg, srv and _core in the source tree are results of `make dev`; catkin installs its own.
 install(
   DIRECTORY flatland/
   DESTINATION ${CATKIN_PACKAGE_PYTHON_DESTINATION} COMPONENT flatland

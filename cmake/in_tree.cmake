@@ -1,7 +1,7 @@
-# Development: `make dev` puts the extension and the messages into the source tree, so that python with
-# PYTHONPATH=<checkout> sees them at once. Another folder gets a relay to the source, as catkin's devel space.
+# Development build: `make dev` builds the extension and the messages in the source tree, for use with
+# PYTHONPATH=<checkout>. Any other package folder gets a relay to the source tree, like the devel space of catkin.
 include(${CMAKE_CURRENT_LIST_DIR}/messages.cmake)
-set(FLATLAND_PACKAGE_DIR ${PROJECT_SOURCE_DIR}/flatland CACHE PATH "Folder that becomes the package flatland")
+set(FLATLAND_PACKAGE_DIR ${PROJECT_SOURCE_DIR}/flatland CACHE PATH "Folder of the package flatland")
 set(FLATLAND_CORE_OUTPUT_DIR ${FLATLAND_PACKAGE_DIR})
 flatland_generate_messages(${FLATLAND_PACKAGE_DIR})
 if(NOT FLATLAND_PACKAGE_DIR STREQUAL ${PROJECT_SOURCE_DIR}/flatland)

@@ -1,7 +1,7 @@
-# Generates the Python code of msg/ and srv/ with Debian's genpy, for builds that catkin does not drive.
+# Generates the Python code of msg/ and srv/ with genpy of Debian, for builds without catkin.
 #
-# genpy belongs to the system's Python and is called by path: under pip's build isolation `env python3`
-# is another interpreter, and PYTHONPATH leads elsewhere (hence -E).
+# genpy requires the Python of the system and is called by path: with build isolation of pip, `env python3`
+# is a different interpreter, and PYTHONPATH refers to other modules (hence -E).
 set(FLATLAND_GENPY_PYTHON /usr/bin/python3)
 set(FLATLAND_GENPY_DIR /usr/lib/genpy)
 set(FLATLAND_GENPY_INCLUDES
@@ -9,14 +9,15 @@ set(FLATLAND_GENPY_INCLUDES
     -Istd_msgs:/usr/share/std_msgs/msg
     -Igeometry_msgs:/usr/share/geometry_msgs/msg)
 
-# flatland_generate_messages(OUTPUT_DIR): fills OUTPUT_DIR/msg and OUTPUT_DIR/srv as part of `all`.
-# Sets FLATLAND_GENERATED_MSG and FLATLAND_GENERATED_SRV, the files, in the caller; empty without genpy.
+# flatland_generate_messages(OUTPUT_DIR): generates OUTPUT_DIR/msg and OUTPUT_DIR/srv as part of `all`.
+# Sets FLATLAND_GENERATED_MSG and FLATLAND_GENERATED_SRV in the caller to the generated files, or to empty lists
+# if genpy is not installed.
 function(flatland_generate_messages output_dir)
-  foreach(needed ${FLATLAND_GENPY_PYTHON} ${FLATLAND_GENPY_DIR}/genmsg_py.py
+  foreach(required ${FLATLAND_GENPY_PYTHON} ${FLATLAND_GENPY_DIR}/genmsg_py.py
           ${FLATLAND_GENPY_DIR}/gensrv_py.py /usr/share/std_msgs/msg /usr/share/geometry_msgs/msg)
-    if(NOT EXISTS ${needed})
+    if(NOT EXISTS ${required})
       message(WARNING
-        "${needed} is missing: building without ROS messages, so without flatland.ros. "
+        "${required} not found: building without ROS messages, flatland.ros will not be available. "
         "On Debian: apt-get install python3-genpy ros-std-msgs ros-geometry-msgs")
       set(FLATLAND_GENERATED_MSG PARENT_SCOPE)
       set(FLATLAND_GENERATED_SRV PARENT_SCOPE)

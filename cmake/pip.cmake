@@ -1,5 +1,5 @@
-# The wheel: scikit-build-core takes flatland/**/*.py itself (pyproject.toml); here is what has to be built,
-# and the ROS package's data, which lands in <environment>/share/flatland.
+# Wheel build. scikit-build-core adds flatland/**/*.py (pyproject.toml). This file adds the generated files,
+# and the data of the ROS package, which is installed in <environment>/share/flatland.
 include(${CMAKE_CURRENT_LIST_DIR}/messages.cmake)
 
 set(FLATLAND_CORE_INSTALL_DIR ${SKBUILD_PLATLIB_DIR}/flatland)
@@ -12,7 +12,8 @@ include(${CMAKE_CURRENT_LIST_DIR}/ros_share.cmake)
 flatland_install_ros_share(${SKBUILD_DATA_DIR}/share/flatland)
 install(FILES package.xml DESTINATION ${SKBUILD_DATA_DIR}/share/flatland COMPONENT flatland)
 
-# Each script has a console entry point of its name (pyproject.toml), whose first line pip makes right.
+# Each script has a console entry point of the same name (pyproject.toml), which pip installs with the
+# interpreter of the environment.
 flatland_ros_scripts(scripts)
 foreach(script ${scripts})
   get_filename_component(name ${script} NAME)

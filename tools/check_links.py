@@ -1,4 +1,4 @@
-"""Checks that relative links and pictures of Markdown files lead to something that exists.
+"""Checks that the targets of relative links and images in Markdown files exist.
 
 Usage: check_links.py FILE_OR_FOLDER...
 """
@@ -18,12 +18,12 @@ _HEADING = re.compile(r"^#+\s+(.*?)\s*#*$", re.MULTILINE)
 
 
 def prose(path: Path) -> str:
-    """Returns a file's text without its blocks of code."""
+    """Returns the text of a file without code blocks."""
     return _CODE.sub("", path.read_text(encoding="utf-8"))
 
 
 def anchors(path: Path) -> set[str]:
-    """Returns the anchors of a file's headings, as GitHub makes them."""
+    """Returns the anchors of the headings of a file, by the rules of GitHub."""
     found: set[str] = set()
     for heading in _HEADING.findall(prose(path)):
         plain = re.sub(r"[^\w\- ]", "", heading.lower()).strip().replace(" ", "-")
@@ -36,26 +36,26 @@ def anchors(path: Path) -> set[str]:
 
 
 def broken_links(path: Path) -> Iterator[str]:
-    """Yields the links of a file that lead nowhere; links to other hosts are not followed."""
+    """Yields a message for each broken link of a file. Links to other hosts are not checked."""
     for target in _LINK.findall(_INLINE_CODE.sub("", prose(path))):
         if re.match(r"[a-z][a-z0-9+.-]*:", target):
             continue
         name, _, anchor = unquote(target).partition("#")
-        aim = path.parent / name if name else path
-        if not aim.exists():
+        linked = path.parent / name if name else path
+        if not linked.exists():
             yield f"{target}: no such file"
-        elif anchor and aim.suffix == ".md" and anchor not in anchors(aim):
+        elif anchor and linked.suffix == ".md" and anchor not in anchors(linked):
             yield f"{target}: no such heading"
 
 
 def main(arguments: list[str]) -> int:
-    """Prints every broken link and returns the exit code."""
+    """Prints all broken links and returns the exit code."""
     files: list[Path] = []
     for argument in map(Path, arguments):
         files += sorted(argument.rglob("*.md")) if argument.is_dir() else [argument]
-    bad = [f"{path}: {problem}" for path in files for problem in broken_links(path)]
-    print("\n".join(bad) if bad else f"{len(files)} files, every link leads somewhere")
-    return 1 if bad else 0
+    broken = [f"{path}: {problem}" for path in files for problem in broken_links(path)]
+    print("\n".join(broken) if broken else f"{len(files)} files, no broken links")
+    return 1 if broken else 0
 
 
 if __name__ == "__main__":

@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
-# Runs tests and says which lines of Python and C++ they ran; `make coverage` builds the extension for it.
+# Runs tests and reports the coverage of Python and C++. `make coverage` builds the extension for it.
 #   tools/coverage.sh PYTEST_ARGUMENTS...
-# The pages are in build/coverage/html: python/index.html and cpp/index.html.
+# Reports: build/coverage/html/python/index.html and build/coverage/html/cpp/index.html.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 build=$PWD/build/coverage
@@ -10,7 +10,7 @@ rm -rf "$html"
 mkdir -p "$html/cpp"
 find "$build" -name '*.gcda' -delete -o -maxdepth 1 -name '.coverage*' -type f -delete
 
-# Nodes and programs that the tests start are measured, too (`patch` in pyproject.toml).
+# Programs that the tests start are measured as well (`patch` in pyproject.toml).
 export COVERAGE_FILE=$build/.coverage
 status=0
 PYTHONPATH="$build/python:${PYTHONPATH:-}" \
@@ -22,7 +22,7 @@ gcovr --root . --filter src/cpp/ --html-details "$html/cpp/index.html" --txt "$b
   --exclude-throw-branches --exclude-unreachable-branches --print-summary "$build" >"$build/cpp_summary.txt"
 coverage report --skip-covered | tee "$build/python.txt"
 cat "$build/cpp.txt"
-echo "Python: $(coverage report --format=total) % of lines and branches"
-echo "C++:    $(sed -n 's/^lines: //p' "$build/cpp_summary.txt") of lines"
-echo "Pages:  $html/python/index.html $html/cpp/index.html"
+echo "Python:  $(coverage report --format=total) % of lines and branches"
+echo "C++:     $(sed -n 's/^lines: //p' "$build/cpp_summary.txt") of lines"
+echo "Reports: $html/python/index.html $html/cpp/index.html"
 exit $status

@@ -1,8 +1,8 @@
-"""Draws the pictures of README.md and docs/drawing.md that need neither ROS nor a display.
+"""Draws the images of README.md and docs/drawing.md that require neither ROS nor a display.
 
-Usage: draw_pictures.py [FOLDER]   (docs/images; pictures that are there are overwritten)
+Usage: draw_pictures.py [FOLDER]   (default: docs/images; existing images are overwritten)
 
-Every run gives the same pictures.
+The images are the same in every run.
 """
 
 from __future__ import annotations
@@ -15,8 +15,8 @@ from flatland.drawing import save
 
 _CHECKOUT = Path(__file__).resolve().parent.parent
 
-# Model file, pose (x, y [m], yaw [rad]).
-THINGS = [
+# Name of the model file, pose (x, y [m], yaw [rad]).
+FURNITURE = [
     ("chair", (-0.6, -5.2, 0.0)),
     ("chair", (1.6, -5.9, 2.0)),
     ("box", (3.6, -5.0, 0.4)),
@@ -28,12 +28,12 @@ THINGS = [
 
 
 def office() -> World:
-    """Loads the office, puts some things into it and lets both robots drive for some seconds."""
+    """Loads the office, adds furniture and drives both robots for some seconds."""
     world = World.from_yaml(_CHECKOUT / "worlds" / "office" / "world.yaml", seed=1)
-    for number, (kind, pose) in enumerate(THINGS, start=1):
+    for number, (kind, pose) in enumerate(FURNITURE, start=1):
         world.spawn_model(f"{kind}.model.yaml", f"{kind}_{number}", pose=pose)
     for topic in ("/scan", "/tricycle/scan"):
-        world.output(topic)  # so that there are scans, with their noise
+        world.output(topic)  # a scan is computed only if its output is wanted
     robot, tricycle = world.command("/cmd_vel"), world.command("/tricycle/cmd_vel")
     robot.set(Twist(linear_x=0.5, angular_z=-0.25))
     tricycle.set(Twist(linear_x=0.9, angular_z=-0.2))
@@ -45,7 +45,7 @@ def office() -> World:
 
 
 def main(arguments: list[str]) -> int:
-    """Draws all pictures into a folder."""
+    """Draws all images into a folder."""
     folder = Path(arguments[0]) if arguments else _CHECKOUT / "docs" / "images"
     folder.mkdir(parents=True, exist_ok=True)
     with office() as world:

@@ -1,8 +1,8 @@
-"""Makes the pictures of README.md and docs/ of the viewer and of RViz, on a virtual screen.
+"""Captures the images of the viewer and of RViz in README.md and docs/, on a virtual screen.
 
-Usage: show_pictures.py [FOLDER]   (docs/images; pictures that are there are overwritten)
+Usage: show_pictures.py [FOLDER]   (default: docs/images; existing images are overwritten)
 
-To be run in flatland's environment (setup.bash). Nothing else of ROS needs to run.
+Requires the environment of setup.bash. The ROS master is started by this program.
 """
 
 from __future__ import annotations
@@ -21,25 +21,25 @@ from typing import Any
 
 import cv2
 import numpy as np
-from draw_pictures import THINGS
+from draw_pictures import FURNITURE
 from virtual_screen import Image, VirtualScreen, missing_programs
 
 _CHECKOUT = Path(__file__).resolve().parent.parent
 _OFFICE = _CHECKOUT / "worlds" / "office"
-_SIZE = (1200, 800)  # of the viewer, and of RViz by its configuration
-_ARROW = (255, 217, 26)  # colour of the viewer's arrow for the heading
+_SIZE = (1200, 800)  # of the windows of the viewer and of RViz [px]
+_ARROW_COLOR = (255, 217, 26)  # of the heading arrow in the viewer
 _FROM_ABOVE = "{Class: rviz/TopDownOrtho, Scale: 34, X: -3, Y: 0.3, Angle: 0}"
 _IN_3D = (
     "{Class: rviz/Orbit, Distance: 24, Focal Point: {X: -1.5, Y: -1, Z: 0}, Pitch: 0.85, Yaw: 4.4}"
 )
-_SPAWN_BUTTON = (525, 20)  # pixels in the viewer
-_FIRST_FIELD = 24  # pixels below the top of its dialog
+_SPAWN_BUTTON = (525, 20)  # position in the window of the viewer [px]
+_FIRST_FIELD = 24  # distance of the first field from the top of the spawn dialog [px]
 _TIMEOUT = 60.0  # s
-_SETTLING = 1.5  # s that RViz gets to draw what it has just been told
+_DRAWING_TIME = 1.5  # time in which RViz draws a change [s]
 
 
 def main(arguments: list[str]) -> int:
-    """Makes all pictures."""
+    """Captures all images."""
     missing = missing_programs()
     if missing:
         print(f"not installed: {', '.join(missing)} (make setup-dev installs them)")
@@ -49,11 +49,11 @@ def main(arguments: list[str]) -> int:
     screen = VirtualScreen(*_SIZE)
     try:
         with _simulator(screen) as environment:
-            _furnish()
+            _spawn_furniture()
             _drive(3.0)
-            _picture_of_viewer(screen, folder / "viewer.png")
-            _picture_of_rviz(screen, environment, _FROM_ABOVE, folder / "rviz.png")
-            _picture_of_rviz(screen, environment, _IN_3D, folder / "walls.png")
+            _capture_viewer(screen, folder / "viewer.png")
+            _capture_rviz(screen, environment, _FROM_ABOVE, folder / "rviz.png")
+            _capture_rviz(screen, environment, _IN_3D, folder / "walls.png")
     finally:
         screen.close()
     return 0
@@ -61,7 +61,7 @@ def main(arguments: list[str]) -> int:
 
 @contextmanager
 def _simulator(screen: VirtualScreen) -> Iterator[dict[str, str]]:
-    """Runs the office with the viewer, on a ROS master of its own."""
+    """Runs the office and the viewer with a separate ROS master."""
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         port = probe.getsockname()[1]
@@ -75,7 +75,7 @@ def _simulator(screen: VirtualScreen) -> Iterator[dict[str, str]]:
         _wait("ROS master", rosgraph.is_master_online)
         rospy.init_node("pictures", disable_rostime=True, disable_signals=True)
         yield environment
-        rospy.signal_shutdown("all pictures are made")
+        rospy.signal_shutdown("all images are saved")
 
 
 @contextmanager
@@ -93,12 +93,12 @@ def _wait(what: str, condition: Callable[[], Any]) -> None:
     end = time.monotonic() + _TIMEOUT
     while not condition():
         if time.monotonic() > end:
-            raise TimeoutError(f"{what}: not within {_TIMEOUT} s")
+            raise TimeoutError(f"{what}: not available within {_TIMEOUT:g} s")
         time.sleep(0.1)
 
 
-def _furnish() -> None:
-    """Puts some things into the office."""
+def _spawn_furniture() -> None:
+    """Adds furniture to the office."""
     import rospy
     from geometry_msgs.msg import Pose2D
 
@@ -106,14 +106,14 @@ def _furnish() -> None:
 
     rospy.wait_for_service("/spawn_model", _TIMEOUT)
     spawn = rospy.ServiceProxy("/spawn_model", SpawnModel)
-    for number, (kind, pose) in enumerate(THINGS, start=1):
-        answer = spawn(str(_OFFICE / f"{kind}.model.yaml"), f"{kind}_{number}", "", Pose2D(*pose))
-        if not answer.success:
-            raise RuntimeError(answer.message)
+    for number, (kind, pose) in enumerate(FURNITURE, start=1):
+        response = spawn(str(_OFFICE / f"{kind}.model.yaml"), f"{kind}_{number}", "", Pose2D(*pose))
+        if not response.success:
+            raise RuntimeError(response.message)
 
 
 def _drive(seconds: float) -> None:
-    """Lets both robots drive a curve."""
+    """Drives both robots along a curve."""
     import rospy
     from geometry_msgs.msg import Twist
 
@@ -122,7 +122,7 @@ def _drive(seconds: float) -> None:
         rospy.Publisher("/tricycle/cmd_vel", Twist, queue_size=1): (0.7, 0.03),
     }
     for robot, (speed, turn) in robots.items():
-        _wait("robot", robot.get_num_connections)
+        _wait("subscriber of the commands", robot.get_num_connections)
         command = Twist()
         command.linear.x, command.angular.z = speed, turn
         robot.publish(command)
@@ -131,33 +131,33 @@ def _drive(seconds: float) -> None:
         robot.publish(Twist())
 
 
-def _picture_of_viewer(screen: VirtualScreen, path: Path) -> None:
-    """Places a model in the viewer; the picture is taken before it is there."""
-    _wait("picture of the office", lambda: (screen.picture().max(axis=2) > 150).mean() > 0.02)
+def _capture_viewer(screen: VirtualScreen, path: Path) -> None:
+    """Captures the viewer while a model is being placed."""
+    _wait("view of the office", lambda: (screen.picture().max(axis=2) > 150).mean() > 0.02)
     width, height = _SIZE
     for _ in range(4):
         screen.click(0.5 * width, 0.5 * height, button=4)
     _drag(screen, (0.5 * width, 0.5 * height), (0.58 * width, 0.5 * height))
     screen.click(*_SPAWN_BUTTON)
-    _wait("dialog", lambda: screen.area_of("Spawn model"))
+    _wait("spawn dialog", lambda: screen.area_of("Spawn model"))
     left, top, width_of_dialog, _ = screen.area_of("Spawn model")
     screen.click(left + width_of_dialog / 2, top + _FIRST_FIELD)
     screen.key("ctrl+a")
     screen.type(str(_OFFICE / "tricycle.model.yaml"))
     screen.key("Return")
     screen.move(0.88 * width, 0.8 * height)
-    _wait("preview", lambda: _has_color(screen.picture(), _ARROW))
+    _wait("preview of the model", lambda: _has_color(screen.picture(), _ARROW_COLOR))
     screen.click(0.875 * width, 0.72 * height)
     screen.move(0.94 * width, 0.712 * height)
-    time.sleep(_SETTLING)
+    time.sleep(_DRAWING_TIME)
     _save(screen, path)
     screen.key("Escape", "ctrl+q")
 
 
-def _picture_of_rviz(
+def _capture_rviz(
     screen: VirtualScreen, environment: dict[str, str], view: str, path: Path
 ) -> None:
-    """Shows a part of the office in RViz, with what the robots have driven."""
+    """Captures a part of the office in RViz, with the trajectories of the robots."""
     text = (_CHECKOUT / "rviz" / "flatland.rviz").read_text()
     before, rest = text.split("    Current:\n")
     after = rest[rest.index("    Saved:\n") :]
@@ -165,15 +165,15 @@ def _picture_of_rviz(
         config = Path(folder) / "picture.rviz"
         config.write_text(f"{before}    Current: {view}\n{after}")
         with _running(["rviz", "-d", str(config)], environment):
-            _wait("picture of RViz", lambda: (screen.picture()[100:600, 400:1100] > 0).all())
-            time.sleep(2 * _SETTLING)
+            _wait("view of RViz", lambda: (screen.picture()[100:600, 400:1100] > 0).all())
+            time.sleep(2 * _DRAWING_TIME)
             _drive(4.0)
-            time.sleep(_SETTLING)
+            time.sleep(_DRAWING_TIME)
             _save(screen, path)
 
 
 def _has_color(image: Image, color: tuple[int, int, int]) -> bool:
-    """Tells whether a colour, or nearly that, has been drawn."""
+    """Returns whether an image contains a colour, within a tolerance."""
     return bool((np.abs(image.astype(int) - color).max(axis=2) < 25).sum() > 20)
 
 

@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Runs `make run`, waits until the simulation runs, ends it as a service manager does, and fails if anything went wrong.
+# Runs `make run` until the simulation runs, then stops it with SIGTERM. Fails if an error is logged.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 log=$(mktemp)

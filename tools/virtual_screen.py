@@ -1,4 +1,4 @@
-"""A screen without a monitor: Xvfb with software OpenGL, its pictures, its mouse and its keys."""
+"""A virtual screen: Xvfb with software OpenGL, screenshots, mouse and keyboard."""
 
 from __future__ import annotations
 
@@ -17,18 +17,27 @@ Image = npt.NDArray[np.uint8]
 
 
 def missing_programs() -> list[str]:
-    """Returns those of the needed programs that are not installed."""
+    """Returns the required programs that are not installed."""
     return [program for program in PROGRAMS if shutil.which(program) is None]
 
 
 class VirtualScreen:
-    """An X server of its own, with a number that was free."""
+    """A virtual X server on a free display number."""
 
     def __init__(self, width: int = 1280, height: int = 800, *more: str) -> None:
-        """Starts the server, with more options for it; `close` ends it."""
+        """Starts the server.
+
+        Args:
+            width: Width of the screen [px].
+            height: Height of the screen [px].
+            more: Additional command-line options of Xvfb.
+
+        Raises:
+            RuntimeError: Xvfb failed to start.
+        """
         reading, writing = os.pipe()
         options = ["-screen", "0", f"{width}x{height}x24", "-nolisten", "tcp", "-noreset", *more]
-        self._server = subprocess.Popen(  # noqa: S603 - our own words
+        self._server = subprocess.Popen(  # noqa: S603 - fixed command
             [PROGRAMS[0], "-displayfd", str(writing), *options],
             pass_fds=[writing],
             stdout=subprocess.DEVNULL,
@@ -43,7 +52,7 @@ class VirtualScreen:
 
     @property
     def environment(self) -> dict[str, str]:
-        """What programs need to draw here."""
+        """Environment variables of programs that use the screen."""
         return {
             "DISPLAY": self.display,
             "LIBGL_ALWAYS_SOFTWARE": "1",
@@ -53,19 +62,19 @@ class VirtualScreen:
         }
 
     def close(self) -> None:
-        """Ends the server, and so all that still draws on it."""
+        """Stops the server and disconnects its clients."""
         self._server.terminate()
         self._server.wait()
 
     def picture(self) -> Image:
-        """Returns what the screen shows: red, green, blue; shape (height, width, 3)."""
+        """Returns a screenshot: red, green, blue; shape (height, width, 3)."""
         for _ in range(10):
-            # xwd fails if a window is closed meanwhile.
+            # xwd fails if a window is closed at the same time.
             with contextlib.suppress(subprocess.CalledProcessError):
                 data = self._run("xwd", "-root", "-silent")
                 break
         else:
-            raise RuntimeError(f"no picture of the display {self.display}")
+            raise RuntimeError(f"xwd failed on display {self.display}")
         header = struct.unpack(">25I", data[:100])
         size, width, height, pixel_bits, row_bytes, colors = (
             header[index] for index in (0, 4, 5, 11, 12, 19)
@@ -77,41 +86,41 @@ class VirtualScreen:
         return image
 
     def area_of(self, title: str) -> tuple[int, int, int, int] | None:
-        """Returns left, top, width and height of the window of that title; None if it is not up."""
+        """Returns left, top, width and height of the window with a title [px], None if not open."""
         search = ("search", "--onlyvisible", "--name", f"^{title}$")
         try:
-            answer = self._run("xdotool", *search, "getwindowgeometry", "--shell").decode()
+            output = self._run("xdotool", *search, "getwindowgeometry", "--shell").decode()
         except subprocess.CalledProcessError:
             return None
-        fields = dict(line.split("=") for line in answer.split())
+        fields = dict(line.split("=") for line in output.split())
         left, top, width, height = (int(fields[key]) for key in ("X", "Y", "WIDTH", "HEIGHT"))
         return left, top, width, height
 
     # -- mouse and keys --------------------------------------------------------------------
 
     def move(self, x: float, y: float) -> None:
-        """Moves the mouse to a pixel."""
+        """Moves the mouse pointer to a pixel."""
         self._run("xdotool", "mousemove", str(round(x)), str(round(y)))
 
     def click(self, x: float, y: float, button: int = 1) -> None:
-        """Clicks at a pixel."""
+        """Clicks a mouse button at a pixel."""
         self.move(x, y)
         self._run("xdotool", "click", str(button))
 
     def press(self, button: int = 1) -> None:
-        """Presses a button and holds it."""
+        """Presses a mouse button and holds it."""
         self._run("xdotool", "mousedown", str(button))
 
     def release(self, button: int = 1) -> None:
-        """Lets go of a button."""
+        """Releases a mouse button."""
         self._run("xdotool", "mouseup", str(button))
 
     def key(self, *keys: str) -> None:
-        """Strikes keys, such as `Escape` or `ctrl+q`."""
+        """Presses and releases keys, such as `Escape` or `ctrl+q`."""
         self._run("xdotool", "key", *keys)
 
     def resize(self, title: str, width: int, height: int) -> None:
-        """Gives the windows of that title another size."""
+        """Resizes the windows with a title [px]."""
         search = ("search", "--onlyvisible", "--name", f"^{title}$")
         self._run("xdotool", *search, "windowsize", "%@", str(width), str(height))
 
@@ -120,8 +129,8 @@ class VirtualScreen:
         self._run("xdotool", "type", "--delay", "1", text)
 
     def _run(self, *command: str) -> bytes:
-        """Runs a program on the screen and returns what it printed."""
+        """Runs a program on the screen and returns its output."""
         environment = {**os.environ, "DISPLAY": self.display}
-        return subprocess.run(  # noqa: S603 - our own words
+        return subprocess.run(  # noqa: S603 - fixed commands
             command, env=environment, check=True, capture_output=True, timeout=120
         ).stdout

@@ -83,7 +83,7 @@ def test_existing_variables_are_extended(shell):
 def test_run_reports_a_missing_world(shell, installed):
     done = shell(f"'{installed}/tools/run.sh' nowhere.yaml")
     assert done.returncode == 1
-    assert "there is no world file nowhere.yaml" in done.stderr
+    assert "world file not found: nowhere.yaml" in done.stderr
 
 
 def test_server_runs_with_a_broken_python_first_on_path(shell, world_file, tmp_path):

@@ -107,7 +107,7 @@ def test_a_topic_of_two_types_is_an_error_that_names_both_plugins(files):
             """
         )
     assert str(caught.value) == (
-        'Flatland plugin: Model Plugin "bumper" type "Bumper" model "b": topic "/state" carries '
-        'Odometry already, used by Model Plugin "drive" type "DiffDrive" model "a", not Collisions '
+        'Flatland plugin: Model Plugin "bumper" type "Bumper" model "b": topic "/state" already '
+        'carries Odometry, used by Model Plugin "drive" type "DiffDrive" model "a", not Collisions '
         f"[{files.folder}/seer.model.yaml:3]"
     )
