@@ -55,23 +55,23 @@ def rows(unit: float) -> list[Row]:
 
 def _rate_rows(where: str, starts: npt.NDArray[np.float64]) -> list[Row]:
     rate = (len(starts) - 1) / (starts[-1] - starts[0])
-    late = 1e3 * _lateness(starts)
+    delays = 1e3 * _delays(starts)
     name = f"at {RATE:g} Hz, {MAX_ROBOTS} robots, {where}"
     note = f"{rate:.3f} Hz over {DURATION:g} s"
     return [
-        Row(f"steps per second {name}", rate, "Hz", RATE - 0.05, at_least=True, note=note),
+        Row(f"step rate {name}", rate, "Hz", RATE - 0.05, at_least=True, note=note),
         *(
-            Row(f"lateness of a cycle {name}, {statistic}", value, "ms")
+            Row(f"delay of a cycle {name}, {statistic}", value, "ms")
             for statistic, value in (
-                ("median", float(np.median(late))),
-                ("99th percentile", float(np.percentile(late, 99))),
-                ("maximum", float(late.max())),
+                ("median", float(np.median(delays))),
+                ("99th percentile", float(np.percentile(delays, 99))),
+                ("maximum", float(delays.max())),
             )
         ),
     ]
 
 
-def _lateness(starts: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+def _delays(starts: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
     """Returns the delay of each cycle relative to its due time [s].
 
     As in `Simulation`, due times are periodic, except that lag beyond `MAX_LAG` is not made up for.
@@ -80,12 +80,12 @@ def _lateness(starts: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
     # Assumes that at least one cycle of the first second started on time.
     first = starts[: int(RATE)]
     due = float(np.min(first - period * np.arange(len(first))))
-    late = np.empty(len(starts))
+    delays = np.empty(len(starts))
     for index, start in enumerate(starts):
         due = max(due, start - max(MAX_LAG, period))
-        late[index] = start - due
+        delays[index] = start - due
         due += period
-    return late
+    return delays
 
 
 @contextmanager
