@@ -219,25 +219,25 @@ class Contents:
         clearance: float = 0.0,
         ignore: Models = (),
     ) -> bool:
-        """Checks whether a disc, or a model, would overlap nothing at a pose.
+        """Returns whether a disc or a model does not overlap anything at a pose.
 
-        The edges of walls and the solid footprints of models count that it would collide with;
-        overlaps of up to 5 mm do not. Walls are edges without an inside: also the inside of a
-        solid obstacle of a map image is free where no edge is touched.
+        It can overlap the edges of walls and the solid footprints of models that it would collide
+        with. Overlaps of up to 5 mm are ignored. Walls are edges without an interior: the interior
+        of a solid obstacle of a map image is free, too, unless an edge is touched.
 
         Args:
-            pose: (x, y) or (x, y, theta) of the disc's centre, or of the model's first body, in the
-                world frame [m, rad].
-            radius: Of the disc [m]; either this or a model is needed.
-            model: A model of the world, or its name, with its footprints as they stand to each
-                other now; never in its own way.
-            layers: Names of the layers that the disc collides with; a model's footprints have
-                their own.
-            clearance: Distance to keep from all that counts [m].
-            ignore: Models, or their names, that do not count.
+            pose: (x, y) or (x, y, theta) of the centre of the disc, or of the first body of the
+                model, in the world frame [m, rad].
+            radius: Radius of the disc [m]; either this or `model` is required.
+            model: A model of the world, or its name; its bodies keep their poses relative to each
+                other, and it does not overlap itself.
+            layers: Names of the layers that the disc collides with; the footprints of a model have
+                their own layers.
+            clearance: Distance to keep from everything that can be overlapped [m].
+            ignore: Models, or their names, that may be overlapped.
 
         Raises:
-            WorldError: There is no such model or layer, or the world is closed.
+            WorldError: A model or layer does not exist, or the world is closed.
             ValueError: A number is out of range, or not exactly one of radius and model is given.
         """
         return self._read(
@@ -256,33 +256,33 @@ class Contents:
         bounds: Sequence[float] | None = None,
         ignore: Models = (),
     ) -> DoubleArray:
-        """Draws random free poses, for instance to spawn robots at.
+        """Samples random free poses, for example to spawn robots at.
 
-        All are at least `clearance` from walls, from models and from each other, within the bounds
-        of the walls. The inside of solid obstacles and closed rooms is free space, too; with
-        `connected_to` only places are drawn that a disc of the radius can reach.
+        The poses are within the bounds of the walls, at least `clearance` away from walls, models
+        and each other. The interior of solid obstacles and of closed rooms is free space, too;
+        with `connected_to`, only places that the disc can reach are sampled.
 
         Args:
-            n: How many.
-            radius: Of the discs that the poses are for [m].
-            clearance: Distance that the discs keep from all that counts [m].
-            rng: Generator or seed; the same one gives the same poses. None for a generator of the
-                world, made from the world's seed.
-            connected_to: A point (x, y) in the world frame [m]. A path of a disc leads from there
-                to each pose without touching a wall; models are not in its way. A passage that is
-                less than a cell of the planner's grid wider than the disc, at most 5 cm on maps of
-                less than 200 m by 200 m, may count as closed.
+            n: Number of poses.
+            radius: Radius of the discs [m].
+            clearance: Distance that the discs keep [m].
+            rng: Generator or seed; the same seed results in the same poses. None for a generator
+                that derives from the seed of the world.
+            connected_to: A point (x, y) in the world frame [m]. From there, a path of a disc leads
+                to each pose without touching a wall; models do not block paths. A passage that is
+                wider than the disc by less than a cell of the planning grid (at most 5 cm for maps
+                of less than 200 m by 200 m) may be treated as closed.
             layers: Names of the layers that the discs collide with.
-            bounds: (x_min, y_min, x_max, y_max) of the area to draw from, and of the paths, in the
+            bounds: (x_min, y_min, x_max, y_max) of the area of the samples and of the paths, in the
                 world frame [m]; None for the bounds of the walls.
-            ignore: Models, or their names, that do not count.
+            ignore: Models, or their names, that may be overlapped.
 
         Returns:
-            (x, y, theta) of each [m, rad], theta from -pi to pi, shape (n, 3).
+            (x, y, theta) of each pose [m, rad], theta from -pi to pi, shape (n, 3).
 
         Raises:
             WorldError: There are too few free places, the disc does not fit at `connected_to`, no
-                wall bounds the area, there is no such model or layer, or the world is closed.
+                wall bounds the area, a model or layer does not exist, or the world is closed.
             ValueError: A number is out of range.
         """
         return self._read(

@@ -1,4 +1,4 @@
-"""Requests: changes of a world that are asked for by other threads, or during a step."""
+"""Requests: changes of a world that other threads, or hooks during a step, request."""
 
 from __future__ import annotations
 
@@ -142,7 +142,7 @@ class Requests:
                 self._action_thread = previous
 
     def change(self, action: Callable[[], R], what: str) -> R | None:
-        """Runs a change of the world: now, or after the step if a hook asks for it.
+        """Runs a change of the world: now, or after the step if a hook requests it.
 
         Args:
             action: The change.
