@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 import os
 import threading
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import Future
 from pathlib import Path
 from types import TracebackType
@@ -15,6 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from flatland.config.node import Source
+from flatland.config.preprocessor import Params
 from flatland.entities.collision_filter import CollisionFilter
 from flatland.entities.layer import Layer
 from flatland.errors import WorldError
@@ -37,7 +38,6 @@ from flatland.timekeeper import Timekeeper
 _LOG = logging.getLogger("flatland")
 
 R = TypeVar("R")
-Params = Mapping[str, object] | Callable[[str], object] | None
 
 
 class World(Contents):

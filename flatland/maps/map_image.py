@@ -13,10 +13,10 @@ import numpy as np
 import numpy.typing as npt
 
 from flatland.config.documents import open_regular
+from flatland.geometry import FloatArray
 from flatland.physics.boundaries import boundary_edges, boundary_loops
 
 GreyImage = npt.NDArray[np.uint8]
-Edges = npt.NDArray[np.float32]
 
 # A loop that simplification would reduce to fewer points than this stays exact: a small loop, such
 # as a pillar or a table leg, would lose its corners or vanish.
@@ -140,7 +140,7 @@ def threshold_in_place(image: GreyImage, occupied_thresh: float) -> GreyImage:
     return image
 
 
-def image_edges(mask: GreyImage, resolution: float, simplify: int) -> tuple[Edges, int]:
+def image_edges(mask: GreyImage, resolution: float, simplify: int) -> tuple[FloatArray, int]:
     """Returns the edges of a layer.
 
     Args:
@@ -166,7 +166,7 @@ def image_edges(mask: GreyImage, resolution: float, simplify: int) -> tuple[Edge
     return _simplified_edges(mask, resolution), len(exact)
 
 
-def _simplified_edges(mask: GreyImage, resolution: float) -> Edges:
+def _simplified_edges(mask: GreyImage, resolution: float) -> FloatArray:
     loops = [_simplified_loop(loop) for loop in boundary_loops(mask)]
     if not loops:
         return np.empty((0, 4), np.float32)

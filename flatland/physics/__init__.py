@@ -16,7 +16,8 @@ from flatland.physics.body import PhysicsBody
 from flatland.physics.contact import ContactEvent, ContactInfo
 from flatland.physics.fixture import PhysicsFixture
 from flatland.physics.joint import PhysicsJoint
-from flatland.physics.world import PhysicsWorld, RayHit, StepReport
+from flatland.physics.queries import RayHit
+from flatland.physics.world import PhysicsWorld, StepReport
 
 __all__ = [
     "ContactEvent",

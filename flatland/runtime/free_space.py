@@ -11,10 +11,9 @@ import numpy as np
 import numpy.typing as npt
 
 from flatland.errors import WorldError
+from flatland.geometry import BoolArray, DoubleArray
 
-DoubleArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
-BoolArray = npt.NDArray[np.bool_]
 Bounds = tuple[float, float, float, float]
 
 _CELLS_PER_RADIUS: Final = 4.0

@@ -8,10 +8,8 @@ from collections.abc import Callable
 from typing import Final
 
 import numpy as np
-import numpy.typing as npt
 
-DoubleArray = npt.NDArray[np.float64]
-BoolArray = npt.NDArray[np.bool_]
+from flatland.geometry import BoolArray, DoubleArray
 
 SEARCH_RADIUS: Final = 5.0  # m
 _SPACING: Final = 0.05  # m between the first candidates

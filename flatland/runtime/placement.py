@@ -9,12 +9,11 @@ from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Final, Literal, TypeAlias, get_args
 
 import numpy as np
-import numpy.typing as npt
 
 from flatland.entities.layer import Layer
 from flatland.entities.model import Model
 from flatland.errors import WorldError
-from flatland.geometry import Pose, finite_pose, transform_points
+from flatland.geometry import BoolArray, DoubleArray, Pose, finite_pose, transform_points
 from flatland.runtime.free_space import Bounds, FreeSpace, Spread
 from flatland.runtime.nearest_place import SEARCH_RADIUS, nearest_offset
 
@@ -25,8 +24,6 @@ if TYPE_CHECKING:
 
 _LOG = logging.getLogger("flatland")
 
-DoubleArray = npt.NDArray[np.float64]
-BoolArray = npt.NDArray[np.bool_]
 Models: TypeAlias = str | Model | Iterable[str | Model]
 
 IfBlocked = Literal["allow", "warn", "refuse", "nearest"]

@@ -13,9 +13,9 @@ from visualization_msgs.msg import InteractiveMarker, InteractiveMarkerControl, 
 
 from flatland.entities.body import Body
 from flatland.entities.model import Model
-from flatland.geometry import Pose, compose, invert, yaw_from_quaternion
+from flatland.geometry import DoubleArray, Pose, compose, invert, yaw_from_quaternion
 from flatland.ros.adapters import convert
-from flatland.ros.markers.marker_geometry import Points, outline
+from flatland.ros.markers.marker_geometry import outline
 from flatland.ros.markers.packed_markers import FRAME
 
 HANDLE_SIZE: Final = (0.5, 0.5, 0.05)  # m
@@ -112,7 +112,7 @@ class _ModelOutline:
             if outlines:
                 self._add(body, compose(to_first, body.pose), np.concatenate(outlines))
 
-    def _add(self, body: Body, pose: Pose, points: Points) -> None:
+    def _add(self, body: Body, pose: Pose, points: DoubleArray) -> None:
         marker = _marker(Marker.LINE_LIST, (LINE_WIDTH, 0.0, 0.0), body.color)
         marker.pose = pose_message(pose)
         marker.points = [Point(*point) for point in points.tolist()]

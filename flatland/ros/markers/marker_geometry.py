@@ -7,10 +7,9 @@ from typing import Final, Protocol
 import numpy as np
 import numpy.typing as npt
 
-from flatland.geometry import Pose, circle_points, compose
+from flatland.geometry import DoubleArray, Pose, circle_points, compose
 
-Points = npt.NDArray[np.float64]
-"""Points (x, y, z) [m], shape (n, 3)."""
+"""DoubleArray (x, y, z) [m], shape (n, 3)."""
 
 CIRCLE_HEIGHT: Final = 0.01  # m; slightly above lines
 _CIRCLE_POINTS: Final = 32
@@ -24,7 +23,7 @@ class Footprint(Protocol):
         """`circle`, `polygon` or `edge`."""
 
     @property
-    def vertices(self) -> Points:
+    def vertices(self) -> DoubleArray:
         """Vertices in the body frame [m], shape (n, 2)."""
 
     @property
@@ -36,7 +35,7 @@ class Footprint(Protocol):
         """Radius of a circle [m]."""
 
 
-def flat(points: npt.ArrayLike, z: float = 0.0) -> Points:
+def flat(points: npt.ArrayLike, z: float = 0.0) -> DoubleArray:
     """Adds a z coordinate to planar points.
 
     Args:
@@ -49,19 +48,19 @@ def flat(points: npt.ArrayLike, z: float = 0.0) -> Points:
     return result
 
 
-def edge_lines(edges: npt.NDArray[np.float32]) -> Points:
+def edge_lines(edges: npt.NDArray[np.float32]) -> DoubleArray:
     """Converts edges to the points of a line list.
 
     Args:
         edges: (x1, y1, x2, y2) [m], shape (n, 4).
 
     Returns:
-        Points at height 0, shape (2 n, 3), two per line.
+        DoubleArray at height 0, shape (2 n, 3), two per line.
     """
     return flat(edges)
 
 
-def wall_triangles(edges: npt.NDArray[np.float32], min_z: float, max_z: float) -> Points:
+def wall_triangles(edges: npt.NDArray[np.float32], min_z: float, max_z: float) -> DoubleArray:
     """Converts edges to the points of a triangle list that forms vertical walls.
 
     Args:
@@ -70,7 +69,7 @@ def wall_triangles(edges: npt.NDArray[np.float32], min_z: float, max_z: float) -
         max_z: Upper end of the walls [m].
 
     Returns:
-        Points of two triangles per wall, shape (6 n, 3).
+        DoubleArray of two triangles per wall, shape (6 n, 3).
     """
     triangles = np.empty((len(edges), 6, 3))
     for corner, (end, z) in enumerate(
@@ -81,14 +80,14 @@ def wall_triangles(edges: npt.NDArray[np.float32], min_z: float, max_z: float) -
     return triangles.reshape(-1, 3)
 
 
-def closed_strip(vertices: npt.ArrayLike) -> Points:
+def closed_strip(vertices: npt.ArrayLike) -> DoubleArray:
     """Converts vertices of a polygon, shape (n, 2), to a closed line strip, shape (n + 1, 3)."""
     corners = flat(vertices)
-    strip: Points = np.concatenate((corners, corners[:1]))
+    strip: DoubleArray = np.concatenate((corners, corners[:1]))
     return strip
 
 
-def outline(footprint: Footprint) -> Points:
+def outline(footprint: Footprint) -> DoubleArray:
     """Returns the outline of a footprint as a line list in the body frame, shape (2 n, 3)."""
     if footprint.shape == "edge":
         return flat(footprint.vertices)
@@ -96,7 +95,7 @@ def outline(footprint: Footprint) -> Points:
         strip = closed_strip(circle_points(footprint.center, footprint.radius, _CIRCLE_POINTS))
     else:
         strip = closed_strip(footprint.vertices)
-    lines: Points = np.stack((strip[:-1], strip[1:]), axis=1)
+    lines: DoubleArray = np.stack((strip[:-1], strip[1:]), axis=1)
     return lines.reshape(-1, 3)
 
 
@@ -104,7 +103,7 @@ def joint_points(
     pose_a: Pose,
     pose_b: Pose,
     anchors: npt.NDArray[np.float64],
-) -> Points:
+) -> DoubleArray:
     """Returns the points of a joint.
 
     Args:
@@ -122,6 +121,6 @@ def joint_points(
     return flat([pose[:2] for pose in (pose_a, ends[0], pose_b, ends[1])])
 
 
-def joint_lines(points: Points) -> Points:
+def joint_lines(points: DoubleArray) -> DoubleArray:
     """Converts the points of a joint to a line list: origins to anchors, and anchor to anchor."""
     return points[[0, 1, 2, 3, 1, 3]]
