@@ -1,4 +1,4 @@
-"""The environment of a user, as installed by `make setup` and exported by `setup.bash`."""
+"""The environment of a user: files installed by `make setup`, variables of `setup.bash`."""
 
 from __future__ import annotations
 
