@@ -19,7 +19,7 @@ from pathlib import Path
 import flatland
 
 CHECKOUT = Path(__file__).resolve().parent.parent
-TIMEOUT = 60.0  # s
+TIMEOUT = 60.0  # s, for any event
 
 _TICKS = os.sysconf("SC_CLK_TCK")
 

@@ -1,11 +1,11 @@
 #!/usr/bin/env python3
 """Generates the maps of the office world: `office.png` (walls) and `tables.png` (table tops).
 
-Run without arguments, it overwrites the images in `office/`; the result is always the same. Black
-pixels are occupied, white pixels are free, and the grey border of `office.png` is unknown. A table
-has four legs in `office.png`, which a low laser scanner detects, and a top in `tables.png`.
+Without arguments, it overwrites the images in `office/`; the result is always the same. Black is
+occupied, white is free, and the grey margin of `office.png` is unknown. A table consists of four
+legs in `office.png`, which a low robot detects, and its top in `tables.png`.
 
-Coordinates are in metres from the lower left corner of the image, x to the right, y up.
+Coordinates are metres from the lower left corner of the image, x to the right, y up.
 """
 
 from __future__ import annotations
@@ -17,24 +17,24 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-RESOLUTION = 0.05  # side of a pixel [m]
+RESOLUTION = 0.05  # [m] per pixel
 WIDTH, HEIGHT = 60.0, 25.0  # [m]
-FREE, UNKNOWN, OCCUPIED = 254, 205, 0  # values of map_saver
+FREE, UNKNOWN, OCCUPIED = 254, 205, 0  # as written by map_saver
 
 OUTER_WALL, INNER_WALL, LEAF = 0.3, 0.2, 0.05  # thickness [m]
 DOOR = 1.0  # clear width [m]
 
-# Inner faces of the outer walls, and centre lines of the walls of the two corridors.
+# The interior of the building, and the centre lines of the walls along the two corridors.
 WEST, EAST, SOUTH, NORTH = 0.8, 59.2, 0.8, 24.2
 SOUTH_ROW, CORE_SOUTH, CORE_NORTH, NORTH_ROW = 5.9, 8.1, 16.9, 19.1
 LOBBY, OPEN_PLAN = 9.0, 42.0  # walls between the offices and the two large rooms
 
 
 class Office:
-    """The two maps of the office."""
+    """The two maps while they are being generated."""
 
     def __init__(self) -> None:
-        """Creates an empty building with outer walls."""
+        """Starts with a free floor inside the outer wall."""
         shape = (pixel(HEIGHT), pixel(WIDTH))
         self.walls = np.full(shape, UNKNOWN, np.uint8)
         self.tables = np.full(shape, FREE, np.uint8)
@@ -43,42 +43,36 @@ class Office:
         self.block(WEST, SOUTH, EAST, NORTH, FREE)
 
     def block(self, x1: float, y1: float, x2: float, y2: float, value: int = OCCUPIED) -> None:
-        """Adds a box to the floor, or fills a rectangle with another value."""
+        """Adds a box, or fills a rectangle with another value."""
         fill(self.walls, x1, y1, x2, y2, value)
 
     def post(self, x: float, y: float, radius: float) -> None:
-        """Adds a round obstacle to the floor: a column, a plant, the foot of a table."""
+        """Adds a round object: a column, a plant, the foot of a table."""
         disc(self.walls, x, y, radius)
 
     def wall_along_x(self, y: float, x1: float, x2: float, *doors: float) -> None:
-        """Adds an inner wall at `y` with door openings centred at `doors`."""
+        """Adds an inner wall at `y` with door openings centred at the given x."""
         half = INNER_WALL / 2
         self.block(x1 - half, y - half, x2 + half, y + half)
         for x in doors:
             self.block(x - DOOR / 2, y - half, x + DOOR / 2, y + half, FREE)
 
     def wall_along_y(self, x: float, y1: float, y2: float, *doors: float) -> None:
-        """Adds an inner wall at `x` with door openings centred at `doors`."""
+        """Adds an inner wall at `x` with door openings centred at the given y."""
         half = INNER_WALL / 2
         self.block(x - half, y1 - half, x + half, y2 + half)
         for y in doors:
             self.block(x - half, y - DOOR / 2, x + half, y + DOOR / 2, FREE)
 
     def door_leaf(self, x: float, y: float, into: float) -> None:
-        """Adds an open door at the left side of the opening at (x, y) in a wall along x.
-
-        Args:
-            x: Centre of the opening.
-            y: Centre line of the wall.
-            into: +1 or -1, the direction in y in which the door opens.
-        """
+        """Adds an open door at the left side of the opening at (x, y) of a wall along x."""
         hinge = x - DOOR / 2
         start = y + into * INNER_WALL / 2
         bottom, top = sorted((start, start + into * 0.9))
         self.block(hinge - LEAF, bottom, hinge, top)
 
     def table(self, x: float, y: float, length: float, width: float) -> None:
-        """Adds a rectangular table with four legs and centre (x, y)."""
+        """Adds a rectangular table with four legs and its centre at (x, y)."""
         dx, dy, leg = length / 2, width / 2, 0.05
         fill(self.tables, x - dx, y - dy, x + dx, y + dy, OCCUPIED)
         for cx in (x - dx + 2 * leg, x + dx - 2 * leg):
@@ -91,13 +85,13 @@ class Office:
         self.post(x, y, 0.12)
 
     def desk(self, x: float, y: float, facing: float) -> None:
-        """Adds a desk with a drawer unit; `facing` is +1 or -1, the side of the user in y."""
+        """Adds a desk with a drawer unit; `facing` is the side of its user in y, +1 or -1."""
         self.table(x, y, 1.6, 0.8)
         self.block(x + 0.25, y - 0.25 + facing * 0.05, x + 0.65, y + 0.25 + facing * 0.05)
 
 
 def pixel(metres: float) -> int:
-    """Returns the index of the pixel border closest to a coordinate."""
+    """Returns the pixel boundary nearest to a coordinate [m]."""
     return round(metres / RESOLUTION)
 
 
@@ -110,7 +104,7 @@ def fill(
 
 
 def disc(image: npt.NDArray[np.uint8], x: float, y: float, radius: float) -> None:
-    """Fills all pixels with centres inside a circle."""
+    """Fills all pixels whose centres are inside a circle."""
     rows, columns = image.shape
     px = (np.arange(columns) + 0.5) * RESOLUTION
     py = (rows - np.arange(rows) - 0.5) * RESOLUTION
@@ -119,7 +113,7 @@ def disc(image: npt.NDArray[np.uint8], x: float, y: float, radius: float) -> Non
 
 
 def draw_structure(office: Office) -> None:
-    """Draws the inner walls: two rows of rooms, two corridors and the core between them."""
+    """Adds the inner walls: two rows of rooms, two corridors and the core between them."""
     # South row of rooms: post room, six offices, a meeting room, a store.
     south = [WEST, LOBBY, 13.0, 17.0, 21.0, 25.0, 29.5, 34.0, 38.0, OPEN_PLAN]
     doors = [5.0, 10.0, 14.0, 18.0, 22.0, 26.0, 32.0, 35.0, 39.0]
@@ -168,7 +162,7 @@ def draw_structure(office: Office) -> None:
 
 def furnish_core(office: Office) -> None:
     """Furnishes the lobby and the rooms between the corridors."""
-    # Lobby: vestibule of the entrance, reception, waiting area with two sofas, plants.
+    # Lobby: draught lobby of the entrance, reception, a waiting corner with two sofas, plants.
     for y in (10.9, 14.0):
         office.block(WEST, y, 2.6, y + 0.1)
     office.block(2.5, 10.9, 2.6, 11.7)
@@ -258,7 +252,7 @@ def furnish_open_plan(office: Office) -> None:
     for x in (44.7, 49.5, 54.3):
         for y in (3.2, 10.4, 14.4, 21.2):
             if x > 53 and y > 19:
-                continue  # occupied by the meeting box
+                continue  # position of the meeting box
             for column in (0.0, 1.7):
                 office.desk(x + column - 0.2, y - 0.45, facing=-1)
                 office.desk(x + column - 0.2, y + 0.45, facing=1)
