@@ -55,8 +55,9 @@ def load_model_alone(world_class: type[World], path: Path, params: Params) -> Wo
     try:
         world.collision_filter = _LayersOnDemand(path)
         world.spawn_model(path, path.name.split(".")[0] or "model")
-    except BaseException:
-        world.close()
+    except BaseException as error:
+        # Not `close`: an exception of a plugin must not replace this one.
+        world.__exit__(type(error), error, error.__traceback__)
         raise
     return world
 

@@ -84,8 +84,9 @@ def load_world(
             raise _all_missing_plugins(world, reader) or error from None
         for entry in world_plugins:
             _load_world_plugin(world, entry, reader)
-    except BaseException:
-        world.close()
+    except BaseException as error:
+        # Not `close`: an exception of a plugin must not replace this one.
+        world.__exit__(type(error), error, error.__traceback__)
         raise
     return world
 

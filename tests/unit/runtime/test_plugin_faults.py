@@ -634,3 +634,11 @@ def test_an_interrupt_in_pre_solve_is_raised_by_the_step(files, faults):
         world.step()
     plugin.act = None
     world.step()
+
+
+def test_an_error_of_a_file_is_not_replaced_by_one_of_a_plugin(files, faults):
+    robot(files, 'name: bad, type: "faults::FaultyShutdown"')
+    with pytest.raises(flatland.YamlError, match="unrecognized entry"):
+        files.load(
+            "properties: {}\nlayers: []\nmodels: [{name: r, model: robot.model.yaml}]\nmodel: 1\n"
+        )
