@@ -172,7 +172,7 @@ def test_concurrent_updates_of_want_are_not_lost():
 
     def toggle(number):
         start.wait()
-        for turn in range(3000):
+        for turn in range(1000):
             output.want((number, turn))
             unsubscribe = output.subscribe(print)
             output.unwant((number, turn))
@@ -188,7 +188,7 @@ def test_concurrent_updates_of_want_are_not_lost():
             thread.join()
     finally:
         sys.setswitchinterval(interval)
-    assert len(output._subscribers) == len(output._wanters) == 4 * 1500
+    assert len(output._subscribers) == len(output._wanters) == 4 * 500
 
 
 def test_an_exception_of_a_subscriber_does_not_reach_the_plugin():
