@@ -24,8 +24,8 @@ class Requests:
     Which thread runs them:
 
     * While a thread serves the queue (`serving`, as `Simulation.run` does), that thread alone.
-    * Otherwise the first of the thread that steps the world next and the thread that made the
-      request and waits for it; the lock of the queue keeps the two apart.
+    * Otherwise the thread that steps the world next, or the thread that made the request and waits
+      for it, whichever is first.
 
     Attributes:
         lock: Held during each step and each batch of actions.
@@ -48,7 +48,7 @@ class Requests:
 
     @contextmanager
     def serving(self, wake: Callable[[], None]) -> Iterator[None]:
-        """Makes the current thread the only one that runs actions, for the time of the block.
+        """Makes the current thread the only one that runs actions, for the duration of the block.
 
         Args:
             wake: Called from any thread when an action arrives.
@@ -67,7 +67,7 @@ class Requests:
 
     @contextmanager
     def hooks(self) -> Iterator[None]:
-        """Marks the current thread as running hooks of plugins, for the time of the block."""
+        """Marks the current thread as running hooks of plugins, for the duration of the block."""
         previous, self.hook_thread = self.hook_thread, threading.get_ident()
         try:
             yield
@@ -78,7 +78,7 @@ class Requests:
     def plugin_code(self) -> Iterator[None]:
         """Marks the current thread as running code of a plugin between two steps.
 
-        This is `on_initialize`, or a callback: changes take effect at once.
+        This is `on_initialize` or a callback; changes take effect immediately.
         """
         previous = self._plugin_thread
         self._plugin_thread = threading.get_ident()
@@ -99,7 +99,7 @@ class Requests:
             method: What may not be called there.
 
         Raises:
-            WorldError: It does.
+            WorldError: The current thread executes code of a plugin.
         """
         thread = threading.get_ident()
         if thread in (self.hook_thread, self._plugin_thread):

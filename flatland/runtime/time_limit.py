@@ -43,13 +43,20 @@ def time_limit(seconds: float | None) -> Iterator[None]:
 
 @contextmanager
 def _signal_limit(seconds: float) -> Iterator[None]:
+    is_active = True
+
     def interrupt(_number: int, _frame: FrameType | None) -> None:
-        raise TimeLimitExceeded
+        if is_active:
+            raise TimeLimitExceeded
 
     previous = signal.signal(signal.SIGALRM, interrupt)
     try:
-        signal.setitimer(signal.ITIMER_REAL, min(seconds, threading.TIMEOUT_MAX), _RETRY_PERIOD)
-        yield
+        try:
+            signal.setitimer(signal.ITIMER_REAL, min(seconds, threading.TIMEOUT_MAX), _RETRY_PERIOD)
+            yield
+        finally:
+            # A signal that arrives from here on must not skip the rest of the clean-up.
+            is_active = False
     finally:
         signal.setitimer(signal.ITIMER_REAL, 0)
         signal.signal(signal.SIGALRM, previous)
