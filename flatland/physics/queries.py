@@ -78,7 +78,9 @@ class PhysicsQueries:
     def cast_rays(
         self, pose: Pose, ends: npt.ArrayLike, mask: int, reflect_mask: int = 0
     ) -> tuple[FloatArray, BoolArray]:
-        """Casts one ray from a rangefinder to each end point; releases the GIL.
+        """Casts one ray from a rangefinder to each end point.
+
+        Releases the GIL for more than 2000 rays.
 
         A ray is stopped by the nearest fixture with a category in `mask` that is not a sensor
         fixture. A ray that starts inside a circle or polygon does not hit that shape. Edges are

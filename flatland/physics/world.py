@@ -70,7 +70,9 @@ class PhysicsWorld(PhysicsQueries):
     def step(
         self, dt: float, velocity_iterations: int, position_iterations: int
     ) -> StepReport | None:
-        """Advances the world by one time step; releases the GIL.
+        """Advances the world by one time step.
+
+        Releases the GIL if the previous step took more than 0.1 ms.
 
         Contacts add no energy: a dynamic body without joints that touches only static bodies is
         at most 1 % and 0.01 m/s faster after a step than before this step or the previous one.

@@ -24,10 +24,11 @@ b2Transform checked_pose(const PyPose& pose) {
   return transform;
 }
 
-// Checks and converts the arguments, casts without the GIL and returns (fractions, reflect).
+// Checks and converts the arguments, casts without the GIL if there are more rays than `max_short`,
+// and returns (fractions, reflect).
 template <typename Cast>
 py::tuple scan(World& world, const PyPose& pose, const Ends& ends, std::int64_t mask,
-               std::int64_t reflect_mask, Cast&& cast) {
+               std::int64_t reflect_mask, py::ssize_t max_short, Cast&& cast) {
   if (ends.ndim() != 2 || ends.shape(1) != 2) {
     throw py::value_error("ends must have shape (n, 2), got " +
                           std::string(py::str(ends.attr("shape"))));
@@ -45,13 +46,14 @@ py::tuple scan(World& world, const PyPose& pose, const Ends& ends, std::int64_t 
   // Safe without the GIL: `use` prevents changes of the world, the results are not shared yet, and
   // `ends` keeps its memory alive. If another thread writes to `ends`, the results are unspecified.
   World::SharedUse use(world);
-  without_gil(use, [&] { cast(request, result); });
+  without_gil_if(ends.shape(0) > max_short, use, [&] { cast(request, result); });
   return py::make_tuple(std::move(fractions), std::move(reflect));
 }
 
 py::tuple py_cast_rays(World& world, const PyPose& pose, const Ends& ends, std::int64_t mask,
                        std::int64_t reflect_mask) {
-  return scan(world, pose, ends, mask, reflect_mask,
+  constexpr py::ssize_t kShortScan = 2000;  // about 30 us
+  return scan(world, pose, ends, mask, reflect_mask, kShortScan,
               [&](const ScanRequest& request, const ScanResult& result) {
                 cast_rays(world.rays(), request, result);
               });
@@ -59,7 +61,7 @@ py::tuple py_cast_rays(World& world, const PyPose& pose, const Ends& ends, std::
 
 py::tuple py_cast_rays_reference(World& world, const PyPose& pose, const Ends& ends,
                                  std::int64_t mask, std::int64_t reflect_mask) {
-  return scan(world, pose, ends, mask, reflect_mask,
+  return scan(world, pose, ends, mask, reflect_mask, 0,
               [&](const ScanRequest& request, const ScanResult& result) {
                 cast_rays_reference(world.engine(), request, result);
               });

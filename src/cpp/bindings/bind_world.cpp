@@ -5,6 +5,12 @@
 namespace py = pybind11;
 
 namespace flatland {
+namespace {
+
+// A step that is expected to be shorter is not worth a release of the GIL [s].
+constexpr double kShortStep = 1e-4;
+
+}  // namespace
 
 py::object to_python(const StepReport& report) {
   if (report.empty()) return py::none();
@@ -22,8 +28,9 @@ WorldClass bind_world(py::module_& module) {
         // Safe without the GIL: the world is in exclusive use by this thread, and without a hook
         // the step accesses no Python object.
         World::ExclusiveUse use(self, World::kStepping);
-        return to_python(without_gil(
-            use, [&] { return self.step(dt, velocity_iterations, position_iterations, nullptr); }));
+        return to_python(without_gil_if(self.last_step_time() > kShortStep, use, [&] {
+          return self.step(dt, velocity_iterations, position_iterations, nullptr);
+        }));
       },
       py::arg("dt"), py::arg("velocity_iterations"), py::arg("position_iterations"));
   world.def("find_new_contacts", &World::find_new_contacts);

@@ -6,6 +6,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <utility>
 
 #include "world/world.h"
 
@@ -23,17 +24,32 @@ void bind_raycast(WorldClass& world);
 void bind_overlap(WorldClass& world);
 void bind_map_edges(pybind11::module_& module);
 
-// Calls work() without the GIL while the world is in use. The use, which starts with the GIL held,
-// ends before the GIL is acquired again, even if work() throws: another thread that holds the GIL
-// may be waiting for the end of the use.
+// Calls work() and ends the use of the world, even if work() throws.
 template <typename Use, typename Work>
-auto without_gil(Use& use, Work&& work) {
-  const pybind11::gil_scoped_release unlocked;
+auto while_in_use(Use& use, Work&& work) {
   struct EndOfUse {
     Use& use;
     ~EndOfUse() { use.end(); }
   } end{use};
   return work();
+}
+
+// Calls work() without the GIL while the world is in use. The use, which starts with the GIL held,
+// ends before the GIL is acquired again: another thread that holds the GIL may be waiting for the
+// end of the use.
+template <typename Use, typename Work>
+auto without_gil(Use& use, Work&& work) {
+  const pybind11::gil_scoped_release unlocked;
+  return while_in_use(use, std::forward<Work>(work));
+}
+
+// The same, with the GIL held if the work is short. A thread that waits for the GIL requests it
+// when it has waited for the switch interval of Python, and starts to wait again whenever the GIL
+// has been released for a moment: a loop of short calls that release it would starve all other
+// threads.
+template <typename Use, typename Work>
+auto without_gil_if(bool is_long, Use& use, Work&& work) {
+  return is_long ? without_gil(use, work) : while_in_use(use, work);
 }
 
 // None for an empty report, else the ids of limited and of invalid bodies.

@@ -3,6 +3,7 @@
 #include <box2d/b2_circle_shape.h>
 #include <box2d/b2_contact.h>
 
+#include <chrono>
 #include <mutex>
 #include <new>
 #include <stdexcept>
@@ -85,6 +86,7 @@ StepReport World::step(double dt, int velocity_iterations, int position_iteratio
     invalid_ = still_invalid();
     if (!invalid_.empty()) return {{}, invalid_};
   }
+  const auto start = std::chrono::steady_clock::now();
   const auto seconds = static_cast<float>(dt);
   StepGuard& guard = contacts_.guard;
   guard.begin(*engine_, seconds);
@@ -93,6 +95,7 @@ StepReport World::step(double dt, int velocity_iterations, int position_iteratio
   contacts_.hook = nullptr;
   StepReport report = guard.end(*engine_);
   invalid_ = report.invalid;
+  last_step_time_ = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   if (contacts_.take_failure()) throw std::bad_alloc();
   return report;
 }

@@ -44,6 +44,8 @@ class World final : private b2DestructionListener {
   // Advances the world by dt > 0 seconds. The hook may be null. The caller has exclusive use of the
   // world. While a body is invalid the world does not advance, and the report names the body again.
   StepReport step(double dt, int velocity_iterations, int position_iterations, PreSolveHook* hook);
+  // Duration of the last step in wall time [s], an estimate of that of the next one.
+  double last_step_time() const { return last_step_time_; }
 
   // Access to objects by id. Throw StaleHandleError if the object was destroyed or the world is
   // closed, and WorldLockedError if the world is in use. Pointers are valid until the next change.
@@ -130,7 +132,8 @@ class World final : private b2DestructionListener {
   SlotMap<JointRecord, IdKind::kJoint> joints_;
   ContactRecorder contacts_;
   RayScene rays_;
-  std::vector<Id> invalid_;  // bodies that the last step left so
+  double last_step_time_ = 1.0;  // the first step may be long
+  std::vector<Id> invalid_;      // bodies that the last step left so
 
   std::atomic<int> users_{0};  // kExclusive, or the number of shared uses
   std::atomic<std::thread::id> owner_{};
