@@ -3,9 +3,10 @@
 The distances must be equal within 1e-4 m plus 1e-5 of the length of the ray. Rays that graze a
 corner, run along a wall or start on one are ill-conditioned: rounding decides which of several
 surfaces they hit, if any. The distance of such a ray must equal that computed by Box2D for one of
-several perturbed rays; any other range would be a hit in mid-air. On slanted surfaces the distances
-of perturbed rays differ by several tolerances. In 2.4 million rays, the difference never exceeded
-ten tolerances.
+several perturbed rays. On slanted surfaces the distances of perturbed rays differ by several
+tolerances. In 2.4 million rays, the difference never exceeded ten tolerances. About one ray in a
+million starts on a surface and differs from all perturbed ones; it must end at a surface and pass
+none. Any other range would be a hit in mid-air.
 """
 
 from __future__ import annotations
@@ -231,9 +232,66 @@ def test_scans_equal_those_of_box2d(data: st.DataObject) -> None:
                 other = world.cast_rays_reference(hair, longer, mask, reflect_mask)
                 same |= equal_or_close(got, ranges(other[0], lengths * stretch), 10 * tolerance)
                 same_reflect |= reflect == other[1]
-        assert same.all(), f"rays {np.nonzero(~same)[0]} from {pose}"
-        assert same_reflect.all(), f"reflection of rays {np.nonzero(~same_reflect)[0]} from {pose}"
+        for ray in np.nonzero(~(same & same_reflect))[0]:
+            margin = 10 * float(tolerance[ray])
+            assert is_valid(
+                world, mask, reflect_mask, pose, ends[ray], got[ray], reflect[ray], margin
+            ), f"ray {ray} from {pose}: range {got[ray]} m, reflection {reflect[ray]}"
     world.close()
+
+
+def is_valid(
+    world: PhysicsWorld,
+    mask: int,
+    reflect_mask: int,
+    pose: Pose,
+    end: npt.NDArray[np.float32],
+    distance: float,
+    reflect: bool,
+    margin: float,
+) -> bool:
+    """Returns whether there is a surface at the distance [m] and none on the way.
+
+    A ray beside it, within the margin [m], may take its place: if a ray starts on a surface,
+    rounding decides whether it hits that surface, and where.
+    """
+    x, y, theta = pose
+    length = float(np.hypot(*end.astype(np.float64)))
+    along = to_unit(math.atan2(end[1], end[0]) + theta)
+    reach = min(distance, length)
+
+    # A ray that starts beside a surface and runs along it does not hit it. In the tip of a narrow
+    # wedge, no such ray exists closer to the sensor than some margins.
+    left = np.array((-along[1], along[0]))
+    free = False
+    for ahead in (1, 10):
+        for side in (-1, 0, 1):
+            way = reach - ahead * margin - (0.0 if math.isinf(distance) else margin)
+            start = np.array((x, y)) + margin * (ahead * along + side * left)
+            free = free or way <= 0 or is_free(world, mask, start, way * along)
+    if not free:
+        return False
+    if math.isinf(distance):
+        return not reflect
+    # A surface at this point, unless tiny, intersects the outline of a square around it.
+    point = np.array((x, y)) + reach * along
+    corners = point + margin * np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)])
+    for corner, others in zip(corners, (corners[[1, 3]], corners[[0, 2]]) * 2, strict=True):
+        fractions, reflected = world.cast_rays_reference(
+            (*corner, 0.0), others - corner, mask, reflect_mask
+        )
+        if np.any(~np.isnan(fractions) & (reflected == reflect)):
+            return True
+    return False
+
+
+def is_free(world: PhysicsWorld, mask: int, start: FloatArray, way: FloatArray) -> bool:
+    fractions, _ = world.cast_rays_reference((start[0], start[1], 0.0), [way], mask)
+    return bool(np.isnan(fractions[0]))
+
+
+def to_unit(angle: float) -> FloatArray:
+    return np.array((math.cos(angle), math.sin(angle)))
 
 
 def equal_or_close(a: FloatArray, b: FloatArray, tolerance: FloatArray) -> npt.NDArray[np.bool_]:
