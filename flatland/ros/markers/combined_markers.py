@@ -106,13 +106,16 @@ class CombinedMarkers(WorldObserver):
 
     def _join_layers(self, make: Callable[[LayerMarkers, int], PackedMarkers]) -> JoinedMarkers:
         # Delete all first: a layer may have lost all its edges and with them its marker.
-        parts = [_deletion(), *(make(each, self._time_ns) for each in self._layers.values())]
+        parts = [
+            PackedMarkers.deletion_of_all(),
+            *(make(each, self._time_ns) for each in self._layers.values()),
+        ]
         return JoinedMarkers(parts)
 
     def _join_models(self) -> JoinedMarkers:
         parts = [markers.message(self._time_ns) for markers in self._models.values()]
         if time.monotonic() < self._delete_until:
-            parts.insert(0, _deletion())
+            parts.insert(0, PackedMarkers.deletion_of_all())
         return JoinedMarkers(parts)
 
     @property
@@ -122,9 +125,3 @@ class CombinedMarkers(WorldObserver):
     def _tick(self, _now: float) -> bool:
         self._all_models.send()
         return self._all_models.connected
-
-
-def _deletion() -> PackedMarkers:
-    markers = PackedMarkers()
-    markers.add_deletion_of_all()
-    return markers

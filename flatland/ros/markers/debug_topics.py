@@ -99,7 +99,7 @@ class DebugTopics(WorldObserver):
         if entry is None or self._closed:
             return
         self._names.release(entry.name)
-        entry.topic.replace(self._with_time(_deletion))
+        entry.topic.replace(self._with_time(PackedMarkers.deletion_of_all))
         self._closing[entry.name] = entry.topic, time.monotonic() + CLOSE_DELAY
         self._topics.send()
         self._ticker.wake()
@@ -179,11 +179,3 @@ class DebugTopics(WorldObserver):
         for entry in self._models.values():
             entry.topic.send()
         return bool(self._closing) or any(entry.topic.connected for entry in self._models.values())
-
-
-def _deletion(time_ns: int) -> PackedMarkers:
-    """Returns a message that deletes all markers of a topic."""
-    markers = PackedMarkers()
-    markers.add_deletion_of_all()
-    markers.set_stamp(time_ns)
-    return markers

@@ -48,6 +48,18 @@ class PackedMarkers(MarkerArray):  # type: ignore[misc]
         self._poses: list[int] = []
         self._points: list[tuple[int, int]] = []
 
+    @classmethod
+    def deletion_of_all(cls, time_ns: int = 0) -> PackedMarkers:
+        """Returns a message that deletes all markers of a topic.
+
+        Args:
+            time_ns: Stamp of the message, simulated time [ns].
+        """
+        markers = cls()
+        markers.add_deletion_of_all()
+        markers.set_stamp(time_ns)
+        return markers
+
     def __len__(self) -> int:
         """Returns the number of markers."""
         return len(self._stamps)
