@@ -213,23 +213,27 @@ def test_an_origin_of_a_wrong_size(write: Write) -> None:
 
 
 @pytest.mark.parametrize(
-    ("old", "new", "key", "why", "line"),
+    ("text", "old", "new", "key", "why", "line"),
     [
-        ("0.05", "0", "resolution", "must be positive, got 0.0", 2),
-        ("0.05", "-0.05", "resolution", "must be positive, got -0.05", 2),
-        ("0.05", ".nan", "resolution", "must be finite, got nan", 2),
-        ("0.05", ".inf", "resolution", "must be finite, got inf", 2),
-        ("-2", ".nan", "origin", "must be finite, got [1.5, nan, 0.3]", 3),
-        ("0.3", "-.inf", "origin", "must be finite, got [1.5, -2.0, -inf]", 3),
-        ("0.65", ".nan", "occupied_thresh", "must be finite, got nan", 4),
+        (IMAGE_MAP, "0.05", "0", "resolution", "must be positive, got 0.0", 2),
+        (IMAGE_MAP, "0.05", "-0.05", "resolution", "must be positive, got -0.05", 2),
+        (IMAGE_MAP, "0.05", ".nan", "resolution", "must be finite, got nan", 2),
+        (IMAGE_MAP, "0.05", ".inf", "resolution", "must be finite, got inf", 2),
+        (IMAGE_MAP, "-2", ".nan", "origin", "must be finite, got [1.5, nan, 0.3]", 3),
+        (IMAGE_MAP, "0.3", "-.inf", "origin", "must be finite, got [1.5, -2.0, -inf]", 3),
+        (IMAGE_MAP, "0.65", ".nan", "occupied_thresh", "must be finite, got nan", 4),
+        (LINE_MAP, "0.1", "0", "scale", "must not be 0", 3),
+        (LINE_MAP, "0.1", ".inf", "scale", "must be finite, got inf", 3),
+        (LINE_MAP, "0.1", "1e38", "scale", "a coordinate does not fit a 32-bit float", 3),
+        (LINE_MAP, "[0, 0, 0]", "[0, .nan, 0]", "origin", "must be finite, got [0.0, nan, 0.0]", 4),
     ],
 )
-def test_image_map_numbers_out_of_range(
-    write: Write, old: str, new: str, key: str, why: str, line: int
+def test_numbers_out_of_range(
+    write: Write, text: str, old: str, new: str, key: str, why: str, line: int
 ) -> None:
-    path = write(IMAGE_MAP.replace(old, new))
-    text = f'Invalid "{key}", {why} (in layer "walls")'
-    assert_fails(path, YamlError, text + position(path, line))
+    path = write(text.replace(old, new))
+    error = f'Invalid "{key}", {why} (in layer "walls")'
+    assert_fails(path, YamlError, error + position(path, line))
 
 
 def test_a_resolution_outside_the_32_bit_range(write: Write) -> None:
@@ -240,23 +244,6 @@ def test_a_resolution_outside_the_32_bit_range(write: Write) -> None:
     )
     text = f'Invalid "resolution", {why} (in layer "walls")'
     assert_fails(path, YamlError, text + position(path, 2))
-
-
-@pytest.mark.parametrize(
-    ("old", "new", "key", "why", "line"),
-    [
-        ("0.1", "0", "scale", "must not be 0", 3),
-        ("0.1", ".inf", "scale", "must be finite, got inf", 3),
-        ("0.1", "1e38", "scale", "a coordinate does not fit a 32-bit float", 3),
-        ("[0, 0, 0]", "[0, .nan, 0]", "origin", "must be finite, got [0.0, nan, 0.0]", 4),
-    ],
-)
-def test_line_segment_map_numbers_out_of_range(
-    write: Write, old: str, new: str, key: str, why: str, line: int
-) -> None:
-    path = write(LINE_MAP.replace(old, new))
-    text = f'Invalid "{key}", {why} (in layer "walls")'
-    assert_fails(path, YamlError, text + position(path, line))
 
 
 def test_a_negative_scale_mirrors_the_segments(write: Write) -> None:
