@@ -99,40 +99,28 @@ class _Reader:
 
     def rate(self, name: str, default: float) -> float:
         wanted = "a number of Hz that is not negative (0 or inf: as fast as possible)"
-        rate = self._number(name, default, wanted)
-        if rate < 0:
-            raise _invalid(name, wanted, rate)
+        rate = self._number(name, default, wanted, lambda rate: rate >= 0)
         return 0.0 if math.isinf(rate) else rate
 
     def lag(self, name: str, default: float) -> float:
         wanted = "a finite number of seconds that is not negative"
-        seconds = self._number(name, default, wanted)
-        if not 0 <= seconds < math.inf:
-            raise _invalid(name, wanted, seconds)
-        return seconds
+        return self._number(name, default, wanted, lambda seconds: 0 <= seconds < math.inf)
 
     def step_size(self, name: str, default: float) -> float:
         wanted = f"a number of seconds from {MIN_STEP_SIZE:g} to {MAX_STEP_SIZE:g}"
-        size = self._number(name, default, wanted)
-        if not MIN_STEP_SIZE <= size <= MAX_STEP_SIZE:
-            raise _invalid(name, wanted, size)
-        return size
+        return self._number(
+            name, default, wanted, lambda size: MIN_STEP_SIZE <= size <= MAX_STEP_SIZE
+        )
 
     def positive(self, name: str, default: float) -> float:
-        wanted = "a positive number"
-        number = self._number(name, default, wanted)
-        if number <= 0:
-            raise _invalid(name, wanted, number)
-        return number
+        return self._number(name, default, "a positive number", lambda number: number > 0)
 
     def optional_positive(self, name: str) -> float | None:
         return None if self._get(name) is None else self.positive(name, 0.0)
 
     def timeout(self, name: str, default: float) -> float | None:
         wanted = "a positive number of seconds (inf: no limit)"
-        seconds = self._number(name, default, wanted)
-        if seconds <= 0:
-            raise _invalid(name, wanted, seconds)
+        seconds = self._number(name, default, wanted, lambda seconds: seconds > 0)
         return None if math.isinf(seconds) else seconds
 
     def boolean(self, name: str, default: bool) -> bool:
@@ -172,7 +160,9 @@ class _Reader:
             raise _invalid(name, wanted, value)
         return value
 
-    def _number(self, name: str, default: float, wanted: str) -> float:
+    def _number(
+        self, name: str, default: float, wanted: str, is_valid: Callable[[float], bool]
+    ) -> float:
         """Reads a number that may be infinite; roslaunch passes `inf` and `1e3` as text."""
         value = self._get(name)
         if value is None:
@@ -185,6 +175,8 @@ class _Reader:
             raise _invalid(name, wanted, value) from None
         if math.isnan(number):
             raise _invalid(name, wanted, value)
+        if not is_valid(number):
+            raise _invalid(name, wanted, number)
         return number
 
     def _integer(self, name: str, wanted: str) -> int | None:
