@@ -14,6 +14,8 @@ import numpy.typing as npt
 
 Pose = tuple[float, float, float]
 Vector2 = tuple[float, float]
+Bounds = tuple[float, float, float, float]
+"""An axis-aligned rectangle (x_min, y_min, x_max, y_max) [m]."""
 FloatArray = npt.NDArray[np.float32]
 DoubleArray = npt.NDArray[np.float64]
 BoolArray = npt.NDArray[np.bool_]
@@ -87,6 +89,14 @@ def transform_points(pose: Sequence[float], points: DoubleArray) -> DoubleArray:
     c, s = math.cos(theta), math.sin(theta)
     transformed: DoubleArray = points @ np.array([[c, s], [-s, c]]) + np.array([x, y])
     return transformed
+
+
+def bounds_of(points: DoubleArray) -> Bounds | None:
+    """Returns the bounds of points, shape (n, 2), None if there are none."""
+    if not len(points):
+        return None
+    (x_min, y_min), (x_max, y_max) = points.min(axis=0).tolist(), points.max(axis=0).tolist()
+    return (x_min, y_min, x_max, y_max)
 
 
 def circle_points(center: Sequence[float], radius: float, count: int) -> DoubleArray:

@@ -10,7 +10,15 @@ import numpy as np
 
 from flatland.entities.body import Body, Color
 from flatland.errors import WorldError
-from flatland.geometry import DoubleArray, Pose, circle_points, compose, transform_points
+from flatland.geometry import (
+    Bounds,
+    DoubleArray,
+    Pose,
+    bounds_of,
+    circle_points,
+    compose,
+    transform_points,
+)
 
 if TYPE_CHECKING:
     from flatland.entities.joint import Joint
@@ -18,9 +26,6 @@ if TYPE_CHECKING:
     from flatland.entities.model import Model
     from flatland.plugins.laser import Laser
     from flatland.world import World
-
-Bounds = tuple[float, float, float, float]
-"""An axis-aligned box (x_min, y_min, x_max, y_max) [m]."""
 
 _CIRCLE_POINTS = 64
 
@@ -74,7 +79,7 @@ class ModelDrawing:
 
     def bounds(self) -> Bounds | None:
         """Returns the bounds of all outlines, None for a model without fixtures."""
-        return _bounds_of([outline.points for outline in self.outlines])
+        return _bounds_of_all([outline.points for outline in self.outlines])
 
 
 @dataclass(frozen=True, slots=True)
@@ -118,15 +123,11 @@ class Scene:
         """Returns the bounds of all layers and models, None for an empty scene."""
         parts = [layer.edges.reshape(-1, 2) for layer in self.layers]
         parts += [outline.points for model in self.models for outline in model.outlines]
-        return _bounds_of(parts)
+        return _bounds_of_all(parts)
 
 
-def _bounds_of(parts: list[DoubleArray]) -> Bounds | None:
-    points = np.concatenate([*parts, np.empty((0, 2))])
-    if not len(points):
-        return None
-    (x_min, y_min), (x_max, y_max) = points.min(axis=0).tolist(), points.max(axis=0).tolist()
-    return (x_min, y_min, x_max, y_max)
+def _bounds_of_all(parts: list[DoubleArray]) -> Bounds | None:
+    return bounds_of(np.concatenate([*parts, np.empty((0, 2))]))
 
 
 def capture_scene(world: World, layers: Iterable[str] | None, scans: bool) -> Scene:
@@ -163,8 +164,7 @@ def capture_scene(world: World, layers: Iterable[str] | None, scans: bool) -> Sc
 
 
 def _draw_layer(layer: Layer) -> LayerDrawing:
-    edges = layer.edges.astype(np.float64).reshape(-1, 2, 2)
-    return LayerDrawing(transform_points(layer.body.pose, edges), layer.color)
+    return LayerDrawing(layer.world_edges.reshape(-1, 2, 2), layer.color)
 
 
 def _local_outlines(body: Body) -> list[tuple[DoubleArray, bool]]:
@@ -189,7 +189,7 @@ def _draw_model(model: Model) -> ModelDrawing:
             for points, is_sensor in _local_outlines(body)
         ]
     first = model.bodies[0]
-    bounds = _bounds_of([points for points, _ in _local_outlines(first)])
+    bounds = _bounds_of_all([points for points, _ in _local_outlines(first)])
     if bounds is None:
         return ModelDrawing(model.name, outlines, None, 0.0, first.color)
     x_min, y_min, x_max, y_max = bounds

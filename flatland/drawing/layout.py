@@ -7,7 +7,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
-from flatland.drawing.capture import Bounds, Scene
+from flatland.drawing.capture import Scene
+from flatland.geometry import Bounds
 
 _MAX_SIDE: Final = 20_000  # pixels; the limit of matplotlib is 65 536
 _DEFAULT_AREA: Final = (13.0, 9.0)  # inches; largest view of an image without an explicit size

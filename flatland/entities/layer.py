@@ -5,8 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
+import numpy as np
+
 from flatland.entities.body import Body, Color, Entity
-from flatland.geometry import FloatArray, Pose
+from flatland.geometry import DoubleArray, FloatArray, Pose, transform_points
 from flatland.physics import PhysicsWorld
 
 WALL_FRICTION = 0.2  # default of Box2D fixtures
@@ -70,6 +72,12 @@ class Layer(Entity):
     def edges(self) -> FloatArray:
         """All edges (x1, y1, x2, y2) in the frame of the body [m], shape (n, 4)."""
         return self.body.edges()
+
+    @property
+    def world_edges(self) -> DoubleArray:
+        """All edges (x1, y1, x2, y2) in the world frame [m], shape (n, 4)."""
+        p_layer = self.edges.astype(np.float64).reshape(-1, 2)
+        return transform_points(self.body.pose, p_layer).reshape(-1, 4)
 
     def add_edges(self, edges: FloatArray) -> None:
         """Adds two-sided edges (x1, y1, x2, y2) in the frame of the body [m], shape (n, 4)."""

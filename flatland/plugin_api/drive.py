@@ -7,7 +7,7 @@ import math
 import time
 from typing import TYPE_CHECKING
 
-from flatland.geometry import Pose
+from flatland.geometry import Pose, rotate
 from flatland.plugin_api.noise import GaussianNoise
 from flatland.plugin_api.parameters import planar_diagonal, read_covariance, read_variances
 from flatland.values import Odometry, Twist
@@ -187,6 +187,4 @@ class Odometer:
 
 def to_local(velocity: Pose, yaw: float) -> Pose:
     """Transforms a velocity from the world frame to the frame of a body with a yaw angle."""
-    vx, vy, omega = velocity
-    c, s = math.cos(yaw), math.sin(yaw)
-    return (c * vx + s * vy, c * vy - s * vx, omega)
+    return (*rotate(velocity, -yaw), velocity[2])

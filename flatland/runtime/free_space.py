@@ -11,10 +11,9 @@ import numpy as np
 import numpy.typing as npt
 
 from flatland.errors import WorldError
-from flatland.geometry import BoolArray, DoubleArray
+from flatland.geometry import BoolArray, Bounds, DoubleArray
 
 IntArray = npt.NDArray[np.int64]
-Bounds = tuple[float, float, float, float]
 
 _CELLS_PER_RADIUS: Final = 4.0
 _MIN_CELL_SIZE: Final = 0.02  # m

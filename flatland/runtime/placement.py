@@ -13,8 +13,8 @@ import numpy as np
 from flatland.entities.layer import Layer
 from flatland.entities.model import Model
 from flatland.errors import WorldError
-from flatland.geometry import BoolArray, DoubleArray, Pose, finite_pose, transform_points
-from flatland.runtime.free_space import Bounds, FreeSpace, Spread
+from flatland.geometry import BoolArray, Bounds, DoubleArray, Pose, bounds_of, finite_pose
+from flatland.runtime.free_space import FreeSpace, Spread
 from flatland.runtime.nearest_place import SEARCH_RADIUS, nearest_offset
 
 if TYPE_CHECKING:
@@ -187,8 +187,10 @@ class Placement:
         self, bits: int, radius: float, clearance: float, bounds: Sequence[float] | None
     ) -> FreeSpace:
         layers = [layer for layer in self._world.layers if layer.category_bits & bits]
-        walls = np.concatenate([np.empty((0, 4)), *map(_world_edges, layers)])
-        area = _bounds_of(walls) if bounds is None else _checked_bounds(bounds)
+        walls = np.concatenate([np.empty((0, 4)), *(layer.world_edges for layer in layers)])
+        area = bounds_of(walls.reshape(-1, 2)) if bounds is None else _checked_bounds(bounds)
+        if area is None:
+            raise WorldError("the layers have no walls; bounds are required")
         key = (bits, radius, clearance, area)
         known = self._spaces.get(key)
         # Plugins may have added or moved walls since.
@@ -241,20 +243,6 @@ def _checked_bounds(bounds: Sequence[float]) -> Bounds:
             f"bounds must be (x_min, y_min, x_max, y_max) of an area [m], got {tuple(bounds)}"
         )
     return (x_min, y_min, x_max, y_max)
-
-
-def _bounds_of(walls: DoubleArray) -> Bounds:
-    if not len(walls):
-        raise WorldError("the layers have no walls; bounds are required")
-    points = walls.reshape(-1, 2)
-    (x_min, y_min), (x_max, y_max) = points.min(axis=0).tolist(), points.max(axis=0).tolist()
-    return (x_min, y_min, x_max, y_max)
-
-
-def _world_edges(layer: Layer) -> DoubleArray:
-    """Returns the edges (x1, y1, x2, y2) of a layer in the world frame [m], shape (n, 4)."""
-    p_layer = layer.edges.astype(np.float64).reshape(-1, 2)
-    return transform_points(layer.body.pose, p_layer).reshape(-1, 4)
 
 
 def _poses(points: DoubleArray, theta: float) -> DoubleArray:
