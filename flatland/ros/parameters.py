@@ -41,6 +41,9 @@ class NodeParameters:
         shutdown_timeout: Limit of wall time between a stop request and the end of the process [s];
             None for no limit.
         if_blocked: Behaviour of `spawn_model` and `move_model` at poses that are not free.
+        move_keeps_odometry: Whether the odometry of a model that is moved by a service or by its
+            interactive marker continues as if it had not moved.
+        initialpose_model: Name of the model that messages on `initialpose` move; empty for none.
     """
 
     world_path: str
@@ -55,6 +58,8 @@ class NodeParameters:
     plugin_timeout: float | None
     shutdown_timeout: float | None
     if_blocked: IfBlocked
+    move_keeps_odometry: bool
+    initialpose_model: str
 
 
 def read_parameters(get: ParameterSource) -> NodeParameters:
@@ -80,6 +85,8 @@ def read_parameters(get: ParameterSource) -> NodeParameters:
         plugin_timeout=reader.timeout("plugin_timeout", 60.0),
         shutdown_timeout=reader.timeout("shutdown_timeout", DEFAULT_SHUTDOWN_TIMEOUT),
         if_blocked=reader.if_blocked("if_blocked", "warn"),
+        move_keeps_odometry=reader.boolean("move_keeps_odometry", False),
+        initialpose_model=reader.text("initialpose_model", ""),
     )
 
 
@@ -96,6 +103,15 @@ class _Reader:
         if not isinstance(value, str):
             raise _invalid(name, "the path of a world file", value)
         return value
+
+    def text(self, name: str, default: str) -> str:
+        value = self._get(name)
+        if value is None:
+            return default
+        # A name of digits is passed as a number by roslaunch and rosrun.
+        if isinstance(value, bool) or not isinstance(value, (str, int)):
+            raise _invalid(name, "a name", value)
+        return str(value).strip()
 
     def rate(self, name: str, default: float) -> float:
         wanted = "a number of Hz that is not negative (0 or inf: as fast as possible)"

@@ -32,6 +32,8 @@ def test_defaults() -> None:
         plugin_timeout=60.0,
         shutdown_timeout=2.0,
         if_blocked="warn",
+        move_keeps_odometry=False,
+        initialpose_model="",
     )
 
 
@@ -66,6 +68,11 @@ def test_defaults() -> None:
         ("shutdown_timeout", math.inf, None),
         ("if_blocked", "allow", "allow"),
         ("if_blocked", "nearest", "nearest"),
+        ("move_keeps_odometry", True, True),
+        ("move_keeps_odometry", "true", True),
+        ("initialpose_model", "robot", "robot"),
+        ("initialpose_model", 7, "7"),
+        ("initialpose_model", " ", ""),
     ],
 )
 def test_valid_values(name: str, value: object, expected: object) -> None:
@@ -123,6 +130,10 @@ def test_invalid_numbers(name: str, value: object) -> None:
         ("if_blocked", ""),
         ("if_blocked", True),
         ("if_blocked", ["warn"]),
+        ("move_keeps_odometry", 1),
+        ("initialpose_model", True),
+        ("initialpose_model", ["robot"]),
+        ("initialpose_model", 1.5),
         ("world_path", 5),
         ("world_path", ["a"]),
     ],

@@ -202,6 +202,8 @@ def test_server_launch_passes_all_parameters(launcher: Any, ros: Any, world: Pat
         "plugin_timeout": 30,
         "shutdown_timeout": 5,
         "if_blocked": "warn",
+        "move_keeps_odometry": False,
+        "initialpose_model": " ",
     }
     assert ros.master.getParam("/use_sim_time") is True
     process.wait_for_line("real-time factor: target inf")
