@@ -203,7 +203,7 @@ def test_server_launch_passes_all_parameters(launcher: Any, ros: Any, world: Pat
         "shutdown_timeout": 5,
         "if_blocked": "warn",
         "move_keeps_odometry": False,
-        "initialpose_model": " ",
+        "initialpose_model": "",
     }
     assert ros.master.getParam("/use_sim_time") is True
     process.wait_for_line("real-time factor: target inf")
