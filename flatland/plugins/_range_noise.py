@@ -8,9 +8,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Final, Protocol
 
 import numpy as np
-import numpy.typing as npt
 
-from flatland.geometry import FloatArray
+from flatland.geometry import BoolArray, FloatArray
 from flatland.plugin_api.parameters import read_not_negative
 
 if TYPE_CHECKING:
@@ -21,8 +20,6 @@ SHARE_TOLERANCE: Final = 1e-6  # by which the sum of the shares may differ from 
 BEAM_KEYS: Final = ("z_hit", "z_short", "z_max", "z_rand", "sigma_hit", "lambda_short")
 MAX_DEVIATION: Final = 1e6  # m; the greatest range of a laser
 MAX_LAMBDA: Final = 1e6  # 1/m; a mean of one micrometre
-
-BoolArray = npt.NDArray[np.bool_]
 
 
 class RangeNoise(Protocol):

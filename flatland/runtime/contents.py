@@ -39,6 +39,7 @@ class Contents:
 
     Attributes:
         layers: The layers in the order of the file.
+        map_layer: Name of the layer that the ROS node publishes as a map; empty for none.
         plugin_host: Starts plugins and calls their hooks.
         ports: All outputs and commands by resolved topic.
         requests: The queue of actions that run between two steps.
@@ -46,6 +47,7 @@ class Contents:
     """
 
     layers: list[Layer]
+    map_layer: str = ""
     plugin_host: PluginHost
     ports: PortRegistry
     requests: Requests
