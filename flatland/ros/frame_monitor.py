@@ -95,7 +95,7 @@ class FrameMonitor(WorldObserver):
 
     def _tick(self, now: float) -> bool:
         """Checks all lasers; returns whether there are lasers left."""
-        own_parents = {child: parent for parent, child in self._world.transforms}
+        own_parents: dict[str, str] | None = None
         is_listening = False
         for output, check in list(self._checks.items()):
             scan = output.latest
@@ -104,6 +104,8 @@ class FrameMonitor(WorldObserver):
                 continue
             if check.start is None:
                 check.start = now
+            if own_parents is None:
+                own_parents = {child: parent for parent, child in self._world.transforms}
             if self._is_connected(scan.frame_id, own_parents):
                 del self._checks[output]
             elif now - check.start >= self._grace_period:
