@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from flatland.maps.occupancy_grid import DEFAULT_RESOLUTION
 from flatland.ros.shutdown import DEFAULT_SHUTDOWN_TIMEOUT
 from flatland.runtime.placement import IF_BLOCKED, IfBlocked
 from flatland.simulation import MAX_LAG
@@ -44,6 +45,10 @@ class NodeParameters:
         move_keeps_odometry: Whether the odometry of a model that is moved by a service or by its
             interactive marker continues as if it had not moved.
         initialpose_model: Name of the model that messages on `initialpose` move; empty for none.
+        publish_map: Name of the layer that is published as a map; empty for that of the world file,
+            None for no map.
+        map_frame: Frame of the map.
+        map_resolution: Size of a cell of the map of a layer without an image [m].
     """
 
     world_path: str
@@ -60,6 +65,9 @@ class NodeParameters:
     if_blocked: IfBlocked
     move_keeps_odometry: bool
     initialpose_model: str
+    publish_map: str | None
+    map_frame: str
+    map_resolution: float
 
 
 def read_parameters(get: ParameterSource) -> NodeParameters:
@@ -86,7 +94,10 @@ def read_parameters(get: ParameterSource) -> NodeParameters:
         shutdown_timeout=reader.timeout("shutdown_timeout", DEFAULT_SHUTDOWN_TIMEOUT),
         if_blocked=reader.if_blocked("if_blocked", "warn"),
         move_keeps_odometry=reader.boolean("move_keeps_odometry", False),
-        initialpose_model=reader.text("initialpose_model", ""),
+        initialpose_model=reader.name("initialpose_model"),
+        publish_map=reader.optional_name("publish_map"),
+        map_frame=reader.frame("map_frame", "map"),
+        map_resolution=reader.finite_positive("map_resolution", DEFAULT_RESOLUTION),
     )
 
 
@@ -103,15 +114,6 @@ class _Reader:
         if not isinstance(value, str):
             raise _invalid(name, "the path of a world file", value)
         return value
-
-    def text(self, name: str, default: str) -> str:
-        value = self._get(name)
-        if value is None:
-            return default
-        # A name of digits is passed as a number by roslaunch and rosrun.
-        if isinstance(value, bool) or not isinstance(value, (str, int)):
-            raise _invalid(name, "a name", value)
-        return str(value).strip()
 
     def rate(self, name: str, default: float) -> float:
         wanted = "a number of Hz that is not negative (0 or inf: as fast as possible)"
@@ -130,6 +132,10 @@ class _Reader:
 
     def positive(self, name: str, default: float) -> float:
         return self._number(name, default, "a positive number", lambda number: number > 0)
+
+    def finite_positive(self, name: str, default: float) -> float:
+        wanted = "a positive, finite number"
+        return self._number(name, default, wanted, lambda number: 0 < number < math.inf)
 
     def optional_positive(self, name: str) -> float | None:
         return None if self._get(name) is None else self.positive(name, 0.0)
@@ -166,6 +172,28 @@ class _Reader:
             if value == choice:
                 return choice
         raise _invalid(name, "one of " + ", ".join(IF_BLOCKED), value)
+
+    def name(self, name: str, wanted: str = "a name") -> str:
+        """Reads a name; empty by default. rosrun passes a name of digits as a number."""
+        value = self._get(name)
+        if value is None:
+            return ""
+        if isinstance(value, bool) or not isinstance(value, (str, int)):
+            raise _invalid(name, wanted, value)
+        return str(value).strip()
+
+    def optional_name(self, name: str) -> str | None:
+        """Reads a name; empty by default, None for false."""
+        value = self._get(name)
+        return None if value is False else self.name(name, "the name of a layer, or false")
+
+    def frame(self, name: str, default: str) -> str:
+        value = self._get(name)
+        if value is None:
+            return default
+        if not isinstance(value, str) or not value.strip(" /"):
+            raise _invalid(name, "the name of a frame", value)
+        return value.strip().lstrip("/")
 
     def natural(self, name: str) -> int | None:
         wanted = "an integer that is not negative"
