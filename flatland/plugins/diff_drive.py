@@ -79,7 +79,7 @@ class DiffDrive(ModelPlugin):
         odometer = self._odometer
         odometer.begin_update()
         wants_twist = twist is not None and twist.wanted
-        if not (wants_twist or odometer.wanted):
+        if not (wants_twist or odometer.sends_transform or odometer.wanted):
             return
         velocity = self.body.velocity
         odometer.report(stamp, pose, velocity)

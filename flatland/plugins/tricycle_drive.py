@@ -214,9 +214,10 @@ class TricycleDrive(ModelPlugin):
         self._odometer.move(previous[self.body.name], keep_odometry)
 
     def _publish(self, stamp: int, pose: Pose) -> None:
-        self._odometer.begin_update()
-        if self._odometer.wanted:
-            self._odometer.report(stamp, pose, self.body.velocity)
+        odometer = self._odometer
+        odometer.begin_update()
+        if odometer.wanted or odometer.sends_transform:
+            odometer.report(stamp, pose, self.body.velocity)
 
     def _steer_for_twist(self, command: Twist, dt: float) -> float:
         """Turns the front wheel for a velocity of the rear center and a yaw rate.
