@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from flatland import _core
+from flatland.geometry import FloatArray
 from flatland.physics.body import PhysicsBody
 from flatland.physics.contact import ContactEvent, ContactInfo, to_events, to_infos
 from flatland.physics.fixture import PhysicsFixture
@@ -250,6 +251,20 @@ class PhysicsWorld(PhysicsQueries):
         for body in bodies:
             if body.world is not self:
                 raise ValueError("a joint must connect bodies of its own world")
+
+    def body_states(self) -> FloatArray:
+        """Returns the states of all bodies in order of creation, exactly as Box2D stores them.
+
+        Returns:
+            Position of the origin (x, y) and angle, centre of mass (x, y), velocity of the centre
+            of mass (vx, vy, omega), all in the world frame [m, rad, s], and 1 if the body is awake,
+            else 0; shape (n, 9).
+
+        Raises:
+            StaleHandleError: The world is closed.
+            WorldLockedError: The world is stepping.
+        """
+        return self._core.body_states()
 
     # -- handles by id ---------------------------------------------------------------------
 

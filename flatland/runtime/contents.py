@@ -11,12 +11,14 @@ import numpy as np
 from flatland.errors import WorldError
 from flatland.geometry import DoubleArray
 from flatland.runtime.placement import IfBlocked, Models, check_if_blocked
+from flatland.runtime.state_hash import state_hash
 
 if TYPE_CHECKING:
     from flatland.config.node import Source
     from flatland.entities.contact import Contact
     from flatland.entities.layer import Layer
     from flatland.entities.model import Model
+    from flatland.physics import PhysicsWorld
     from flatland.plugin_api.plugin import WorldPlugin
     from flatland.plugin_api.port_registry import PortRegistry
     from flatland.plugin_api.ports import CommandTopic, Output
@@ -27,6 +29,7 @@ if TYPE_CHECKING:
     from flatland.runtime.plugin_host import PluginHost
     from flatland.runtime.requests import Requests
     from flatland.runtime.transforms import FramePair, TransformBuffer
+    from flatland.timekeeper import Timekeeper
     from flatland.values import Transform
 
 R = TypeVar("R")
@@ -46,9 +49,12 @@ class Contents:
     """
 
     layers: list[Layer]
+    physics: PhysicsWorld
     plugin_host: PluginHost
     ports: PortRegistry
     requests: Requests
+    seed: int
+    timekeeper: Timekeeper
     transform_buffer: TransformBuffer
 
     _contacts: ContactReporter
@@ -206,6 +212,25 @@ class Contents:
     def contacts(self) -> list[Contact]:
         """All pairs of fixtures that touch now."""
         return self._contacts.touching
+
+    # -- state -----------------------------------------------------------------------------
+
+    def state_hash(self) -> str:
+        """Returns a hash of the state: equal for two runs that have been the same so far.
+
+        It covers, bit by bit, the time, the transforms and velocities of all bodies, the models,
+        commands, random number generators and noise of all plugins, and what they return from
+        `state`. It depends neither on subscribers, viewers and threads nor on the wall time.
+
+        Returns:
+            32 hexadecimal digits.
+
+        Raises:
+            WorldError: The world is closed, or the state of a plugin cannot be hashed.
+        """
+        return self._read(
+            lambda: state_hash(self.seed, self.timekeeper, self.physics, self.models, self.plugins)
+        )
 
     # -- free places -----------------------------------------------------------------------
 
