@@ -5,15 +5,15 @@ from __future__ import annotations
 import logging
 import os
 import threading
-from collections.abc import Callable, Iterable, Sequence
-from concurrent.futures import Future
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from types import TracebackType
-from typing import TypeVar
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
 
+from flatland.config.inputs import Inputs
 from flatland.config.node import Source
 from flatland.config.preprocessor import Params
 from flatland.entities.collision_filter import CollisionFilter
@@ -35,9 +35,11 @@ from flatland.runtime.requests import Requests
 from flatland.runtime.transforms import TransformBuffer
 from flatland.timekeeper import Timekeeper
 
-_LOG = logging.getLogger("flatland")
+if TYPE_CHECKING:
+    from flatland.recording import Recorder
+    from flatland.runtime.change_log import ChangeLog
 
-R = TypeVar("R")
+_LOG = logging.getLogger("flatland")
 
 
 class World(Contents):
@@ -55,6 +57,8 @@ class World(Contents):
         seed: Seed of all random numbers.
         params: Source of the values of `param()` in YAML files.
         path: The world file, as given; relative model paths start from its folder.
+        plugin_errors: Policy for exceptions, see `from_yaml`.
+        on_invalid_body: Policy for invalid bodies, see `from_yaml`.
     """
 
     def __init__(
@@ -91,10 +95,12 @@ class World(Contents):
         if plugin_timeout is not None and not plugin_timeout > 0:
             raise ValueError(f"plugin_timeout must be positive [s] or None, got {plugin_timeout}")
         self.timekeeper = Timekeeper(step_size)
+        self.plugin_errors, self.on_invalid_body = plugin_errors, on_invalid_body
         self._faults = Faults(plugin_errors)
         self.seed = checked_seed(seed)
         self.params = params
         self.path = ""
+        self.inputs = Inputs()
         self.velocity_iterations = velocity_iterations
         self.position_iterations = position_iterations
         self.collision_filter = CollisionFilter()
@@ -116,6 +122,8 @@ class World(Contents):
         self._body_monitor = BodyMonitor(
             self.physics, self._contacts, self._models, on_invalid_body
         )
+        self.change_count = 0
+        self._change_log: ChangeLog | None = None
         self._paused = False
         self._closed = False
         self.add_observer(self._body_monitor)
@@ -240,36 +248,8 @@ class World(Contents):
         self._observers.time_advanced(timekeeper.sim_time_ns)
         host.after_physics_step(timekeeper)
         self.transform_buffer.flush()
-
-    @property
-    def paused(self) -> bool:
-        """Whether steps have no effect."""
-        return self._paused
-
-    def pause(self) -> None:
-        """Pauses the world from the next step on."""
-        self._paused = True
-
-    def resume(self) -> None:
-        """Resumes a paused world."""
-        self._paused = False
-
-    def toggle_pause(self) -> None:
-        """Pauses a running world, resumes a paused one."""
-        self._paused = not self._paused
-
-    # -- requests --------------------------------------------------------------------------
-
-    def post(self, action: Callable[[], R]) -> Future[R]:
-        """Queues an action that runs between two steps; see `Requests.post`."""
-        return self.requests.post(action)
-
-    def between_steps(self, action: Callable[[], R]) -> R:
-        """Returns the result of a function that reads the world, run while no step is in progress.
-
-        Safe from any thread; in a plugin's hook it runs at once.
-        """
-        return self.requests.read(action)
+        if self._change_log is not None:
+            self._change_log.step_done()
 
     # -- observers -------------------------------------------------------------------------
 
@@ -285,7 +265,27 @@ class World(Contents):
         """
         self._observers.remove(observer)
 
-    # -- images ----------------------------------------------------------------------------
+    # -- recordings and images -------------------------------------------------------------
+
+    def record(self, path: str | os.PathLike[str]) -> Recorder:
+        """Records this run, so that `flatland replay` can repeat it and find differences.
+
+        Args:
+            path: The file; an existing one is replaced.
+
+        Returns:
+            The recorder; its `close` ends the recording, as does the end of the world.
+
+        Raises:
+            WorldError: The world was not loaded from a file, or has changed since.
+            RecordingError: The file cannot be written.
+        """
+        from flatland.recording import Recorder  # Late: the simulation does not depend on it.
+
+        recorder = Recorder(self, path)
+        self.log_changes(recorder)
+        self.add_observer(recorder)
+        return recorder
 
     def draw(
         self,
@@ -336,6 +336,8 @@ class World(Contents):
         with self.requests.lock:
             if self._closed:
                 return
+            if self._change_log is not None:
+                self._change_log.world_closing()
             self.plugin_host.shut_down(list(self.plugin_host.world_plugins))
             for model in reversed(self.models):
                 self._models.delete(model.name)

@@ -195,7 +195,7 @@ def test_a_state_that_cannot_be_hashed_is_an_error_that_names_the_plugin(
     monkeypatch.setattr(
         type(world.model("robot").plugin("drive")), "state", lambda plugin: [object()]
     )
-    with pytest.raises(WorldError, match='"drive".* a value of type object, which cannot be'):
+    with pytest.raises(WorldError, match=r'"drive".* a value of type object, which cannot be'):
         world.state_hash()
 
 
