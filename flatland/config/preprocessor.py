@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 
 from flatland.config.documents import load_documents, parse_documents
-from flatland.config.inputs import note_param
+from flatland.config.inputs import next_seed, note_param
 from flatland.config.lua import EvalError, evaluate
 from flatland.config.node import MAX_NESTING, ListNode, Node, NullNode, ScalarNode, Source
 from flatland.errors import YamlError
@@ -131,7 +131,7 @@ class _Preprocessor:
     def _evaluate(self, node: ScalarNode) -> str:
         expression = node.text[len(_EVAL) :].strip(" \t\r\n\f\v")
         try:
-            result = evaluate(expression, self._param)
+            result = evaluate(expression, self._param, next_seed())
         except EvalError as error:
             message = f'Failed to evaluate "{_shorten(expression)}", {_shorten(str(error))}'
             raise self._error(node, message) from error

@@ -23,6 +23,7 @@ from flatland.plugin_api.missing_plugins import (
     missing_plugins_error,
     read_entries,
 )
+from flatland.plugin_api.noise import checked_seed
 
 if TYPE_CHECKING:
     from flatland.runtime.body_monitor import InvalidBodyPolicy
@@ -52,7 +53,8 @@ def load_world(
     """Creates a world of the given class from a file; see `World.from_yaml` for the arguments."""
     if simplify_map not in SIMPLIFICATIONS:
         raise ValueError(f"simplify_map must be 0, 1 or 2, got {simplify_map!r}")
-    inputs = Inputs(simplify_map)
+    seed = checked_seed(seed)
+    inputs = Inputs(seed, simplify_map)
     with inputs.collecting():
         world = _create_world(
             world_class,
