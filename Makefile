@@ -49,6 +49,10 @@ bench: setup-dev  ## measure performance, write build/bench.json and .png: make 
 	@. ./setup.bash && python bench --json build/bench.json --plot build/bench.png \
 	  $(if $(BASELINE),--baseline "$(BASELINE)") $(ARGS)
 
+.PHONY: soak
+soak: setup-dev  ## run for a long time and check that nothing grows: make soak [ARGS="office --scale 0.1"]
+	@. ./setup.bash && python bench/soak.py $(ARGS)
+
 .PHONY: docs
 docs: setup  ## check the links and images of README.md and docs/
 	@$(PYTHON) tools/check_links.py README.md docs

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 from flatland import _core
 from flatland.geometry import FloatArray
@@ -14,6 +15,22 @@ from flatland.physics.joint import PhysicsJoint
 from flatland.physics.queries import PhysicsQueries
 
 PreSolveHook = Callable[[_core.PreSolveContact, _core.OldManifold], object]
+
+
+class ObjectCounts(NamedTuple):
+    """The numbers of objects in a physics world.
+
+    Attributes:
+        bodies: Number of bodies.
+        fixtures: Number of fixtures.
+        joints: Number of joints.
+        contacts: Number of pairs of fixtures whose bounding boxes overlap.
+    """
+
+    bodies: int
+    fixtures: int
+    joints: int
+    contacts: int
 
 
 @dataclass(frozen=True, slots=True)
@@ -251,6 +268,15 @@ class PhysicsWorld(PhysicsQueries):
         for body in bodies:
             if body.world is not self:
                 raise ValueError("a joint must connect bodies of its own world")
+
+    def object_counts(self) -> ObjectCounts:
+        """Returns the numbers of objects.
+
+        Raises:
+            StaleHandleError: The world is closed.
+            WorldLockedError: The world is stepping.
+        """
+        return ObjectCounts(*self._core.object_counts())
 
     def body_states(self) -> FloatArray:
         """Returns the states of all bodies in order of creation, exactly as Box2D stores them.
