@@ -23,8 +23,8 @@ run: setup  ## run the simulator: make run [WORLD=world.yaml] [ARGS="show_viz:=f
 	@tools/run.sh "$(WORLD)" $(ARGS)
 
 .PHONY: test
-test: setup-dev  ## run all tests: make test [ARGS="-k laser"]
-	@. ./setup.bash && pytest $(ARGS)
+test: setup-dev  ## run all tests, in two processes: make test [ARGS="-k laser"]
+	@. ./setup.bash && pytest --numprocesses 2 --dist loadgroup $(ARGS)
 
 .PHONY: fuzz
 fuzz: setup-dev  ## test the physics engine with thousands of random jams
