@@ -75,19 +75,12 @@ class World(Contents):
         plugin_errors: FaultPolicy = "raise",
         on_invalid_body: InvalidBodyPolicy = "raise",
     ) -> None:
-        """Creates an empty world; `from_yaml` describes the arguments that both have in common.
+        """Creates an empty world; `from_yaml` describes the other arguments.
 
         Args:
-            seed: See `from_yaml`, as for all arguments that are not described here.
-            params: Source of the values of `param()`.
-            step_size: Simulated time of one step [s].
             velocity_iterations: Velocity iterations of the Box2D solver.
             position_iterations: Position iterations of the Box2D solver.
             base_dir: Folder that relative paths of models and maps start from.
-            observers: Receive notifications.
-            plugin_timeout: Limit of `on_initialize` [s].
-            plugin_errors: Policy for exceptions.
-            on_invalid_body: Policy for invalid bodies.
 
         Raises:
             ValueError: An argument is out of range.
@@ -201,6 +194,14 @@ class World(Contents):
                 raise
             _LOG.exception("closing the world failed")
 
+    def __repr__(self) -> str:
+        """Returns the file, the time and the number of layers and models."""
+        file = "/".join(Path(self.path).parts[-2:])
+        if self._closed:
+            return f"<World {file!r}, closed>"
+        counts = f"layers: {len(self.layers)}, models: {len(self._models.by_name)}"
+        return f"<World {file!r} at {self.time:.3f} s, {counts}>"
+
     # -- time ------------------------------------------------------------------------------
 
     @property
@@ -251,20 +252,6 @@ class World(Contents):
         if self._change_log is not None:
             self._change_log.step_done()
 
-    # -- observers -------------------------------------------------------------------------
-
-    def add_observer(self, observer: WorldObserver) -> None:
-        """Notifies an observer of all events from now on."""
-        self._observers.add(observer, self)
-
-    def remove_observer(self, observer: WorldObserver) -> None:
-        """Stops the notifications of an observer.
-
-        Raises:
-            ValueError: It was not added, or has been removed.
-        """
-        self._observers.remove(observer)
-
     # -- recordings and images -------------------------------------------------------------
 
     def record(self, path: str | os.PathLike[str]) -> Recorder:
@@ -313,6 +300,12 @@ class World(Contents):
         return draw(
             self, size=size, dpi=dpi, view=view, layers=layers, scans=scans, names=names, axes=axes
         )
+
+    def _repr_png_(self) -> bytes | None:
+        """Returns a PNG image for Jupyter; None for a closed world and without matplotlib."""
+        from flatland.drawing import draw_png
+
+        return draw_png(self)
 
     # -- end -------------------------------------------------------------------------------
 

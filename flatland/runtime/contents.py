@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar, cast
 
 import numpy as np
 
@@ -28,13 +28,14 @@ if TYPE_CHECKING:
     from flatland.runtime.change_log import ChangeLog
     from flatland.runtime.contacts import ContactReporter
     from flatland.runtime.model_set import ModelSet
-    from flatland.runtime.observer import Observers
+    from flatland.runtime.observer import Observers, WorldObserver
     from flatland.runtime.placement import Placement
     from flatland.runtime.plugin_host import PluginHost
     from flatland.runtime.requests import Requests
     from flatland.runtime.transforms import FramePair, TransformBuffer
     from flatland.timekeeper import Timekeeper
     from flatland.values import Transform
+    from flatland.world import World
 
 R = TypeVar("R")
 
@@ -46,6 +47,7 @@ class Contents:
 
     Attributes:
         layers: The layers in the order of the file.
+        map_layer: Name of the layer that the ROS node publishes as a map; empty for none.
         plugin_host: Starts plugins and calls their hooks.
         ports: All outputs and commands by resolved topic.
         requests: The queue of actions that run between two steps.
@@ -56,6 +58,7 @@ class Contents:
     """
 
     layers: list[Layer]
+    map_layer: str = ""
     physics: PhysicsWorld
     plugin_host: PluginHost
     ports: PortRegistry
@@ -246,6 +249,20 @@ class Contents:
     def toggle_pause(self) -> None:
         """Pauses a running world, resumes a paused one."""
         self._paused = not self._paused
+
+    # -- observers -------------------------------------------------------------------------
+
+    def add_observer(self, observer: WorldObserver) -> None:
+        """Notifies an observer of all events from now on."""
+        self._observers.add(observer, cast("World", self))
+
+    def remove_observer(self, observer: WorldObserver) -> None:
+        """Stops the notifications of an observer.
+
+        Raises:
+            ValueError: It was not added, or has been removed.
+        """
+        self._observers.remove(observer)
 
     # -- plugins, ports, transforms, contacts ----------------------------------------------
 
