@@ -61,7 +61,7 @@ class World(Contents):
         on_invalid_body: Policy for invalid bodies, see `from_yaml`.
     """
 
-    def __init__(
+    def __init__(  # noqa: D417 - the other arguments are those of from_yaml
         self,
         *,
         seed: int | None = None,
