@@ -218,6 +218,10 @@ class Odometer:
             self._is_exact = False
             self._offset = compose(self._estimate(previous), invert(pose))
 
+    def state(self) -> object:
+        """Returns everything that changes, for `FlatlandPlugin.state`."""
+        return (self._offset, None if self._drift is None else self._drift.state())
+
     def _estimate(self, pose: Pose) -> Pose:
         """Returns the odometry without white noise, in the odometry frame."""
         return compose(self._offset, pose) if self._drift is None else self._drift.pose

@@ -74,6 +74,10 @@ class DiffDrive(ModelPlugin):
         """Keeps the odometry, or displaces it along with the model."""
         self._odometer.move(previous[self.body.name], keep_odometry)
 
+    def state(self) -> object:
+        """Returns the commanded velocities within the limits, and the state of the odometry."""
+        return (self._velocity, self._yaw_rate, self._odometer.state())
+
     def _publish(self, stamp: int, pose: Pose) -> None:
         twist = self._twist
         odometer = self._odometer

@@ -213,6 +213,11 @@ class TricycleDrive(ModelPlugin):
         """Keeps the odometry, or displaces it along with the model."""
         self._odometer.move(previous[self.body.name], keep_odometry)
 
+    def state(self) -> object:
+        """Returns the state of the front wheel and of the odometry."""
+        wheel = (self.steering_angle, self.steering_velocity, self.front_velocity)
+        return (wheel, self._target_angle, self._odometer.state())
+
     def _publish(self, stamp: int, pose: Pose) -> None:
         odometer = self._odometer
         odometer.begin_update()
