@@ -41,6 +41,9 @@ class NodeParameters:
         shutdown_timeout: Limit of wall time between a stop request and the end of the process [s];
             None for no limit.
         if_blocked: Behaviour of `spawn_model` and `move_model` at poses that are not free.
+        use_sim_time: Whether `/clock` is published and stamps are simulated times; otherwise they
+            are wall times.
+        clock_rate: Maximum rate of `/clock` in wall time [Hz]; 0 for one message per step.
     """
 
     world_path: str
@@ -55,6 +58,8 @@ class NodeParameters:
     plugin_timeout: float | None
     shutdown_timeout: float | None
     if_blocked: IfBlocked
+    use_sim_time: bool
+    clock_rate: float
 
 
 def read_parameters(get: ParameterSource) -> NodeParameters:
@@ -80,6 +85,8 @@ def read_parameters(get: ParameterSource) -> NodeParameters:
         plugin_timeout=reader.timeout("plugin_timeout", 60.0),
         shutdown_timeout=reader.timeout("shutdown_timeout", DEFAULT_SHUTDOWN_TIMEOUT),
         if_blocked=reader.if_blocked("if_blocked", "warn"),
+        use_sim_time=reader.boolean("use_sim_time", True),
+        clock_rate=reader.rate("clock_rate", 0.0, unlimited="one message per step"),
     )
 
 
@@ -97,8 +104,8 @@ class _Reader:
             raise _invalid(name, "the path of a world file", value)
         return value
 
-    def rate(self, name: str, default: float) -> float:
-        wanted = "a number of Hz that is not negative (0 or inf: as fast as possible)"
+    def rate(self, name: str, default: float, unlimited: str = "as fast as possible") -> float:
+        wanted = f"a number of Hz that is not negative (0 or inf: {unlimited})"
         rate = self._number(name, default, wanted, lambda rate: rate >= 0)
         return 0.0 if math.isinf(rate) else rate
 

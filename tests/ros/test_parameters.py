@@ -32,6 +32,8 @@ def test_defaults() -> None:
         plugin_timeout=60.0,
         shutdown_timeout=2.0,
         if_blocked="warn",
+        use_sim_time=True,
+        clock_rate=0.0,
     )
 
 
@@ -66,6 +68,10 @@ def test_defaults() -> None:
         ("shutdown_timeout", math.inf, None),
         ("if_blocked", "allow", "allow"),
         ("if_blocked", "nearest", "nearest"),
+        ("use_sim_time", False, False),
+        ("use_sim_time", "true", True),
+        ("clock_rate", 100, 100.0),
+        ("clock_rate", "inf", 0.0),
     ],
 )
 def test_valid_values(name: str, value: object, expected: object) -> None:
@@ -84,6 +90,7 @@ def test_valid_values(name: str, value: object, expected: object) -> None:
         "benchmark_duration",
         "plugin_timeout",
         "shutdown_timeout",
+        "clock_rate",
     ],
 )
 @pytest.mark.parametrize("value", [math.nan, "nan", -1, -1e-300, "fast", "", True, [1], {"a": 1}])
@@ -119,6 +126,7 @@ def test_invalid_numbers(name: str, value: object) -> None:
         ("seed", 1.5),
         ("seed", "a"),
         ("seed", False),
+        ("use_sim_time", "maybe"),
         ("if_blocked", "stop"),
         ("if_blocked", ""),
         ("if_blocked", True),
@@ -264,9 +272,10 @@ def test_missed_rate_is_reported_with_the_most_expensive_plugin(
 
 
 def test_lag_within_max_lag_is_not_reported(
-    launcher: Any, slow_world: Path, eventually: Callable[..., Any]
+    launcher: Any, ros: Any, slow_world: Path, eventually: Callable[..., Any]
 ) -> None:
     process = launcher.server(slow_world, update_rate=100, max_lag=1000)
+    ros.log_everything()
     # With the default value, the warning is logged with the third report.
     eventually("six reports", lambda: process.output.count("cycle use min") >= 6)
     assert "cannot be held" not in process.output
