@@ -90,6 +90,44 @@ def read_parameters(get: ParameterSource) -> NodeParameters:
     )
 
 
+@dataclass(frozen=True, slots=True)
+class TeleopParameters:
+    """The parameters of the node `teleop_key`.
+
+    Attributes:
+        max_linear: Maximum velocity [m/s].
+        max_angular: Maximum angular velocity [rad/s].
+        rate: Rate of the commands while a key is held [Hz].
+        repeat_delay: Time from a press to the first repetition of the terminal [s].
+        key_timeout: Time after a repetition in which the next one is expected [s].
+    """
+
+    max_linear: float
+    max_angular: float
+    rate: float
+    repeat_delay: float
+    key_timeout: float
+
+
+def read_teleop_parameters(get: ParameterSource) -> TeleopParameters:
+    """Reads and checks all parameters of the node `teleop_key`.
+
+    Args:
+        get: Returns the value of a parameter of the node, None if it is not set.
+
+    Raises:
+        ParameterError: A parameter is invalid.
+    """
+    reader = _Reader(get)
+    return TeleopParameters(
+        max_linear=reader.finite("max_linear", 1.0),
+        max_angular=reader.finite("max_angular", 2.0),
+        rate=reader.finite("rate", 20.0),
+        repeat_delay=reader.finite("repeat_delay", 0.6),
+        key_timeout=reader.finite("key_timeout", 0.2),
+    )
+
+
 class _Reader:
     """Converts and checks one parameter at a time."""
 
@@ -121,6 +159,10 @@ class _Reader:
 
     def positive(self, name: str, default: float) -> float:
         return self._number(name, default, "a positive number", lambda number: number > 0)
+
+    def finite(self, name: str, default: float) -> float:
+        wanted = "a positive, finite number"
+        return self._number(name, default, wanted, lambda number: 0 < number < math.inf)
 
     def optional_positive(self, name: str) -> float | None:
         return None if self._get(name) is None else self.positive(name, 0.0)

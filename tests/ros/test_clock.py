@@ -122,7 +122,7 @@ def test_limited_clock_publishes_the_last_time_before_a_pause(ros: Any) -> None:
             clock.time_advanced(time_ns)
         received = [message.clock.to_nsec() for message in topic.rest(0.5)]
         assert received[-1] == times[-1]
-        assert len(received) <= 2
+        assert len(received) < len(times) / 10
 
 
 def test_limited_clock_of_a_fast_simulation(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -42,18 +43,18 @@ def test_transforms_and_the_clock_of_a_scan_are_received_before_it(
         for topic in (("/scan", LaserScan), ("/tf", TFMessage), ("/clock", Clock))
     )
     scans.next()
-    late = []
+    frames: defaultdict[Any, set[tuple[str, str]]] = defaultdict(set)
+    late, last_time = [], None
     for _ in range(40):
         stamp = scans.next().header.stamp
-        frames = {
-            (each.header.frame_id, each.child_frame_id)
-            for message in tf.received()
-            for each in message.transforms
-            if each.header.stamp == stamp
-        }
-        last_time = clock.received()[-1].clock
-        if not (frames >= NEEDED and last_time >= stamp):
-            late.append((stamp, frames, last_time))
+        # Several scans may have arrived, and the transforms of all of them.
+        for message in tf.received():
+            for each in message.transforms:
+                frames[each.header.stamp].add((each.header.frame_id, each.child_frame_id))
+        for message in clock.received():
+            last_time = message.clock
+        if not (frames[stamp] >= NEEDED and last_time is not None and last_time >= stamp):
+            late.append((stamp, frames[stamp], last_time))
     assert late == []
     for subscriber in (scans, tf, clock):
         subscriber.close()
