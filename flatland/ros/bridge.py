@@ -86,9 +86,12 @@ class Bridge(WorldObserver):
         """Publishes the messages of the step."""
         self._in_step = False
         if self._held:
-            held, self._held = self._held, []
-            for publish, message in held:
-                publish(message)
+            self._publish_held()
+
+    def _publish_held(self) -> None:
+        held, self._held = self._held, []
+        for publish, message in held:
+            publish(message)
 
     def _send(self, publish: Callable[[Any], None], message: Any) -> None:
         """Publishes a message of an output: at the end of the step, or at once between two steps.
@@ -125,6 +128,8 @@ class Bridge(WorldObserver):
         topic = self._outputs.pop(output, None)
         if topic is not None:
             topic.unsubscribe()
+            # A model whose pose is invalid is removed within a step.
+            self._publish_held()
             if not self._closed:
                 topic.publisher.close()
 
