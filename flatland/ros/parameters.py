@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from flatland.maps.occupancy_grid import DEFAULT_RESOLUTION
 from flatland.ros.shutdown import DEFAULT_SHUTDOWN_TIMEOUT
 from flatland.runtime.placement import IF_BLOCKED, IfBlocked
 from flatland.simulation import MAX_LAG
@@ -44,6 +45,10 @@ class NodeParameters:
         use_sim_time: Whether `/clock` is published and stamps are simulated times; otherwise they
             are wall times.
         clock_rate: Maximum rate of `/clock` in wall time [Hz]; 0 for one message per step.
+        publish_map: Name of the layer that is published as a map; empty for that of the world file,
+            None for no map.
+        map_frame: Frame of the map.
+        map_resolution: Size of a cell of the map of a layer without an image [m].
     """
 
     world_path: str
@@ -60,6 +65,9 @@ class NodeParameters:
     if_blocked: IfBlocked
     use_sim_time: bool
     clock_rate: float
+    publish_map: str | None
+    map_frame: str
+    map_resolution: float
 
 
 def read_parameters(get: ParameterSource) -> NodeParameters:
@@ -87,6 +95,9 @@ def read_parameters(get: ParameterSource) -> NodeParameters:
         if_blocked=reader.if_blocked("if_blocked", "warn"),
         use_sim_time=reader.boolean("use_sim_time", True),
         clock_rate=reader.rate("clock_rate", 0.0, unlimited="one message per step"),
+        publish_map=reader.optional_name("publish_map"),
+        map_frame=reader.frame("map_frame", "map"),
+        map_resolution=reader.finite_positive("map_resolution", DEFAULT_RESOLUTION),
     )
 
 
@@ -120,11 +131,11 @@ def read_teleop_parameters(get: ParameterSource) -> TeleopParameters:
     """
     reader = _Reader(get)
     return TeleopParameters(
-        max_linear=reader.finite("max_linear", 1.0),
-        max_angular=reader.finite("max_angular", 2.0),
-        rate=reader.finite("rate", 20.0),
-        repeat_delay=reader.finite("repeat_delay", 0.6),
-        key_timeout=reader.finite("key_timeout", 0.2),
+        max_linear=reader.finite_positive("max_linear", 1.0),
+        max_angular=reader.finite_positive("max_angular", 2.0),
+        rate=reader.finite_positive("rate", 20.0),
+        repeat_delay=reader.finite_positive("repeat_delay", 0.6),
+        key_timeout=reader.finite_positive("key_timeout", 0.2),
     )
 
 
@@ -160,7 +171,7 @@ class _Reader:
     def positive(self, name: str, default: float) -> float:
         return self._number(name, default, "a positive number", lambda number: number > 0)
 
-    def finite(self, name: str, default: float) -> float:
+    def finite_positive(self, name: str, default: float) -> float:
         wanted = "a positive, finite number"
         return self._number(name, default, wanted, lambda number: 0 < number < math.inf)
 
@@ -199,6 +210,25 @@ class _Reader:
             if value == choice:
                 return choice
         raise _invalid(name, "one of " + ", ".join(IF_BLOCKED), value)
+
+    def optional_name(self, name: str) -> str | None:
+        """Reads a name; empty by default, None for false. roslaunch passes a number as such."""
+        value = self._get(name)
+        if value is None:
+            return ""
+        if value is False:
+            return None
+        if isinstance(value, bool) or not isinstance(value, (str, int)):
+            raise _invalid(name, "the name of a layer, or false", value)
+        return str(value).strip()
+
+    def frame(self, name: str, default: str) -> str:
+        value = self._get(name)
+        if value is None:
+            return default
+        if not isinstance(value, str) or not value.strip(" /"):
+            raise _invalid(name, "the name of a frame", value)
+        return value.strip().lstrip("/")
 
     def natural(self, name: str) -> int | None:
         wanted = "an integer that is not negative"

@@ -34,6 +34,9 @@ def test_defaults() -> None:
         if_blocked="warn",
         use_sim_time=True,
         clock_rate=0.0,
+        publish_map="",
+        map_frame="map",
+        map_resolution=0.05,
     )
 
 
@@ -72,6 +75,15 @@ def test_defaults() -> None:
         ("use_sim_time", "true", True),
         ("clock_rate", 100, 100.0),
         ("clock_rate", "inf", 0.0),
+        ("publish_map", "walls", "walls"),
+        ("publish_map", "", ""),
+        ("publish_map", " ", ""),
+        ("publish_map", 2, "2"),
+        ("publish_map", False, None),
+        ("map_frame", "r1/map", "r1/map"),
+        ("map_frame", "/map", "map"),
+        ("map_resolution", "0.1", 0.1),
+        ("map_resolution", 1, 1.0),
     ],
 )
 def test_valid_values(name: str, value: object, expected: object) -> None:
@@ -91,6 +103,7 @@ def test_valid_values(name: str, value: object, expected: object) -> None:
         "plugin_timeout",
         "shutdown_timeout",
         "clock_rate",
+        "map_resolution",
     ],
 )
 @pytest.mark.parametrize("value", [math.nan, "nan", -1, -1e-300, "fast", "", True, [1], {"a": 1}])
@@ -113,6 +126,14 @@ def test_invalid_numbers(name: str, value: object) -> None:
         ("step_size", 1001),
         ("step_size", 10**400),
         ("viz_pub_rate", 0),
+        ("map_resolution", 0),
+        ("map_resolution", math.inf),
+        ("map_frame", ""),
+        ("map_frame", "/"),
+        ("map_frame", 1),
+        ("publish_map", True),
+        ("publish_map", 1.5),
+        ("publish_map", ["walls"]),
         ("benchmark_duration", 0),
         ("plugin_timeout", 0),
         ("shutdown_timeout", 0),

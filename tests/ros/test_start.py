@@ -191,6 +191,7 @@ def test_server_launch_passes_all_parameters(launcher: Any, ros: Any, world: Pat
         "plugin_timeout:=30",
         "shutdown_timeout:=5",
         "clock_rate:=500",
+        "publish_map:=2d",
     )
     times = [message.clock.to_nsec() for message in ros.topic("/clock", Clock).take(20)]
     assert {time % 10_000_000 for time in times} == {0}
@@ -209,6 +210,7 @@ def test_server_launch_passes_all_parameters(launcher: Any, ros: Any, world: Pat
         "if_blocked": "warn",
         "use_sim_time": True,
         "clock_rate": 500,
+        "publish_map": "2d",
     }
     assert ros.master.getParam("/use_sim_time") is True
     ros.log_everything()
