@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from flatland.ros.message_types import MESSAGE_PACKAGES, OWN_PACKAGE
 from flatland.ros.shutdown import DEFAULT_SHUTDOWN_TIMEOUT
 from flatland.runtime.placement import IF_BLOCKED, IfBlocked
 from flatland.simulation import MAX_LAG
@@ -41,6 +42,7 @@ class NodeParameters:
         shutdown_timeout: Limit of wall time between a stop request and the end of the process [s];
             None for no limit.
         if_blocked: Behaviour of `spawn_model` and `move_model` at poses that are not free.
+        msgs_package: Package of the message and service types, `flatland` or `flatland_msgs`.
     """
 
     world_path: str
@@ -55,13 +57,17 @@ class NodeParameters:
     plugin_timeout: float | None
     shutdown_timeout: float | None
     if_blocked: IfBlocked
+    msgs_package: str
 
 
-def read_parameters(get: ParameterSource) -> NodeParameters:
+def read_parameters(
+    get: ParameterSource, *, default_msgs_package: str = OWN_PACKAGE
+) -> NodeParameters:
     """Reads and checks all parameters of the node.
 
     Args:
         get: Returns the value of a parameter of the node, None if it is not set.
+        default_msgs_package: Default of `msgs_package`.
 
     Raises:
         ParameterError: A parameter is missing or invalid.
@@ -80,6 +86,7 @@ def read_parameters(get: ParameterSource) -> NodeParameters:
         plugin_timeout=reader.timeout("plugin_timeout", 60.0),
         shutdown_timeout=reader.timeout("shutdown_timeout", DEFAULT_SHUTDOWN_TIMEOUT),
         if_blocked=reader.if_blocked("if_blocked", "warn"),
+        msgs_package=reader.msgs_package("msgs_package", default_msgs_package),
     )
 
 
@@ -150,6 +157,14 @@ class _Reader:
             if value == choice:
                 return choice
         raise _invalid(name, "one of " + ", ".join(IF_BLOCKED), value)
+
+    def msgs_package(self, name: str, default: str) -> str:
+        value = self._get(name)
+        if value is None:
+            return default
+        if not isinstance(value, str) or value not in MESSAGE_PACKAGES:
+            raise _invalid(name, " or ".join(MESSAGE_PACKAGES), value)
+        return value
 
     def natural(self, name: str) -> int | None:
         wanted = "an integer that is not negative"

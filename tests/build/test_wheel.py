@@ -90,5 +90,6 @@ def test_each_script_is_an_entry_point(wheel, checkout):
 
 def test_versions_agree(checkout):
     project = tomllib.loads((checkout / "pyproject.toml").read_text())["project"]
-    package = ElementTree.parse(checkout / "package.xml").getroot()
-    assert package.findtext("version") == project["version"]
+    packages = [*checkout.glob("catkin/*/package.xml"), *checkout.glob("compat/*/package.xml")]
+    versions = [ElementTree.parse(path).getroot().findtext("version") for path in packages]
+    assert versions == [project["version"]] * 5

@@ -32,6 +32,7 @@ def test_defaults() -> None:
         plugin_timeout=60.0,
         shutdown_timeout=2.0,
         if_blocked="warn",
+        msgs_package="flatland",
     )
 
 
@@ -66,6 +67,8 @@ def test_defaults() -> None:
         ("shutdown_timeout", math.inf, None),
         ("if_blocked", "allow", "allow"),
         ("if_blocked", "nearest", "nearest"),
+        ("msgs_package", "flatland", "flatland"),
+        ("msgs_package", "flatland_msgs", "flatland_msgs"),
     ],
 )
 def test_valid_values(name: str, value: object, expected: object) -> None:
@@ -123,6 +126,10 @@ def test_invalid_numbers(name: str, value: object) -> None:
         ("if_blocked", ""),
         ("if_blocked", True),
         ("if_blocked", ["warn"]),
+        ("msgs_package", "std_msgs"),
+        ("msgs_package", ""),
+        ("msgs_package", True),
+        ("msgs_package", ["flatland"]),
         ("world_path", 5),
         ("world_path", ["a"]),
     ],
