@@ -27,7 +27,8 @@ for module in (flatland, flatland._core, flatland.msg, flatland.world):
 
 
 def test_ros_tools_find_the_package(space, checkout):
-    expected = checkout if space.name == "devel" else space.folder / "share" / "flatland"
+    in_checkout = checkout / "catkin" / "flatland"
+    expected = in_checkout if space.name == "devel" else space.folder / "share" / "flatland"
     assert Path(space.run("rospack", "find", "flatland").strip()).resolve() == expected
     assert "Collision[] collisions" in space.run("rosmsg", "show", "-r", "flatland/Collisions")
     md5 = space.run("rossrv", "md5", "flatland/SpawnModel").split()[0]

@@ -1,0 +1,128 @@
+"""Packages of the reference simulator in a workspace: C++ headers, launch files, a C++ client."""
+
+from __future__ import annotations
+
+import os
+import signal
+import socket
+import subprocess
+from pathlib import Path
+
+import pytest
+from waiting import BUILD_TIMEOUT, TIMEOUT
+
+# The first test builds the workspace.
+pytestmark = pytest.mark.timeout(BUILD_TIMEOUT)
+
+PACKAGES = ("flatland_msgs", "flatland_plugins", "flatland_server", "flatland_viz")
+WORLD = """
+properties: {}
+layers: [{name: 2d, map: map.yaml}]
+"""
+MAP = "type: line_segments\ndata: walls.dat\nscale: 1.0\norigin: [0, 0, 0]\n"
+WALLS = "-5 -5 5 -5\n5 -5 5 5\n5 5 -5 5\n-5 5 -5 -5\n"
+CRATE = """
+bodies:
+  - {name: box, footprints: [{type: circle, radius: 0.5, density: 1}]}
+plugins:
+  - {type: Bumper, name: bumper}
+"""
+RESULTS = [
+    "an absent model file is refused",
+    *("spawned", "listed", "collides with a wall", "moved", "is free", "deleted"),
+    "no longer listed",
+]
+
+
+@pytest.fixture(scope="module")
+def room(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A world without models; `crate.yaml` is beside it."""
+    folder = tmp_path_factory.mktemp("room")
+    for name, text in (
+        ("world.yaml", WORLD),
+        ("map.yaml", MAP),
+        ("walls.dat", WALLS),
+        ("crate.yaml", CRATE),
+    ):
+        (folder / name).write_text(text)
+    return folder / "world.yaml"
+
+
+def test_ros_tools_find_the_packages(space, checkout):
+    for package in PACKAGES:
+        found = Path(space.run("rospack", "find", package).strip()).resolve()
+        in_space = space.folder / "share" / package
+        assert found == (checkout / "compat" / package if space.name == "devel" else in_space)
+    assert "Collision[] collisions" in space.run("rosmsg", "show", "-r", "flatland_msgs/Collisions")
+    for name in ("SpawnModel", "MoveModel", "DeleteModel"):
+        md5 = {space.run("rossrv", "md5", f"{package}/{name}") for package in PACKAGES[:1]}
+        assert md5 == {space.run("rossrv", "md5", f"flatland/{name}")}
+
+
+def test_python_code_is_generated(space):
+    printed = space.run(
+        "/usr/bin/python3",
+        "-c",
+        "import flatland_msgs.msg as m, flatland_msgs.srv as s; "
+        "print(m.__file__, m.Collisions._type, m.Collisions._slot_types[1], s.SpawnModel._type)",
+    )
+    path, *types = printed.split()
+    assert Path(path).is_relative_to(space.folder)
+    assert types == [
+        "flatland_msgs/Collisions",
+        "flatland_msgs/Collision[]",
+        "flatland_msgs/SpawnModel",
+    ]
+
+
+def test_a_clone_in_a_workspace_needs_nothing_else(catkin_workspace):
+    """The packages are found without further links, and no other package of the checkout is."""
+    linked = {path.name for path in (catkin_workspace / "src").iterdir()}
+    assert linked == {"CMakeLists.txt", "flatland", "my_robots", "a_client"}
+    environment = {"PATH": "/usr/bin:/bin", "ROS_PACKAGE_PATH": str(catkin_workspace / "src")}
+    listed = subprocess.run(
+        ["rospack", "list-names"], env=environment, capture_output=True, text=True, check=True
+    ).stdout.split()
+    assert sorted(listed) == sorted(["a_client", "flatland", "my_robots", *PACKAGES])
+
+
+def test_cpp_client_of_the_reference(space, room):
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        port = free.getsockname()[1]
+    environment = {**space.environment, "ROS_MASTER_URI": f"http://127.0.0.1:{port}"}
+    log = space.scratch / f"{space.name}.log"
+    command = ["roslaunch", "-p", str(port), "flatland_server", "server.launch"]
+    with log.open("w") as output:
+        launch = subprocess.Popen(
+            [*command, f"world_path:={room}", "show_viz:=true", "use_rviz:=true"],
+            env=environment,
+            cwd=space.scratch,
+            stdout=output,
+            stderr=subprocess.STDOUT,
+            start_new_session=True,
+        )
+    client = space.folder / "lib" / "a_client" / "a_client"
+    try:
+        done = subprocess.run(
+            [client, room.with_name("crate.yaml")],
+            env=environment,
+            timeout=TIMEOUT,
+            capture_output=True,
+            text=True,
+        )
+        types = space.run(
+            "env",
+            f"ROS_MASTER_URI={environment['ROS_MASTER_URI']}",
+            "rosservice",
+            "type",
+            "/spawn_model",
+        )
+        os.kill(launch.pid, signal.SIGINT)
+        assert launch.wait(TIMEOUT) == 0, log.read_text()
+    finally:
+        if launch.poll() is None:
+            os.killpg(launch.pid, signal.SIGKILL)
+    assert done.stdout.splitlines() == RESULTS, done.stdout + done.stderr + log.read_text()
+    assert done.returncode == 0
+    assert types == "flatland_msgs/SpawnModel\n"
