@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+import rosservice
 from geometry_msgs.msg import Pose2D
 from nav_msgs.msg import Odometry
 from rosgraph_msgs.msg import Clock
