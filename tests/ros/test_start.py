@@ -202,6 +202,7 @@ def test_server_launch_passes_all_parameters(launcher: Any, ros: Any, world: Pat
         "plugin_timeout": 30,
         "shutdown_timeout": 5,
         "if_blocked": "warn",
+        "msgs_package": "flatland",
     }
     assert ros.master.getParam("/use_sim_time") is True
     process.wait_for_line("real-time factor: target inf")
