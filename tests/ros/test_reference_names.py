@@ -200,7 +200,8 @@ def test_launch_files_of_the_reference_work_unedited(
     master = module_ros.master
 
     def is_ready() -> bool:
-        assert launched.running, launched.output
+        if not launched.running:
+            pytest.fail(launched.output)
         names = {name for name, _nodes in master.getSystemState()[2]}
         return f"/{form.name}/toggle_pause" in names
 
