@@ -1,5 +1,6 @@
 # Development build: `make dev` builds the extension and the messages in the source tree, for use with
-# PYTHONPATH=<checkout>. The package flatland_msgs is generated beside the package flatland. Any other package folder gets a relay to the source tree, like the devel space of catkin.
+# PYTHONPATH=<checkout>. The package flatland_msgs is generated beside the package flatland. Any other package
+# folder gets a relay to the source tree, like the devel space of catkin.
 include(${CMAKE_CURRENT_LIST_DIR}/messages.cmake)
 set(FLATLAND_PACKAGE_DIR ${PROJECT_SOURCE_DIR}/flatland CACHE PATH "Folder of the package flatland")
 set(FLATLAND_CORE_OUTPUT_DIR ${FLATLAND_PACKAGE_DIR})

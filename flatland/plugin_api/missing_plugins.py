@@ -150,7 +150,7 @@ class LookupHints:
             text += f"; a C++ plugin of that name is exported by {' and '.join(places)}"
         alternative = alternative_to(type_name)
         if alternative:
-            text += f"; this is a plugin of a fork of the reference: {alternative}"
+            text += f"; forks of the reference have a plugin of that name: {alternative}"
         return text
 
     def advise(self, type_names: Collection[str]) -> str:

@@ -7,12 +7,14 @@ from __future__ import annotations
 
 import itertools
 import textwrap
+import xml.etree.ElementTree as ElementTree
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import pytest
+import roslaunch.config
 import rosservice
 from geometry_msgs.msg import Pose2D
 from nav_msgs.msg import Odometry
@@ -247,3 +249,72 @@ def test_parameters_of_an_outer_namespace_are_used(launched: Any, module_ros: An
         message.header.stamp.to_nsec() for message in module_ros.topic(topic, Odometry).take(5)
     ]
     assert {b - a for a, b in itertools.pairwise(stamps)} == {100_000_000}
+
+
+@pytest.mark.parametrize(
+    ("file", "defaults"),
+    [
+        (
+            "server.launch",
+            {
+                "update_rate": "200.0",
+                "step_size": "0.005",
+                "show_viz": "true",
+                "viz_pub_rate": "30.0",
+                "use_rviz": "false",
+            },
+        ),
+        (
+            "benchmark.launch",
+            {
+                "update_rate": "200.0",
+                "step_size": "0.005",
+                "benchmark_duration": "60.0",
+                "use_perf": "false",
+                "show_viz": "true",
+                "simplify_map": "2",
+            },
+        ),
+    ],
+)
+def test_arguments_and_defaults_of_the_reference(
+    checkout: Path, file: str, defaults: dict[str, str]
+) -> None:
+    path = checkout / "compat" / "flatland_server" / "launch" / file
+    arguments = {
+        element.get("name"): element.get("default")
+        for element in ElementTree.parse(path).getroot().findall("arg")
+        if element.get("value") is None
+    }
+    assert arguments.pop("world_path")
+    assert arguments == defaults
+
+
+def test_benchmark_of_the_reference(launcher: Any, ros: Any, world: Path) -> None:
+    process = launcher.launch(
+        "flatland_server",
+        "benchmark.launch",
+        f"world_path:={world}",
+        "update_rate:=10",  # without effect
+        "step_size:=0.01",
+        "benchmark_duration:=100",
+        "show_viz:=true",
+        "simplify_map:=1",
+    )
+    process.wait_for_line("benchmark: 10000 iterations")
+    assert process.wait() == 0
+    parameters = ros.master.getParam("/flatland_benchmark")
+    assert parameters["simplify_map"] == 1
+
+
+def test_perf_records_the_benchmark_on_request(
+    ros_environment: dict[str, str], checkout: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("ROS_PACKAGE_PATH", ros_environment["ROS_PACKAGE_PATH"])
+    path = checkout / "compat" / "flatland_server" / "launch" / "benchmark.launch"
+    for given, prefix in (("false", None), ("true", "perf record --call-graph dwarf")):
+        files = [(str(path), [f"use_perf:={given}"])]
+        config = roslaunch.config.load_config_default(files, None, verbose=False)
+        [node] = config.nodes
+        assert (node.package, node.type) == ("flatland_server", "flatland_server")
+        assert (node.launch_prefix or None) == prefix or node.launch_prefix.startswith(prefix)

@@ -255,7 +255,7 @@ def test_a_cpp_class_with_a_base_class_of_flatland_is_reported(files, monkeypatc
     ],
 )
 def test_alternatives_to_the_plugins_of_forks(type_name, advice):
-    text = find_error(type_name).split("; this is a plugin of a fork of the reference: ")[1]
+    text = find_error(type_name).split("; forks of the reference have a plugin of that name: ")[1]
     assert advice in text
 
 
