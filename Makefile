@@ -96,4 +96,4 @@ sanitize: setup-dev  ## run unit tests with sanitizers in the extension: make sa
 
 .PHONY: clean
 clean:  ## remove all build results and .venv
-	rm -rf $(VENV) build flatland/_core*.so flatland/msg flatland/srv
+	rm -rf $(VENV) build flatland/_core*.so flatland/msg flatland/srv flatland_msgs

@@ -9,8 +9,10 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from flatland.errors import PluginError
+from flatland.plugin_api.fork_plugins import alternative_to
 from flatland.plugin_api.manifest import (
     INCLUDED_PACKAGE,
+    PORTING_GUIDE,
     listed_manifests,
     lookup_name,
     read_reference_names,
@@ -21,7 +23,6 @@ if TYPE_CHECKING:
     from flatland.config.reader import YamlReader
     from flatland.plugin_api.registry import PluginRegistry
 
-PORTING_GUIDE = 'section "From a C++ plugin" of docs/write_a_plugin.md'
 # Plugins for tests of manifests, which are no useful suggestions.
 _UNLISTED = {f"{INCLUDED_PACKAGE}::Dummy{kind}Plugin" for kind in ("Model", "World")}
 _MIN_SIMILARITY = 0.7  # of a suggestion to the missing name
@@ -132,7 +133,8 @@ class LookupHints:
     def describe(self, type_name: str) -> str:
         """Returns a text about one `type:` of a YAML file.
 
-        It contains similar known names, and the packages that export a C++ plugin of that name.
+        It contains similar known names, the packages that export a C++ plugin of that name, and
+        what to use instead of a plugin of a known fork of the reference.
         """
         name = lookup_name(type_name)
         text = f'no plugin "{name}"'
@@ -146,6 +148,9 @@ class LookupHints:
         places = self._reference_plugins.get(name) or self._reference_plugins.get(type_name)
         if places:
             text += f"; a C++ plugin of that name is exported by {' and '.join(places)}"
+        alternative = alternative_to(type_name)
+        if alternative:
+            text += f"; forks of the reference have a plugin of that name: {alternative}"
         return text
 
     def advise(self, type_names: Collection[str]) -> str:

@@ -7,6 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from flatland.maps.occupancy_grid import DEFAULT_RESOLUTION
+from flatland.ros.message_types import MESSAGE_PACKAGES, OWN_PACKAGE
 from flatland.ros.shutdown import DEFAULT_SHUTDOWN_TIMEOUT
 from flatland.runtime.placement import IF_BLOCKED, IfBlocked
 from flatland.simulation import MAX_LAG
@@ -52,6 +53,7 @@ class NodeParameters:
             None for no map.
         map_frame: Frame of the map.
         map_resolution: Size of a cell of the map of a layer without an image [m].
+        msgs_package: Package of the message and service types, `flatland` or `flatland_msgs`.
     """
 
     world_path: str
@@ -73,13 +75,17 @@ class NodeParameters:
     publish_map: str | None
     map_frame: str
     map_resolution: float
+    msgs_package: str
 
 
-def read_parameters(get: ParameterSource) -> NodeParameters:
+def read_parameters(
+    get: ParameterSource, *, default_msgs_package: str = OWN_PACKAGE
+) -> NodeParameters:
     """Reads and checks all parameters of the node.
 
     Args:
         get: Returns the value of a parameter of the node, None if it is not set.
+        default_msgs_package: Default of `msgs_package`.
 
     Raises:
         ParameterError: A parameter is missing or invalid.
@@ -105,6 +111,7 @@ def read_parameters(get: ParameterSource) -> NodeParameters:
         publish_map=reader.optional_name("publish_map"),
         map_frame=reader.frame("map_frame", "map"),
         map_resolution=reader.finite_positive("map_resolution", DEFAULT_RESOLUTION),
+        msgs_package=reader.msgs_package("msgs_package", default_msgs_package),
     )
 
 
@@ -239,6 +246,14 @@ class _Reader:
         if not isinstance(value, str) or not value.strip(" /"):
             raise _invalid(name, "the name of a frame", value)
         return value.strip().lstrip("/")
+
+    def msgs_package(self, name: str, default: str) -> str:
+        value = self._get(name)
+        if value is None:
+            return default
+        if not isinstance(value, str) or value not in MESSAGE_PACKAGES:
+            raise _invalid(name, " or ".join(MESSAGE_PACKAGES), value)
+        return value
 
     def natural(self, name: str) -> int | None:
         wanted = "an integer that is not negative"

@@ -317,17 +317,21 @@ def ros_environment(checkout: Path, tmp_path_factory: pytest.TempPathFactory) ->
 
 
 def _overlay(checkout: Path, folder: Path) -> Path:
-    """Creates the layout of an installed package, with links into the source tree."""
-    share = folder / "share" / "flatland"
-    (share / "scripts").mkdir(parents=True)
-    for name in ("package.xml", "flatland_plugins.xml", "launch", "msg", "rviz", "srv", "worlds"):
-        (share / name).symlink_to(checkout / name)
-    for script in (checkout / "scripts").iterdir():
-        if script.is_file():
-            starter = share / "scripts" / script.name
-            starter.write_text(f'#!/bin/sh\nexec "{sys.executable}" "{script}" "$@"\n')
-            starter.chmod(0o755)
-    return share.parent
+    """Creates the layout of the installed packages, with links into the source tree."""
+    share = folder / "share"
+    for package in (checkout / "catkin" / "flatland", *(checkout / "compat").iterdir()):
+        installed = share / package.name
+        (installed / "scripts").mkdir(parents=True)
+        data = ("package.xml", "flatland_plugins.xml", "launch", "msg", "rviz", "srv", "worlds")
+        for name in data:
+            if (package / name).exists():
+                (installed / name).symlink_to(package / name)
+        for script in (package / "scripts").glob("*"):
+            if script.is_file():
+                starter = installed / "scripts" / script.name
+                starter.write_text(f'#!/bin/sh\nexec "{sys.executable}" "{script}" "$@"\n')
+                starter.chmod(0o755)
+    return share
 
 
 @pytest.fixture(scope="session")

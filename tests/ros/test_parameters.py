@@ -39,6 +39,7 @@ def test_defaults() -> None:
         publish_map="",
         map_frame="map",
         map_resolution=0.05,
+        msgs_package="flatland",
     )
 
 
@@ -91,6 +92,8 @@ def test_defaults() -> None:
         ("map_frame", "/map", "map"),
         ("map_resolution", "0.1", 0.1),
         ("map_resolution", 1, 1.0),
+        ("msgs_package", "flatland", "flatland"),
+        ("msgs_package", "flatland_msgs", "flatland_msgs"),
     ],
 )
 def test_valid_values(name: str, value: object, expected: object) -> None:
@@ -163,6 +166,10 @@ def test_invalid_numbers(name: str, value: object) -> None:
         ("initialpose_model", True),
         ("initialpose_model", ["robot"]),
         ("initialpose_model", 1.5),
+        ("msgs_package", "std_msgs"),
+        ("msgs_package", ""),
+        ("msgs_package", True),
+        ("msgs_package", ["flatland"]),
         ("world_path", 5),
         ("world_path", ["a"]),
     ],

@@ -213,6 +213,7 @@ def test_server_launch_passes_all_parameters(launcher: Any, ros: Any, world: Pat
         "use_sim_time": True,
         "clock_rate": 500,
         "publish_map": "2d",
+        "msgs_package": "flatland",
     }
     assert ros.master.getParam("/use_sim_time") is True
     ros.log_everything()

@@ -349,7 +349,7 @@ def run_into_broken_pipe(arguments, folder, **options):
 
 def test_version_equals_that_of_the_packages(checkout):
     project = tomllib.loads((checkout / "pyproject.toml").read_text())["project"]
-    package = ElementTree.parse(checkout / "package.xml").getroot()
+    package = ElementTree.parse(checkout / "catkin" / "flatland" / "package.xml").getroot()
     assert flatland.__version__ == project["version"] == package.findtext("version")
     assert project["scripts"]["flatland"] == "flatland.cli:main"
     done = run("--version")
