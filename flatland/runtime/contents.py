@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
+from flatland.config.reader import ReadYaml, YamlReader
 from flatland.errors import WorldError
 from flatland.geometry import DoubleArray
 from flatland.runtime.placement import IfBlocked, Models, check_if_blocked
@@ -43,7 +44,10 @@ class Contents:
         ports: All outputs and commands by resolved topic.
         requests: The queue of actions that run between two steps.
         transform_buffer: Collects the transforms of plugins.
+        read_yaml: Loads a model file; `YamlReader.from_file`, or a method that collects errors.
     """
+
+    read_yaml: ReadYaml = YamlReader.from_file
 
     layers: list[Layer]
     plugin_host: PluginHost

@@ -1,0 +1,278 @@
+"""A reader that collects the errors of files instead of raising the first one."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager
+from typing import Any, Self, TypeVar, Unpack
+
+from flatland.config import hints
+from flatland.config.convert import TUPLE_SIZES, Key, Kind, Limits, NodeKind
+from flatland.config.node import ListNode, MapNode, Node, NullNode
+from flatland.config.preprocessor import Params, preprocess_file
+from flatland.config.reader import REQUIRED, YamlReader
+from flatland.errors import FlatlandError, Place, YamlError
+
+R = TypeVar("R")
+
+
+class FollowUpError(YamlError):
+    """An error that results from another one, which has been collected."""
+
+
+class ErrorCollector:
+    """The errors of some files in the order in which they were found, without duplicates.
+
+    Attributes:
+        errors: The errors.
+        place: Position of the entry that is being loaded, None at the end.
+    """
+
+    def __init__(self) -> None:
+        """Creates an empty list."""
+        self.errors: list[FlatlandError] = []
+        self.place: Place | None = None
+        self._seen: set[tuple[Place | None, str]] = set()
+        self._model = ""
+        self._stand_ins = 0
+        # By id; the nodes are kept because the id of a deleted object can be reused.
+        self._unexpanded: dict[int, Node] = {}
+
+    def read(self, path: str | os.PathLike[str], params: Params = None) -> CollectingReader:
+        """Loads a file; its reader and all readers of its entries collect errors.
+
+        Raises:
+            YamlError: The file cannot be read or is not valid YAML.
+        """
+        return CollectingReader(preprocess_file(os.fspath(path), params, self._keep)).into(self)
+
+    def add(self, error: FlatlandError) -> None:
+        """Adds an error, unless it results from others or was added for another model."""
+        if isinstance(error, FollowUpError) or isinstance(error.__cause__, FollowUpError):
+            return
+        for part in error.parts():
+            text = part.message
+            if self._model:  # models of one file have the same errors
+                text = text.replace(f'"{self._model}"', '""')
+                text = text.replace(f'"{self._model.lower()}"', '""')
+            if (part.place, text) not in self._seen:
+                self._seen.add((part.place, text))
+                self.errors.append(part)
+
+    @contextmanager
+    def at(self, place: Place | None) -> Iterator[None]:
+        """Sets `place` for a block, which an error ends; the error is added."""
+        outer, self.place = self.place, place
+        try:
+            yield
+        except FlatlandError as error:
+            self.add(error)
+        finally:
+            self.place = outer
+
+    @contextmanager
+    def model(self, name: str) -> Iterator[None]:
+        """Sets the name of the model that is loaded in a block."""
+        outer, self._model = self._model, name
+        try:
+            yield
+        finally:
+            self._model = outer
+
+    def is_unexpanded(self, node: Node | None) -> bool:
+        """Returns whether a node is a `$eval` or `$include` that failed."""
+        return id(node) in self._unexpanded
+
+    def new_name(self) -> str:
+        """Returns a name in place of a missing one."""
+        self._stand_ins += 1
+        return f"(unknown {self._stand_ins})"
+
+    def _keep(self, error: YamlError, node: Node) -> None:
+        self.add(error)
+        self._unexpanded[id(node)] = node
+
+
+class CollectingReader(YamlReader):
+    """A reader that adds errors to an `ErrorCollector` and continues.
+
+    In place of an invalid value it returns the default, or a stand-in if the value is required.
+    Errors that the caller creates about stand-ins are follow-up errors and not collected.
+    """
+
+    _collector: ErrorCollector
+    _is_stand_in: bool
+    _bad_keys: set[Key]  # shared like the record of the keys that were read
+
+    def into(
+        self, collector: ErrorCollector, bad_keys: set[Key] | None = None, stand_in: bool = False
+    ) -> Self:
+        """Sets the collector and returns the reader.
+
+        Args:
+            collector: Receives the errors.
+            bad_keys: Keys whose required values are missing or invalid.
+            stand_in: Whether the node stands in for an invalid one.
+        """
+        self._collector = collector
+        self._bad_keys = set() if bad_keys is None else bad_keys
+        self._is_stand_in = stand_in
+        return self
+
+    # -- reading ---------------------------------------------------------------------------
+
+    def get(
+        self, key: Key, kind: Kind, default: object = REQUIRED, **limits: Unpack[Limits]
+    ) -> Any:
+        """Reads an entry; see `YamlReader.get`."""
+
+        def read(reader: Any) -> Any:
+            return reader.get(key, kind, default, **limits)
+
+        return self._read(key, kind, default, limits, read)
+
+    def get_list(self, key: Key, kind: Kind, default: object = REQUIRED, **options: Any) -> Any:
+        """Reads an entry as a list; see `YamlReader.get_list`."""
+
+        def read(reader: Any) -> Any:
+            return reader.get_list(key, kind, default, **options)
+
+        size = options.get("size") or options.get("min_size", 0)
+        limits = {key: options[key] for key in ("minimum", "maximum") if key in options}
+        return self._read(key, kind, default, limits, read, size)
+
+    def _read(
+        self,
+        key: Key,
+        kind: Kind,
+        default: object,
+        limits: Any,
+        read: Callable[[YamlReader], Any],
+        size: int | None = None,
+    ) -> Any:
+        strict = self._strict()
+        if not (self._is_stand_in or self._collector.is_unexpanded(strict._find_quietly(key))):
+            try:
+                return read(strict)
+            except YamlError as error:
+                self._collector.add(error)
+        if default is not REQUIRED:
+            return default
+        self._bad_keys.add(key)
+        if size is None:
+            return self._stand_in(kind, limits)
+        return [self._stand_in(kind, limits) for _ in range(size)]
+
+    def _stand_in(self, kind: Kind, limits: Limits) -> Any:
+        if kind in ("string", str):
+            return self._collector.new_name()
+        if kind in ("bool", bool):
+            return False
+        number = 1.0
+        minimum, maximum = limits.get("minimum"), limits.get("maximum")
+        if minimum is not None:
+            number = max(number, minimum)
+        if maximum is not None:
+            number = min(number, maximum)
+        if kind in ("int", int):
+            return int(number)
+        if kind in ("float", float):
+            return number
+        return (number,) * TUPLE_SIZES.get(str(kind), 2)
+
+    def subnode(self, key: Key, kind: NodeKind = "any") -> Self:
+        """Returns a reader of a required entry; see `TreeReader.subnode`."""
+        return self._sub(key, kind, lambda reader: reader.subnode(key, kind))
+
+    def optional_subnode(self, key: Key, kind: NodeKind = "any") -> Self:
+        """Returns a reader of an optional entry; see `TreeReader.optional_subnode`."""
+        return self._sub(key, kind, lambda reader: reader.optional_subnode(key, kind))
+
+    def _sub(self, key: Key, kind: NodeKind, open_: Callable[[YamlReader], YamlReader]) -> Self:
+        strict = self._strict()
+        found = strict._find_quietly(key)
+        if not (self._is_stand_in or key in self._bad_keys or self._collector.is_unexpanded(found)):
+            try:
+                entry = open_(strict)
+                return self._derived(entry._node, entry.location, entry.name)
+            except YamlError as error:
+                self._collector.add(error)
+        self._bad_keys.add(key)
+        source, line = self._node.source, self._node.line
+        nodes: dict[NodeKind, Node] = {
+            "list": ListNode(source, line),
+            "map": MapNode(source, line),
+            "any": NullNode(source, line),
+        }
+        return self._reader(nodes[kind], key).into(self._collector, stand_in=True)
+
+    def ensure_accessed_all(self) -> None:
+        """Adds an error for each key of the map that has not been read."""
+        node = self._node
+        if self._is_stand_in or not isinstance(node, MapNode):
+            return
+        known = self._accessed - set(node.entries)
+        for key in self.unread_keys():
+            message = f'Entry {self._label()}contains unrecognized entry(s) {{"{key}"}}'
+            hint = hints.unknown_key(key, known)
+            self._collector.add(self._strict()._error(message, node.key_lines[key], hint))
+
+    # -- errors of the caller --------------------------------------------------------------
+
+    def error(self, message: str, hint: str = "") -> YamlError:
+        """Returns an error about the node; see `TreeReader.error`."""
+        error = super().error(message, hint)
+        return FollowUpError(error.message) if self._is_stand_in or self._bad_keys else error
+
+    def invalid(self, key: Key, why: str) -> YamlError:
+        """Returns an error about the value of an entry; see `TreeReader.invalid`."""
+        error = self._strict().invalid(key, why)
+        is_follow_up = self._is_stand_in or key in self._bad_keys
+        return FollowUpError(error.message) if is_follow_up else error
+
+    def report(self, error: FlatlandError) -> None:
+        """Adds an error."""
+        self._collector.add(error)
+
+    def collect_errors(self) -> AbstractContextManager[None]:
+        """Returns a context in which an error ends only the block, and is added."""
+        return self._collector.at(self.place)
+
+    def collect_errors_of_model(self, name: str) -> AbstractContextManager[None]:
+        """Returns a context for the loading of a model, whose errors may occur in others too."""
+        return self._collector.model(name)
+
+    def attempt(self, action: Callable[[Any], R]) -> R | None:
+        """Returns the result of an action, which collects errors only if it raises one.
+
+        Code that catches the errors of some values thus works as usual.
+        """
+        try:
+            return action(self._strict())
+        except FlatlandError as error:
+            first = error
+        before = len(self._collector.errors)
+        result = None
+        try:
+            result = action(self)
+        except FlatlandError as error:
+            cause = error.__cause__
+            # Other exceptions may be raised because of a stand-in.
+            if len(self._collector.errors) == before or isinstance(cause, YamlError):
+                self._collector.add(error)
+        if len(self._collector.errors) == before:
+            self._collector.add(first)
+        return result
+
+    # -- other readers ---------------------------------------------------------------------
+
+    def _strict(self) -> YamlReader:
+        """Returns a reader of the same node, with the same record of keys, that raises errors."""
+        reader = YamlReader(self._node, self.location, self.name)
+        reader._accessed = self._accessed
+        return reader
+
+    def _derived(self, node: Node, location: str, name: str) -> Self:
+        reader = type(self)(node, location, name)
+        return reader.into(self._collector, stand_in=self._is_stand_in)
