@@ -4,6 +4,10 @@
 the plugin interface. This package does not require ROS, except for the ROS node `flatland.ros`.
 """
 
+from flatland.requirements import check_requirements
+
+check_requirements()  # otherwise, a traceback would be all that a user sees
+
 from flatland.config.reader import YamlReader
 from flatland.drawing import draw
 from flatland.entities.body import Body

@@ -26,18 +26,20 @@ class ErrorCollector:
 
     Attributes:
         errors: The errors.
+        found: Number of errors with duplicates.
         place: Position of the entry that is being loaded, None at the end.
     """
 
     def __init__(self) -> None:
         """Creates an empty list."""
         self.errors: list[FlatlandError] = []
+        self.found = 0
         self.place: Place | None = None
         self._seen: set[tuple[Place | None, str]] = set()
         self._model = ""
         self._stand_ins = 0
         # By id; the nodes are kept because the id of a deleted object can be reused.
-        self._unexpanded: dict[int, Node] = {}
+        self._unusable: dict[int, Node] = {}
 
     def read(self, path: str | os.PathLike[str], params: Params = None) -> CollectingReader:
         """Loads a file; its reader and all readers of its entries collect errors.
@@ -51,6 +53,7 @@ class ErrorCollector:
         """Adds an error, unless it results from others or was added for another model."""
         if isinstance(error, FollowUpError) or isinstance(error.__cause__, FollowUpError):
             return
+        self.found += 1
         for part in error.parts():
             text = part.message
             if self._model:  # models of one file have the same errors
@@ -80,9 +83,13 @@ class ErrorCollector:
         finally:
             self._model = outer
 
-    def is_unexpanded(self, node: Node | None) -> bool:
-        """Returns whether a node is a `$eval` or `$include` that failed."""
-        return id(node) in self._unexpanded
+    def is_unusable(self, node: Node | None) -> bool:
+        """Returns whether a node is a `$eval` or `$include` that failed, or was marked."""
+        return id(node) in self._unusable
+
+    def mark_unusable(self, node: Node) -> None:
+        """Makes readers return the default or a stand-in in place of a node."""
+        self._unusable[id(node)] = node
 
     def new_name(self) -> str:
         """Returns a name in place of a missing one."""
@@ -91,7 +98,13 @@ class ErrorCollector:
 
     def _keep(self, error: YamlError, node: Node) -> None:
         self.add(error)
-        self._unexpanded[id(node)] = node
+        self.mark_unusable(node)
+
+
+class _ValueError(YamlError):
+    """An error that a caller created about a node."""
+
+    node: Node
 
 
 class CollectingReader(YamlReader):
@@ -152,7 +165,9 @@ class CollectingReader(YamlReader):
         size: int | None = None,
     ) -> Any:
         strict = self._strict()
-        if not (self._is_stand_in or self._collector.is_unexpanded(strict._find_quietly(key))):
+        if isinstance(key, str):
+            self._accessed.add(key)
+        if not (self._is_stand_in or self._collector.is_unusable(strict._find_quietly(key))):
             try:
                 return read(strict)
             except YamlError as error:
@@ -191,8 +206,10 @@ class CollectingReader(YamlReader):
 
     def _sub(self, key: Key, kind: NodeKind, open_: Callable[[YamlReader], YamlReader]) -> Self:
         strict = self._strict()
+        if isinstance(key, str):
+            self._accessed.add(key)
         found = strict._find_quietly(key)
-        if not (self._is_stand_in or key in self._bad_keys or self._collector.is_unexpanded(found)):
+        if not (self._is_stand_in or key in self._bad_keys or self._collector.is_unusable(found)):
             try:
                 entry = open_(strict)
                 return self._derived(entry._node, entry.location, entry.name)
@@ -213,7 +230,10 @@ class CollectingReader(YamlReader):
         if self._is_stand_in or not isinstance(node, MapNode):
             return
         known = self._accessed - set(node.entries)
+        misspelled = [key for key in self._bad_keys if isinstance(key, str) and key in known]
         for key in self.unread_keys():
+            if hints.did_you_mean(key, misspelled):
+                continue  # part of the error about the missing key
             message = f'Entry {self._label()}contains unrecognized entry(s) {{"{key}"}}'
             hint = hints.unknown_key(key, known)
             self._collector.add(self._strict()._error(message, node.key_lines[key], hint))
@@ -223,13 +243,15 @@ class CollectingReader(YamlReader):
     def error(self, message: str, hint: str = "") -> YamlError:
         """Returns an error about the node; see `TreeReader.error`."""
         error = super().error(message, hint)
-        return FollowUpError(error.message) if self._is_stand_in or self._bad_keys else error
+        is_follow_up = self._is_stand_in or bool(self._bad_keys)
+        return FollowUpError(error.message) if is_follow_up else _located(error, self._node)
 
     def invalid(self, key: Key, why: str) -> YamlError:
         """Returns an error about the value of an entry; see `TreeReader.invalid`."""
         error = self._strict().invalid(key, why)
         is_follow_up = self._is_stand_in or key in self._bad_keys
-        return FollowUpError(error.message) if is_follow_up else error
+        node = self._find_quietly(key) or self._node
+        return FollowUpError(error.message) if is_follow_up else _located(error, node)
 
     def report(self, error: FlatlandError) -> None:
         """Adds an error."""
@@ -246,23 +268,30 @@ class CollectingReader(YamlReader):
     def attempt(self, action: Callable[[Any], R]) -> R | None:
         """Returns the result of an action, which collects errors only if it raises one.
 
-        Code that catches the errors of some values thus works as usual.
+        Code that catches the errors of some values thus works as usual. After an error about a
+        value, the action is repeated with a stand-in for this value.
         """
         try:
             return action(self._strict())
         except FlatlandError as error:
             first = error
-        before = len(self._collector.errors)
+        collector = self._collector
+        before = collector.found
         result = None
-        try:
-            result = action(self)
-        except FlatlandError as error:
-            cause = error.__cause__
-            # Other exceptions may be raised because of a stand-in.
-            if len(self._collector.errors) == before or isinstance(cause, YamlError):
-                self._collector.add(error)
-        if len(self._collector.errors) == before:
-            self._collector.add(first)
+        while True:
+            try:
+                result = action(self)
+                break
+            except FlatlandError as error:
+                cause = error if isinstance(error, YamlError) else error.__cause__
+                # Other exceptions may be raised because of a stand-in.
+                if isinstance(cause, YamlError) or collector.found == before:
+                    collector.add(error)
+                if not isinstance(cause, _ValueError) or collector.is_unusable(cause.node):
+                    break
+                collector.mark_unusable(cause.node)
+        if collector.found == before:
+            collector.add(first)
         return result
 
     # -- other readers ---------------------------------------------------------------------
@@ -276,3 +305,9 @@ class CollectingReader(YamlReader):
     def _derived(self, node: Node, location: str, name: str) -> Self:
         reader = type(self)(node, location, name)
         return reader.into(self._collector, stand_in=self._is_stand_in)
+
+
+def _located(error: YamlError, node: Node) -> YamlError:
+    located = _ValueError(error.message, place=error.place, hint=error.hint)
+    located.node = node
+    return located

@@ -67,6 +67,8 @@ def unknown_key(key: str, known: Iterable[str]) -> str:
         key: The key.
         known: Keys that are not in the map but would have been used.
     """
+    if key.isdigit():
+        return "decimals are written with a point, as in 0.5"
     known = sorted(known)
     similar = did_you_mean(key, known)
     if similar or key.lower() in _UNKNOWN_KEYS:
@@ -137,8 +139,8 @@ def similar_file(path: str) -> str:
 
 def malformed(why: str) -> str:
     """Returns a hint for a text that is not valid YAML."""
-    if "cannot start any token" in why and "\\t" in why:
-        return "YAML is indented with spaces, not with tabs"
+    if "cannot start any token" in why:
+        return "indent with spaces, not with tabs, and quote values that start with @, ` or %"
     if "mapping values are not allowed" in why:
         return "check the indentation, and quote values that contain a colon"
     if "did not find expected" in why:

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 PORTING_GUIDE = 'section "From a C++ plugin" of docs/write_a_plugin.md'
 # Plugins for tests of manifests, which are no useful suggestions.
 _UNLISTED = {f"{INCLUDED_PACKAGE}::Dummy{kind}Plugin" for kind in ("Model", "World")}
+_HINT = f'"enabled: false" skips the plugin; C++ plugins must be ported to Python, {PORTING_GUIDE}'
 _MIN_SIMILARITY = 0.7  # of a suggestion to the missing name
 _MAX_SUGGESTIONS = 3
 
@@ -110,7 +111,7 @@ def missing_plugins_error(
         if owners[0] is not None:
             text += " model " + ", ".join(f'"{owner}"' for owner in owners)
         text += f": {hints.describe(type_name)}"
-        missing.append(PluginError(text + place.suffix, place=place, hint=advice))
+        missing.append(PluginError(text + place.suffix, place=place, hint=_HINT))
     if len(missing) == 1:
         return MissingPluginsError(f"{text}; {advice}{place.suffix}", missing)
     return MissingPluginsError("\n".join([*(error.message for error in missing), advice]), missing)
