@@ -40,6 +40,7 @@ class ErrorCollector:
         self._stand_ins = 0
         # By id; the nodes are kept because the id of a deleted object can be reused.
         self._unusable: dict[int, Node] = {}
+        self._bad_spots: set[_Spot] = set()
 
     def read(self, path: str | os.PathLike[str], params: Params = None) -> CollectingReader:
         """Loads a file; its reader and all readers of its entries collect errors.
@@ -87,9 +88,24 @@ class ErrorCollector:
         """Returns whether a node is a `$eval` or `$include` that failed, or was marked."""
         return id(node) in self._unusable
 
-    def mark_unusable(self, node: Node) -> None:
-        """Makes readers return the default or a stand-in in place of a node."""
-        self._unusable[id(node)] = node
+    def is_bad(self, spot: _Spot) -> bool:
+        """Returns whether there is an error about the value of a spot."""
+        return spot in self._bad_spots
+
+    def mark(self, error: _ValueError) -> bool:
+        """Makes readers return the default or a stand-in in place of the value of an error.
+
+        Returns:
+            Whether this was not so before.
+        """
+        is_new = not self.is_unusable(error.node) or (
+            error.spot is not None and error.spot not in self._bad_spots
+        )
+        if error.node is not None:
+            self._unusable[id(error.node)] = error.node
+        if error.spot is not None:
+            self._bad_spots.add(error.spot)
+        return is_new and (error.node is not None or error.spot is not None)
 
     def new_name(self) -> str:
         """Returns a name in place of a missing one."""
@@ -98,13 +114,29 @@ class ErrorCollector:
 
     def _keep(self, error: YamlError, node: Node) -> None:
         self.add(error)
-        self.mark_unusable(node)
+        self._unusable[id(node)] = node
+
+
+_Spot = tuple[Place, str, str, Key]
+"""Place, location and name of a reader, and a key."""
 
 
 class _ValueError(YamlError):
-    """An error that a caller created about a node."""
+    """An error about a value.
 
-    node: Node
+    Attributes:
+        node: The value, None if it is missing.
+        spot: Where it was read, None if the caller created the error.
+    """
+
+    node: Node | None = None
+    spot: _Spot | None = None
+
+
+def _about(error: YamlError, node: Node | None, spot: _Spot | None = None) -> _ValueError:
+    result = _ValueError(error.message, place=error.place, hint=error.hint)
+    result.node, result.spot = node, spot
+    return result
 
 
 class CollectingReader(YamlReader):
@@ -116,6 +148,7 @@ class CollectingReader(YamlReader):
 
     _collector: ErrorCollector
     _is_stand_in: bool
+    _raises: bool = False
     _bad_keys: set[Key]  # shared like the record of the keys that were read
 
     def into(
@@ -164,20 +197,38 @@ class CollectingReader(YamlReader):
         read: Callable[[YamlReader], Any],
         size: int | None = None,
     ) -> Any:
-        strict = self._strict()
-        if isinstance(key, str):
-            self._accessed.add(key)
-        if not (self._is_stand_in or self._collector.is_unusable(strict._find_quietly(key))):
+        if not self._is_invalid(key):
             try:
-                return read(strict)
+                return read(self._strict())
             except YamlError as error:
-                self._collector.add(error)
+                self._handle(error, key)
         if default is not REQUIRED:
             return default
         self._bad_keys.add(key)
         if size is None:
             return self._stand_in(kind, limits)
         return [self._stand_in(kind, limits) for _ in range(size)]
+
+    def _is_invalid(self, key: Key) -> bool:
+        """Returns whether errors about an entry are known or follow from others."""
+        if isinstance(key, str):
+            self._accessed.add(key)
+        collector = self._collector
+        return (
+            self._is_stand_in
+            or collector.is_unusable(self._find_quietly(key))
+            or collector.is_bad(self._spot(key))
+        )
+
+    def _spot(self, key: Key) -> _Spot:
+        return (self.place, self.location, self.name, key)
+
+    def _handle(self, error: YamlError, key: Key) -> None:
+        located = _about(error, self._find_quietly(key), self._spot(key))
+        if self._raises:
+            raise located
+        self._collector.add(located)
+        self._collector.mark(located)
 
     def _stand_in(self, kind: Kind, limits: Limits) -> Any:
         if kind in ("string", str):
@@ -205,16 +256,12 @@ class CollectingReader(YamlReader):
         return self._sub(key, kind, lambda reader: reader.optional_subnode(key, kind))
 
     def _sub(self, key: Key, kind: NodeKind, open_: Callable[[YamlReader], YamlReader]) -> Self:
-        strict = self._strict()
-        if isinstance(key, str):
-            self._accessed.add(key)
-        found = strict._find_quietly(key)
-        if not (self._is_stand_in or key in self._bad_keys or self._collector.is_unusable(found)):
+        if not (self._is_invalid(key) or key in self._bad_keys):
             try:
-                entry = open_(strict)
+                entry = open_(self._strict())
                 return self._derived(entry._node, entry.location, entry.name)
             except YamlError as error:
-                self._collector.add(error)
+                self._handle(error, key)
         self._bad_keys.add(key)
         source, line = self._node.source, self._node.line
         nodes: dict[NodeKind, Node] = {
@@ -244,17 +291,19 @@ class CollectingReader(YamlReader):
         """Returns an error about the node; see `TreeReader.error`."""
         error = super().error(message, hint)
         is_follow_up = self._is_stand_in or bool(self._bad_keys)
-        return FollowUpError(error.message) if is_follow_up else _located(error, self._node)
+        return FollowUpError(error.message) if is_follow_up else _about(error, self._node)
 
     def invalid(self, key: Key, why: str) -> YamlError:
         """Returns an error about the value of an entry; see `TreeReader.invalid`."""
         error = self._strict().invalid(key, why)
         is_follow_up = self._is_stand_in or key in self._bad_keys
         node = self._find_quietly(key) or self._node
-        return FollowUpError(error.message) if is_follow_up else _located(error, node)
+        return FollowUpError(error.message) if is_follow_up else _about(error, node)
 
     def report(self, error: FlatlandError) -> None:
-        """Adds an error."""
+        """Adds an error, or raises it within `attempt`."""
+        if self._raises and not isinstance(error, FollowUpError):
+            raise error
         self._collector.add(error)
 
     def collect_errors(self) -> AbstractContextManager[None]:
@@ -266,33 +315,26 @@ class CollectingReader(YamlReader):
         return self._collector.model(name)
 
     def attempt(self, action: Callable[[Any], R]) -> R | None:
-        """Returns the result of an action, which collects errors only if it raises one.
+        """Returns the result of an action, which is repeated after each error about a value.
 
-        Code that catches the errors of some values thus works as usual. After an error about a
-        value, the action is repeated with a stand-in for this value.
+        Readers raise errors in the action, so that code that catches some of them works as usual.
+        When the action is repeated, they return the default or a stand-in for the value.
         """
-        try:
-            return action(self._strict())
-        except FlatlandError as error:
-            first = error
         collector = self._collector
         before = collector.found
-        result = None
+        reader = self._derived(self._node, self.location, self.name)
+        reader._accessed = self._accessed
+        reader._raises = True
         while True:
             try:
-                result = action(self)
-                break
+                return action(reader)
             except FlatlandError as error:
                 cause = error if isinstance(error, YamlError) else error.__cause__
                 # Other exceptions may be raised because of a stand-in.
                 if isinstance(cause, YamlError) or collector.found == before:
                     collector.add(error)
-                if not isinstance(cause, _ValueError) or collector.is_unusable(cause.node):
-                    break
-                collector.mark_unusable(cause.node)
-        if collector.found == before:
-            collector.add(first)
-        return result
+                if not (isinstance(cause, _ValueError) and collector.mark(cause)):
+                    return None
 
     # -- other readers ---------------------------------------------------------------------
 
@@ -303,11 +345,6 @@ class CollectingReader(YamlReader):
         return reader
 
     def _derived(self, node: Node, location: str, name: str) -> Self:
-        reader = type(self)(node, location, name)
-        return reader.into(self._collector, stand_in=self._is_stand_in)
-
-
-def _located(error: YamlError, node: Node) -> YamlError:
-    located = _ValueError(error.message, place=error.place, hint=error.hint)
-    located.node = node
-    return located
+        reader = type(self)(node, location, name).into(self._collector, stand_in=self._is_stand_in)
+        reader._raises = self._raises
+        return reader
