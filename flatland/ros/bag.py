@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 import os
+import warnings
 from collections.abc import Callable, Sequence
 from typing import Any
 
@@ -93,6 +94,9 @@ class BagRecorder(WorldObserver):
     def _write(self, topic: str, message: Any, time_ns: int | None = None) -> None:
         if time_ns is None:
             time_ns = self._world.timekeeper.sim_time_ns if self._world is not None else 0
-        self._bag.write(topic, message, convert.time(max(time_ns, _FIRST_TIME), Time))
+        with warnings.catch_warnings():
+            # genpy serializes arrays with a deprecated method of numpy.
+            warnings.simplefilter("ignore", DeprecationWarning)
+            self._bag.write(topic, message, convert.time(max(time_ns, _FIRST_TIME), Time))
         self.messages += 1
         self.topics.add(topic)

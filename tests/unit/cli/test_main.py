@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import argparse
 import os
+import shlex
 import subprocess
 import sys
 import tomllib
@@ -13,6 +15,7 @@ from flatland_command import main, run
 
 import flatland
 from flatland.cli import arguments
+from flatland.cli.main import make_parser
 
 
 class TestBrokenPipe:
@@ -78,3 +81,71 @@ def test_values_of_parameters_are_yaml():
     values = {"1": 1, "0.5": 0.5, "true": True, "a b": "a b", "": "", "a=b": "a=b"}
     for text, value in values.items():
         assert arguments.parameter(f"/x={text}") == ("/x", value)
+
+
+def test_completion(tmp_path):
+    """Answers the shell as argcomplete requires: the words are written to file descriptor 8."""
+    done = subprocess.run(
+        ["bash", "-c", f'"{sys.executable}" -m flatland 8>&1 9>/dev/null >/dev/null'],
+        env={
+            **os.environ,
+            "_ARGCOMPLETE": "1",
+            "_ARGCOMPLETE_IFS": "\n",
+            "_ARGCOMPLETE_SHELL": "bash",
+            "COMP_LINE": "flatland d",
+            "COMP_POINT": "10",
+            "COMP_TYPE": "9",
+        },
+        capture_output=True,
+        text=True,
+        timeout=60,
+    )
+    assert done.stdout.split() == ["doctor"]
+
+
+def test_interruption_ends_without_a_traceback(monkeypatch, capsys):
+    def interrupt(_options):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("flatland.cli.show._show", interrupt)
+    assert main("show", "w.yaml", "-o", "a.png") == 130
+    assert capsys.readouterr().err == "flatland: interrupted\n"
+
+
+COMMANDS = ("check", "info", "show", "run", "new", "doctor")
+
+
+def subparser(name: str) -> argparse.ArgumentParser:
+    """Returns the parser of a command."""
+    actions = make_parser()._subparsers._group_actions  # type: ignore[union-attr]
+    parser: argparse.ArgumentParser = actions[0].choices[name]
+    return parser
+
+
+def example_commands() -> list[str]:
+    """Returns the examples in the help of all commands."""
+    commands = []
+    for name in COMMANDS:
+        helped = subparser(name).format_help()
+        examples = helped.split("examples:\n")[1].strip().splitlines()
+        assert examples, name
+        commands += [example.strip() for example in examples]
+    return commands
+
+
+# test_doctor.py runs those of `flatland doctor`.
+@pytest.mark.parametrize(
+    "example", [text for text in example_commands() if not text.startswith("flatland doctor")]
+)
+def test_the_examples_of_the_help_run(checkout, tmp_path, monkeypatch, capsys, example):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "worlds").mkdir()
+    (tmp_path / "worlds" / "office").symlink_to(checkout / "worlds" / "office")
+    command, *words = shlex.split(example)
+    assert command == "flatland"
+    assert main(*words) == 0, capsys.readouterr()
+
+
+def test_all_commands_have_examples():
+    actions = make_parser()._subparsers._group_actions  # type: ignore[union-attr]
+    assert set(actions[0].choices) == set(COMMANDS)
