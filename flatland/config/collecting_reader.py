@@ -325,6 +325,7 @@ class CollectingReader(YamlReader):
         reader = self._derived(self._node, self.location, self.name)
         reader._accessed = self._accessed
         reader._raises = True
+        texts: set[str] = set()
         while True:
             try:
                 return action(reader)
@@ -333,8 +334,10 @@ class CollectingReader(YamlReader):
                 # Other exceptions may be raised because of a stand-in.
                 if isinstance(cause, YamlError) or collector.found == before:
                     collector.add(error)
-                if not (isinstance(cause, _ValueError) and collector.mark(cause)):
+                is_new = isinstance(cause, _ValueError) and collector.mark(cause)
+                if not is_new or error.message in texts:
                     return None
+                texts.add(error.message)
 
     # -- other readers ---------------------------------------------------------------------
 

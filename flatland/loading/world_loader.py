@@ -184,10 +184,13 @@ def _load_model(world: World, entry: YamlReader, names: set[str]) -> None:
     names.add(name)
     with model_reader.collect_errors_of_model(name):
         try:
-            world.spawn_model(path, name, namespace, pose)
-        except WorldError as error:
-            # The entry of the world file is invalid, not the model file.
-            raise model_reader.error(error.message) from None
+            try:
+                world.spawn_model(path, name, namespace, pose)
+            except WorldError as error:
+                # The entry of the world file is invalid, not the model file.
+                model_reader.report(model_reader.error(error.message))
+                with suppress(WorldError):  # only if errors are collected
+                    world.spawn_model(path, name, "", pose)
         except UnreadableFileError as error:
             located = model_reader.subnode("model")
             raise located.error(error.message, error.hint) from error

@@ -174,7 +174,7 @@ models:
 - {name: b, model: robot.model.yaml, pose: [9, 9, 0]}
 - {name: b, model: robot.model.yaml}
 - {nmae: c, model: syntax.yaml}
-- {name: d, model: minimal.model.yaml, namespace: 5-x}
+- {name: d, model: minimal.model.yaml, namespace: 5-x, pose: [5, 5, 0]}
 plugins:
 - {type: RandomWal, name: boxes, layer: walls, robot_name: a}
 - {type: RandomWall, name: more, layer: walls, robot_name: a, num_of_walls: x}
@@ -361,6 +361,42 @@ class TestAllProblems:
         )
         report = self.report(path, capsys)
         assert ['{"unread"}' in problem["message"] for problem in report["problems"]] == [True]
+
+    def test_a_plugin_that_rejects_all_of_its_parameters(self, files, monkeypatch, capsys):
+        """The error concerns no single value, so that the plugin is not started forever."""
+        files.write(
+            "strict.py",
+            """
+            import flatland
+
+            class Strict(flatland.ModelPlugin):
+                def on_initialize(self, config):
+                    config.get("rate", "float", 1.0)
+                    raise config.error("rates and ranges exclude each other")
+            """,
+        )
+        manifest = files.write(
+            "plugins.xml",
+            '<library path="."><class name="my::Strict" type="strict.Strict" '
+            'base_class_type="flatland::ModelPlugin"/></library>',
+        )
+        monkeypatch.setenv("FLATLAND_PLUGIN_PATH", manifest)
+        monkeypatch.syspath_prepend(str(files.folder))
+        plugin = "{type: 'my::Strict', name: s, rate: fast}"
+        body = "{name: base, footprints: []}"
+        path = files.write("m.model.yaml", f"bodies: [{body}]\nplugins: [{plugin}]\n")
+        problems = self.report(path, capsys)["problems"]
+        assert len(problems) == 2
+        assert 'converting entry "rate"' in problems[0]["message"]
+        assert problems[1]["message"].endswith("rates and ranges exclude each other")
+
+    def test_a_model_with_an_invalid_namespace_is_checked(self, files, capsys):
+        files.write("m.model.yaml", "bodies: [{name: base, footprints: [], x: 1}]")
+        models = "[{name: m, model: m.model.yaml, namespace: 1}]"
+        path = files.write("w.yaml", f"{{properties: {{}}, layers: [], models: {models}}}")
+        first, second = self.report(path, capsys)["problems"]
+        assert "not a legal ROS name" in first["message"]
+        assert '{"x"}' in second["message"]
 
     def test_errors_of_one_file_are_not_repeated_for_each_model(self, files, capsys):
         files.write("m.model.yaml", "bodies: [{name: base, footprints: [], x: 1}]")
