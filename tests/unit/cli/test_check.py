@@ -390,6 +390,15 @@ class TestAllProblems:
         assert 'converting entry "rate"' in problems[0]["message"]
         assert problems[1]["message"].endswith("rates and ranges exclude each other")
 
+    def test_a_missing_parameter_of_a_plugin_does_not_hide_the_others(self, files, capsys):
+        laser = "{type: Laser, name: l, body: base, angle: {min: 0, max: 1, increment: x}, foo: 1}"
+        body = "{name: base, footprints: []}"
+        path = files.write("m.model.yaml", f"bodies: [{body}]\nplugins: [{laser}]\n")
+        messages = [problem["message"] for problem in self.report(path, capsys)["problems"]]
+        assert len(messages) == 3
+        for part in ('"range" does not exist', '"increment" to float', '{"foo"}'):
+            assert any(part in message for message in messages)
+
     def test_a_model_with_an_invalid_namespace_is_checked(self, files, capsys):
         files.write("m.model.yaml", "bodies: [{name: base, footprints: [], x: 1}]")
         models = "[{name: m, model: m.model.yaml, namespace: 1}]"
