@@ -6,7 +6,14 @@ with matplotlib, and `render` provides the public functions. `frames` and `video
 
 from flatland.drawing.frames import FrameRenderer
 from flatland.drawing.layout import Layout
-from flatland.drawing.render import PICTURE_FORMATS, check_matplotlib, draw, make_figure, save
+from flatland.drawing.render import (
+    PICTURE_FORMATS,
+    check_matplotlib,
+    draw,
+    draw_png,
+    make_figure,
+    save,
+)
 from flatland.drawing.video import VIDEO_FORMATS, VideoFile, check_opencv
 
 __all__ = [
@@ -18,6 +25,7 @@ __all__ = [
     "check_matplotlib",
     "check_opencv",
     "draw",
+    "draw_png",
     "make_figure",
     "save",
 ]

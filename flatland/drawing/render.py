@@ -5,6 +5,7 @@ matplotlib is imported when the first image is drawn. Its global state (pyplot) 
 
 from __future__ import annotations
 
+import io
 import math
 import os
 import threading
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
     from flatland.world import World
 
 PICTURE_FORMATS: Final = (".png", ".pdf", ".svg")
+NOTEBOOK_DPI: Final = 72.0  # an image of at most 936 x 648 pixels
 
 # matplotlib shares its font cache between figures, and the cache is not thread-safe.
 MATPLOTLIB_LOCK = threading.Lock()
@@ -188,6 +190,25 @@ def check_drawing_options(dpi: float, layers: Iterable[str] | None) -> None:
         raise ValueError(f"dpi must be from 10 to 2400, got {dpi}")
     if isinstance(layers, str):
         raise ValueError(f"layers must be a list of names, got {layers!r}")
+
+
+def draw_png(world: World) -> bytes | None:
+    """Draws a world for a notebook.
+
+    Args:
+        world: The world to draw.
+
+    Returns:
+        A PNG image; None if the world is closed, or matplotlib is missing.
+    """
+    try:
+        figure = make_figure(world, dpi=NOTEBOOK_DPI)
+    except FlatlandError:
+        return None
+    file = io.BytesIO()
+    with MATPLOTLIB_LOCK:
+        figure.canvas.print_png(file)
+    return file.getvalue()
 
 
 def check_matplotlib() -> None:
