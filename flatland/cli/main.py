@@ -14,6 +14,14 @@ from flatland.errors import FlatlandError
 
 _BROKEN_PIPE = 128 + signal.SIGPIPE  # exit code in a shell of a program ended by SIGPIPE
 _INTERRUPTED = 128 + signal.SIGINT
+_EPILOG = """
+flatland COMMAND --help describes a command.
+
+examples:
+  flatland check worlds/office/world.yaml
+  flatland run worlds/office/world.yaml --duration 60
+  flatland new world arena
+"""
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -67,7 +75,8 @@ def make_parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="flatland",
         description="Checks, draws, describes and runs worlds without ROS; creates new ones.",
-        epilog="flatland COMMAND --help describes a command, with examples.",
+        epilog=_EPILOG,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("--version", action="version", version=f"flatland {flatland.__version__}")
     commands = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)

@@ -5,9 +5,11 @@ from __future__ import annotations
 import difflib
 import re
 from collections.abc import Iterable
+from itertools import islice
 from pathlib import Path
 
 _MIN_SIMILARITY = 0.6
+_MAX_FILES = 1000  # of a folder, compared with the name of a missing file
 
 _UNKNOWN_KEYS = {
     "mass": "the mass results from the density [kg/m²] and the area of the footprints",
@@ -132,7 +134,9 @@ def similar_file(path: str) -> str:
             return ""
         if not file.parent.is_dir():
             return f'the folder "{file.parent}" does not exist'
-        return did_you_mean(file.name, (entry.name for entry in file.parent.iterdir()))
+        # The simulation may be waiting for this, and the folder may be large.
+        names = (entry.name for entry in islice(file.parent.iterdir(), _MAX_FILES))
+        return did_you_mean(file.name, names)
     except (OSError, ValueError):
         return ""
 

@@ -147,5 +147,7 @@ def test_the_examples_of_the_help_run(checkout, tmp_path, monkeypatch, capsys, e
 
 
 def test_all_commands_have_examples():
+    examples = make_parser().format_help().split("examples:\n")[1].strip().splitlines()
+    assert {example.strip() for example in examples} < set(example_commands())
     actions = make_parser()._subparsers._group_actions  # type: ignore[union-attr]
     assert set(actions[0].choices) == set(COMMANDS)
