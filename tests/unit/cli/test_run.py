@@ -255,6 +255,23 @@ class TestVideo:
         assert np.abs(frames[0] - start).mean() < 3
         assert np.abs(frames[-1] - start).mean() > np.abs(frames[0] - start).mean() + 1
 
+    @pytest.mark.parametrize("codecs", [("zzzz", "mp4v"), ("zzzz",)])
+    def test_an_opencv_without_the_encoder(self, robot_world, monkeypatch, caplog, capsys, codecs):
+        """The codec zzzz does not exist; the next one is used, if there is one."""
+        monkeypatch.setattr("flatland.drawing.video._CODECS", codecs)
+        arguments = ["--video", "a.mp4", "--fps", "10", "--size", "320x240"]
+        code = main("run", robot_world, "--duration", "0.5", *arguments)
+        assert 'OpenCV has no encoder for the codec "zzzz"' in caplog.text
+        if codecs[1:]:
+            assert code == 0
+            video = cv2.VideoCapture("a.mp4")
+            assert video.get(cv2.CAP_PROP_FRAME_COUNT) == 5
+            video.release()
+        else:
+            assert code == 1
+            assert "with the codecs zzzz" in capsys.readouterr().err
+            assert not list(Path().glob("*.mp4"))
+
     def test_a_frame_equals_a_picture_at_any_time(self, robot_world):
         with flatland.World.from_yaml(robot_world, seed=1) as world:
             renderer = FrameRenderer(world, size=(320, 240), scans=False, names=True)
