@@ -72,7 +72,8 @@ class ModelSet:
         world = self._world
         checked_pose = self._check_spawn(path, name, namespace, pose)
         path = world.resolve_path(path)
-        reader = world.read_yaml(path, world.params)
+        with world.inputs.collecting():
+            reader = world.read_yaml(path, world.params)
         model = Model(world, name, namespace, path)
         loader = ModelLoader(world.physics, world.collision_filter, model, reader)
         try:
