@@ -8,7 +8,7 @@ from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from flatland.errors import PluginError
+from flatland.errors import FlatlandError, Place, PluginError
 from flatland.plugin_api.fork_plugins import alternative_to
 from flatland.plugin_api.manifest import (
     INCLUDED_PACKAGE,
@@ -25,12 +25,27 @@ if TYPE_CHECKING:
 
 # Plugins for tests of manifests, which are no useful suggestions.
 _UNLISTED = {f"{INCLUDED_PACKAGE}::Dummy{kind}Plugin" for kind in ("Model", "World")}
+_HINT = f'"enabled: false" skips the plugin; C++ plugins must be ported to Python, {PORTING_GUIDE}'
 _MIN_SIMILARITY = 0.7  # of a suggestion to the missing name
 _MAX_SUGGESTIONS = 3
 
 
 class MissingPluginsError(PluginError):
     """Raised if some plugins of a model or world are declared by no manifest."""
+
+    def __init__(self, message: str, missing: Sequence[PluginError] = ()) -> None:
+        """Initializes the error.
+
+        Args:
+            message: Text about all missing plugins.
+            missing: An error for each of them.
+        """
+        super().__init__(message, place=missing[0].place if missing else None)
+        self._missing = missing
+
+    def parts(self) -> Sequence[FlatlandError]:
+        """Returns an error for each missing plugin."""
+        return self._missing or (self,)
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,13 +55,13 @@ class PluginEntry:
     Attributes:
         name: Name of the plugin.
         type_name: Value of `type:`.
-        place: File and line of the entry, such as ` [robot.model.yaml:12]`.
+        place: File and line of the entry.
         model: Name of the model, None for a world plugin.
     """
 
     name: str
     type_name: str
-    place: str
+    place: Place
     model: str | None
 
 
@@ -61,9 +76,7 @@ def read_entries(entries: Iterable[YamlReader], model: str | None) -> list[Plugi
         YamlError: An entry has no name or type.
     """
     return [
-        PluginEntry(
-            entry.get("name", "string"), entry.get("type", "string"), entry.error("").message, model
-        )
+        PluginEntry(entry.get("name", "string"), entry.get("type", "string"), entry.place, model)
         for entry in entries
         if entry.get("enabled", "bool", True)
     ]
@@ -88,21 +101,21 @@ def missing_plugins_error(
         return None
     hints = registry.hints()
     advice = hints.advise(missing_types)
-    models: dict[tuple[str, str, str], list[str | None]] = {}
+    models: dict[tuple[str, str, Place], list[str | None]] = {}
     for entry in entries:
         if entry.type_name in missing_types:
             models.setdefault((entry.name, entry.type_name, entry.place), []).append(entry.model)
-    lines = []
+    missing = []
     for (name, type_name, place), owners in models.items():
         kind = "World" if owners[0] is None else "Model"
         text = f'{kind} Plugin "{name}" type "{type_name}"'
         if owners[0] is not None:
             text += " model " + ", ".join(f'"{owner}"' for owner in owners)
         text += f": {hints.describe(type_name)}"
-        if len(models) == 1:
-            return MissingPluginsError(f"{text}; {advice}{place}")
-        lines.append(text + place)
-    return MissingPluginsError("\n".join([*lines, advice]))
+        missing.append(PluginError(text + place.suffix, place=place, hint=_HINT))
+    if len(missing) == 1:
+        return MissingPluginsError(f"{text}; {advice}{place.suffix}", missing)
+    return MissingPluginsError("\n".join([*(error.message for error in missing), advice]), missing)
 
 
 class LookupHints:

@@ -121,6 +121,18 @@ def test_server_runs_with_a_broken_python_first_on_path(shell, world_file, tmp_p
     assert "was started" not in printed
 
 
+def test_the_command_is_completed_in_an_interactive_shell(installed, tmp_path):
+    """`bash -i` reads no start file here; the completion is that of argcomplete."""
+    done = subprocess.run(
+        ["bash", "--norc", "-ic", '. "$0"; complete -p flatland', installed / "setup.bash"],
+        env={"HOME": str(tmp_path), "PATH": "/usr/bin:/bin"},
+        stdin=subprocess.DEVNULL,
+        capture_output=True,
+        text=True,
+    )
+    assert "_python_argcomplete flatland" in done.stdout, done.stderr
+
+
 def test_numpy_is_the_debian_package(shell):
     """The extensions of ROS were built with it, so that no newer version may be installed."""
     done = shell('. "$0"; python -c "import numpy, yaml; print(numpy.__file__, yaml.__file__)"')
