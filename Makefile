@@ -50,8 +50,9 @@ bench: setup-dev  ## measure performance, write build/bench.json and .png: make 
 	  $(if $(BASELINE),--baseline "$(BASELINE)") $(ARGS)
 
 .PHONY: docs
-docs: setup  ## check the links and images of README.md and docs/
-	@$(PYTHON) tools/check_links.py README.md docs
+docs: setup  ## check the links of all pages, build the documentation site in build/docs/html
+	@$(PYTHON) tools/check_links.py README.md CONTRIBUTING.md docs examples
+	@tools/build_docs.sh
 
 .PHONY: pictures
 pictures: setup-dev  ## generate the images of README.md and docs/, on a virtual screen
