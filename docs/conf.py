@@ -15,6 +15,7 @@ import numpy as np
 import numpy.typing as npt
 from docutils import nodes
 from sphinx import addnodes
+from sphinx.pycode import ModuleAnalyzer
 from sphinx.util.typing import stringify_annotation
 
 import flatland
@@ -57,6 +58,7 @@ copybutton_exclude = ".linenos, .gp, .go"
 # -- reference from docstrings
 
 autodoc_member_order = "bysource"
+autodoc_preserve_defaults = True
 autodoc_typehints_format = "short"
 autodoc_default_options = {"members": True}
 # Described in api/types.rst.
@@ -72,6 +74,9 @@ autodoc_type_aliases = {
         "FramePair",
         "IfBlocked",
         "InvalidBodyPolicy",
+        "Key",
+        "Kind",
+        "NodeKind",
         "Params",
         "Pose",
         "Triple",
@@ -84,11 +89,12 @@ napoleon_use_ivar = False
 napoleon_use_rtype = False
 python_maximum_signature_line_length = 90
 python_use_unqualified_type_names = True
+toc_object_entries_show_parents = "hide"
 add_module_names = False
 default_role = "literal"  # single backquotes in docstrings are code
 nitpick_ignore_regex = [
     # Other projects; their documentation is not fetched during the build.
-    (r"py:class", r"(np|npt|numpy|collections\.abc|concurrent\.futures|os|builtins)\..*"),
+    (r"py:class", r"(np|npt|numpy|collections\.abc|concurrent\.futures|os|builtins|threading)\..*"),
     (r"py:class", r"pybind11_builtins\..*"),
     # Type variables.
     (r"py:(class|obj)", r"(flatland\.[a-z_.]+\.)?[DRT]"),
@@ -158,6 +164,20 @@ def _shorten(text: str | None) -> str | None:
     return re.sub(r"TypeAliasForwardRef\('(\w+)'\)", r"\1", text)
 
 
+def show_attribute_types(
+    app: Sphinx, kind: str, name: str, documented: Any, options: Any, lines: list[str]
+) -> None:
+    """Puts the type of an attribute behind its name; napoleon writes a separate field."""
+    del app, kind, name, documented, options
+    heading = 0
+    for number, line in enumerate(lines):
+        if line.startswith(".. attribute::"):
+            heading = number
+        elif heading and line.startswith("   :type:"):
+            lines.insert(heading + 1, lines.pop(number))
+            heading = 0
+
+
 def link_type(
     app: Sphinx, environment: BuildEnvironment, link: addnodes.pending_xref, text: nodes.Element
 ) -> nodes.Element | None:
@@ -170,8 +190,18 @@ def link_type(
     )
 
 
+def omit_overloads(app: Sphinx) -> None:
+    """Omits the overloads of `YamlReader`, one per kind of value, which are for type checkers."""
+    del app
+    analyzer = ModuleAnalyzer.for_module("flatland.config.reader")
+    analyzer.analyze()
+    analyzer.overloads.clear()
+
+
 def setup(app: Sphinx) -> None:
     """Registers the event handlers of this file."""
+    app.connect("builder-inited", omit_overloads)
     app.connect("doctree-read", link_folders)
     app.connect("missing-reference", link_type)
     app.connect("autodoc-process-signature", show_signature)
+    app.connect("autodoc-process-docstring", show_attribute_types, priority=600)  # after napoleon
