@@ -91,7 +91,7 @@ python_maximum_signature_line_length = 90
 python_use_unqualified_type_names = True
 toc_object_entries_show_parents = "hide"
 add_module_names = False
-default_role = "literal"  # single backquotes in docstrings are code
+default_role = "py:obj"  # code in single backquotes is linked if it is the name of an object
 nitpick_ignore_regex = [
     # Other projects; their documentation is not fetched during the build.
     (r"py:class", r"(np|npt|numpy|collections\.abc|concurrent\.futures|os|builtins|threading)\..*"),
@@ -178,10 +178,12 @@ def show_attribute_types(
             heading = 0
 
 
-def link_type(
+def link_name(
     app: Sphinx, environment: BuildEnvironment, link: addnodes.pending_xref, text: nodes.Element
 ) -> nodes.Element | None:
-    """Resolves the names of types in signatures, which Sphinx takes for classes."""
+    """Resolves the names of types in signatures, and displays code that is not a name."""
+    if link.get("refdomain") == "py" and link.get("reftype") == "obj":
+        return text
     if link.get("refdomain") != "py" or link.get("reftype") != "class":
         return None
     domain = environment.get_domain("py")
@@ -202,6 +204,6 @@ def setup(app: Sphinx) -> None:
     """Registers the event handlers of this file."""
     app.connect("builder-inited", omit_overloads)
     app.connect("doctree-read", link_folders)
-    app.connect("missing-reference", link_type)
+    app.connect("missing-reference", link_name)
     app.connect("autodoc-process-signature", show_signature)
     app.connect("autodoc-process-docstring", show_attribute_types, priority=600)  # after napoleon

@@ -1,11 +1,12 @@
 #!/usr/bin/env bash
-# Builds the documentation site in build/docs/html. Warnings, such as broken links, are errors.
-#   tools/build_docs.sh [arguments of sphinx-build...]
+# Builds the documentation site. Warnings, such as broken links, are errors.
+#   tools/build_docs.sh [FOLDER]      (default: build/docs/html; an existing folder is replaced)
 set -euo pipefail
 cd "$(dirname "$0")/.."
 root=$PWD
 venv=$root/build/docs/venv
 python=$root/.venv/bin/python
+output=${1:-build/docs/html}
 
 # Sphinx has an environment of its own: the programs of ROS import what is installed in .venv.
 requirements=$("$python" -c '
@@ -31,7 +32,7 @@ if [[ $(cat "$venv/flatland-requirements" 2>/dev/null) != "$identity" ]]; then
 fi
 
 # All pages are built: Sphinx repeats no warnings of pages that have not changed.
-rm -rf build/docs/html
-env -u PYTHONPATH "$venv/bin/python" -m sphinx -b html -c docs -d build/docs/doctrees -E -q -W --keep-going "$@" \
-  . build/docs/html
-"$python" tools/check_site.py build/docs/html
+rm -rf "$output"
+env -u PYTHONPATH "$venv/bin/python" -m sphinx -b html -c docs -d "$(dirname "$output")/doctrees" -E -q \
+  -W --keep-going . "$output"
+"$python" tools/check_site.py "$output"

@@ -192,7 +192,7 @@ class TreeReader:
             raise self._error(message, self._node.key_lines[unread[0]])
 
     def error(self, message: str) -> YamlError:
-        """Returns an error whose text ends with the position of the node, as in `[model.yaml:12]`."""
+        """Returns an error whose text ends with the position of the node: `[model.yaml:12]`."""
         return YamlError(message + self._position())
 
     def invalid(self, key: Key, why: str) -> YamlError:
