@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 import yaml
 
@@ -78,3 +79,36 @@ def test_the_program_of_a_page_runs(page, checkout, monkeypatch, capsys):
     [program] = blocks(checkout / page, "python")
     exec(compile(program, page, "exec"), {})
     assert re.search(r"\(.*\) \d", capsys.readouterr().out)
+
+
+@pytest.mark.parametrize("page", ["drawing.md", "python.md"])
+def test_the_programs_of_a_page_run_one_after_the_other(
+    page, docs, checkout, monkeypatch, tmp_path
+):
+    (tmp_path / "worlds").symlink_to(checkout / "worlds")
+    monkeypatch.chdir(tmp_path)
+    first, *others = blocks(docs / page, "python")
+    exec(compile(first, page, "exec"), {})
+    # The first program closes its world; the others continue with an open one.
+    with flatland.World.from_yaml("worlds/office/world.yaml", seed=1) as world:
+        names = {"flatland": flatland, "world": world, "path": np.zeros((2, 2))}
+        for program in others:
+            exec(compile(program, page, "exec"), names)
+    assert others
+
+
+def without_comments(text: str) -> str:
+    """Returns YAML without comments, which differ between a page and a file."""
+    lines = [re.sub(r"(^| ) *#.*", "", line) for line in text.splitlines()]
+    return "\n".join(line for line in lines if line)
+
+
+def test_blocks_that_name_a_file_are_part_of_it(docs, checkout):
+    found = re.findall(
+        r"^```yaml\n# (worlds/\S+)\n(.*?)^```",
+        (docs / "models.md").read_text(),
+        re.MULTILINE | re.DOTALL,
+    )
+    assert len(found) == 4
+    for path, text in found:
+        assert without_comments(text) in without_comments((checkout / path).read_text())
