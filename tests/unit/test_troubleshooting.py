@@ -194,6 +194,7 @@ WRITTEN_IN = {
     "A topic of a plugin does not exist in ROS": "flatland/ros/bridge.py",
     "The simulation is slower than real time": "flatland/simulation/rate_monitor.py",
     "The node does not end": "flatland/ros/shutdown.py",
+    "RViz displays no scan": "flatland/ros/frame_monitor.py",
     "The viewer does not open": "flatland/viewer/app.py",
     "The viewer does not find a master": "flatland/viewer/app.py",
 }
