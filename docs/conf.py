@@ -94,8 +94,9 @@ add_module_names = False
 default_role = "py:obj"  # code in single backquotes is linked if it is the name of an object
 nitpick_ignore_regex = [
     # Other projects; their documentation is not fetched during the build.
-    (r"py:class", r"(np|npt|numpy|collections\.abc|concurrent\.futures|os|builtins|threading)\..*"),
+    (r"py:class", r"(np|npt|numpy|collections\.abc|concurrent\.futures|os|builtins|threading|contextlib)\..*"),
     (r"py:class", r"pybind11_builtins\..*"),
+    (r"py:class", "Future"),
     # Type variables.
     (r"py:(class|obj)", r"(flatland\.[a-z_.]+\.)?[DRT]"),
 ]
@@ -104,6 +105,7 @@ _CONSTRUCTED = {
     "flatland.DynamicsLimits",
     "flatland.Timekeeper",
     "flatland.UpdateTimer",
+    "flatland.recording.Replay",
     "flatland.simulation.Simulation",
 }
 
