@@ -94,8 +94,8 @@ add_module_names = False
 default_role = "py:obj"  # code in single backquotes is linked if it is the name of an object
 nitpick_ignore_regex = [
     # Other projects; their documentation is not fetched during the build.
-    (r"py:class", r"(np|npt|numpy|collections\.abc|concurrent\.futures|os|builtins|threading|contextlib)\..*"),
-    (r"py:class", r"pybind11_builtins\..*"),
+    (r"py:class", r"(np|npt|numpy|pybind11_builtins)\..*"),
+    (r"py:class", r"(builtins|collections\.abc|concurrent\.futures|contextlib|os|threading)\..*"),
     (r"py:class", "Future"),
     # Type variables.
     (r"py:(class|obj)", r"(flatland\.[a-z_.]+\.)?[DRT]"),
