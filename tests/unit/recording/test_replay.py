@@ -263,6 +263,17 @@ def test_changes_made_by_plugins_are_repeated_by_the_plugins(
     assert replay(path).difference is None
 
 
+def test_a_replay_keeps_the_odometry_of_moved_models(world_files: Any, tmp_path: Path) -> None:
+    path = tmp_path / "run.flog"
+    world = world_files.load(WORLD)
+    world.record(path)
+    world.step(10)
+    world.move_model("robot", (-1.0, 1.0, 0.5), keep_odometry=True)
+    world.step(10)
+    world.close()
+    assert replay(path).difference is None
+
+
 @pytest.mark.parametrize(
     "change",
     [
