@@ -141,21 +141,27 @@ class ServerNode:
     def _simulate(self, parameters: NodeParameters) -> None:
         """Loads the world and steps it until a stop is requested."""
         from flatland.ros.bridge import Bridge
+        from flatland.ros.clock import NodeClock, SimulatedClock, WallClock
         from flatland.ros.deferred_topics import DeferredTopics
         from flatland.ros.frame_monitor import FrameMonitor
         from flatland.ros.services import Services
         from flatland.ros.transport.registrar import Registrar
         from flatland.simulation import Simulation
 
-        _warn_of_wall_time()
+        _check_time_of_other_nodes(parameters.use_sim_time)
         self._registrar = Registrar()
-        bridge = Bridge(self._registrar)
+        clock: NodeClock
+        if parameters.use_sim_time:
+            clock = SimulatedClock(self._registrar, parameters.clock_rate)
+        else:
+            clock = WallClock()
+        bridge = Bridge(self._registrar, clock)
         world = _load(parameters, bridge)
         simulation = Simulation(
             world,
             parameters.update_rate,
             max_lag=parameters.max_lag,
-            report=lambda report: _LOG.info("%s", report),
+            report=lambda report: _LOG.debug("%s", report),
         )
         self._simulation = simulation
         if self._stopping.is_set():
@@ -195,6 +201,7 @@ class ServerNode:
             # unregisters all topics at once.
             bridge.close()
             world.close()
+            clock.close()
 
 
 def _load(parameters: NodeParameters, bridge: Any) -> World:
@@ -270,11 +277,18 @@ def _yaml_parameter(name: str) -> object:
     return rospy.get_param(name, None)
 
 
-def _warn_of_wall_time() -> None:
+def _check_time_of_other_nodes(use_sim_time: bool) -> None:
+    """Logs a warning if other nodes use another time than the stamps of this one."""
     import rospy
 
-    if rospy.get_param("/use_sim_time", False) is not True:
+    others = rospy.get_param("/use_sim_time", False) is True
+    if use_sim_time and not others:
         _LOG.warning("/use_sim_time is not true: other nodes do not follow the simulated time")
+    elif others and not use_sim_time:
+        _LOG.warning(
+            "/use_sim_time is true, but this node uses wall time and publishes no /clock: the time "
+            "of other nodes stands still; set /use_sim_time to false before they start"
+        )
 
 
 def _unregister() -> None:

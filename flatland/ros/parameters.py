@@ -45,6 +45,9 @@ class NodeParameters:
         move_keeps_odometry: Whether the odometry of a model that is moved by a service or by its
             interactive marker continues as if it had not moved.
         initialpose_model: Name of the model that messages on `initialpose` move; empty for none.
+        use_sim_time: Whether `/clock` is published and stamps are simulated times; otherwise they
+            are wall times.
+        clock_rate: Maximum rate of `/clock` in wall time [Hz]; 0 for one message per step.
         publish_map: Name of the layer that is published as a map; empty for that of the world file,
             None for no map.
         map_frame: Frame of the map.
@@ -65,6 +68,8 @@ class NodeParameters:
     if_blocked: IfBlocked
     move_keeps_odometry: bool
     initialpose_model: str
+    use_sim_time: bool
+    clock_rate: float
     publish_map: str | None
     map_frame: str
     map_resolution: float
@@ -95,9 +100,49 @@ def read_parameters(get: ParameterSource) -> NodeParameters:
         if_blocked=reader.if_blocked("if_blocked", "warn"),
         move_keeps_odometry=reader.boolean("move_keeps_odometry", False),
         initialpose_model=reader.name("initialpose_model"),
+        use_sim_time=reader.boolean("use_sim_time", True),
+        clock_rate=reader.rate("clock_rate", 0.0, unlimited="one message per step"),
         publish_map=reader.optional_name("publish_map"),
         map_frame=reader.frame("map_frame", "map"),
         map_resolution=reader.finite_positive("map_resolution", DEFAULT_RESOLUTION),
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class TeleopParameters:
+    """The parameters of the node `teleop_key`.
+
+    Attributes:
+        max_linear: Maximum velocity [m/s].
+        max_angular: Maximum angular velocity [rad/s].
+        rate: Rate of the commands while a key is held [Hz].
+        repeat_delay: Time from a press to the first repetition of the terminal [s].
+        key_timeout: Time after a repetition in which the next one is expected [s].
+    """
+
+    max_linear: float
+    max_angular: float
+    rate: float
+    repeat_delay: float
+    key_timeout: float
+
+
+def read_teleop_parameters(get: ParameterSource) -> TeleopParameters:
+    """Reads and checks all parameters of the node `teleop_key`.
+
+    Args:
+        get: Returns the value of a parameter of the node, None if it is not set.
+
+    Raises:
+        ParameterError: A parameter is invalid.
+    """
+    reader = _Reader(get)
+    return TeleopParameters(
+        max_linear=reader.finite_positive("max_linear", 1.0),
+        max_angular=reader.finite_positive("max_angular", 2.0),
+        rate=reader.finite_positive("rate", 20.0),
+        repeat_delay=reader.finite_positive("repeat_delay", 0.6),
+        key_timeout=reader.finite_positive("key_timeout", 0.2),
     )
 
 
@@ -115,8 +160,8 @@ class _Reader:
             raise _invalid(name, "the path of a world file", value)
         return value
 
-    def rate(self, name: str, default: float) -> float:
-        wanted = "a number of Hz that is not negative (0 or inf: as fast as possible)"
+    def rate(self, name: str, default: float, unlimited: str = "as fast as possible") -> float:
+        wanted = f"a number of Hz that is not negative (0 or inf: {unlimited})"
         rate = self._number(name, default, wanted, lambda rate: rate >= 0)
         return 0.0 if math.isinf(rate) else rate
 

@@ -43,6 +43,8 @@ class PluginHost:
         registry: The plugin classes that files can name.
         world_plugins: The world plugins in order of loading.
         hooks: The hooks of all plugins.
+        costs: The costs that are being measured, None if none are.
+        disabled: The plugins that were disabled because a hook raised repeatedly.
     """
 
     def __init__(
@@ -70,6 +72,8 @@ class PluginHost:
         self._faults = faults
         self._timeout = timeout
         self.hooks = HookTable()
+        self.costs: PluginCosts | None = None
+        self.disabled: set[FlatlandPlugin] = set()
 
     # -- start and end ---------------------------------------------------------------------
 
@@ -179,6 +183,7 @@ class PluginHost:
                 self._faults.add((plugin, "on_shutdown"), name, error)
             self._release(plugin)
         self._faults.forget(set(plugins))
+        self.disabled.difference_update(plugins)
 
     def _release(self, plugin: FlatlandPlugin) -> None:
         """Closes the ports and connections that a plugin left open."""
@@ -193,6 +198,7 @@ class PluginHost:
 
     def measure(self, costs: PluginCosts | None) -> None:
         """Adds the wall time of all hooks to some costs from now on; None ends the measurement."""
+        self.costs = costs
         self.hooks.wrap(None if costs is None else costs.timed)
 
     @property
@@ -272,3 +278,4 @@ class PluginHost:
             except PLUGIN_FAULTS as error:
                 if self._faults.add_in_hook(plugin, hook, describe(plugin), error):
                     self.hooks.remove(plugin)
+                    self.disabled.add(plugin)

@@ -26,6 +26,7 @@ pytest.importorskip("flatland.msg", reason="the messages are not built")
 import rosgraph
 import roslib.packages
 import rospy
+from roscpp.srv import SetLoggerLevel
 from waiting import TIMEOUT, wait_until
 
 import flatland
@@ -258,13 +259,17 @@ class Ros:
 
         return self.call("/move_model", MoveModel, name, Pose2D(*pose))
 
+    def log_everything(self, node: str = "/flatland_server") -> None:
+        """Makes a node log messages of all levels."""
+        self.call(f"{node}/set_logger_level", SetLoggerLevel, "rosout", "debug")
+
     def registered(self, node: str = "/flatland_server") -> dict[str, set[str]]:
         """Returns the publishers, subscribers and services that a node has registered.
 
-        Without those of the interactive markers and the pause state, which every node registers
-        some time after its start.
+        Without those of the interactive markers, the pause state and the diagnostics, which every
+        node registers some time after its start.
         """
-        late = re.compile(rf"/interactive_model_markers/|^{node}/paused$")
+        late = re.compile(rf"/interactive_model_markers/|^{node}/paused$|^/diagnostics$")
         state = self.master.getSystemState()
         kinds = ("publishers", "subscribers", "services")
         return {
