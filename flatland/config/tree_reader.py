@@ -202,7 +202,7 @@ class TreeReader:
             raise self._error(message, self._node.key_lines[unread[0]], hint)
 
     def error(self, message: str, hint: str = "") -> YamlError:
-        """Returns an error whose text ends with the position of the node: ` [model.yaml:12]`.
+        """Returns an error whose text ends with the position of the node: `[model.yaml:12]`.
 
         Args:
             message: Description of the problem.
