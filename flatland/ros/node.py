@@ -11,6 +11,7 @@ from concurrent.futures import Future, wait
 from typing import TYPE_CHECKING, Any, Final
 
 from flatland.errors import FlatlandError
+from flatland.ros.fault_reports import FaultReports
 from flatland.ros.parameters import NodeParameters, ParameterError, read_parameters
 from flatland.ros.shutdown import ShutdownWatchdog
 
@@ -28,6 +29,9 @@ _SWITCH_INTERVAL: Final = 0.0002  # s for which a thread keeps the GIL while oth
 _UNREGISTER_TIMEOUT: Final = 0.5  # s
 _STOP_POLL_PERIOD: Final = 0.05  # s between two checks for a stop request without a master
 _SHUTDOWN_POLL_PERIOD: Final = 0.002  # s
+_USE_SIM_TIME: Final = "/use_sim_time"
+# The reason that the ROS master gives to a node whose name another node has taken.
+_REPLACED: Final = "new node registered with same name"
 
 
 def main() -> int:
@@ -48,15 +52,20 @@ class ServerNode:
         self._stopping = threading.Event()
         self._simulation: Simulation | None = None
         self._registrar: Registrar | None = None
+        self._watchdog: ShutdownWatchdog | None = None
+        self._replaced = False  # whether another node has the name of this one
+        self._fault_reports = FaultReports()
 
     def run(self) -> int:
         """Runs until a stop is requested, and returns the exit code."""
         # First of all, so that no signal is lost.
-        watchdog = ShutdownWatchdog(self._stop, _unregister)
+        watchdog = self._watchdog = ShutdownWatchdog(self._stop, _unregister)
+        self._fault_reports.install()
         # The threads of rospy need the GIL about a hundred times for a connection or registration.
         # With the default interval of 5 ms, this takes up to a second beside a loop at full speed.
         # A short interval costs nothing while no other thread waits for the GIL.
         sys.setswitchinterval(_SWITCH_INTERVAL)
+        import rosgraph
         import rospy
 
         try:
@@ -65,6 +74,9 @@ class ServerNode:
         except ValueError as error:
             _LOG.critical("%s (from ROS_MASTER_URI)", error)
             return 1
+        from flatland.ros.transport import inbound
+
+        inbound.install()
         try:
             # Without rostime, rospy does not subscribe to `/clock`; the bridge sets its time.
             rospy.init_node(NODE_NAME, disable_signals=True, disable_rostime=True)
@@ -75,7 +87,12 @@ class ServerNode:
             return 1
         from flatland.ros.logs import log_to_ros
 
-        rospy.on_shutdown(watchdog.request_stop)
+        def shut_down(reason: str) -> None:
+            self._replaced |= _REPLACED in reason
+            watchdog.request_stop()
+
+        # Before the hook of rospy that unregisters the node. `rospy.on_shutdown` passes no reason.
+        rospy.core._preshutdown_hooks.insert(0, shut_down)
         log_to_ros()
         try:
             parameters = read_parameters(_private_parameter)
@@ -87,6 +104,13 @@ class ServerNode:
             code = self._fail("unexpected internal error", exc_info=True)
         else:
             code = 0
+        if self._replaced:
+            _LOG.critical(
+                'another node has taken the name "%s" on the ROS master at %s: this one ends',
+                rospy.get_name(),
+                rosgraph.get_master_uri(),
+            )
+            code = 1
         if self._registrar is not None:
             self._registrar.close(_UNREGISTER_TIMEOUT)
         _unregister()
@@ -124,6 +148,12 @@ class ServerNode:
                 warning_due = math.inf
         return False
 
+    def _replace(self) -> None:
+        """Ends the node because another one has its name; safe from any thread."""
+        self._replaced = True
+        if self._watchdog is not None:
+            self._watchdog.request_stop()
+
     def _stop(self) -> None:
         """Ends the simulation after the current step; safe from any thread."""
         self._stopping.set()
@@ -142,14 +172,20 @@ class ServerNode:
         """Loads the world and steps it until a stop is requested."""
         from flatland.ros.bridge import Bridge
         from flatland.ros.deferred_topics import DeferredTopics
+        from flatland.ros.hook_watchdog import HookWatchdog
         from flatland.ros.services import Services
+        from flatland.ros.transport.master_watch import MasterWatch
         from flatland.ros.transport.registrar import Registrar
         from flatland.simulation import Simulation
 
         _warn_of_wall_time()
         self._registrar = Registrar()
+        self._registrar.keep_parameters(_current_parameters())
+        master_watch = MasterWatch(self._registrar, self._replace)
         bridge = Bridge(self._registrar)
         world = _load(parameters, bridge)
+        self._fault_reports.world = world
+        hook_watchdog = HookWatchdog(world)
         simulation = Simulation(
             world,
             parameters.update_rate,
@@ -170,6 +206,8 @@ class ServerNode:
                 if not simulation.stopped:
                     _log_benchmark(result)
         finally:
+            master_watch.close()
+            hook_watchdog.close()
             deferred_topics.close()
             # Plugins are closed before their topics, so that `on_shutdown` can publish; rospy then
             # unregisters all topics at once.
@@ -229,10 +267,21 @@ def _yaml_parameter(name: str) -> object:
     return rospy.get_param(name, None)
 
 
+def _current_parameters() -> dict[str, object]:
+    """Returns the private parameters and `/use_sim_time`, as far as they are set, by name."""
+    import rospy
+
+    private = rospy.get_param("~", {})
+    found = {rospy.resolve_name(f"~{name}"): value for name, value in private.items()}
+    if rospy.has_param(_USE_SIM_TIME):
+        found[_USE_SIM_TIME] = rospy.get_param(_USE_SIM_TIME)
+    return found
+
+
 def _warn_of_wall_time() -> None:
     import rospy
 
-    if rospy.get_param("/use_sim_time", False) is not True:
+    if rospy.get_param(_USE_SIM_TIME, False) is not True:
         _LOG.warning("/use_sim_time is not true: other nodes do not follow the simulated time")
 
 
