@@ -23,8 +23,8 @@ run: setup  ## run the simulator: make run [WORLD=world.yaml] [ARGS="show_viz:=f
 	@tools/run.sh "$(WORLD)" $(ARGS)
 
 .PHONY: test
-test: setup-dev  ## run all tests: make test [ARGS="-k laser"]
-	@. ./setup.bash && pytest $(ARGS)
+test: setup-dev  ## run all tests, in two processes: make test [ARGS="-k laser"]
+	@. ./setup.bash && pytest --numprocesses 2 --dist loadgroup $(ARGS)
 
 .PHONY: fuzz
 fuzz: setup-dev  ## test the physics engine with thousands of random jams
@@ -49,9 +49,14 @@ bench: setup-dev  ## measure performance, write build/bench.json and .png: make 
 	@. ./setup.bash && python bench --json build/bench.json --plot build/bench.png \
 	  $(if $(BASELINE),--baseline "$(BASELINE)") $(ARGS)
 
+.PHONY: soak
+soak: setup-dev  ## run for a long time and check that nothing grows: make soak [ARGS="office --scale 0.1"]
+	@. ./setup.bash && python bench/soak.py $(ARGS)
+
 .PHONY: docs
-docs: setup  ## check the links and images of README.md and docs/
-	@$(PYTHON) tools/check_links.py README.md docs
+docs: setup  ## check the links of all pages, build the documentation site in build/docs/html
+	@$(PYTHON) tools/check_links.py README.md CONTRIBUTING.md docs examples
+	@tools/build_docs.sh
 
 .PHONY: pictures
 pictures: setup-dev  ## generate the images of README.md and docs/, on a virtual screen
@@ -92,4 +97,4 @@ sanitize: setup-dev  ## run unit tests with sanitizers in the extension: make sa
 
 .PHONY: clean
 clean:  ## remove all build results and .venv
-	rm -rf $(VENV) build flatland/_core*.so flatland/msg flatland/srv
+	rm -rf $(VENV) build flatland/_core*.so flatland/msg flatland/srv flatland_msgs

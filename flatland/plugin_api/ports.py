@@ -93,9 +93,20 @@ class Output(Generic[T]):
             try:
                 callback(value)
             except PLUGIN_FAULTS as error:
-                if self._on_fault is None:
-                    raise
-                self._on_fault(self, callback, error)
+                self.report_fault(callback, error)
+
+    def report_fault(self, callback: Callable[[T], None], error: BaseException) -> None:
+        """Handles an exception of a subscriber, as if it had raised in `emit`.
+
+        For subscribers that finish their work later. To be called while the exception is handled.
+
+        Args:
+            callback: The subscriber.
+            error: What it raised.
+        """
+        if self._on_fault is None:
+            raise error
+        self._on_fault(self, callback, error)
 
     def subscribe(self, callback: Callable[[T], None], *, wants: bool = True) -> Callable[[], None]:
         """Subscribes a function to all further values; safe from any thread.
@@ -135,9 +146,21 @@ class Command(Generic[T]):
         received: Number of values accepted.
         owner: Name of the plugin that opened it, for messages.
         closed: Whether the plugin has ended.
+        on_set: Called as `on_set(command, value)` before each `set`, also for values that are not
+            accepted; None for no function.
     """
 
-    __slots__ = ("accept", "closed", "name", "owner", "received", "topic", "value", "value_type")
+    __slots__ = (
+        "accept",
+        "closed",
+        "name",
+        "on_set",
+        "owner",
+        "received",
+        "topic",
+        "value",
+        "value_type",
+    )
 
     def __init__(
         self,
@@ -164,6 +187,7 @@ class Command(Generic[T]):
         self.received = 0
         self.closed = False
         self.accept = accept
+        self.on_set: Callable[[Command[T], T], None] | None = None
 
     def set(self, value: T) -> None:
         """Sets the value if `accept` allows it.
@@ -173,6 +197,8 @@ class Command(Generic[T]):
         """
         if not isinstance(value, self.value_type):
             raise TypeError(f"command {self.topic} takes {self.value_type.__name__}, got {value!r}")
+        if self.on_set is not None:
+            self.on_set(self, value)
         if self.accept is None or self.accept(value):
             self.value = value
             self.received += 1

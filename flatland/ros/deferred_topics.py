@@ -1,4 +1,4 @@
-"""Topics that are opened after the first step: markers and the pause state."""
+"""Topics that are opened after the first step: markers, the pause state and diagnostics."""
 
 from __future__ import annotations
 
@@ -22,7 +22,12 @@ class DeferredTopics:
     """
 
     def __init__(
-        self, registrar: Registrar, simulation: Simulation, *, debug_rate: float | None
+        self,
+        registrar: Registrar,
+        simulation: Simulation,
+        *,
+        debug_rate: float | None,
+        move_keeps_odometry: bool = False,
     ) -> None:
         """Schedules the opening of the topics.
 
@@ -30,7 +35,9 @@ class DeferredTopics:
             registrar: Registers the topics with the ROS master.
             simulation: Simulation of the world.
             debug_rate: Rate of the debug markers in wall time [Hz]; None for no debug markers.
+            move_keeps_odometry: Whether a drag keeps the odometry of the model.
         """
+        self._move_keeps_odometry = move_keeps_odometry
         self._registrar = registrar
         self._simulation = simulation
         self._debug_rate = debug_rate
@@ -57,8 +64,10 @@ class DeferredTopics:
             self._start(self._start_pause_topic, "the pause state")
             importlib.import_module("flatland.ros.interactive.interactive_markers")
             self._start(self._start_interactive_markers, "interactive markers")
+            importlib.import_module("flatland.ros.diagnostics")
+            self._start(self._start_diagnostics, "diagnostics")
         except ImportError as error:
-            _LOG.warning("markers are disabled: %s", error)
+            _LOG.warning("markers or diagnostics are disabled: %s", error)
 
     def _start(self, action: Any, what: str) -> None:
         def log_failure(done: Future[Any]) -> None:
@@ -86,4 +95,16 @@ class DeferredTopics:
         from flatland.ros.interactive.interactive_markers import InteractiveMarkers
 
         if not self._closed:
-            self._parts.append(InteractiveMarkers(self._registrar, self._simulation))
+            self._parts.append(
+                InteractiveMarkers(
+                    self._registrar,
+                    self._simulation,
+                    move_keeps_odometry=self._move_keeps_odometry,
+                )
+            )
+
+    def _start_diagnostics(self) -> None:
+        from flatland.ros.diagnostics import Diagnostics
+
+        if not self._closed:
+            self._parts.append(Diagnostics(self._registrar, self._simulation))

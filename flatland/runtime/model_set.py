@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from flatland.config.reader import YamlReader
 from flatland.entities.model import Model
 from flatland.errors import WorldError, YamlError
 from flatland.geometry import Pose, finite_pose
@@ -73,17 +72,17 @@ class ModelSet:
         world = self._world
         checked_pose = self._check_spawn(path, name, namespace, pose)
         path = world.resolve_path(path)
-        reader = YamlReader.from_file(path, world.params)
+        with world.inputs.collecting():
+            reader = world.read_yaml(path, world.params)
         model = Model(world, name, namespace, path)
         loader = ModelLoader(world.physics, world.collision_filter, model, reader)
         try:
             loader.load_bodies_and_joints(checked_pose)
             self._place(model, model.pose, if_blocked, "spawn")
             self._contacts.add_bodies(model.bodies)
-            entries = loader.plugin_entries()
-            self._host.require_plugins(entries, name)
-            for entry in entries:
-                self._host.start_model_plugin(model, entry)
+            for entry in self._host.require_plugins(loader.plugin_entries(), name):
+                with entry.collect_errors():
+                    self._host.start_model_plugin(model, entry)
         except BaseException:
             self._remove(model)
             raise
@@ -93,13 +92,17 @@ class ModelSet:
         self._observers.model_added(model)
         return model
 
-    def move(self, name: str, pose: Sequence[float], if_blocked: IfBlocked) -> Model:
+    def move(
+        self, name: str, pose: Sequence[float], if_blocked: IfBlocked, keep_odometry: bool
+    ) -> Model:
         """Moves a model; see `World.move_model`."""
         model = self._find_to("move", name)
+        previous = {body.name: body.pose for body in model.bodies}
         try:
             self._place(model, finite_pose(pose), if_blocked, "move")
         except ValueError as error:
             raise WorldError(f'failed to move model "{name}", {error}') from None
+        self._host.model_moved(model, previous, keep_odometry)
         if if_blocked == "warn":
             self._placement.warn_if_blocked(model)
         self._observers.model_moved(model)

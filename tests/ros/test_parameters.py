@@ -32,6 +32,14 @@ def test_defaults() -> None:
         plugin_timeout=60.0,
         shutdown_timeout=2.0,
         if_blocked="warn",
+        move_keeps_odometry=False,
+        initialpose_model="",
+        use_sim_time=True,
+        clock_rate=0.0,
+        publish_map="",
+        map_frame="map",
+        map_resolution=0.05,
+        msgs_package="flatland",
     )
 
 
@@ -66,6 +74,26 @@ def test_defaults() -> None:
         ("shutdown_timeout", math.inf, None),
         ("if_blocked", "allow", "allow"),
         ("if_blocked", "nearest", "nearest"),
+        ("move_keeps_odometry", True, True),
+        ("move_keeps_odometry", "true", True),
+        ("initialpose_model", "robot", "robot"),
+        ("initialpose_model", 7, "7"),
+        ("initialpose_model", " ", ""),
+        ("use_sim_time", False, False),
+        ("use_sim_time", "true", True),
+        ("clock_rate", 100, 100.0),
+        ("clock_rate", "inf", 0.0),
+        ("publish_map", "walls", "walls"),
+        ("publish_map", "", ""),
+        ("publish_map", " ", ""),
+        ("publish_map", 2, "2"),
+        ("publish_map", False, None),
+        ("map_frame", "r1/map", "r1/map"),
+        ("map_frame", "/map", "map"),
+        ("map_resolution", "0.1", 0.1),
+        ("map_resolution", 1, 1.0),
+        ("msgs_package", "flatland", "flatland"),
+        ("msgs_package", "flatland_msgs", "flatland_msgs"),
     ],
 )
 def test_valid_values(name: str, value: object, expected: object) -> None:
@@ -84,6 +112,8 @@ def test_valid_values(name: str, value: object, expected: object) -> None:
         "benchmark_duration",
         "plugin_timeout",
         "shutdown_timeout",
+        "clock_rate",
+        "map_resolution",
     ],
 )
 @pytest.mark.parametrize("value", [math.nan, "nan", -1, -1e-300, "fast", "", True, [1], {"a": 1}])
@@ -106,6 +136,14 @@ def test_invalid_numbers(name: str, value: object) -> None:
         ("step_size", 1001),
         ("step_size", 10**400),
         ("viz_pub_rate", 0),
+        ("map_resolution", 0),
+        ("map_resolution", math.inf),
+        ("map_frame", ""),
+        ("map_frame", "/"),
+        ("map_frame", 1),
+        ("publish_map", True),
+        ("publish_map", 1.5),
+        ("publish_map", ["walls"]),
         ("benchmark_duration", 0),
         ("plugin_timeout", 0),
         ("shutdown_timeout", 0),
@@ -119,10 +157,19 @@ def test_invalid_numbers(name: str, value: object) -> None:
         ("seed", 1.5),
         ("seed", "a"),
         ("seed", False),
+        ("use_sim_time", "maybe"),
         ("if_blocked", "stop"),
         ("if_blocked", ""),
         ("if_blocked", True),
         ("if_blocked", ["warn"]),
+        ("move_keeps_odometry", 1),
+        ("initialpose_model", True),
+        ("initialpose_model", ["robot"]),
+        ("initialpose_model", 1.5),
+        ("msgs_package", "std_msgs"),
+        ("msgs_package", ""),
+        ("msgs_package", True),
+        ("msgs_package", ["flatland"]),
         ("world_path", 5),
         ("world_path", ["a"]),
     ],
@@ -264,9 +311,10 @@ def test_missed_rate_is_reported_with_the_most_expensive_plugin(
 
 
 def test_lag_within_max_lag_is_not_reported(
-    launcher: Any, slow_world: Path, eventually: Callable[..., Any]
+    launcher: Any, ros: Any, slow_world: Path, eventually: Callable[..., Any]
 ) -> None:
     process = launcher.server(slow_world, update_rate=100, max_lag=1000)
+    ros.log_everything()
     # With the default value, the warning is logged with the third report.
     eventually("six reports", lambda: process.output.count("cycle use min") >= 6)
     assert "cannot be held" not in process.output

@@ -2,15 +2,35 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections.abc import Callable, Sequence
 from typing import Any
 
 from genpy import Time
 from geometry_msgs.msg import Point, Pose, Quaternion, Twist, Vector3
 from std_msgs.msg import Header
 
+from flatland import geometry
 from flatland.geometry import DoubleArray, quaternion_from_yaw
 from flatland.timekeeper import NANOSECONDS
+
+_stamps: Callable[[int], int] | None = None
+
+
+def set_stamps(stamps: Callable[[int], int] | None) -> None:
+    """Sets the stamps of all messages of this process.
+
+    Args:
+        stamps: Returns the stamp [ns] of a simulated time [ns]; called in any thread. None if
+            stamps are simulated times.
+    """
+    global _stamps
+    _stamps = stamps
+
+
+def stamp(nanoseconds: int) -> int:
+    """Returns the stamp [ns] of a simulated time [ns]: that time, or wall time."""
+    return nanoseconds if _stamps is None else _stamps(nanoseconds)
 
 
 def make(message_type: type[Any], *fields: Any) -> Any:
@@ -25,8 +45,10 @@ def make(message_type: type[Any], *fields: Any) -> Any:
 
 
 def time(nanoseconds: int, time_type: type[Time] = Time) -> Time:
-    """Converts simulated nanoseconds to a ROS time without rounding."""
+    """Converts simulated nanoseconds to the ROS time of a stamp without rounding."""
     result: Time = object.__new__(time_type)
+    if _stamps is not None:
+        nanoseconds = _stamps(nanoseconds)
     result.secs, result.nsecs = divmod(nanoseconds, NANOSECONDS)
     return result
 
@@ -55,3 +77,12 @@ def covariance(matrix: DoubleArray) -> Sequence[float]:
     """Flattens a square matrix in row-major order."""
     numbers: list[float] = matrix.ravel().tolist()
     return numbers
+
+
+def planar_pose(message: Pose) -> geometry.Pose | None:
+    """Converts a message to (x, y, theta); None for non-finite numbers or a zero quaternion."""
+    position, q = message.position, message.orientation
+    numbers = (position.x, position.y, position.z, q.x, q.y, q.z, q.w)
+    if not all(map(math.isfinite, numbers)) or not any((q.x, q.y, q.z, q.w)):
+        return None
+    return (position.x, position.y, geometry.yaw_from_quaternion(q.x, q.y, q.z, q.w))

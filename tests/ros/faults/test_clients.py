@@ -290,9 +290,12 @@ def test_rubbish_on_the_port_of_xmlrpc(
     node.assert_serves()
 
 
+EMPTY_REQUEST = b"\x00\x00\x00\x00"
+
+
 @pytest.mark.parametrize(
     "data",
-    [b"\x00\x00\x00\x00", b"\x04\x00\x00\x00\xff\xff\xff\xff", b"\x02\x00\x00\x00ab"],
+    [EMPTY_REQUEST, b"\x04\x00\x00\x00\xff\xff\xff\xff", b"\x02\x00\x00\x00ab"],
     ids=range(3),
 )
 def test_rubbish_request_of_a_service(
@@ -304,6 +307,8 @@ def test_rubbish_request_of_a_service(
     tcpros.read_frame(connections[0])
     connections[0].sendall(data)
     assert is_closed(connections[0])
+    if data == EMPTY_REQUEST:
+        node.process.wait_for_line(r"\[WARN\].*closed the connection of a client: ")
     node.assert_serves()
 
 
