@@ -246,12 +246,23 @@ def test_rubbish_on_the_port_of_tcpros(
     node.assert_serves()
 
 
-def test_half_headers_block_no_other_client(node: Node, connections: list[socket.socket]) -> None:
+@pytest.fixture(scope="module")
+def incomplete() -> Iterator[list[socket.socket]]:
+    """Connections with incomplete headers, which stay open for the other tests."""
+    opened: list[socket.socket] = []
+    yield opened
+    for connection in opened:
+        connection.close()
+
+
+def test_half_headers_block_no_other_client(
+    node: Node, incomplete: list[socket.socket], connections: list[socket.socket]
+) -> None:
     header = tcpros.header({"topic": "/clock", "callerid": "/half"})
     request = b"POST / HTTP/1.1\r\nHost: node\r\nContent-Length: 1000\r\n\r\n<?xml"
     for size in (0, 1, 4, 5, len(header) - 1):
-        connections.append(tcpros.connect(node.tcpros))
-        connections[-1].sendall(header[:size])
+        incomplete.append(tcpros.connect(node.tcpros))
+        incomplete[-1].sendall(header[:size])
     for size in (0, 1, 20, len(request)):
         connections.append(tcpros.connect(node.xmlrpc))
         connections[-1].sendall(request[:size])
@@ -380,3 +391,14 @@ def test_many_connections_that_are_left_open(
     assert count_files(pid) <= MAX_FILES
     assert "Traceback" not in process.output
     assert process.stop() == 0
+
+
+def test_incomplete_headers_are_closed_after_some_time(
+    node: Node, incomplete: list[socket.socket]
+) -> None:
+    """Last, because the time limit is 10 s."""
+    assert incomplete
+    for connection in incomplete:
+        assert is_closed(connection)
+    node.process.wait_for_line(r"\[WARN\].*closed a connection from .*: its header is not complete")
+    node.assert_serves()
