@@ -27,7 +27,7 @@ class Place:
 
     @property
     def suffix(self) -> str:
-        """The place at the end of an error message, such as ` [model.yaml:12]`."""
+        """The path and line in brackets, for the end of an error message."""
         if self.line is None:
             return f" [{self.path}]" if self.path else ""
         return f" [{self.path}:{self.line}]" if self.path else f" [line {self.line}]"

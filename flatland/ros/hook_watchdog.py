@@ -20,7 +20,7 @@ _POLL_PERIOD: Final = 0.5  # s
 
 
 class HookWatchdog:
-    """Looks at the thread that steps a world, in a separate thread.
+    """Inspects the thread that steps a world, from a separate thread.
 
     Hooks have no additional cost: the stack of the thread is inspected twice a second, and only
     while the simulated time stands still. A hook or callback that has not returned for `LIMIT` is
