@@ -70,7 +70,7 @@ class Background:
         """The output so far."""
         return self._log.read_text(errors="replace")
 
-    def wait_for(self, pattern: str) -> None:
+    def wait_for(self, pattern: str, timeout: float = TIMEOUT) -> None:
         """Waits until the output matches a pattern."""
 
         def printed() -> bool:
@@ -81,7 +81,7 @@ class Background:
                 pytest.fail(f"ended without {pattern!r}:\n{self.output}")
             return found
 
-        wait_until(f"output with {pattern!r}", printed, poll_period=0.05)
+        wait_until(f"output with {pattern!r}", printed, timeout, poll_period=0.05)
 
     def stop(self) -> None:
         """Stops the program as Ctrl-C does."""
@@ -100,6 +100,12 @@ class Background:
 def example(checkout: Path) -> Path:
     """The example package."""
     return checkout / "examples" / "my_robots"
+
+
+@pytest.fixture
+def unused_port() -> Callable[[], int]:
+    """Returns an unused TCP port with each call, for further ROS masters."""
+    return free_port
 
 
 @pytest.fixture
