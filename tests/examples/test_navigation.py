@@ -19,9 +19,11 @@ from waiting import TIMEOUT
 import flatland
 
 NODES = {
-    ("navigation", ""): {"/flatland_server", "/rviz", "/map_server", "/amcl", "/move_base"},
-    ("navigation", "rviz:=false map:=none simulator:=false"): {"/amcl", "/move_base"},
-    ("localization", ""): {"/flatland_server", "/rviz", "/map_server", "/amcl"},
+    ("navigation", ""): {"/flatland_server", "/rviz", "/amcl", "/move_base"},
+    ("navigation", "simulator:=false"): {"/amcl", "/move_base"},
+    ("localization", ""): {"/flatland_server", "/rviz", "/amcl"},
+    ("localization", "map:=/a.yaml rviz:=false"): {"/flatland_server", "/map_server", "/amcl"},
+    ("localization", "map:=none simulator:=false"): {"/amcl"},
     ("mapping", ""): {"/flatland_server", "/rviz", "/gmapping", "/move_base"},
     ("mapping", "slam:=hector move_base:=false"): {"/flatland_server", "/rviz", "/hector_mapping"},
 }
@@ -145,6 +147,9 @@ def test_the_parameters_fit_the_office(checkout, resolve, office, package):
     initial = [params[f"/amcl/initial_pose_{axis}"] for axis in "xya"]
     assert initial == pytest.approx([x, y, yaw], abs=1e-6)
     assert params["/map_to_odom"] is False
+    assert params["/flatland_server/publish_map"] == office.layers[0].name
+    params, _ = resolve("navigation", "map:=/a.yaml")
+    assert params["/flatland_server/publish_map"] is False
 
 
 @pytest.mark.ros
@@ -352,8 +357,9 @@ def tour_of(shell, package, tmp_path) -> Callable[..., subprocess.CompletedProce
 
 @pytest.mark.ros
 def test_a_tour_reports_times_and_errors(checkout, shell, start, tour_of):
-    world = f"world_path:={checkout / 'worlds' / 'simple' / 'world.yaml'}"
-    server = start(["roslaunch", "flatland", "server.launch", world, "show_viz:=false"], shell)
+    world = checkout / "worlds" / "simple" / "world.yaml"
+    launch = ["roslaunch", "flatland", "server.launch", f"world_path:={world}", "show_viz:=false"]
+    server = start([*launch, "update_rate:=1000"], shell)
     server.wait_for('loaded ".*world.yaml"')
     driver = start([sys.executable, "-c", DRIVER], shell)
     driver.wait_for("")
