@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from flatland.geometry import DoubleArray, FloatArray, Pose, Vector2
+from flatland.timekeeper import NANOSECONDS
 
 
 def _zeros(*shape: int) -> DoubleArray:
@@ -32,7 +33,7 @@ class Twist:
     angular_z: float = 0.0
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class LaserScan:
     """One scan of a planar laser; angles and ranges as in `sensor_msgs/LaserScan`.
 
@@ -61,6 +62,15 @@ class LaserScan:
     range_max: float
     ranges: FloatArray
     intensities: FloatArray
+
+    def __repr__(self) -> str:
+        """Returns the number of beams, the shortest range, the stamp and the frame."""
+        hits = self.ranges[np.isfinite(self.ranges)]
+        shortest = f"min {hits.min():.3f} m" if len(hits) else "no hits"
+        return (
+            f"LaserScan({len(self.ranges)} beams, {shortest}, "
+            f"stamp {self.stamp / NANOSECONDS:.3f} s, frame {self.frame_id!r})"
+        )
 
 
 @dataclass(frozen=True, slots=True, eq=False)

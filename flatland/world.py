@@ -5,8 +5,7 @@ from __future__ import annotations
 import logging
 import os
 import threading
-from collections.abc import Callable, Iterable, Sequence
-from concurrent.futures import Future
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from types import TracebackType
 from typing import TypeVar
@@ -193,6 +192,14 @@ class World(Contents):
                 raise
             _LOG.exception("closing the world failed")
 
+    def __repr__(self) -> str:
+        """Returns the file, the time and the number of layers and models."""
+        file = "/".join(Path(self.path).parts[-2:])
+        if self._closed:
+            return f"<World {file!r}, closed>"
+        counts = f"layers: {len(self.layers)}, models: {len(self._models.by_name)}"
+        return f"<World {file!r} at {self.time:.3f} s, {counts}>"
+
     # -- time ------------------------------------------------------------------------------
 
     @property
@@ -258,19 +265,6 @@ class World(Contents):
         """Pauses a running world, resumes a paused one."""
         self._paused = not self._paused
 
-    # -- requests --------------------------------------------------------------------------
-
-    def post(self, action: Callable[[], R]) -> Future[R]:
-        """Queues an action that runs between two steps; see `Requests.post`."""
-        return self.requests.post(action)
-
-    def between_steps(self, action: Callable[[], R]) -> R:
-        """Returns the result of a function that reads the world, run while no step is in progress.
-
-        Safe from any thread; in a plugin's hook it runs at once.
-        """
-        return self.requests.read(action)
-
     # -- observers -------------------------------------------------------------------------
 
     def add_observer(self, observer: WorldObserver) -> None:
@@ -313,6 +307,12 @@ class World(Contents):
         return draw(
             self, size=size, dpi=dpi, view=view, layers=layers, scans=scans, names=names, axes=axes
         )
+
+    def _repr_png_(self) -> bytes | None:
+        """Returns a PNG image for Jupyter; None for a closed world and without matplotlib."""
+        from flatland.drawing import draw_png
+
+        return draw_png(self)
 
     # -- end -------------------------------------------------------------------------------
 

@@ -5,6 +5,21 @@ with matplotlib, and `render` provides the public functions.
 """
 
 from flatland.drawing.layout import Layout
-from flatland.drawing.render import PICTURE_FORMATS, check_matplotlib, draw, make_figure, save
+from flatland.drawing.render import (
+    PICTURE_FORMATS,
+    check_matplotlib,
+    draw,
+    draw_png,
+    make_figure,
+    save,
+)
 
-__all__ = ["PICTURE_FORMATS", "Layout", "check_matplotlib", "draw", "make_figure", "save"]
+__all__ = [
+    "PICTURE_FORMATS",
+    "Layout",
+    "check_matplotlib",
+    "draw",
+    "draw_png",
+    "make_figure",
+    "save",
+]

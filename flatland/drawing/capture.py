@@ -211,8 +211,10 @@ def _draw_joint(joint: Joint) -> JointDrawing:
 
 def _draw_scan(laser: Laser) -> ScanDrawing:
     pose, ranges = laser.last_scan or laser.cast_without_noise()
-    # A beam without a hit reports NaN, infinity or the full range.
+    # A beam without a hit reports NaN, infinity or the full range; one whose hit is too close
+    # reports -inf.
     is_hit = np.isfinite(ranges) & (ranges != np.float32(laser.range))
     fractions = np.where(is_hit, ranges.astype(np.float64) / laser.range, 1.0)
+    fractions[np.isneginf(ranges)] = 0.0
     ends = transform_points(pose, laser.beam_ends * fractions[:, np.newaxis])
     return ScanDrawing(np.concatenate([[pose[:2]], ends]), ends[is_hit])

@@ -5,6 +5,7 @@ matplotlib is imported when the first image is drawn. Its global state (pyplot) 
 
 from __future__ import annotations
 
+import io
 import math
 import os
 import threading
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
     from flatland.world import World
 
 PICTURE_FORMATS: Final = (".png", ".pdf", ".svg")
+NOTEBOOK_DPI: Final = 72.0  # an image of at most 936 x 648 pixels
 
 # matplotlib shares its font cache between figures, and the cache is not thread-safe.
 _MATPLOTLIB_LOCK = threading.Lock()
@@ -179,6 +181,25 @@ def save(
             figure.canvas.print_png(path)
         else:
             figure.savefig(path, format=suffix[1:])
+
+
+def draw_png(world: World) -> bytes | None:
+    """Draws a world for a notebook.
+
+    Args:
+        world: The world to draw.
+
+    Returns:
+        A PNG image; None if the world is closed, or matplotlib is missing.
+    """
+    try:
+        figure = make_figure(world, dpi=NOTEBOOK_DPI)
+    except FlatlandError:
+        return None
+    file = io.BytesIO()
+    with _MATPLOTLIB_LOCK:
+        figure.canvas.print_png(file)
+    return file.getvalue()
 
 
 def check_matplotlib() -> None:

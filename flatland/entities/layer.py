@@ -26,6 +26,7 @@ class Layer(Entity):
         body: Static body at the origin of the layer.
         exact_edge_count: Number of edges of the map before simplification.
         unknown_map_keys: Keys of the map file that flatland does not use, sorted.
+        map_path: The map file; empty for a layer without a map.
     """
 
     def __init__(
@@ -40,6 +41,7 @@ class Layer(Entity):
         edges: FloatArray | None = None,
         exact_edge_count: int = 0,
         unknown_map_keys: Sequence[str] = (),
+        map_path: str = "",
     ) -> None:
         """Creates the body of the layer and its edges.
 
@@ -53,6 +55,7 @@ class Layer(Entity):
             edges: Edges (x1, y1, x2, y2) in the frame of the body [m], shape (n, 4).
             exact_edge_count: Number of edges of the map before simplification.
             unknown_map_keys: Keys of the map file that flatland does not use.
+            map_path: The map file; empty for a layer without a map.
         """
         self.name = names[0]
         self.names = list(names)
@@ -61,6 +64,7 @@ class Layer(Entity):
         self.properties = properties
         self.exact_edge_count = exact_edge_count
         self.unknown_map_keys = tuple(unknown_map_keys)
+        self.map_path = map_path
         self.body = Body(physics.create_body("static", origin), self, self.name, color)
         if edges is not None and len(edges):
             self.add_edges(edges)

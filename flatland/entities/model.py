@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from flatland.entities.body import Body, Entity
 from flatland.entities.joint import Joint
-from flatland.errors import WorldError
+from flatland.errors import FlatlandError, WorldError
 from flatland.geometry import MAX_MAGNITUDE, Pose, Vector2, compose, finite_pose, invert
 from flatland.graph_names import clean_name
 
@@ -42,7 +42,13 @@ class Model(Entity):
         self.displacement: Vector2 = (0.0, 0.0)
 
     def __repr__(self) -> str:
-        return f"<Model {self.name!r}>"
+        """Returns the name, the pose and the number of bodies and plugins."""
+        contents = f"bodies: {len(self.bodies)}, plugins: {len(self.plugins)}"
+        try:
+            x, y, theta = self.pose
+        except (FlatlandError, IndexError):  # It was deleted, or is not complete yet.
+            return f"<Model {self.name!r}, {contents}>"
+        return f"<Model {self.name!r} at ({x:.3f}, {y:.3f}, {theta:.3f}), {contents}>"
 
     def find_body(self, name: str) -> Body | None:
         """Returns the body with a name, None if it does not exist."""

@@ -56,6 +56,7 @@ def load_world(
     properties = reader.subnode("properties", "map")
     velocity_iterations = properties.get("velocity_iterations", "int", 10, minimum=1)
     position_iterations = properties.get("position_iterations", "int", 10, minimum=1)
+    map_layer: str = properties.get("publish_map", "string", "")
     properties.ensure_accessed_all()
     world = world_class(
         seed=seed,
@@ -73,6 +74,12 @@ def load_world(
     try:
         for entry in reader.subnode("layers", "list").items():
             _load_layer(world, entry, simplify_map)
+        if map_layer and not any(map_layer in layer.names for layer in world.layers):
+            names = ", ".join(layer.name for layer in world.layers) or "none"
+            raise properties.invalid(
+                "publish_map", f"must be the name of a layer ({names}), got {map_layer}"
+            )
+        world.map_layer = map_layer
         try:
             _load_models(world, reader)
             # Unknown keys are reported before world plugins are started.
@@ -129,6 +136,7 @@ def _load_layer(world: World, reader: YamlReader, simplify_map: int) -> None:
                 edges=layer_map.edges,
                 exact_edge_count=layer_map.exact_edge_count,
                 unknown_map_keys=layer_map.unknown_keys,
+                map_path=layer_map.path,
             )
         except ValueError as error:  # finite, but outside the range of the physics
             raise YamlError(

@@ -13,12 +13,12 @@ from flatland.geometry import FloatArray, Pose, compose
 from flatland.plugin_api.parameters import (
     at_key,
     read_body,
-    read_not_negative,
     read_pose,
     read_rate,
 )
 from flatland.plugin_api.plugin import ModelPlugin
 from flatland.plugin_api.update_timer import UpdateTimer
+from flatland.plugins._range_noise import read_range_noise
 from flatland.values import LaserScan
 
 if TYPE_CHECKING:
@@ -90,6 +90,9 @@ class Laser(ModelPlugin):
         body: The body on which the sensor is mounted.
         angles: Angles of the beams.
         range: Length of a beam [m].
+        range_min: Shortest range that is measured [m]; a shorter one is reported as -inf.
+        scan_time: Reported time between scans [s].
+        time_increment: Reported time between beams [s].
         origin: (x, y, theta) of the sensor in the body frame.
         intensities: Intensities of the last scan computed: 255 for a beam whose nearest hit is in
             the layer `reflectance`, else 0; shape (n,), or (0,) in a world without that layer;
@@ -113,7 +116,9 @@ class Laser(ModelPlugin):
         self.timer = UpdateTimer(read_rate(config))
         self.always_publish: bool = config.get("always_publish", "bool", False)
         self._length = np.float32(self.range)
-        self._deviation = np.float32(self._read_deviation(config))
+        self.range_min = self._read_range_min(config)
+        self.scan_time, self.time_increment = self._read_times(config)
+        self._range_noise = read_range_noise(config, self.range)
         self._noise = self.noise_stream("scan")
         self._no_hit = self._read_no_hit(config)
         self._mask = self._read_mask(config)
@@ -138,14 +143,29 @@ class Laser(ModelPlugin):
             )
         return length
 
-    @staticmethod
-    def _read_deviation(config: YamlReader) -> float:
-        deviation = read_not_negative(config, "noise_std_dev", 0.0)
-        if deviation > MAX_RANGE:
-            raise at_key(config, "noise_std_dev").error(
-                f'Invalid "noise_std_dev", must be at most {MAX_RANGE:g} m, got {deviation}'
+    def _read_range_min(self, config: YamlReader) -> float:
+        shortest: float = config.get("range_min", "float", 0.0)
+        if not 0 <= shortest < self.range:
+            raise config.invalid(
+                "range_min",
+                f'must not be negative and less than "range", {self.range:g} m, got {shortest}',
             )
-        return deviation
+        return shortest
+
+    def _read_times(self, config: YamlReader) -> tuple[float, float]:
+        scan_time, time_increment = (
+            config.get(key, "float", 0.0, finite=True, minimum=0)
+            for key in ("scan_time", "time_increment")
+        )
+        # The duration from the first to the last beam; a product of rounded numbers.
+        duration = time_increment * (self.angles.count - 1)
+        if scan_time and duration > scan_time * (1 + 1e-6):
+            raise config.invalid(
+                "time_increment",
+                f"{self.angles.count} beams must not take longer than the scan_time of "
+                f"{scan_time:g} s, got {time_increment:g} s per beam, {duration:g} s in total",
+            )
+        return scan_time, time_increment
 
     def _read_no_hit(self, config: YamlReader) -> float:
         values = {"nan": math.nan, "inf": math.inf, "range": self.range}
@@ -182,9 +202,9 @@ class Laser(ModelPlugin):
                 angle_min=angles.minimum,
                 angle_max=angles.maximum,
                 angle_increment=angles.increment,
-                time_increment=0.0,
-                scan_time=0.0,
-                range_min=0.0,
+                time_increment=self.time_increment,
+                scan_time=self.scan_time,
+                range_min=self.range_min,
                 range_max=self.range,
                 ranges=ranges,
                 intensities=self.intensities,
@@ -207,13 +227,15 @@ class Laser(ModelPlugin):
             pose, self.beam_ends, self._mask, self._reflect_mask
         )
         ranges = fractions * self._length
-        if self._deviation:
-            # The range of a miss is NaN and remains NaN.
-            noise = rng.standard_normal(ranges.shape, dtype=np.float32)
-            noise *= self._deviation
-            ranges += noise
+        if self._range_noise is not None:
+            # The range of a miss is NaN.
+            is_hit = self._range_noise.apply(ranges, rng)
+            if is_hit is not None:
+                reflects &= is_hit
+        if self.range_min:
+            ranges[ranges < self.range_min] = -math.inf
         if not math.isnan(self._no_hit):
-            ranges[np.isnan(fractions)] = self._no_hit
+            ranges[np.isnan(ranges)] = self._no_hit
         if self._reflect_mask:
             self.intensities = np.where(reflects, np.float32(REFLECTIVE), np.float32(0.0))
         self.last_scan = (pose, ranges)

@@ -104,6 +104,11 @@ class Bridge(WorldObserver):
             if not self._closed:
                 topic.publisher.close()
 
+    def subscribed(self, output: Output[Any]) -> bool:
+        """Returns whether the topic of an output has subscribers."""
+        topic = self._outputs.get(output)
+        return topic is not None and topic.publisher.connected
+
     def command_opened(self, command: Command[Any]) -> None:
         """Subscribes to the topic of a command."""
         adapter = find_adapter(command.value_type)

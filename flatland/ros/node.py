@@ -142,6 +142,7 @@ class ServerNode:
         """Loads the world and steps it until a stop is requested."""
         from flatland.ros.bridge import Bridge
         from flatland.ros.deferred_topics import DeferredTopics
+        from flatland.ros.frame_monitor import FrameMonitor
         from flatland.ros.services import Services
         from flatland.ros.transport.registrar import Registrar
         from flatland.simulation import Simulation
@@ -161,7 +162,9 @@ class ServerNode:
             simulation.stop()
         debug_rate = parameters.viz_pub_rate if parameters.show_viz else None
         deferred_topics = DeferredTopics(self._registrar, simulation, debug_rate=debug_rate)
+        frame_monitor = FrameMonitor(self._registrar, simulation, bridge.subscribed)
         try:
+            _publish_map(self._registrar, world, parameters)
             Services(self._registrar, simulation, parameters.if_blocked)
             if parameters.benchmark_duration is None:
                 simulation.run()
@@ -171,6 +174,7 @@ class ServerNode:
                     _log_benchmark(result)
         finally:
             deferred_topics.close()
+            frame_monitor.close()
             # Plugins are closed before their topics, so that `on_shutdown` can publish; rospy then
             # unregisters all topics at once.
             bridge.close()
@@ -200,6 +204,27 @@ def _load(parameters: NodeParameters, bridge: Any) -> World:
         len(world.models),
     )
     return world
+
+
+def _publish_map(registrar: Registrar, world: World, parameters: NodeParameters) -> None:
+    """Publishes the layer that the parameters or the world file name as a map, if any.
+
+    Raises:
+        ParameterError: The layer of the parameter does not exist.
+        FlatlandError: The layer cannot be published.
+    """
+    layer = parameters.publish_map or ("" if parameters.publish_map is None else world.map_layer)
+    if not layer:
+        return
+    from flatland.ros.map_topics import MapTopics
+
+    names = [name for each in world.layers for name in each.names]
+    if layer not in names:
+        raise ParameterError(
+            'Invalid parameter "~publish_map": it must be the name of a layer '
+            f"({', '.join(names) or 'none'}), got {layer!r}"
+        )
+    MapTopics(registrar, world, layer, parameters.map_frame, parameters.map_resolution)
 
 
 def _log_benchmark(result: RunResult) -> None:

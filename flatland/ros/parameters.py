@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from flatland.maps.occupancy_grid import DEFAULT_RESOLUTION
 from flatland.ros.shutdown import DEFAULT_SHUTDOWN_TIMEOUT
 from flatland.runtime.placement import IF_BLOCKED, IfBlocked
 from flatland.simulation import MAX_LAG
@@ -41,6 +42,10 @@ class NodeParameters:
         shutdown_timeout: Limit of wall time between a stop request and the end of the process [s];
             None for no limit.
         if_blocked: Behaviour of `spawn_model` and `move_model` at poses that are not free.
+        publish_map: Name of the layer that is published as a map; empty for that of the world file,
+            None for no map.
+        map_frame: Frame of the map.
+        map_resolution: Size of a cell of the map of a layer without an image [m].
     """
 
     world_path: str
@@ -55,6 +60,9 @@ class NodeParameters:
     plugin_timeout: float | None
     shutdown_timeout: float | None
     if_blocked: IfBlocked
+    publish_map: str | None
+    map_frame: str
+    map_resolution: float
 
 
 def read_parameters(get: ParameterSource) -> NodeParameters:
@@ -80,6 +88,9 @@ def read_parameters(get: ParameterSource) -> NodeParameters:
         plugin_timeout=reader.timeout("plugin_timeout", 60.0),
         shutdown_timeout=reader.timeout("shutdown_timeout", DEFAULT_SHUTDOWN_TIMEOUT),
         if_blocked=reader.if_blocked("if_blocked", "warn"),
+        publish_map=reader.optional_name("publish_map"),
+        map_frame=reader.frame("map_frame", "map"),
+        map_resolution=reader.finite_positive("map_resolution", DEFAULT_RESOLUTION),
     )
 
 
@@ -114,6 +125,10 @@ class _Reader:
 
     def positive(self, name: str, default: float) -> float:
         return self._number(name, default, "a positive number", lambda number: number > 0)
+
+    def finite_positive(self, name: str, default: float) -> float:
+        wanted = "a positive, finite number"
+        return self._number(name, default, wanted, lambda number: 0 < number < math.inf)
 
     def optional_positive(self, name: str) -> float | None:
         return None if self._get(name) is None else self.positive(name, 0.0)
@@ -150,6 +165,25 @@ class _Reader:
             if value == choice:
                 return choice
         raise _invalid(name, "one of " + ", ".join(IF_BLOCKED), value)
+
+    def optional_name(self, name: str) -> str | None:
+        """Reads a name; empty by default, None for false. roslaunch passes a number as such."""
+        value = self._get(name)
+        if value is None:
+            return ""
+        if value is False:
+            return None
+        if isinstance(value, bool) or not isinstance(value, (str, int)):
+            raise _invalid(name, "the name of a layer, or false", value)
+        return str(value).strip()
+
+    def frame(self, name: str, default: str) -> str:
+        value = self._get(name)
+        if value is None:
+            return default
+        if not isinstance(value, str) or not value.strip(" /"):
+            raise _invalid(name, "the name of a frame", value)
+        return value.strip().lstrip("/")
 
     def natural(self, name: str) -> int | None:
         wanted = "an integer that is not negative"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Iterable, Sequence
+from concurrent.futures import Future
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
@@ -39,6 +40,7 @@ class Contents:
 
     Attributes:
         layers: The layers in the order of the file.
+        map_layer: Name of the layer that the ROS node publishes as a map; empty for none.
         plugin_host: Starts plugins and calls their hooks.
         ports: All outputs and commands by resolved topic.
         requests: The queue of actions that run between two steps.
@@ -46,6 +48,7 @@ class Contents:
     """
 
     layers: list[Layer]
+    map_layer: str = ""
     plugin_host: PluginHost
     ports: PortRegistry
     requests: Requests
@@ -164,6 +167,19 @@ class Contents:
             WorldError: The model does not exist.
         """
         self._change(lambda: self._models.delete(name), f'deletion of model "{name}"')
+
+    # -- requests --------------------------------------------------------------------------
+
+    def post(self, action: Callable[[], R]) -> Future[R]:
+        """Queues an action that runs between two steps; see `Requests.post`."""
+        return self.requests.post(action)
+
+    def between_steps(self, action: Callable[[], R]) -> R:
+        """Returns the result of a function that reads the world, run while no step is in progress.
+
+        Safe from any thread; in a plugin's hook it runs at once.
+        """
+        return self.requests.read(action)
 
     def _change(self, action: Callable[[], R], what: str) -> R | None:
         def checked() -> R:

@@ -32,6 +32,9 @@ def test_defaults() -> None:
         plugin_timeout=60.0,
         shutdown_timeout=2.0,
         if_blocked="warn",
+        publish_map="",
+        map_frame="map",
+        map_resolution=0.05,
     )
 
 
@@ -66,6 +69,15 @@ def test_defaults() -> None:
         ("shutdown_timeout", math.inf, None),
         ("if_blocked", "allow", "allow"),
         ("if_blocked", "nearest", "nearest"),
+        ("publish_map", "walls", "walls"),
+        ("publish_map", "", ""),
+        ("publish_map", " ", ""),
+        ("publish_map", 2, "2"),
+        ("publish_map", False, None),
+        ("map_frame", "r1/map", "r1/map"),
+        ("map_frame", "/map", "map"),
+        ("map_resolution", "0.1", 0.1),
+        ("map_resolution", 1, 1.0),
     ],
 )
 def test_valid_values(name: str, value: object, expected: object) -> None:
@@ -84,6 +96,7 @@ def test_valid_values(name: str, value: object, expected: object) -> None:
         "benchmark_duration",
         "plugin_timeout",
         "shutdown_timeout",
+        "map_resolution",
     ],
 )
 @pytest.mark.parametrize("value", [math.nan, "nan", -1, -1e-300, "fast", "", True, [1], {"a": 1}])
@@ -106,6 +119,14 @@ def test_invalid_numbers(name: str, value: object) -> None:
         ("step_size", 1001),
         ("step_size", 10**400),
         ("viz_pub_rate", 0),
+        ("map_resolution", 0),
+        ("map_resolution", math.inf),
+        ("map_frame", ""),
+        ("map_frame", "/"),
+        ("map_frame", 1),
+        ("publish_map", True),
+        ("publish_map", 1.5),
+        ("publish_map", ["walls"]),
         ("benchmark_duration", 0),
         ("plugin_timeout", 0),
         ("shutdown_timeout", 0),

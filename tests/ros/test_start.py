@@ -186,6 +186,7 @@ def test_server_launch_passes_all_parameters(launcher: Any, ros: Any, world: Pat
         "seed:=7",
         "plugin_timeout:=30",
         "shutdown_timeout:=5",
+        "publish_map:=2d",
     )
     times = [message.clock.to_nsec() for message in ros.topic("/clock", Clock).take(20)]
     assert {time % 10_000_000 for time in times} == {0}
@@ -202,6 +203,7 @@ def test_server_launch_passes_all_parameters(launcher: Any, ros: Any, world: Pat
         "plugin_timeout": 30,
         "shutdown_timeout": 5,
         "if_blocked": "warn",
+        "publish_map": "2d",
     }
     assert ros.master.getParam("/use_sim_time") is True
     process.wait_for_line("real-time factor: target inf")

@@ -140,6 +140,13 @@ class TestScans:
             world.step()
         assert eye(world).last_scan is not None
 
+    def test_hit_that_is_too_close_is_at_the_sensor(self, files):
+        world = room_world(files, f"[{laser('range_min: 2.5, always_publish: true')}]")
+        world.step()
+        (scan,) = capture_scene(world, None, scans=True).scans
+        assert scan.area[[0, 3]] == pytest.approx(np.array([(4, 3), (4, 3)]))  # 2 m to the back
+        assert len(scan.hits) == 3
+
     def test_last_scan_is_drawn_with_its_noise(self, files):
         world = room_world(files, f"[{laser('noise_std_dev: 0.02', increment=0.01)}]")
         output = world.output("/scan")

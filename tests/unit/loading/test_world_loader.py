@@ -32,6 +32,14 @@ ERRORS = {
         "{properties: {position_iterations: 0}, layers: []}",
         'Invalid "position_iterations", must be at least 1, got 0 (in "properties")',
     ),
+    "map of an unknown layer": (
+        "{properties: {publish_map: roof}, layers: [{name: [a, c]}, {name: b}]}",
+        'Invalid "publish_map", must be the name of a layer (a, b), got roof (in "properties")',
+    ),
+    "map without layers": (
+        "{properties: {publish_map: roof}, layers: []}",
+        'Invalid "publish_map", must be the name of a layer (none), got roof (in "properties")',
+    ),
     "unknown world key": (
         "{properties: {}, layers: [], b: 1, a: 2}",
         'Entry contains unrecognized entry(s) {"a", "b"}',
@@ -244,6 +252,12 @@ def test_solver_iterations(files):
         "{properties: {velocity_iterations: 11, position_iterations: 12}, layers: []}"
     )
     assert (world.velocity_iterations, world.position_iterations) == (11, 12)
+
+
+def test_layer_that_is_published_as_a_map(files, empty_world):
+    assert empty_world.map_layer == ""
+    layers = "layers: [{name: a}, {name: [b, c]}]"
+    assert files.load(f"{{properties: {{publish_map: c}}, {layers}}}").map_layer == "c"
 
 
 def test_entries_of_layers(files):

@@ -25,6 +25,15 @@ ROOM_LAYERS = "[{name: 2d, map: room.yaml}, {name: 3d}]"
 CROSS = "{min: 0, max: 4.8, increment: 1.5707963267948966}"  # right, up, left, down
 
 
+BESIDE_A_POST = """
+- name: base
+  footprints: [{type: circle, radius: 0.2, density: 1, layers: [3d]}]
+- name: post
+  pose: [0.501, 0, 0]
+  footprints: [{type: circle, radius: 0.5, density: 1}]
+"""
+
+
 def laser(extra: str = "", angle: str = CROSS) -> str:
     return f"- {{type: Laser, name: eye, body: base, range: 20, angle: {angle}, {extra}}}"
 
@@ -181,6 +190,57 @@ class TestNoHit:
         np.testing.assert_allclose(
             eye(world).compute_ranges(), [math.nan, math.nan, 2.0, 3.0], atol=1e-4
         )
+
+
+class TestRangeMin:
+    @pytest.mark.parametrize("no_hit", ["nan", "inf", "range"])
+    def test_a_hit_that_is_too_close_is_negative_infinity(self, walls: Walls, no_hit: str) -> None:
+        ranges = eye(walls.room(f"range_min: 2.5, no_hit: {no_hit}")).compute_ranges()
+        assert ranges[2] == -math.inf
+        assert ranges[[0, 1, 3]] == pytest.approx([6.0, 5.0, 3.0], abs=1e-4)
+
+    def test_misses_are_not_affected(self, walls: Walls) -> None:
+        ranges = eye(walls.load(laser("range_min: 2.5"))).compute_ranges()
+        assert np.isnan(ranges).all()
+
+    def test_the_measured_range_counts(self, walls: Walls) -> None:
+        angle = "{min: 3.1414, max: 3.1416, increment: 2.0e-7}"  # to the wall at 2 m
+        ranges = eye(walls.room("range_min: 2, noise_std_dev: 0.1", angle)).compute_ranges()
+        close = ranges == -math.inf
+        assert 0.4 < close.mean() < 0.6
+        assert (ranges[~close] >= 2).all()
+
+    def test_nothing_is_too_close_by_default(self, walls: Walls) -> None:
+        world = walls.load(laser(), bodies=BESIDE_A_POST)
+        assert eye(world).compute_ranges()[0] == pytest.approx(0.001, abs=1e-4)
+
+    def test_the_message_contains_it(self, walls: Walls) -> None:
+        world = walls.room("range_min: 2.5")
+        output = world.output("/scan")
+        world.step()
+        assert output.latest.range_min == 2.5
+        assert output.latest.ranges[2] == -math.inf
+
+
+class TestTimes:
+    def test_times_are_reported_as_configured(self, walls: Walls) -> None:
+        world = walls.room("scan_time: 0.1, time_increment: 0.025")
+        output = world.output("/scan")
+        world.step()
+        assert (output.latest.scan_time, output.latest.time_increment) == (0.1, 0.025)
+
+    def test_a_time_increment_needs_no_scan_time(self, walls: Walls) -> None:
+        world = walls.room("time_increment: 0.025")
+        output = world.output("/scan")
+        world.step()
+        assert (output.latest.scan_time, output.latest.time_increment) == (0.0, 0.025)
+
+    def test_the_scan_remains_instantaneous(self, walls: Walls) -> None:
+        world = walls.room("scan_time: 0.1, time_increment: 0.025")
+        world.model("robot").body("base").set_velocity(1.0, 0.0, 0.0)
+        output = world.output("/scan")
+        world.step()
+        assert output.latest.ranges == pytest.approx([6.0, 5.0, 2.0, 3.0], abs=1e-4)
 
 
 class TestNoise:
@@ -457,6 +517,19 @@ class TestErrors:
             ("no_hit: zero", 'Invalid "no_hit", must be one of: nan, inf, range, got zero'),
             ("topic: 'a b'", '"a b" is not a legal topic name'),
             ("colour: red", "colour"),
+            (
+                "range_min: -0.1",
+                'Invalid "range_min", must not be negative and less than "range", 20 m',
+            ),
+            ("range_min: 20", 'must not be negative and less than "range", 20 m, got 20'),
+            ("range_min: .nan", 'Invalid "range_min", must not be negative'),
+            ("scan_time: -1", 'Invalid "scan_time", must be finite and not negative'),
+            ("time_increment: .inf", 'Invalid "time_increment", must be finite and not negative'),
+            (
+                "scan_time: 0.1, time_increment: 0.05",
+                'Invalid "time_increment", 4 beams must not take longer than the scan_time of '
+                "0.1 s, got 0.05 s per beam, 0.15 s in total",
+            ),
         ],
     )
     def test_other_parameters(self, plugin_world: Any, extra: str, message: str) -> None:

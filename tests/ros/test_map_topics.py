@@ -1,0 +1,163 @@
+"""The map of a layer, published as by `map_server`, and the warning of lasers without a TF path."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+import pytest
+import rospy
+from nav_msgs.msg import MapMetaData, OccupancyGrid
+from nav_msgs.srv import GetMap
+from sensor_msgs.msg import LaserScan
+
+GREYS = [[0, 205, 254], [254, 254, 0]]
+CELLS = [0, 0, 100, 100, -1, 0]  # the bottom row first; 205 is unknown
+GREY_MAP = "image: grey.png\nresolution: 0.5\norigin: [1, -2, 0.3]\noccupied_thresh: 0.65\n"
+LAYERS = "[{name: 2d, map: map.yaml}, {name: [grey, low], map: grey.yaml}, {name: empty}]"
+LASER = "{type: Laser, name: eye, body: base, range: 20, angle: {min: 0, max: 1, increment: 1}}"
+BODIES = "bodies: [{name: base, footprints: [{type: circle, radius: 0.2, density: 1}]}]"
+LOST = f"{BODIES}\nplugins: [{LASER}]\n"
+FOUND = f"{BODIES}\nplugins: [{LASER}, {{type: DiffDrive, name: drive, body: base}}]\n"
+MODELS = """
+  - {name: lost, model: lost.model.yaml, namespace: lost}
+  - {name: found, model: found.model.yaml, namespace: found, pose: [2, 2, 0]}
+"""
+
+
+@pytest.fixture(scope="module")
+def world(write_world: Callable[..., Path]) -> Path:
+    """A world whose file publishes the layer `grey`, an image."""
+    path = write_world(MODELS, layers=LAYERS, lost=LOST, found=FOUND)
+    (path.parent / "grey.yaml").write_text(GREY_MAP)
+    cv2.imwrite(str(path.parent / "grey.png"), np.array(GREYS, np.uint8))
+    text = path.read_text().replace("properties: {}", "properties: {publish_map: low}")
+    path.write_text(text)
+    return path
+
+
+@pytest.fixture(scope="module", autouse=True)
+def server(module_launcher: Any, module_ros: Any, world: Path) -> Any:
+    """One server for most tests of this file; the scans of both robots have a subscriber."""
+    process = module_launcher.server(world, seed=1)
+    for robot in ("lost", "found"):
+        module_ros.topic(f"/{robot}/scan", LaserScan)
+    return process
+
+
+def assert_is_the_map(grid: OccupancyGrid) -> None:
+    assert grid.header.frame_id == "map"
+    assert list(grid.data) == CELLS
+    info = grid.info
+    assert (info.width, info.height, info.resolution) == (3, 2, 0.5)
+    position, rotation = info.origin.position, info.origin.orientation
+    assert (position.x, position.y, position.z) == (1, -2, 0)
+    assert (rotation.x, rotation.y) == (0, 0)
+    assert (rotation.z, rotation.w) == pytest.approx((math.sin(0.15), math.cos(0.15)))
+
+
+def test_topics_and_service_have_the_names_and_types_of_map_server(ros: Any, server: Any) -> None:
+    registered = ros.registered()
+    assert {"/map", "/map_metadata"} <= registered["publishers"]
+    assert "/static_map" in registered["services"]
+    types = ros.types()
+    assert types["/map"] == "nav_msgs/OccupancyGrid"
+    assert types["/map_metadata"] == "nav_msgs/MapMetaData"
+    assert "publishing layer" not in server.output
+
+
+def test_a_missing_image_is_an_error_until_it_is_back(ros: Any, world: Path, server: Any) -> None:
+    image = world.parent / "grey.png"
+    content = image.read_bytes()
+    image.unlink()
+    try:
+        with pytest.raises(rospy.ServiceException, match=r"Failed to load .*grey\.yaml:1"):
+            ros.call("/static_map", GetMap)
+        topic = ros.topic("/map_metadata", MapMetaData)
+        server.wait_for_line(r"\[ERROR\].*cannot publish the map: .*Failed to load .*grey\.yaml:1")
+        assert topic.rest() == []
+    finally:
+        image.write_bytes(content)
+    assert_is_the_map(ros.call("/static_map", GetMap).map)
+
+
+def test_map_is_published_with_its_metadata(ros: Any) -> None:
+    grid = ros.topic("/map", OccupancyGrid).next()
+    assert_is_the_map(grid)
+    assert 0 < grid.header.stamp.to_sec() < 1000  # simulated time
+    assert grid.info.map_load_time == grid.header.stamp
+    assert ros.topic("/map_metadata", MapMetaData).next() == grid.info
+
+
+def test_map_is_latched_and_created_once(ros: Any, server: Any) -> None:
+    first = ros.topic("/map", OccupancyGrid).next()
+    second = ros.topic("/map", OccupancyGrid)
+    assert second.next().header.stamp == first.header.stamp
+    assert second.rest() == []
+    assert ros.call("/static_map", GetMap).map.header.stamp == first.header.stamp
+    lines = [line for line in server.lines if "publishing layer" in line]
+    assert len(lines) == 1
+    assert 'publishing layer "low" as a map of 3 x 2 cells of 0.5 m' in lines[0]
+
+
+@pytest.mark.parametrize(
+    ("layer", "reason"),
+    [
+        (
+            "roof",
+            'Invalid parameter "~publish_map": it must be the name of a layer '
+            "(2d, grey, low, empty), got 'roof'",
+        ),
+        ("empty", 'layer "empty" has no walls and therefore no map'),
+    ],
+)
+def test_an_invalid_layer_is_reported_in_one_fatal_line(
+    launcher: Any, world: Path, layer: str, reason: str
+) -> None:
+    # With another name, so that it does not replace the server of this file.
+    process = launcher.start("__name:=other", world_path=world, publish_map=layer)
+    assert process.wait() == 1
+    (line,) = [line for line in process.lines if "[FATAL]" in line]
+    assert reason in line
+    assert "Traceback" not in process.output
+
+
+def test_a_laser_without_a_path_to_the_world_causes_one_warning(server: Any) -> None:
+    server.wait_for_line(
+        r'\[WARN\].*Model Plugin "eye" type "Laser" model "lost": no TF path leads from frame '
+        r'"lost_eye" of the scans on /lost/scan to the world \(the chain of parents ends at '
+        r'"lost_base"\).*Remedy: enable_odom_tf_pub'
+    )
+    assert sum("no TF path" in line for line in server.lines) == 1
+
+
+class TestParameters:
+    """Other servers replace the one of this file from here on."""
+
+    def test_a_layer_of_line_segments(
+        self, launcher: Any, ros: Any, world: Path, server: Any
+    ) -> None:
+        server.stop()
+        launcher.server(world, publish_map="2d", map_resolution=0.5, map_frame="/arena")
+        grid = ros.call("/static_map", GetMap).map
+        assert grid.header.frame_id == "arena"
+        assert (grid.info.width, grid.info.height, grid.info.resolution) == (21, 21, 0.5)
+        assert (grid.info.origin.position.x, grid.info.origin.position.y) == (-5, -5)
+        assert grid.info.origin.orientation.w == 1
+        cells = np.array(grid.data).reshape(21, 21)
+        assert (cells[[0, -1]] == 100).all()
+        assert (cells[:, [0, -1]] == 100).all()
+        assert (cells[1:-1, 1:-1] == 0).all()
+
+    def test_false_overrides_the_world_file(
+        self, launcher: Any, ros: Any, world: Path, server: Any
+    ) -> None:
+        server.stop()
+        launcher.server(world, publish_map="false")
+        registered = ros.registered()
+        assert "/map" not in registered["publishers"]
+        assert "/static_map" not in registered["services"]

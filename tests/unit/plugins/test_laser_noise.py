@@ -1,0 +1,268 @@
+"""The noise models of the laser, compared with their closed-form distributions."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+
+import flatland
+
+BEAMS = 50_001
+LINE = "{min: 0, max: 0.0005, increment: 1.0e-8}"  # BEAMS beams that all point ahead
+EXACT = 6.0  # m; distance of the wall ahead
+RANGE = 20.0  # m
+# Kolmogorov-Smirnov: the statistic of n correct samples is above 1.95 / sqrt(n) with p = 0.001.
+LIMIT = 1.95
+
+Distribution = Callable[[npt.NDArray[np.float64]], npt.NDArray[np.float64]]
+
+
+def laser(extra: str, angle: str = LINE) -> str:
+    return f"- {{type: Laser, name: eye, body: base, range: {RANGE}, angle: {angle}, {extra}}}"
+
+
+class Eye:
+    """Loads a robot with a laser whose beams all hit a wall, or hit nothing."""
+
+    def __init__(self, plugin_world: Any) -> None:
+        self._load = plugin_world
+
+    def world(self, extra: str, seed: int = 1, angle: str = LINE) -> flatland.World:
+        files = self._load.files
+        files.write("wall.dat", f"{EXACT} -1 {EXACT} 1")
+        files.write("wall.yaml", "{type: line_segments, data: wall.dat, scale: 1, origin: [0,0,0]}")
+        layers = "[{name: reflectance, map: wall.yaml}, {name: empty}]"
+        return self._load(laser(extra, angle), layers=layers, seed=seed)  # type: ignore[no-any-return]
+
+    def __call__(self, extra: str) -> Any:
+        return self.world(extra).model("robot").plugin("eye")
+
+    def ranges(self, extra: str) -> npt.NDArray[np.float64]:
+        ranges = self(extra).compute_ranges()
+        assert ranges.shape == (BEAMS,)
+        assert ranges.dtype == np.float32
+        return ranges.astype(np.float64)  # type: ignore[no-any-return]
+
+
+@pytest.fixture
+def eye(plugin_world: Any) -> Eye:
+    return Eye(plugin_world)
+
+
+def normal(x: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+    """Cumulative standard normal distribution."""
+    return np.array([0.5 * math.erfc(-value / math.sqrt(2)) for value in x])
+
+
+def truncated_normal(mean: float, sigma: float) -> Distribution:
+    """The normal distribution between 0 and the maximum range, equation 6.4."""
+    low, high = normal(np.array([-mean / sigma, (RANGE - mean) / sigma]))
+    return lambda x: np.clip((normal((x - mean) / sigma) - low) / (high - low), 0, 1)
+
+
+def truncated_exponential(rate: float, limit: float) -> Distribution:
+    """The exponential distribution between 0 and a limit, equation 6.7."""
+    return lambda x: np.clip(
+        (1 - np.exp(-rate * np.clip(x, 0, limit))) / (1 - math.exp(-rate * limit)), 0, 1
+    )
+
+
+def uniform(x: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+    """The uniform distribution between 0 and the maximum range, equation 6.12."""
+    return np.clip(x / RANGE, 0, 1)
+
+
+def deviation_of(samples: npt.NDArray[np.float64], distribution: Distribution) -> float:
+    """Returns the Kolmogorov-Smirnov statistic, multiplied by the root of the sample size."""
+    n = len(samples)
+    expected = distribution(np.sort(samples))
+    steps = np.arange(n + 1) / n
+    largest = max(np.abs(expected - steps[1:]).max(), np.abs(expected - steps[:-1]).max())
+    return float(largest * math.sqrt(n))
+
+
+class TestGaussian:
+    def test_additive_noise_has_a_constant_deviation(self, eye: Eye) -> None:
+        ranges = eye.ranges("noise_model: additive, noise_std_dev: 0.2")
+        assert deviation_of(ranges, lambda x: normal((x - EXACT) / 0.2)) < LIMIT
+
+    def test_additive_is_the_default(self, eye: Eye) -> None:
+        default = eye.ranges("noise_std_dev: 0.2")
+        assert (default == eye.ranges("noise_model: additive, noise_std_dev: 0.2")).all()
+
+    def test_the_deviation_of_proportional_noise_is_a_share_of_the_range(self, eye: Eye) -> None:
+        ranges = eye.ranges("noise_model: proportional, noise_std_dev: 0.02")
+        assert deviation_of(ranges, lambda x: normal((x - EXACT) / (0.02 * EXACT))) < LIMIT
+
+    @pytest.mark.parametrize("model", ["additive", "proportional"])
+    def test_misses_have_no_noise(self, eye: Eye, model: str) -> None:
+        ranges = eye.ranges(f"noise_model: {model}, noise_std_dev: 0.2, layers: [empty]")
+        assert np.isnan(ranges).all()
+
+    @pytest.mark.parametrize("model", ["additive", "proportional"])
+    def test_no_model_is_active_without_a_deviation(self, eye: Eye, model: str) -> None:
+        assert eye.ranges(f"noise_model: {model}") == pytest.approx(EXACT, abs=1e-4)
+
+
+class TestBeamModel:
+    @pytest.mark.parametrize("sigma", [0.05, 3.0, 15.0])
+    def test_hits_are_normal_within_the_range_of_the_sensor(self, eye: Eye, sigma: float) -> None:
+        ranges = eye.ranges(f"noise_model: beam, sigma_hit: {sigma}")
+        assert deviation_of(ranges, truncated_normal(EXACT, sigma)) < LIMIT
+        assert ranges.min() >= 0
+        assert ranges.max() <= RANGE
+
+    def test_hits_are_exact_without_sigma(self, eye: Eye) -> None:
+        assert eye.ranges("noise_model: beam") == pytest.approx(EXACT, abs=1e-4)
+
+    @pytest.mark.parametrize("rate", [0.01, 0.5, 10.0])
+    def test_short_readings_are_exponential_up_to_the_hit(self, eye: Eye, rate: float) -> None:
+        ranges = eye.ranges(f"noise_model: beam, z_short: 1, lambda_short: {rate}")
+        assert deviation_of(ranges, truncated_exponential(rate, EXACT)) < LIMIT
+
+    def test_short_readings_of_a_miss_extend_to_the_maximum_range(self, eye: Eye) -> None:
+        extra = "noise_model: beam, z_short: 1, lambda_short: 0.1, layers: [empty]"
+        assert deviation_of(eye.ranges(extra), truncated_exponential(0.1, RANGE)) < LIMIT
+
+    @pytest.mark.parametrize("layers", ["all", "empty"])
+    def test_random_readings_are_uniform(self, eye: Eye, layers: str) -> None:
+        ranges = eye.ranges(f"noise_model: beam, z_rand: 1, layers: [{layers}]")
+        assert deviation_of(ranges, uniform) < LIMIT
+
+    @pytest.mark.parametrize(
+        ("no_hit", "value"), [("nan", math.nan), ("inf", math.inf), ("range", RANGE)]
+    )
+    def test_missed_readings_are_reported_as_misses(
+        self, eye: Eye, no_hit: str, value: float
+    ) -> None:
+        ranges = eye.ranges(f"noise_model: beam, z_max: 1, no_hit: {no_hit}")
+        np.testing.assert_array_equal(ranges, np.full(BEAMS, value))
+
+    def test_hits_of_beams_without_a_hit_are_misses(self, eye: Eye) -> None:
+        ranges = eye.ranges("noise_model: beam, sigma_hit: 0.5, layers: [empty]")
+        assert np.isnan(ranges).all()
+
+    def test_a_mixture_has_the_shares_of_its_parts(self, eye: Eye) -> None:
+        shares = "z_hit: 0.7, z_short: 0.1, z_max: 0.05, z_rand: 0.15"
+        ranges = eye.ranges(f"noise_model: beam, {shares}, sigma_hit: 0.1, lambda_short: 0.4")
+        is_miss = np.isnan(ranges)
+        # Five standard deviations of the binomial distribution.
+        assert is_miss.mean() == pytest.approx(0.05, abs=5 * math.sqrt(0.05 * 0.95 / BEAMS))
+        hit, short = truncated_normal(EXACT, 0.1), truncated_exponential(0.4, EXACT)
+
+        def expected(x: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+            return (0.7 * hit(x) + 0.1 * short(x) + 0.15 * uniform(x)) / 0.95
+
+        assert deviation_of(ranges[~is_miss], expected) < LIMIT
+
+    def test_the_share_of_hits_is_what_the_others_leave(self, eye: Eye) -> None:
+        ranges = eye.ranges("noise_model: beam, z_max: 0.25")
+        assert np.isnan(ranges).mean() == pytest.approx(0.25, abs=0.01)
+        assert ranges[~np.isnan(ranges)] == pytest.approx(EXACT, abs=1e-4)
+
+    def test_readings_other_than_hits_have_no_intensity(self, eye: Eye) -> None:
+        plugin = eye("noise_model: beam, z_max: 0.25")
+        is_miss = np.isnan(plugin.compute_ranges())
+        assert (plugin.intensities[is_miss] == 0).all()
+        assert (plugin.intensities[~is_miss] == 255).all()
+
+
+MIXTURE = "z_short: 0.2, z_max: 0.1, z_rand: 0.2, sigma_hit: 4, lambda_short: 0.4"
+MODELS = [
+    "noise_model: proportional, noise_std_dev: 0.1",
+    f"noise_model: beam, {MIXTURE}",
+]
+
+
+@pytest.mark.parametrize("model", MODELS)
+class TestDeterminism:
+    FAN = "{min: -0.1, max: 0.1, increment: 0.002}"
+
+    def scans(self, world: flatland.World, first: int) -> list[bytes]:
+        """Scans of steps `first` to 4, with a subscriber that connects before step `first`."""
+        output = world.ports.find_output("/scan")
+        world.step(first)
+        scans: list[bytes] = []
+        output.subscribe(lambda scan: scans.append(scan.ranges.tobytes()))
+        world.step(5 - first)
+        return scans
+
+    def test_scans_are_determined_by_the_seed(self, eye: Eye, model: str) -> None:
+        first, second, other = (
+            self.scans(eye.world(model, seed, self.FAN), 0) for seed in (3, 3, 4)
+        )
+        assert first == second
+        assert first != other
+        assert len(set(first)) == 5
+
+    def test_scans_do_not_depend_on_when_a_subscriber_connects(self, eye: Eye, model: str) -> None:
+        early = self.scans(eye.world(model, 3, self.FAN), 0)
+        assert self.scans(eye.world(model, 3, self.FAN), 2) == early[2:]
+
+
+@pytest.mark.parametrize(
+    ("extra", "message"),
+    [
+        (
+            "noise_model: white",
+            'Invalid "noise_model", must be one of: additive, proportional, beam',
+        ),
+        (
+            "noise_model: proportional, noise_std_dev: 1.5",
+            'Invalid "noise_std_dev", must be at most 1 times the range, got 1.5',
+        ),
+        (
+            "noise_model: proportional, noise_std_dev: -1",
+            'Invalid "noise_std_dev", must not be negative',
+        ),
+        (
+            "noise_model: beam, noise_std_dev: 0.1",
+            'Invalid "noise_std_dev", not used by the noise model beam: use sigma_hit',
+        ),
+        ("z_hit: 1", 'Invalid "z_hit", only used with "noise_model: beam"'),
+        (
+            "noise_model: proportional, lambda_short: 1",
+            'Invalid "lambda_short", only used with "noise_model: beam"',
+        ),
+        ("noise_model: beam, z_rand: 1.5", 'Invalid "z_rand", must be from 0 to 1, got 1.5'),
+        ("noise_model: beam, z_max: -0.5", 'Invalid "z_max", must be from 0 to 1, got -0.5'),
+        ("noise_model: beam, z_hit: .nan", 'Invalid "z_hit", must be from 0 to 1, got nan'),
+        (
+            "noise_model: beam, z_hit: 0.95, z_max: 0.1",
+            'Invalid "z_hit", z_hit + z_short + z_max + z_rand must be 1, '
+            "got 0.95 + 0 + 0.1 + 0 = 1.05",
+        ),
+        (
+            "noise_model: beam, z_max: 0.6, z_rand: 0.6",
+            "z_hit + z_short + z_max + z_rand must be 1, got 0 + 0 + 0.6 + 0.6 = 1.2",
+        ),
+        (
+            "noise_model: beam, sigma_hit: 21",
+            'Invalid "sigma_hit", must be at most the "range", 20 m, got 21',
+        ),
+        ("noise_model: beam, sigma_hit: -1", 'Invalid "sigma_hit", must not be negative'),
+        ("noise_model: beam, z_short: 0.1", 'Invalid "z_short", requires "lambda_short"'),
+        (
+            "noise_model: beam, z_short: 0.1, lambda_short: 0",
+            'Invalid "lambda_short", must be greater than 0 and at most 1e+06 1/m, got 0',
+        ),
+        (
+            "noise_model: beam, z_short: 0.1, lambda_short: .inf",
+            'Invalid "lambda_short", must be greater than 0',
+        ),
+    ],
+)
+def test_invalid_parameters(plugin_world: Any, extra: str, message: str) -> None:
+    text = plugin_world.error(laser(extra))
+    assert message in text
+    assert "robot.model.yaml:" in text
+
+
+def test_shares_may_differ_from_1_by_rounding(eye: Eye) -> None:
+    ranges = eye.ranges("noise_model: beam, z_hit: 0.3333333, z_max: 0.3333333, z_rand: 0.3333333")
+    assert np.isnan(ranges).mean() == pytest.approx(1 / 3, abs=0.01)
