@@ -1,4 +1,4 @@
-"""Draws the images of README.md and docs/drawing.md that require neither ROS nor a display.
+"""Draws the images of README.md and docs/*.md that require neither ROS nor a display.
 
 Usage: draw_pictures.py [FOLDER]   (default: docs/images; existing images are overwritten)
 
@@ -8,7 +8,16 @@ The images are the same in every run.
 from __future__ import annotations
 
 import sys
+import tempfile
 from pathlib import Path
+
+import matplotlib
+
+matplotlib.use("Agg")
+
+import matplotlib.pyplot as plt
+import numpy as np
+import numpy.typing as npt
 
 from flatland import Twist, World
 from flatland.drawing import save
@@ -44,6 +53,69 @@ def office() -> World:
     return world
 
 
+# Parameters of the drives whose odometry is compared.
+ODOMETRY = ("odom_pose_noise: [0.01, 0.01, 0.01]", "odom_drift: [0.002, 0.001, 0.01, 0.001]")
+_SIDE, _SPEED, _TURN_RATE, _LAPS = 6.0, 0.5, 0.6, 2  # m, m/s, rad/s
+_RATE = 10  # Hz
+
+
+def drive_squares(parameter: str) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
+    """Drives some laps of a square with round corners.
+
+    Args:
+        parameter: Parameter of the drive, as YAML.
+
+    Returns:
+        Time [s], x and y [m] of the ground truth and of the odometry, each of shape (n, 3).
+    """
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        (folder / "robot.model.yaml").write_text(
+            "bodies: [{name: base, footprints: [{type: circle, radius: 0.2, density: 1}]}]\n"
+            "plugins:\n"
+            f"  - {{type: DiffDrive, name: drive, body: base, pub_rate: {_RATE}, {parameter}}}\n"
+        )
+        (folder / "world.yaml").write_text(
+            "properties: {}\nlayers: [{name: 2d}]\n"
+            "models: [{name: robot, model: robot.model.yaml}]\n"
+        )
+        with World.from_yaml(folder / "world.yaml", seed=5) as world:
+            paths: list[list[tuple[float, float, float]]] = [[], []]
+            for topic, path in zip(("ground_truth", "filtered"), paths, strict=True):
+                world.output(f"/odometry/{topic}").subscribe(
+                    lambda value, path=path: path.append((value.stamp / 1e9, *value.pose[:2]))
+                )
+            command, step_size = world.command("/cmd_vel"), world.timekeeper.step_size
+            for _ in range(4 * _LAPS):
+                command.set(Twist(linear_x=_SPEED))
+                world.step(round(_SIDE / _SPEED / step_size))
+                command.set(Twist(linear_x=_SPEED, angular_z=_TURN_RATE))
+                world.step(round(np.pi / 2 / _TURN_RATE / step_size))
+    return np.array(paths[0]), np.array(paths[1])
+
+
+def draw_odometry(path: Path) -> None:
+    """Plots paths and errors of odometry with white noise and of odometry that drifts."""
+    figure, axes = plt.subplots(2, 2, figsize=(10, 8), dpi=100, height_ratios=(3, 1))
+    for parameter, (paths, errors) in zip(ODOMETRY, axes.T, strict=True):
+        truth, odometry = drive_squares(parameter)
+        paths.plot(odometry[:, 1], odometry[:, 2], color="tab:orange", lw=1, label="odometry")
+        paths.plot(truth[:, 1], truth[:, 2], color="black", lw=1.5, label="ground truth")
+        paths.set(title=parameter, xlabel="x [m]", ylabel="y [m]", aspect="equal")
+        paths.set(xlim=(-3, 9), ylim=(-2.5, 9.5))
+        paths.legend(loc="center")
+        error = np.hypot(*(odometry - truth)[:, 1:].T)
+        errors.plot(truth[:, 0], error, color="tab:orange", lw=1)
+        errors.set(xlabel="simulated time [s]", ylabel="error [m]", xlim=(0, truth[-1, 0]))
+        errors.set(ylim=(0, 2))
+        for axis in (paths, errors):
+            axis.grid(alpha=0.3)
+    figure.tight_layout()
+    # Without the version of matplotlib, so that the file is the same in every run.
+    figure.savefig(path, metadata={"Software": None})
+    plt.close(figure)
+
+
 def main(arguments: list[str]) -> int:
     """Draws all images into a folder."""
     folder = Path(arguments[0]) if arguments else _CHECKOUT / "docs" / "images"
@@ -51,6 +123,7 @@ def main(arguments: list[str]) -> int:
     with office() as world:
         save(world, folder / "office.png")
         save(world, folder / "corridor.png", view=(-5.5, -7.8, 6.0, -3.0), names=True)
+    draw_odometry(folder / "odometry.png")
     return 0
 
 

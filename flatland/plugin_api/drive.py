@@ -7,9 +7,17 @@ import math
 import time
 from typing import TYPE_CHECKING
 
-from flatland.geometry import Pose, rotate
+from flatland.geometry import DoubleArray, Pose, Vector2, compose, invert, rotate
+from flatland.plugin_api.after_step import NeverDue, StepHook, call_after_step, read_after_step
 from flatland.plugin_api.noise import GaussianNoise
-from flatland.plugin_api.parameters import planar_diagonal, read_covariance, read_variances
+from flatland.plugin_api.odometry_drift import OdometryDrift
+from flatland.plugin_api.parameters import (
+    planar_diagonal,
+    read_covariance,
+    read_rate,
+    read_variances,
+)
+from flatland.plugin_api.update_timer import UpdateTimer
 from flatland.values import Odometry, Twist
 
 if TYPE_CHECKING:
@@ -17,6 +25,7 @@ if TYPE_CHECKING:
     from flatland.entities.body import Body
     from flatland.plugin_api.plugin import ModelPlugin
     from flatland.plugin_api.ports import Command, Output
+    from flatland.timekeeper import Timekeeper
 
 _LOG = logging.getLogger("flatland")
 
@@ -75,10 +84,13 @@ def open_twist_command(plugin: ModelPlugin, topic: str) -> Command[Twist]:
 class Odometer:
     """Emits the motion of a body as ground truth and as odometry with noise.
 
+    The odometry frame is the world frame at first. With `odom_drift`, the odometry is an estimate
+    that drifts from the true pose (`OdometryDrift`).
+
     Attributes:
         frame_id: Frame of the odometry pose, as in the YAML file.
+        world_frame_id: Frame of the ground truth, as in the YAML file.
         child_frame_id: Frame of the body.
-        twist_covariance: Covariance emitted with the twist, shape (6, 6).
         twist_noise: Noise of vx, vy and the yaw rate of a twist emitted besides the odometry.
     """
 
@@ -89,7 +101,9 @@ class Odometer:
         body: Body,
         *,
         twist_in_local_frame: bool,
+        sends_transform: bool,
         publish: bool = True,
+        center: Vector2 = (0.0, 0.0),
     ) -> None:
         """Reads the parameters and declares the outputs.
 
@@ -98,7 +112,9 @@ class Odometer:
             config: Parameters of the drive.
             body: Body whose origin is measured.
             twist_in_local_frame: Default of the parameter of that name.
+            sends_transform: Default of the parameter `enable_odom_tf_pub`.
             publish: Whether to declare outputs; the parameters are checked in any case.
+            center: Point of the body that moves along its x axis, body frame [m].
 
         Raises:
             YamlError: A parameter is invalid.
@@ -107,14 +123,18 @@ class Odometer:
         truth_topic = config.get("ground_truth_pub", "string", "odometry/ground_truth")
         odometry_topic = config.get("odom_pub", "string", "odometry/filtered")
         self.frame_id: str = config.get("odom_frame_id", "string", "odom")
-        self._truth_frame_id: str = config.get("ground_truth_frame_id", "string", "map")
+        self.world_frame_id: str = config.get("ground_truth_frame_id", "string", "map")
         self._local: bool = config.get("twist_in_local_frame", "bool", twist_in_local_frame)
+        self._sends_transform: bool = config.get("enable_odom_tf_pub", "bool", sends_transform)
         pose_variances = read_variances(config, "odom_pose_noise")
         twist_variances = read_variances(config, "odom_twist_noise")
+        # A covariance of the file is emitted as it is; that of the drift is added to the default.
+        self._adds_pose_covariance = "odom_pose_covariance" not in config
+        self._adds_twist_covariance = "odom_twist_covariance" not in config
         self._pose_covariance = read_covariance(
             config, "odom_pose_covariance", planar_diagonal(pose_variances)
         )
-        self.twist_covariance = read_covariance(
+        self._twist_covariance = read_covariance(
             config, "odom_twist_covariance", planar_diagonal(twist_variances)
         )
         self._pose_noise = GaussianNoise(plugin.noise_stream("odometry pose"), pose_variances)
@@ -123,44 +143,142 @@ class Odometer:
         self.twist_noise = GaussianNoise(plugin.noise_stream("twist"), twist_variances)
         all_noise = (self._pose_noise, self._twist_noise, self.twist_noise)
         self._active_noise = tuple(noise for noise in all_noise if noise)
+        self._body = body
         self.child_frame_id = plugin.model.frame(body.name)
+        self._plugin = plugin
+        # Pose of the world frame in the odometry frame; None for the identity, and with drift.
+        self._offset: Pose | None = None
+        self._drift: OdometryDrift | None = None
+        drift = config.get_list(
+            "odom_drift", "float", [0.0, 0.0, 0.0, 0.0], size=4, finite=True, minimum=0
+        )
+        if any(drift):
+            a1, a2, a3, a4 = drift
+            stream = plugin.noise_stream("odometry drift")
+            self._drift = OdometryDrift((a1, a2, a3, a4), stream, body.pose, center)
         self._truth: Output[Odometry] | None = None
         self._odometry: Output[Odometry] | None = None
         if publish:
             self._truth = plugin.output(truth_topic, Odometry)
             self._odometry = plugin.output(odometry_topic, Odometry)
 
+    def schedule(self, config: YamlReader, publish: StepHook) -> UpdateTimer:
+        """Reads `pub_rate` and `after_step`, and arranges for what happens after each step.
+
+        Args:
+            config: Parameters of the drive.
+            publish: Publishes the current state with the current time.
+
+        Returns:
+            The timer of the updates in `before_physics_step`.
+
+        Raises:
+            YamlError: A parameter is invalid.
+        """
+        timer = UpdateTimer(read_rate(config, "pub_rate"))
+        drift, body = self._drift, self._body
+        publishes_after_step = read_after_step(config) and timer.rate > 0
+
+        def finish_step(timekeeper: Timekeeper) -> None:
+            if drift is not None:
+                # In each step, so that the drift depends neither on the rate nor on subscribers.
+                drift.advance(body.pose)
+            if publishes_after_step and timer.check_update(timekeeper):
+                publish(timekeeper)
+
+        if publishes_after_step or drift is not None:
+            call_after_step(self._plugin, finish_step)
+        return NeverDue() if publishes_after_step else timer
+
     @property
     def wanted(self) -> bool:
-        """Whether the ground truth or the odometry is wanted."""
+        """Whether the ground truth, the odometry or the transform is wanted."""
         truth, odometry = self._truth, self._odometry
-        return (truth is not None and truth.wanted) or (odometry is not None and odometry.wanted)
+        return (
+            self._sends_transform
+            or (truth is not None and truth.wanted)
+            or (odometry is not None and odometry.wanted)
+        )
 
     def begin_update(self) -> None:
         """Advances the noise; to be called for each update due, emitted or not."""
         for noise in self._active_noise:
             noise.begin_update()
 
-    def report(self, stamp: int, pose: Pose, velocity: Pose) -> Pose:
-        """Emits the ground truth and the odometry, each if it is wanted.
+    def move(self, previous: Pose, keep: bool) -> None:
+        """Takes over that the model was moved.
+
+        Args:
+            previous: Pose of the body before the move, in the world frame [m, rad].
+            keep: Whether the odometry remains as before the move; otherwise it jumps along.
+        """
+        pose = self._body.pose
+        if self._drift is not None:
+            self._drift.move(previous, pose, keep)
+        elif keep and all(map(math.isfinite, previous)):
+            self._offset = compose(self._estimate(previous), invert(pose))
+
+    def _estimate(self, pose: Pose) -> Pose:
+        """Returns the odometry without white noise, in the odometry frame."""
+        if self._drift is not None:
+            return self._drift.pose
+        return pose if self._offset is None else compose(self._offset, pose)
+
+    def measure(self, pose: Pose, velocity: Pose) -> Pose:
+        """Returns the velocity that the odometry measures, without white noise.
+
+        Args:
+            pose: (x, y, yaw) of the origin of the body in the world frame [m, rad].
+            velocity: (vx, vy, omega) of the origin of the body in the world frame [m/s, rad/s].
+
+        Returns:
+            (vx, vy, omega) in the frame of the body [m/s, rad/s].
+        """
+        twist = to_local(velocity, pose[2])
+        return twist if self._drift is None else self._drift.measure(twist)
+
+    def twist_covariance(self, pose: Pose, velocity: Pose, yaw: float = 0.0) -> DoubleArray:
+        """Returns the covariance of a measured velocity with white noise, shape (6, 6).
+
+        Args:
+            pose: As for `measure`.
+            velocity: As for `measure`.
+            yaw: Heading of the body in the frame of the result, 0 for that of the body [rad].
+        """
+        drift = self._drift
+        if drift is None or not self._adds_twist_covariance:
+            return self._twist_covariance
+        twist = to_local(velocity, pose[2])
+        covariance: DoubleArray = drift.twist_covariance(twist, yaw) + self._twist_covariance
+        return covariance
+
+    def report(self, stamp: int, pose: Pose, velocity: Pose) -> None:
+        """Emits the ground truth, the odometry and the transform, each if it is wanted.
 
         Args:
             stamp: Simulated time [ns].
             pose: (x, y, yaw) of the origin of the body in the world frame [m, rad].
             velocity: (vx, vy, omega) of the origin of the body in the world frame [m/s, rad/s].
-
-        Returns:
-            The pose with the noise of the odometry.
         """
-        noisy_pose = self._noisy(pose, self._pose_noise)
+        estimate = self._estimate(pose)
+        noisy_pose = self._noisy(estimate, self._pose_noise)
+        if self._sends_transform:
+            self._plugin.send_transform(self.frame_id, self.child_frame_id, *noisy_pose)
         truth, odometry = self._truth, self._odometry
         if truth is None or odometry is None or not (truth.wanted or odometry.wanted):
-            return noisy_pose
-        twist = to_local(velocity, pose[2]) if self._local else velocity
+            return
+        true_twist = to_local(velocity, pose[2]) if self._local else velocity
         child = self.child_frame_id
         if truth.wanted:
-            truth.emit(Odometry(stamp, self._truth_frame_id, child, pose, twist))
+            truth.emit(Odometry(stamp, self.world_frame_id, child, pose, true_twist))
         if odometry.wanted:
+            twist, pose_covariance = true_twist, self._pose_covariance
+            yaw = 0.0 if self._local else estimate[2]
+            if self._drift is not None or self._offset is not None:
+                twist = self.measure(pose, velocity)
+                twist = (*rotate(twist, yaw), twist[2])
+            if self._drift is not None and self._adds_pose_covariance:
+                pose_covariance = self._drift.pose_covariance() + pose_covariance
             odometry.emit(
                 Odometry(
                     stamp,
@@ -168,11 +286,10 @@ class Odometer:
                     child,
                     noisy_pose,
                     self._noisy(twist, self._twist_noise),
-                    self._pose_covariance,
-                    self.twist_covariance,
+                    pose_covariance,
+                    self.twist_covariance(pose, velocity, yaw),
                 )
             )
-        return noisy_pose
 
     @staticmethod
     def _noisy(values: Pose, noise: GaussianNoise) -> Pose:

@@ -18,10 +18,11 @@ from flatland.plugin_api.noise import NoiseStream
 from flatland.plugin_api.ports import Command, Output
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Mapping
 
     from flatland.config.reader import YamlReader
     from flatland.entities.model import Model
+    from flatland.geometry import Pose
     from flatland.physics import OldManifold
     from flatland.timekeeper import Timekeeper
     from flatland.world import World
@@ -221,12 +222,22 @@ class ModelPlugin(FlatlandPlugin):
         model: The model.
         all_contacts: Whether the contact hooks receive the contacts of all models instead of only
             those of this model.
+        world_frame_id: Name of the world frame in what the plugin emits, empty if there is none.
     """
 
     base_class_type = "flatland::ModelPlugin"
     all_contacts: ClassVar[bool] = False
 
     model: Model
+    world_frame_id: str = ""
+
+    def model_moved(self, previous: Mapping[str, Pose], keep_odometry: bool) -> None:
+        """Called after `World.move_model` has moved the model.
+
+        Args:
+            previous: Pose of each body before the move by name of the body, world frame [m, rad].
+            keep_odometry: Whether estimates of the pose are to continue from before the move.
+        """
 
     def filter_contact(self, contact: Contact | MutableContact) -> ModelContact | None:
         """Returns a contact from the point of view of this model.

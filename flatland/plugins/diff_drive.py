@@ -7,12 +7,13 @@ from typing import TYPE_CHECKING
 
 from flatland.plugin_api.drive import Odometer, open_twist_command
 from flatland.plugin_api.dynamics_limits import DynamicsLimits
-from flatland.plugin_api.parameters import read_body, read_rate
+from flatland.plugin_api.parameters import read_body
 from flatland.plugin_api.plugin import ModelPlugin
-from flatland.plugin_api.update_timer import UpdateTimer
 from flatland.values import TwistWithCovariance
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from flatland.config.reader import YamlReader
     from flatland.geometry import Pose
     from flatland.plugin_api.ports import Output
@@ -30,20 +31,23 @@ class DiffDrive(ModelPlugin):
             PluginError: A topic is not a legal name.
         """
         self.body = read_body(config, self.model)
-        self.timer = UpdateTimer(read_rate(config, "pub_rate"))
         self.linear_dynamics = DynamicsLimits.from_config(
             config.optional_subnode("linear_dynamics", "map")
         )
         self.angular_dynamics = DynamicsLimits.from_config(
             config.optional_subnode("angular_dynamics", "map")
         )
-        self._sends_transform: bool = config.get("enable_odom_tf_pub", "bool", True)
         self._odometer = Odometer(
             self,
             config,
             self.body,
             twist_in_local_frame=True,
+            sends_transform=True,
             publish=config.get("enable_odom_pub", "bool", True),
+        )
+        self.world_frame_id = self._odometer.world_frame_id
+        self.timer = self._odometer.schedule(
+            config, lambda timekeeper: self._publish(timekeeper.sim_time_ns, self.body.pose)
         )
         twist_topic = config.get("twist_pub", "string", "twist")
         self._twist: Output[TwistWithCovariance] | None = None
@@ -66,25 +70,27 @@ class DiffDrive(ModelPlugin):
         if self.timer.check_update(timekeeper):
             self._publish(timekeeper.sim_time_ns, pose)
 
+    def model_moved(self, previous: Mapping[str, Pose], keep_odometry: bool) -> None:
+        """Keeps the odometry, or displaces it along with the model."""
+        self._odometer.move(previous[self.body.name], keep_odometry)
+
     def _publish(self, stamp: int, pose: Pose) -> None:
         twist = self._twist
         odometer = self._odometer
         odometer.begin_update()
         wants_twist = twist is not None and twist.wanted
-        if not (wants_twist or self._sends_transform or odometer.wanted):
+        if not (wants_twist or odometer.wanted):
             return
         velocity = self.body.velocity
-        noisy_pose = odometer.report(stamp, pose, velocity)
+        odometer.report(stamp, pose, velocity)
         if twist is not None and wants_twist:
-            forward = velocity[0] * math.cos(pose[2]) + velocity[1] * math.sin(pose[2])
+            forward, _, yaw_rate = odometer.measure(pose, velocity)
             noise = odometer.twist_noise
             twist.emit(
                 TwistWithCovariance(
                     stamp,
                     odometer.child_frame_id,
-                    (forward + noise.sample(0), 0.0, velocity[2] + noise.sample(2)),
-                    odometer.twist_covariance,
+                    (forward + noise.sample(0), 0.0, yaw_rate + noise.sample(2)),
+                    odometer.twist_covariance(pose, velocity),
                 )
             )
-        if self._sends_transform:
-            self.send_transform(odometer.frame_id, odometer.child_frame_id, *noisy_pose)

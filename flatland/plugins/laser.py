@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from flatland.geometry import FloatArray, Pose, compose
+from flatland.plugin_api.after_step import update_after_step
 from flatland.plugin_api.parameters import (
     at_key,
     read_body,
@@ -114,6 +115,7 @@ class Laser(ModelPlugin):
         self.angles = BeamAngles.from_config(config.subnode("angle", "map"))
         self.origin = read_pose(config, "origin")
         self.timer = UpdateTimer(read_rate(config))
+        update_after_step(self, config, self.timer)
         self.always_publish: bool = config.get("always_publish", "bool", False)
         self._length = np.float32(self.range)
         self.range_min = self._read_range_min(config)

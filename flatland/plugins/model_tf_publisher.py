@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
+from flatland.plugin_api.after_step import update_after_step
 from flatland.plugin_api.parameters import read_bodies, read_body_or_first, read_rate
 from flatland.plugin_api.plugin import ModelPlugin
 from flatland.plugin_api.update_timer import UpdateTimer
@@ -26,8 +27,9 @@ class ModelTfPublisher(ModelPlugin):
         self.reference = read_body_or_first(config, self.model, "reference")
         excluded = read_bodies(config, self.model, "exclude")
         self.timer = UpdateTimer(read_rate(config))
+        update_after_step(self, config, self.timer)
         self._sends_world: bool = config.get("publish_tf_world", "bool", False)
-        self._world_frame_id: str = config.get("world_frame_id", "string", "map")
+        self.world_frame_id = config.get("world_frame_id", "string", "map")
         self._reference_frame_id = self.model.frame(self.reference.name)
         self._others = [
             (body, self.model.frame(body.name))
@@ -49,4 +51,4 @@ class ModelTfPublisher(ModelPlugin):
                 reference_frame_id, frame_id, c * dx + s * dy, c * dy - s * dx, body_yaw - yaw
             )
         if self._sends_world:
-            self.send_transform(self._world_frame_id, reference_frame_id, x, y, yaw)
+            self.send_transform(self.world_frame_id, reference_frame_id, x, y, yaw)

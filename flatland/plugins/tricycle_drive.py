@@ -7,19 +7,22 @@ from typing import TYPE_CHECKING
 
 from flatland.plugin_api.drive import Odometer, open_twist_command
 from flatland.plugin_api.dynamics_limits import DynamicsLimits
-from flatland.plugin_api.parameters import at_key, read_body, read_not_negative, read_rate
+from flatland.plugin_api.parameters import at_key, read_body, read_not_negative
 from flatland.plugin_api.plugin import ModelPlugin
-from flatland.plugin_api.update_timer import UpdateTimer
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from flatland.config.reader import YamlReader
     from flatland.entities.body import Body
     from flatland.entities.joint import Joint
     from flatland.entities.model import Model
-    from flatland.geometry import Vector2
+    from flatland.geometry import Pose, Vector2
     from flatland.timekeeper import Timekeeper
+    from flatland.values import Twist
 
 _TOLERANCE = 1e-5  # m between an anchor and its required position
+_COMMANDS = ("steering", "twist")
 
 
 class TricycleGeometry:
@@ -135,7 +138,6 @@ class TricycleDrive(ModelPlugin):
             PluginError: A topic is not a legal name.
         """
         self.body = read_body(config, self.model)
-        self.timer = UpdateTimer(read_rate(config, "pub_rate"))
         self.max_steer_angle = read_not_negative(config, "max_steer_angle", 0.0)
         self.linear_dynamics = DynamicsLimits.from_config(
             config.optional_subnode("linear_dynamics", "map")
@@ -143,12 +145,34 @@ class TricycleDrive(ModelPlugin):
         self.angular_dynamics = self._read_angular_dynamics(config)
         self.geometry = TricycleGeometry(config, self.model, self.body)
         # Unlike the reference: odometry has its own frame, not that of the ground truth.
-        self._odometer = Odometer(self, config, self.body, twist_in_local_frame=False)
+        self._odometer = Odometer(
+            self,
+            config,
+            self.body,
+            twist_in_local_frame=False,
+            sends_transform=False,
+            center=self.geometry.rear_center,
+        )
+        self.world_frame_id = self._odometer.world_frame_id
+        self.timer = self._odometer.schedule(
+            config, lambda timekeeper: self._publish(timekeeper.sim_time_ns, self.body.pose)
+        )
         self._command = open_twist_command(self, config.get("twist_sub", "string", "cmd_vel"))
+        self._takes_twist = self._read_command_type(config) == "twist"
+        self._target_angle = 0.0
         self.steering_angle = 0.0
         self.steering_velocity = 0.0
         self.front_velocity = 0.0
         self._displayed_angle: float | None = None
+
+    @staticmethod
+    def _read_command_type(config: YamlReader) -> str:
+        kind: str = config.get("command", "string", "steering")
+        if kind not in _COMMANDS:
+            raise at_key(config, "command").error(
+                f'Invalid "command", must be one of: {", ".join(_COMMANDS)}, got {kind}'
+            )
+        return kind
 
     @staticmethod
     def _read_angular_dynamics(config: YamlReader) -> DynamicsLimits:
@@ -167,15 +191,15 @@ class TricycleDrive(ModelPlugin):
         body = self.body
         pose = body.pose
         if self.timer.check_update(timekeeper):
-            self._odometer.begin_update()
-            if self._odometer.wanted:
-                self._odometer.report(timekeeper.sim_time_ns, pose, body.velocity)
+            self._publish(timekeeper.sim_time_ns, pose)
         dt = timekeeper.step_size
         command = self._command.value
-        self._steer(command.angular_z, dt)
-        v = self.front_velocity = self.linear_dynamics.limit(
-            self.front_velocity, command.linear_x, dt
-        )
+        if self._takes_twist:
+            speed = self._steer_for_twist(command, dt)
+        else:
+            self._steer(command.angular_z, dt)
+            speed = command.linear_x
+        v = self.front_velocity = self.linear_dynamics.limit(self.front_velocity, speed, dt)
         geometry = self.geometry
         steering_angle = self.steering_angle
         omega = v * math.sin(steering_angle) / geometry.wheelbase
@@ -184,6 +208,40 @@ class TricycleDrive(ModelPlugin):
         sideways = -omega * geometry.rear_center[0]
         c, s = math.cos(pose[2]), math.sin(pose[2])
         body.set_velocity(c * forward - s * sideways, s * forward + c * sideways, omega)
+
+    def model_moved(self, previous: Mapping[str, Pose], keep_odometry: bool) -> None:
+        """Keeps the odometry, or displaces it along with the model."""
+        self._odometer.move(previous[self.body.name], keep_odometry)
+
+    def _publish(self, stamp: int, pose: Pose) -> None:
+        self._odometer.begin_update()
+        if self._odometer.wanted:
+            self._odometer.report(stamp, pose, self.body.velocity)
+
+    def _steer_for_twist(self, command: Twist, dt: float) -> float:
+        """Turns the front wheel for a velocity of the rear center and a yaw rate.
+
+        The front wheel moves with the forward velocity v of the rear center and, across the
+        wheelbase L, with L * omega to the left; its heading is the direction of the sum.
+
+        Returns:
+            The speed of the front wheel for the command [m/s].
+        """
+        v, across = command.linear_x, self.geometry.wheelbase * command.angular_z
+        if v or across:
+            # From -90 to 90 degrees; the wheel rolls backwards to reverse.
+            angle = math.atan2(-across if v < 0 else across, abs(v))
+            limit = self.max_steer_angle
+            if limit and abs(angle) > limit:
+                # The narrowest possible curve at the commanded speed of the rear center.
+                angle = math.copysign(limit, angle)
+                across = v * math.tan(angle)
+            self._target_angle = angle
+        # A command to stop keeps the steering angle.
+        self._steer(self._target_angle, dt)
+        speed = math.copysign(math.hypot(v, across), v if v else 1.0)
+        # The robot waits for a front wheel that points elsewhere.
+        return speed * max(0.0, math.cos(self._target_angle - self.steering_angle))
 
     def _steer(self, target: float, dt: float) -> None:
         """Turns the front wheel towards an angle within the limits."""

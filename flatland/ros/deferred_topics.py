@@ -22,7 +22,12 @@ class DeferredTopics:
     """
 
     def __init__(
-        self, registrar: Registrar, simulation: Simulation, *, debug_rate: float | None
+        self,
+        registrar: Registrar,
+        simulation: Simulation,
+        *,
+        debug_rate: float | None,
+        move_keeps_odometry: bool = False,
     ) -> None:
         """Schedules the opening of the topics.
 
@@ -30,7 +35,9 @@ class DeferredTopics:
             registrar: Registers the topics with the ROS master.
             simulation: Simulation of the world.
             debug_rate: Rate of the debug markers in wall time [Hz]; None for no debug markers.
+            move_keeps_odometry: Whether a drag keeps the odometry of the model.
         """
+        self._move_keeps_odometry = move_keeps_odometry
         self._registrar = registrar
         self._simulation = simulation
         self._debug_rate = debug_rate
@@ -86,4 +93,10 @@ class DeferredTopics:
         from flatland.ros.interactive.interactive_markers import InteractiveMarkers
 
         if not self._closed:
-            self._parts.append(InteractiveMarkers(self._registrar, self._simulation))
+            self._parts.append(
+                InteractiveMarkers(
+                    self._registrar,
+                    self._simulation,
+                    move_keeps_odometry=self._move_keeps_odometry,
+                )
+            )

@@ -161,11 +161,27 @@ class ServerNode:
         if self._stopping.is_set():
             simulation.stop()
         debug_rate = parameters.viz_pub_rate if parameters.show_viz else None
-        deferred_topics = DeferredTopics(self._registrar, simulation, debug_rate=debug_rate)
+        deferred_topics = DeferredTopics(
+            self._registrar,
+            simulation,
+            debug_rate=debug_rate,
+            move_keeps_odometry=parameters.move_keeps_odometry,
+        )
         frame_monitor = FrameMonitor(self._registrar, simulation, bridge.subscribed)
         try:
             _publish_map(self._registrar, world, parameters)
-            Services(self._registrar, simulation, parameters.if_blocked)
+            Services(
+                self._registrar,
+                simulation,
+                parameters.if_blocked,
+                move_keeps_odometry=parameters.move_keeps_odometry,
+            )
+            if parameters.initialpose_model:
+                from flatland.ros.initial_pose import InitialPose
+
+                InitialPose(
+                    self._registrar, simulation, parameters.initialpose_model, parameters.if_blocked
+                )
             if parameters.benchmark_duration is None:
                 simulation.run()
             else:

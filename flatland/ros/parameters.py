@@ -42,6 +42,9 @@ class NodeParameters:
         shutdown_timeout: Limit of wall time between a stop request and the end of the process [s];
             None for no limit.
         if_blocked: Behaviour of `spawn_model` and `move_model` at poses that are not free.
+        move_keeps_odometry: Whether the odometry of a model that is moved by a service or by its
+            interactive marker continues as if it had not moved.
+        initialpose_model: Name of the model that messages on `initialpose` move; empty for none.
         publish_map: Name of the layer that is published as a map; empty for that of the world file,
             None for no map.
         map_frame: Frame of the map.
@@ -60,6 +63,8 @@ class NodeParameters:
     plugin_timeout: float | None
     shutdown_timeout: float | None
     if_blocked: IfBlocked
+    move_keeps_odometry: bool
+    initialpose_model: str
     publish_map: str | None
     map_frame: str
     map_resolution: float
@@ -88,6 +93,8 @@ def read_parameters(get: ParameterSource) -> NodeParameters:
         plugin_timeout=reader.timeout("plugin_timeout", 60.0),
         shutdown_timeout=reader.timeout("shutdown_timeout", DEFAULT_SHUTDOWN_TIMEOUT),
         if_blocked=reader.if_blocked("if_blocked", "warn"),
+        move_keeps_odometry=reader.boolean("move_keeps_odometry", False),
+        initialpose_model=reader.name("initialpose_model"),
         publish_map=reader.optional_name("publish_map"),
         map_frame=reader.frame("map_frame", "map"),
         map_resolution=reader.finite_positive("map_resolution", DEFAULT_RESOLUTION),
@@ -166,16 +173,19 @@ class _Reader:
                 return choice
         raise _invalid(name, "one of " + ", ".join(IF_BLOCKED), value)
 
-    def optional_name(self, name: str) -> str | None:
-        """Reads a name; empty by default, None for false. roslaunch passes a number as such."""
+    def name(self, name: str, wanted: str = "a name") -> str:
+        """Reads a name; empty by default. rosrun passes a name of digits as a number."""
         value = self._get(name)
         if value is None:
             return ""
-        if value is False:
-            return None
         if isinstance(value, bool) or not isinstance(value, (str, int)):
-            raise _invalid(name, "the name of a layer, or false", value)
+            raise _invalid(name, wanted, value)
         return str(value).strip()
+
+    def optional_name(self, name: str) -> str | None:
+        """Reads a name; empty by default, None for false."""
+        value = self._get(name)
+        return None if value is False else self.name(name, "the name of a layer, or false")
 
     def frame(self, name: str, default: str) -> str:
         value = self._get(name)

@@ -46,7 +46,12 @@ class Services:
     """
 
     def __init__(
-        self, registrar: Registrar, simulation: Simulation, if_blocked: IfBlocked = "warn"
+        self,
+        registrar: Registrar,
+        simulation: Simulation,
+        if_blocked: IfBlocked = "warn",
+        *,
+        move_keeps_odometry: bool = False,
     ) -> None:
         """Advertises the services asynchronously.
 
@@ -54,6 +59,7 @@ class Services:
             registrar: Registers the services with the ROS master.
             simulation: Simulation that the services control.
             if_blocked: Behaviour of `spawn_model` and `move_model` at poses that are not free.
+            move_keeps_odometry: Whether `move_model` keeps the odometry of the model.
 
         Raises:
             FlatlandError: A plugin has a service of the same name.
@@ -61,6 +67,7 @@ class Services:
         self._registrar = registrar
         self._simulation = simulation
         self._if_blocked = if_blocked
+        self._keep_odometry = move_keeps_odometry
         world = simulation.world
         for name, service_type, handler in (
             ("spawn_model", SpawnModel, self._spawn_model),
@@ -96,7 +103,10 @@ class Services:
         return MoveModelResponse(
             *self._carry_out(
                 lambda: _displacement(
-                    self._simulation.world.move_model(request.name, pose, self._if_blocked), pose
+                    self._simulation.world.move_model(
+                        request.name, pose, self._if_blocked, keep_odometry=self._keep_odometry
+                    ),
+                    pose,
                 )
             )
         )

@@ -138,7 +138,12 @@ class Contents:
         )
 
     def move_model(
-        self, name: str, pose: Sequence[float], if_blocked: IfBlocked = "warn"
+        self,
+        name: str,
+        pose: Sequence[float],
+        if_blocked: IfBlocked = "warn",
+        *,
+        keep_odometry: bool = False,
     ) -> Model | None:
         """Moves a model rigidly so that its first body is at a pose, at rest.
 
@@ -146,6 +151,9 @@ class Contents:
             name: Name of the model.
             pose: (x, y, theta) in the world frame [m, rad].
             if_blocked: As in `spawn_model`.
+            keep_odometry: Whether the odometry of its drives, and the transform from the odometry
+                frame, continue as if the model had not moved: the robot is kidnapped. By default,
+                they jump along with it.
 
         Returns:
             The model; None if a plugin's hook calls this, since the model moves after the step.
@@ -157,7 +165,8 @@ class Contents:
         """
         check_if_blocked(if_blocked)
         return self._change(
-            lambda: self._models.move(name, pose, if_blocked), f'move of model "{name}"'
+            lambda: self._models.move(name, pose, if_blocked, keep_odometry),
+            f'move of model "{name}"',
         )
 
     def delete_model(self, name: str) -> None:

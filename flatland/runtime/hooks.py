@@ -9,6 +9,7 @@ from flatland.plugin_api.plugin import FlatlandPlugin, ModelPlugin
 
 if TYPE_CHECKING:
     from flatland.entities.body import Body, Entity
+    from flatland.entities.model import Model
 
 STEP_HOOKS: Final = ("before_physics_step", "after_physics_step")
 CONTACT_HOOKS: Final = ("begin_contact", "end_contact", "post_solve")
@@ -96,6 +97,10 @@ class HookTable:
     def of_contact(self, hook: str, body_a: Body, body_b: Body) -> HookList:
         """Returns a contact hook of the plugins that a contact concerns, in order."""
         return self._contact_hooks[hook].between(body_a.entity, body_b.entity)
+
+    def of_move(self, model: Model) -> HookList:
+        """Returns the hook `model_moved` of the plugins of a model that are not disabled."""
+        return [(plugin, plugin.model_moved) for plugin in model.plugins if plugin in self._order]
 
     def has_any(self, *hooks: str) -> bool:
         """Returns whether any plugin overrides one of some contact hooks."""

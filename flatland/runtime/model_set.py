@@ -93,13 +93,17 @@ class ModelSet:
         self._observers.model_added(model)
         return model
 
-    def move(self, name: str, pose: Sequence[float], if_blocked: IfBlocked) -> Model:
+    def move(
+        self, name: str, pose: Sequence[float], if_blocked: IfBlocked, keep_odometry: bool
+    ) -> Model:
         """Moves a model; see `World.move_model`."""
         model = self._find_to("move", name)
+        previous = {body.name: body.pose for body in model.bodies}
         try:
             self._place(model, finite_pose(pose), if_blocked, "move")
         except ValueError as error:
             raise WorldError(f'failed to move model "{name}", {error}') from None
+        self._host.model_moved(model, previous, keep_odometry)
         if if_blocked == "warn":
             self._placement.warn_if_blocked(model)
         self._observers.model_moved(model)

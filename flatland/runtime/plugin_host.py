@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from flatland.config.reader import YamlReader
     from flatland.entities.body import Body
     from flatland.entities.model import Model
+    from flatland.geometry import Pose
     from flatland.physics import ContactEvent, OldManifold, PreSolveContact
     from flatland.runtime.faults import Faults
     from flatland.runtime.observer import Observers
@@ -216,6 +217,11 @@ class PluginHost:
     def after_physics_step(self, timekeeper: Timekeeper) -> None:
         """Calls `after_physics_step` of all plugins."""
         self._call("after_physics_step", self.hooks.of_step("after_physics_step"), timekeeper)
+
+    def model_moved(self, model: Model, previous: Mapping[str, Pose], keep_odometry: bool) -> None:
+        """Calls `model_moved` of the plugins of a model; see `ModelPlugin.model_moved`."""
+        with self._requests.hooks():
+            self._call("model_moved", self.hooks.of_move(model), previous, keep_odometry)
 
     def dispatch_contacts(self, events: Sequence[ContactEvent], bodies: Mapping[int, Body]) -> None:
         """Passes recorded contact events to the plugins that they concern, in order.

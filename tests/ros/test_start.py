@@ -203,6 +203,8 @@ def test_server_launch_passes_all_parameters(launcher: Any, ros: Any, world: Pat
         "plugin_timeout": 30,
         "shutdown_timeout": 5,
         "if_blocked": "warn",
+        "move_keeps_odometry": False,
+        "initialpose_model": "",
         "publish_map": "2d",
     }
     assert ros.master.getParam("/use_sim_time") is True

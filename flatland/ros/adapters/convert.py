@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import Any
 
@@ -9,6 +10,7 @@ from genpy import Time
 from geometry_msgs.msg import Point, Pose, Quaternion, Twist, Vector3
 from std_msgs.msg import Header
 
+from flatland import geometry
 from flatland.geometry import DoubleArray, quaternion_from_yaw
 from flatland.timekeeper import NANOSECONDS
 
@@ -55,3 +57,12 @@ def covariance(matrix: DoubleArray) -> Sequence[float]:
     """Flattens a square matrix in row-major order."""
     numbers: list[float] = matrix.ravel().tolist()
     return numbers
+
+
+def planar_pose(message: Pose) -> geometry.Pose | None:
+    """Converts a message to (x, y, theta); None for non-finite numbers or a zero quaternion."""
+    position, q = message.position, message.orientation
+    numbers = (position.x, position.y, position.z, q.x, q.y, q.z, q.w)
+    if not all(map(math.isfinite, numbers)) or not any((q.x, q.y, q.z, q.w)):
+        return None
+    return (position.x, position.y, geometry.yaw_from_quaternion(q.x, q.y, q.z, q.w))

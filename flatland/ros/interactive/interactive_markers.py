@@ -12,9 +12,10 @@ from visualization_msgs.msg import InteractiveMarkerFeedback
 from flatland.entities.model import Model
 from flatland.errors import FlatlandError
 from flatland.geometry import Pose, wrap_angle
+from flatland.ros.adapters import convert
 from flatland.ros.interactive.drag import Drags
 from flatland.ros.interactive.marker_server import MarkerServer
-from flatland.ros.interactive.model_handle import model_handle, planar_pose, pose_message
+from flatland.ros.interactive.model_handle import model_handle, pose_message
 from flatland.ros.markers.packed_markers import FRAME
 from flatland.ros.names import UniqueNames, sendable_text
 from flatland.ros.transport.registrar import Registrar
@@ -36,13 +37,17 @@ class InteractiveMarkers(WorldObserver):
     Updates are published at most 30 times per second of wall time, and only if there are clients.
     """
 
-    def __init__(self, registrar: Registrar, simulation: Simulation) -> None:
+    def __init__(
+        self, registrar: Registrar, simulation: Simulation, *, move_keeps_odometry: bool = False
+    ) -> None:
         """Advertises the topics asynchronously; must be called between two steps.
 
         Args:
             registrar: Registers the topics with the ROS master.
             simulation: Simulation of the world.
+            move_keeps_odometry: Whether a drag keeps the odometry of the model.
         """
+        self._keep_odometry = move_keeps_odometry
         self._world = simulation.world
         self._closed = False
         self._names = UniqueNames()
@@ -140,13 +145,18 @@ class InteractiveMarkers(WorldObserver):
                 FRAME,
             )
             return None
-        return planar_pose(feedback.pose)
+        return convert.planar_pose(feedback.pose)
 
     def _release(self, name: str, pose: Pose | None) -> None:
         self._drags.end(name)
         self._invalidate_published(name)
         if pose is not None:
-            self._world.move_model(self._models[name].name, pose, if_blocked="allow")
+            self._world.move_model(
+                self._models[name].name,
+                pose,
+                if_blocked="allow",
+                keep_odometry=self._keep_odometry,
+            )
 
     def _delete(self, feedback: InteractiveMarkerFeedback) -> None:
         self._world.delete_model(self._models[feedback.marker_name].name)

@@ -13,7 +13,7 @@ from visualization_msgs.msg import InteractiveMarker, InteractiveMarkerControl, 
 
 from flatland.entities.body import Body
 from flatland.entities.model import Model
-from flatland.geometry import DoubleArray, Pose, compose, invert, yaw_from_quaternion
+from flatland.geometry import DoubleArray, Pose, compose, invert
 from flatland.ros.adapters import convert
 from flatland.ros.markers.marker_geometry import outline
 from flatland.ros.markers.packed_markers import FRAME
@@ -55,15 +55,6 @@ def pose_message(pose: Pose) -> PoseMessage:
     """Converts a pose (x, y, theta) to a message."""
     x, y, theta = pose
     return PoseMessage(Point(x, y, 0.0), convert.quaternion(theta))
-
-
-def planar_pose(message: PoseMessage) -> Pose | None:
-    """Converts a message to (x, y, theta); None for non-finite numbers or a zero quaternion."""
-    position, q = message.position, message.orientation
-    numbers = (position.x, position.y, position.z, q.x, q.y, q.z, q.w)
-    if not all(map(math.isfinite, numbers)) or not any((q.x, q.y, q.z, q.w)):
-        return None
-    return (position.x, position.y, yaw_from_quaternion(q.x, q.y, q.z, q.w))
 
 
 def _control(name: str, mode: int, markers: list[Marker]) -> InteractiveMarkerControl:

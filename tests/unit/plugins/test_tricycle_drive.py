@@ -290,6 +290,24 @@ class TestOdometry:
         assert odometry[0].pose_covariance.diagonal().tolist() == [0.04, 0.09, 0, 0, 0, 0.16]
         assert odometry[0].twist_covariance.diagonal().tolist() == [0.25, 0.36, 0, 0, 0, 0.49]
 
+    def test_transform_to_the_body_on_request(self, trike: Any, collect: Collect) -> None:
+        extra = "enable_odom_tf_pub: true, odom_pose_noise: [1, 1, 1], pub_rate: 50"
+        world = trike(extra, namespace="r1", pose=(1.0, 2.0, 0.5))
+        odometry = collect(world, "/r1" + ODOMETRY)
+        for _ in range(9):
+            world.step()
+            assert list(world.transforms) == [("odom", "r1_base")]
+            sent = world.transforms["odom", "r1_base"]
+            assert (sent.x, sent.y, sent.yaw) == odometry[-1].pose
+            assert sent.stamp == odometry[-1].stamp
+        assert sent.stamp == 40_000_000
+
+    def test_the_transform_needs_no_subscriber(self, trike: Any) -> None:
+        world = trike("enable_odom_tf_pub: true, odom_frame_id: wheel_odom")
+        command(world, 1.0, 0.0)
+        world.step(11)
+        assert world.transforms["wheel_odom", "base"].x == pytest.approx(0.05, abs=1e-3)
+
     def test_no_transform_and_no_twist_topic(self, trike: Any) -> None:
         world = trike()
         world.step()
@@ -301,6 +319,125 @@ class TestOdometry:
         truths = collect(world, TRUTH)
         world.step(20)
         assert [value.stamp for value in truths] == [k * 20_000_000 for k in range(5)]
+
+
+class TestTwistCommand:
+    """`command: twist`: the speed of the rear center, 1 m behind the origin, and the yaw rate."""
+
+    def rear(self, world: flatland.World) -> tuple[float, float, float]:
+        """Returns the velocity of the rear center in the frame of the body, and the yaw rate."""
+        vx, vy, omega = base(world).velocity
+        theta = base(world).pose[2]
+        c, s = math.cos(theta), math.sin(theta)
+        return (c * vx + s * vy, c * vy - s * vx - omega, omega)
+
+    @pytest.mark.parametrize(
+        ("v", "omega", "angle", "speed"),
+        [
+            (0.6, 0.0, 0.0, 0.6),
+            (0.6, 0.8, math.atan2(0.8, 0.6), 1.0),
+            (0.6, -0.8, -math.atan2(0.8, 0.6), 1.0),
+            (-0.6, 0.0, 0.0, -0.6),
+            # Backwards, to the left seen from above: the wheel points to the right.
+            (-0.6, 0.8, -math.atan2(0.8, 0.6), -1.0),
+            (-0.6, -0.8, math.atan2(0.8, 0.6), -1.0),
+            (0.0, 0.5, math.pi / 2, 0.5),
+            (0.0, -0.5, -math.pi / 2, 0.5),
+            (-0.0, 0.5, math.pi / 2, 0.5),
+            (0.0, 0.0, 0.0, 0.0),
+        ],
+    )
+    def test_steering_angle_and_speeds(
+        self, trike: Any, v: float, omega: float, angle: float, speed: float
+    ) -> None:
+        world = trike("command: twist", pose=(0.0, 0.0, 0.7))
+        command(world, v, omega)
+        plugin(world).before_physics_step(world.timekeeper)
+        assert plugin(world).steering_angle == pytest.approx(angle)
+        assert plugin(world).front_velocity == pytest.approx(speed)
+        assert self.rear(world) == pytest.approx((v, 0.0, omega), abs=1e-5)
+
+    def test_another_wheelbase(self, plugin_world: Any) -> None:
+        moved = joints(
+            left=joint("left_j", "weld", "left", "[-0.5, 0.4]"),
+            right=joint("right_j", "weld", "right", "[-0.5, -0.4]"),
+        )
+        bodies = BODIES.replace("[-1, ", "[-0.5, ")
+        world = plugin_world(drive("command: twist"), bodies=bodies, joints=moved)
+        command(world, 0.6, 0.8)
+        plugin(world).before_physics_step(world.timekeeper)
+        assert plugin(world).steering_angle == pytest.approx(math.atan2(0.5 * 0.8, 0.6))
+        assert base(world).velocity[2] == pytest.approx(0.8, abs=1e-5)
+
+    def test_robot_drives_the_commanded_circle(self, trike: Any) -> None:
+        world = trike("command: twist")
+        command(world, 0.5, 0.5)
+        for _ in range(20):
+            world.step(50)
+            x, y, theta = base(world).pose
+            rear = (x - math.cos(theta), y - math.sin(theta))
+            # A radius of v / omega = 1 m.
+            centre = (rear[0] - math.sin(theta), rear[1] + math.cos(theta))
+            assert centre == pytest.approx((-1.0, 1.0), abs=0.02)
+        assert theta == pytest.approx(0.5 * world.time, rel=0.01)
+
+    @pytest.mark.parametrize("sign", [1.0, -1.0])
+    def test_beyond_the_steering_limit_the_speed_is_kept(self, trike: Any, sign: float) -> None:
+        world = trike("command: twist, max_steer_angle: 0.5")
+        command(world, sign * 0.6, 2.0)
+        plugin(world).before_physics_step(world.timekeeper)
+        assert plugin(world).steering_angle == pytest.approx(sign * 0.5)
+        assert self.rear(world) == pytest.approx((sign * 0.6, 0.0, 0.6 * math.tan(0.5)), abs=1e-5)
+
+    def test_no_turn_in_place_below_ninety_degrees(self, trike: Any) -> None:
+        world = trike("command: twist, max_steer_angle: 1.5")
+        command(world, 0.0, 1.0)
+        world.step(50)
+        assert plugin(world).steering_angle == 1.5
+        assert base(world).pose == pytest.approx((0.0, 0.0, 0.0), abs=1e-4)
+
+    def test_turn_in_place_about_the_rear_center(self, trike: Any) -> None:
+        world = trike("command: twist, max_steer_angle: 1.5708")
+        command(world, 0.0, 1.0)
+        world.step(200)
+        x, y, theta = base(world).pose
+        assert theta == pytest.approx(1.0, abs=0.02)
+        assert (x - math.cos(theta), y - math.sin(theta)) == pytest.approx((-1.0, 0.0), abs=0.02)
+
+    def test_a_limit_of_the_speed_keeps_the_curvature(self, trike: Any) -> None:
+        world = trike("command: twist, linear_dynamics: {velocity_limit: 0.25}")
+        command(world, 0.6, 0.8)
+        plugin(world).before_physics_step(world.timekeeper)
+        assert self.rear(world) == pytest.approx((0.15, 0.0, 0.2), abs=1e-5)
+
+    def test_the_robot_waits_for_its_front_wheel(self, trike: Any) -> None:
+        world = trike("command: twist, angular_dynamics: {velocity_limit: 1.0}")
+        command(world, 0.0, 1.0)
+        for _ in range(200):
+            plugin(world).before_physics_step(world.timekeeper)
+            angle = plugin(world).steering_angle
+            assert plugin(world).front_velocity == pytest.approx(math.sin(angle), abs=1e-9)
+        # More than 90 degrees from the target.
+        command(world, 0.3, -0.9)
+        plugin(world).before_physics_step(world.timekeeper)
+        assert plugin(world).front_velocity == 0.0
+
+    def test_a_command_to_stop_keeps_the_steering_angle(self, trike: Any) -> None:
+        world = trike("command: twist")
+        command(world, 0.6, 0.8)
+        world.step()
+        command(world, 0.0, 0.0)
+        world.step(3)
+        assert plugin(world).steering_angle == pytest.approx(math.atan2(0.8, 0.6))
+        assert base(world).velocity == pytest.approx((0.0, 0.0, 0.0), abs=1e-6)
+
+    def test_steering_commands_are_the_default(self, trike: Any) -> None:
+        for extra in ("", "command: steering"):
+            world = trike(extra)
+            command(world, 0.6, 0.8)
+            plugin(world).before_physics_step(world.timekeeper)
+            assert plugin(world).steering_angle == 0.8
+            assert plugin(world).front_velocity == 0.6
 
 
 def test_an_invalid_command_is_rejected(trike: Any, caplog: pytest.LogCaptureFixture) -> None:
@@ -417,7 +554,8 @@ class TestErrors:
             ("odom_pose_noise: [-1, 0, 0]", 'Invalid "odom_pose_noise", must be finite'),
             ("angular_dynamics: {top: 1}", "top"),
             ("linear_dynamics: {velocity_limit: -1}", 'Invalid "velocity_limit"'),
-            ("enable_odom_tf_pub: true", "enable_odom_tf_pub"),
+            ("command: rate", 'Invalid "command", must be one of: steering, twist, got rate'),
+            ("command: 3", "must be one of: steering, twist, got 3"),
             ("twist_pub: t", "twist_pub"),
         ],
     )
