@@ -20,6 +20,7 @@ from pathlib import Path
 from typing import Any
 
 import actionlib
+import rosgraph
 import rospy
 import tf2_ros
 import yaml
@@ -176,11 +177,20 @@ def wait(what: str, condition: Any, timeout: float) -> None:
     """
     end = time.monotonic() + timeout
     while not condition():
-        if rospy.is_shutdown():
+        if rospy.core.is_shutdown_requested():
             raise TourError("interrupted")
         if time.monotonic() > end:
             raise TourError(f"{what}: not within {timeout:g} s")
         time.sleep(_POLL_PERIOD)
+
+
+def is_published(topic: str) -> bool:
+    """Returns whether a node publishes a topic."""
+    try:
+        published, _, _ = rosgraph.Master("/tour").getSystemState()
+    except (OSError, rosgraph.MasterException):
+        return False
+    return any(name == topic for name, _ in published)
 
 
 def drive_to(
@@ -250,11 +260,14 @@ def drive(options: argparse.Namespace) -> list[Leg]:
         TourError: The tour is invalid, or a node is missing.
     """
     goals = read_tour(options.tour) * options.repeat
+    topic = rospy.resolve_name(options.ground_truth)
+    # Before the start of the node: without a master, it would wait without a limit, and before the
+    # simulator is launched, it would not use its time.
+    wait(f"topic {topic}", lambda: is_published(topic), options.wait)
     rospy.init_node("tour", anonymous=True)
     truth = Truth(options.ground_truth, options.frame, options.base_frame)
     client = actionlib.SimpleActionClient(options.action, MoveBaseAction)
-    name = rospy.resolve_name(options.ground_truth)
-    wait(f"true pose on {name}", lambda: truth.received, options.wait)
+    wait(f"true pose on {topic}", lambda: truth.received, options.wait)
     server = rospy.resolve_name(options.action)
     wait(
         f"action server {server}",
@@ -305,7 +318,7 @@ def main() -> int:
     options = parse(rospy.myargv()[1:])
     try:
         legs = drive(options)
-    except (TourError, rospy.ROSInterruptException) as error:
+    except (TourError, rospy.ROSException) as error:
         print(f"tour: {error}", file=sys.stderr)
         return 1
     print(report(legs))
