@@ -108,28 +108,40 @@ def unused_port() -> Callable[[], int]:
     return free_port
 
 
-@pytest.fixture
-def environment(checkout: Path, tmp_path: Path) -> dict[str, str]:
+@pytest.fixture(scope="session")
+def new_environment(checkout: Path) -> Callable[[Path], dict[str, str]]:
     """Returns the environment of a shell after `. setup.bash`, with a new home and ROS master."""
     package = Path(flatland.__file__).resolve().parent
     # The package is the installed one, or the source tree after `make dev`.
     share = checkout if package.parent == checkout else Path(sys.prefix) / "share"
-    home = tmp_path / "home"
-    home.mkdir()
-    return {
-        "HOME": str(home),
-        "PATH": f"{Path(sys.executable).parent}:/usr/bin:/bin",
-        "LANG": "C.UTF-8",
-        "PYTHONPATH": str(package.parent),
-        "ROS_PACKAGE_PATH": f"{share}:/usr/share",
-        "ROS_DISTRO": "Debian",
-        "ROS_VERSION": "1",
-        "ROS_PYTHON_VERSION": "3",
-        "ROS_ETC_DIR": "/etc/ros",
-        "ROS_MASTER_URI": f"http://127.0.0.1:{free_port()}",
-        "ROS_IP": "127.0.0.1",
-        "PYTHONUNBUFFERED": "1",
-    }
+
+    def create(folder: Path) -> dict[str, str]:
+        home = folder / "home"
+        home.mkdir()
+        return {
+            "HOME": str(home),
+            "PATH": f"{Path(sys.executable).parent}:/usr/bin:/bin",
+            "LANG": "C.UTF-8",
+            "PYTHONPATH": str(package.parent),
+            "ROS_PACKAGE_PATH": f"{share}:/usr/share",
+            "ROS_DISTRO": "Debian",
+            "ROS_VERSION": "1",
+            "ROS_PYTHON_VERSION": "3",
+            "ROS_ETC_DIR": "/etc/ros",
+            "ROS_MASTER_URI": f"http://127.0.0.1:{free_port()}",
+            "ROS_IP": "127.0.0.1",
+            "PYTHONUNBUFFERED": "1",
+        }
+
+    return create
+
+
+@pytest.fixture
+def environment(
+    new_environment: Callable[[Path], dict[str, str]], tmp_path: Path
+) -> dict[str, str]:
+    """The environment of a shell after `. setup.bash`."""
+    return new_environment(tmp_path)
 
 
 @pytest.fixture

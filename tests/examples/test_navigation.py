@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import re
+import shlex
 import subprocess
 import sys
 from collections.abc import Callable
@@ -19,22 +20,28 @@ from waiting import TIMEOUT
 import flatland
 
 NODES = {
-    ("navigation", ""): {"/flatland_server", "/rviz", "/amcl", "/move_base"},
-    ("navigation", "simulator:=false"): {"/amcl", "/move_base"},
-    ("localization", ""): {"/flatland_server", "/rviz", "/amcl"},
-    ("localization", "map:=/a.yaml rviz:=false"): {"/flatland_server", "/map_server", "/amcl"},
-    ("localization", "map:=none simulator:=false"): {"/amcl"},
-    ("mapping", ""): {"/flatland_server", "/rviz", "/gmapping", "/move_base"},
-    ("mapping", "slam:=hector move_base:=false"): {"/flatland_server", "/rviz", "/hector_mapping"},
+    "navigation.launch": {"/flatland_server", "/rviz", "/amcl", "/move_base"},
+    "navigation.launch simulator:=false": {"/amcl", "/move_base"},
+    "localization.launch": {"/flatland_server", "/rviz", "/amcl"},
+    "localization.launch map:=/a.yaml rviz:=false": {"/flatland_server", "/map_server", "/amcl"},
+    "localization.launch map:=none simulator:=false": {"/amcl"},
+    "mapping.launch": {"/flatland_server", "/rviz", "/gmapping", "/move_base"},
+    "mapping.launch slam:=hector move_base:=false": {
+        "/flatland_server",
+        "/rviz",
+        "/hector_mapping",
+    },
 }
-# Prints the parameters and the nodes with their remappings of a launch file as JSON.
+# Reads launch files with arguments, and prints the parameters and the nodes with their remappings.
 RESOLVE = dedent(
     """
     import json, sys, roslaunch.config
-    config = roslaunch.config.load_config_default([(sys.argv[1], sys.argv[2:])], None)
-    nodes = {node.namespace + node.name: dict(node.remap_args) for node in config.nodes}
-    params = {name: param.value for name, param in config.params.items()}
-    print("JSON" + json.dumps([params, nodes]))
+    result = []
+    for path, *arguments in json.load(sys.stdin):
+        config = roslaunch.config.load_config_default([(path, arguments)], None)
+        nodes = {node.namespace + node.name: dict(node.remap_args) for node in config.nodes}
+        result.append(({name: param.value for name, param in config.params.items()}, nodes))
+    print("JSON" + json.dumps(result))
     """
 )
 # Values of launch arguments.
@@ -62,19 +69,36 @@ def shell(environment: dict[str, str], package: Path) -> dict[str, str]:
     return environment
 
 
-@pytest.fixture
-def resolve(
-    shell: dict[str, str], package: Path, run_command: Callable[..., str], tmp_path: Path
-) -> Callable[..., Any]:
-    """Resolves a launch file with arguments to parameters and remappings of nodes."""
+@pytest.fixture(scope="module")
+def resolve(new_environment: Any, package: Path, tmp_path_factory: Any) -> Callable[..., Any]:
+    """Resolves launch files with arguments to parameters and remappings of nodes.
 
-    def run(name: str, *arguments: str) -> tuple[dict[str, Any], dict[str, Any]]:
-        path = package / "launch" / f"{name}.launch"
-        printed = run_command([sys.executable, "-c", RESOLVE, path, *arguments], shell, tmp_path)
-        params, nodes = json.loads(printed[printed.index("JSON") + 4 :])
-        return params, nodes
+    All in one process, because each start of roslaunch takes a second.
+    """
+    shell = new_environment(tmp_path_factory.mktemp("roslaunch"))
+    shell["ROS_PACKAGE_PATH"] = f"{package}:{shell['ROS_PACKAGE_PATH']}"
+
+    def run(*launches: str) -> list[tuple[dict[str, Any], dict[str, Any]]]:
+        files = [shlex.split(launch) for launch in launches]
+        done = subprocess.run(
+            [sys.executable, "-c", RESOLVE],
+            env=shell,
+            input=json.dumps([[f"{package}/launch/{name}", *more] for name, *more in files]),
+            capture_output=True,
+            text=True,
+            timeout=TIMEOUT,
+        )
+        assert done.returncode == 0, done.stderr
+        return json.loads(done.stdout[done.stdout.index("JSON") + 4 :])
 
     return run
+
+
+@pytest.fixture(scope="module")
+def params(resolve: Callable[..., Any]) -> dict[str, Any]:
+    """The parameters of navigation.launch."""
+    [(params, _)] = resolve("navigation.launch")
+    return params
 
 
 @pytest.fixture(scope="module")
@@ -84,44 +108,69 @@ def office(checkout: Path) -> Any:
 
 
 @pytest.mark.ros
-@pytest.mark.parametrize(("name", "arguments"), NODES)
-def test_the_launch_files_start_the_nodes(name, arguments, shell, run_command, tmp_path):
-    command = ["roslaunch", "flatland_navigation", f"{name}.launch", *arguments.split(), "--nodes"]
-    nodes = run_command(command, shell, tmp_path)
-    assert set(nodes.split()) == NODES[name, arguments]
+def test_the_launch_files_start_the_nodes(resolve):
+    for launch, (_, nodes) in zip(NODES, resolve(*NODES), strict=True):
+        assert set(nodes) == NODES[launch], launch
 
 
 @pytest.mark.ros
-def test_all_commands_of_the_documentation_can_be_launched(
-    checkout, package, shell, run_command, tmp_path
-):
+def test_the_package_is_found_by_roslaunch(shell, run_command, tmp_path):
+    command = ["roslaunch", "flatland_navigation", "navigation.launch", "--nodes"]
+    assert "/move_base" in run_command(command, shell, tmp_path).split()
+
+
+@pytest.mark.ros
+def test_all_commands_of_the_documentation_can_be_launched(checkout, package, resolve):
     pages = [checkout / "docs" / "navigation.md", package / "README.md", checkout / "README.md"]
     text = "\n".join(page.read_text() for page in pages)
-    commands = re.findall(r"^roslaunch (flatland_navigation \S+.*?)(?: *#.*)?$", text, re.MULTILINE)
-    assert len(commands) >= 5
-    for command in set(commands):
-        run_command(["bash", "-c", f"roslaunch {command} --nodes"], shell, tmp_path)
+    commands = re.findall(r"^roslaunch flatland_navigation (\S+.*?)(?: *#.*)?$", text, re.MULTILINE)
+    assert len(commands) >= 8
+    robot = str(package / "config" / "robot.yaml")
+    resolve(*(command.replace("/path/robot.yaml", robot) for command in set(commands)))
 
 
 @pytest.mark.ros
-@pytest.mark.parametrize("launch", ["navigation", "mapping", "mapping slam:=hector"])
-def test_topics_and_frames_of_the_arguments_reach_all_nodes(launch, resolve):
-    name, *arguments = launch.split()
-    given = [f"{key}:={value}" for key, value in TOPICS.items()]
-    params, nodes = resolve(name, *arguments, *given, "simulator:=false")
-    for node, remappings in nodes.items():
-        for topic, target in remappings.items():
-            assert target == TOPICS["map_topic" if topic == "map" else topic], (node, topic)
-    for key, value in params.items():
-        assert value not in DEFAULTS, key
-    used = {str(value) for value in params.values()}
-    used |= {target for remappings in nodes.values() for target in remappings.values()}
-    assert used >= set(TOPICS.values())
+def test_topics_and_frames_of_the_arguments_reach_all_nodes(resolve):
+    given = " ".join(f"{key}:={value}" for key, value in TOPICS.items())
+    launches = ["navigation.launch", "mapping.launch", "mapping.launch slam:=hector"]
+    results = resolve(*(f"{launch} {given} simulator:=false" for launch in launches))
+    for launch, (params, nodes) in zip(launches, results, strict=True):
+        for node, remappings in nodes.items():
+            for topic, target in remappings.items():
+                assert target == TOPICS["map_topic" if topic == "map" else topic], (launch, node)
+        for key, value in params.items():
+            assert value not in DEFAULTS, (launch, key)
+        used = {str(value) for value in params.values()}
+        used |= {target for remappings in nodes.values() for target in remappings.values()}
+        assert used >= set(TOPICS.values()), launch
 
 
 @pytest.mark.ros
-def test_the_parameters_fit_the_office(checkout, resolve, office, package):
-    params, _ = resolve("navigation")
+def test_two_robots_have_topics_and_frames_of_their_own(resolve, package):
+    [(params, nodes)] = resolve("two_robots.launch")
+    with flatland.World.from_yaml(package / "worlds/two_robots/world.yaml", seed=1) as world:
+        poses = {model.name: model.bodies[0].pose for model in world.models}
+        robots = list(poses)
+        assert robots == ["robot_1", "robot_2"]
+        for robot in robots:
+            scan = world.output(f"/{robot}/scan")
+            world.step(50)
+            assert scan.latest.frame_id == f"{robot}_laser"
+    for robot in robots:
+        amcl, move_base = f"/{robot}/amcl", f"/{robot}/move_base"
+        assert {amcl, move_base} <= set(nodes)
+        assert params[f"{amcl}/odom_frame_id"] == f"{robot}_odom"
+        assert params[f"{amcl}/base_frame_id"] == f"{robot}_base_link"
+        initial = [params[f"{amcl}/initial_pose_{axis}"] for axis in "xya"]
+        assert initial == pytest.approx(list(poses[robot]), abs=1e-4)
+        assert params[f"{move_base}/local_costmap/global_frame"] == f"{robot}_odom"
+        assert params[f"{move_base}/global_costmap/robot_base_frame"] == f"{robot}_base_link"
+        model = yaml.safe_load((package / f"worlds/two_robots/{robot}.model.yaml").read_text())
+        assert model["plugins"][1]["odom_frame_id"] == f"{robot}_odom"
+
+
+@pytest.mark.ros
+def test_the_parameters_fit_the_office(checkout, resolve, params, office):
     model = yaml.safe_load((checkout / "worlds/office/diff_robot.model.yaml").read_text())
     plugins = {plugin["type"]: plugin for plugin in model["plugins"]}
     laser, drive = plugins["Laser"], plugins["DiffDrive"]
@@ -148,18 +197,21 @@ def test_the_parameters_fit_the_office(checkout, resolve, office, package):
     assert initial == pytest.approx([x, y, yaw], abs=1e-6)
     assert params["/map_to_odom"] is False
     assert params["/flatland_server/publish_map"] == office.layers[0].name
-    params, _ = resolve("navigation", "map:=/a.yaml")
-    assert params["/flatland_server/publish_map"] is False
+    [(with_file, _)] = resolve("navigation.launch map:=/a.yaml")
+    assert with_file["/flatland_server/publish_map"] is False
 
 
 @pytest.mark.ros
 def test_the_slam_parameters_fit_the_laser_of_the_office(checkout, resolve):
     model = yaml.safe_load((checkout / "worlds/office/diff_robot.model.yaml").read_text())
     laser = next(plugin for plugin in model["plugins"] if plugin["type"] == "Laser")
-    params, _ = resolve("mapping")
+    (params, _), (hector, _) = resolve("mapping.launch", "mapping.launch slam:=hector")
     assert 0 < params["/gmapping/maxUrange"] <= params["/gmapping/maxRange"] < laser["range"]
-    params, _ = resolve("mapping", "slam:=hector")
-    assert params["/hector_mapping/laser_max_dist"] < laser["range"]
+    assert hector["/hector_mapping/laser_max_dist"] < laser["range"]
+    for parameters in (params, hector):
+        # The SLAM node publishes the map.
+        assert parameters["/flatland_server/publish_map"] is False
+        assert parameters["/map_to_odom"] is False
 
 
 def test_the_goals_of_the_office_are_free(package, office):
@@ -232,9 +284,8 @@ OBSERVE = dedent(
 
 @pytest.mark.ros
 def test_the_simulator_provides_the_frames_and_topics_of_all_nodes(
-    package, shell, resolve, start, run_command, tmp_path
+    package, shell, params, start, run_command, tmp_path
 ):
-    params, _ = resolve("navigation")
     launch = package / "launch" / "components" / "simulator.launch"
     server = start(["roslaunch", launch, "rviz:=false"], shell)
     server.wait_for('loaded ".*world.yaml"')
