@@ -23,8 +23,8 @@ run: setup  ## run the simulator: make run [WORLD=world.yaml] [ARGS="show_viz:=f
 	@tools/run.sh "$(WORLD)" $(ARGS)
 
 .PHONY: test
-test: setup-dev  ## run all tests: make test [ARGS="-k laser"]
-	@. ./setup.bash && pytest $(ARGS)
+test: setup-dev  ## run all tests, in two processes: make test [ARGS="-k laser"]
+	@. ./setup.bash && pytest --numprocesses 2 --dist loadgroup $(ARGS)
 
 .PHONY: fuzz
 fuzz: setup-dev  ## test the physics engine with thousands of random jams
@@ -48,6 +48,10 @@ format: setup-dev  ## format Python and C++ sources
 bench: setup-dev  ## measure performance, write build/bench.json and .png: make bench [BASELINE=earlier.json]
 	@. ./setup.bash && python bench --json build/bench.json --plot build/bench.png \
 	  $(if $(BASELINE),--baseline "$(BASELINE)") $(ARGS)
+
+.PHONY: soak
+soak: setup-dev  ## run for a long time and check that nothing grows: make soak [ARGS="office --scale 0.1"]
+	@. ./setup.bash && python bench/soak.py $(ARGS)
 
 .PHONY: docs
 docs: setup  ## check the links and images of README.md and docs/

@@ -38,11 +38,12 @@ from flatland.values import (
     Twist,
     TwistWithCovariance,
 )
+from flatland.version import VERSION
 from flatland.world import World
 
 load_world = World.from_yaml
 
-__version__ = "0.1.0"
+__version__ = VERSION
 
 __all__ = [
     "Body",

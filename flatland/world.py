@@ -8,11 +8,12 @@ import threading
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 from types import TracebackType
-from typing import TypeVar
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
 
+from flatland.config.inputs import Inputs
 from flatland.config.node import Source
 from flatland.config.preprocessor import Params
 from flatland.entities.collision_filter import CollisionFilter
@@ -34,9 +35,11 @@ from flatland.runtime.requests import Requests
 from flatland.runtime.transforms import TransformBuffer
 from flatland.timekeeper import Timekeeper
 
-_LOG = logging.getLogger("flatland")
+if TYPE_CHECKING:
+    from flatland.recording import Recorder
+    from flatland.runtime.change_log import ChangeLog
 
-R = TypeVar("R")
+_LOG = logging.getLogger("flatland")
 
 
 class World(Contents):
@@ -54,9 +57,11 @@ class World(Contents):
         seed: Seed of all random numbers.
         params: Source of the values of `param()` in YAML files.
         path: The world file, as given; relative model paths start from its folder.
+        plugin_errors: Policy for exceptions, see `from_yaml`.
+        on_invalid_body: Policy for invalid bodies, see `from_yaml`.
     """
 
-    def __init__(
+    def __init__(  # noqa: D417 - the other arguments are those of from_yaml
         self,
         *,
         seed: int | None = None,
@@ -70,19 +75,12 @@ class World(Contents):
         plugin_errors: FaultPolicy = "raise",
         on_invalid_body: InvalidBodyPolicy = "raise",
     ) -> None:
-        """Creates an empty world; `from_yaml` describes the arguments that both have in common.
+        """Creates an empty world; `from_yaml` describes the other arguments.
 
         Args:
-            seed: See `from_yaml`, as for all arguments that are not described here.
-            params: Source of the values of `param()`.
-            step_size: Simulated time of one step [s].
             velocity_iterations: Velocity iterations of the Box2D solver.
             position_iterations: Position iterations of the Box2D solver.
             base_dir: Folder that relative paths of models and maps start from.
-            observers: Receive notifications.
-            plugin_timeout: Limit of `on_initialize` [s].
-            plugin_errors: Policy for exceptions.
-            on_invalid_body: Policy for invalid bodies.
 
         Raises:
             ValueError: An argument is out of range.
@@ -90,10 +88,12 @@ class World(Contents):
         if plugin_timeout is not None and not plugin_timeout > 0:
             raise ValueError(f"plugin_timeout must be positive [s] or None, got {plugin_timeout}")
         self.timekeeper = Timekeeper(step_size)
+        self.plugin_errors, self.on_invalid_body = plugin_errors, on_invalid_body
         self._faults = Faults(plugin_errors)
         self.seed = checked_seed(seed)
         self.params = params
         self.path = ""
+        self.inputs = Inputs()
         self.velocity_iterations = velocity_iterations
         self.position_iterations = position_iterations
         self.collision_filter = CollisionFilter()
@@ -115,6 +115,8 @@ class World(Contents):
         self._body_monitor = BodyMonitor(
             self.physics, self._contacts, self._models, on_invalid_body
         )
+        self.change_count = 0
+        self._change_log: ChangeLog | None = None
         self._paused = False
         self._closed = False
         self.add_observer(self._body_monitor)
@@ -247,39 +249,30 @@ class World(Contents):
         self._observers.time_advanced(timekeeper.sim_time_ns)
         host.after_physics_step(timekeeper)
         self.transform_buffer.flush()
+        if self._change_log is not None:
+            self._change_log.step_done()
 
-    @property
-    def paused(self) -> bool:
-        """Whether steps have no effect."""
-        return self._paused
+    # -- recordings and images -------------------------------------------------------------
 
-    def pause(self) -> None:
-        """Pauses the world from the next step on."""
-        self._paused = True
+    def record(self, path: str | os.PathLike[str]) -> Recorder:
+        """Records this run, so that `flatland replay` can repeat it and find differences.
 
-    def resume(self) -> None:
-        """Resumes a paused world."""
-        self._paused = False
+        Args:
+            path: The file; an existing one is replaced.
 
-    def toggle_pause(self) -> None:
-        """Pauses a running world, resumes a paused one."""
-        self._paused = not self._paused
-
-    # -- observers -------------------------------------------------------------------------
-
-    def add_observer(self, observer: WorldObserver) -> None:
-        """Notifies an observer of all events from now on."""
-        self._observers.add(observer, self)
-
-    def remove_observer(self, observer: WorldObserver) -> None:
-        """Stops the notifications of an observer.
+        Returns:
+            The recorder; its `close` ends the recording, as does the end of the world.
 
         Raises:
-            ValueError: It was not added, or has been removed.
+            WorldError: The world was not loaded from a file, or has changed since.
+            RecordingError: The file cannot be written.
         """
-        self._observers.remove(observer)
+        from flatland.recording import Recorder  # Late: the simulation does not depend on it.
 
-    # -- images ----------------------------------------------------------------------------
+        recorder = Recorder(self, path)
+        self.log_changes(recorder)
+        self.add_observer(recorder)
+        return recorder
 
     def draw(
         self,
@@ -336,6 +329,8 @@ class World(Contents):
         with self.requests.lock:
             if self._closed:
                 return
+            if self._change_log is not None:
+                self._change_log.world_closing()
             self.plugin_host.shut_down(list(self.plugin_host.world_plugins))
             for model in reversed(self.models):
                 self._models.delete(model.name)

@@ -23,14 +23,20 @@ _TESTS = Path(__file__).resolve().parent
 _CHECKOUT = _TESTS.parent
 # Tests that need a ROS master, a screen or a compiler, and take a while.
 _MARKED_FOLDERS = {"ros": "ros", "ros/viewer": "viewer", "build": "build"}
+# Folders whose tests run in one process, since they share a workspace or a screen. The tests of
+# each other file run in one process.
+_GROUPED_FOLDERS = ("build", "ros/viewer")
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Gives all tests of a folder the marker of the folder."""
+    """Marks all tests by their folder, and assigns those that share fixtures to one process."""
     for item in items:
         for folder, marker in _MARKED_FOLDERS.items():
             if _TESTS / folder in item.path.parents:
                 item.add_marker(marker)
+        folder = next((f for f in _GROUPED_FOLDERS if _TESTS / f in item.path.parents), None)
+        group = folder or str(item.path.relative_to(_TESTS))
+        item.add_marker(pytest.mark.xdist_group(group))
 
 
 @pytest.fixture(scope="session")

@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import BinaryIO
 
 from flatland.config.composer import Composer, end_position, malformed
+from flatland.config.inputs import note_file
 from flatland.config.node import Node, Source
 from flatland.errors import UnreadableFileError
 
@@ -61,6 +62,7 @@ def open_regular(path: str) -> BinaryIO:
         raise FileNotFoundError(errno.ENOENT, str(error), path) from error
     if not is_regular:
         raise OSError(errno.EINVAL, "it is not a regular file", path)
+    note_file(path)
     return Path(path).open("rb")
 
 

@@ -48,13 +48,14 @@ class EvalResult:
     unset: tuple[str, ...]
 
 
-def evaluate(expression: str, param: Callable[[str], object]) -> EvalResult:
+def evaluate(expression: str, param: Callable[[str], object], seed: int = 0) -> EvalResult:
     """Evaluates an expression in a fresh Lua 5.1 state.
 
     Args:
         expression: Lua code; without a `return `, it is the expression of the value.
         param: Function that returns the value of a ROS parameter: a number, a string or a bool;
             None if it is not set.
+        seed: Seed of `math.random`, at least 0.
 
     Raises:
         EvalError: The expression is not valid Lua, fails, exceeds the limit of time or memory, or
@@ -65,7 +66,7 @@ def evaluate(expression: str, param: Callable[[str], object]) -> EvalResult:
     spent = 0.0
     for _ in range(_MAX_RUNS):
         start = time.process_time()
-        status, *rest = _run(code, params, spent)
+        status, *rest = _run(code, params, spent, seed)
         spent += time.process_time() - start
         texts = [_decode(text) for text in rest]
         if status == b"value":
@@ -98,7 +99,7 @@ def _decode(text: bytes) -> str:
         raise EvalError(f"{text[:40]!r} is not UTF-8 text") from None
 
 
-def _run(code: str, params: list[object], spent: float) -> tuple[bytes, ...]:
+def _run(code: str, params: list[object], spent: float, seed: int) -> tuple[bytes, ...]:
     source = code.encode()
     size = len(source) + sum(len(value) for value in params if isinstance(value, bytes))
     if size > _MAX_INPUT:
@@ -106,7 +107,7 @@ def _run(code: str, params: list[object], spent: float) -> tuple[bytes, ...]:
     new_state, interval = _state_factory()
     try:
         result: tuple[bytes, ...] = new_state().execute(
-            _sandbox(), source, spent, TIME_LIMIT, MEMORY_LIMIT, interval, *params
+            _sandbox(), source, spent, TIME_LIMIT, MEMORY_LIMIT, interval, seed, *params
         )
         return result
     except MemoryError:

@@ -7,6 +7,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 
 from flatland.config.documents import load_documents, parse_documents
+from flatland.config.inputs import next_seed, note_param
 from flatland.config.lua import EvalError, evaluate
 from flatland.config.node import MAX_NESTING, ListNode, Node, NullNode, ScalarNode, Source
 from flatland.errors import YamlError
@@ -130,7 +131,7 @@ class _Preprocessor:
     def _evaluate(self, node: ScalarNode) -> str:
         expression = node.text[len(_EVAL) :].strip(" \t\r\n\f\v")
         try:
-            result = evaluate(expression, self._param)
+            result = evaluate(expression, self._param, next_seed())
         except EvalError as error:
             message = f'Failed to evaluate "{_shorten(expression)}", {_shorten(str(error))}'
             raise self._error(node, message) from error
@@ -139,11 +140,13 @@ class _Preprocessor:
         return result.text
 
     def _param(self, name: str) -> object:
-        if self._params is None:
-            return None
+        value: object = None
         if isinstance(self._params, Mapping):
-            return self._params.get(name)
-        return self._params(name)
+            value = self._params.get(name)
+        elif self._params is not None:
+            value = self._params(name)
+        note_param(name, value)
+        return value
 
     def _include(self, node: ScalarNode, marker: str, chain: _Chain, depth: int) -> list[Node]:
         written = node.text[len(marker) :].strip()

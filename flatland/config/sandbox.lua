@@ -1,7 +1,7 @@
 -- The only chunk that runs in a Lua state; evaluates one expression. All functions that the guards
 -- use are local variables, so that an expression that changes globals can neither read nor replace
 -- them.
-local code, spent, time_limit, memory_limit, interval = ...
+local code, spent, time_limit, memory_limit, interval, seed = ...
 local error, ipairs, pairs, pcall, select, tonumber, tostring, type, unpack =
   error, ipairs, pairs, pcall, select, tonumber, tostring, type, unpack
 local clock, getenv, sethook, memory_used = os.clock, os.getenv, debug.sethook, collectgarbage
@@ -10,8 +10,8 @@ local byte, find, gsub, rep, sort = string.byte, string.find, string.gsub, strin
 local concat, insert = table.concat, table.insert
 
 local known = {}  -- by parameter name: a table that holds the value, empty for an unset parameter
-local given = {select(6, ...)}
-for i = 1, select("#", ...) - 5, 2 do known[given[i]] = {given[i + 1]} end
+local given = {select(7, ...)}
+for i = 1, select("#", ...) - 6, 2 do known[given[i]] = {given[i + 1]} end
 
 if jit then jit.off() end  -- compiled code does not call hooks
 for _, name in ipairs{"execute", "exit", "remove", "rename", "tmpname", "setlocale"} do
@@ -68,6 +68,24 @@ function coroutine.wrap(run)
   end
   return function(...) return finish(pass(resume(thread, ...))) end
 end
+
+-- The generator of Park and Miller (1988), whose state is local: that of the C library is shared by
+-- the whole process, so that other code would change the results.
+local floor, state = math.floor, 1
+function math.randomseed(number)
+  state = floor(tonumber(number) or 0) % 2147483646 + 1
+  if state ~= state then state = 1 end
+  for _ = 1, 3 do state = 16807 * state % 2147483647 end  -- similar seeds, different numbers
+end
+function math.random(first, last)
+  state = 16807 * state % 2147483647
+  local fraction = (state - 1) / 2147483646
+  if first == nil then return fraction end
+  local low, high = tonumber(last and first or 1), tonumber(last or first)
+  if not (low and high and low <= high) then error("interval is empty", 2) end
+  return floor(low) + floor(fraction * (floor(high) - floor(low) + 1))
+end
+math.randomseed(seed)
 
 -- Text only: a forged binary chunk can corrupt the memory of the process.
 function _G.loadstring(text, name)

@@ -7,8 +7,9 @@ import os
 from collections.abc import Iterable
 from contextlib import suppress
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
+from flatland.config.inputs import Inputs
 from flatland.config.node import Source
 from flatland.config.preprocessor import Params
 from flatland.config.reader import YamlReader
@@ -22,6 +23,7 @@ from flatland.plugin_api.missing_plugins import (
     missing_plugins_error,
     read_entries,
 )
+from flatland.plugin_api.noise import checked_seed
 
 if TYPE_CHECKING:
     from flatland.runtime.body_monitor import InvalidBodyPolicy
@@ -51,6 +53,35 @@ def load_world(
     """Creates a world of the given class from a file; see `World.from_yaml` for the arguments."""
     if simplify_map not in SIMPLIFICATIONS:
         raise ValueError(f"simplify_map must be 0, 1 or 2, got {simplify_map!r}")
+    seed = checked_seed(seed)
+    inputs = Inputs(seed, simplify_map)
+    with inputs.collecting():
+        world = _create_world(
+            world_class,
+            path,
+            inputs,
+            seed=seed,
+            params=params,
+            step_size=step_size,
+            observers=observers,
+            plugin_timeout=plugin_timeout,
+            plugin_errors=plugin_errors,
+            on_invalid_body=on_invalid_body,
+        )
+    # A recording can start as long as these are unchanged.
+    world.change_count = 0
+    inputs.commands_received = world.ports.commands_received()
+    return world
+
+
+def _create_world(
+    world_class: type[World],
+    path: str | os.PathLike[str],
+    inputs: Inputs,
+    *,
+    params: Params,
+    **options: Any,
+) -> World:
     file = Path(Source("", str(Path.cwd())).resolve(os.fspath(path)))
     reader = YamlReader.from_file(file, params)
     properties = reader.subnode("properties", "map")
@@ -59,21 +90,17 @@ def load_world(
     map_layer: str = properties.get("publish_map", "string", "")
     properties.ensure_accessed_all()
     world = world_class(
-        seed=seed,
         params=params,
-        step_size=step_size,
         velocity_iterations=velocity_iterations,
         position_iterations=position_iterations,
         base_dir=file.parent,
-        observers=observers,
-        plugin_timeout=plugin_timeout,
-        plugin_errors=plugin_errors,
-        on_invalid_body=on_invalid_body,
+        **options,
     )
     world.path = str(file)
+    world.inputs = inputs
     try:
         for entry in reader.subnode("layers", "list").items():
-            _load_layer(world, entry, simplify_map)
+            _load_layer(world, entry, inputs.simplify_map)
         if map_layer and not any(map_layer in layer.names for layer in world.layers):
             names = ", ".join(layer.name for layer in world.layers) or "none"
             raise properties.invalid(

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 from flatland import _core
+from flatland.geometry import FloatArray
 from flatland.physics.body import PhysicsBody
 from flatland.physics.contact import ContactEvent, ContactInfo, to_events, to_infos
 from flatland.physics.fixture import PhysicsFixture
@@ -13,6 +15,22 @@ from flatland.physics.joint import PhysicsJoint
 from flatland.physics.queries import PhysicsQueries
 
 PreSolveHook = Callable[[_core.PreSolveContact, _core.OldManifold], object]
+
+
+class ObjectCounts(NamedTuple):
+    """The numbers of objects in a physics world.
+
+    Attributes:
+        bodies: Number of bodies.
+        fixtures: Number of fixtures.
+        joints: Number of joints.
+        contacts: Number of pairs of fixtures whose bounding boxes overlap.
+    """
+
+    bodies: int
+    fixtures: int
+    joints: int
+    contacts: int
 
 
 @dataclass(frozen=True, slots=True)
@@ -250,6 +268,29 @@ class PhysicsWorld(PhysicsQueries):
         for body in bodies:
             if body.world is not self:
                 raise ValueError("a joint must connect bodies of its own world")
+
+    def object_counts(self) -> ObjectCounts:
+        """Returns the numbers of objects.
+
+        Raises:
+            StaleHandleError: The world is closed.
+            WorldLockedError: The world is stepping.
+        """
+        return ObjectCounts(*self._core.object_counts())
+
+    def body_states(self) -> FloatArray:
+        """Returns the states of all bodies in order of creation, exactly as Box2D stores them.
+
+        Returns:
+            Position of the origin (x, y) and angle, centre of mass (x, y), velocity of the centre
+            of mass (vx, vy, omega), all in the world frame [m, rad, s], and 1 if the body is awake,
+            else 0; shape (n, 9).
+
+        Raises:
+            StaleHandleError: The world is closed.
+            WorldLockedError: The world is stepping.
+        """
+        return self._core.body_states()
 
     # -- handles by id ---------------------------------------------------------------------
 

@@ -7,7 +7,7 @@ import math
 import time
 from typing import TYPE_CHECKING
 
-from flatland.geometry import DoubleArray, Pose, Vector2, compose, invert, rotate
+from flatland.geometry import IDENTITY, DoubleArray, Pose, Vector2, compose, invert, rotate
 from flatland.plugin_api.after_step import NeverDue, StepHook, call_after_step, read_after_step
 from flatland.plugin_api.noise import GaussianNoise
 from flatland.plugin_api.odometry_drift import OdometryDrift
@@ -91,6 +91,7 @@ class Odometer:
         frame_id: Frame of the odometry pose, as in the YAML file.
         world_frame_id: Frame of the ground truth, as in the YAML file.
         child_frame_id: Frame of the body.
+        sends_transform: Whether `report` sends the transform from the odometry frame to the body.
         twist_noise: Noise of vx, vy and the yaw rate of a twist emitted besides the odometry.
     """
 
@@ -125,7 +126,7 @@ class Odometer:
         self.frame_id: str = config.get("odom_frame_id", "string", "odom")
         self.world_frame_id: str = config.get("ground_truth_frame_id", "string", "map")
         self._local: bool = config.get("twist_in_local_frame", "bool", twist_in_local_frame)
-        self._sends_transform: bool = config.get("enable_odom_tf_pub", "bool", sends_transform)
+        self.sends_transform: bool = config.get("enable_odom_tf_pub", "bool", sends_transform)
         pose_variances = read_variances(config, "odom_pose_noise")
         twist_variances = read_variances(config, "odom_twist_noise")
         # A covariance of the file is emitted as it is; that of the drift is added to the default.
@@ -146,8 +147,9 @@ class Odometer:
         self._body = body
         self.child_frame_id = plugin.model.frame(body.name)
         self._plugin = plugin
-        # Pose of the world frame in the odometry frame; None for the identity, and with drift.
-        self._offset: Pose | None = None
+        self._is_exact = True  # The odometry is the true pose, apart from white noise.
+        # Pose of the world frame in the odometry frame, without drift.
+        self._offset = IDENTITY
         self._drift: OdometryDrift | None = None
         drift = config.get_list(
             "odom_drift", "float", [0.0, 0.0, 0.0, 0.0], size=4, finite=True, minimum=0
@@ -155,6 +157,7 @@ class Odometer:
         if any(drift):
             a1, a2, a3, a4 = drift
             stream = plugin.noise_stream("odometry drift")
+            self._is_exact = False
             self._drift = OdometryDrift((a1, a2, a3, a4), stream, body.pose, center)
         self._truth: Output[Odometry] | None = None
         self._odometry: Output[Odometry] | None = None
@@ -192,13 +195,9 @@ class Odometer:
 
     @property
     def wanted(self) -> bool:
-        """Whether the ground truth, the odometry or the transform is wanted."""
+        """Whether the ground truth or the odometry is wanted."""
         truth, odometry = self._truth, self._odometry
-        return (
-            self._sends_transform
-            or (truth is not None and truth.wanted)
-            or (odometry is not None and odometry.wanted)
-        )
+        return (truth is not None and truth.wanted) or (odometry is not None and odometry.wanted)
 
     def begin_update(self) -> None:
         """Advances the noise; to be called for each update due, emitted or not."""
@@ -216,13 +215,16 @@ class Odometer:
         if self._drift is not None:
             self._drift.move(previous, pose, keep)
         elif keep and all(map(math.isfinite, previous)):
+            self._is_exact = False
             self._offset = compose(self._estimate(previous), invert(pose))
+
+    def state(self) -> object:
+        """Returns everything that changes, for `FlatlandPlugin.state`."""
+        return (self._offset, None if self._drift is None else self._drift.state())
 
     def _estimate(self, pose: Pose) -> Pose:
         """Returns the odometry without white noise, in the odometry frame."""
-        if self._drift is not None:
-            return self._drift.pose
-        return pose if self._offset is None else compose(self._offset, pose)
+        return compose(self._offset, pose) if self._drift is None else self._drift.pose
 
     def measure(self, pose: Pose, velocity: Pose) -> Pose:
         """Returns the velocity that the odometry measures, without white noise.
@@ -260,9 +262,9 @@ class Odometer:
             pose: (x, y, yaw) of the origin of the body in the world frame [m, rad].
             velocity: (vx, vy, omega) of the origin of the body in the world frame [m/s, rad/s].
         """
-        estimate = self._estimate(pose)
+        estimate = pose if self._is_exact else self._estimate(pose)
         noisy_pose = self._noisy(estimate, self._pose_noise)
-        if self._sends_transform:
+        if self.sends_transform:
             self._plugin.send_transform(self.frame_id, self.child_frame_id, *noisy_pose)
         truth, odometry = self._truth, self._odometry
         if truth is None or odometry is None or not (truth.wanted or odometry.wanted):
@@ -274,7 +276,7 @@ class Odometer:
         if odometry.wanted:
             twist, pose_covariance = true_twist, self._pose_covariance
             yaw = 0.0 if self._local else estimate[2]
-            if self._drift is not None or self._offset is not None:
+            if not self._is_exact:
                 twist = self.measure(pose, velocity)
                 twist = (*rotate(twist, yaw), twist[2])
             if self._drift is not None and self._adds_pose_covariance:

@@ -155,6 +155,11 @@ class OdometryDrift:
             self.pose = self._of_origin()
         self._true = true
 
+    def state(self) -> object:
+        """Returns everything that changes, for `FlatlandPlugin.state`."""
+        errors = (self._progress, self._distance_error, self._angle_error)
+        return (self._true, self._estimate, self._covariance, errors)
+
     def measure(self, velocity: Pose) -> Pose:
         """Returns the velocity of the estimate for a true velocity.
 

@@ -58,6 +58,7 @@ class FlatlandPlugin:
     _entropy: tuple[int, ...]
     _outputs: list[Output[Any]]
     _commands: list[Command[Any]]
+    _noise_streams: list[NoiseStream]
     _sent: set[tuple[str, str]]
     _detached: bool
     _label: str
@@ -81,6 +82,7 @@ class FlatlandPlugin:
         self.ros = None
         self._outputs = []
         self._commands = []
+        self._noise_streams = []
         self._sent = set()
         self._detached = False
         self._label = describe(self)
@@ -147,7 +149,18 @@ class FlatlandPlugin:
         Args:
             output: Name of the output or quantity, unique within the plugin.
         """
-        return NoiseStream([*self._entropy, zlib.crc32(output.encode())])
+        stream = NoiseStream([*self._entropy, zlib.crc32(output.encode())])
+        self._noise_streams.append(stream)
+        return stream
+
+    def _random_state(self) -> tuple[Any, list[int]]:
+        """Returns the states of `rng` and of the noise streams, for `World.state_hash`."""
+        updates = [stream.updates for stream in self._noise_streams]
+        return self.rng.bit_generator.state, updates
+
+    def _command_state(self) -> list[tuple[str, int, Any]]:
+        """Returns the values of the commands, for `World.state_hash`."""
+        return [(command.topic, command.received, command.value) for command in self._commands]
 
     def _resolve(self, topic: str) -> str:
         if self._detached:
@@ -210,6 +223,19 @@ class FlatlandPlugin:
 
     def post_solve(self, contact: Contact, impulse: ContactImpulse) -> None:
         """Called after the physics step with the impulses that the solver applied to a contact."""
+
+    def state(self) -> Any:
+        """Returns everything that changes at run time and affects the future of the simulation.
+
+        `World.state_hash` includes the returned value. Commands, `rng` and noise streams are
+        included in any case, and need not be part of it. Values that depend on subscribers, such
+        as the last scan of a laser that scans only on demand, must not be part of it.
+
+        Returns:
+            None, or any combination of bools, numbers, strings, bytes, arrays of numbers and
+            dataclasses in tuples, lists, sets and dictionaries.
+        """
+        return None
 
     def on_shutdown(self) -> None:
         """Releases resources; called once, when the model is removed or the world is closed."""

@@ -53,6 +53,10 @@ class PortRegistry:
         """All open commands by resolved topic."""
         return {topic: list(commands) for topic, commands in self._commands.items()}
 
+    def commands_received(self) -> int:
+        """Returns the number of values that all open commands accepted."""
+        return sum(command.received for same in self._commands.values() for command in same)
+
     def open_output(self, name: str, value_type: type[T], owner: str = "") -> Output[T]:
         """Opens an output, which is shared by all plugins that open the same topic.
 

@@ -135,9 +135,21 @@ class Command(Generic[T]):
         received: Number of values accepted.
         owner: Name of the plugin that opened it, for messages.
         closed: Whether the plugin has ended.
+        on_set: Called as `on_set(command, value)` before each `set`, also for values that are not
+            accepted; None for no function.
     """
 
-    __slots__ = ("accept", "closed", "name", "owner", "received", "topic", "value", "value_type")
+    __slots__ = (
+        "accept",
+        "closed",
+        "name",
+        "on_set",
+        "owner",
+        "received",
+        "topic",
+        "value",
+        "value_type",
+    )
 
     def __init__(
         self,
@@ -164,6 +176,7 @@ class Command(Generic[T]):
         self.received = 0
         self.closed = False
         self.accept = accept
+        self.on_set: Callable[[Command[T], T], None] | None = None
 
     def set(self, value: T) -> None:
         """Sets the value if `accept` allows it.
@@ -173,6 +186,8 @@ class Command(Generic[T]):
         """
         if not isinstance(value, self.value_type):
             raise TypeError(f"command {self.topic} takes {self.value_type.__name__}, got {value!r}")
+        if self.on_set is not None:
+            self.on_set(self, value)
         if self.accept is None or self.accept(value):
             self.value = value
             self.received += 1

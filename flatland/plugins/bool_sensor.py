@@ -44,3 +44,7 @@ class BoolSensor(ModelPlugin):
             self._output.emit(bool(self._touching) or self._touched_since_last)
         # Reset without subscribers too, so that the first one does not receive an old contact.
         self._touched_since_last = False
+
+    def state(self) -> object:
+        """Returns the number of contacts, and whether one began since the last update due."""
+        return (len(self._touching), self._touched_since_last)

@@ -85,6 +85,11 @@ class Bumper(ModelPlugin):
             )
         self._solved.clear()
 
+    def state(self) -> object:
+        """Returns the bodies of all current contacts."""
+        touches = self._touches.values()
+        return sorted((touch.body, touch.other_entity, touch.other_body) for touch in touches)
+
     def _collision(self, contact_id: int, touch: _Touch, dt: float) -> Collision:
         forces, positions, normals = _NO_FORCES, _NO_POINTS, _NO_POINTS
         calls = self._solved.get(contact_id)

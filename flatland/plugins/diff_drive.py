@@ -74,12 +74,16 @@ class DiffDrive(ModelPlugin):
         """Keeps the odometry, or displaces it along with the model."""
         self._odometer.move(previous[self.body.name], keep_odometry)
 
+    def state(self) -> object:
+        """Returns the commanded velocities within the limits, and the state of the odometry."""
+        return (self._velocity, self._yaw_rate, self._odometer.state())
+
     def _publish(self, stamp: int, pose: Pose) -> None:
         twist = self._twist
         odometer = self._odometer
         odometer.begin_update()
         wants_twist = twist is not None and twist.wanted
-        if not (wants_twist or odometer.wanted):
+        if not (wants_twist or odometer.sends_transform or odometer.wanted):
             return
         velocity = self.body.velocity
         odometer.report(stamp, pose, velocity)

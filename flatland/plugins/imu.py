@@ -82,6 +82,10 @@ class Imu(ModelPlugin):
         if self._broadcast_tf and self._frame_id != self._parent_frame_id:
             self.send_transform(self._parent_frame_id, self._frame_id, 0.0, 0.0, 0.0)
 
+    def state(self) -> object:
+        """Returns the time and velocity of the last update due."""
+        return self._last
+
     def _acceleration(self, stamp: int, velocity: Pose, yaw: float) -> Vector2:
         """Returns the mean acceleration since the last update due, in the body frame [m/s²]."""
         if self._last is None:

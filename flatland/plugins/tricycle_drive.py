@@ -213,10 +213,16 @@ class TricycleDrive(ModelPlugin):
         """Keeps the odometry, or displaces it along with the model."""
         self._odometer.move(previous[self.body.name], keep_odometry)
 
+    def state(self) -> object:
+        """Returns the state of the front wheel and of the odometry."""
+        wheel = (self.steering_angle, self.steering_velocity, self.front_velocity)
+        return (wheel, self._target_angle, self._odometer.state())
+
     def _publish(self, stamp: int, pose: Pose) -> None:
-        self._odometer.begin_update()
-        if self._odometer.wanted:
-            self._odometer.report(stamp, pose, self.body.velocity)
+        odometer = self._odometer
+        odometer.begin_update()
+        if odometer.wanted or odometer.sends_transform:
+            odometer.report(stamp, pose, self.body.velocity)
 
     def _steer_for_twist(self, command: Twist, dt: float) -> float:
         """Turns the front wheel for a velocity of the rear center and a yaw rate.

@@ -92,6 +92,10 @@ class Tween(ModelPlugin):
         """Reverts the effect of the physics step on the body."""
         self._hold()
 
+    def state(self) -> object:
+        """Returns the progress along the path, and whether the motion is forward."""
+        return (self._progress, self._exact_progress, self._forward)
+
     def _hold(self) -> None:
         # Also wakes the body: Box2D puts bodies without velocity to sleep and then finds no new
         # contacts for them.

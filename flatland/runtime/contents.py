@@ -3,32 +3,39 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterable, Sequence
-from concurrent.futures import Future
-from typing import TYPE_CHECKING, Any, TypeVar
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any, TypeVar, cast
 
 import numpy as np
 
 from flatland.errors import WorldError
 from flatland.geometry import DoubleArray
 from flatland.runtime.placement import IfBlocked, Models, check_if_blocked
+from flatland.runtime.state_hash import state_hash
 
 if TYPE_CHECKING:
+    from concurrent.futures import Future
+
+    from flatland.config.inputs import Inputs
     from flatland.config.node import Source
     from flatland.entities.contact import Contact
     from flatland.entities.layer import Layer
     from flatland.entities.model import Model
+    from flatland.physics import PhysicsWorld
     from flatland.plugin_api.plugin import WorldPlugin
     from flatland.plugin_api.port_registry import PortRegistry
     from flatland.plugin_api.ports import CommandTopic, Output
+    from flatland.runtime.change_log import ChangeLog
     from flatland.runtime.contacts import ContactReporter
     from flatland.runtime.model_set import ModelSet
-    from flatland.runtime.observer import Observers
+    from flatland.runtime.observer import Observers, WorldObserver
     from flatland.runtime.placement import Placement
     from flatland.runtime.plugin_host import PluginHost
     from flatland.runtime.requests import Requests
     from flatland.runtime.transforms import FramePair, TransformBuffer
+    from flatland.timekeeper import Timekeeper
     from flatland.values import Transform
+    from flatland.world import World
 
 R = TypeVar("R")
 
@@ -45,19 +52,29 @@ class Contents:
         ports: All outputs and commands by resolved topic.
         requests: The queue of actions that run between two steps.
         transform_buffer: Collects the transforms of plugins.
+        change_count: Number of models that were spawned, moved or deleted since the world file was
+            loaded, including attempts that failed.
+        inputs: The files and parameters that were read.
     """
 
     layers: list[Layer]
     map_layer: str = ""
+    physics: PhysicsWorld
     plugin_host: PluginHost
     ports: PortRegistry
     requests: Requests
+    seed: int
+    timekeeper: Timekeeper
     transform_buffer: TransformBuffer
+    change_count: int
+    inputs: Inputs
 
+    _change_log: ChangeLog | None
     _contacts: ContactReporter
     _files: Source
     _models: ModelSet
     _observers: Observers
+    _paused: bool
     _placement: Placement
 
     @property
@@ -93,6 +110,10 @@ class Contents:
     def layer_changed(self, layer: Layer) -> None:
         """Notifies the observers that the edges of a layer changed."""
         self._observers.layer_changed(layer.name)
+
+    def log_changes(self, log: ChangeLog | None) -> None:
+        """Notifies a log of all further changes and steps, instead of the previous one."""
+        self._change_log = log
 
     def resolve_path(self, path: str) -> str:
         """Returns the absolute path of a model or map file.
@@ -133,8 +154,15 @@ class Contents:
         path = os.fspath(yaml_path)
         check_if_blocked(if_blocked)
         return self._change(
+            "spawn_model",
+            {
+                "yaml_path": path,
+                "name": name,
+                "namespace": namespace,
+                "pose": _numbers(pose),
+                "if_blocked": if_blocked,
+            },
             lambda: self._models.spawn(path, name, namespace, pose, if_blocked),
-            f'spawn of model "{name}"',
         )
 
     def move_model(
@@ -165,8 +193,14 @@ class Contents:
         """
         check_if_blocked(if_blocked)
         return self._change(
+            "move_model",
+            {
+                "name": name,
+                "pose": _numbers(pose),
+                "if_blocked": if_blocked,
+                "keep_odometry": keep_odometry,
+            },
             lambda: self._models.move(name, pose, if_blocked, keep_odometry),
-            f'move of model "{name}"',
         )
 
     def delete_model(self, name: str) -> None:
@@ -175,7 +209,29 @@ class Contents:
         Raises:
             WorldError: The model does not exist.
         """
-        self._change(lambda: self._models.delete(name), f'deletion of model "{name}"')
+        self._change("delete_model", {"name": name}, lambda: self._models.delete(name))
+
+    def _change(
+        self, kind: str, arguments: Mapping[str, object], action: Callable[[], R]
+    ) -> R | None:
+        """Carries out a change; one that a hook requests is repeated by the same hook in a replay.
+
+        Args:
+            kind: Name of the method, for a recording and messages.
+            arguments: Arguments of the method.
+            action: The change.
+        """
+        is_external = not self.requests.in_hook
+
+        def checked() -> R:
+            self._check_open()
+            self.change_count += 1
+            if self._change_log is None or not is_external:
+                return action()
+            with self._change_log.change(kind, arguments):
+                return action()
+
+        return self.requests.change(checked, f'{kind} "{arguments["name"]}"')
 
     # -- requests --------------------------------------------------------------------------
 
@@ -190,12 +246,36 @@ class Contents:
         """
         return self.requests.read(action)
 
-    def _change(self, action: Callable[[], R], what: str) -> R | None:
-        def checked() -> R:
-            self._check_open()
-            return action()
+    @property
+    def paused(self) -> bool:
+        """Whether steps have no effect."""
+        return self._paused
 
-        return self.requests.change(checked, what)
+    def pause(self) -> None:
+        """Pauses the world from the next step on."""
+        self._paused = True
+
+    def resume(self) -> None:
+        """Resumes a paused world."""
+        self._paused = False
+
+    def toggle_pause(self) -> None:
+        """Pauses a running world, resumes a paused one."""
+        self._paused = not self._paused
+
+    # -- observers -------------------------------------------------------------------------
+
+    def add_observer(self, observer: WorldObserver) -> None:
+        """Notifies an observer of all events from now on."""
+        self._observers.add(observer, cast("World", self))
+
+    def remove_observer(self, observer: WorldObserver) -> None:
+        """Stops the notifications of an observer.
+
+        Raises:
+            ValueError: It was not added, or has been removed.
+        """
+        self._observers.remove(observer)
 
     # -- plugins, ports, transforms, contacts ----------------------------------------------
 
@@ -231,6 +311,25 @@ class Contents:
     def contacts(self) -> list[Contact]:
         """All pairs of fixtures that touch now."""
         return self._contacts.touching
+
+    # -- state -----------------------------------------------------------------------------
+
+    def state_hash(self) -> str:
+        """Returns a hash of the state: equal for two runs that have been the same so far.
+
+        It covers, bit by bit, the time, the transforms and velocities of all bodies, the models,
+        commands, random number generators and noise of all plugins, and what they return from
+        `state`. It depends neither on subscribers, viewers and threads nor on the wall time.
+
+        Returns:
+            32 hexadecimal digits.
+
+        Raises:
+            WorldError: The world is closed, or the state of a plugin cannot be hashed.
+        """
+        return self._read(
+            lambda: state_hash(self.seed, self.timekeeper, self.physics, self.models, self.plugins)
+        )
 
     # -- free places -----------------------------------------------------------------------
 
@@ -322,3 +421,11 @@ class Contents:
 
     def _check_open(self) -> None:
         raise NotImplementedError
+
+
+def _numbers(pose: object) -> object:
+    """Returns a pose as plain numbers if it is one; an invalid one is rejected later."""
+    try:
+        return tuple(float(number) for number in pose)  # type: ignore[attr-defined]
+    except (TypeError, ValueError):
+        return repr(pose)

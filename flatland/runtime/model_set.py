@@ -73,7 +73,8 @@ class ModelSet:
         world = self._world
         checked_pose = self._check_spawn(path, name, namespace, pose)
         path = world.resolve_path(path)
-        reader = YamlReader.from_file(path, world.params)
+        with world.inputs.collecting():
+            reader = YamlReader.from_file(path, world.params)
         model = Model(world, name, namespace, path)
         loader = ModelLoader(world.physics, world.collision_filter, model, reader)
         try:

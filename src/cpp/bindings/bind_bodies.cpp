@@ -1,6 +1,7 @@
 #include <pybind11/numpy.h>
 #include <pybind11/stl.h>
 
+#include <cstring>
 #include <string>
 #include <tuple>
 
@@ -71,6 +72,13 @@ void bind_bodies(WorldClass& world) {
             [](const World& self, Id body) { return self.read_body(body)->GetLinearDamping(); });
   world.def("angular_damping",
             [](const World& self, Id body) { return self.read_body(body)->GetAngularDamping(); });
+  world.def("body_states", [](const World& self) {
+    const std::vector<BodyState> states = states_of(self);
+    constexpr auto kColumns = std::tuple_size_v<BodyState>;
+    py::array_t<float> rows({states.size(), kColumns});
+    if (!states.empty()) std::memcpy(rows.mutable_data(), states.data(), rows.nbytes());
+    return rows;
+  });
   world.def("fixtures", &fixtures_of);
   world.def("joints", &joints_of);
 }

@@ -36,6 +36,10 @@ WorldClass bind_world(py::module_& module) {
   world.def("find_new_contacts", &World::find_new_contacts);
   world.def("destroy_body", &World::destroy_body, py::arg("body"));
   world.def("destroy_joint", &World::destroy_joint, py::arg("joint"));
+  world.def("object_counts", [](const World& self) {
+    const auto counts = self.object_counts();
+    return py::make_tuple(counts[0], counts[1], counts[2], counts[3]);
+  });
   world.def("has_body", &World::has_body, py::arg("body"));
   world.def("has_fixture", &World::has_fixture, py::arg("fixture"));
   world.def("has_joint", &World::has_joint, py::arg("joint"));

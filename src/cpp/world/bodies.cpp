@@ -101,6 +101,22 @@ void set_velocity(World& world, Id body_id, const Triple& velocity) {
   body->SetAngularVelocity(omega);
 }
 
+std::vector<BodyState> states_of(const World& world) {
+  world.check_readable();
+  std::vector<BodyState> states;
+  states.reserve(static_cast<std::size_t>(world.engine().GetBodyCount()));
+  for (const b2Body* body = world.engine().GetBodyList(); body != nullptr; body = body->GetNext()) {
+    const b2Vec2& position = body->GetPosition();
+    const b2Vec2& center = body->GetWorldCenter();
+    const b2Vec2& velocity = body->GetLinearVelocity();
+    states.push_back({position.x, position.y, body->GetAngle(), center.x, center.y, velocity.x,
+                      velocity.y, body->GetAngularVelocity(), body->IsAwake() ? 1.0F : 0.0F});
+  }
+  // Box2D prepends new bodies to its list.
+  std::reverse(states.begin(), states.end());
+  return states;
+}
+
 void apply_force(World& world, Id body_id, double fx, double fy, double px, double py) {
   b2Body* body = world.change_body(body_id);
   const b2Vec2 force = checked_vector(fx, fy, "force");

@@ -33,6 +33,12 @@ void set_pose(World& world, Id body, const Triple& pose);
 Triple velocity_of(const World& world, Id body);
 void set_velocity(World& world, Id body, const Triple& velocity);
 
+// The state of a body as Box2D stores it: position of the origin (x, y) and angle, center of mass
+// (x, y), velocity of the center of mass (vx, vy, omega), and 1 if the body is awake, else 0.
+using BodyState = std::array<float, 9>;
+// States of all bodies, in order of creation.
+std::vector<BodyState> states_of(const World& world);
+
 void apply_force(World& world, Id body, double fx, double fy, double px, double py);
 void apply_torque(World& world, Id body, double torque);
 

@@ -116,6 +116,12 @@ const b2Body* World::read_body(Id id) const {
   return *body;
 }
 
+std::array<std::size_t, 4> World::object_counts() const {
+  check_readable();
+  return {bodies_.size(), fixtures_.size(), joints_.size(),
+          static_cast<std::size_t>(engine_->GetContactCount())};
+}
+
 const b2Fixture* World::read_fixture(Id id) const {
   check_readable();
   b2Fixture* const* fixture = fixtures_.find(id);

@@ -11,7 +11,9 @@
 #include <box2d/b2_joint.h>
 #include <box2d/b2_world.h>
 
+#include <array>
 #include <atomic>
+#include <cstddef>
 #include <memory>
 #include <string>
 #include <thread>
@@ -55,6 +57,9 @@ class World final : private b2DestructionListener {
   b2Body* change_body(Id id);
   b2Fixture* change_fixture(Id id);
   b2Joint* change_joint(Id id);
+  // Numbers of bodies, fixtures, joints and contacts, including contacts of fixtures that only
+  // overlap in the broad phase.
+  std::array<std::size_t, 4> object_counts() const;
   bool has_body(Id id) const { return bodies_.find(id) != nullptr; }
   bool has_fixture(Id id) const { return fixtures_.find(id) != nullptr; }
   bool has_joint(Id id) const { return joints_.find(id) != nullptr; }

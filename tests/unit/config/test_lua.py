@@ -424,3 +424,42 @@ def test_the_memory_of_states_is_released() -> None:
         run("#('x'):rep(1e6)")
     gc.collect()
     assert resident() - before < 50e6
+
+
+# -- random numbers ------------------------------------------------------------------------
+
+
+def numbers(code: str, seeds: range) -> list[float]:
+    return [float(evaluate(code, lambda _: None, seed).text) for seed in seeds]
+
+
+def test_random_numbers_depend_on_the_seed_alone(runtime: str) -> None:
+    first = numbers("math.random()", range(20))
+    assert numbers("math.random()", range(20)) == first, runtime
+    assert len(set(first)) == 20
+
+
+def test_random_numbers_of_different_seeds_are_uniform() -> None:
+    sample = sorted(numbers("math.random()", range(1000)))
+    assert all(0.0 <= number < 1.0 for number in sample)
+    # The Kolmogorov-Smirnov distance of a uniform sample exceeds this with a probability of 1e-6.
+    assert max(abs(number - i / 1000) for i, number in enumerate(sample)) < 2.69 / 1000**0.5
+
+
+@pytest.mark.parametrize(
+    ("arguments", "values"),
+    [("6", range(1, 7)), ("-2, 1", range(-2, 2)), ("3, 3", [3]), ("2.9", [1, 2]), ("'2'", [1, 2])],
+)
+def test_random_integers_are_in_the_interval(arguments: str, values: range) -> None:
+    assert set(numbers(f"math.random({arguments})", range(100))) == set(values)
+
+
+@pytest.mark.parametrize("arguments", ["0", "3, 1", "0/0", "'a'", "1, 0/0"])
+def test_an_empty_interval_is_an_error(runtime: str, arguments: str) -> None:
+    assert "interval is empty" in failure(f"math.random({arguments})"), runtime
+
+
+@pytest.mark.parametrize("seed", ["7", "-1e300", "0/0", "'x'", ""])
+def test_random_numbers_after_randomseed_do_not_depend_on_the_seed(seed: str) -> None:
+    code = f"return (function() math.randomseed({seed}) return math.random() end)()"
+    assert len(set(numbers(code, range(5)))) == 1

@@ -276,3 +276,16 @@ def test_a_refused_move_has_no_effect_on_the_odometry(robot: Load) -> None:
     before = transform(world)
     world.step(1)
     assert math.dist(before[:2], transform(world)[:2]) < 0.01
+
+
+@pytest.mark.parametrize("extra", ["", DRIFT])
+def test_the_odometry_is_part_of_the_state(robot: Load, extra: str) -> None:
+    def state(keep: bool) -> str:
+        world = robot(extra)
+        world.step(100)
+        world.move_model("robot", (0.0, 0.0, 0.0), keep_odometry=keep)
+        world.step(10)
+        return world.state_hash()
+
+    assert state(True) == state(True)
+    assert state(True) != state(False)

@@ -1,0 +1,207 @@
+"""The file format of recordings: lines of JSON with checksums, only ever appended to.
+
+Each line is `CHECKSUM JSON`: the CRC-32 of the JSON text in eight hexadecimal digits, a space, and
+an object. Every line is written by one call of the operating system and therefore survives the end
+of the process for any reason. A line that was cut off by a full disk or a loss of power can only be
+the last one.
+"""
+
+from __future__ import annotations
+
+import base64
+import dataclasses
+import importlib
+import json
+import os
+import zlib
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+
+from flatland.errors import FlatlandError
+
+FORMAT: Final = "flatland recording 1"
+
+Record = dict[str, Any]
+
+
+class RecordingError(FlatlandError):
+    """A recording cannot be written, or is invalid."""
+
+    prefix = "Flatland recording: "
+
+
+class LogWriter:
+    """Appends records to a file."""
+
+    def __init__(self, path: str | os.PathLike[str]) -> None:
+        """Creates the file; an existing one is replaced.
+
+        Args:
+            path: The file.
+
+        Raises:
+            RecordingError: The file cannot be created.
+        """
+        self.path = os.fspath(path)
+        try:
+            self._file = os.open(
+                self.path, os.O_WRONLY | os.O_CREAT | os.O_TRUNC | os.O_APPEND, 0o666
+            )
+        except OSError as error:
+            raise RecordingError(f'cannot create "{self.path}": {error.strerror}') from error
+
+    def write(self, record: Record) -> None:
+        """Appends a record.
+
+        Raises:
+            RecordingError: The file cannot be written; the incomplete line is removed.
+        """
+        text = json.dumps(record, separators=(",", ":")).encode()
+        line = b"%08x %s\n" % (zlib.crc32(text), text)
+        size = os.fstat(self._file).st_size
+        try:
+            rest = memoryview(line)
+            while rest:
+                rest = rest[os.write(self._file, rest) :]
+        except OSError as error:
+            with suppress(OSError):  # not a regular file
+                os.ftruncate(self._file, size)
+            raise RecordingError(f'cannot write "{self.path}": {error.strerror}') from error
+
+    def close(self) -> None:
+        """Closes the file; idempotent."""
+        if self._file >= 0:
+            os.close(self._file)
+            self._file = -1
+
+
+@dataclass(frozen=True, slots=True)
+class Recording:
+    """A recording that was read.
+
+    Attributes:
+        path: The file.
+        records: All complete records, the header first.
+        is_cut: Whether an incomplete record follows them.
+    """
+
+    path: str
+    records: list[Record]
+    is_cut: bool
+
+    @property
+    def header(self) -> Record:
+        """The first record."""
+        return self.records[0]
+
+
+def read_recording(path: str | os.PathLike[str]) -> Recording:
+    """Reads a recording.
+
+    Raises:
+        RecordingError: The file cannot be read, is not a recording, or a line other than the last
+            one is damaged; the text names the line.
+    """
+    name = os.fspath(path)
+    try:
+        content = Path(path).read_bytes()
+    except OSError as error:
+        raise RecordingError(f'cannot read "{name}": {error.strerror}') from error
+    records: list[Record] = []
+    lines = content.split(b"\n")
+    rest = lines.pop()  # empty, if the last line is complete
+    for number, line in enumerate(lines, 1):
+        record = _decode_line(line)
+        if record is None:
+            if number == 1:
+                break
+            raise RecordingError(f'"{name}" is damaged [{name}:{number}]')
+        records.append(record)
+    if not records or records[0].get("format") != FORMAT:
+        raise RecordingError(f'"{name}" is not a recording of flatland ("{FORMAT}")')
+    return Recording(name, records, bool(rest))
+
+
+def _decode_line(line: bytes) -> Record | None:
+    checksum, separator, text = line.partition(b" ")
+    if not separator or checksum != b"%08x" % zlib.crc32(text):
+        return None
+    record = json.loads(text)
+    return record if isinstance(record, dict) else None
+
+
+# -- values of commands --------------------------------------------------------------------
+
+
+def encode_value(value: Any) -> Any:
+    """Converts a value to JSON that `decode_value` converts back exactly.
+
+    Args:
+        value: None, a bool, int, float or string, an array of numbers, a dataclass at the top level
+            of its module, or a tuple, list or dictionary with string keys of such values.
+
+    Raises:
+        TypeError: The value, or one inside it, has another type.
+    """
+    match value:
+        case None | bool() | int() | float() | str():
+            return value
+        case np.generic():
+            return {"array": encode_value(np.asarray(value)), "scalar": True}
+        case np.ndarray() if value.dtype.kind in "biuf":
+            data = base64.b64encode(np.ascontiguousarray(value).tobytes()).decode()
+            return {"dtype": value.dtype.str, "shape": list(value.shape), "data": data}
+        case list():
+            return [encode_value(item) for item in value]
+        case tuple():
+            return {"tuple": [encode_value(item) for item in value]}
+        case dict() if all(isinstance(key, str) for key in value):
+            return {"dict": {key: encode_value(item) for key, item in value.items()}}
+        case _ if dataclasses.is_dataclass(value) and not isinstance(value, type):
+            kind = type(value)
+            fields = {
+                f.name: encode_value(getattr(value, f.name)) for f in dataclasses.fields(kind)
+            }
+            return {"type": f"{kind.__module__}:{kind.__qualname__}", "fields": fields}
+    raise TypeError(f"a value of type {type(value).__name__} cannot be recorded")
+
+
+def decode_value(value: Any) -> Any:
+    """Returns the value that `encode_value` converted.
+
+    Raises:
+        RecordingError: The module or class of a dataclass does not exist.
+    """
+    match value:
+        case list():
+            return [decode_value(item) for item in value]
+        case {"array": array, "scalar": True}:
+            return decode_value(array)[()]
+        case {"dtype": dtype, "shape": shape, "data": data}:
+            return np.frombuffer(base64.b64decode(data), np.dtype(dtype)).reshape(shape)
+        case {"tuple": items}:
+            return tuple(decode_value(item) for item in items)
+        case {"dict": items}:
+            return {key: decode_value(item) for key, item in items.items()}
+        case {"type": name, "fields": fields}:
+            kind = _find_dataclass(name)
+            return kind(**{key: decode_value(item) for key, item in fields.items()})
+        case _:
+            return value
+
+
+def _find_dataclass(name: str) -> type[Any]:
+    module, _, qualified = name.partition(":")
+    try:
+        found = getattr(importlib.import_module(module), qualified)
+    except (ImportError, AttributeError) as error:
+        raise RecordingError(
+            f'the type "{name}" of a command cannot be imported: {error}'
+        ) from error
+    if not (isinstance(found, type) and dataclasses.is_dataclass(found)):
+        raise RecordingError(f'the type "{name}" of a command is not a dataclass')
+    return found

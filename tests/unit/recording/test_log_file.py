@@ -1,0 +1,182 @@
+"""The file format of recordings."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from flatland import Twist
+from flatland.recording.log_file import (
+    FORMAT,
+    LogWriter,
+    RecordingError,
+    decode_value,
+    encode_value,
+    read_recording,
+)
+
+HEADER = {"format": FORMAT}
+RECORDS = [HEADER, {"step": 1, "kind": "a"}, {"step": 2, "kind": "b", "text": "ä\n"}]
+
+
+@pytest.fixture
+def path(tmp_path: Path) -> Path:
+    """A complete recording."""
+    file = tmp_path / "run.flog"
+    writer = LogWriter(file)
+    for record in RECORDS:
+        writer.write(record)
+    writer.close()
+    return file
+
+
+def test_the_records_are_read_in_order(path: Path) -> None:
+    recording = read_recording(path)
+    assert recording.records == RECORDS
+    assert recording.header == HEADER
+    assert not recording.is_cut
+
+
+def test_records_are_in_the_file_before_it_is_closed(tmp_path: Path) -> None:
+    writer = LogWriter(tmp_path / "run.flog")
+    for count, record in enumerate(RECORDS, 1):
+        writer.write(record)
+        assert read_recording(tmp_path / "run.flog").records == RECORDS[:count]
+    writer.close()
+    writer.close()
+
+
+def test_a_recording_can_be_cut_at_every_byte_of_its_last_record(path: Path) -> None:
+    content = path.read_bytes()
+    start = content[:-1].rindex(b"\n") + 1
+    assert len(content) - start > 30
+    for end in range(start, len(content)):
+        path.write_bytes(content[:end])
+        recording = read_recording(path)
+        assert recording.records == RECORDS[:-1]
+        assert recording.is_cut == (end > start)
+
+
+def test_an_existing_file_is_replaced(path: Path) -> None:
+    writer = LogWriter(path)
+    writer.write(HEADER)
+    writer.close()
+    assert read_recording(path).records == [HEADER]
+
+
+def test_a_changed_byte_is_an_error_with_the_line(path: Path) -> None:
+    content = bytearray(path.read_bytes())
+    content[content.index(b"\n") + 15] ^= 1
+    path.write_bytes(content)
+    with pytest.raises(RecordingError, match=rf"is damaged \[{path}:2\]"):
+        read_recording(path)
+
+
+@pytest.mark.parametrize("content", [b"", b"\n", b"image: a.png\n", bytes(100), b"00000000 {}\n"])
+def test_another_file_is_not_a_recording(tmp_path: Path, content: bytes) -> None:
+    file = tmp_path / "other"
+    file.write_bytes(content)
+    with pytest.raises(RecordingError, match="is not a recording of flatland"):
+        read_recording(file)
+
+
+def test_a_recording_of_another_format_is_refused(tmp_path: Path) -> None:
+    writer = LogWriter(tmp_path / "run.flog")
+    writer.write({"format": "flatland recording 2"})
+    writer.close()
+    with pytest.raises(RecordingError, match="flatland recording 1"):
+        read_recording(tmp_path / "run.flog")
+
+
+@pytest.mark.parametrize("name", ["missing/run.flog", "."])
+def test_a_path_that_cannot_be_opened_is_an_error(tmp_path: Path, name: str) -> None:
+    with pytest.raises(RecordingError, match="cannot create"):
+        LogWriter(tmp_path / name)
+    with pytest.raises(RecordingError, match="cannot read"):
+        read_recording(tmp_path / name)
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="no /dev/full")
+def test_a_full_disk_is_an_error() -> None:
+    writer = LogWriter("/dev/full")
+    with pytest.raises(RecordingError, match='cannot write "/dev/full": No space left'):
+        writer.write(HEADER)
+    writer.close()
+
+
+# -- values --------------------------------------------------------------------------------
+
+
+def through_json(value: Any) -> Any:
+    return decode_value(json.loads(json.dumps(encode_value(value))))
+
+
+@pytest.mark.parametrize(
+    "value",
+    [
+        None,
+        True,
+        3,
+        -(1 << 70),
+        0.1,
+        -0.0,
+        5e-324,
+        math.inf,
+        "a ä \ud800",
+        [1, (2.0, "b"), {"c": None}],
+        {"tuple": [1], "type": "x", "array": 2},
+        Twist(0.1, -0.2, 1e-300),
+        (Twist(), [Twist(1.0)]),
+    ],
+)
+def test_values_are_unchanged(value: Any) -> None:
+    result = through_json(value)
+    assert result == value
+    assert repr(result) == repr(value)
+
+
+def test_nan_remains_nan() -> None:
+    assert math.isnan(through_json(math.nan))
+
+
+@pytest.mark.parametrize(
+    "array", [np.arange(6, dtype=np.float32).reshape(2, 3), np.zeros(0), np.array([True, False])]
+)
+def test_arrays_are_unchanged(array: Any) -> None:
+    result = through_json(array)
+    np.testing.assert_array_equal(result, array)
+    assert result.dtype == array.dtype
+
+
+def test_numpy_scalars_are_unchanged() -> None:
+    result = through_json(np.float32(0.1))
+    assert result == np.float32(0.1)
+    assert type(result) is np.float32
+
+
+@pytest.mark.parametrize("value", [object(), {1: 2}, len, np.array([None]), [set()]])
+def test_other_values_cannot_be_recorded(value: Any) -> None:
+    with pytest.raises(TypeError, match="cannot be recorded"):
+        encode_value(value)
+
+
+@pytest.mark.parametrize("name", ["missing_module:A", "flatland:Missing", "os:system"])
+def test_a_type_that_is_not_there_is_an_error(name: str) -> None:
+    with pytest.raises(RecordingError, match=f'the type "{name}" of a command'):
+        decode_value({"type": name, "fields": {}})
+
+
+def test_the_file_is_only_appended_to(tmp_path: Path) -> None:
+    writer = LogWriter(tmp_path / "run.flog")
+    writer.write(HEADER)
+    with (tmp_path / "run.flog").open("ab") as other:
+        other.write(b"other\n")
+    writer.write(HEADER)
+    writer.close()
+    lines = (tmp_path / "run.flog").read_bytes().splitlines()
+    assert lines == [lines[0], b"other", lines[0]]

@@ -1,0 +1,357 @@
+"""Recorded runs are repeated exactly, and differences are found."""
+
+from __future__ import annotations
+
+import logging
+import os
+import signal
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+import flatland
+from flatland import ModelPlugin, Twist, World
+from flatland.errors import FlatlandError, WorldError
+from flatland.recording import RecordingError, Replay
+from flatland.recording.log_file import read_recording
+
+ROBOT = """
+bodies:
+  - name: base
+    footprints: [{type: circle, radius: 0.2, density: 1}]
+plugins:
+  - {type: DiffDrive, name: drive, body: base}
+"""
+WORLD = """
+properties: {}
+layers: [{name: 2d, map: room.yaml}]
+models:
+  - {name: robot, model: robot.model.yaml}
+  - {name: ball, model: ball.model.yaml, pose: [1.5, 0.05, 0]}
+"""
+BALL = """
+bodies:
+  - name: base
+    linear_damping: 0.5
+    footprints:
+      - {type: circle, radius: '$eval param("radius", 0.2)', density: 1, restitution: 0.5}
+"""
+ROOM = "type: line_segments\ndata: room.dat\nscale: 1\norigin: [0, 0, 0]\n"
+
+
+@pytest.fixture
+def world_files(files: Any) -> Any:
+    """A room with a robot and a ball."""
+    files.write("robot.model.yaml", ROBOT)
+    files.write("ball.model.yaml", BALL)
+    files.write("room.yaml", ROOM)
+    files.write("room.dat", "-3 -3 3 -3\n3 -3 3 3\n3 3 -3 3\n-3 3 -3 -3\n")
+    return files
+
+
+def drive(world: World) -> None:
+    """Drives into the ball, changes the models, and makes requests that fail."""
+    world.command("/cmd_vel").set(Twist(linear_x=0.7, angular_z=0.01))
+    world.step(150)
+    world.spawn_model("ball.model.yaml", "other", "ns", (0.5, 0.1, 1.0), "nearest")
+    with pytest.raises(FlatlandError):
+        world.spawn_model("ball.model.yaml", "other")
+    with pytest.raises(FlatlandError):
+        world.spawn_model("missing.yaml", "third")
+    with pytest.raises(FlatlandError):
+        world.move_model("other", (float("nan"), 0, 0))
+    with pytest.raises(FlatlandError):
+        world.delete_model("missing")
+    world.step(77)
+    world.command("/cmd_vel").set(Twist(linear_x=-0.5))
+    world.move_model("ball", (-1.0, 0.0, 0.3))
+    world.step(200)
+    world.delete_model("other")
+    world.step(123)
+
+
+@pytest.fixture
+def run(world_files: Any) -> Path:
+    """A recording of `drive`."""
+    path: Path = world_files.folder / "run.flog"
+    world = world_files.load(WORLD, params={"radius": 0.25})
+    world.record(path)
+    drive(world)
+    world.close()
+    return path
+
+
+def replay(path: Path, **options: Any) -> Replay:
+    result = Replay(path, **options)
+    result.run()
+    result.close()
+    return result
+
+
+def test_a_run_is_repeated_exactly(run: Path) -> None:
+    result = replay(run)
+    assert result.difference is None
+    assert result.last_step == 550
+    kinds = [record.get("kind") for record in read_recording(run).records]
+    assert kinds.count("state") == 2
+    assert kinds.count("result") == 7
+    assert kinds[-1] == "end"
+
+
+def test_the_steps_are_reported(run: Path) -> None:
+    result = Replay(run)
+    steps: list[int] = []
+    result.run(steps.append)
+    assert steps == list(range(1, 551))
+    result.close()
+
+
+def test_a_recording_does_not_change_the_run(world_files: Any) -> None:
+    world = world_files.load(WORLD, params={"radius": 0.25})
+    drive(world)
+    expected = world.state_hash()
+    recorded = world_files.load(WORLD, params={"radius": 0.25})
+    recorded.record(world_files.folder / "run.flog")
+    drive(recorded)
+    assert recorded.state_hash() == expected
+
+
+def test_a_run_that_was_killed_is_repeated_to_its_last_record(
+    world_files: Any, tmp_path: Path
+) -> None:
+    world_files.write("world.yaml", WORLD)
+    code = f"""
+import os, signal
+import flatland
+world = flatland.World.from_yaml({str(world_files.folder / "world.yaml")!r}, seed=1)
+world.record({str(tmp_path / "run.flog")!r})
+world.step(450)
+world.command("/cmd_vel").set(flatland.Twist(linear_x=0.7))
+os.kill(os.getpid(), signal.SIGKILL)
+"""
+    done = subprocess.run([sys.executable, "-c", code], check=False)
+    assert done.returncode == -signal.SIGKILL
+    result = replay(tmp_path / "run.flog")
+    assert (result.difference, result.last_step) == (None, 450)
+
+
+def test_the_recording_survives_a_cut_at_every_byte_of_a_request(run: Path) -> None:
+    content = run.read_bytes()
+    lines = content.splitlines(keepends=True)
+    last = next(i for i, line in enumerate(lines) if b'"spawn_model"' in line)
+    before = b"".join(lines[:last])
+    for length in range(len(lines[last]) + 1):
+        run.write_bytes(before + lines[last][:length])
+        # Without running it: 190 runs would take long, and the records decide.
+        assert len(read_recording(run).records) == last + (length == len(lines[last]))
+    result = replay(run)
+    assert (result.difference, result.last_step) == (None, 150)
+
+
+# -- differences ---------------------------------------------------------------------------
+
+
+def test_the_first_step_that_differs_is_named(run: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    result = Replay(run)
+    body = result.world.model("ball").bodies[0]
+    steps = 0
+
+    def disturb(step: int) -> None:
+        nonlocal steps
+        steps = step
+        if step == 42:
+            body.set_velocity(0.0, 1e-6, 0.0)
+
+    difference = result.run(disturb)
+    result.close()
+    assert difference is not None
+    assert difference.step == 43
+    assert difference.text == "poses or velocities of bodies differ"
+    assert steps < 250  # ends at the next comparison
+
+
+def test_a_plugin_that_behaves_differently_is_found(
+    run: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    result = Replay(run)
+    monkeypatch.setattr(
+        type(result.world.model("robot").plugin("drive")), "state", lambda plugin: "other"
+    )
+    difference = result.run()
+    result.close()
+    assert difference is not None
+    assert (difference.step, difference.text) == (200, "the state of a plugin differs")
+
+
+def test_a_request_with_another_outcome_is_found(run: Path) -> None:
+    result = Replay(run)
+    result.world.spawn_model("ball.model.yaml", "other", pose=(2, 2, 0), if_blocked="allow")
+    difference = result.run()
+    result.close()
+    assert difference is not None
+    assert difference.step == 150
+    assert "spawn_model succeeds in the recording, but fails (YamlError" in difference.text
+
+
+def test_a_changed_file_is_an_error_that_names_it(world_files: Any, run: Path) -> None:
+    world_files.write("ball.model.yaml", BALL.replace("0.5", "0.6"))
+    with pytest.raises(RecordingError, match=r'files have changed .*ball\.model\.yaml"$'):
+        Replay(run)
+    assert replay(run, check_files=False).difference is not None
+
+
+def test_a_deleted_file_is_an_error_that_names_it(world_files: Any, run: Path) -> None:
+    (world_files.folder / "room.dat").unlink()
+    with pytest.raises(RecordingError, match=r'files have changed .*room\.dat"$'):
+        Replay(run)
+
+
+# -- what is recorded ----------------------------------------------------------------------
+
+
+class Helper(ModelPlugin):
+    """Spawns a model and sets a command, at its start and in a hook."""
+
+    def on_initialize(self, config: Any) -> None:
+        self.count = 0
+        self._act()
+
+    def before_physics_step(self, timekeeper: flatland.Timekeeper) -> None:
+        if timekeeper.sim_time_ns == 10 * timekeeper.step_size_ns:
+            self._act()
+
+    def _act(self) -> None:
+        self.count += 1
+        name = f"{self.model.name}_{self.count}"
+        y = 2 * self.count - 3 + (self.model.name == "second")
+        self.world.spawn_model("ball.model.yaml", name, pose=(-2, y, 0))
+        self.world.command("/cmd_vel").set(Twist(linear_x=0.1 * self.count))
+
+
+def test_changes_made_by_plugins_are_repeated_by_the_plugins(
+    world_files: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, "helper_of_replay", SimpleNamespace(Helper=Helper))
+    manifest = world_files.write(
+        "helper.xml",
+        """
+        <library path=".">
+          <class type="helper_of_replay.Helper" name="tests::Helper"
+                 base_class_type="flatland::ModelPlugin"/>
+        </library>
+        """,
+    )
+    monkeypatch.setenv("FLATLAND_PLUGIN_PATH", manifest)
+    plugins = "plugins: [{type: 'tests::Helper', name: helper}]\n"
+    world_files.write("helper.model.yaml", BALL + plugins)
+    world = world_files.load(WORLD + "  - {name: first, model: helper.model.yaml, pose: [2, 2, 0]}")
+    path = world_files.folder / "run.flog"
+    world.record(path)
+    world.step(30)
+    world.spawn_model("helper.model.yaml", "second", pose=(2, -2, 0))
+    world.step(30)
+    names = [model.name for model in world.models]
+    world.close()
+    assert names == ["robot", "ball", "first_1", "first", "first_2", "second_1", "second"]
+    records = read_recording(path).records[1:]
+    assert [record["kind"] for record in records] == ["spawn_model", "result", "end"]
+    assert replay(path).difference is None
+
+
+def test_a_replay_keeps_the_odometry_of_moved_models(world_files: Any, tmp_path: Path) -> None:
+    path = tmp_path / "run.flog"
+    world = world_files.load(WORLD)
+    world.record(path)
+    world.step(10)
+    world.move_model("robot", (-1.0, 1.0, 0.5), keep_odometry=True)
+    world.step(10)
+    world.close()
+    assert replay(path).difference is None
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        lambda world: world.step(),
+        lambda world: world.move_model("ball", (1, 1, 0)),
+        lambda world: world.command("/cmd_vel").set(Twist(1.0)),
+    ],
+)
+def test_a_recording_starts_before_the_first_change(
+    world_files: Any, change: Callable[[World], object]
+) -> None:
+    world = world_files.load(WORLD)
+    change(world)
+    with pytest.raises(WorldError, match="must start before the first step, command and request"):
+        world.record(world_files.folder / "run.flog")
+    assert not (world_files.folder / "run.flog").exists()
+
+
+def test_a_world_without_a_file_cannot_be_recorded(tmp_path: Path) -> None:
+    with World(seed=1) as world, pytest.raises(WorldError, match="loaded from a file"):
+        world.record(tmp_path / "run.flog")
+
+
+def test_a_recorder_can_be_closed_before_the_world(world_files: Any) -> None:
+    path = world_files.folder / "run.flog"
+    world = world_files.load(WORLD)
+    recorder = world.record(path)
+    world.step(3)
+    recorder.close()
+    size = path.stat().st_size
+    world.step(300)
+    world.command("/cmd_vel").set(Twist(1.0))
+    world.move_model("ball", (1, 1, 0))
+    assert path.stat().st_size == size
+    assert not recorder.is_open
+    world.close()
+    assert (replay(path).difference, replay(path).last_step) == (None, 3)
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="no /dev/full")
+def test_a_full_disk_at_the_start_is_an_error(world_files: Any) -> None:
+    world = world_files.load(WORLD)
+    with pytest.raises(RecordingError, match="No space left"):
+        world.record("/dev/full")
+    world.step()
+
+
+def test_a_full_disk_during_the_run_ends_the_recording_only(
+    world_files: Any, caplog: pytest.LogCaptureFixture
+) -> None:
+    world = world_files.load(WORLD)
+    recorder = world.record(world_files.folder / "run.flog")
+    full = os.open("/dev/full", os.O_WRONLY)
+    os.dup2(full, recorder._writer._file)
+    os.close(full)
+    with caplog.at_level(logging.ERROR, logger="flatland"):
+        world.step(450)
+    assert [r.getMessage() for r in caplog.records] == [
+        f'Flatland recording: cannot write "{world_files.folder / "run.flog"}": '
+        "No space left on device; the recording ends at step 200"
+    ]
+    assert not recorder.is_open
+    world.move_model("ball", (1, 1, 0))
+    world.command("/cmd_vel").set(Twist(1.0))
+
+
+def test_random_numbers_of_files_derive_from_the_seed(world_files: Any) -> None:
+    world_files.write(
+        "ball.model.yaml",
+        BALL.replace('$eval param("radius", 0.2)', "$eval 0.1 + 0.1 * math.random()"),
+    )
+
+    def radii(seed: int) -> list[float]:
+        world = world_files.load(WORLD, seed=seed)
+        world.spawn_model("ball.model.yaml", "other", pose=(2, 2, 0))
+        return [model.bodies[0].fixtures[0].radius for model in world.models[1:]]
+
+    first = radii(1)
+    assert first[0] != first[1]
+    assert radii(1) == first
+    assert radii(2) != first
