@@ -54,8 +54,9 @@ soak: setup-dev  ## run for a long time and check that nothing grows: make soak 
 	@. ./setup.bash && python bench/soak.py $(ARGS)
 
 .PHONY: docs
-docs: setup  ## check the links and images of README.md and docs/
-	@$(PYTHON) tools/check_links.py README.md docs
+docs: setup  ## check the links of all pages, build the documentation site in build/docs/html
+	@$(PYTHON) tools/check_links.py README.md CONTRIBUTING.md docs examples
+	@tools/build_docs.sh
 
 .PHONY: pictures
 pictures: setup-dev  ## generate the images of README.md and docs/, on a virtual screen
@@ -96,4 +97,4 @@ sanitize: setup-dev  ## run unit tests with sanitizers in the extension: make sa
 
 .PHONY: clean
 clean:  ## remove all build results and .venv
-	rm -rf $(VENV) build flatland/_core*.so flatland/msg flatland/srv
+	rm -rf $(VENV) build flatland/_core*.so flatland/msg flatland/srv flatland_msgs

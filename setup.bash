@@ -35,5 +35,14 @@ export ROS_PYTHON_VERSION=3
 export ROS_ETC_DIR=${ROS_ETC_DIR:-/etc/ros}
 export ROS_MASTER_URI=${ROS_MASTER_URI:-http://localhost:11311}
 
+# Completion of the command flatland, if argcomplete is installed.
+case $- in
+  *i*)
+    eval "$("$_flatland_root/.venv/bin/python" -c '
+import argcomplete
+print(argcomplete.shellcode(["flatland"], shell="bash"))' 2>/dev/null)"
+    ;;
+esac
+
 unset -f _flatland_prepend
 unset _flatland_root

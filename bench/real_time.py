@@ -108,7 +108,7 @@ def _cycle_starts(session: RosSession) -> npt.NDArray[np.float64]:
         with _recorded_world(file) as (world, manifest):
             session.environment["FLATLAND_PLUGIN_PATH"] = str(manifest)
             server = session.server(world_path=world, update_rate=RATE, seed=1)
-            server.wait_for("cycle use")
+            server.wait_for("loaded")
             time.sleep(SETTLING_TIME + DURATION)
             session.stop(server)
             del session.environment["FLATLAND_PLUGIN_PATH"]

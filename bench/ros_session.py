@@ -167,7 +167,7 @@ def _overlay(package: Path, folder: Path) -> Path:
     share = folder / "share" / "flatland"
     (share / "scripts").mkdir(parents=True)
     for name in ("package.xml", "flatland_plugins.xml", "launch", "msg", "srv", "worlds"):
-        (share / name).symlink_to(package / name)
+        (share / name).symlink_to(package / "catkin" / "flatland" / name)
     launcher = share / "scripts" / "flatland_server"
     script = package / "scripts" / "flatland_server"
     launcher.write_text(f'#!/bin/sh\nexec "{sys.executable}" "{script}" "$@"\n')

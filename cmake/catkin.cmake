@@ -22,8 +22,9 @@ configure_file(${CMAKE_CURRENT_LIST_DIR}/devel_relay.py.in ${FLATLAND_DEVEL_PACK
 
 set(FLATLAND_CORE_INSTALL_DIR ${CATKIN_PACKAGE_PYTHON_DESTINATION})
 # msg, srv and _core in the source tree are results of `make dev`; catkin installs its own.
+get_filename_component(python_package ${PROJECT_SOURCE_DIR}/flatland REALPATH)
 install(
-  DIRECTORY flatland/
+  DIRECTORY ${python_package}/
   DESTINATION ${CATKIN_PACKAGE_PYTHON_DESTINATION} COMPONENT flatland
   PATTERN "__pycache__" EXCLUDE
   PATTERN "*~" EXCLUDE

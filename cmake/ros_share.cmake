@@ -7,7 +7,9 @@ function(flatland_install_ros_share destination)
   install(FILES ${manifest} DESTINATION ${destination} COMPONENT flatland)
   foreach(folder launch msg srv rviz worlds)
     if(IS_DIRECTORY ${PROJECT_SOURCE_DIR}/${folder})
-      install(DIRECTORY ${folder} DESTINATION ${destination} COMPONENT flatland
+      # In catkin/flatland, the folder is a symbolic link, which install() would copy.
+      get_filename_component(contents ${PROJECT_SOURCE_DIR}/${folder} REALPATH)
+      install(DIRECTORY ${contents}/ DESTINATION ${destination}/${folder} COMPONENT flatland
               PATTERN "*.py" EXCLUDE  # generators of the maps
               PATTERN "__pycache__" EXCLUDE
               PATTERN "*~" EXCLUDE)

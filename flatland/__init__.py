@@ -4,6 +4,10 @@
 the plugin interface. This package does not require ROS, except for the ROS node `flatland.ros`.
 """
 
+from flatland.requirements import check_requirements
+
+check_requirements()  # otherwise, a traceback would be all that a user sees
+
 from flatland.config.reader import YamlReader
 from flatland.drawing import draw
 from flatland.entities.body import Body
@@ -15,6 +19,7 @@ from flatland.errors import (
     FlatlandError,
     MapFileError,
     PhysicsError,
+    Place,
     PluginError,
     StaleHandleError,
     WorldError,
@@ -67,6 +72,7 @@ __all__ = [
     "Odometry",
     "Output",
     "PhysicsError",
+    "Place",
     "PluginError",
     "StaleHandleError",
     "Timekeeper",

@@ -19,6 +19,8 @@ _ContactColumns = tuple[npt.NDArray[np.uint8], _Ints, _Ints, _Doubles, _Doubles,
 # ids of limited bodies, ids of invalid bodies
 _StepReport = tuple[list[int], list[int]]
 
+BOX2D_VERSION: str
+
 # --- world, bodies, fixtures, joints, contacts and rays; documented in flatland.physics ---
 
 class World:

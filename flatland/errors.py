@@ -6,22 +6,60 @@ its class, so that the origin of the error is visible in logs and service respon
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import ClassVar, Final
 
 
+@dataclass(frozen=True, slots=True, order=True)
+class Place:
+    """A position in a file.
+
+    Attributes:
+        path: The file as given, empty for a text that was not read from a file.
+        line: Line number, from 1; None for the whole file.
+        column: Column number, from 1; None if unknown.
+    """
+
+    path: str
+    line: int | None = None
+    column: int | None = None
+
+    @property
+    def suffix(self) -> str:
+        """The place at the end of an error message, such as ` [model.yaml:12]`."""
+        if self.line is None:
+            return f" [{self.path}]" if self.path else ""
+        return f" [{self.path}:{self.line}]" if self.path else f" [line {self.line}]"
+
+
 class FlatlandError(Exception):
-    """Base class of the errors of flatland."""
+    """Base class of the errors of flatland.
+
+    Attributes:
+        message: Description of the problem, without the prefix of the class.
+        place: The position in a file that the error is about, None if there is none.
+        hint: What probably helps, empty if nothing is known; not part of the message.
+    """
 
     prefix: ClassVar[str] = ""
 
-    def __init__(self, message: str = "") -> None:
+    def __init__(self, message: str = "", *, place: Place | None = None, hint: str = "") -> None:
         """Initializes the error.
 
         Args:
             message: Description of the problem and of what was expected, without the prefix.
+            place: The position in a file; not added to the message.
+            hint: What probably helps.
         """
         super().__init__(f"{self.prefix}{message}")
         self.message = message
+        self.place = place
+        self.hint = hint
+
+    def parts(self) -> Sequence[FlatlandError]:
+        """Returns the errors that this one consists of, by default only itself."""
+        return (self,)
 
 
 class YamlError(FlatlandError):

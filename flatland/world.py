@@ -226,9 +226,11 @@ class World(Contents):
                     requests.process()
                 if not self._paused:
                     requests.hook_thread = thread
+                    self._observers.step_started()
                     try:
                         self._step_once()
                     finally:
+                        self._observers.step_finished()
                         requests.hook_thread = None
                 if actions:
                     requests.process()

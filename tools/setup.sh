@@ -51,17 +51,19 @@ if [[ ! -x $venv/bin/python || $(cat "$stamps/venv" 2>/dev/null) != "$venv_ident
   mkdir -p "$stamps"
   echo "$venv_identity" >"$stamps/venv"
 fi
+# Excludes the installed ROS packages from searches of a workspace that contains this folder.
+touch "$venv/CATKIN_IGNORE"
 pip=("$venv/bin/python" -m pip --disable-pip-version-check --no-input)
 
 # Prints all files that are installed from the source tree, without build results in flatland/.
 sources() {
-  local inputs=(pyproject.toml CMakeLists.txt package.xml README.md LICENSE flatland_plugins.xml
-    cmake src/cpp flatland msg srv launch rviz worlds scripts) existing=() input
+  local inputs=(pyproject.toml CMakeLists.txt README.md LICENSE flatland_plugins.xml
+    cmake src/cpp flatland msg srv launch rviz worlds scripts catkin compat) existing=() input
   for input in "${inputs[@]}"; do
     if [[ -e $input ]]; then existing+=("$input"); fi
   done
   find "${existing[@]}" \( -path flatland/msg -o -path flatland/srv -o -name __pycache__ \) -prune -o \
-    ! -type d ! -name '*.so' -print0 | sort -z
+    -xtype f ! -name '*.so' -print0 | sort -z
 }
 content=$(sources | xargs -0 sha256sum | sha256sum)
 # `dev` includes `run`.
@@ -80,11 +82,12 @@ quietly "pip install" "${pip[@]}" install --no-build-isolation --config-settings
 
 # Python started in this folder imports the source package, which therefore requires the build results as
 # well. Each file is replaced atomically, since other processes may be reading it.
-site=$("$venv/bin/python" -c 'import sysconfig; print(sysconfig.get_path("platlib"))')/flatland
-(cd "$site" && find . -name '_core*.so' -o -path './msg/*.py' -o -path './srv/*.py') | while IFS= read -r file; do
-  mkdir -p "flatland/$(dirname "$file")"
-  cp "$site/$file" "flatland/$file.new"
-  mv "flatland/$file.new" "flatland/$file"
+site=$("$venv/bin/python" -c 'import sysconfig; print(sysconfig.get_path("platlib"))')
+(cd "$site" && find flatland flatland_msgs -name '_core*.so' -o -path 'flatland_msgs/*.py' \
+  -o -path 'flatland/msg/*.py' -o -path 'flatland/srv/*.py') | while IFS= read -r file; do
+  mkdir -p "$(dirname "$file")"
+  cp "$site/$file" "$file.new"
+  mv "$file.new" "$file"
 done
 
 rm -f "$stamps/run" "$stamps/dev"

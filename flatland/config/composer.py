@@ -13,6 +13,7 @@ from typing import NoReturn
 
 import yaml
 
+from flatland.config import hints
 from flatland.config.node import MAX_NESTING, ListNode, MapNode, Node, NullNode, ScalarNode, Source
 from flatland.errors import YamlError
 
@@ -30,7 +31,11 @@ _BLANK = re.compile(r"^(?:[ \t]*+[-?:](?=[ \t]))*+[ \t]++(?=#|\r?$)", re.MULTILI
 
 def malformed(source: Source, line: int, column: int, why: str) -> YamlError:
     """Returns the error of a text that is not valid YAML."""
-    return YamlError(f'Malformatted file, path="{source.path}", line {line} col {column}, {why}')
+    return YamlError(
+        f'Malformatted file, path="{source.path}", line {line} col {column}, {why}',
+        place=source.place(line, column),
+        hint=hints.malformed(why),
+    )
 
 
 def end_position(text: str) -> tuple[int, int]:
@@ -175,11 +180,13 @@ class Composer:
         line = _start(event)[0]
         first = parent.key_lines.setdefault(key, line)
         if key in parent.entries:
+            place = self._source.place(line)
             _LOG.warning(
                 'Duplicate key "%s" ignored, the value in line %d is used%s',
                 key,
                 first,
-                self._source.position(line),
+                place.suffix,
+                extra={"place": place},
             )
         return key
 

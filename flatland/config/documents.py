@@ -13,9 +13,10 @@ from pathlib import Path
 from typing import BinaryIO
 
 from flatland.config.composer import Composer, end_position, malformed
+from flatland.config.hints import similar_file
 from flatland.config.inputs import note_file
 from flatland.config.node import Node, Source
-from flatland.errors import UnreadableFileError
+from flatland.errors import Place, UnreadableFileError
 
 _MAX_FILE_BYTES = 64 * 1024 * 1024
 
@@ -71,13 +72,17 @@ def _read(path: str) -> bytes:
         with open_regular(path) as file:
             content = file.read(_MAX_FILE_BYTES + 1)
     except (FileNotFoundError, NotADirectoryError):
-        raise UnreadableFileError(f'File does not exist, path="{path}"') from None
+        raise UnreadableFileError(
+            f'File does not exist, path="{path}"', place=Place(path), hint=similar_file(path)
+        ) from None
     except OSError as error:
         raise UnreadableFileError(
-            f'Failed to read file, path="{path}", {error.strerror}'
+            f'Failed to read file, path="{path}", {error.strerror}', place=Place(path)
         ) from error
     if len(content) > _MAX_FILE_BYTES:
-        raise UnreadableFileError(f'Failed to read file, path="{path}", it is larger than 64 MiB')
+        raise UnreadableFileError(
+            f'Failed to read file, path="{path}", it is larger than 64 MiB', place=Place(path)
+        )
     return content
 
 

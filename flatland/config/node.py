@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from flatland.errors import Place
+
 MAX_NESTING = 100
 """Largest number of nested lists and maps, including levels that aliases and includes add."""
 
@@ -33,15 +35,14 @@ class Source:
         except RuntimeError:  # `~name` of an unknown user
             return str(self.folder / Path(path))
 
-    def position(self, line: int | None) -> str:
-        """Returns the suffix of error messages, such as ` [model.yaml:12]`.
+    def place(self, line: int | None, column: int | None = None) -> Place:
+        """Returns a position in the text.
 
         Args:
             line: Line number, from 1; None for the whole text.
+            column: Column number, from 1; None if unknown.
         """
-        if line is None:
-            return f" [{self.path}]" if self.path else ""
-        return f" [{self.path}:{line}]" if self.path else f" [line {line}]"
+        return Place(self.path, line, column)
 
 
 @dataclass(slots=True, eq=False)

@@ -23,15 +23,20 @@ _MAX_SHOWN = 500  # characters of an expression or a Lua message in an error mes
 
 ParamLookup = Callable[[str], object]
 Params = Mapping[str, object] | ParamLookup | None
+ExpansionErrorHandler = Callable[[YamlError, Node], None]
 
 
-def preprocess_file(path: str, params: Params = None) -> Node:
+def preprocess_file(
+    path: str, params: Params = None, on_error: ExpansionErrorHandler | None = None
+) -> Node:
     """Loads a file and preprocesses its first document.
 
     Args:
         path: The file.
         params: Source of the values of `param(NAME)`: a mapping, or a function that returns None
             for an unknown name.
+        on_error: Called with the error of each scalar that cannot be expanded, and with the scalar,
+            which then stays as it is; None to raise the first error.
 
     Returns:
         The root; a null node for a file without a document.
@@ -40,7 +45,7 @@ def preprocess_file(path: str, params: Params = None) -> Node:
         YamlError: The file cannot be read, is not valid YAML, or cannot be preprocessed.
     """
     root = _first(load_documents(path), Source.of_file(path))
-    return _Preprocessor(params).expand(root, ((_identity(path), path),), 0)
+    return _Preprocessor(params, on_error).expand(root, ((_identity(path), path),), 0)
 
 
 def preprocess_text(text: str, base_dir: str, params: Params = None) -> Node:
@@ -67,8 +72,13 @@ def _first(documents: list[Node], source: Source) -> Node:
     if not documents:
         return NullNode(source, 1)
     if len(documents) > 1:
-        second = source.position(documents[1].line)
-        _LOG.warning("Only the first of %d YAML documents is used%s", len(documents), second)
+        second = source.place(documents[1].line)
+        _LOG.warning(
+            "Only the first of %d YAML documents is used%s",
+            len(documents),
+            second.suffix,
+            extra={"place": second},
+        )
     return documents[0]
 
 
@@ -83,8 +93,9 @@ _Chain = tuple[tuple[str, str], ...]
 class _Preprocessor:
     """Expands one file with all files that it includes."""
 
-    def __init__(self, params: Params) -> None:
+    def __init__(self, params: Params, on_error: ExpansionErrorHandler | None = None) -> None:
         self._params = params
+        self._on_error = on_error
         self._includes = 0
         # The result for each node by its id, so that a node with aliases is expanded once. The
         # original node is kept alive because the id of a deleted object can be reused.
@@ -101,7 +112,10 @@ class _Preprocessor:
             raise self._error(node, f"Nested deeper than {MAX_NESTING} levels")
         result: Node = node
         if isinstance(node, ScalarNode):
-            result = self._expand_scalar(node, chain, depth)
+            try:
+                result = self._expand_scalar(node, chain, depth)
+            except YamlError as error:
+                self._handle(error, node)
         elif isinstance(node, ListNode):
             node.items = self._expand_items(node.items, chain, depth)
         else:
@@ -114,7 +128,10 @@ class _Preprocessor:
         expanded: list[Node] = []
         for item in items:
             if isinstance(item, ScalarNode) and item.text.startswith(_INCLUDE_ALL):
-                expanded += self._include(item, _INCLUDE_ALL, chain, depth + 1)
+                try:
+                    expanded += self._include(item, _INCLUDE_ALL, chain, depth + 1)
+                except YamlError as error:
+                    self._handle(error, item)
             else:
                 expanded.append(self.expand(item, chain, depth + 1))
         return expanded
@@ -128,6 +145,11 @@ class _Preprocessor:
             raise self._error(node, f"{_INCLUDE_ALL} must be an item of a list")
         return node
 
+    def _handle(self, error: YamlError, node: Node) -> None:
+        if self._on_error is None:
+            raise error
+        self._on_error(error, node)
+
     def _evaluate(self, node: ScalarNode) -> str:
         expression = node.text[len(_EVAL) :].strip(" \t\r\n\f\v")
         try:
@@ -135,8 +157,9 @@ class _Preprocessor:
         except EvalError as error:
             message = f'Failed to evaluate "{_shorten(expression)}", {_shorten(str(error))}'
             raise self._error(node, message) from error
+        place = node.source.place(node.line)
         for name in result.unset:
-            _LOG.warning("%s is not set%s", name, node.source.position(node.line))
+            _LOG.warning("%s is not set%s", name, place.suffix, extra={"place": place})
         return result.text
 
     def _param(self, name: str) -> object:
@@ -177,4 +200,5 @@ class _Preprocessor:
 
     @staticmethod
     def _error(node: Node, message: str) -> YamlError:
-        return YamlError(message + node.source.position(node.line))
+        place = node.source.place(node.line)
+        return YamlError(message + place.suffix, place=place)

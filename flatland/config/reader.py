@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import os
+from collections.abc import Callable
 from typing import Any, Literal, TypeVar, Unpack, overload
 
+from flatland.config import hints
 from flatland.config.convert import (
     CONVERSIONS,
     TUPLE_SIZES,
@@ -19,6 +22,8 @@ from flatland.config.convert import (
     StringKind,
     unmet_limit,
 )
+from flatland.config.node import ScalarNode
+from flatland.config.preprocessor import Params
 from flatland.config.tree_reader import TreeReader
 from flatland.geometry import Pose, Vector2
 
@@ -26,6 +31,10 @@ D = TypeVar("D")
 T = TypeVar("T")
 REQUIRED = object()
 """Default of an entry that is required."""
+
+
+ReadYaml = Callable[[str | os.PathLike[str], Params], "YamlReader"]
+"""Loads a file, with the source of the values of `param(NAME)`."""
 
 
 class YamlReader(TreeReader):
@@ -173,4 +182,6 @@ class YamlReader(TreeReader):
             return convert(self._node)
         except ValueError:
             pass
-        raise self._error(f"Error converting entry {self._label()}to {type_name}")
+        text = self._node.text if isinstance(self._node, ScalarNode) else ""
+        hint = hints.conversion(text, type_name)
+        raise self._error(f"Error converting entry {self._label()}to {type_name}", hint=hint)

@@ -4,13 +4,17 @@ from __future__ import annotations
 
 import copy
 import os
-from collections.abc import Iterator
-from typing import Any, Self
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, nullcontext
+from typing import Any, Self, TypeVar
 
+from flatland.config import hints
 from flatland.config.convert import Key, NodeKind, to_plain
 from flatland.config.node import ListNode, MapNode, Node, NullNode, ScalarNode
 from flatland.config.preprocessor import Params, preprocess_file, preprocess_text
-from flatland.errors import YamlError
+from flatland.errors import FlatlandError, Place, YamlError
+
+R = TypeVar("R")
 
 
 class TreeReader:
@@ -62,7 +66,7 @@ class TreeReader:
         return cls(preprocess_text(text, os.fspath(base_dir), params))
 
     def __repr__(self) -> str:
-        return f"<{type(self).__name__} {self.location} {self.name}{self._position()}>"
+        return f"<{type(self).__name__} {self.location} {self.name}{self.place.suffix}>"
 
     @property
     def path(self) -> str:
@@ -73,6 +77,11 @@ class TreeReader:
     def line(self) -> int:
         """Line of the node in its file, from 1."""
         return self._node.line
+
+    @property
+    def place(self) -> Place:
+        """Position of the node in its file."""
+        return self._node.source.place(self._node.line)
 
     @property
     def is_null(self) -> bool:
@@ -113,7 +122,7 @@ class TreeReader:
             return self
         entries = {key: value for key, value in node.entries.items() if key not in keys}
         rest = MapNode(node.source, node.line, entries, node.key_lines)
-        return type(self)(rest, self.location, self.name)
+        return self._derived(rest, self.location, self.name)
 
     def subnode(self, key: Key, kind: NodeKind = "any") -> Self:
         """Returns a reader of a required entry.
@@ -189,11 +198,17 @@ class TreeReader:
         if unread and isinstance(self._node, MapNode):
             names = ", ".join(f'"{key}"' for key in sorted(unread))
             message = f"Entry {self._label()}contains unrecognized entry(s) {{{names}}}"
-            raise self._error(message, self._node.key_lines[unread[0]])
+            hint = hints.unknown_key(unread[0], self._accessed - set(self._node.entries))
+            raise self._error(message, self._node.key_lines[unread[0]], hint)
 
-    def error(self, message: str) -> YamlError:
-        """Returns an error whose text ends with the position of the node: ` [model.yaml:12]`."""
-        return YamlError(message + self._position())
+    def error(self, message: str, hint: str = "") -> YamlError:
+        """Returns an error whose text ends with the position of the node: `[model.yaml:12]`.
+
+        Args:
+            message: Description of the problem.
+            hint: What probably helps; not part of the text.
+        """
+        return YamlError(message + self.place.suffix, place=self.place, hint=hint)
 
     def invalid(self, key: Key, why: str) -> YamlError:
         """Returns an error about the value of an entry: `Invalid "KEY", WHY (in LOCATION)`.
@@ -214,15 +229,38 @@ class TreeReader:
         """
         return self._node.source.resolve(path)
 
-    def _position(self, line: int | None = None) -> str:
-        return self._node.source.position(line or self._node.line)
+    # -- collection of errors, see `flatland.config.collecting_reader` -------------------------
+
+    def report(self, error: FlatlandError) -> None:
+        """Raises an error; a reader that collects errors stores it and returns."""
+        raise error
+
+    def collect_errors(self) -> AbstractContextManager[None]:
+        """Returns a context that has no effect.
+
+        With a reader that collects errors, an error ends only the block.
+        """
+        return nullcontext()
+
+    def collect_errors_of_model(self, name: str) -> AbstractContextManager[None]:  # noqa: ARG002
+        """Returns a context that has no effect; see `CollectingReader`."""
+        return nullcontext()
+
+    def attempt(self, action: Callable[[Self], R]) -> R | None:
+        """Returns the result of an action that reads this node with code of others.
+
+        With a reader that collects errors, the action is repeated after an error, with values in
+        place of the invalid ones, and the result may be None.
+        """
+        return action(self)
 
     def _label(self) -> str:
         return f"{self.name.lower()} " if self.name else ""
 
-    def _error(self, message: str, line: int | None = None) -> YamlError:
+    def _error(self, message: str, line: int | None = None, hint: str = "") -> YamlError:
         where = f" (in {self.location.lower()})" if self.location else ""
-        return YamlError(message + where + self._position(line))
+        place = self._node.source.place(line or self._node.line)
+        return YamlError(message + where + place.suffix, place=place, hint=hint)
 
     def _invalid(self, why: str) -> YamlError:
         return self._error(f"Invalid {self.name}, {why}")
@@ -231,6 +269,14 @@ class TreeReader:
         if not {"any": True, "map": self.is_map, "list": self.is_list}[kind]:
             name = f"{self.name} " if self.name else ""
             raise self._error(f"Entry {name}must be a {kind}")
+
+    def _find_quietly(self, key: Key) -> Node | None:
+        """Returns the node of an entry, None if it does not exist or this is no map or list."""
+        if isinstance(self._node, MapNode) and isinstance(key, str):
+            return self._node.entries.get(key)
+        if isinstance(self._node, ListNode) and isinstance(key, int):
+            return self._node.items[key] if 0 <= key < len(self._node.items) else None
+        return None
 
     def _find(self, key: Key) -> Node | None:
         """Returns the node of an entry or None, and records that the key was read."""
@@ -252,12 +298,20 @@ class TreeReader:
         node = self._find(key)
         if node is None:
             missing = self._reader(self._node, key)
-            raise missing._error(f"Entry {missing.name} does not exist")
+            hint = ""
+            if isinstance(key, str) and isinstance(self._node, MapNode):
+                lines = self._node.key_lines
+                hint = hints.missing_key(key, {name: lines[name] for name in self.unread_keys()})
+            raise missing._error(f"Entry {missing.name} does not exist", hint=hint)
         return self._reader(node, key)
 
     def _reader(self, node: Node, key: Key) -> Self:
         name = f'"{key}"' if isinstance(key, str) else f"index={key}"
-        return type(self)(node, f"{self.location} {self.name}".strip(), name)
+        return self._derived(node, f"{self.location} {self.name}".strip(), name)
+
+    def _derived(self, node: Node, location: str, name: str) -> Self:
+        """Creates a reader of another node, with a new record of keys."""
+        return type(self)(node, location, name)
 
     def _check_size(self, min_size: int, max_size: int | None, size: int | None) -> None:
         count = len(self)
@@ -271,4 +325,5 @@ class TreeReader:
             required = f"<= {max_size}"
         else:
             return
-        raise self._error(f"Entry {self._label()}must have size {required}")
+        hint = hints.wrong_size(self.name)
+        raise self._error(f"Entry {self._label()}must have size {required}", hint=hint)

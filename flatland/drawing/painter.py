@@ -43,6 +43,14 @@ def paint(scene: Scene, layout: Layout, dpi: float, names: bool) -> Figure:
     inches = ((columns + 1e-3) / dpi, (rows + 1e-3) / dpi)
     figure = Figure(figsize=inches, dpi=dpi, facecolor=_PAPER)
     FigureCanvasAgg(figure)
+    axes = _add_axes(figure, layout)
+    _paint_walls(axes, scene)
+    paint_models(axes, scene, layout, dpi, names)
+    return figure
+
+
+def _add_axes(figure: Figure, layout: Layout) -> Any:
+    columns, rows = layout.size
     left, bottom, width, height = layout.frame
     axes = figure.add_axes(
         (left / columns, bottom / rows, width / columns, height / rows), facecolor=_FLOOR
@@ -50,8 +58,29 @@ def paint(scene: Scene, layout: Layout, dpi: float, names: bool) -> Figure:
     x_min, y_min, x_max, y_max = layout.view
     axes.set(xlim=(x_min, x_max), ylim=(y_min, y_max), autoscale_on=False)
     _paint_axes(axes, layout.has_axes)
+    return axes
+
+
+def paint_models(axes: Any, scene: Scene, layout: Layout, dpi: float, names: bool) -> None:
+    """Draws everything that moves: scans, models and joints.
+
+    Args:
+        axes: Axes of a figure of `paint`.
+        scene: Contents of the image; its layers are not drawn.
+        layout: See `paint`.
+        dpi: See `paint`.
+        names: See `paint`.
+    """
     for i, scan in enumerate(scene.scans):
         _paint_scan(axes, scan, _SCAN_COLORS[i % len(_SCAN_COLORS)])
+    _paint_footprints(axes, scene)
+    _paint_joints(axes, scene)
+    _paint_headings(axes, scene, min_size=_MIN_MODEL_SIZE * dpi / layout.scale)
+    if names:
+        _paint_names(axes, scene)
+
+
+def _paint_walls(axes: Any, scene: Scene) -> None:
     for layer in scene.layers:
         lines = LineCollection(
             layer.edges,
@@ -60,12 +89,6 @@ def paint(scene: Scene, layout: Layout, dpi: float, names: bool) -> Figure:
             capstyle="projecting",
         )
         _add(axes, lines, _WALLS)
-    _paint_footprints(axes, scene)
-    _paint_joints(axes, scene)
-    _paint_headings(axes, scene, min_size=_MIN_MODEL_SIZE * dpi / layout.scale)
-    if names:
-        _paint_names(axes, scene)
-    return figure
 
 
 def _add(axes: Any, collection: Collection, zorder: int) -> None:

@@ -27,7 +27,7 @@ PICTURE_FORMATS: Final = (".png", ".pdf", ".svg")
 NOTEBOOK_DPI: Final = 72.0  # an image of at most 936 x 648 pixels
 
 # matplotlib shares its font cache between figures, and the cache is not thread-safe.
-_MATPLOTLIB_LOCK = threading.Lock()
+MATPLOTLIB_LOCK = threading.Lock()
 
 
 def draw(
@@ -80,7 +80,7 @@ def draw(
         names=names,
         axes=axes,
     )
-    with _MATPLOTLIB_LOCK:
+    with MATPLOTLIB_LOCK:
         figure.canvas.draw()
         pixels = np.asarray(figure.canvas.buffer_rgba())
     return np.ascontiguousarray(pixels[:, :, :3])
@@ -121,14 +121,11 @@ def make_figure(
     check_matplotlib()
     from flatland.drawing.painter import paint
 
-    if not (math.isfinite(dpi) and 10 <= dpi <= 2400):
-        raise ValueError(f"dpi must be from 10 to 2400, got {dpi}")
-    if isinstance(layers, str):
-        raise ValueError(f"layers must be a list of names, got {layers!r}")
+    check_drawing_options(dpi, layers)
     bounds = None if view is None else checked_view(view)
     scene = world.between_steps(lambda: capture_scene(world, layers, scans))
     layout = Layout.make(size, dpi, bounds or default_view(scene), axes)
-    with _MATPLOTLIB_LOCK:
+    with MATPLOTLIB_LOCK:
         return paint(scene, layout, dpi, names)
 
 
@@ -176,11 +173,23 @@ def save(
         names=names,
         axes=axes,
     )
-    with _MATPLOTLIB_LOCK:
+    with MATPLOTLIB_LOCK:
         if suffix == ".png":
             figure.canvas.print_png(path)
         else:
             figure.savefig(path, format=suffix[1:])
+
+
+def check_drawing_options(dpi: float, layers: Iterable[str] | None) -> None:
+    """Checks arguments of `draw`.
+
+    Raises:
+        ValueError: An argument is invalid.
+    """
+    if not (math.isfinite(dpi) and 10 <= dpi <= 2400):
+        raise ValueError(f"dpi must be from 10 to 2400, got {dpi}")
+    if isinstance(layers, str):
+        raise ValueError(f"layers must be a list of names, got {layers!r}")
 
 
 def draw_png(world: World) -> bytes | None:
@@ -197,7 +206,7 @@ def draw_png(world: World) -> bytes | None:
     except FlatlandError:
         return None
     file = io.BytesIO()
-    with _MATPLOTLIB_LOCK:
+    with MATPLOTLIB_LOCK:
         figure.canvas.print_png(file)
     return file.getvalue()
 

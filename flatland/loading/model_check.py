@@ -8,9 +8,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from flatland.config.preprocessor import Params
-from flatland.config.reader import YamlReader
+from flatland.config.reader import ReadYaml, YamlReader
 from flatland.entities.collision_filter import MAX_LAYERS, CollisionFilter
-from flatland.errors import YamlError
+from flatland.errors import Place, YamlError
 
 if TYPE_CHECKING:
     from flatland.world import World
@@ -37,7 +37,12 @@ def is_model_file(path: Path, params: Params) -> bool:
     return "bodies" in reader and "layers" not in reader and "properties" not in reader
 
 
-def load_model_alone(world_class: type[World], path: Path, params: Params) -> World:
+def load_model_alone(
+    world_class: type[World],
+    path: Path,
+    params: Params,
+    read: ReadYaml = YamlReader.from_file,
+) -> World:
     """Creates a world that contains one model and no layers.
 
     The footprints and plugins of the model may refer to any layers, up to the number that a world
@@ -47,11 +52,13 @@ def load_model_alone(world_class: type[World], path: Path, params: Params) -> Wo
         world_class: Class of the world.
         path: The model file; the name of the model is the file name up to the first dot.
         params: Source of the values of `param()` in YAML files.
+        read: Loads the file.
 
     Raises:
         FlatlandError: The file is invalid; the world is closed.
     """
     world = world_class(seed=0, params=params)
+    world.read_yaml = read
     try:
         world.collision_filter = _LayersOnDemand(path)
         world.spawn_model(path, path.name.split(".")[0] or "model")
@@ -86,7 +93,8 @@ class _LayersOnDemand(CollisionFilter):
         if len(named) > MAX_LAYERS:
             raise YamlError(
                 f"Model refers to {len(named)} layers {{{', '.join(named)}}}, max allowed in a "
-                f"world is {MAX_LAYERS} [{self._path}]"
+                f"world is {MAX_LAYERS} [{self._path}]",
+                place=Place(str(self._path)),
             )
         self.register(new)
         return super().unknown(names)

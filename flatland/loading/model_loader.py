@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any, TypeVar
 
+from flatland.config.hints import choice, did_you_mean
 from flatland.config.reader import YamlReader
 from flatland.entities.body import Body
 from flatland.entities.collision_filter import CollisionFilter
@@ -18,6 +19,8 @@ from flatland.physics import PhysicsJoint, PhysicsWorld
 _LOG = logging.getLogger("flatland")
 
 BODY_TYPES = ("static", "kinematic", "dynamic")
+FOOTPRINT_TYPES = ("circle", "polygon")
+JOINT_TYPES = ("revolute", "weld")
 BODY_COLOR = (1.0, 1.0, 1.0, 0.5)
 
 T = TypeVar("T")
@@ -58,14 +61,16 @@ class ModelLoader:
         """
         bodies = self._reader.subnode("bodies", "list")
         for entry in bodies.items():
-            self._load_body(entry, pose)
+            with entry.collect_errors():
+                self._load_body(entry, pose)
         if not self._model.bodies:
             raise bodies.error(
                 f'Invalid "bodies" in "{self._model.name}" model, must be a list of bodies of at '
                 "least size 1"
             )
         for entry in self._reader.optional_subnode("joints", "list").items():
-            self._load_joint(entry)
+            with entry.collect_errors():
+                self._load_joint(entry)
 
     def plugin_entries(self) -> list[YamlReader]:
         """Returns the entries of the enabled plugins.
@@ -80,9 +85,11 @@ class ModelLoader:
             if not _is_enabled(entry, f'{self._place} plugin "{name}"'):
                 continue
             if name in names:
-                raise entry.error(
-                    f'Invalid "plugins" in "{self._model.name}" model, plugin with name "{name}" '
-                    "already exists"
+                entry.report(
+                    entry.error(
+                        f'Invalid "plugins" in "{self._model.name}" model, plugin with name '
+                        f'"{name}" already exists'
+                    )
                 )
             names.add(name)
             entries.append(entry)
@@ -95,17 +102,23 @@ class ModelLoader:
         if not _is_enabled(reader, f'{self._place} body "{name}"'):
             return
         if self._model.find_body(name) is not None:
-            raise reader.error(
-                f'Invalid "bodies" in "{self._model.name}" model, body with name "{name}" '
-                "already exists"
+            reader.report(
+                reader.error(
+                    f'Invalid "bodies" in "{self._model.name}" model, body with name "{name}" '
+                    "already exists"
+                )
             )
         pose = reader.get("pose", "pose", IDENTITY, finite=True)
         body_type = reader.get("type", "string", "dynamic")
         if body_type not in BODY_TYPES:
-            raise reader.error(
-                f'Invalid "type" in {self._place} body "{name}", must be one of: '
-                f"{', '.join(BODY_TYPES)}"
+            reader.report(
+                reader.error(
+                    f'Invalid "type" in {self._place} body "{name}", must be one of: '
+                    f"{', '.join(BODY_TYPES)}",
+                    choice(body_type, BODY_TYPES),
+                )
             )
+            body_type = "dynamic"
         color = reader.get("color", "color", BODY_COLOR, finite=True)
         linear_damping = reader.get("linear_damping", "float", 0.0, finite=True, minimum=0)
         angular_damping = reader.get("angular_damping", "float", 0.0, finite=True, minimum=0)
@@ -122,22 +135,31 @@ class ModelLoader:
         body = Body(physics_body, self._model, name, color)
         self._model.bodies.append(body)
         for footprint in footprints.items():
-            self._load_footprint(body, footprint)
+            with footprint.collect_errors():
+                self._load_footprint(body, footprint)
 
     def _load_footprint(self, body: Body, reader: YamlReader) -> None:
         place = f"{reader.location} {reader.name}"
         kind = reader.get("type", "string")
-        if kind not in ("circle", "polygon"):
-            raise reader.error(
-                f'Invalid footprint "type" in {place}, support footprints are: circle, polygon'
+        if kind not in FOOTPRINT_TYPES:
+            reader.report(
+                reader.error(
+                    f'Invalid footprint "type" in {place}, support footprints are: '
+                    f"{', '.join(FOOTPRINT_TYPES)}",
+                    choice(kind, FOOTPRINT_TYPES),
+                )
             )
         layers = reader.get_list("layers", "string", ["all"])
         unknown = self._layers.unknown(layers)
         if unknown:
-            raise reader.error(
-                f'Invalid footprint "layers" in {place}, {{{",".join(unknown)}}} layer(s) does '
-                "not exist"
+            reader.report(
+                reader.error(
+                    f'Invalid footprint "layers" in {place}, {{{",".join(unknown)}}} layer(s) does '
+                    "not exist",
+                    _layer_hint(unknown, self._layers),
+                )
             )
+            layers = [name for name in layers if name not in unknown]
         category_bits = self._layers.category_bits(layers)
         properties: dict[str, Any] = {
             "density": reader.get("density", "float", finite=True, minimum=0),
@@ -147,6 +169,8 @@ class ModelLoader:
             "category_bits": category_bits,
             "mask_bits": category_bits if reader.get("collision", "bool", True) else 0,
         }
+        if kind not in FOOTPRINT_TYPES:
+            return  # reported above
         if kind == "circle":
             radius = reader.get("radius", "float", finite=True, minimum=0)
             center = reader.get("center", "vector", (0.0, 0.0), finite=True)
@@ -164,31 +188,41 @@ class ModelLoader:
         if not _is_enabled(reader, place):
             return
         if self._model.find_joint(name) is not None:
-            raise reader.error(
-                f'Invalid "joints" in "{self._model.name}" model, joint with name "{name}" '
-                "already exists"
+            reader.report(
+                reader.error(
+                    f'Invalid "joints" in "{self._model.name}" model, joint with name "{name}" '
+                    "already exists"
+                )
             )
         kind = reader.get("type", "string")
-        if kind not in ("revolute", "weld"):
-            raise reader.error(
-                f'Invalid joint "type" in {place}, supported joints are: revolute, weld'
+        if kind not in JOINT_TYPES:
+            reader.report(
+                reader.error(
+                    f'Invalid joint "type" in {place}, supported joints are: '
+                    f"{', '.join(JOINT_TYPES)}",
+                    choice(kind, JOINT_TYPES),
+                )
             )
         color = reader.get("color", "color", BODY_COLOR, finite=True)
         collide_connected = reader.get("collide_connected", "bool", False)
         ends = reader.subnode("bodies", "list")
         if len(ends) != 2:
-            raise ends.error(
-                f'Invalid "bodies" in {place}, must be a sequence of exactly two items'
+            ends.report(
+                ends.error(f'Invalid "bodies" in {place}, must be a sequence of exactly two items')
             )
         bodies, anchors = [], []
         for end in ends.items():
             body_name = end.get("name", "string")
             body = self._model.find_body(body_name)
             if body is None:
-                raise end.error(
-                    f'Cannot find body with name "{body_name}" in {end.location} {end.name}'
+                end.report(
+                    end.error(
+                        f'Cannot find body with name "{body_name}" in {end.location} {end.name}',
+                        did_you_mean(body_name, (other.name for other in self._model.bodies)),
+                    )
                 )
-            bodies.append(body)
+            else:
+                bodies.append(body)
             anchors.append(end.get_list("anchor", "float", size=2, finite=True))
         options: dict[str, Any] = {"collide_connected": collide_connected}
         create: Callable[..., PhysicsJoint]
@@ -200,7 +234,11 @@ class ModelLoader:
             options["reference_angle"] = reader.get("angle", "float", 0.0, finite=True)
             options["frequency"] = reader.get("frequency", "float", 0.0, finite=True, minimum=0)
             options["damping"] = reader.get("damping", "float", 0.0, finite=True, minimum=0)
+        if kind not in JOINT_TYPES:
+            return  # reported above
         reader.ensure_accessed_all()
+        if len(bodies) != 2:
+            return  # reported above
         joint = _create(reader, create, bodies[0], bodies[1], anchors[0], anchors[1], **options)
         self._model.joints.append(Joint(joint, name, (bodies[0], bodies[1]), color))
 
@@ -211,10 +249,18 @@ def _read_limits(reader: YamlReader) -> tuple[float, float] | None:
         return None
     lower, upper = limits
     if lower > upper:
-        raise reader.invalid(
-            "limits", f"the lower limit {lower} must not be above the upper limit {upper}"
+        reader.report(
+            reader.invalid(
+                "limits", f"the lower limit {lower} must not be above the upper limit {upper}"
+            )
         )
+        return None
     return (lower, upper)
+
+
+def _layer_hint(unknown: Sequence[str], layers: CollisionFilter) -> str:
+    similar = did_you_mean(unknown[0], layers.names)
+    return similar or f"layers of the world: {', '.join(layers.names) or 'none'}"
 
 
 def _is_enabled(reader: YamlReader, place: str) -> bool:

@@ -12,11 +12,11 @@ from typing import TYPE_CHECKING, Any
 from flatland.config.inputs import Inputs
 from flatland.config.node import Source
 from flatland.config.preprocessor import Params
-from flatland.config.reader import YamlReader
+from flatland.config.reader import ReadYaml, YamlReader
 from flatland.entities.layer import Layer
-from flatland.errors import UnreadableFileError, WorldError, YamlError
+from flatland.errors import Place, UnreadableFileError, WorldError, YamlError
 from flatland.geometry import IDENTITY
-from flatland.maps.map_file import load_map
+from flatland.maps.map_file import LayerMap, load_map
 from flatland.plugin_api.missing_plugins import (
     MissingPluginsError,
     PluginEntry,
@@ -49,8 +49,13 @@ def load_world(
     plugin_timeout: float | None,
     plugin_errors: FaultPolicy,
     on_invalid_body: InvalidBodyPolicy,
+    read: ReadYaml = YamlReader.from_file,
 ) -> World:
-    """Creates a world of the given class from a file; see `World.from_yaml` for the arguments."""
+    """Creates a world of the given class from a file; see `World.from_yaml` for the arguments.
+
+    With a function `read` whose readers collect errors (`flatland.config.collecting_reader`), the
+    world contains the valid parts of the files.
+    """
     if simplify_map not in SIMPLIFICATIONS:
         raise ValueError(f"simplify_map must be 0, 1 or 2, got {simplify_map!r}")
     seed = checked_seed(seed)
@@ -67,6 +72,7 @@ def load_world(
             plugin_timeout=plugin_timeout,
             plugin_errors=plugin_errors,
             on_invalid_body=on_invalid_body,
+            read=read,
         )
     # A recording can start as long as these are unchanged.
     world.change_count = 0
@@ -80,10 +86,11 @@ def _create_world(
     inputs: Inputs,
     *,
     params: Params,
+    read: ReadYaml,
     **options: Any,
 ) -> World:
     file = Path(Source("", str(Path.cwd())).resolve(os.fspath(path)))
-    reader = YamlReader.from_file(file, params)
+    reader = read(file, params)
     properties = reader.subnode("properties", "map")
     velocity_iterations = properties.get("velocity_iterations", "int", 10, minimum=1)
     position_iterations = properties.get("position_iterations", "int", 10, minimum=1)
@@ -98,26 +105,32 @@ def _create_world(
     )
     world.path = str(file)
     world.inputs = inputs
+    world.read_yaml = read
     try:
         for entry in reader.subnode("layers", "list").items():
-            _load_layer(world, entry, inputs.simplify_map)
+            with entry.collect_errors():
+                _load_layer(world, entry, inputs.simplify_map)
         if map_layer and not any(map_layer in layer.names for layer in world.layers):
             names = ", ".join(layer.name for layer in world.layers) or "none"
-            raise properties.invalid(
-                "publish_map", f"must be the name of a layer ({names}), got {map_layer}"
+            properties.report(
+                properties.invalid(
+                    "publish_map", f"must be the name of a layer ({names}), got {map_layer}"
+                )
             )
+            map_layer = ""  # only if errors are collected
         world.map_layer = map_layer
         try:
             _load_models(world, reader)
             # Unknown keys are reported before world plugins are started.
             world_plugins = list(reader.optional_subnode("plugins", "list").items())
             reader.ensure_accessed_all()
-            world.plugin_host.require_plugins(world_plugins, None)
+            world_plugins = world.plugin_host.require_plugins(world_plugins, None)
         except MissingPluginsError as error:
             # The error lists the missing plugins of one model; report those of the whole world.
             raise _all_missing_plugins(world, reader) or error from None
         for entry in world_plugins:
-            _load_world_plugin(world, entry, reader)
+            with entry.collect_errors():
+                _load_world_plugin(world, entry, reader)
     except BaseException as error:
         # Not `close`: an exception of a plugin must not replace this one.
         world.__exit__(type(error), error, error.__traceback__)
@@ -135,23 +148,20 @@ def _load_layer(world: World, reader: YamlReader, simplify_map: int) -> None:
     color = reader.get("color", "color", LAYER_COLOR, finite=True)
     properties = reader.optional_subnode("properties", "map")
     reader.ensure_accessed_all()
-    try:
-        world.collision_filter.register(names)
-    except YamlError as error:
-        raise reader.error(error.message) from None
+    is_registered = False
+    with reader.collect_errors():
+        _register_layer(world, reader, names)
+        is_registered = True
+    layer_map = None
+    if map_path:
+        with reader.collect_errors():
+            layer_map = _load_map(world, reader, map_path, names[0], simplify_map)
+    if not is_registered:
+        return
     bits = world.collision_filter.category_bits(names)
-    if not map_path:
+    if layer_map is None:
         layer = Layer(world.physics, names, bits, color, properties.plain() or {})
     else:
-        try:
-            layer_map = load_map(
-                world.resolve_path(map_path),
-                names[0],
-                simplify=simplify_map,
-                params=world.params,
-            )
-        except UnreadableFileError as error:
-            raise reader.subnode("map").error(error.message) from error
         try:
             layer = Layer(
                 world.physics,
@@ -167,30 +177,63 @@ def _load_layer(world: World, reader: YamlReader, simplify_map: int) -> None:
             )
         except ValueError as error:  # finite, but outside the range of the physics
             raise YamlError(
-                f'Invalid map in layer "{names[0]}", {error} [{layer_map.path}]'
+                f'Invalid map in layer "{names[0]}", {error} [{layer_map.path}]',
+                place=Place(layer_map.path),
             ) from error
     world.add_layer(layer)
+
+
+def _register_layer(world: World, reader: YamlReader, names: list[str]) -> None:
+    try:
+        world.collision_filter.register(names)
+    except YamlError as error:
+        raise reader.error(error.message) from None
+
+
+def _load_map(
+    world: World, reader: YamlReader, map_path: str, layer_name: str, simplify_map: int
+) -> LayerMap:
+    try:
+        return load_map(
+            world.resolve_path(map_path),
+            layer_name,
+            simplify=simplify_map,
+            params=world.params,
+            read=world.read_yaml,
+        )
+    except UnreadableFileError as error:
+        raise reader.subnode("map").error(error.message, error.hint) from error
 
 
 def _load_models(world: World, reader: YamlReader) -> None:
     names: set[str] = set()
     for entry in reader.optional_subnode("models", "list").items():
-        name = entry.get("name", "string")
-        model_reader = entry.with_location(f'model "{name}"')
-        pose = model_reader.get("pose", "pose", IDENTITY, finite=True)
-        namespace = model_reader.get("namespace", "string", "")
-        path = model_reader.get("model", "string")
-        model_reader.ensure_accessed_all()
-        if name in names:
-            raise model_reader.error(f'Model with name "{name}" already exists')
-        names.add(name)
+        with entry.collect_errors():
+            _load_model(world, entry, names)
+
+
+def _load_model(world: World, entry: YamlReader, names: set[str]) -> None:
+    name = entry.get("name", "string")
+    model_reader = entry.with_location(f'model "{name}"')
+    pose = model_reader.get("pose", "pose", IDENTITY, finite=True)
+    namespace = model_reader.get("namespace", "string", "")
+    path = model_reader.get("model", "string")
+    model_reader.ensure_accessed_all()
+    if name in names:
+        raise model_reader.error(f'Model with name "{name}" already exists')
+    names.add(name)
+    with model_reader.collect_errors_of_model(name):
         try:
-            world.spawn_model(path, name, namespace, pose)
-        except WorldError as error:
-            # The entry of the world file is invalid, not the model file.
-            raise model_reader.error(error.message) from None
+            try:
+                world.spawn_model(path, name, namespace, pose)
+            except WorldError as error:
+                # The entry of the world file is invalid, not the model file.
+                model_reader.report(model_reader.error(error.message))
+                with suppress(WorldError):  # only if errors are collected
+                    world.spawn_model(path, name, "", pose)
         except UnreadableFileError as error:
-            raise model_reader.subnode("model").error(error.message) from error
+            located = model_reader.subnode("model")
+            raise located.error(error.message, error.hint) from error
 
 
 def _all_missing_plugins(world: World, reader: YamlReader) -> MissingPluginsError | None:

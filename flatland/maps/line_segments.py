@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from flatland.config.documents import open_regular
-from flatland.errors import MapFileError
+from flatland.errors import MapFileError, Place
 
 _COLUMNS = 4
 
@@ -57,6 +57,8 @@ def _parse(line: str, number: int, path: str) -> list[float]:
     if len(segment) < _COLUMNS or not all(math.isfinite(value) for value in segment):
         raise MapFileError(
             f'Failed to read line segment from line {number}, in file "{Path(path).name}"'
-            f" [{path}:{number}]"
+            f" [{path}:{number}]",
+            place=Place(path, number),
+            hint="each line has four numbers, x1 y1 x2 y2; lines that start with # are comments",
         )
     return segment

@@ -8,8 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from flatland.config.hints import similar_file
 from flatland.config.preprocessor import Params
-from flatland.config.reader import YamlReader
+from flatland.config.reader import ReadYaml, YamlReader
 from flatland.errors import MapFileError
 from flatland.geometry import Pose
 from flatland.maps.line_segments import read_line_segments
@@ -47,6 +48,7 @@ def load_map(
     *,
     simplify: int = 0,
     params: Params = None,
+    read: ReadYaml = YamlReader.from_file,
 ) -> LayerMap:
     """Reads a map file and its image or data file.
 
@@ -57,6 +59,7 @@ def load_map(
             pixel; 2 the same after the removal of small features of the free space. Line segments
             are not simplified.
         params: Source of the values of `param()` in the map file.
+        read: Loads the map file.
 
     Returns:
         The geometry of the layer.
@@ -68,7 +71,7 @@ def load_map(
     """
     if simplify not in (0, 1, 2):
         raise ValueError(f"simplify must be 0, 1 or 2, got {simplify!r}")
-    reader = YamlReader.from_file(path, params).with_location(f'layer "{layer_name}"')
+    reader = read(path, params).with_location(f'layer "{layer_name}"')
     if reader.get("type", "string", None) == "line_segments":
         layer_map = _load_line_segments(reader, layer_name)
     else:
@@ -102,7 +105,8 @@ def _load_image(reader: YamlReader, layer_name: str, simplify: int) -> LayerMap:
     occupied_thresh = reader.get("occupied_thresh", "float", finite=True)
     unknown_keys = tuple(sorted(reader.unread_keys()))
     if resolution <= 0:
-        raise reader.invalid("resolution", f"must be positive, got {resolution}")
+        reader.report(reader.invalid("resolution", f"must be positive, got {resolution}"))
+        resolution = 1.0
     if not 0 <= occupied_thresh <= 1:
         _LOG.warning(
             'Layer "%s": "occupied_thresh" is %g, outside the range of pixel values, 0 to 1',
@@ -113,7 +117,9 @@ def _load_image(reader: YamlReader, layer_name: str, simplify: int) -> LayerMap:
         image = read_grey_image(image_path)
     except OSError as error:
         node = reader.subnode("image")
-        raise node.error(f'Failed to load "{image_path}" in layer "{layer_name}"') from error
+        raise node.error(
+            f'Failed to load "{image_path}" in layer "{layer_name}"', similar_file(image_path)
+        ) from error
     try:
         mask = threshold_in_place(image, occupied_thresh)
         edges, exact_edge_count = image_edges(mask, resolution, simplify)
@@ -129,12 +135,14 @@ def _load_line_segments(reader: YamlReader, layer_name: str) -> LayerMap:
     origin = reader.get("origin", "pose", finite=True)
     unknown_keys = tuple(sorted(reader.unread_keys()))
     if scale == 0:
-        raise reader.invalid("scale", "must not be 0")
+        reader.report(reader.invalid("scale", "must not be 0"))
     try:
         segments = read_line_segments(data_path)
     except OSError as error:
         located = reader.subnode("data").error(f'Failed to load "{data_path}"')
-        raise MapFileError(located.message) from error
+        raise MapFileError(
+            located.message, place=located.place, hint=similar_file(data_path)
+        ) from error
     with np.errstate(over="ignore"):
         edges = (segments * scale).astype(np.float32)
     if not np.isfinite(edges).all():

@@ -10,7 +10,7 @@ Lengths are in metres, angles in radians, times in seconds and masses in kilogra
 be finite and within +-1e9. Box2D computes in single precision.
 """
 
-from flatland._core import OldManifold, PreSolveContact
+from flatland._core import BOX2D_VERSION, OldManifold, PreSolveContact
 from flatland.geometry import Pose
 from flatland.physics.body import PhysicsBody
 from flatland.physics.contact import ContactEvent, ContactInfo
@@ -20,6 +20,7 @@ from flatland.physics.queries import RayHit
 from flatland.physics.world import PhysicsWorld, StepReport
 
 __all__ = [
+    "BOX2D_VERSION",
     "ContactEvent",
     "ContactInfo",
     "OldManifold",

@@ -44,7 +44,7 @@ class PhysicsBody(Handle):
 
     @property
     def type(self) -> str:
-        """Type of the body: `static`, `kinematic` or `dynamic`."""
+        """Type of the body, `static`, `kinematic` or `dynamic`."""
         return self._core.body_type(self.id)
 
     @property
@@ -123,7 +123,7 @@ class PhysicsBody(Handle):
 
     @property
     def mass(self) -> float:
-        """Mass [kg]: 1 for a dynamic body without massive fixtures, 0 if it is not dynamic."""
+        """Mass [kg], 1 for a dynamic body without massive fixtures, 0 if it is not dynamic."""
         return self._core.mass(self.id)
 
     @property

@@ -37,7 +37,7 @@ class PhysicsFixture(Handle):
 
     @property
     def shape(self) -> str:
-        """Type of the shape: `circle`, `polygon` or `edge`."""
+        """Type of the shape, `circle`, `polygon` or `edge`."""
         return self._core.fixture_shape(self.id)
 
     @property

@@ -42,7 +42,7 @@ class PhysicsJoint(Handle):
 
     @property
     def type(self) -> str:
-        """Type of the joint: `revolute` or `weld`."""
+        """Type of the joint, `revolute` or `weld`."""
         return self._core.joint_type(self.id)
 
     @property

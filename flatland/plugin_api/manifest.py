@@ -13,6 +13,7 @@ from flatland.errors import PluginError
 INCLUDED_PACKAGE = "flatland_plugins"
 MANIFEST_VARIABLE = "FLATLAND_PLUGIN_PATH"
 BASE_CLASS_TYPES = ("flatland::ModelPlugin", "flatland::WorldPlugin")
+PORTING_GUIDE = 'section "From a C++ plugin" of docs/write_a_plugin.md'
 _REFERENCE_PREFIX = "flatland_server::"  # namespace of the base classes of C++ plugins
 
 
@@ -63,6 +64,11 @@ def read_manifest(path: str | os.PathLike[str]) -> list[PluginClass]:
         base = element.get("base_class_type", "")
         if base.startswith(_REFERENCE_PREFIX):
             continue
+        if "::" in class_path:
+            raise PluginError(
+                f'manifest "{path}", class "{lookup_name}": "{class_path}" is a C++ plugin, which '
+                f"cannot be loaded; {PORTING_GUIDE} explains how to port it to Python"
+            )
         if "." not in class_path:
             raise PluginError(
                 f'manifest "{path}", class "{lookup_name}": type must be the dotted path of '

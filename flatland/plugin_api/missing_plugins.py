@@ -8,9 +8,11 @@ from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from flatland.errors import PluginError
+from flatland.errors import FlatlandError, Place, PluginError
+from flatland.plugin_api.fork_plugins import alternative_to
 from flatland.plugin_api.manifest import (
     INCLUDED_PACKAGE,
+    PORTING_GUIDE,
     listed_manifests,
     lookup_name,
     read_reference_names,
@@ -21,15 +23,29 @@ if TYPE_CHECKING:
     from flatland.config.reader import YamlReader
     from flatland.plugin_api.registry import PluginRegistry
 
-PORTING_GUIDE = 'section "From a C++ plugin" of docs/write_a_plugin.md'
 # Plugins for tests of manifests, which are no useful suggestions.
 _UNLISTED = {f"{INCLUDED_PACKAGE}::Dummy{kind}Plugin" for kind in ("Model", "World")}
+_HINT = f'"enabled: false" skips the plugin; C++ plugins must be ported to Python, {PORTING_GUIDE}'
 _MIN_SIMILARITY = 0.7  # of a suggestion to the missing name
 _MAX_SUGGESTIONS = 3
 
 
 class MissingPluginsError(PluginError):
     """Raised if some plugins of a model or world are declared by no manifest."""
+
+    def __init__(self, message: str, missing: Sequence[PluginError] = ()) -> None:
+        """Initializes the error.
+
+        Args:
+            message: Text about all missing plugins.
+            missing: An error for each of them.
+        """
+        super().__init__(message, place=missing[0].place if missing else None)
+        self._missing = missing
+
+    def parts(self) -> Sequence[FlatlandError]:
+        """Returns an error for each missing plugin."""
+        return self._missing or (self,)
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,13 +55,13 @@ class PluginEntry:
     Attributes:
         name: Name of the plugin.
         type_name: Value of `type:`.
-        place: File and line of the entry, such as ` [robot.model.yaml:12]`.
+        place: File and line of the entry.
         model: Name of the model, None for a world plugin.
     """
 
     name: str
     type_name: str
-    place: str
+    place: Place
     model: str | None
 
 
@@ -60,9 +76,7 @@ def read_entries(entries: Iterable[YamlReader], model: str | None) -> list[Plugi
         YamlError: An entry has no name or type.
     """
     return [
-        PluginEntry(
-            entry.get("name", "string"), entry.get("type", "string"), entry.error("").message, model
-        )
+        PluginEntry(entry.get("name", "string"), entry.get("type", "string"), entry.place, model)
         for entry in entries
         if entry.get("enabled", "bool", True)
     ]
@@ -87,21 +101,21 @@ def missing_plugins_error(
         return None
     hints = registry.hints()
     advice = hints.advise(missing_types)
-    models: dict[tuple[str, str, str], list[str | None]] = {}
+    models: dict[tuple[str, str, Place], list[str | None]] = {}
     for entry in entries:
         if entry.type_name in missing_types:
             models.setdefault((entry.name, entry.type_name, entry.place), []).append(entry.model)
-    lines = []
+    missing = []
     for (name, type_name, place), owners in models.items():
         kind = "World" if owners[0] is None else "Model"
         text = f'{kind} Plugin "{name}" type "{type_name}"'
         if owners[0] is not None:
             text += " model " + ", ".join(f'"{owner}"' for owner in owners)
         text += f": {hints.describe(type_name)}"
-        if len(models) == 1:
-            return MissingPluginsError(f"{text}; {advice}{place}")
-        lines.append(text + place)
-    return MissingPluginsError("\n".join([*lines, advice]))
+        missing.append(PluginError(text + place.suffix, place=place, hint=_HINT))
+    if len(missing) == 1:
+        return MissingPluginsError(f"{text}; {advice}{place.suffix}", missing)
+    return MissingPluginsError("\n".join([*(error.message for error in missing), advice]), missing)
 
 
 class LookupHints:
@@ -132,7 +146,8 @@ class LookupHints:
     def describe(self, type_name: str) -> str:
         """Returns a text about one `type:` of a YAML file.
 
-        It contains similar known names, and the packages that export a C++ plugin of that name.
+        It contains similar known names, the packages that export a C++ plugin of that name, and
+        what to use instead of a plugin of a known fork of the reference.
         """
         name = lookup_name(type_name)
         text = f'no plugin "{name}"'
@@ -146,6 +161,9 @@ class LookupHints:
         places = self._reference_plugins.get(name) or self._reference_plugins.get(type_name)
         if places:
             text += f"; a C++ plugin of that name is exported by {' and '.join(places)}"
+        alternative = alternative_to(type_name)
+        if alternative:
+            text += f"; forks of the reference have a plugin of that name: {alternative}"
         return text
 
     def advise(self, type_names: Collection[str]) -> str:

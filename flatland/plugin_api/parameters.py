@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from flatland.config.hints import did_you_mean
 from flatland.geometry import IDENTITY, DoubleArray, Pose
 
 if TYPE_CHECKING:
@@ -36,7 +37,12 @@ def find_body(config: YamlReader, key: str, model: Model, name: str) -> Body:
     """
     body = model.find_body(name)
     if body is None:
-        raise at_key(config, key).error(f'Body with name "{name}" does not exist')
+        names = (other.name for other in model.bodies)
+        entry = at_key(config, key)
+        entry.report(
+            entry.error(f'Body with name "{name}" does not exist', did_you_mean(name, names))
+        )
+        return model.bodies[0]  # only if errors are collected
     return body
 
 

@@ -93,9 +93,20 @@ class Output(Generic[T]):
             try:
                 callback(value)
             except PLUGIN_FAULTS as error:
-                if self._on_fault is None:
-                    raise
-                self._on_fault(self, callback, error)
+                self.report_fault(callback, error)
+
+    def report_fault(self, callback: Callable[[T], None], error: BaseException) -> None:
+        """Handles an exception of a subscriber, as if it had raised in `emit`.
+
+        For subscribers that finish their work later. To be called while the exception is handled.
+
+        Args:
+            callback: The subscriber.
+            error: What it raised.
+        """
+        if self._on_fault is None:
+            raise error
+        self._on_fault(self, callback, error)
 
     def subscribe(self, callback: Callable[[T], None], *, wants: bool = True) -> Callable[[], None]:
         """Subscribes a function to all further values; safe from any thread.

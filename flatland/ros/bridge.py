@@ -7,15 +7,13 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import Future
 from typing import Any
 
-import rospy
-from rosgraph_msgs.msg import Clock
-from rospy import rostime
 from tf2_msgs.msg import TFMessage
 
 from flatland.errors import PLUGIN_FAULTS
 from flatland.plugin_api.plugin import FlatlandPlugin
 from flatland.plugin_api.ports import Command, Output
-from flatland.ros.adapters import convert, find_adapter, transform
+from flatland.ros.adapters import find_adapter, transform
+from flatland.ros.clock import NodeClock
 from flatland.ros.plugin_ros import PluginRos
 from flatland.ros.transport.publisher import Publisher
 from flatland.ros.transport.registrar import Registrar
@@ -32,25 +30,28 @@ TF_QUEUE_SIZE = 100  # messages, one per step; a dropped one is a gap in its tra
 class Bridge(WorldObserver):
     """Connects one world to ROS; passed to `World.from_yaml` as an observer.
 
-    Must be created after `rospy.init_node`. The bridge sets the ROS time of the node in each step,
-    because the node does not subscribe to the clock that it publishes.
+    Must be created after `rospy.init_node`. In each step, `/clock` is published first, then `/tf`,
+    then the values that were emitted in the step, in their order: no stamp is in the future, and
+    the transforms of a stamp precede the messages with that stamp.
     """
 
-    def __init__(self, registrar: Registrar) -> None:
-        """Advertises the clock and the transforms, and sets the ROS time to 0.
+    def __init__(self, registrar: Registrar, clock: NodeClock) -> None:
+        """Advertises the transforms.
 
         Args:
             registrar: Registers topics and services with the ROS master.
+            clock: Notified of the simulated time.
         """
         self._registrar = registrar
+        self._clock = clock
         self._world: World | None = None
         self._closed = False
         self._outputs: dict[Output[Any], _OutputTopic] = {}
         self._commands: dict[Command[Any], Subscriber] = {}
-        self._clock = Publisher(registrar, "/clock", Clock)
-        self._clock_message = Clock()
         self._tf = Publisher(registrar, "/tf", TFMessage, queue_size=TF_QUEUE_SIZE)
-        _set_ros_time(rospy.Time(0))
+        self._in_step = False
+        # Messages that wait for the end of the step, with the functions that publish them.
+        self._held: list[tuple[Callable[[Any], None], Any]] = []
 
     def close(self) -> None:
         """Stops closing single topics, because rospy is about to close all of them."""
@@ -60,15 +61,17 @@ class Bridge(WorldObserver):
         """Stores the world, which runs the requests and commands from ROS."""
         self._world = world
 
-    # -- time and transforms ---------------------------------------------------------------
+    # -- one step --------------------------------------------------------------------------
+
+    def step_started(self) -> None:
+        """Holds all messages of outputs until the end of the step."""
+        self._in_step = True
+        if self._world is not None:
+            self._clock.step_started(self._world.timekeeper.sim_time_ns)
 
     def time_advanced(self, time_ns: int) -> None:
-        """Publishes `/clock`."""
-        time = convert.time(time_ns, rospy.Time)
-        _set_ros_time(time)
-        if self._clock.connected:
-            self._clock_message.clock = time
-            self._clock.publish(self._clock_message)
+        """Notifies the clock."""
+        self._clock.time_advanced(time_ns)
 
     @property
     def wants_transforms(self) -> bool:
@@ -78,6 +81,30 @@ class Bridge(WorldObserver):
     def transforms_sent(self, transforms: Sequence[Transform]) -> None:
         """Publishes all transforms of a step in one `/tf` message."""
         self._tf.publish(TFMessage([transform.to_message(each) for each in transforms]))
+
+    def step_finished(self) -> None:
+        """Publishes the messages of the step."""
+        self._in_step = False
+        if self._held:
+            self._publish_held()
+
+    def _publish_held(self) -> None:
+        held, self._held = self._held, []
+        for publish, message in held:
+            publish(message)
+
+    def _send(self, publish: Callable[[Any], None], message: Any) -> None:
+        """Publishes a message of an output: at the end of the step, or at once between two steps.
+
+        Args:
+            publish: Publishes the message; does not raise if the world handles exceptions.
+            message: The message.
+        """
+        if not self._in_step or self._world is None:
+            publish(message)
+            return
+        costs = self._world.plugin_host.costs
+        self._held.append((publish if costs is None else costs.later(publish), message))
 
     # -- ports -----------------------------------------------------------------------------
 
@@ -94,13 +121,15 @@ class Bridge(WorldObserver):
             on_connection=lambda connected: (output.want if connected else output.unwant)(self),
             owner=output.owners[0],
         )
-        self._outputs[output] = _OutputTopic(output, publisher, adapter.to_message)
+        self._outputs[output] = _OutputTopic(output, publisher, adapter.to_message, self._send)
 
     def output_closed(self, output: Output[Any]) -> None:
         """Closes the topic of an output."""
         topic = self._outputs.pop(output, None)
         if topic is not None:
             topic.unsubscribe()
+            # A model whose pose is invalid is removed within a step.
+            self._publish_held()
             if not self._closed:
                 topic.publisher.close()
 
@@ -171,31 +200,32 @@ class _OutputTopic:
     """
 
     def __init__(
-        self, output: Output[Any], publisher: Publisher, to_message: Callable[[Any], Any]
+        self,
+        output: Output[Any],
+        publisher: Publisher,
+        to_message: Callable[[Any], Any],
+        send: Callable[[Callable[[Any], None], Any], None],
     ) -> None:
         self.publisher = publisher
+        self._output = output
+        self._send = send
         self._to_message = to_message
         # The subscribers of the topic decide whether the output is wanted, see `on_connection`.
         self.unsubscribe = output.subscribe(self, wants=False)
 
     def __call__(self, value: Any) -> None:
         if self.publisher.connected:
-            self.publisher.publish(self._to_message(value))
+            # Converted now, because the value may change until the end of the step.
+            self._send(self._publish, self._to_message(value))
+
+    def _publish(self, message: Any) -> None:
+        try:
+            self.publisher.publish(message)
+        except PLUGIN_FAULTS as error:
+            self._output.report_fault(self, error)
 
     def __repr__(self) -> str:
         """Returns the name of the subscriber in the log."""
         adapter = getattr(self._to_message, "__qualname__", repr(self._to_message))
         module = getattr(self._to_message, "__module__", "")
         return f'ROS topic "{self.publisher.topic}" (adapter {module}.{adapter})'
-
-
-def _set_ros_time(time: rospy.Time) -> None:
-    """Sets the value of `rospy.get_rostime` and wakes the threads that sleep in ROS time.
-
-    Equivalent to the callback of rospy for `/clock`, but without its copy and its deprecation
-    warning, which cost more than a physics step.
-    """
-    rostime._rostime_current = time
-    changed = rostime.get_rostime_cond()
-    with changed:
-        changed.notify_all()

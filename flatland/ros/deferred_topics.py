@@ -1,4 +1,4 @@
-"""Topics that are opened after the first step: markers and the pause state."""
+"""Topics that are opened after the first step: markers, the pause state and diagnostics."""
 
 from __future__ import annotations
 
@@ -64,8 +64,10 @@ class DeferredTopics:
             self._start(self._start_pause_topic, "the pause state")
             importlib.import_module("flatland.ros.interactive.interactive_markers")
             self._start(self._start_interactive_markers, "interactive markers")
+            importlib.import_module("flatland.ros.diagnostics")
+            self._start(self._start_diagnostics, "diagnostics")
         except ImportError as error:
-            _LOG.warning("markers are disabled: %s", error)
+            _LOG.warning("markers or diagnostics are disabled: %s", error)
 
     def _start(self, action: Any, what: str) -> None:
         def log_failure(done: Future[Any]) -> None:
@@ -100,3 +102,9 @@ class DeferredTopics:
                     move_keeps_odometry=self._move_keeps_odometry,
                 )
             )
+
+    def _start_diagnostics(self) -> None:
+        from flatland.ros.diagnostics import Diagnostics
+
+        if not self._closed:
+            self._parts.append(Diagnostics(self._registrar, self._simulation))

@@ -1,4 +1,7 @@
-"""Forwards the log of flatland to rospy, that is, to the console and to `/rosout`."""
+"""Forwards the log of flatland to rospy, that is, to the console and to `/rosout`.
+
+The level of the logger `rosout` of the node applies, which the service `~set_logger_level` changes.
+"""
 
 from __future__ import annotations
 
@@ -24,4 +27,5 @@ def log_to_ros() -> None:
     logger.propagate = False
     logger.handlers = [_ToRosout()]
     if logger.level == logging.NOTSET:
-        logger.setLevel(logging.INFO)
+        # All records: the level of rospy's logger decides.
+        logger.setLevel(logging.DEBUG)

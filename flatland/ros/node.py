@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import argparse
 import logging
 import math
 import sys
 import threading
 import time
+from collections.abc import Sequence
 from concurrent.futures import Future, wait
 from typing import TYPE_CHECKING, Any, Final
 
 from flatland.errors import FlatlandError
+from flatland.ros.message_types import MESSAGE_PACKAGES, OWN_PACKAGE, select_package
 from flatland.ros.parameters import NodeParameters, ParameterError, read_parameters
 from flatland.ros.shutdown import ShutdownWatchdog
 
@@ -28,23 +31,46 @@ _SWITCH_INTERVAL: Final = 0.0002  # s for which a thread keeps the GIL while oth
 _UNREGISTER_TIMEOUT: Final = 0.5  # s
 _STOP_POLL_PERIOD: Final = 0.05  # s between two checks for a stop request without a master
 _SHUTDOWN_POLL_PERIOD: Final = 0.002  # s
+# Some forks of the reference read these from the global namespace, others from the private one.
+_GLOBAL_IN_FORKS: Final = ("world_path", "update_rate", "step_size", "show_viz", "viz_pub_rate")
 
 
-def main() -> int:
+def main(arguments: Sequence[str] | None = None) -> int:
     """Runs the node.
+
+    Args:
+        arguments: Arguments of the command line; None for those of the process.
 
     Returns:
         The exit code: 0 after a requested stop or a complete benchmark, 1 after a failure, whose
         cause is logged at critical level.
     """
-    return ServerNode().run()
+    parser = argparse.ArgumentParser(
+        prog=NODE_NAME,
+        description="The simulator node of flatland. Parameters are set as _NAME:=VALUE.",
+        allow_abbrev=False,
+    )
+    parser.add_argument(
+        "--msgs-package",
+        choices=MESSAGE_PACKAGES,
+        default=OWN_PACKAGE,
+        help="package of the message and service types, if ~msgs_package is not set",
+    )
+    # The remaining arguments are read by rospy.
+    options, _ = parser.parse_known_args(arguments)
+    return ServerNode(options.msgs_package).run()
 
 
 class ServerNode:
     """One run of the node."""
 
-    def __init__(self) -> None:
-        """Prepares the run."""
+    def __init__(self, default_msgs_package: str = OWN_PACKAGE) -> None:
+        """Prepares the run.
+
+        Args:
+            default_msgs_package: Default of the parameter `msgs_package`.
+        """
+        self._default_msgs_package = default_msgs_package
         self._stopping = threading.Event()
         self._simulation: Simulation | None = None
         self._registrar: Registrar | None = None
@@ -78,7 +104,9 @@ class ServerNode:
         rospy.on_shutdown(watchdog.request_stop)
         log_to_ros()
         try:
-            parameters = read_parameters(_private_parameter)
+            parameters = read_parameters(
+                _private_parameter, default_msgs_package=self._default_msgs_package
+            )
             watchdog.timeout = parameters.shutdown_timeout
             self._simulate(parameters)
         except (ParameterError, FlatlandError) as error:
@@ -139,23 +167,42 @@ class ServerNode:
         return 1
 
     def _simulate(self, parameters: NodeParameters) -> None:
-        """Loads the world and steps it until a stop is requested."""
+        """Loads the world and steps it until a stop is requested.
+
+        Raises:
+            ParameterError: The package of the message types is not installed.
+            FlatlandError: The world cannot be loaded.
+        """
+        package = parameters.msgs_package
+        try:
+            # Before the imports below, which fix the types of the topics.
+            select_package(package)
+        except ImportError as error:
+            raise ParameterError(
+                f'Invalid parameter "~msgs_package": "{package}" is not installed, {error}'
+            ) from error
         from flatland.ros.bridge import Bridge
+        from flatland.ros.clock import NodeClock, SimulatedClock, WallClock
         from flatland.ros.deferred_topics import DeferredTopics
         from flatland.ros.frame_monitor import FrameMonitor
         from flatland.ros.services import Services
         from flatland.ros.transport.registrar import Registrar
         from flatland.simulation import Simulation
 
-        _warn_of_wall_time()
+        _check_time_of_other_nodes(parameters.use_sim_time)
         self._registrar = Registrar()
-        bridge = Bridge(self._registrar)
+        clock: NodeClock
+        if parameters.use_sim_time:
+            clock = SimulatedClock(self._registrar, parameters.clock_rate)
+        else:
+            clock = WallClock()
+        bridge = Bridge(self._registrar, clock)
         world = _load(parameters, bridge)
         simulation = Simulation(
             world,
             parameters.update_rate,
             max_lag=parameters.max_lag,
-            report=lambda report: _LOG.info("%s", report),
+            report=lambda report: _LOG.debug("%s", report),
         )
         self._simulation = simulation
         if self._stopping.is_set():
@@ -195,6 +242,7 @@ class ServerNode:
             # unregisters all topics at once.
             bridge.close()
             world.close()
+            clock.close()
 
 
 def _load(parameters: NodeParameters, bridge: Any) -> World:
@@ -253,11 +301,16 @@ def _log_benchmark(result: RunResult) -> None:
 
 
 def _private_parameter(name: str) -> object:
-    """Returns a private parameter; `simplify_map` is searched for in outer namespaces too."""
+    """Returns a private parameter.
+
+    `simplify_map` is searched for in outer namespaces too; without a `~world_path`, so are the
+    parameters that the launch files of some forks of the reference set there.
+    """
     import rospy
 
     resolved = rospy.resolve_name(f"~{name}")
-    if name == "simplify_map":
+    is_searched = name in _GLOBAL_IN_FORKS and not rospy.has_param("~world_path")
+    if name == "simplify_map" or is_searched:
         # Searches the namespace of the node, then each one above it.
         resolved = rospy.search_param(name) or resolved
     return rospy.get_param(resolved, None)
@@ -270,11 +323,18 @@ def _yaml_parameter(name: str) -> object:
     return rospy.get_param(name, None)
 
 
-def _warn_of_wall_time() -> None:
+def _check_time_of_other_nodes(use_sim_time: bool) -> None:
+    """Logs a warning if other nodes use another time than the stamps of this one."""
     import rospy
 
-    if rospy.get_param("/use_sim_time", False) is not True:
+    others = rospy.get_param("/use_sim_time", False) is True
+    if use_sim_time and not others:
         _LOG.warning("/use_sim_time is not true: other nodes do not follow the simulated time")
+    elif others and not use_sim_time:
+        _LOG.warning(
+            "/use_sim_time is true, but this node uses wall time and publishes no /clock: the time "
+            "of other nodes stands still; set /use_sim_time to false before they start"
+        )
 
 
 def _unregister() -> None:

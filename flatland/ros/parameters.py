@@ -7,6 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from flatland.maps.occupancy_grid import DEFAULT_RESOLUTION
+from flatland.ros.message_types import MESSAGE_PACKAGES, OWN_PACKAGE
 from flatland.ros.shutdown import DEFAULT_SHUTDOWN_TIMEOUT
 from flatland.runtime.placement import IF_BLOCKED, IfBlocked
 from flatland.simulation import MAX_LAG
@@ -45,10 +46,14 @@ class NodeParameters:
         move_keeps_odometry: Whether the odometry of a model that is moved by a service or by its
             interactive marker continues as if it had not moved.
         initialpose_model: Name of the model that messages on `initialpose` move; empty for none.
+        use_sim_time: Whether `/clock` is published and stamps are simulated times; otherwise they
+            are wall times.
+        clock_rate: Maximum rate of `/clock` in wall time [Hz]; 0 for one message per step.
         publish_map: Name of the layer that is published as a map; empty for that of the world file,
             None for no map.
         map_frame: Frame of the map.
         map_resolution: Size of a cell of the map of a layer without an image [m].
+        msgs_package: Package of the message and service types, `flatland` or `flatland_msgs`.
     """
 
     world_path: str
@@ -65,16 +70,22 @@ class NodeParameters:
     if_blocked: IfBlocked
     move_keeps_odometry: bool
     initialpose_model: str
+    use_sim_time: bool
+    clock_rate: float
     publish_map: str | None
     map_frame: str
     map_resolution: float
+    msgs_package: str
 
 
-def read_parameters(get: ParameterSource) -> NodeParameters:
+def read_parameters(
+    get: ParameterSource, *, default_msgs_package: str = OWN_PACKAGE
+) -> NodeParameters:
     """Reads and checks all parameters of the node.
 
     Args:
         get: Returns the value of a parameter of the node, None if it is not set.
+        default_msgs_package: Default of `msgs_package`.
 
     Raises:
         ParameterError: A parameter is missing or invalid.
@@ -95,9 +106,50 @@ def read_parameters(get: ParameterSource) -> NodeParameters:
         if_blocked=reader.if_blocked("if_blocked", "warn"),
         move_keeps_odometry=reader.boolean("move_keeps_odometry", False),
         initialpose_model=reader.name("initialpose_model"),
+        use_sim_time=reader.boolean("use_sim_time", True),
+        clock_rate=reader.rate("clock_rate", 0.0, unlimited="one message per step"),
         publish_map=reader.optional_name("publish_map"),
         map_frame=reader.frame("map_frame", "map"),
         map_resolution=reader.finite_positive("map_resolution", DEFAULT_RESOLUTION),
+        msgs_package=reader.msgs_package("msgs_package", default_msgs_package),
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class TeleopParameters:
+    """The parameters of the node `teleop_key`.
+
+    Attributes:
+        max_linear: Maximum velocity [m/s].
+        max_angular: Maximum angular velocity [rad/s].
+        rate: Rate of the commands while a key is held [Hz].
+        repeat_delay: Time from a press to the first repetition of the terminal [s].
+        key_timeout: Time after a repetition in which the next one is expected [s].
+    """
+
+    max_linear: float
+    max_angular: float
+    rate: float
+    repeat_delay: float
+    key_timeout: float
+
+
+def read_teleop_parameters(get: ParameterSource) -> TeleopParameters:
+    """Reads and checks all parameters of the node `teleop_key`.
+
+    Args:
+        get: Returns the value of a parameter of the node, None if it is not set.
+
+    Raises:
+        ParameterError: A parameter is invalid.
+    """
+    reader = _Reader(get)
+    return TeleopParameters(
+        max_linear=reader.finite_positive("max_linear", 1.0),
+        max_angular=reader.finite_positive("max_angular", 2.0),
+        rate=reader.finite_positive("rate", 20.0),
+        repeat_delay=reader.finite_positive("repeat_delay", 0.6),
+        key_timeout=reader.finite_positive("key_timeout", 0.2),
     )
 
 
@@ -115,8 +167,8 @@ class _Reader:
             raise _invalid(name, "the path of a world file", value)
         return value
 
-    def rate(self, name: str, default: float) -> float:
-        wanted = "a number of Hz that is not negative (0 or inf: as fast as possible)"
+    def rate(self, name: str, default: float, unlimited: str = "as fast as possible") -> float:
+        wanted = f"a number of Hz that is not negative (0 or inf: {unlimited})"
         rate = self._number(name, default, wanted, lambda rate: rate >= 0)
         return 0.0 if math.isinf(rate) else rate
 
@@ -194,6 +246,14 @@ class _Reader:
         if not isinstance(value, str) or not value.strip(" /"):
             raise _invalid(name, "the name of a frame", value)
         return value.strip().lstrip("/")
+
+    def msgs_package(self, name: str, default: str) -> str:
+        value = self._get(name)
+        if value is None:
+            return default
+        if not isinstance(value, str) or value not in MESSAGE_PACKAGES:
+            raise _invalid(name, " or ".join(MESSAGE_PACKAGES), value)
+        return value
 
     def natural(self, name: str) -> int | None:
         wanted = "an integer that is not negative"

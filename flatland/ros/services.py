@@ -13,25 +13,12 @@ from std_srvs.srv import Empty, EmptyResponse
 from flatland.entities.model import Model
 from flatland.errors import FlatlandError
 from flatland.geometry import Pose
+from flatland.ros.message_types import service_class
 from flatland.ros.names import sendable_text
 from flatland.ros.transport.registrar import Registrar
 from flatland.ros.transport.service import Service, wait_for
 from flatland.runtime.placement import IfBlocked
 from flatland.simulation import Simulation
-from flatland.srv import (
-    DeleteModel,
-    DeleteModelRequest,
-    DeleteModelResponse,
-    MoveModel,
-    MoveModelRequest,
-    MoveModelResponse,
-    SetRate,
-    SetRateRequest,
-    SetRateResponse,
-    SpawnModel,
-    SpawnModelRequest,
-    SpawnModelResponse,
-)
 
 _LOG = logging.getLogger("flatland")
 
@@ -70,58 +57,54 @@ class Services:
         self._keep_odometry = move_keeps_odometry
         world = simulation.world
         for name, service_type, handler in (
-            ("spawn_model", SpawnModel, self._spawn_model),
-            ("delete_model", DeleteModel, self._delete_model),
-            ("move_model", MoveModel, self._move_model),
-            ("set_rate", SetRate, self._set_rate),
+            ("spawn_model", service_class("SpawnModel"), self._spawn_model),
+            ("delete_model", service_class("DeleteModel"), self._delete_model),
+            ("move_model", service_class("MoveModel"), self._move_model),
+            ("set_rate", service_class("SetRate"), self._set_rate),
             ("pause", Empty, self._switch(world.pause)),
             ("resume", Empty, self._switch(world.resume)),
             ("toggle_pause", Empty, self._switch(world.toggle_pause)),
         ):
             Service(registrar, name, service_type, handler)
 
-    def _spawn_model(self, request: SpawnModelRequest) -> SpawnModelResponse:
+    # rospy converts the returned fields to the response class of the service.
+
+    def _spawn_model(self, request: Any) -> tuple[bool, str]:
         pose = _pose(request.pose)
-        return SpawnModelResponse(
-            *self._carry_out(
-                lambda: _displacement(
-                    self._simulation.world.spawn_model(
-                        request.yaml_path, request.name, request.ns, pose, self._if_blocked
-                    ),
-                    pose,
-                )
+        return self._carry_out(
+            lambda: _displacement(
+                self._simulation.world.spawn_model(
+                    request.yaml_path, request.name, request.ns, pose, self._if_blocked
+                ),
+                pose,
             )
         )
 
-    def _delete_model(self, request: DeleteModelRequest) -> DeleteModelResponse:
-        return DeleteModelResponse(
-            *self._carry_out(lambda: self._simulation.world.delete_model(request.name))
-        )
+    def _delete_model(self, request: Any) -> tuple[bool, str]:
+        return self._carry_out(lambda: self._simulation.world.delete_model(request.name))
 
-    def _move_model(self, request: MoveModelRequest) -> MoveModelResponse:
+    def _move_model(self, request: Any) -> tuple[bool, str]:
         pose = _pose(request.pose)
-        return MoveModelResponse(
-            *self._carry_out(
-                lambda: _displacement(
-                    self._simulation.world.move_model(
-                        request.name, pose, self._if_blocked, keep_odometry=self._keep_odometry
-                    ),
-                    pose,
-                )
+        return self._carry_out(
+            lambda: _displacement(
+                self._simulation.world.move_model(
+                    request.name, pose, self._if_blocked, keep_odometry=self._keep_odometry
+                ),
+                pose,
             )
         )
 
-    def _set_rate(self, request: SetRateRequest) -> SetRateResponse:
+    def _set_rate(self, request: Any) -> tuple[bool, str]:
         rate = request.update_rate
         if math.isnan(rate) or rate < 0:
-            return SetRateResponse(False, f"update_rate must not be negative, got {rate}")
+            return False, f"update_rate must not be negative, got {rate}"
         done, message = self._carry_out(lambda: self._simulation.set_rate(rate))
         if done:
             # Clients read the current rate from the parameter.
             value = 0.0 if math.isinf(rate) else rate
             self._registrar.submit(lambda: rospy.set_param("~update_rate", value))
             self._registrar.flush(_REGISTRATION_TIMEOUT)
-        return SetRateResponse(done, message)
+        return done, message
 
     def _switch(self, action: Callable[[], None]) -> Callable[[Any], EmptyResponse]:
         def serve(_request: Any) -> EmptyResponse:

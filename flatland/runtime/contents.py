@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, TypeVar, cast
 
 import numpy as np
 
+from flatland.config.reader import ReadYaml, YamlReader
 from flatland.errors import WorldError
 from flatland.geometry import DoubleArray
 from flatland.runtime.placement import IfBlocked, Models, check_if_blocked
@@ -52,10 +53,13 @@ class Contents:
         ports: All outputs and commands by resolved topic.
         requests: The queue of actions that run between two steps.
         transform_buffer: Collects the transforms of plugins.
+        read_yaml: Loads a model file; `YamlReader.from_file`, or a method that collects errors.
         change_count: Number of models that were spawned, moved or deleted since the world file was
             loaded, including attempts that failed.
         inputs: The files and parameters that were read.
     """
+
+    read_yaml: ReadYaml = YamlReader.from_file
 
     layers: list[Layer]
     map_layer: str = ""

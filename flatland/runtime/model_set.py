@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from flatland.config.reader import YamlReader
 from flatland.entities.model import Model
 from flatland.errors import WorldError, YamlError
 from flatland.geometry import Pose, finite_pose
@@ -74,17 +73,16 @@ class ModelSet:
         checked_pose = self._check_spawn(path, name, namespace, pose)
         path = world.resolve_path(path)
         with world.inputs.collecting():
-            reader = YamlReader.from_file(path, world.params)
+            reader = world.read_yaml(path, world.params)
         model = Model(world, name, namespace, path)
         loader = ModelLoader(world.physics, world.collision_filter, model, reader)
         try:
             loader.load_bodies_and_joints(checked_pose)
             self._place(model, model.pose, if_blocked, "spawn")
             self._contacts.add_bodies(model.bodies)
-            entries = loader.plugin_entries()
-            self._host.require_plugins(entries, name)
-            for entry in entries:
-                self._host.start_model_plugin(model, entry)
+            for entry in self._host.require_plugins(loader.plugin_entries(), name):
+                with entry.collect_errors():
+                    self._host.start_model_plugin(model, entry)
         except BaseException:
             self._remove(model)
             raise

@@ -54,6 +54,9 @@ class WorldObserver:
     def layer_changed(self, layer_name: str) -> None:
         """A layer was added, or its edges changed."""
 
+    def step_started(self) -> None:
+        """A step starts; no hook has run yet."""
+
     def time_advanced(self, time_ns: int) -> None:
         """The simulated time [ns] advanced; hooks after the step have not run yet."""
 
@@ -64,6 +67,9 @@ class WorldObserver:
 
     def transforms_sent(self, transforms: Sequence[Transform]) -> None:
         """All transforms of one step."""
+
+    def step_finished(self) -> None:
+        """A step ends: its hooks have run, and its transforms were sent; also if it failed."""
 
     def plugin_ros(self, plugin: FlatlandPlugin) -> Any:
         """Returns what a plugin gets as `self.ros`, None if this observer provides nothing."""
@@ -84,6 +90,8 @@ class Observers:
         # Notified in every step, so only those that override the method.
         self._of_time: tuple[WorldObserver, ...] = ()
         self._of_transforms: tuple[WorldObserver, ...] = ()
+        self._of_start: tuple[WorldObserver, ...] = ()
+        self._of_finish: tuple[WorldObserver, ...] = ()
 
     def add(self, observer: WorldObserver, world: World) -> None:
         """Adds an observer and attaches it to a world."""
@@ -110,6 +118,8 @@ class Observers:
         self._all = observers
         self._of_time = tuple(o for o in observers if _overrides(o, "time_advanced"))
         self._of_transforms = tuple(o for o in observers if _overrides(o, "transforms_sent"))
+        self._of_start = tuple(o for o in observers if _overrides(o, "step_started"))
+        self._of_finish = tuple(o for o in observers if _overrides(o, "step_finished"))
 
     # -- ports: raising refuses the port ---------------------------------------------------
 
@@ -155,6 +165,16 @@ class Observers:
     def layer_changed(self, layer_name: str) -> None:
         """Notifies all observers."""
         self._notify("layer_changed", layer_name)
+
+    def step_started(self) -> None:
+        """Notifies the observers that override the method."""
+        for observer in self._of_start:
+            self._call(observer, "step_started")
+
+    def step_finished(self) -> None:
+        """Notifies the observers that override the method."""
+        for observer in self._of_finish:
+            self._call(observer, "step_finished")
 
     def time_advanced(self, time_ns: int) -> None:
         """Notifies the observers that override the method."""

@@ -16,6 +16,9 @@ class PluginCosts:
 
     The time of a hook includes its scans and the messages of the outputs to which it emits. See
     `PluginHost.measure`.
+
+    Attributes:
+        running: The plugin whose hook runs, None between two hooks.
     """
 
     def __init__(self, clock: Callable[[], float] = time.perf_counter) -> None:
@@ -26,19 +29,31 @@ class PluginCosts:
         """
         self._clock = clock
         self._seconds: defaultdict[FlatlandPlugin, float] = defaultdict(float)
+        self.running: FlatlandPlugin | None = None
 
     def timed(self, plugin: FlatlandPlugin, hook: Hook) -> Hook:
         """Returns a hook that calls the given one and adds its time to the costs of its plugin."""
         clock, seconds = self._clock, self._seconds
 
         def call(*arguments: Any) -> None:
+            outer, self.running = self.running, plugin
             start = clock()
             try:
                 hook(*arguments)
             finally:
                 seconds[plugin] += clock() - start
+                self.running = outer
 
         return call
+
+    @property
+    def seconds(self) -> dict[FlatlandPlugin, float]:
+        """Wall time of each plugin whose hooks were called [s]."""
+        return dict(self._seconds)
+
+    def later(self, action: Hook) -> Hook:
+        """Returns an action that counts as part of the hook that runs now, if one does."""
+        return action if self.running is None else self.timed(self.running, action)
 
     def describe(self, elapsed: float, count: int = 3) -> str:
         """Returns the names and shares of the most expensive plugins in one line.

@@ -43,6 +43,8 @@ class PluginHost:
         registry: The plugin classes that files can name.
         world_plugins: The world plugins in order of loading.
         hooks: The hooks of all plugins.
+        costs: The costs that are being measured, None if none are.
+        disabled: The plugins that were disabled because a hook raised repeatedly.
     """
 
     def __init__(
@@ -70,23 +72,33 @@ class PluginHost:
         self._faults = faults
         self._timeout = timeout
         self.hooks = HookTable()
+        self.costs: PluginCosts | None = None
+        self.disabled: set[FlatlandPlugin] = set()
 
     # -- start and end ---------------------------------------------------------------------
 
-    def require_plugins(self, entries: Iterable[YamlReader], model: str | None) -> None:
+    def require_plugins(self, entries: Iterable[YamlReader], model: str | None) -> list[YamlReader]:
         """Checks that a plugin class exists for each enabled entry of a `plugins` list.
 
         Args:
             entries: Entries of the list.
             model: Name of the model, None for world plugins.
 
+        Returns:
+            The entries; if errors are collected, those whose class exists.
+
         Raises:
             MissingPluginsError: Classes do not exist; the text names all of them.
             YamlError: An entry has no name or type.
         """
-        error = missing_plugins_error(self.registry, read_entries(entries, model))
-        if error is not None:
-            raise error
+        entries = list(entries)
+        named = read_entries(entries, model)
+        error = missing_plugins_error(self.registry, named)
+        if error is None:
+            return entries
+        entries[0].report(error)
+        missing = set(self.registry.find_missing(entry.type_name for entry in named))
+        return [entry for entry in entries if entry.get("type", "string") not in missing]
 
     def start_model_plugin(self, model: Model, entry: YamlReader) -> None:
         """Starts a plugin of a model and appends it to the model's plugins.
@@ -98,6 +110,9 @@ class PluginHost:
         Raises:
             PluginError: It cannot be found, created or initialized.
         """
+        entry.attempt(lambda reader: self._start_model_plugin(model, reader))
+
+    def _start_model_plugin(self, model: Model, entry: YamlReader) -> None:
         name, type_name = entry.get("name", "string"), entry.get("type", "string")
         what = f'Model Plugin "{name}" type "{type_name}" model "{model.name}"'
         plugin = self._create(type_name, ModelPlugin, what, entry)
@@ -123,6 +138,10 @@ class PluginHost:
                 raise entry.error(
                     f'Invalid "world plugins" with name "{name}", type "{type_name}" already exists'
                 )
+        entry.attempt(lambda reader: self._start_world_plugin(reader, world_config))
+
+    def _start_world_plugin(self, entry: YamlReader, world_config: YamlReader) -> None:
+        name, type_name = entry.get("name", "string"), entry.get("type", "string")
         what = f'World Plugin "{name}" type "{type_name}"'
         plugin = self._create(type_name, WorldPlugin, what, entry)
         plugin.world_config = world_config
@@ -134,7 +153,8 @@ class PluginHost:
         try:
             return self.registry.create(type_name, base)
         except PluginError as error:
-            raise PluginError(entry.error(f"{what}: {error.message}").message) from error
+            located = entry.error(f"{what}: {error.message}")
+            raise PluginError(located.message, place=located.place) from error
 
     def _start(self, plugin: FlatlandPlugin, entry: YamlReader, place: tuple[str, str]) -> None:
         """Initializes a plugin and adds its hooks; a failure leaves nothing behind."""
@@ -149,9 +169,10 @@ class PluginHost:
             if isinstance(error, SystemExit) or not (isinstance(error, FlatlandError) or text):
                 text = f"{type(error).__name__} {text}".strip()
             text = f"{describe(plugin)}: {text}"
-            if not isinstance(error, YamlError):  # which names a place of its own
-                text = entry.error(text).message
-            raise PluginError(text) from error
+            if isinstance(error, YamlError):  # which names a place of its own
+                position = error.place or entry.place
+                raise PluginError(text, place=position, hint=error.hint) from error
+            raise PluginError(text + entry.place.suffix, place=entry.place) from error
         except BaseException:
             self._release(plugin)
             raise
@@ -179,6 +200,7 @@ class PluginHost:
                 self._faults.add((plugin, "on_shutdown"), name, error)
             self._release(plugin)
         self._faults.forget(set(plugins))
+        self.disabled.difference_update(plugins)
 
     def _release(self, plugin: FlatlandPlugin) -> None:
         """Closes the ports and connections that a plugin left open."""
@@ -193,6 +215,7 @@ class PluginHost:
 
     def measure(self, costs: PluginCosts | None) -> None:
         """Adds the wall time of all hooks to some costs from now on; None ends the measurement."""
+        self.costs = costs
         self.hooks.wrap(None if costs is None else costs.timed)
 
     @property
@@ -272,3 +295,4 @@ class PluginHost:
             except PLUGIN_FAULTS as error:
                 if self._faults.add_in_hook(plugin, hook, describe(plugin), error):
                     self.hooks.remove(plugin)
+                    self.disabled.add(plugin)

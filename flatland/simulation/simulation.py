@@ -51,6 +51,9 @@ class Simulation:
 
     Attributes:
         world: The world.
+        statistics: Statistics of the last report period in which the world was stepped, None
+            before the end of the first one.
+        lost_time: Lag that was dropped since the start [s of wall time].
     """
 
     def __init__(
@@ -81,6 +84,8 @@ class Simulation:
         if not 0 <= max_lag < math.inf:
             raise ValueError(f"max_lag must be finite and not negative [s], got {max_lag}")
         self.world = world
+        self.statistics: CycleStatistics | None = None
+        self.lost_time = 0.0
         self._period = _period_of(update_rate)
         self._max_lag = max_lag
         self._report = report
@@ -94,6 +99,11 @@ class Simulation:
     def stopped(self) -> bool:
         """Whether `stop` was called."""
         return self._stopped
+
+    @property
+    def rate(self) -> float:
+        """Target steps per second of wall time [Hz], inf for as many as possible."""
+        return 1.0 / self._period if self._period else math.inf
 
     def set_rate(self, update_rate: float) -> None:
         """Changes the rate from the next step on; to be called between two steps.
@@ -165,6 +175,7 @@ class Simulation:
                 if world.paused:
                     due = max(due, end)
                 elif end - due > max(max_lag, period):
+                    self.lost_time += end - due - max_lag
                     monitor.lose(end - due - max_lag, period, end)
                     due = end - max_lag
                 self._wait_until(due, period)
@@ -192,8 +203,10 @@ class Simulation:
     def _finish(self, window: CycleWindow, now: float) -> None:
         """Reports a window, unless the world was not stepped in it."""
         now_ns = self.world.timekeeper.sim_time_ns
-        if self._report is not None and now_ns > window.start_ns:
-            self._report(window.statistics(now, now_ns))
+        if now_ns > window.start_ns:
+            self.statistics = window.statistics(now, now_ns)
+            if self._report is not None:
+                self._report(self.statistics)
 
 
 def _period_of(update_rate: float) -> float:

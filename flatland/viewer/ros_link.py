@@ -16,7 +16,7 @@ from PyQt5.QtCore import QObject, pyqtSignal
 from std_msgs.msg import Bool
 from visualization_msgs.msg import MarkerArray
 
-from flatland.msg import DebugTopicList
+from flatland.ros.message_types import message_class
 from flatland.viewer.bounds import bounds_of
 from flatland.viewer.simulator_client import SimulatorClient, SimulatorState
 
@@ -140,12 +140,15 @@ class RosLink(QObject):
 
     def _subscribe(self) -> None:
         debug_topics = self.simulator.resolve("~debug/topics")
-        rospy.Subscriber(debug_topics, DebugTopicList, self._on_debug_topics)
+        # The package of the type depends on the simulator, and may change with its next start.
+        rospy.Subscriber(debug_topics, rospy.AnyMsg, self._on_debug_topics)
         rospy.Subscriber(
             self.simulator.resolve("~paused"), Bool, lambda message: self.paused.emit(message.data)
         )
 
-    def _on_debug_topics(self, message: Any) -> None:
+    def _on_debug_topics(self, serialized: Any) -> None:
+        message = message_class("DebugTopicList")()
+        message.deserialize(serialized._buff)
         topics = set(message.topics)
         self.debug_topics.emit(list(message.topics))
         # The walls of a layer (`…_3d`) have the same bounds as its edges.

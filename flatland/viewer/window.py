@@ -22,7 +22,7 @@ from PyQt5.QtWidgets import (
 from std_srvs.srv import Empty
 from visualization_msgs.msg import MarkerArray
 
-from flatland.srv import SetRate, SpawnModel
+from flatland.ros.message_types import service_class
 from flatland.viewer.bounds import Bounds, union
 from flatland.viewer.outline import Outline, read_outline
 from flatland.viewer.placement import Stage
@@ -273,7 +273,11 @@ class ViewerWindow(QMainWindow):
             self.status_bar.show_temporary_message(f"Cannot set the update rate: {reason}")
 
         self._link.call(
-            "set_rate", SetRate, rate, on_success=lambda _response: None, on_failure=fail
+            "set_rate",
+            service_class("SetRate"),
+            rate,
+            on_success=lambda _response: None,
+            on_failure=fail,
         )
 
     # -- spawning --------------------------------------------------------------------------
@@ -321,7 +325,7 @@ class ViewerWindow(QMainWindow):
         choice = self._choice
         self._link.call(
             "spawn_model",
-            SpawnModel,
+            service_class("SpawnModel"),
             choice.path,
             choice.name,
             choice.name,

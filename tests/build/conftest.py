@@ -82,13 +82,14 @@ def world_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="session")
 def catkin_workspace(tmp_path_factory: pytest.TempPathFactory, checkout: Path) -> Path:
-    """A workspace with flatland and the example package in src/, built and installed."""
+    """A workspace with flatland, the example package and a client in src/, built and installed."""
     if shutil.which("catkin_make", path="/usr/bin") is None:
         pytest.skip("catkin is not installed")
     workspace = tmp_path_factory.mktemp("catkin") / "work space"
     (workspace / "src").mkdir(parents=True)
     (workspace / "src" / "flatland").symlink_to(checkout)
     (workspace / "src" / "my_robots").symlink_to(checkout / "examples" / "my_robots")
+    (workspace / "src" / "a_client").symlink_to(checkout / "tests" / "build" / "client")
     environment = clean_environment(workspace)
     run(["catkin_make", "-j2"], environment, workspace, timeout=BUILD_TIMEOUT)
     run(["catkin_make", "install", "-j2"], environment, workspace, timeout=BUILD_TIMEOUT)

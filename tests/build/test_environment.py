@@ -46,6 +46,20 @@ def test_ros_tools_find_the_package(shell, installed):
     assert "string entity_A" in done.stdout
 
 
+def test_ros_tools_find_the_packages_of_the_reference(shell, installed):
+    names = "flatland_msgs flatland_plugins flatland_server flatland_viz"
+    done = shell(
+        f'set -eu; . "$0"; for name in {names}; do rospack find $name; done; '
+        "rosmsg show -r flatland_msgs/Collisions; /usr/bin/python3 -c "
+        "'import flatland_msgs.srv; print(flatland_msgs.srv.SpawnModel._type)'"
+    )
+    assert done.returncode == 0, done.stderr
+    lines = done.stdout.splitlines()
+    assert lines[:4] == [f"{installed}/.venv/share/{name}" for name in names.split()]
+    assert "Collision[] collisions" in lines
+    assert lines[-1] == "flatland_msgs/SpawnModel"
+
+
 def test_system_python_imports_services(shell, installed):
     """rosservice runs in /usr/bin/python3 and imports the class of the service."""
     done = shell('. "$0"; rossrv show flatland/SpawnModel; /usr/bin/python3 -c "'
@@ -54,10 +68,11 @@ def test_system_python_imports_services(shell, installed):
     assert f"{installed}/.venv/lib" in done.stdout
 
 
-def test_roslaunch_finds_the_launch_files(shell):
-    done = shell('. "$0"; roslaunch --nodes flatland server.launch show_viz:=false')
+@pytest.mark.parametrize("package", ["flatland", "flatland_server"])
+def test_roslaunch_finds_the_launch_files(shell, package):
+    done = shell(f'. "$0"; roslaunch --nodes {package} server.launch show_viz:=false')
     assert done.returncode == 0, done.stderr
-    assert done.stdout.strip()
+    assert done.stdout.strip() == "/flatland_server"
 
 
 def test_second_source_has_no_effect(shell):
@@ -104,6 +119,18 @@ def test_server_runs_with_a_broken_python_first_on_path(shell, world_file, tmp_p
     assert done.returncode == 0, printed
     assert "benchmark: 200 iterations" in printed
     assert "was started" not in printed
+
+
+def test_the_command_is_completed_in_an_interactive_shell(installed, tmp_path):
+    """`bash -i` reads no start file here; the completion is that of argcomplete."""
+    done = subprocess.run(
+        ["bash", "--norc", "-ic", '. "$0"; complete -p flatland', installed / "setup.bash"],
+        env={"HOME": str(tmp_path), "PATH": "/usr/bin:/bin"},
+        stdin=subprocess.DEVNULL,
+        capture_output=True,
+        text=True,
+    )
+    assert "_python_argcomplete flatland" in done.stdout, done.stderr
 
 
 def test_numpy_is_the_debian_package(shell):

@@ -76,6 +76,30 @@ def test_ros_package_data(wheel, checkout):
     assert b"<class " in wheel.read(f"{prefix}flatland_plugins.xml")
 
 
+def test_packages_of_the_reference(wheel, checkout):
+    marker = "/share/flatland_msgs/package.xml"
+    share = next(n for n in wheel.namelist() if n.endswith(marker)).removesuffix(
+        "flatland_msgs/package.xml"
+    )
+    names = {n.removeprefix(share) for n in wheel.namelist() if n.startswith(share)}
+    expected = {
+        f"flatland_msgs/{path.relative_to(checkout)}"
+        for path in (*checkout.glob("msg/*"), *checkout.glob("srv/*"))
+    }
+    for path in (checkout / "compat").rglob("*"):
+        parts = path.relative_to(checkout / "compat").parts
+        if path.is_file() and parts[1] in ("package.xml", "launch", "scripts"):
+            expected.add("/".join(parts))
+    assert {name for name in names if not name.startswith("flatland/")} == expected
+    server = wheel.read(f"{share}flatland_server/scripts/flatland_server").decode()
+    assert '/bin/flatland_server" --msgs-package flatland_msgs "$@"' in server
+    for path in (checkout / "msg").iterdir():
+        assert f"flatland_msgs/msg/_{path.stem}.py" in wheel.namelist()
+    for path in (checkout / "srv").iterdir():
+        assert f"flatland_msgs/srv/_{path.stem}.py" in wheel.namelist()
+    assert "flatland_msgs/__init__.py" in wheel.namelist()
+
+
 def test_each_script_is_an_entry_point(wheel, checkout):
     entry_points = next(n for n in wheel.namelist() if n.endswith("entry_points.txt"))
     lines = wheel.read(entry_points).decode().splitlines()
@@ -84,11 +108,14 @@ def test_each_script_is_an_entry_point(wheel, checkout):
     assert "flatland_server" in scripts
     for script in scripts:
         assert script in commands
-        (info,) = [i for i in wheel.infolist() if i.filename.endswith(f"flatland/scripts/{script}")]
+        (info,) = [
+            i for i in wheel.infolist() if i.filename.endswith(f"share/flatland/scripts/{script}")
+        ]
         assert info.external_attr >> 16 & 0o111, "roslaunch finds executable files only"
 
 
 def test_versions_agree(checkout):
     project = tomllib.loads((checkout / "pyproject.toml").read_text())["project"]
-    package = ElementTree.parse(checkout / "package.xml").getroot()
-    assert package.findtext("version") == project["version"]
+    packages = [*checkout.glob("catkin/*/package.xml"), *checkout.glob("compat/*/package.xml")]
+    versions = [ElementTree.parse(path).getroot().findtext("version") for path in packages]
+    assert versions == [project["version"]] * 5

@@ -106,7 +106,7 @@ def test_on_ros_the_package_is_found_on_the_package_path(
     example, environment, tmp_path, start, run_command
 ):
     pytest.importorskip("rospy", reason="ROS is not installed")
-    environment["ROS_PACKAGE_PATH"] += f":{example.parent}"
+    environment["ROS_PACKAGE_PATH"] += f":{example}"
     packages = run_command(
         ["rospack", "plugins", "--attrib=plugin", "flatland"], environment, tmp_path
     )

@@ -26,6 +26,7 @@ pytest.importorskip("flatland.msg", reason="the messages are not built")
 import rosgraph
 import roslib.packages
 import rospy
+from roscpp.srv import SetLoggerLevel
 from waiting import TIMEOUT, wait_until
 
 import flatland
@@ -258,13 +259,17 @@ class Ros:
 
         return self.call("/move_model", MoveModel, name, Pose2D(*pose))
 
+    def log_everything(self, node: str = "/flatland_server") -> None:
+        """Makes a node log messages of all levels."""
+        self.call(f"{node}/set_logger_level", SetLoggerLevel, "rosout", "debug")
+
     def registered(self, node: str = "/flatland_server") -> dict[str, set[str]]:
         """Returns the publishers, subscribers and services that a node has registered.
 
-        Without those of the interactive markers and the pause state, which every node registers
-        some time after its start.
+        Without those of the interactive markers, the pause state and the diagnostics, which every
+        node registers some time after its start.
         """
-        late = re.compile(rf"/interactive_model_markers/|^{node}/paused$")
+        late = re.compile(rf"/interactive_model_markers/|^{node}/paused$|^/diagnostics$")
         state = self.master.getSystemState()
         kinds = ("publishers", "subscribers", "services")
         return {
@@ -312,17 +317,21 @@ def ros_environment(checkout: Path, tmp_path_factory: pytest.TempPathFactory) ->
 
 
 def _overlay(checkout: Path, folder: Path) -> Path:
-    """Creates the layout of an installed package, with links into the source tree."""
-    share = folder / "share" / "flatland"
-    (share / "scripts").mkdir(parents=True)
-    for name in ("package.xml", "flatland_plugins.xml", "launch", "msg", "rviz", "srv", "worlds"):
-        (share / name).symlink_to(checkout / name)
-    for script in (checkout / "scripts").iterdir():
-        if script.is_file():
-            starter = share / "scripts" / script.name
-            starter.write_text(f'#!/bin/sh\nexec "{sys.executable}" "{script}" "$@"\n')
-            starter.chmod(0o755)
-    return share.parent
+    """Creates the layout of the installed packages, with links into the source tree."""
+    share = folder / "share"
+    for package in (checkout / "catkin" / "flatland", *(checkout / "compat").iterdir()):
+        installed = share / package.name
+        (installed / "scripts").mkdir(parents=True)
+        data = ("package.xml", "flatland_plugins.xml", "launch", "msg", "rviz", "srv", "worlds")
+        for name in data:
+            if (package / name).exists():
+                (installed / name).symlink_to(package / name)
+        for script in (package / "scripts").glob("*"):
+            if script.is_file():
+                starter = installed / "scripts" / script.name
+                starter.write_text(f'#!/bin/sh\nexec "{sys.executable}" "{script}" "$@"\n')
+                starter.chmod(0o755)
+    return share
 
 
 @pytest.fixture(scope="session")

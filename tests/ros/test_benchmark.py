@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from rosgraph_msgs.msg import Clock
 
 
 def test_benchmark_reports_and_ends(launcher: Any, write_world: Callable[..., Path]) -> None:
@@ -29,7 +30,9 @@ def test_interrupted_benchmark_reports_nothing(
 ) -> None:
     world = write_world("[{name: robot, model: robot.model.yaml}]")
     process = launcher.start(world_path=world, update_rate=0, benchmark_duration=1e9)
-    process.wait_for_line("cycle use")
+    process.wait_for_line("loaded")
+    clock = ros.topic("/clock", Clock)
+    clock.until(lambda message: message.clock.to_nsec() > 0)
     assert process.stop() == 0
     assert "benchmark:" not in process.output
     assert ros.registered() == {"publishers": set(), "subscribers": set(), "services": set()}

@@ -40,5 +40,5 @@ def test_all_pages_with_calls_are_tested(checkout: Path) -> None:
     with_calls = [
         str(page.relative_to(checkout)) for page in pages if _CALL.search(page.read_text())
     ]
-    # tests/examples run all commands of write_a_plugin.md.
-    assert set(with_calls) - {"docs/write_a_plugin.md"} == set(PAGES)
+    # tests/examples run all commands of these pages.
+    assert set(with_calls) - {"docs/write_a_plugin.md", "docs/several_robots.md"} == set(PAGES)

@@ -9,12 +9,10 @@ of its response.
 from __future__ import annotations
 
 import hashlib
+import importlib
 import subprocess
 
 import pytest
-
-import flatland.msg
-import flatland.srv
 
 # Including the types of `std_msgs` and `geometry_msgs` that are used.
 FIELDS = {
@@ -66,10 +64,18 @@ def test_field_lists_have_the_sums_of_the_reference(name: str) -> None:
     assert expected_sum(name) == OF_THE_REFERENCE[name]
 
 
+@pytest.mark.parametrize("package", ["flatland", "flatland_msgs"])
 @pytest.mark.parametrize("name", [*MESSAGES, *REQUESTS])
-def test_sums_of_the_classes(name: str) -> None:
-    package = flatland.msg if name in MESSAGES else flatland.srv
-    assert getattr(package, name)._md5sum == expected_sum(name)
+def test_sums_of_the_classes(name: str, package: str) -> None:
+    module = importlib.import_module(f"{package}.{'msg' if name in MESSAGES else 'srv'}")
+    generated = getattr(module, name)
+    assert generated._md5sum == expected_sum(name)
+    assert generated._type == f"{package}/{name}"
+
+
+def test_types_of_fields_are_of_the_package() -> None:
+    collisions = importlib.import_module("flatland_msgs.msg").Collisions
+    assert collisions._slot_types == ["std_msgs/Header", "flatland_msgs/Collision[]"]
 
 
 @pytest.mark.parametrize(

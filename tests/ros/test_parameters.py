@@ -34,9 +34,12 @@ def test_defaults() -> None:
         if_blocked="warn",
         move_keeps_odometry=False,
         initialpose_model="",
+        use_sim_time=True,
+        clock_rate=0.0,
         publish_map="",
         map_frame="map",
         map_resolution=0.05,
+        msgs_package="flatland",
     )
 
 
@@ -76,6 +79,10 @@ def test_defaults() -> None:
         ("initialpose_model", "robot", "robot"),
         ("initialpose_model", 7, "7"),
         ("initialpose_model", " ", ""),
+        ("use_sim_time", False, False),
+        ("use_sim_time", "true", True),
+        ("clock_rate", 100, 100.0),
+        ("clock_rate", "inf", 0.0),
         ("publish_map", "walls", "walls"),
         ("publish_map", "", ""),
         ("publish_map", " ", ""),
@@ -85,6 +92,8 @@ def test_defaults() -> None:
         ("map_frame", "/map", "map"),
         ("map_resolution", "0.1", 0.1),
         ("map_resolution", 1, 1.0),
+        ("msgs_package", "flatland", "flatland"),
+        ("msgs_package", "flatland_msgs", "flatland_msgs"),
     ],
 )
 def test_valid_values(name: str, value: object, expected: object) -> None:
@@ -103,6 +112,7 @@ def test_valid_values(name: str, value: object, expected: object) -> None:
         "benchmark_duration",
         "plugin_timeout",
         "shutdown_timeout",
+        "clock_rate",
         "map_resolution",
     ],
 )
@@ -147,6 +157,7 @@ def test_invalid_numbers(name: str, value: object) -> None:
         ("seed", 1.5),
         ("seed", "a"),
         ("seed", False),
+        ("use_sim_time", "maybe"),
         ("if_blocked", "stop"),
         ("if_blocked", ""),
         ("if_blocked", True),
@@ -155,6 +166,10 @@ def test_invalid_numbers(name: str, value: object) -> None:
         ("initialpose_model", True),
         ("initialpose_model", ["robot"]),
         ("initialpose_model", 1.5),
+        ("msgs_package", "std_msgs"),
+        ("msgs_package", ""),
+        ("msgs_package", True),
+        ("msgs_package", ["flatland"]),
         ("world_path", 5),
         ("world_path", ["a"]),
     ],
@@ -296,9 +311,10 @@ def test_missed_rate_is_reported_with_the_most_expensive_plugin(
 
 
 def test_lag_within_max_lag_is_not_reported(
-    launcher: Any, slow_world: Path, eventually: Callable[..., Any]
+    launcher: Any, ros: Any, slow_world: Path, eventually: Callable[..., Any]
 ) -> None:
     process = launcher.server(slow_world, update_rate=100, max_lag=1000)
+    ros.log_everything()
     # With the default value, the warning is logged with the third report.
     eventually("six reports", lambda: process.output.count("cycle use min") >= 6)
     assert "cannot be held" not in process.output

@@ -158,6 +158,10 @@ def test_node_continues_without_its_master(launcher: Any, world: Path, eventuall
     process.wait_for_line("waiting for the ROS master")
     core = launcher.program("rosmaster", "--core", "-p", str(port))
     process.wait_for_line("loaded")
+    level = launcher.program(
+        "rosservice", "call", "/flatland_server/set_logger_level", "rosout", "debug"
+    )
+    assert level.wait() == 0, level.output
     core.kill()
     reports = process.output.count("cycle use")
     eventually("two more reports", lambda: process.output.count("cycle use") >= reports + 2)
@@ -186,6 +190,7 @@ def test_server_launch_passes_all_parameters(launcher: Any, ros: Any, world: Pat
         "seed:=7",
         "plugin_timeout:=30",
         "shutdown_timeout:=5",
+        "clock_rate:=500",
         "publish_map:=2d",
     )
     times = [message.clock.to_nsec() for message in ros.topic("/clock", Clock).take(20)]
@@ -205,9 +210,13 @@ def test_server_launch_passes_all_parameters(launcher: Any, ros: Any, world: Pat
         "if_blocked": "warn",
         "move_keeps_odometry": False,
         "initialpose_model": "",
+        "use_sim_time": True,
+        "clock_rate": 500,
         "publish_map": "2d",
+        "msgs_package": "flatland",
     }
     assert ros.master.getParam("/use_sim_time") is True
+    ros.log_everything()
     process.wait_for_line("real-time factor: target inf")
     assert "drawn at random" not in process.output
     assert process.stop() == 0

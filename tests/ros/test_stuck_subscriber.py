@@ -3,19 +3,15 @@
 from __future__ import annotations
 
 import itertools
-import socket
-import struct
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
-from urllib.parse import urlparse
-from xmlrpc.client import ServerProxy
 
 import pytest
+from raw_subscriber import RawSubscriber
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import LaserScan
 from std_srvs.srv import Empty
-from waiting import TIMEOUT
 
 BEAMS = """
 bodies: [{name: base, footprints: [{type: circle, radius: 0.2, density: 1}]}]
@@ -26,44 +22,6 @@ plugins:
 SCAN_SIZE = 40_000  # bytes, about: 10 001 beams
 
 
-class StuckSubscriber:
-    """A subscriber that completes the handshake of TCPROS, and then reads only on demand."""
-
-    def __init__(self, master: Any, topic: str, message_type: type[Any]) -> None:
-        (publisher,) = next(nodes for name, nodes in master.getSystemState()[0] if name == topic)
-        node = ServerProxy(master.lookupNode(publisher))
-        code, text, protocol = node.requestTopic("/stuck", topic, [["TCPROS"]])
-        assert code == 1, text
-        self.socket = socket.socket()
-        self.socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
-        self.socket.settimeout(TIMEOUT)
-        self.socket.connect((urlparse(f"//{protocol[1]}").hostname, protocol[2]))
-        fields = {
-            "callerid": "/stuck",
-            "topic": topic,
-            "type": message_type._type,
-            "md5sum": message_type._md5sum,
-            "message_definition": message_type._full_text,
-        }
-        lines = [f"{name}={value}".encode() for name, value in fields.items()]
-        header = b"".join(struct.pack("<I", len(line)) + line for line in lines)
-        self.socket.sendall(struct.pack("<I", len(header)) + header)
-        assert b"md5sum" in self.read_frame()
-
-    def read_frame(self) -> bytes:
-        """Reads one message or the header."""
-        (size,) = struct.unpack("<I", self._read(4))
-        return self._read(size)
-
-    def _read(self, size: int) -> bytes:
-        data = b""
-        while len(data) < size:
-            part = self.socket.recv(size - len(data))
-            assert part, "the publisher closed the connection"
-            data += part
-        return data
-
-
 @pytest.fixture(autouse=True)
 def server(launcher: Any, write_world: Callable[..., Path]) -> Any:
     world = write_world("[{name: robot, model: beams.model.yaml}]", beams=BEAMS)
@@ -71,13 +29,13 @@ def server(launcher: Any, write_world: Callable[..., Path]) -> Any:
 
 
 @pytest.fixture
-def stuck(ros: Any) -> Iterator[StuckSubscriber]:
-    subscriber = StuckSubscriber(ros.master, "/scan", LaserScan)
+def stuck(ros: Any) -> Iterator[RawSubscriber]:
+    subscriber = RawSubscriber(ros.master, "/scan", LaserScan, receive_buffer=4096)
     yield subscriber
     subscriber.socket.close()
 
 
-def test_other_subscribers_receive_all_messages(ros: Any, stuck: StuckSubscriber) -> None:
+def test_other_subscribers_receive_all_messages(ros: Any, stuck: RawSubscriber) -> None:
     del stuck
     clock, scans = ros.topic("/clock", Clock), ros.topic("/scan", LaserScan)
     # 500 scans of 40 kB exceed the buffers of any socket.
@@ -92,7 +50,7 @@ def test_other_subscribers_receive_all_messages(ros: Any, stuck: StuckSubscriber
 
 
 def test_slow_reader_receives_complete_messages_up_to_the_newest(
-    ros: Any, stuck: StuckSubscriber
+    ros: Any, stuck: RawSubscriber
 ) -> None:
     clock = ros.topic("/clock", Clock)
     first = clock.next().clock.to_sec()
@@ -111,7 +69,7 @@ def test_slow_reader_receives_complete_messages_up_to_the_newest(
     assert max(steps) > 5_000_000
 
 
-def test_closed_connection_is_removed(ros: Any, stuck: StuckSubscriber, server: Any) -> None:
+def test_closed_connection_is_removed(ros: Any, stuck: RawSubscriber, server: Any) -> None:
     clock = ros.topic("/clock", Clock)
     first = clock.next().clock.to_sec()
     clock.until(lambda message: message.clock.to_sec() > first + 500 * 0.005)

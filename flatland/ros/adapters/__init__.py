@@ -62,7 +62,8 @@ def register_adapter(
     Args:
         value_type: Type of the values carried by the ports of a plugin.
         message_type: ROS message class.
-        to_message: Converts a value to a message; called in the thread that steps the world.
+        to_message: Converts a value to a new message; called in the thread that steps the world.
+            The message is sent at the end of the step.
         from_message: Converts a message to a value; called in a rospy thread.
 
     Raises:

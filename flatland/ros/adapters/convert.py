@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 from genpy import Time
@@ -13,6 +13,24 @@ from std_msgs.msg import Header
 from flatland import geometry
 from flatland.geometry import DoubleArray, quaternion_from_yaw
 from flatland.timekeeper import NANOSECONDS
+
+_stamps: Callable[[int], int] | None = None
+
+
+def set_stamps(stamps: Callable[[int], int] | None) -> None:
+    """Sets the stamps of all messages of this process.
+
+    Args:
+        stamps: Returns the stamp [ns] of a simulated time [ns]; called in any thread. None if
+            stamps are simulated times.
+    """
+    global _stamps
+    _stamps = stamps
+
+
+def stamp(nanoseconds: int) -> int:
+    """Returns the stamp [ns] of a simulated time [ns]: that time, or wall time."""
+    return nanoseconds if _stamps is None else _stamps(nanoseconds)
 
 
 def make(message_type: type[Any], *fields: Any) -> Any:
@@ -27,8 +45,10 @@ def make(message_type: type[Any], *fields: Any) -> Any:
 
 
 def time(nanoseconds: int, time_type: type[Time] = Time) -> Time:
-    """Converts simulated nanoseconds to a ROS time without rounding."""
+    """Converts simulated nanoseconds to the ROS time of a stamp without rounding."""
     result: Time = object.__new__(time_type)
+    if _stamps is not None:
+        nanoseconds = _stamps(nanoseconds)
     result.secs, result.nsecs = divmod(nanoseconds, NANOSECONDS)
     return result
 

@@ -13,10 +13,10 @@ from visualization_msgs.msg import MarkerArray
 from flatland.entities.layer import Layer
 from flatland.entities.model import Model
 from flatland.errors import FlatlandError
-from flatland.msg import DebugTopicList
 from flatland.ros.markers.layer_markers import LayerMarkers
 from flatland.ros.markers.model_markers import ModelMarkers
 from flatland.ros.markers.packed_markers import PackedMarkers
+from flatland.ros.message_types import message_class
 from flatland.ros.names import UniqueNames, legal_name
 from flatland.ros.transport.registrar import Registrar
 from flatland.ros.transport.state_topic import StateTopic
@@ -27,6 +27,7 @@ from flatland.simulation import Simulation
 _LOG = logging.getLogger("flatland")
 
 NAMESPACE: Final = "~debug"
+_DebugTopicList = message_class("DebugTopicList")
 CLOSE_DELAY: Final = 0.2  # s of wall time between the last message and the end of a topic
 
 
@@ -62,7 +63,7 @@ class DebugTopics(WorldObserver):
         self._models: dict[str, _Entry] = {}
         self._closing: dict[str, tuple[StateTopic, float]] = {}  # by name, with the closing time
         self._ticker = Ticker("flatland-markers", rate, self._post, self._tick)
-        self._topics = self._open("topics", DebugTopicList, self._topic_list)
+        self._topics = self._open("topics", _DebugTopicList, self._topic_list)
         for layer in self._world.layers:
             self._add_layer(layer)
         for model in self._world.models:
@@ -168,9 +169,9 @@ class DebugTopics(WorldObserver):
     def _with_time(self, make: Callable[[int], PackedMarkers]) -> Callable[[], PackedMarkers]:
         return lambda: make(self._world.timekeeper.sim_time_ns)
 
-    def _topic_list(self) -> DebugTopicList:
+    def _topic_list(self) -> Any:
         layers = [entry for entries in self._layers.values() for entry in entries]
-        return DebugTopicList([entry.name for entry in (*layers, *self._models.values())])
+        return _DebugTopicList([entry.name for entry in (*layers, *self._models.values())])
 
     def _tick(self, now: float) -> bool:
         """Publishes the models and closes the topics of deleted models."""

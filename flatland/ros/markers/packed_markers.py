@@ -18,6 +18,7 @@ from std_msgs.msg import ColorRGBA
 from visualization_msgs.msg import Marker, MarkerArray
 
 from flatland.geometry import quaternion_from_yaw
+from flatland.ros.adapters import convert
 from flatland.ros.names import sendable_text
 from flatland.timekeeper import NANOSECONDS
 
@@ -100,8 +101,8 @@ class PackedMarkers(MarkerArray):  # type: ignore[misc]
         return self._append(self._new(Marker.DELETEALL), b"", 0)
 
     def set_stamp(self, time_ns: int) -> None:
-        """Sets the stamp of all markers [ns]."""
-        stamp = divmod(time_ns, NANOSECONDS)
+        """Sets the stamp of all markers to a simulated time [ns]."""
+        stamp = divmod(convert.stamp(time_ns), NANOSECONDS)
         for offset in self._stamps:
             _STAMP.pack_into(self._data, offset, *stamp)
 

@@ -12,6 +12,7 @@ import logging
 import select
 import socket
 import threading
+import weakref
 from collections import deque
 from typing import Any
 
@@ -25,6 +26,9 @@ class Outbox:
 
     Replaces `write_data` of the connection. A message is sent completely or not at all: when the
     queue is full, the oldest message is dropped, but never one that is partially sent.
+
+    Attributes:
+        dropped: Number of dropped messages.
     """
 
     def __init__(self, transport: Any, queue_size: int) -> None:
@@ -38,9 +42,27 @@ class Outbox:
         self._lock = threading.Lock()
         self._partial: memoryview | None = None  # rest of the partially sent message
         self._queue: deque[bytes] = deque(maxlen=queue_size)
+        self.dropped = 0
         transport.socket.setblocking(False)
         transport.set_cleanup_callback(self._closed)
         transport.write_data = self.write
+        with _all_lock:
+            _all.add(self)
+
+    @property
+    def topic(self) -> str:
+        """Resolved name of the topic."""
+        return str(self._transport.name)
+
+    @property
+    def subscriber(self) -> str:
+        """Name of the node that receives the messages."""
+        return str(self._transport.endpoint_id)
+
+    @property
+    def closed(self) -> bool:
+        """Whether the connection is closed."""
+        return bool(self._transport.done)
 
     def write(self, data: bytes) -> None:
         """Sends or queues a message without blocking.
@@ -54,6 +76,8 @@ class Outbox:
         if self._transport.done:
             raise TransportTerminated("connection closed")
         with self._lock:
+            if len(self._queue) == self._queue.maxlen:
+                self.dropped += 1
             self._queue.append(data)
             if self._partial is not None or len(self._queue) > 1:
                 return  # The flusher already watches the socket; keep the order.
@@ -100,6 +124,17 @@ class Outbox:
     def _closed(self, transport: Any) -> None:
         """Stops watching the socket; called by rospy when the connection is closed."""
         _flusher().forget(self, transport.fileno())
+
+
+_all: weakref.WeakSet[Outbox] = weakref.WeakSet()
+_all_lock = threading.Lock()
+
+
+def open_outboxes() -> list[Outbox]:
+    """Returns the outboxes of all open connections of this process."""
+    with _all_lock:
+        outboxes = list(_all)
+    return [outbox for outbox in outboxes if not outbox.closed]
 
 
 class _Flusher(threading.Thread):

@@ -1,7 +1,14 @@
+#include <box2d/box2d.h>
+
+#include <string>
+
 #include "bindings/bindings.h"
 
 PYBIND11_MODULE(_core, module) {
   module.doc() = "Box2D objects by id; used only by flatland.physics.";
+  module.attr("BOX2D_VERSION") = std::to_string(b2_version.major) + "." +
+                                 std::to_string(b2_version.minor) + "." +
+                                 std::to_string(b2_version.revision);
   flatland::bind_errors();
   flatland::WorldClass world = flatland::bind_world(module);
   flatland::bind_bodies(world);

@@ -47,7 +47,7 @@ def connect() -> Iterator[Callable[[], tuple[TCPROSTransport, list[bytes]]]]:
         end.close()
 
 
-# flatland.ros.bridge: the time of the node is set without a subscription to /clock.
+# flatland.ros.clock: the time of the node is set without a subscription to /clock.
 RUN_CLOCK = """
 import threading
 import rospy
@@ -151,6 +151,7 @@ def test_connections_have_the_attributes_that_an_outbox_uses(connect: Any) -> No
     closed = []
     transport.set_cleanup_callback(closed.append)
     assert (transport.done, transport.stat_bytes, transport.stat_num_msg) == (False, 0, 0)
+    assert (transport.name, transport.endpoint_id) == ("pinned", "http://localhost:1/")
     assert transport.fileno() == transport.socket.fileno() >= 0
     transport.close()
     assert transport.done

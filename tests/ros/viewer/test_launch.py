@@ -101,6 +101,7 @@ def test_all_displays_are_enabled_in_the_rviz_configuration(ros: Any, checkout: 
         assert (display["Enabled"], display["Value"]) == (True, True), display["Name"]
 
 
+@pytest.mark.parametrize("package", ["flatland", "flatland_server"])
 def test_viewer_starts_with_the_simulator_and_can_be_closed_alone(
     on_screen: Any,
     ros: Any,
@@ -108,8 +109,10 @@ def test_viewer_starts_with_the_simulator_and_can_be_closed_alone(
     screen: Any,
     screenshot: Callable[..., Any],
     eventually: Callable[..., Any],
+    package: str,
 ) -> None:
-    launch = on_screen.launch("flatland", "server.launch", f"world_path:={room}")
+    # The types of the debug topics are those of flatland or flatland_msgs.
+    launch = on_screen.launch(package, "server.launch", f"world_path:={room}")
     screenshot(lambda picture: len(picture.places(BLUE)) > 10)
     assert "/flatland_viz" in nodes()
 
@@ -126,15 +129,18 @@ def test_viewer_starts_with_the_simulator_and_can_be_closed_alone(
     assert launch.stop() == 0
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize(
+    ("package", "number"), [("flatland", signal.SIGINT), ("flatland_viz", signal.SIGTERM)]
+)
 def test_viewer_exits_on_a_signal(
     on_screen: Any,
     ros: Any,
     running_room: Any,
     screenshot: Callable[..., Any],
+    package: str,
     number: signal.Signals,
 ) -> None:
-    viewer = on_screen.program("rosrun", "flatland", "flatland_viz")
+    viewer = on_screen.program("rosrun", package, "flatland_viz")
     screenshot(lambda picture: len(picture.places(BLUE)) > 10)
     viewer.send(number)
     assert viewer.wait() == 0

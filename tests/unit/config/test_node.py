@@ -30,7 +30,7 @@ def test_the_home_of_an_unknown_user_is_not_expanded() -> None:
 
 
 def test_positions_in_messages() -> None:
-    assert Source("w.yaml", "/").position(3) == " [w.yaml:3]"
-    assert Source("w.yaml", "/").position(None) == " [w.yaml]"
-    assert Source("", "/").position(3) == " [line 3]"
-    assert Source("", "/").position(None) == ""
+    assert Source("w.yaml", "/").place(3).suffix == " [w.yaml:3]"
+    assert Source("w.yaml", "/").place(None).suffix == " [w.yaml]"
+    assert Source("", "/").place(3).suffix == " [line 3]"
+    assert Source("", "/").place(None).suffix == ""

@@ -8,7 +8,9 @@ import pytest
 
 import flatland
 from flatland import PluginError
-from flatland.plugin_api.missing_plugins import PORTING_GUIDE, MissingPluginsError
+from flatland.plugin_api.fork_plugins import alternative_to, fork_plugin_names
+from flatland.plugin_api.manifest import PORTING_GUIDE
+from flatland.plugin_api.missing_plugins import MissingPluginsError
 
 BODY = "{name: base, footprints: [{type: circle, radius: 0.2, density: 1}]}"
 
@@ -209,6 +211,65 @@ def test_a_cpp_manifest_that_cannot_be_read_is_reported(files, monkeypatch):
     assert f'; manifests with errors: manifest "{path}" cannot be read: No such file' in find_error(
         "Door"
     )
+
+
+def test_a_model_with_a_cpp_plugin_names_the_package_and_the_porting_guide(
+    files, monkeypatch, empty_world
+):
+    files.write("hall/package.xml", CPP_PACKAGE.format(name="hall", tag="flatland_server"))
+    files.write("hall/plugins.xml", CPP_MANIFEST)
+    monkeypatch.setenv("ROS_PACKAGE_PATH", str(files.folder))
+    path = write_model(files, "m.yaml", "name: up, type: Elevator")
+    message = error_of(empty_world.spawn_model, path, "m")
+    assert (
+        f'; a C++ plugin of that name is exported by package "hall" '
+        f"({files.folder}/hall/plugins.xml); C++ plugins cannot be loaded, {PORTING_GUIDE} "
+        "explains how to port them to Python; "
+    ) in message
+    assert message.endswith(f" [{path}:3]")
+
+
+def test_a_cpp_class_with_a_base_class_of_flatland_is_reported(files, monkeypatch):
+    text = CPP_MANIFEST.replace("flatland_server::", "flatland::")
+    manifest = files.write("cpp.xml", text)
+    monkeypatch.setenv("FLATLAND_PLUGIN_PATH", manifest)
+    assert (
+        f'; manifests with errors: manifest "{manifest}", class "flatland_plugins::Elevator": '
+        '"flatland_plugins::Elevator" is a C++ plugin, which cannot be loaded; '
+        f"{PORTING_GUIDE} explains how to port it to Python"
+    ) in find_error("Elevator")
+
+
+@pytest.mark.parametrize(
+    ("type_name", "advice"),
+    [
+        ("PedsimMovement", "a Python plugin can receive its agents with self.ros.subscribe"),
+        ("VehicleMovement", "a Python plugin can receive its agents with self.ros.subscribe"),
+        ("PosePub", "use ModelTfPublisher with publish_tf_world: true"),
+        ("DiffDrive2", "use DiffDrive"),
+        ("ackermannDrive", "use TricycleDrive, "),
+        ("flatland_plugins::AckermannDrive", "use TricycleDrive, "),
+        ("arena_plugins/RandomMove", "use Tween for a periodic motion"),
+        ("Tween2", "use Tween, which moves to a single pose"),
+        ("HoloSecondOrder", "write a Python plugin that calls body.set_velocity(vx, vy, omega)"),
+    ],
+)
+def test_alternatives_to_the_plugins_of_forks(type_name, advice):
+    text = find_error(type_name).split("; forks of the reference have a plugin of that name: ")[1]
+    assert advice in text
+
+
+def test_other_names_have_no_alternative():
+    for type_name in ("Elevator", "Pose", "hall::Pub"):
+        assert "fork" not in find_error(type_name)
+
+
+def test_alternatives_name_existing_plugins_only():
+    known = {name.split("::")[1] for name in flatland.World(seed=1).plugin_host.registry.classes}
+    for name in fork_plugin_names():
+        assert name not in known
+        words = re.findall(r"\b[A-Z][A-Za-z]{3,}\b", alternative_to(name))
+        assert set(words) - {"Python"} <= known, name
 
 
 def test_cpp_plugins_of_a_listed_manifest_are_named(files, monkeypatch):

@@ -15,7 +15,7 @@ plugins: [{type: DiffDrive, name: drive, body: base}]
 EVENTS = (
     *("attached", "detached", "output_opened", "output_closed", "command_opened"),
     *("command_closed", "model_added", "model_moved", "model_removed", "layer_changed"),
-    *("time_advanced", "transforms_sent"),
+    *("step_started", "time_advanced", "transforms_sent", "step_finished"),
 )
 
 

@@ -2,17 +2,16 @@
 
 import math
 
-from genpy import Time
 from sensor_msgs.msg import BatteryState
 
-from flatland.ros.adapters import register_adapter
+from flatland.ros.adapters import convert, register_adapter
 from my_robots.battery import BatteryReading
 
 
 def to_message(reading: BatteryReading) -> BatteryState:
     """Converts a reading to a message."""
     message = BatteryState()
-    message.header.stamp = Time(*divmod(reading.stamp, 1_000_000_000))
+    message.header.stamp = convert.time(reading.stamp)
     message.voltage = reading.voltage
     message.current = reading.power / reading.voltage
     message.charge = reading.energy / reading.voltage

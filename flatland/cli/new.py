@@ -1,0 +1,159 @@
+"""`flatland new`: creates a robot, a world or a package with a plugin to start from."""
+
+from __future__ import annotations
+
+import argparse
+import importlib.resources
+import keyword
+import os
+import re
+import sys
+import tempfile
+from collections.abc import Iterator
+from importlib.resources.abc import Traversable
+from pathlib import Path
+
+import numpy as np
+
+from flatland.cli.arguments import Commands, add_command
+from flatland.errors import FlatlandError
+
+_EXAMPLES = (
+    "flatland new robot rover",
+    "flatland new world arena",
+    "flatland new plugin speedometer",
+    "flatland new world lab --folder worlds",
+)
+_NEXT = {
+    "robot": ("flatland check {path}", "flatland info {path}"),
+    "world": (
+        "flatland check {path}/world.yaml",
+        "flatland show {path}/world.yaml -o {name}.png",
+        "flatland run {path}/world.yaml --duration 60",
+        "roslaunch flatland server.launch world_path:=$PWD/{path}/world.yaml",
+    ),
+    "plugin": ("python3 -m unittest discover -s {path}/test",),
+}
+_PIXELS_PER_METRE = 20
+_ROOM = (8.0, 6.0)  # m
+
+
+def add(commands: Commands) -> None:
+    """Adds the command."""
+    parser = add_command(
+        commands,
+        "new",
+        summary="create a robot, a world or a plugin to start from",
+        description="Creates commented files that run: a robot with a drive and a laser scanner "
+        "(the file NAME.model.yaml), a world with a map and a robot (the folder NAME), or a ROS "
+        "package with a plugin and its test (the folder NAME). Existing files are never changed.",
+        examples=_EXAMPLES,
+    )
+    parser.add_argument("kind", choices=sorted(_NEXT), help="what to create")
+    parser.add_argument("name", metavar="NAME", help="letters, digits and underscores")
+    parser.add_argument(
+        "--folder",
+        type=Path,
+        default=Path(),
+        help="existing folder to create it in (default: the current one)",
+    )
+    parser.set_defaults(run=_new)
+
+
+def _new(options: argparse.Namespace) -> int:
+    path = create(options.kind, options.name, options.folder)
+    print(f"created {path}")
+    print("next:")
+    for command in _NEXT[options.kind]:
+        print(f"  {command.format(path=path, name=options.name)}")
+    return 0
+
+
+def create(kind: str, name: str, folder: Path) -> Path:
+    """Creates a robot, a world or a plugin.
+
+    Args:
+        kind: `robot`, `world` or `plugin`.
+        name: Its name.
+        folder: Existing folder to create it in.
+
+    Returns:
+        The file of the robot, or the folder of the world or plugin.
+
+    Raises:
+        FlatlandError: The name is invalid, or the file or folder exists.
+        OSError: A file cannot be written; nothing is left behind.
+    """
+    _check_name(kind, name)
+    target = folder / (f"{name}.model.yaml" if kind == "robot" else name)
+    if target.exists() or target.is_symlink():
+        raise FlatlandError(f"{target} exists, choose another name or --folder")
+    if not folder.is_dir():
+        raise FlatlandError(f"the folder {folder} does not exist")
+    # In a temporary folder first, so that nothing incomplete is left behind.
+    with tempfile.TemporaryDirectory(dir=folder, prefix=".flatland-new-") as temporary:
+        content = Path(temporary) / "content"
+        content.mkdir()
+        _write_templates(kind, name, content)
+        if kind == "world":
+            _write_templates("robot", "robot", content)
+            _write_map(content / "map.pgm")
+        source = content / target.name if kind == "robot" else content
+        os.rename(source, target)  # noqa: PTH104
+    return target
+
+
+def _check_name(kind: str, name: str) -> None:
+    if kind == "plugin":
+        if not re.fullmatch("[a-z][a-z0-9_]*", name):
+            raise FlatlandError(
+                "the name of a package must start with a lower-case letter and contain only "
+                f"lower-case letters, digits and underscores, got {name!r}"
+            )
+        if keyword.iskeyword(name) or name in sys.stdlib_module_names or name == "flatland":
+            raise FlatlandError(f"the name {name!r} is that of a Python keyword or module")
+    elif not re.fullmatch("[A-Za-z][A-Za-z0-9_]*", name):
+        raise FlatlandError(
+            "the name must start with a letter and contain only letters, digits and underscores, "
+            f"got {name!r}"
+        )
+
+
+def _write_templates(kind: str, name: str, folder: Path) -> None:
+    root = importlib.resources.files("flatland.cli") / "templates" / kind
+    class_name = "".join(part.capitalize() for part in name.split("_"))
+    for parts, template in _files(root):
+        path = folder.joinpath(*(part.replace("__name__", name) for part in parts))
+        path = path.with_name(path.name.removesuffix(".in"))
+        path.parent.mkdir(parents=True, exist_ok=True)
+        text = template.read_text(encoding="utf-8")
+        text = text.replace("@name@", name).replace("@Name@", class_name)
+        path.write_text(text, encoding="utf-8")
+
+
+def _files(folder: Traversable, *parents: str) -> Iterator[tuple[tuple[str, ...], Traversable]]:
+    """Iterates over all templates below a folder, with the parts of their paths."""
+    for entry in sorted(folder.iterdir(), key=lambda entry: entry.name):
+        if entry.is_dir():
+            yield from _files(entry, *parents, entry.name)
+        elif entry.name.endswith(".in"):
+            yield (*parents, entry.name), entry
+
+
+def _write_map(path: Path) -> None:
+    """Draws a room with a partition and two pillars as a grey image (PGM)."""
+    width, height = (round(side * _PIXELS_PER_METRE) for side in _ROOM)
+    image = np.zeros((height, width), np.uint8)  # black is occupied
+
+    def fill(x_min: float, y_min: float, x_max: float, y_max: float, value: int) -> None:
+        columns = slice(round(x_min * _PIXELS_PER_METRE), round(x_max * _PIXELS_PER_METRE))
+        rows = slice(
+            height - round(y_max * _PIXELS_PER_METRE), height - round(y_min * _PIXELS_PER_METRE)
+        )
+        image[rows, columns] = value
+
+    fill(0.2, 0.2, _ROOM[0] - 0.2, _ROOM[1] - 0.2, 255)
+    fill(5.0, 2.0, 5.2, _ROOM[1], 0)  # the partition leaves a passage of 1.8 m
+    fill(2.8, 3.6, 3.2, 4.0, 0)
+    fill(6.4, 2.4, 6.8, 2.8, 0)
+    path.write_bytes(b"P5\n%d %d\n255\n" % (width, height) + image.tobytes())

@@ -1,0 +1,96 @@
+"""Pictures of one world at many times, for videos."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from flatland.drawing.capture import Scene, capture_scene
+from flatland.drawing.layout import Layout, checked_view, default_view
+from flatland.drawing.render import MATPLOTLIB_LOCK, check_drawing_options, check_matplotlib
+from flatland.runtime.observer import WorldObserver
+
+if TYPE_CHECKING:
+    from flatland.world import World
+
+
+class FrameRenderer(WorldObserver):
+    """Draws pictures of a world with the same view.
+
+    Axes and walls are drawn once, so that a picture takes less time than with `draw`; walls that
+    change are drawn again. The view is that of the first picture.
+    """
+
+    def __init__(
+        self,
+        world: World,
+        *,
+        size: tuple[int, int] | None = None,
+        dpi: float = 100.0,
+        view: Sequence[float] | None = None,
+        layers: Iterable[str] | None = None,
+        scans: bool = True,
+        names: bool = False,
+        axes: bool = True,
+    ) -> None:
+        """Determines the view; see `draw` for the arguments.
+
+        The width and height of pictures are rounded down to even numbers, as video codecs require.
+
+        Raises:
+            FlatlandError: The world is closed, a layer does not exist, or matplotlib is missing.
+            ValueError: `size`, `dpi`, `view` or `layers` is invalid.
+        """
+        check_matplotlib()
+        check_drawing_options(dpi, layers)
+        self._world = world
+        self._layers = None if layers is None else list(layers)
+        self._dpi, self._scans, self._names = dpi, scans, names
+        bounds = None if view is None else checked_view(view)
+        scene = capture_scene(world, self._layers, scans)
+        layout = Layout.make(size, dpi, bounds or default_view(scene), axes)
+        columns, rows = (side // 2 * 2 for side in layout.size)
+        self._layout = Layout.make((max(columns, 2), max(rows, 2)), dpi, layout.view, axes)
+        self._figure: Any = None
+        self._background: Any = None
+        world.add_observer(self)
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """Width and height of the pictures [pixels]."""
+        return self._layout.size
+
+    def layer_changed(self, layer_name: str) -> None:  # noqa: ARG002
+        """Draws the walls again for the next picture."""
+        self._background = None
+
+    def picture(self) -> npt.NDArray[np.uint8]:
+        """Draws the current state of the world.
+
+        Returns:
+            RGB image, top row first, shape (height, width, 3).
+        """
+        from flatland.drawing.painter import paint, paint_models
+
+        with MATPLOTLIB_LOCK:
+            if self._background is None:
+                walls = capture_scene(self._world, self._layers, scans=False).layers
+                scene = Scene(walls, [], [], [])
+                self._figure = paint(scene, self._layout, self._dpi, names=False)
+                self._figure.canvas.draw()
+                self._background = self._figure.canvas.copy_from_bbox(self._figure.bbox)
+            canvas, axes = self._figure.canvas, self._figure.axes[0]
+            canvas.restore_region(self._background)
+            fixed = set(axes.get_children())
+            scene = capture_scene(self._world, (), self._scans)
+            paint_models(axes, scene, self._layout, self._dpi, self._names)
+            moving = [artist for artist in axes.get_children() if artist not in fixed]
+            for artist in sorted(moving, key=lambda artist: artist.get_zorder()):
+                axes.draw_artist(artist)
+            pixels = np.array(canvas.buffer_rgba())[:, :, :3]
+            for artist in moving:
+                artist.remove()
+        return np.ascontiguousarray(pixels)

@@ -1,0 +1,85 @@
+"""Video files, written by OpenCV."""
+
+from __future__ import annotations
+
+import importlib
+import logging
+import os
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+import numpy.typing as npt
+
+from flatland.errors import FlatlandError
+
+_LOG = logging.getLogger("flatland")
+
+VIDEO_FORMATS: Final = (".mp4",)
+# H.264, which browsers play; MPEG-4 Part 2 where OpenCV was built without an encoder for it.
+_CODECS: Final = ("avc1", "mp4v")
+
+
+def check_opencv() -> None:
+    """Checks that OpenCV can be imported.
+
+    Raises:
+        FlatlandError: OpenCV is missing or broken.
+    """
+    try:
+        importlib.import_module("cv2")
+    except ImportError as error:
+        raise FlatlandError(
+            f"videos need OpenCV ({error}): apt-get install python3-opencv"
+        ) from error
+
+
+class VideoFile:
+    """A video file that is open for writing.
+
+    Attributes:
+        codec: Four characters of the codec, `avc1` for H.264.
+        frames: Number of frames written.
+    """
+
+    def __init__(self, path: str | os.PathLike[str], fps: float, size: tuple[int, int]) -> None:
+        """Creates the file.
+
+        Args:
+            path: The file, overwritten if it exists.
+            fps: Frames per second.
+            size: Width and height [pixels], even numbers.
+
+        Raises:
+            FlatlandError: OpenCV is missing.
+            OSError: The file cannot be written.
+        """
+        check_opencv()
+        cv2: Any = importlib.import_module("cv2")
+        self._path = Path(path)
+        with self._path.open("wb"):
+            pass  # OpenCV does not say why it cannot write a file
+        self.frames = 0
+        for self.codec in _CODECS:
+            code = cv2.VideoWriter_fourcc(*self.codec)
+            self._writer = cv2.VideoWriter(str(path), cv2.CAP_FFMPEG, code, fps, size)
+            if self._writer.isOpened():
+                break
+            _LOG.warning('OpenCV has no encoder for the codec "%s"', self.codec)
+        else:
+            raise OSError(f"OpenCV cannot write {path} with the codecs {', '.join(_CODECS)}")
+
+    def write(self, image: npt.NDArray[np.uint8]) -> None:
+        """Appends a frame, an RGB image of shape (height, width, 3)."""
+        self._writer.write(np.ascontiguousarray(image[:, :, ::-1]))  # as BGR
+        self.frames += 1
+
+    def close(self) -> None:
+        """Completes the file.
+
+        Raises:
+            OSError: The file was not written, for example because the disk is full.
+        """
+        self._writer.release()
+        if self.frames and not self._path.stat().st_size:
+            raise OSError(f"OpenCV did not write {self._path}")

@@ -1,0 +1,1 @@
+"""Teleoperation by keyboard."""

@@ -1,0 +1,136 @@
+"""`flatland doctor`, with things that are really missing."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import venv
+from pathlib import Path
+from typing import Any
+
+import pytest
+from flatland_command import run
+from waiting import TIMEOUT
+
+from flatland.cli import doctor
+
+
+@pytest.fixture(scope="module")
+def bare_python(tmp_path_factory: pytest.TempPathFactory) -> str:
+    """An interpreter without any packages."""
+    folder = tmp_path_factory.mktemp("venv")
+    venv.create(folder, system_site_packages=False, with_pip=False)
+    return str(folder / "bin" / "python")
+
+
+def clean_environment(**variables: str) -> dict[str, str]:
+    return {"PATH": "/nowhere", "HOME": "/nowhere", **variables}
+
+
+def findings(text: str) -> dict[str, dict[str, Any]]:
+    return {finding["name"]: finding for finding in json.loads(text)["findings"]}
+
+
+def test_a_complete_installation(checkout):
+    done = run("doctor", "--json", cwd=checkout)
+    found = findings(done.stdout)
+    assert done.returncode == 0, done.stdout
+    for name in ("version", "flatland", "numpy", "PyYAML", "lupa", "extension and Box2D"):
+        assert found[name]["status"] == "ok"
+        assert found[name]["remedy"] == ""
+    assert found["extension and Box2D"]["detail"].startswith("Box2D 2.")
+    assert json.loads(done.stdout)["ok"]
+
+
+def test_without_any_package_everything_has_a_remedy(bare_python, checkout, tmp_path):
+    script = checkout / "flatland" / "cli" / "doctor.py"
+    done = subprocess.run(
+        [bare_python, script],
+        env=clean_environment(),
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        timeout=TIMEOUT,
+    )
+    assert (done.returncode, done.stderr) == (1, "")
+    lines = done.stdout.splitlines()
+    assert "  missing  numpy: not installed" in lines
+    assert lines[lines.index("  missing  numpy: not installed") + 1] == (
+        "           -> apt-get install python3-numpy"
+    )
+    assert any(line.startswith("  absent   rospy: not installed") for line in lines)
+    assert any(line.startswith("  absent   command flatland: not on PATH") for line in lines)
+    assert any(line.startswith("  absent   display: DISPLAY is not set") for line in lines)
+    assert any(
+        line.startswith("  info     ROS master: ROS_MASTER_URI is not set") for line in lines
+    )
+    assert lines[-1].startswith("required and missing: numpy, PyYAML, lupa")
+
+
+def test_importing_flatland_without_its_requirements_names_the_doctor(
+    bare_python, checkout, tmp_path
+):
+    done = subprocess.run(
+        [bare_python, "-m", "flatland", "doctor"],
+        env=clean_environment(PYTHONPATH=str(checkout)),
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        timeout=TIMEOUT,
+    )
+    assert done.returncode == 1
+    last = done.stderr.splitlines()[-1]
+    assert "numpy: apt-get install python3-numpy" in last
+    assert last.endswith(f"python3 {checkout / 'flatland' / 'cli' / 'doctor.py'}")
+
+
+@pytest.mark.parametrize(
+    ("text", "reason"),
+    [
+        ("raise RuntimeError('broken')", "import fails: RuntimeError: broken"),
+        ("import os; os.abort()", "import fails: "),
+        ("raise SystemExit(3)", "import fails: "),
+    ],
+)
+def test_a_module_that_cannot_be_imported(tmp_path, monkeypatch, text, reason):
+    (tmp_path / "broken_module.py").write_text(text)
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
+    monkeypatch.syspath_prepend(str(tmp_path))
+    modules = [("broken_module", "broken", "repair it", ""), ("json", "json", "", "")]
+    broken, fine = doctor._check_modules("tools", modules, required=True)
+    assert (broken.status, broken.remedy) == ("missing", "repair it")
+    assert broken.detail.startswith(reason)
+    assert fine.status == "ok"
+
+
+def test_a_program_that_does_not_end_is_stopped(monkeypatch):
+    monkeypatch.setattr(doctor, "_TIMEOUT", 0.2)
+    done = doctor._run_python("import time; time.sleep(1000)")
+    assert done.returncode == 1
+    assert done.stderr == "no answer within 0.2 s"
+
+
+def test_a_display_that_does_not_answer(monkeypatch):
+    monkeypatch.setenv("DISPLAY", ":987")
+    monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
+    monkeypatch.delenv("QT_QPA_PLATFORM", raising=False)
+    (display,) = doctor._check_display()
+    assert (display.name, display.status) == ("display", "absent")
+    assert ":987" in display.detail
+    assert display.remedy
+
+
+def test_the_ros_master(monkeypatch):
+    monkeypatch.setenv("ROS_MASTER_URI", "http://localhost:1")
+    assert doctor._check_master().detail.startswith("not running at http://localhost:1 (")
+    monkeypatch.setenv("ROS_MASTER_URI", "http://localhost:notaport")
+    assert doctor._check_master().status == "info"
+
+
+def test_packages_are_those_of_the_list(checkout: Path):
+    """Each Debian package of a remedy is in packages-apt.txt, so that `make setup` installs it."""
+    listed = {line.split()[1] for line in (checkout / "packages-apt.txt").read_text().splitlines()}
+    for _, name, remedy, _ in (*doctor._REQUIRED, *doctor._OPTIONAL, *doctor._ROS):
+        for word in remedy.replace(",", "").split():
+            if word.startswith("python3-"):
+                assert word in listed, name

@@ -1,0 +1,70 @@
+"""Runs the commands of docs/command_line.md and compares their output."""
+
+from __future__ import annotations
+
+import re
+import shlex
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from flatland_command import main
+from waiting import TIMEOUT
+
+_BLOCK = re.compile(
+    r"(?:^File `(?P<file>[^`]+)`:\n\n)?^```(?P<language>\w+)\n(?P<text>.*?)^```$",
+    re.MULTILINE | re.DOTALL,
+)
+
+
+def run_block(text: str, capsys: pytest.CaptureFixture[str]) -> str:
+    """Runs the commands of a block and returns what they print."""
+    output = ""
+    for line in text.splitlines():
+        command, *words = shlex.split(line, comments=True)
+        if command == "flatland":
+            code = main(*words)
+            output += capsys.readouterr().out
+        else:
+            assert command == "python3"
+            code = subprocess.run(
+                [sys.executable, *words], capture_output=True, timeout=TIMEOUT
+            ).returncode
+        assert code == (1 if "# exits with 1" in line else 0), f"{line}\n{output}"
+    return output
+
+
+def test_the_commands_of_the_page_print_what_it_says(checkout, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "worlds").mkdir()
+    (tmp_path / "worlds" / "office").symlink_to(checkout / "worlds" / "office")
+    page = (checkout / "docs" / "command_line.md").read_text()
+    output, compared = "", 0
+    for block in _BLOCK.finditer(page):
+        text = block["text"]
+        if block["file"]:
+            Path(block["file"]).write_text(text)
+        elif block["language"] == "bash":
+            output = run_block(text, capsys)
+        elif "-> apt-get" not in text:  # that of `flatland doctor` depends on the machine
+            pattern = ".*".join(re.escape(part) for part in text.split("..."))
+            assert re.search(pattern, output, re.DOTALL), f"{text}\nis not in\n{output}"
+            compared += 1
+    assert compared == 4
+
+
+def test_all_commands_and_options_are_described(checkout):
+    page = (checkout / "docs" / "command_line.md").read_text()
+    for command in ("check", "info", "show", "run", "new", "doctor"):
+        assert f"flatland {command}" in page
+    from flatland.cli.main import make_parser
+
+    actions = make_parser()._subparsers._group_actions  # type: ignore[union-attr]
+    options = {
+        option
+        for action in actions[0].choices["run"]._actions
+        for option in action.option_strings
+        if option.startswith("--")
+    }
+    assert [option for option in options - {"--help"} if option not in page] == []
