@@ -6,7 +6,7 @@ import ctypes
 import signal
 import threading
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from types import FrameType
 from typing import Final
 
@@ -67,22 +67,35 @@ def _exception_limit(seconds: float) -> Iterator[None]:
     thread = ctypes.c_ulong(threading.get_ident())
     finished = threading.Event()
     lock = threading.Lock()
+    has_expired = False
+
+    def raise_in_thread() -> None:
+        exception = ctypes.py_object(TimeLimitExceeded)
+        ctypes.pythonapi.PyThreadState_SetAsyncExc(thread, exception)
 
     def interrupt() -> None:
+        nonlocal has_expired
         wait = min(seconds, threading.TIMEOUT_MAX)
         while not finished.wait(wait):
             with lock:
                 if not finished.is_set():
-                    ctypes.pythonapi.PyThreadState_SetAsyncExc(
-                        thread, ctypes.py_object(TimeLimitExceeded)
-                    )
+                    has_expired = True
+                    raise_in_thread()
             wait = _RETRY_PERIOD
 
     threading.Thread(target=interrupt, name="flatland-time-limit", daemon=True).start()
     try:
         yield
     finally:
-        with lock:
-            finished.set()
-            # Cancels an exception that has been set and not yet been raised.
-            ctypes.pythonapi.PyThreadState_SetAsyncExc(thread, None)
+        while not finished.is_set():
+            # An exception of the limit can also be raised here.
+            with suppress(TimeLimitExceeded), lock:
+                finished.set()
+        if has_expired:
+            # Another exception may be pending. It must be raised, not cancelled: Python 3.11 does
+            # not reset its request flag for a cancelled one. All code would then be slower, and
+            # traced code would not proceed.
+            with suppress(TimeLimitExceeded):
+                raise_in_thread()
+                while True:
+                    pass

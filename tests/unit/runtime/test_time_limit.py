@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import signal
 import socket
+import subprocess
+import sys
 import threading
 import time
 from collections.abc import Callable
 from concurrent.futures import Future
 
 import pytest
+from waiting import TIMEOUT
 
 from flatland.runtime.time_limit import TimeLimitExceeded, time_limit
 
@@ -94,3 +97,29 @@ def test_code_that_returns_in_time_is_not_interrupted(in_main_thread: bool) -> N
 def test_without_a_limit_nothing_is_interrupted() -> None:
     with time_limit(None):
         assert signal.getitimer(signal.ITIMER_REAL) == (0.0, 0.0)
+
+
+@pytest.mark.parametrize("run", [lambda: None, loop], ids=["in time", "too late"])
+def test_code_can_be_traced_after_a_limit_in_a_thread(run: Callable[[], object]) -> None:
+    """In Python 3.11, a cancelled exception would keep traced code from proceeding."""
+    code = f"""
+import sys, threading
+from flatland.runtime.time_limit import TimeLimitExceeded, time_limit
+
+def limited():
+    try:
+        with time_limit(0.05):
+            {"pass" if run is not loop else "while True: pass"}
+    except TimeLimitExceeded:
+        print("limited")
+
+thread = threading.Thread(target=limited)
+thread.start()
+thread.join()
+sys.settrace(lambda *arguments: None)
+print(sum(number for number in range(10)))
+"""
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, timeout=TIMEOUT, check=True
+    )
+    assert done.stdout.split() == ([] if run is not loop else ["limited"]) + ["45"]
