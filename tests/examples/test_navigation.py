@@ -117,6 +117,8 @@ def test_the_launch_files_start_the_nodes(resolve):
 def test_the_package_is_found_by_roslaunch(shell, run_command, tmp_path):
     command = ["roslaunch", "flatland_navigation", "navigation.launch", "--nodes"]
     assert "/move_base" in run_command(command, shell, tmp_path).split()
+    command = ["rosrun", "flatland_navigation", "tour.py", "--help"]
+    assert "--ground-truth" in run_command(command, shell, tmp_path)
 
 
 @pytest.mark.ros
@@ -153,6 +155,9 @@ def test_two_robots_have_topics_and_frames_of_their_own(resolve, package):
         robots = list(poses)
         assert robots == ["robot_1", "robot_2"]
         for robot in robots:
+            tour = yaml.safe_load((package / "tours" / f"{robot}.yaml").read_text())
+            for goal in tour["goals"]:
+                assert world.is_free(tuple(goal["pose"]), radius=0.4, ignore=robots), goal
             scan = world.output(f"/{robot}/scan")
             world.step(50)
             assert scan.latest.frame_id == f"{robot}_laser"
