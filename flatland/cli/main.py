@@ -9,7 +9,7 @@ import sys
 from collections.abc import Sequence
 
 import flatland
-from flatland.cli import check, doctor, info, new, run, show
+from flatland.cli import check, doctor, info, new, replay, run, show
 from flatland.errors import FlatlandError
 
 _BROKEN_PIPE = 128 + signal.SIGPIPE  # exit code in a shell of a program ended by SIGPIPE
@@ -80,7 +80,7 @@ def make_parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("--version", action="version", version=f"flatland {flatland.__version__}")
     commands = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
-    for module in (check, info, show, run, new, doctor):
+    for module in (check, info, show, run, replay, new, doctor):
         module.add(commands)
     return parser
 

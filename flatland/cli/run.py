@@ -5,15 +5,10 @@ from __future__ import annotations
 import argparse
 import dataclasses
 import math
-import os
-import signal
-import sys
-import threading
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import ExitStack, contextmanager, suppress
+from collections.abc import Iterator, Mapping
+from contextlib import ExitStack
 from pathlib import Path
-from types import FrameType
 from typing import TYPE_CHECKING, Any
 
 import yaml
@@ -29,17 +24,19 @@ from flatland.cli.arguments import (
     positive,
 )
 from flatland.cli.contents import counted
+from flatland.cli.outputs import open_bag, path_with, replaced
+from flatland.cli.progress import StopSignals, progress_bar
 from flatland.drawing import VIDEO_FORMATS, FrameRenderer, VideoFile, check_matplotlib, check_opencv
 from flatland.errors import FlatlandError
 from flatland.world import World
 
 if TYPE_CHECKING:
-    from flatland.ros.bag import BagRecorder
     from flatland.runtime.observer import WorldObserver
 
 _EXAMPLES = (
     "flatland run worlds/office/world.yaml --duration 60",
     "flatland run worlds/office/world.yaml --duration 5 --seed 1 --bag office.bag",
+    "flatland run worlds/office/world.yaml --duration 5 --record office.flog",
     "flatland run worlds/office/world.yaml --duration 2 --video office.mp4 --size 640x480 "
     '--command "/cmd_vel={linear: {x: 0.5}, angular: {z: 0.3}}"',
 )
@@ -83,13 +80,19 @@ def add(commands: Commands) -> None:
     )
     parser.add_argument(
         "--bag",
-        type=_path_with((".bag",)),
+        type=path_with((".bag",)),
         metavar="FILE",
         help="bag file (ROS 1) with all outputs and transforms; an existing file is replaced",
     )
     parser.add_argument(
+        "--record",
+        type=Path,
+        metavar="FILE",
+        help="recording from which `flatland replay` repeats the run; an existing file is replaced",
+    )
+    parser.add_argument(
         "--video",
-        type=_path_with(VIDEO_FORMATS),
+        type=path_with(VIDEO_FORMATS),
         metavar="FILE",
         help=f"video file ({', '.join(VIDEO_FORMATS)}); an existing file is replaced",
     )
@@ -102,26 +105,19 @@ def add(commands: Commands) -> None:
     parser.set_defaults(run=_run)
 
 
-def _path_with(suffixes: Sequence[str]) -> Callable[[str], Path]:
-    def path(text: str) -> Path:
-        if Path(text).suffix.lower() not in suffixes:
-            raise argparse.ArgumentTypeError(f"must end with {' or '.join(suffixes)}, got {text!r}")
-        return Path(text)
-
-    return path
-
-
 def _run(options: argparse.Namespace) -> int:
     if options.video:  # before loading, which may take long
         check_matplotlib()
         check_opencv()
-    with _StopSignals() as stop, ExitStack() as files:
+    with StopSignals() as stop, ExitStack() as files:
         observers: list[WorldObserver] = []
         recorder = None
         if options.bag:
-            recorder = _open_bag(files.enter_context(_replaced(options.bag)), files)
+            recorder = open_bag(files.enter_context(replaced(options.bag)), files)
             observers.append(recorder)
         with load(options, options.seed, step_size=options.step_size, observers=observers) as world:
+            if options.record:
+                world.record(options.record)
             for topic, value in options.command:
                 set_command(world, topic, value)
             video = _Video(options, world, files) if options.video else None
@@ -136,10 +132,12 @@ def _run(options: argparse.Namespace) -> int:
             recorder.close()
             topics = counted(len(recorder.topics), "topic")
             print(f"wrote {options.bag}: {counted(recorder.messages, 'message')}, {topics}")
+        if options.record:
+            print(f"wrote {options.record}")
     return 128 + stop.signal if stop.signal else 0
 
 
-def _print_summary(world: World, wall_time: float, stop: _StopSignals) -> None:
+def _print_summary(world: World, wall_time: float, stop: StopSignals) -> None:
     verb = "interrupted after" if stop.signal else "simulated"
     factor = world.time / wall_time if wall_time > 0 else math.inf
     print(
@@ -151,7 +149,7 @@ def _print_summary(world: World, wall_time: float, stop: _StopSignals) -> None:
 # -- stepping ------------------------------------------------------------------------------
 
 
-def _simulate(world: World, duration: float, video: _Video | None, stop: _StopSignals) -> None:
+def _simulate(world: World, duration: float, video: _Video | None, stop: StopSignals) -> None:
     """Steps a world until some simulated time, or until a signal.
 
     Raises:
@@ -161,7 +159,7 @@ def _simulate(world: World, duration: float, video: _Video | None, stop: _StopSi
     total = max(1, math.ceil(duration / step_size - 1e-9))
     done, chunk = 0, 1
     start = time.perf_counter()
-    with _progress_bar(total * step_size) as advance:
+    with progress_bar(total * step_size) as advance:
         while done < total and not stop.signal:
             until = total
             if video is not None:
@@ -184,89 +182,7 @@ def _simulate(world: World, duration: float, video: _Video | None, stop: _StopSi
             advance(steps * step_size, done * step_size / (now - start))
 
 
-@contextmanager
-def _progress_bar(seconds: float) -> Iterator[Callable[[float, float], None]]:
-    """Shows a progress bar on the standard error output if it is a terminal.
-
-    Args:
-        seconds: Simulated time at the end.
-
-    Yields:
-        A function of the additional simulated time [s] and the real-time factor.
-    """
-    try:
-        from tqdm import tqdm
-    except ImportError:  # `flatland doctor` reports it
-        yield lambda _seconds, _factor: None
-        return
-    form = "{percentage:3.0f}%|{bar}| {n:.1f}/{total:.1f} s [{elapsed}<{remaining}{postfix}]"
-    with tqdm(total=seconds, bar_format=form, disable=None, file=sys.stderr) as bar:
-
-        def advance(more: float, factor: float) -> None:
-            bar.set_postfix_str(f"{factor:.1f}x real time", refresh=False)
-            bar.update(more)
-
-        yield advance
-
-
-class _StopSignals:
-    """Replaces the handlers of SIGINT and SIGTERM; the first signal only ends the simulation.
-
-    A second signal has its usual effect.
-
-    Attributes:
-        signal: The signal that was received, 0 for none.
-    """
-
-    def __init__(self) -> None:
-        self.signal = 0
-        self._previous: dict[int, Any] = {}
-
-    def __enter__(self) -> _StopSignals:
-        if threading.current_thread() is threading.main_thread():
-            for number in (signal.SIGINT, signal.SIGTERM):
-                self._previous[number] = signal.signal(number, self._handle)
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self._restore()
-
-    def _handle(self, number: int, _frame: FrameType | None) -> None:
-        self.signal = number
-        self._restore()
-
-    def _restore(self) -> None:
-        while self._previous:
-            signal.signal(*self._previous.popitem())
-
-
-# -- files ---------------------------------------------------------------------------------
-
-
-@contextmanager
-def _replaced(path: Path) -> Iterator[Path]:
-    """Yields a temporary path; the file becomes `path` at the end, and is removed on an error."""
-    part = path.with_name(f"{path.stem}.part{path.suffix}")
-    try:
-        yield part
-        os.replace(part, path)  # noqa: PTH105
-    except BaseException:
-        with suppress(OSError):
-            part.unlink()
-        raise
-
-
-def _open_bag(path: Path, files: ExitStack) -> BagRecorder:
-    try:
-        from flatland.ros.bag import BagRecorder
-    except ImportError as error:
-        raise FlatlandError(
-            f"bags need the messages of ROS and rosbag ({error}): "
-            "apt-get install python3-rosbag python3-tf2-msgs python3-nav-msgs python3-sensor-msgs"
-        ) from error
-    recorder = BagRecorder(path)
-    files.callback(recorder.close)
-    return recorder
+# -- video ---------------------------------------------------------------------------------
 
 
 class _Video:
@@ -277,7 +193,7 @@ class _Video:
     """
 
     def __init__(self, options: argparse.Namespace, world: World, files: ExitStack) -> None:
-        part = files.enter_context(_replaced(options.video))
+        part = files.enter_context(replaced(options.video))
         try:
             self._renderer = FrameRenderer(world, **picture_options(options))
         except ValueError as error:

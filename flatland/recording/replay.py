@@ -40,6 +40,7 @@ class Replay:
         world: The world of the repeated run.
         last_step: The last step of the recording.
         difference: The first difference that was found, None for none.
+        step: Number of steps so far.
     """
 
     def __init__(
@@ -78,7 +79,7 @@ class Replay:
         )
         self.last_step: int = max((r["step"] for r in self.recording.records[1:]), default=0)
         self.difference: Difference | None = None
-        self._step = 0
+        self.step = 0
         self._on_step: Callable[[int], object] | None = None
         # Of the steps since the last comparison, and of the steps with a recorded hash: taken at
         # the same point of a step as by the recorder, before requests of hooks are carried out.
@@ -118,7 +119,7 @@ class Replay:
         for index, record in enumerate(records[1:], 1):
             if self.difference is not None:
                 break
-            self.world.step(record["step"] - self._step)
+            self.world.step(record["step"] - self.step)
             following = records[index + 1] if index + 1 < len(records) else None
             self._apply(record, following)
         return self.difference
@@ -136,12 +137,12 @@ class Replay:
 
     def step_done(self) -> None:
         """Takes the checksum of the bodies, and the hash of the world if one was recorded."""
-        self._step += 1
+        self.step += 1
         self._checksums.append(checksum(self.world.physics))
-        if self._step in self._hash_steps:
-            self._hashes[self._step] = self.world.state_hash()
+        if self.step in self._hash_steps:
+            self._hashes[self.step] = self.world.state_hash()
         if self._on_step is not None:
-            self._on_step(self._step)
+            self._on_step(self.step)
 
     def world_closing(self) -> None:
         """Does nothing: a replay has no file to complete."""
@@ -154,11 +155,11 @@ class Replay:
                 self._set_command(record)
             case "lost":
                 self._differ(
-                    self._step, f"a value of command {record['topic']} could not be recorded"
+                    self.step, f"a value of command {record['topic']} could not be recorded"
                 )
             case "state" | "end" as kind:
                 self._compare_bodies(record["bodies"])
-                actual = self._hashes.pop(self._step) if kind == "state" else None
+                actual = self._hashes.pop(self.step) if kind == "state" else None
                 self._compare(record["state"], "the state of a plugin differs", actual)
             case "result":
                 pass
@@ -168,7 +169,7 @@ class Replay:
     def _set_command(self, record: Record) -> None:
         commands = self.world.ports.commands.get(record["topic"], [])
         if record["number"] >= len(commands):
-            self._differ(self._step, f"command {record['topic']} does not exist")
+            self._differ(self.step, f"command {record['topic']} does not exist")
             return
         commands[record["number"]].set(decode_value(record["value"]))
 
@@ -178,7 +179,7 @@ class Replay:
             self._set_params(following)
         method = _CHANGES.get(kind)
         if method is None:
-            raise RecordingError(f'unknown request "{kind}" at step {self._step}')
+            raise RecordingError(f'unknown request "{kind}" at step {self.step}')
         error: str | None = None
         try:
             method(self.world, **{key: decode_value(v) for key, v in arguments.items()})
@@ -186,7 +187,7 @@ class Replay:
             error = f"{type(raised).__name__}: {raised}"
         if following is not None and has_result and error != following["error"]:
             self._differ(
-                self._step,
+                self.step,
                 f"{kind} {_outcome(following['error'])} in the recording, but {_outcome(error)}",
             )
 
@@ -198,17 +199,17 @@ class Replay:
     def _compare_bodies(self, recorded: str) -> None:
         expected = [int(recorded[i : i + 8], 16) for i in range(0, len(recorded), 8)]
         actual, self._checksums = self._checksums, []
-        first, self._first_checksum_step = self._first_checksum_step, self._step + 1
+        first, self._first_checksum_step = self._first_checksum_step, self.step + 1
         for number, (one, other) in enumerate(zip(expected, actual, strict=False)):
             if one != other:
                 self._differ(first + number, "poses or velocities of bodies differ")
                 return
         if len(expected) != len(actual):
-            self._differ(self._step, "the number of steps differs")
+            self._differ(self.step, "the number of steps differs")
 
     def _compare(self, recorded: str, text: str, actual: str | None = None) -> None:
         if (actual or self.world.state_hash()) != recorded:
-            self._differ(self._step, text)
+            self._differ(self.step, text)
 
     def _differ(self, step: int, text: str) -> None:
         if self.difference is None:

@@ -6,6 +6,12 @@ The level of the logger `rosout` of the node applies, which the service `~set_lo
 from __future__ import annotations
 
 import logging
+from typing import Final
+
+import rospy
+from rospy.impl.paramserver import get_param_server_cache
+
+_TOPICS_PARAMETER: Final = "/rosout_disable_topics_generation"
 
 
 class _ToRosout(logging.Handler):
@@ -21,7 +27,14 @@ class _ToRosout(logging.Handler):
 
 
 def log_to_ros() -> None:
-    """Forwards the log of flatland to rospy; must be called after `rospy.init_node`."""
+    """Forwards the log of flatland to rospy; must be called after `rospy.init_node`.
+
+    rospy calls the master for each message, as long as a parameter of `/rosout` is not set. A
+    master that does not respond would block the thread that logs, for example the one that steps
+    the world. The call also registers the node again after another one has taken its name. The
+    parameter is therefore read once.
+    """
+    get_param_server_cache().set(_TOPICS_PARAMETER, rospy.get_param(_TOPICS_PARAMETER, False))
     logger = logging.getLogger("flatland")
     # The logger of rospy propagates to the root logger already; avoid duplicate records.
     logger.propagate = False

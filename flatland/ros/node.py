@@ -13,6 +13,7 @@ from concurrent.futures import Future, wait
 from typing import TYPE_CHECKING, Any, Final
 
 from flatland.errors import FlatlandError
+from flatland.ros.fault_reports import FaultReports
 from flatland.ros.message_types import MESSAGE_PACKAGES, OWN_PACKAGE, select_package
 from flatland.ros.parameters import NodeParameters, ParameterError, read_parameters
 from flatland.ros.shutdown import ShutdownWatchdog
@@ -31,6 +32,9 @@ _SWITCH_INTERVAL: Final = 0.0002  # s for which a thread keeps the GIL while oth
 _UNREGISTER_TIMEOUT: Final = 0.5  # s
 _STOP_POLL_PERIOD: Final = 0.05  # s between two checks for a stop request without a master
 _SHUTDOWN_POLL_PERIOD: Final = 0.002  # s
+_USE_SIM_TIME: Final = "/use_sim_time"
+# The reason that the ROS master gives to a node whose name another node has taken.
+_REPLACED: Final = "new node registered with same name"
 # Some forks of the reference read these from the global namespace, others from the private one.
 _GLOBAL_IN_FORKS: Final = ("world_path", "update_rate", "step_size", "show_viz", "viz_pub_rate")
 
@@ -74,15 +78,20 @@ class ServerNode:
         self._stopping = threading.Event()
         self._simulation: Simulation | None = None
         self._registrar: Registrar | None = None
+        self._watchdog: ShutdownWatchdog | None = None
+        self._replaced = False  # whether another node has the name of this one
+        self._fault_reports = FaultReports()
 
     def run(self) -> int:
         """Runs until a stop is requested, and returns the exit code."""
         # First of all, so that no signal is lost.
-        watchdog = ShutdownWatchdog(self._stop, _unregister)
+        watchdog = self._watchdog = ShutdownWatchdog(self._stop, _unregister)
+        self._fault_reports.install()
         # The threads of rospy need the GIL about a hundred times for a connection or registration.
         # With the default interval of 5 ms, this takes up to a second beside a loop at full speed.
         # A short interval costs nothing while no other thread waits for the GIL.
         sys.setswitchinterval(_SWITCH_INTERVAL)
+        import rosgraph
         import rospy
 
         try:
@@ -91,6 +100,9 @@ class ServerNode:
         except ValueError as error:
             _LOG.critical("%s (from ROS_MASTER_URI)", error)
             return 1
+        from flatland.ros.transport import inbound
+
+        inbound.install()
         try:
             # Without rostime, rospy does not subscribe to `/clock`; the bridge sets its time.
             rospy.init_node(NODE_NAME, disable_signals=True, disable_rostime=True)
@@ -101,7 +113,12 @@ class ServerNode:
             return 1
         from flatland.ros.logs import log_to_ros
 
-        rospy.on_shutdown(watchdog.request_stop)
+        def shut_down(reason: str) -> None:
+            self._replaced |= _REPLACED in reason
+            watchdog.request_stop()
+
+        # Before the hook of rospy that unregisters the node. `rospy.on_shutdown` passes no reason.
+        rospy.core._preshutdown_hooks.insert(0, shut_down)
         log_to_ros()
         try:
             parameters = read_parameters(
@@ -115,6 +132,13 @@ class ServerNode:
             code = self._fail("unexpected internal error", exc_info=True)
         else:
             code = 0
+        if self._replaced:
+            _LOG.critical(
+                'another node has taken the name "%s" on the ROS master at %s: this one ends',
+                rospy.get_name(),
+                rosgraph.get_master_uri(),
+            )
+            code = 1
         if self._registrar is not None:
             self._registrar.close(_UNREGISTER_TIMEOUT)
         _unregister()
@@ -152,6 +176,12 @@ class ServerNode:
                 warning_due = math.inf
         return False
 
+    def _replace(self) -> None:
+        """Ends the node because another one has its name; safe from any thread."""
+        self._replaced = True
+        if self._watchdog is not None:
+            self._watchdog.request_stop()
+
     def _stop(self) -> None:
         """Ends the simulation after the current step; safe from any thread."""
         self._stopping.set()
@@ -185,12 +215,16 @@ class ServerNode:
         from flatland.ros.clock import NodeClock, SimulatedClock, WallClock
         from flatland.ros.deferred_topics import DeferredTopics
         from flatland.ros.frame_monitor import FrameMonitor
+        from flatland.ros.hook_watchdog import HookWatchdog
         from flatland.ros.services import Services
+        from flatland.ros.transport.master_watch import MasterWatch
         from flatland.ros.transport.registrar import Registrar
         from flatland.simulation import Simulation
 
         _check_time_of_other_nodes(parameters.use_sim_time)
         self._registrar = Registrar()
+        self._registrar.keep_parameters(_current_parameters())
+        master_watch = MasterWatch(self._registrar, self._replace)
         clock: NodeClock
         if parameters.use_sim_time:
             clock = SimulatedClock(self._registrar, parameters.clock_rate)
@@ -198,6 +232,8 @@ class ServerNode:
             clock = WallClock()
         bridge = Bridge(self._registrar, clock)
         world = _load(parameters, bridge)
+        self._fault_reports.world = world
+        hook_watchdog = HookWatchdog(world)
         simulation = Simulation(
             world,
             parameters.update_rate,
@@ -236,6 +272,8 @@ class ServerNode:
                 if not simulation.stopped:
                     _log_benchmark(result)
         finally:
+            master_watch.close()
+            hook_watchdog.close()
             deferred_topics.close()
             frame_monitor.close()
             # Plugins are closed before their topics, so that `on_shutdown` can publish; rospy then
@@ -323,11 +361,22 @@ def _yaml_parameter(name: str) -> object:
     return rospy.get_param(name, None)
 
 
+def _current_parameters() -> dict[str, object]:
+    """Returns the private parameters and `/use_sim_time`, as far as they are set, by name."""
+    import rospy
+
+    private = rospy.get_param("~", {})
+    found = {rospy.resolve_name(f"~{name}"): value for name, value in private.items()}
+    if rospy.has_param(_USE_SIM_TIME):
+        found[_USE_SIM_TIME] = rospy.get_param(_USE_SIM_TIME)
+    return found
+
+
 def _check_time_of_other_nodes(use_sim_time: bool) -> None:
     """Logs a warning if other nodes use another time than the stamps of this one."""
     import rospy
 
-    others = rospy.get_param("/use_sim_time", False) is True
+    others = rospy.get_param(_USE_SIM_TIME, False) is True
     if use_sim_time and not others:
         _LOG.warning("/use_sim_time is not true: other nodes do not follow the simulated time")
     elif others and not use_sim_time:

@@ -146,7 +146,7 @@ class PluginRos:
             self._registrar,
             self._resolve(name),
             service_type,
-            lambda request: wait_for(self._post(lambda: run(request))),
+            lambda request: wait_for(self._post(lambda: run(request)), self._plugin.world.requests),
             owner=self._owner,
         )
         self._closers.append(service.close)

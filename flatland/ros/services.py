@@ -102,13 +102,16 @@ class Services:
         if done:
             # Clients read the current rate from the parameter.
             value = 0.0 if math.isinf(rate) else rate
-            self._registrar.submit(lambda: rospy.set_param("~update_rate", value))
+            self._registrar.set_parameter("~update_rate", value)
             self._registrar.flush(_REGISTRATION_TIMEOUT)
         return done, message
 
     def _switch(self, action: Callable[[], None]) -> Callable[[Any], EmptyResponse]:
         def serve(_request: Any) -> EmptyResponse:
-            self._carry_out(action)
+            done, message = self._carry_out(action)
+            if not done:
+                # The response has no field for an error.
+                raise rospy.ServiceException(message)
             return EmptyResponse()
 
         return serve
@@ -120,7 +123,8 @@ class Services:
             Whether it succeeded, and the text that it returned or the error.
         """
         try:
-            message = wait_for(self._simulation.post(action)) or ""
+            requests = self._simulation.world.requests
+            message = wait_for(self._simulation.post(action), requests) or ""
             # A client may use the topics of a model as soon as it receives the response.
             self._registrar.flush(_REGISTRATION_TIMEOUT)
         except (FlatlandError, rospy.ServiceException) as error:

@@ -11,16 +11,14 @@ import sys
 import threading
 import time
 from collections.abc import Callable
-from types import FrameType
 from typing import Final
 
-from flatland.plugin_api.plugin import FlatlandPlugin, describe
+from flatland.ros.stacks import describe_stack
 
 _LOG = logging.getLogger("flatland")
 
 DEFAULT_SHUTDOWN_TIMEOUT: Final = 2.0  # s
 _LAST_ACTION_TIMEOUT: Final = 0.5  # s, for each action that precedes a forced exit
-_STACK_DEPTH: Final = 10  # calls shown of a stack
 _STOP_SIGNALS: Final = (signal.SIGINT, signal.SIGTERM)
 
 
@@ -94,35 +92,3 @@ def _running() -> str:
         for thread in threads
         if thread.ident in frames
     )
-
-
-def describe_stack(frame: FrameType) -> str:
-    """Describes a stack in one line.
-
-    Args:
-        frame: Innermost frame.
-
-    Returns:
-        The innermost calls with file, line and function, the last one made at the end; in code of
-        a plugin, preceded by the plugin and its method, and only the calls from there on.
-    """
-    calls: list[str] = []
-    plugin_method, plugin_calls = "", None
-    current: FrameType | None = frame
-    while current is not None:
-        code = current.f_code
-        calls.append(f"{code.co_filename}:{current.f_lineno} in {code.co_name}")
-        owner = current.f_locals.get("self")
-        if isinstance(owner, FlatlandPlugin):
-            # The outermost such call counts: the hook or callback.
-            plugin_method, plugin_calls = f"{_name(owner)}: {code.co_name}, ", len(calls)
-        current = current.f_back
-    innermost = calls[:plugin_calls][:_STACK_DEPTH]
-    return plugin_method + " > ".join(reversed(innermost))
-
-
-def _name(plugin: FlatlandPlugin) -> str:
-    try:
-        return describe(plugin)
-    except AttributeError:  # A plugin has no name or model before it is attached to a world.
-        return type(plugin).__qualname__

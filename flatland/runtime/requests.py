@@ -31,6 +31,8 @@ class Requests:
         lock: Held during each step and each batch of actions.
         actions: The actions that wait.
         hook_thread: Identifier of the thread that runs hooks of plugins, None if none does.
+        blocked_by: Code of a plugin that keeps actions from running, as found by a watchdog; empty
+            if there is none.
     """
 
     def __init__(self) -> None:
@@ -40,6 +42,7 @@ class Requests:
         self._server: int | None = None
         self._wake: Callable[[], None] | None = None
         self.hook_thread: int | None = None
+        self.blocked_by = ""
         # Identifiers of the threads that run other code of plugins, and that run actions.
         self._plugin_thread: int | None = None
         self._action_thread: int | None = None

@@ -193,6 +193,11 @@ class Topic:
         return messages
 
     @property
+    def is_empty(self) -> bool:
+        """Whether no message waits."""
+        return self._messages.empty()
+
+    @property
     def connected(self) -> bool:
         """Whether a publisher is connected."""
         return self._subscriber.get_num_connections() > 0

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import signal
+import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -58,6 +59,8 @@ class SlowEnd(flatland.WorldPlugin):
             file.write("complete\\n")
 """
 NAMES = ("EndlessStart", "EndlessStep", "EndlessEnd", "EndlessThread", "SlowEnd")
+LAST_ACTIONS = 1.5  # s
+MARGIN = 3.0  # s, for a busy machine
 NOTHING = {"publishers": set(), "subscribers": set(), "services": set()}
 
 
@@ -190,9 +193,9 @@ def test_thread_of_a_plugin_that_does_not_end_is_named(
 
 
 @pytest.fixture
-def large_map(tmp_path: Path) -> Path:
-    """A world with a small layer, followed by a layer of a million edges."""
-    for name, size in (("small", 10), ("large", 1000)):
+def large_map(request: pytest.FixtureRequest, tmp_path: Path) -> Path:
+    """A world with a small layer, followed by a layer of a million edges, or more."""
+    for name, size in (("small", 10), ("large", getattr(request, "param", 1000))):
         pixels = np.random.default_rng(1).choice(np.uint8([0, 255]), (size, size))
         cv2.imwrite(str(tmp_path / f"{name}.png"), pixels)
         (tmp_path / f"{name}.yaml").write_text(
@@ -204,11 +207,15 @@ def large_map(tmp_path: Path) -> Path:
     return path
 
 
+@pytest.mark.parametrize("large_map", [3000], indirect=True, ids=["9 million cells"])
 def test_signal_while_a_large_map_loads(launcher: Any, ros: Any, large_map: Path) -> None:
     process = launcher.start(world_path=large_map, shutdown_timeout=0.05)
     process.wait_for_line('Layer "small"')
+    start = time.monotonic()
     process.send(signal.SIGTERM)
     assert_was_ended(process, ros, r"MainThread: .*/world_loader.py:\d+ in ", timeout="0.05")
+    # Besides the time limit, the node has half a second each for three last actions.
+    assert time.monotonic() - start < LAST_ACTIONS + MARGIN
 
 
 def test_map_that_loads_within_the_time_limit_ends_cleanly(

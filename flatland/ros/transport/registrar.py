@@ -7,10 +7,11 @@ steps the world only queues these calls; they are made in the order in which the
 
 from __future__ import annotations
 
+import contextlib
 import logging
 import queue
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import rospy
@@ -21,15 +22,23 @@ _LOG = logging.getLogger("flatland")
 
 
 class Registrar:
-    """Registers and unregisters topics and services in order."""
+    """Registers and unregisters topics and services in order.
+
+    Attributes:
+        master_lost: Whether the ROS master is known not to respond.
+    """
 
     def __init__(self) -> None:
         """Starts the thread."""
         self._actions: queue.SimpleQueue[Callable[[], object]] = queue.SimpleQueue()
         self._closed = False
+        self.master_lost = False
         self._lock = threading.Lock()
         self._types: dict[tuple[str, str], type[Any]] = {}
         self._owners: dict[tuple[str, str], list[str]] = {}
+        # Parameters by resolved name: as the node found them, and as it has set them.
+        self._found_parameters: dict[str, object] = {}
+        self._own_parameters: dict[str, object] = {}
         self._thread = threading.Thread(target=self._run, name="flatland-registrar", daemon=True)
         self._thread.start()
 
@@ -38,7 +47,7 @@ class Registrar:
         self._actions.put(action)
 
     def flush(self, timeout: float) -> bool:
-        """Waits until all actions queued so far are done.
+        """Waits until all actions queued so far are done; not while the master is lost.
 
         Args:
             timeout: Limit of wall time [s].
@@ -46,6 +55,8 @@ class Registrar:
         Returns:
             Whether they are done.
         """
+        if self.master_lost:
+            return False
         done = threading.Event()
         self.submit(done.set)
         return done.wait(timeout)
@@ -87,6 +98,42 @@ class Registrar:
             if not self._owners[key]:
                 del self._owners[key], self._types[key]
 
+    def set_parameter(self, name: str, value: object) -> None:
+        """Sets a parameter asynchronously; without a master, as soon as there is one.
+
+        Args:
+            name: Name of the parameter, private with a leading `~`.
+            value: The value.
+        """
+        resolved = rospy.resolve_name(name)
+        self._own_parameters[resolved] = value
+
+        def set_now() -> None:
+            with contextlib.suppress(OSError):  # no master; `restore_parameters` sets it
+                rospy.set_param(resolved, value)
+
+        self.submit(set_now)
+
+    def keep_parameters(self, parameters: Mapping[str, object]) -> None:
+        """Stores parameters of the node that are set again on a new master.
+
+        Args:
+            parameters: Values by resolved name.
+        """
+        self._found_parameters.update(parameters)
+
+    def restore_parameters(self) -> None:
+        """Sets the parameters of the node on a new master; to be called in an action.
+
+        A parameter that someone else has set in the meantime is kept, unless the node itself
+        determines its value.
+        """
+        for name, value in self._found_parameters.items():
+            if name not in self._own_parameters and not rospy.has_param(name):
+                rospy.set_param(name, value)
+        for name, value in list(self._own_parameters.items()):
+            rospy.set_param(name, value)
+
     def close(self, timeout: float) -> None:
         """Discards the queue and ends the thread; rospy unregisters everything at shutdown.
 
@@ -100,7 +147,9 @@ class Registrar:
     def _run(self) -> None:
         while not self._closed:
             action = self._actions.get()
-            if self._closed or rospy.is_shutdown():
+            # A node that registers while it ends would take its name back from the node that
+            # replaces it.
+            if self._closed or rospy.core.is_shutdown_requested():
                 continue
             try:
                 action()

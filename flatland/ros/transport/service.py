@@ -9,8 +9,9 @@ from typing import Any, Final
 import rospy
 
 from flatland.ros.transport.registrar import Registrar
+from flatland.runtime.requests import Requests
 
-_SHUTDOWN_POLL_PERIOD: Final = 0.2  # s
+_POLL_PERIOD: Final = 0.2  # s between two checks of a request that waits
 
 
 class Service:
@@ -68,20 +69,26 @@ class Service:
             self._service.shutdown()
 
 
-def wait_for(future: Future[Any]) -> Any:
+def wait_for(future: Future[Any], requests: Requests) -> Any:
     """Waits in the thread of a service until the simulation has handled a request.
 
     Args:
         future: Result of the request.
+        requests: The queue of the request.
 
     Raises:
-        rospy.ServiceException: The node shuts down first.
+        rospy.ServiceException: The node shuts down first, or a plugin blocks the simulation; in
+            the latter case, the request is withdrawn.
     """
     while True:
         try:
-            return future.result(timeout=_SHUTDOWN_POLL_PERIOD)
+            return future.result(timeout=_POLL_PERIOD)
         except TimeoutError:
             if future.done():
                 raise
             if rospy.core.is_shutdown_requested():
                 raise rospy.ServiceException("the simulator is shutting down") from None
+            if requests.blocked_by and future.cancel():
+                raise rospy.ServiceException(
+                    f"the simulation is blocked: {requests.blocked_by} does not return"
+                ) from None

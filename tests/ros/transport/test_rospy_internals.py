@@ -14,8 +14,12 @@ from collections.abc import Callable, Iterator
 from typing import Any
 
 import pytest
+import rosgraph.xmlrpc
 import rospy
+import rospy.impl.rosout
 from interactive_markers.interactive_marker_server import InteractiveMarkerServer
+from rospy.impl import registration, tcpros_base
+from rospy.impl.paramserver import ParamServerCache
 from rospy.impl.tcpros_base import TCPROSTransport
 from rospy.impl.tcpros_pubsub import TCPROSHandler, TCPROSPub
 from rospy.topics import _PublisherImpl, _TopicManager
@@ -160,6 +164,45 @@ def test_connections_have_the_attributes_that_an_outbox_uses(connect: Any) -> No
 
 def test_shutdown_can_be_queried() -> None:
     assert rospy.core.is_shutdown_requested() is False
+
+
+def test_servers_are_created_by_names_of_their_modules() -> None:
+    """`inbound.install` replaces both classes."""
+    assert "TCPServer(self._tcp_server_callback, self.port)" in inspect.getsource(
+        tcpros_base.TCPROSServer.start_server
+    )
+    assert "ThreadingXMLRPCServer((bind_address, port), log_requests)" in inspect.getsource(
+        rosgraph.xmlrpc.XmlRpcNode._run_init
+    )
+    source = inspect.getsource(tcpros_base.TCPROSServer._tcp_server_callback)
+    assert "self.topic_connection_handler(sock, client_addr, header)" in source
+    assert "self.service_connection_handler(sock, client_addr, header)" in source
+
+
+def test_registration_listeners_register_topics_and_services() -> None:
+    """`MasterWatch` calls `notify_added` for each registration of the node."""
+    registered = inspect.getsource(registration.RegManager.reg_added)
+    for call in ("registerPublisher", "registerSubscriber", "registerService", "publisher_update"):
+        assert call in registered
+    assert "reg_added" in inspect.getsource(registration.RegistrationListeners.notify_added)
+
+
+def test_shutdown_hooks_receive_the_reason() -> None:
+    """`ServerNode` recognizes that another node has its name."""
+    assert isinstance(rospy.core._preshutdown_hooks, list)
+    source = inspect.getsource(rospy.core.signal_shutdown)
+    assert "for h in _preshutdown_hooks" in source
+    assert "h(reason)" in source
+
+
+def test_cached_parameters_need_no_master() -> None:
+    """`log_to_ros` stores the parameter that rospy reads for each message of `/rosout`."""
+    assert 'get_param_cached("/rosout_disable_topics_generation"' in inspect.getsource(
+        rospy.impl.rosout._rosout
+    )
+    cache = ParamServerCache()
+    cache.set("/pinned", False)
+    assert cache.get("/pinned") is False
 
 
 def test_the_interactive_marker_server_uses_the_attributes_that_flatland_sets() -> None:

@@ -112,7 +112,7 @@ def test_interruption_ends_without_a_traceback(monkeypatch, capsys):
     assert capsys.readouterr().err == "flatland: interrupted\n"
 
 
-COMMANDS = ("check", "info", "show", "run", "new", "doctor")
+COMMANDS = ("check", "info", "show", "run", "replay", "new", "doctor")
 
 
 def subparser(name: str) -> argparse.ArgumentParser:
@@ -143,6 +143,9 @@ def test_the_examples_of_the_help_run(checkout, tmp_path, monkeypatch, capsys, e
     (tmp_path / "worlds" / "office").symlink_to(checkout / "worlds" / "office")
     command, *words = shlex.split(example)
     assert command == "flatland"
+    if words[0] == "replay":
+        world = tmp_path / "worlds" / "office" / "world.yaml"
+        assert main("run", world, "--duration", "0.1", "--record", words[1]) == 0
     assert main(*words) == 0, capsys.readouterr()
 
 

@@ -1,0 +1,404 @@
+"""Clients that are killed, never read, send rubbish or open thousands of connections."""
+
+from __future__ import annotations
+
+import contextlib
+import resource
+import signal
+import socket
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from typing import Any
+from xmlrpc.client import ServerProxy
+
+import pytest
+import tcpros
+from rosgraph_msgs.msg import Clock
+from sensor_msgs.msg import LaserScan
+from std_msgs.msg import String
+from std_srvs.srv import Empty, Trigger
+from tcpros import ServiceClient, is_closed
+from waiting import wait_until
+
+from flatland.srv import DeleteModel
+
+NODE = "/flatland_server"
+BEAMS = """
+bodies: [{name: base, footprints: [{type: circle, radius: 0.2, density: 1}]}]
+plugins:
+  - {type: Laser, name: laser, body: base, range: 20,
+     angle: {min: -2, max: 2, increment: 0.0004}}
+"""
+SCAN_SIZE = 80_000  # bytes, about: ranges and intensities of 10 001 beams
+CLIENTS = 50
+CALLS = 200  # of each client
+CONNECTIONS = 10_000
+MAX_FILES = 300  # of the node in the test with many connections
+
+
+def count_files(pid: int) -> int:
+    """Returns the number of open files of a process."""
+    return sum(1 for _ in Path(f"/proc/{pid}/fd").iterdir())
+
+
+class Node:
+    """The node under test, its ports, and what the system says about its process."""
+
+    def __init__(self, process: Any, master: Any) -> None:
+        self.process = process
+        self.master = master
+        self.uri = tcpros.node_uri(master, NODE)
+        self.xmlrpc = tcpros.xmlrpc_address(master, NODE)
+        self.tcpros = tcpros.service_address(master, "/delete_model")
+        self.pid = ServerProxy(self.uri).getPid("/test")[2]
+
+    def status(self, field: str) -> int:
+        """Returns a number of /proc/PID/status: VmRSS [kB], Threads."""
+        for line in Path(f"/proc/{self.pid}/status").read_text().splitlines():
+            if line.startswith(field + ":"):
+                return int(line.split()[1])
+        raise KeyError(field)
+
+    def files(self) -> int:
+        """Returns the number of open files."""
+        return count_files(self.pid)
+
+    def connections(self) -> str:
+        """Returns the connections of all topics, with the names of the other nodes."""
+        return str(ServerProxy(self.uri).getBusInfo("/test"))
+
+    def settled(self) -> tuple[int, int]:
+        """Returns the numbers of files and threads once they do not change any more."""
+        last: list[tuple[int, int]] = []
+
+        def is_settled() -> bool:
+            last.append((self.files(), self.status("Threads")))
+            return len(last) > 1 and last[-1] == last[-2]
+
+        wait_until("settled numbers of files and threads", is_settled, poll_period=0.3)
+        return last[-1]
+
+    def delete(self, name: str) -> str:
+        """Calls /delete_model over a new connection and returns the message."""
+        client = ServiceClient(self.tcpros, "/delete_model", DeleteModel, persistent=False)
+        return str(client.call(name).message)
+
+    def assert_serves(self) -> None:
+        """Asserts that new clients of services, topics and of XML-RPC are served."""
+        assert 'model with name "nobody" does not exist' in self.delete("nobody")
+        subscriber = tcpros.Subscriber(self.master, "/clock", Clock, node=NODE)
+        assert len(tcpros.read_frame(subscriber.socket)) == 8
+        subscriber.socket.close()
+        assert ServerProxy(self.uri).getPid("/test") == [1, "", self.pid]
+        assert self.process.running
+        assert "Traceback" not in self.process.output
+
+
+@pytest.fixture(scope="module")
+def node(module_launcher: Any, module_ros: Any, write_world: Callable[..., Path]) -> Node:
+    world = write_world("[{name: robot, model: beams.model.yaml}]", beams=BEAMS)
+    return Node(module_launcher.server(world, update_rate=200), module_ros.master)
+
+
+@pytest.fixture
+def connections() -> Iterator[list[socket.socket]]:
+    """Connections that are closed at the end of the test."""
+    opened: list[socket.socket] = []
+    yield opened
+    for connection in opened:
+        connection.close()
+
+
+# -- calls ---------------------------------------------------------------------------------
+
+
+def test_many_clients_are_answered_in_order(node: Node) -> None:
+    start = threading.Barrier(CLIENTS)
+
+    def call(client: int) -> list[str]:
+        """Half of the clients send all requests at once, over one connection."""
+        names = [f"{client}-{number}" for number in range(CALLS)]
+        persistent = client % 2 == 0
+        service = ServiceClient(node.tcpros, "/delete_model", DeleteModel, persistent=persistent)
+        start.wait()
+        if persistent:
+            service.send([(name,) for name in names])
+            messages = [service.receive().message for _ in names]
+        else:
+            messages = [service.call(name).message for name in names]
+        service.close()
+        return messages
+
+    with ThreadPoolExecutor(CLIENTS) as pool:
+        answers = list(pool.map(call, range(CLIENTS)))
+    for client, messages in enumerate(answers):
+        assert [message.split('"')[1] for message in messages] == [
+            f"{client}-{number}" for number in range(CALLS)
+        ]
+    node.assert_serves()
+
+
+# -- subscribers ---------------------------------------------------------------------------
+
+KILLED = """
+import rospy, sys
+from rosgraph_msgs.msg import Clock
+from sensor_msgs.msg import LaserScan
+from std_msgs.msg import Bool
+
+rospy.init_node("killed", anonymous=True, disable_rostime=True)
+for name, kind in (("/clock", Clock), ("/scan", LaserScan), ("/flatland_server/paused", Bool),):
+    rospy.wait_for_message(name, kind)
+    rospy.Subscriber(name, kind, lambda message: None)
+while rospy.get_published_topics() and not all(
+    impl.has_connections() for impl in rospy.topics.get_topic_manager().subs.values()
+):
+    rospy.rostime.wallsleep(0.01)
+print("connected", flush=True)
+rospy.spin()
+"""
+
+
+@pytest.mark.parametrize("paused", [False, True])
+def test_killed_subscriber_leaves_nothing_behind(
+    node: Node, launcher: Any, ros: Any, paused: bool
+) -> None:
+    if paused:
+        ros.call("/pause", Empty)
+    try:
+        if paused:  # Only the topic with a state sends messages.
+            program = KILLED.replace('("/clock", Clock), ("/scan", LaserScan), ', "")
+        else:
+            program = KILLED
+        before = node.settled()
+        subscriber = launcher.program(sys.executable, "-c", program)
+        subscriber.wait_for_line("connected")
+        wait_until("its connections", lambda: "/killed" in node.connections())
+        subscriber.send(signal.SIGKILL)
+        subscriber.wait()
+        wait_until(
+            "files and threads as before",
+            lambda: (
+                "/killed" not in node.connections()
+                and node.files() <= before[0]
+                and node.status("Threads") <= before[1]
+            ),
+        )
+    finally:
+        ros.call("/resume", Empty)
+    node.assert_serves()
+
+
+def test_subscriber_that_never_reads_costs_neither_memory_nor_speed(node: Node, ros: Any) -> None:
+    clock = ros.topic("/clock", Clock)
+
+    def rate(steps: int) -> float:
+        """Returns the rate of the simulation [Hz] over some steps."""
+        clock.drop()
+        first, start = clock.next().clock.to_sec(), time.monotonic()
+        clock.until(lambda message: message.clock.to_sec() >= first + steps * 0.005)
+        return steps / (time.monotonic() - start)
+
+    reader = ros.topic("/scan", LaserScan)
+    rate(20)
+    usual = rate(200)
+    memory = node.status("VmRSS")
+    stuck = tcpros.Subscriber(ros.master, "/scan", LaserScan)
+    with_stuck = rate(400)
+    grown = node.status("VmRSS") - memory
+    sent = 400 * SCAN_SIZE // 1024
+    assert grown < sent / 4, f"{grown} kB for {sent} kB of messages"
+    # Other programs use the machine as well; a publisher that waits would stop the simulation.
+    assert with_stuck > usual / 3
+    assert reader.next()
+    stuck.socket.close()
+    node.assert_serves()
+
+
+# -- rubbish -------------------------------------------------------------------------------
+
+RUBBISH = [
+    b"\x00" * 64,
+    b"\xff" * 64,
+    b"GET / HTTP/1.1\r\n\r\n",
+    b"\x10\x00\x00\x00\x00\x00\x00\x00" + b"a" * 12,
+    b"\x08\x00\x00\x00\x04\x00\x00\x00\xff\xfe=\xfd",
+    b"\x08\x00\x00\x00\xff\x00\x00\x00a=b!",
+    tcpros.header({"hello": "world"}),
+    tcpros.header({"topic": "/clock"}),
+    tcpros.header({"service": "/delete_model"}),
+    tcpros.header({"topic": "/nothing", "md5sum": "*", "callerid": "/rubbish", "type": "*"}),
+    tcpros.header({"service": "/nothing", "md5sum": "*", "callerid": "/rubbish"}),
+]
+
+
+@pytest.mark.parametrize("data", RUBBISH, ids=range(len(RUBBISH)))
+def test_rubbish_on_the_port_of_tcpros(
+    node: Node, connections: list[socket.socket], data: bytes
+) -> None:
+    connections.append(tcpros.connect(node.tcpros))
+    connections[0].sendall(data)
+    assert is_closed(connections[0])
+    node.assert_serves()
+
+
+@pytest.fixture(scope="module")
+def incomplete() -> Iterator[list[socket.socket]]:
+    """Connections with incomplete headers, which stay open for the other tests."""
+    opened: list[socket.socket] = []
+    yield opened
+    for connection in opened:
+        connection.close()
+
+
+def test_half_headers_block_no_other_client(
+    node: Node, incomplete: list[socket.socket], connections: list[socket.socket]
+) -> None:
+    header = tcpros.header({"topic": "/clock", "callerid": "/half"})
+    request = b"POST / HTTP/1.1\r\nHost: node\r\nContent-Length: 1000\r\n\r\n<?xml"
+    for size in (0, 1, 4, 5, len(header) - 1):
+        incomplete.append(tcpros.connect(node.tcpros))
+        incomplete[-1].sendall(header[:size])
+    for size in (0, 1, 20, len(request)):
+        connections.append(tcpros.connect(node.xmlrpc))
+        connections[-1].sendall(request[:size])
+    node.assert_serves()
+
+
+def test_header_in_single_bytes_is_accepted(node: Node) -> None:
+    fields = {"callerid": "/slow", "service": "/delete_model", "md5sum": "*"}
+    with contextlib.closing(tcpros.connect(node.tcpros)) as connection:
+        connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        for byte in tcpros.header(fields):
+            connection.sendall(bytes([byte]))
+        assert DeleteModel._md5sum.encode() in tcpros.read_frame(connection)
+
+
+@pytest.mark.parametrize(
+    "data",
+    [
+        b"\x00\xff\x00\xff\r\n\r\n",
+        b"GET / HTTP/1.1\r\n\r\n",
+        b"POST / HTTP/1.0\r\nContent-Length: 7\r\n\r\nrubbish",
+        b"POST / HTTP/1.0\r\nContent-Length: many\r\n\r\nrubbish",
+        b"POST / HTTP/1.0\r\nContent-Length: 99999999999\r\n\r\nrubbish",
+        b"POST / HTTP/1.0\r\n\r\n",
+    ],
+    ids=range(6),
+)
+def test_rubbish_on_the_port_of_xmlrpc(
+    node: Node, connections: list[socket.socket], data: bytes
+) -> None:
+    connections.append(tcpros.connect(node.xmlrpc))
+    connections[0].sendall(data)
+    answer = connections[0].recv(4096)
+    assert answer == b"" or answer.startswith((b"HTTP/1", b"<!DOCTYPE", b"<?xml"))
+    connections[0].close()
+    node.assert_serves()
+
+
+EMPTY_REQUEST = b"\x00\x00\x00\x00"
+
+
+@pytest.mark.parametrize(
+    "data",
+    [EMPTY_REQUEST, b"\x04\x00\x00\x00\xff\xff\xff\xff", b"\x02\x00\x00\x00ab"],
+    ids=range(3),
+)
+def test_rubbish_request_of_a_service(
+    node: Node, connections: list[socket.socket], data: bytes
+) -> None:
+    fields = {"callerid": "/rubbish", "service": "/delete_model", "md5sum": "*"}
+    connections.append(tcpros.connect(node.tcpros))
+    connections[0].sendall(tcpros.header(fields))
+    tcpros.read_frame(connections[0])
+    connections[0].sendall(data)
+    assert is_closed(connections[0])
+    if data == EMPTY_REQUEST:
+        node.process.wait_for_line(r"\[WARN\].*closed the connection of a client: ")
+    node.assert_serves()
+
+
+# -- wrong MD5 sums ------------------------------------------------------------------------
+
+
+def test_wrong_md5_of_a_topic_is_refused(node: Node, ros: Any) -> None:
+    subscriber = tcpros.Subscriber(ros.master, "/clock", String, callerid="/mistaken")
+    assert (
+        b"error=topic types do not match: [std_msgs/String] vs. [rosgraph_msgs/Clock]"
+        in subscriber.response
+    )
+    assert is_closed(subscriber.socket)
+    subscriber = tcpros.Subscriber(
+        ros.master, "/clock", Clock, callerid="/mistaken", md5sum="0" * 32
+    )
+    assert b"error=Client [/mistaken] wants topic [/clock] to have" in subscriber.response
+    assert is_closed(subscriber.socket)
+    node.process.wait_for_line(r"\[WARN\].*refused a connection of /mistaken: Client \[/mistaken\]")
+    node.assert_serves()
+
+
+def test_wrong_md5_of_a_service_is_refused(node: Node, connections: list[socket.socket]) -> None:
+    fields = {"callerid": "/mistaken", "service": "/delete_model", "md5sum": Trigger._md5sum}
+    connections.append(tcpros.connect(node.tcpros))
+    connections[0].sendall(tcpros.header(fields))
+    assert b"error=request from [/mistaken]: md5sums do not match: " in tcpros.read_frame(
+        connections[0]
+    )
+    assert is_closed(connections[0])
+    node.assert_serves()
+
+
+# -- many connections ----------------------------------------------------------------------
+
+
+def test_many_connections_that_are_left_open(
+    launcher: Any,
+    server_path: str,
+    ros: Any,
+    write_world: Callable[..., Path],
+    connections: list[socket.socket],
+) -> None:
+    """The node has no more than `MAX_FILES` files, and closes the oldest connections."""
+    _, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+    resource.setrlimit(resource.RLIMIT_NOFILE, (hard, hard))
+    process = launcher.program(
+        "bash",
+        "-c",
+        f'ulimit -n {MAX_FILES}; exec "$0" "$@"',
+        server_path,
+        f"_world_path:={write_world()}",
+        "__name:=crowded",
+        "delete_model:=/crowded/delete_model",
+    )
+    process.wait_for_line("loaded")
+    wait_until(
+        "the node", lambda: ros.registered("/crowded")["services"] >= {"/crowded/delete_model"}
+    )
+    tcpros_address = tcpros.service_address(ros.master, "/crowded/delete_model")
+    xmlrpc_address = tcpros.xmlrpc_address(ros.master, "/crowded")
+    for number in range(CONNECTIONS):
+        connections.append(tcpros.connect(tcpros_address if number % 10 else xmlrpc_address))
+    client = ServiceClient(tcpros_address, "/crowded/delete_model", DeleteModel, persistent=False)
+    assert 'model with name "nobody" does not exist' in client.call("nobody").message
+    uri = tcpros.node_uri(ros.master, "/crowded")
+    code, _, pid = ServerProxy(uri).getPid("/test")
+    assert code == 1
+    assert count_files(pid) <= MAX_FILES
+    assert "Traceback" not in process.output
+    assert process.stop() == 0
+
+
+def test_incomplete_headers_are_closed_after_some_time(
+    node: Node, incomplete: list[socket.socket]
+) -> None:
+    """Last, because the time limit is 10 s."""
+    assert incomplete
+    for connection in incomplete:
+        assert is_closed(connection)
+    node.process.wait_for_line(r"\[WARN\].*closed a connection from .*: its header is not complete")
+    node.assert_serves()

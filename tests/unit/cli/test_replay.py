@@ -1,0 +1,131 @@
+"""`flatland replay`, and recordings of `flatland run`."""
+
+from __future__ import annotations
+
+import re
+import signal
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+from flatland_command import main
+from waiting import TIMEOUT, wait_until
+
+from flatland.recording import log_file
+
+ROBOT = """
+bodies:
+- {name: base, footprints: [{type: circle, radius: 0.5, density: 1}]}
+plugins:
+- {type: DiffDrive, name: drive, body: base}
+"""
+DRIVE = ("--command", "/cmd_vel={linear: {x: 0.5}}")
+
+
+@pytest.fixture
+def world(files: Any, monkeypatch: pytest.MonkeyPatch) -> str:
+    """A world with a robot; its folder is the current one."""
+    monkeypatch.chdir(files.folder)
+    files.write("robot.model.yaml", ROBOT)
+    return files.write(
+        "world.yaml",
+        """
+        properties: {}
+        layers: [{name: walls}]
+        models: [{name: robot, model: robot.model.yaml}]
+        """,
+    )
+
+
+@pytest.fixture
+def recording(world: str, capsys: pytest.CaptureFixture[str]) -> Path:
+    """A recording of a run of 2.5 s."""
+    arguments = ("run", world, "--duration", "2.5", "--seed", "1", "--record", "run.flog", *DRIVE)
+    assert main(*arguments) == 0
+    assert capsys.readouterr().out.endswith("\nwrote run.flog\n")
+    return Path("run.flog")
+
+
+def test_a_recorded_run_is_repeated(recording: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main("replay", recording) == 0
+    assert capsys.readouterr().out == "run.flog: 500 steps (2.5 s), no difference\n"
+
+
+def test_a_difference_is_printed(recording: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    records = log_file.read_recording(recording).records
+    writer = log_file.LogWriter(recording)
+    for record in records:
+        if record.get("kind") == "command":
+            record = {**record, "step": 99}
+        writer.write(record)
+    writer.close()
+    assert main("replay", recording) == 1
+    assert capsys.readouterr().out == (
+        "run.flog: the first difference is at step 1 (0.005 s): "
+        "poses or velocities of bodies differ\n"
+    )
+
+
+def test_a_changed_file_is_an_error(
+    files: Any, recording: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    files.write("robot.model.yaml", ROBOT + "# changed\n")
+    assert main("replay", recording) == 1
+    assert "files have changed since the recording" in capsys.readouterr().err
+    assert main("replay", recording, "--ignore-changes") == 0
+
+
+def test_a_missing_recording_is_an_error(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main("replay", tmp_path / "missing.flog") == 1
+    assert "No such file" in capsys.readouterr().err
+
+
+def test_the_bag_of_a_replay_is_that_of_the_run(world: str) -> None:
+    rosbag = pytest.importorskip("rosbag")
+    arguments = ("run", world, "--duration", "0.5", "--seed", "1", *DRIVE)
+    assert main(*arguments, "--record", "run.flog", "--bag", "run.bag") == 0
+    assert main("replay", "run.flog", "--bag", "replay.bag") == 0
+    bags = []
+    for name in ("run.bag", "replay.bag"):
+        with rosbag.Bag(name) as bag:
+            bags.append([(topic, str(message), time) for topic, message, time in bag])
+    assert bags[0] == bags[1]
+    assert len(bags[0]) > 300
+
+
+def test_a_run_that_was_killed_is_repeated(world: str, capsys: pytest.CaptureFixture[str]) -> None:
+    command = [sys.executable, "-m", "flatland", "run", world, "--duration", "1e9"]
+    process = subprocess.Popen(
+        [*command, "--record", "run.flog", *DRIVE],
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+    )
+    recording = Path("run.flog")
+    wait_until(
+        "two simulated seconds",
+        lambda: recording.exists() and recording.read_bytes().count(b'"state","state"') > 2,
+    )
+    process.send_signal(signal.SIGKILL)
+    process.wait(TIMEOUT)
+    assert main("replay", recording) == 0
+    first, second = capsys.readouterr().out.splitlines()
+    assert re.fullmatch(r"run\.flog: \d+ steps \(\d+ s\), no difference", first)
+    assert second == "the recording has no end: the program that wrote it was killed"
+
+
+def test_a_signal_ends_the_replay(world: str, recording: Path) -> None:
+    assert main("run", world, "--duration", "600", "--record", "long.flog") == 0
+    process = subprocess.Popen(
+        [sys.executable, "-m", "flatland", "replay", "long.flog", "--bag", "long.bag"],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.DEVNULL,
+        text=True,
+    )
+    wait_until("the bag", Path("long.part.bag").exists)
+    process.send_signal(signal.SIGINT)
+    output, _ = process.communicate(timeout=TIMEOUT)
+    assert process.returncode == 130, output
