@@ -4,7 +4,7 @@ SHELL := /bin/bash
 
 VENV := .venv
 PYTHON := $(VENV)/bin/python
-CPP_FILES = $(shell find src/cpp $(wildcard bench) -name '*.h' -o -name '*.cpp')
+CPP_FILES = $(shell find src/cpp tests $(wildcard bench) -name '*.h' -o -name '*.cpp')
 
 .PHONY: help
 help:  ## list the commands

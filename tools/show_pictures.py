@@ -2,7 +2,8 @@
 
 Usage: show_pictures.py [FOLDER]   (default: docs/images; existing images are overwritten)
 
-Requires the environment of setup.bash. The ROS master is started by this program.
+Requires the environment of setup.bash. The ROS master is started by this program. navigation.png is
+captured only if amcl and move_base are on ROS_PACKAGE_PATH, see examples/navigation/README.md.
 """
 
 from __future__ import annotations
@@ -26,9 +27,14 @@ from virtual_screen import Image, VirtualScreen, missing_programs
 
 _CHECKOUT = Path(__file__).resolve().parent.parent
 _OFFICE = _CHECKOUT / "worlds" / "office"
+_NAVIGATION = _CHECKOUT / "examples" / "navigation"
+_NAVIGATION_NODES = ("amcl", "move_base")
 _SIZE = (1200, 800)  # of the windows of the viewer and of RViz [px]
 _ARROW_COLOR = (255, 217, 26)  # of the heading arrow in the viewer
 _FROM_ABOVE = "{Class: rviz/TopDownOrtho, Scale: 34, X: -3, Y: 0.3, Angle: 0}"
+_ROUTE = "{Class: rviz/TopDownOrtho, Scale: 46, X: -0.3, Y: -0.6, Angle: 0}"
+_GOAL = (4.0, 3.0)  # position in the office [m], with a heading of 0
+_ON_THE_WAY = -1.5  # y at which the image is captured [m]
 _IN_3D = (
     "{Class: rviz/Orbit, Distance: 24, Focal Point: {X: -1.5, Y: -1, Z: 0}, Pitch: 0.85, Yaw: 4.4}"
 )
@@ -48,6 +54,7 @@ def main(arguments: list[str]) -> int:
     folder.mkdir(parents=True, exist_ok=True)
     screen = VirtualScreen(*_SIZE)
     try:
+        _capture_navigation(screen, folder / "navigation.png")
         with _simulator(screen) as environment:
             _spawn_furniture()
             _drive(3.0)
@@ -62,12 +69,9 @@ def main(arguments: list[str]) -> int:
 @contextmanager
 def _simulator(screen: VirtualScreen) -> Iterator[dict[str, str]]:
     """Runs the office and the viewer with a separate ROS master."""
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        port = probe.getsockname()[1]
-    os.environ.update(ROS_MASTER_URI=f"http://127.0.0.1:{port}", ROS_IP="127.0.0.1")
+    port = _new_master()
     environment = {**os.environ, **screen.environment}
-    command = ["roslaunch", "-p", str(port), "flatland", "server.launch", "seed:=1"]
+    command = ["roslaunch", "-p", port, "flatland", "server.launch", "seed:=1"]
     with _running(command, environment):
         import rosgraph
         import rospy
@@ -76,6 +80,15 @@ def _simulator(screen: VirtualScreen) -> Iterator[dict[str, str]]:
         rospy.init_node("pictures", disable_rostime=True, disable_signals=True)
         yield environment
         rospy.signal_shutdown("all images are saved")
+
+
+def _new_master() -> str:
+    """Sets the variables of a ROS master on an unused port, and returns the port."""
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        port = probe.getsockname()[1]
+    os.environ.update(ROS_MASTER_URI=f"http://127.0.0.1:{port}", ROS_IP="127.0.0.1")
+    return str(port)
 
 
 @contextmanager
@@ -158,18 +171,70 @@ def _capture_rviz(
     screen: VirtualScreen, environment: dict[str, str], view: str, path: Path
 ) -> None:
     """Captures a part of the office in RViz, with the trajectories of the robots."""
-    text = (_CHECKOUT / "rviz" / "flatland.rviz").read_text()
-    before, rest = text.split("    Current:\n")
-    after = rest[rest.index("    Saved:\n") :]
     with tempfile.TemporaryDirectory() as folder:
-        config = Path(folder) / "picture.rviz"
-        config.write_text(f"{before}    Current: {view}\n{after}")
+        config = _with_view(_CHECKOUT / "rviz" / "flatland.rviz", view, Path(folder))
         with _running(["rviz", "-d", str(config)], environment):
             _wait("view of RViz", lambda: (screen.picture()[100:600, 400:1100] > 0).all())
             time.sleep(2 * _DRAWING_TIME)
             _drive(4.0)
             time.sleep(_DRAWING_TIME)
             _save(screen, path)
+
+
+def _with_view(config: Path, view: str, folder: Path) -> Path:
+    """Writes a copy of a configuration of RViz with another view; returns its path."""
+    before, rest = config.read_text().split("    Current:\n")
+    after = rest[rest.index("    Saved:\n") :]
+    copy = folder / "picture.rviz"
+    copy.write_text(f"{before}    Current: {view}\n{after}")
+    return copy
+
+
+def _capture_navigation(screen: VirtualScreen, path: Path) -> None:
+    """Captures the office robot on its way to a goal, in the RViz of examples/navigation."""
+    import rospkg
+
+    packages = rospkg.RosPack().list()
+    if missing := [node for node in _NAVIGATION_NODES if node not in packages]:
+        print(f"{path}: not captured, not on ROS_PACKAGE_PATH: {', '.join(missing)}")
+        return
+    port = _new_master()
+    package_path = f"{_NAVIGATION}:{os.environ['ROS_PACKAGE_PATH']}"
+    environment = {**os.environ, **screen.environment, "ROS_PACKAGE_PATH": package_path}
+    with tempfile.TemporaryDirectory() as folder:
+        config = _with_view(_NAVIGATION / "rviz" / "navigation.rviz", _ROUTE, Path(folder))
+        launch = ["roslaunch", "-p", port, "flatland_navigation", "navigation.launch", "seed:=1"]
+        with _running([*launch, f"rviz_config:={config}"], environment):
+            code = "import show_pictures as p; p.send_goal()"
+            subprocess.run(  # noqa: S603 - a process of its own, because it is a node of this master
+                [sys.executable, "-c", code], env=environment, cwd=Path(__file__).parent, check=True
+            )
+            _save(screen, path)
+
+
+def send_goal() -> None:
+    """Sends the robot to the goal and returns when it is on the way."""
+    import rospy
+    from geometry_msgs.msg import PoseStamped
+    from nav_msgs.msg import OccupancyGrid, Odometry
+
+    rospy.init_node("goal", disable_rostime=True)
+    for topic in ("/map", "/move_base/local_costmap/costmap"):
+        rospy.wait_for_message(topic, OccupancyGrid, _TIMEOUT)
+    time.sleep(4 * _DRAWING_TIME)  # RViz starts
+    publisher = rospy.Publisher("/move_base_simple/goal", PoseStamped, queue_size=1)
+    _wait("move_base", publisher.get_num_connections)
+    goal = PoseStamped()
+    goal.header.frame_id = "map"
+    goal.pose.position.x, goal.pose.position.y = _GOAL
+    goal.pose.orientation.w = 1.0
+    publisher.publish(goal)
+
+    def position() -> float:
+        truth = rospy.wait_for_message("/odometry/ground_truth", Odometry, _TIMEOUT)
+        return float(truth.pose.pose.position.y)
+
+    _wait("the robot on its way", lambda: position() > _ON_THE_WAY)
 
 
 def _has_color(image: Image, color: tuple[int, int, int]) -> bool:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import dataclasses
 import json
+import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -81,8 +82,10 @@ def _info(options: argparse.Namespace) -> int:
     else:
         world = load(options, seed=0)
     with world:
-        world.step()  # in which plugins send their first transforms
+        world.step()  # in which most plugins send their first transforms
         contents = describe_world(world, str(options.path))
+        world.step(_steps_to_first_updates(world))
+        contents["frames"] = _describe_frames(world)
     if options.json:
         print(json.dumps(contents, indent=2))
     else:
@@ -97,7 +100,7 @@ def describe_world(world: World, path: str) -> dict[str, Any]:
     """Returns the contents of a world as values of JSON.
 
     Args:
-        world: A world that was stepped at least once, so that its frames are known.
+        world: A world that was stepped, so that its frames are known.
         path: The world file, as given.
     """
     return {
@@ -106,11 +109,24 @@ def describe_world(world: World, path: str) -> dict[str, Any]:
         "models": [_model(world, model) for model in world.models],
         "world_plugins": [_plugin(plugin) for plugin in world.plugins],
         "topics": [dataclasses.asdict(topic) for topic in topics(world)],
-        "frames": [
-            {"parent": parent, "child": child} for parent, child in sorted(world.transforms)
-        ],
+        "frames": _describe_frames(world),
         "services": [{"name": name, "type": kind} for name, kind in NODE_SERVICES.items()],
     }
+
+
+def _describe_frames(world: World) -> list[dict[str, str]]:
+    return [{"parent": parent, "child": child} for parent, child in sorted(world.transforms)]
+
+
+def _steps_to_first_updates(world: World) -> int:
+    """Returns the number of steps in which plugins with `after_step` send their first transforms.
+
+    Their first update is due one period after the start; at most one second is considered.
+    """
+    plugins = [plugin for model in world.models for plugin in model.plugins]
+    rates = [rate for plugin in plugins if (rate := _rate(plugin))]
+    step_size = world.timekeeper.step_size_ns / 1e9
+    return math.ceil(min(1.0, 1 / min(rates, default=1.0)) / step_size)
 
 
 def _layer(layer: Layer) -> dict[str, Any]:

@@ -191,7 +191,7 @@ class Odometer:
 
         if publishes_after_step or drift is not None:
             call_after_step(self._plugin, finish_step)
-        return NeverDue() if publishes_after_step else timer
+        return NeverDue(timer.rate) if publishes_after_step else timer
 
     @property
     def wanted(self) -> bool:

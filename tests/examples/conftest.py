@@ -70,7 +70,7 @@ class Background:
         """The output so far."""
         return self._log.read_text(errors="replace")
 
-    def wait_for(self, pattern: str) -> None:
+    def wait_for(self, pattern: str, timeout: float = TIMEOUT) -> None:
         """Waits until the output matches a pattern."""
 
         def printed() -> bool:
@@ -81,7 +81,7 @@ class Background:
                 pytest.fail(f"ended without {pattern!r}:\n{self.output}")
             return found
 
-        wait_until(f"output with {pattern!r}", printed, poll_period=0.05)
+        wait_until(f"output with {pattern!r}", printed, timeout, poll_period=0.05)
 
     def stop(self) -> None:
         """Stops the program as Ctrl-C does."""
@@ -103,27 +103,45 @@ def example(checkout: Path) -> Path:
 
 
 @pytest.fixture
-def environment(checkout: Path, tmp_path: Path) -> dict[str, str]:
+def unused_port() -> Callable[[], int]:
+    """Returns an unused TCP port with each call, for further ROS masters."""
+    return free_port
+
+
+@pytest.fixture(scope="session")
+def new_environment(checkout: Path) -> Callable[[Path], dict[str, str]]:
     """Returns the environment of a shell after `. setup.bash`, with a new home and ROS master."""
     package = Path(flatland.__file__).resolve().parent
     # The package is the installed one, or the source tree after `make dev`.
     share = checkout if package.parent == checkout else Path(sys.prefix) / "share"
-    home = tmp_path / "home"
-    home.mkdir()
-    return {
-        "HOME": str(home),
-        "PATH": f"{Path(sys.executable).parent}:/usr/bin:/bin",
-        "LANG": "C.UTF-8",
-        "PYTHONPATH": str(package.parent),
-        "ROS_PACKAGE_PATH": f"{share}:/usr/share",
-        "ROS_DISTRO": "Debian",
-        "ROS_VERSION": "1",
-        "ROS_PYTHON_VERSION": "3",
-        "ROS_ETC_DIR": "/etc/ros",
-        "ROS_MASTER_URI": f"http://127.0.0.1:{free_port()}",
-        "ROS_IP": "127.0.0.1",
-        "PYTHONUNBUFFERED": "1",
-    }
+
+    def create(folder: Path) -> dict[str, str]:
+        home = folder / "home"
+        home.mkdir()
+        return {
+            "HOME": str(home),
+            "PATH": f"{Path(sys.executable).parent}:/usr/bin:/bin",
+            "LANG": "C.UTF-8",
+            "PYTHONPATH": str(package.parent),
+            "ROS_PACKAGE_PATH": f"{share}:/usr/share",
+            "ROS_DISTRO": "Debian",
+            "ROS_VERSION": "1",
+            "ROS_PYTHON_VERSION": "3",
+            "ROS_ETC_DIR": "/etc/ros",
+            "ROS_MASTER_URI": f"http://127.0.0.1:{free_port()}",
+            "ROS_IP": "127.0.0.1",
+            "PYTHONUNBUFFERED": "1",
+        }
+
+    return create
+
+
+@pytest.fixture
+def environment(
+    new_environment: Callable[[Path], dict[str, str]], tmp_path: Path
+) -> dict[str, str]:
+    """The environment of a shell after `. setup.bash`."""
+    return new_environment(tmp_path)
 
 
 @pytest.fixture

@@ -11,7 +11,7 @@ import pytest
 from waiting import TIMEOUT
 
 _CALL = re.compile(r"^rosservice call .*$", re.MULTILINE)
-PAGES = ["README.md", "docs/models.md", "docs/ros.md", "docs/viewer.md"]
+PAGES = ["README.md", "docs/models.md", "docs/navigation.md", "docs/ros.md", "docs/viewer.md"]
 
 
 @pytest.mark.parametrize("page", PAGES)

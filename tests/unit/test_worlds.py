@@ -189,6 +189,23 @@ def test_one_localization_can_send_the_transform_to_map(worlds: Path) -> None:
         assert ("odom", "base_link") in world.transforms
 
 
+def odometry_error(path: Path, params: dict[str, object]) -> float:
+    """Returns the distance between odometry and true position after 10 m [m]."""
+    with flatland.World.from_yaml(str(path), seed=1, params=params) as world:
+        odometry, truth = world.output("/odometry/filtered"), world.output("/odometry/ground_truth")
+        world.command("/cmd_vel").set(flatland.Twist(linear_x=0.5))
+        world.step(4000)
+        poses = (odometry.latest.pose, truth.latest.pose)
+        assert truth.latest.pose[0] > 6.5
+        return math.dist(poses[0][:2], poses[1][:2])
+
+
+def test_the_odometry_drifts_only_with_a_localization(worlds: Path) -> None:
+    path = worlds / "office/world.yaml"
+    assert odometry_error(path, {}) == 0.0
+    assert 0.01 < odometry_error(path, {"/map_to_odom": False}) < 1.0
+
+
 @pytest.mark.parametrize("model", ["chair", "box", "door", "diff_robot", "tricycle"])
 def test_models_can_be_spawned(office: flatland.World, model: str) -> None:
     office.spawn_model(f"{model}.model.yaml", "another", "another", (14.0, 0.0, 0.0))

@@ -97,6 +97,16 @@ def test_text(robot_world, capsys):
     assert "spawn_model flatland/SpawnModel" in rows
 
 
+def test_frames_and_rates_of_plugins_that_publish_after_the_step(files, capsys):
+    robot = ROBOT.replace("pub_rate: 20", "pub_rate: 20, after_step: true")
+    path = files.write("robot.model.yaml", robot.replace("rate: 10}", "rate: 4, after_step: true}"))
+    contents = info(path, capsys)
+    frames = {(frame["parent"], frame["child"]) for frame in contents["frames"]}
+    assert frames == {("odom", "base"), ("base", "arm"), ("arm", "eye")}
+    rates = {topic["topic"]: topic["rate"] for topic in contents["topics"]}
+    assert rates["/odometry/filtered"] == 20
+
+
 def test_a_model(files, capsys):
     path = files.write("robot.model.yaml", ROBOT)
     contents = info(path, capsys)

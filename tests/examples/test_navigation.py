@@ -1,0 +1,474 @@
+"""The package flatland_navigation: what can be tested without amcl, SLAM nodes and move_base."""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+import shlex
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from textwrap import dedent
+from typing import Any
+
+import pytest
+import yaml
+from waiting import TIMEOUT
+
+import flatland
+
+NODES = {
+    "navigation.launch": {"/flatland_server", "/rviz", "/amcl", "/move_base"},
+    "navigation.launch simulator:=false": {"/amcl", "/move_base"},
+    "localization.launch": {"/flatland_server", "/rviz", "/amcl"},
+    "localization.launch map:=/a.yaml rviz:=false": {"/flatland_server", "/map_server", "/amcl"},
+    "localization.launch map:=none simulator:=false": {"/amcl"},
+    "mapping.launch": {"/flatland_server", "/rviz", "/gmapping", "/move_base"},
+    "mapping.launch slam:=hector move_base:=false": {
+        "/flatland_server",
+        "/rviz",
+        "/hector_mapping",
+    },
+}
+# Reads launch files with arguments, and prints the parameters and the nodes with their remappings.
+RESOLVE = dedent(
+    """
+    import json, sys, roslaunch.config
+    result = []
+    for path, *arguments in json.load(sys.stdin):
+        config = roslaunch.config.load_config_default([(path, arguments)], None)
+        nodes = {node.namespace + node.name: dict(node.remap_args) for node in config.nodes}
+        result.append(({name: param.value for name, param in config.params.items()}, nodes))
+    print("JSON" + json.dumps(result))
+    """
+)
+# Values of launch arguments.
+TOPICS = {
+    "scan": "lidar",
+    "odom": "wheels",
+    "cmd_vel": "velocity",
+    "map_topic": "/floor_plan",
+    "map_frame": "building",
+    "odom_frame": "r1_odom",
+    "base_frame": "r1_base",
+}
+DEFAULTS = ["odom", "base_link", "odometry/filtered"]
+
+
+@pytest.fixture(scope="module")
+def package(checkout: Path) -> Path:
+    return checkout / "examples" / "navigation"
+
+
+@pytest.fixture
+def shell(environment: dict[str, str], package: Path) -> dict[str, str]:
+    """The environment of the README: the folder of the package is on ROS_PACKAGE_PATH."""
+    environment["ROS_PACKAGE_PATH"] = f"{package}:{environment['ROS_PACKAGE_PATH']}"
+    return environment
+
+
+@pytest.fixture(scope="module")
+def resolve(new_environment: Any, package: Path, tmp_path_factory: Any) -> Callable[..., Any]:
+    """Resolves launch files with arguments to parameters and remappings of nodes.
+
+    All in one process, because each start of roslaunch takes a second.
+    """
+    shell = new_environment(tmp_path_factory.mktemp("roslaunch"))
+    shell["ROS_PACKAGE_PATH"] = f"{package}:{shell['ROS_PACKAGE_PATH']}"
+
+    def run(*launches: str) -> list[tuple[dict[str, Any], dict[str, Any]]]:
+        files = [shlex.split(launch) for launch in launches]
+        done = subprocess.run(
+            [sys.executable, "-c", RESOLVE],
+            env=shell,
+            input=json.dumps([[f"{package}/launch/{name}", *more] for name, *more in files]),
+            capture_output=True,
+            text=True,
+            timeout=TIMEOUT,
+        )
+        assert done.returncode == 0, done.stderr
+        return json.loads(done.stdout[done.stdout.index("JSON") + 4 :])
+
+    return run
+
+
+@pytest.fixture(scope="module")
+def params(resolve: Callable[..., Any]) -> dict[str, Any]:
+    """The parameters of navigation.launch."""
+    [(params, _)] = resolve("navigation.launch")
+    return params
+
+
+@pytest.fixture(scope="module")
+def office(checkout: Path) -> Any:
+    with flatland.World.from_yaml(checkout / "worlds/office/world.yaml", seed=1) as world:
+        yield world
+
+
+@pytest.mark.ros
+def test_the_launch_files_start_the_nodes(resolve):
+    for launch, (_, nodes) in zip(NODES, resolve(*NODES), strict=True):
+        assert set(nodes) == NODES[launch], launch
+
+
+@pytest.mark.ros
+def test_the_package_is_found_by_roslaunch(shell, run_command, tmp_path):
+    command = ["roslaunch", "flatland_navigation", "navigation.launch", "--nodes"]
+    assert "/move_base" in run_command(command, shell, tmp_path).split()
+    command = ["rosrun", "flatland_navigation", "tour.py", "--help"]
+    assert "--ground-truth" in run_command(command, shell, tmp_path)
+
+
+@pytest.mark.ros
+def test_all_commands_of_the_documentation_can_be_launched(checkout, package, resolve):
+    pages = [checkout / "docs" / "navigation.md", package / "README.md", checkout / "README.md"]
+    text = "\n".join(page.read_text() for page in pages)
+    commands = re.findall(r"^roslaunch flatland_navigation (\S+.*?)(?: *#.*)?$", text, re.MULTILINE)
+    assert len(commands) >= 8
+    robot = str(package / "config" / "robot.yaml")
+    resolve(*(command.replace("/path/robot.yaml", robot) for command in set(commands)))
+
+
+@pytest.mark.ros
+def test_topics_and_frames_of_the_arguments_reach_all_nodes(resolve):
+    given = " ".join(f"{key}:={value}" for key, value in TOPICS.items())
+    launches = ["navigation.launch", "mapping.launch", "mapping.launch slam:=hector"]
+    results = resolve(*(f"{launch} {given} simulator:=false" for launch in launches))
+    for launch, (params, nodes) in zip(launches, results, strict=True):
+        for node, remappings in nodes.items():
+            for topic, target in remappings.items():
+                assert target == TOPICS["map_topic" if topic == "map" else topic], (launch, node)
+        for key, value in params.items():
+            assert value not in DEFAULTS, (launch, key)
+        used = {str(value) for value in params.values()}
+        used |= {target for remappings in nodes.values() for target in remappings.values()}
+        assert used >= set(TOPICS.values()), launch
+
+
+@pytest.mark.ros
+def test_two_robots_have_topics_and_frames_of_their_own(resolve, package):
+    [(params, nodes)] = resolve("two_robots.launch")
+    with flatland.World.from_yaml(package / "worlds/two_robots/world.yaml", seed=1) as world:
+        poses = {model.name: model.bodies[0].pose for model in world.models}
+        robots = list(poses)
+        assert robots == ["robot_1", "robot_2"]
+        for robot in robots:
+            tour = yaml.safe_load((package / "tours" / f"{robot}.yaml").read_text())
+            for goal in tour["goals"]:
+                assert world.is_free(tuple(goal["pose"]), radius=0.4, ignore=robots), goal
+            scan = world.output(f"/{robot}/scan")
+            world.step(50)
+            assert scan.latest.frame_id == f"{robot}_laser"
+    for robot in robots:
+        amcl, move_base = f"/{robot}/amcl", f"/{robot}/move_base"
+        assert {amcl, move_base} <= set(nodes)
+        assert params[f"{amcl}/odom_frame_id"] == f"{robot}_odom"
+        assert params[f"{amcl}/base_frame_id"] == f"{robot}_base_link"
+        initial = [params[f"{amcl}/initial_pose_{axis}"] for axis in "xya"]
+        assert initial == pytest.approx(list(poses[robot]), abs=1e-4)
+        assert params[f"{move_base}/local_costmap/global_frame"] == f"{robot}_odom"
+        assert params[f"{move_base}/global_costmap/robot_base_frame"] == f"{robot}_base_link"
+        model = yaml.safe_load((package / f"worlds/two_robots/{robot}.model.yaml").read_text())
+        assert model["plugins"][1]["odom_frame_id"] == f"{robot}_odom"
+
+
+@pytest.mark.ros
+def test_the_parameters_fit_the_office(checkout, resolve, params, office):
+    model = yaml.safe_load((checkout / "worlds/office/diff_robot.model.yaml").read_text())
+    plugins = {plugin["type"]: plugin for plugin in model["plugins"]}
+    laser, drive = plugins["Laser"], plugins["DiffDrive"]
+    radius = model["bodies"][0]["footprints"][0]["radius"]
+    assert laser["no_hit"] == "inf"
+    for costmap in ("global_costmap", "local_costmap"):
+        source = f"/move_base/{costmap}/obstacles/scan"
+        assert params[f"{source}/inf_is_valid"] is True
+        # costmap_2d converts inf to a reading of the range of the laser.
+        assert params[f"{source}/obstacle_range"] < params[f"{source}/raytrace_range"]
+        assert params[f"{source}/raytrace_range"] <= laser["range"]
+        assert radius - 0.05 < params[f"/move_base/{costmap}/robot_radius"] <= radius
+    planner = "/move_base/DWAPlannerROS"
+    for limit, axis, key in (
+        ("max_vel_x", "linear", "velocity_limit"),
+        ("acc_lim_x", "linear", "acceleration_limit"),
+        ("max_vel_theta", "angular", "velocity_limit"),
+        ("acc_lim_theta", "angular", "acceleration_limit"),
+    ):
+        assert 0 < params[f"{planner}/{limit}"] <= drive[f"{axis}_dynamics"][key], limit
+    robot = next(m for m in office.models if m.name == "robot")
+    x, y, yaw = robot.bodies[0].pose
+    initial = [params[f"/amcl/initial_pose_{axis}"] for axis in "xya"]
+    assert initial == pytest.approx([x, y, yaw], abs=1e-6)
+    assert params["/map_to_odom"] is False
+    assert params["/flatland_server/publish_map"] == office.layers[0].name
+    [(with_file, _)] = resolve("navigation.launch map:=/a.yaml")
+    assert with_file["/flatland_server/publish_map"] is False
+
+
+@pytest.mark.ros
+def test_the_slam_parameters_fit_the_laser_of_the_office(checkout, resolve):
+    model = yaml.safe_load((checkout / "worlds/office/diff_robot.model.yaml").read_text())
+    laser = next(plugin for plugin in model["plugins"] if plugin["type"] == "Laser")
+    (params, _), (hector, _) = resolve("mapping.launch", "mapping.launch slam:=hector")
+    assert 0 < params["/gmapping/maxUrange"] <= params["/gmapping/maxRange"] < laser["range"]
+    assert hector["/hector_mapping/laser_max_dist"] < laser["range"]
+    for parameters in (params, hector):
+        # The SLAM node publishes the map.
+        assert parameters["/flatland_server/publish_map"] is False
+        assert parameters["/map_to_odom"] is False
+
+
+def test_the_goals_of_the_office_are_free(package, office):
+    tour = yaml.safe_load((package / "tours" / "office.yaml").read_text())
+    assert len(tour["goals"]) == 4
+    for goal in tour["goals"]:
+        assert office.is_free(tuple(goal["pose"]), radius=0.4, ignore=["robot"]), goal["name"]
+
+
+# The message type that each display of RViz shows.
+DISPLAYS = {
+    "rviz/Map": "nav_msgs/OccupancyGrid",
+    "rviz/MarkerArray": "visualization_msgs/MarkerArray",
+    "rviz/LaserScan": "sensor_msgs/LaserScan",
+    "rviz/PoseArray": "geometry_msgs/PoseArray",
+    "rviz/PoseWithCovariance": "geometry_msgs/PoseWithCovarianceStamped",
+    "rviz/Path": "nav_msgs/Path",
+    "rviz/Polygon": "geometry_msgs/PolygonStamped",
+    "rviz/Pose": "geometry_msgs/PoseStamped",
+    "rviz/Odometry": "nav_msgs/Odometry",
+    "rviz/InteractiveMarkers": "visualization_msgs/InteractiveMarkerUpdate",
+}
+# Topics of the nodes that are not installed here; planners in the names come from move_base.yaml.
+OTHERS = {
+    "/map": "nav_msgs/OccupancyGrid",
+    "/particlecloud": "geometry_msgs/PoseArray",
+    "/amcl_pose": "geometry_msgs/PoseWithCovarianceStamped",
+    "/move_base/global_costmap/costmap": "nav_msgs/OccupancyGrid",
+    "/move_base/local_costmap/costmap": "nav_msgs/OccupancyGrid",
+    "/move_base/local_costmap/footprint": "geometry_msgs/PolygonStamped",
+    "/move_base/current_goal": "geometry_msgs/PoseStamped",
+    "/move_base/{base_global_planner}/plan": "nav_msgs/Path",
+    "/move_base/{base_local_planner}/local_plan": "nav_msgs/Path",
+}
+# Prints the topics, the frames of messages and the tree of transforms of the simulator as JSON.
+OBSERVE = dedent(
+    """
+    import json, time, rosgraph, rospy
+    from geometry_msgs.msg import Twist
+    from nav_msgs.msg import Odometry
+    from sensor_msgs.msg import LaserScan
+    from tf2_msgs.msg import TFMessage
+
+    rospy.init_node("observer", disable_rostime=True)
+    parents = {}
+    def receive(message):
+        parents.update({t.child_frame_id: t.header.frame_id for t in message.transforms})
+    rospy.Subscriber("/tf", TFMessage, receive)
+    scan = rospy.wait_for_message("/scan", LaserScan)
+    odom = rospy.wait_for_message("/odometry/filtered", Odometry)
+    truth = rospy.wait_for_message("/odometry/ground_truth", Odometry)
+    while scan.header.frame_id not in parents or odom.child_frame_id not in parents:
+        time.sleep(0.01)
+    later = rospy.wait_for_message("/scan", LaserScan).header.stamp
+    while rospy.wait_for_message("/scan", LaserScan).header.stamp.to_sec() < later.to_sec() + 0.2:
+        pass  # several periods of all transforms
+    master = rosgraph.Master("/observer")
+    subscribers = master.getSystemState()[1]
+    print("JSON" + json.dumps({
+        "types": dict(master.getTopicTypes()),
+        "subscribed": [topic for topic, nodes in subscribers if "/flatland_server" in nodes],
+        "parents": parents,
+        "scan": scan.header.frame_id,
+        "odom": [odom.header.frame_id, odom.child_frame_id],
+        "truth": [truth.header.frame_id, truth.child_frame_id],
+    }))
+    """
+)
+
+
+@pytest.mark.ros
+def test_the_simulator_provides_the_frames_and_topics_of_all_nodes(
+    package, shell, params, start, run_command, tmp_path
+):
+    launch = package / "launch" / "components" / "simulator.launch"
+    server = start(["roslaunch", launch, "rviz:=false"], shell)
+    server.wait_for('loaded ".*world.yaml"')
+    printed = run_command([sys.executable, "-c", OBSERVE], shell, tmp_path)
+    seen = json.loads(printed[printed.index("JSON") + 4 :])
+
+    # What amcl, the SLAM nodes and move_base subscribe to by the default arguments.
+    assert seen["types"]["/scan"] == "sensor_msgs/LaserScan"
+    assert seen["types"]["/odometry/filtered"] == "nav_msgs/Odometry"
+    assert seen["types"]["/clock"] == "rosgraph_msgs/Clock"
+    assert "/cmd_vel" in seen["subscribed"]
+    frames = [params[f"/amcl/{frame}_frame_id"] for frame in ("global", "odom", "base")]
+    assert seen["odom"] == frames[1:]
+    assert seen["truth"] == [frames[0], frames[2]]
+    parents = seen["parents"]
+    assert parents[seen["scan"]] == "base_link"
+    assert parents["base_link"] == "odom"
+    # The localisation sends this transform, and nothing else does.
+    assert "odom" not in parents
+    # RViz
+    planners = {
+        key: params[f"/move_base/{key}"].split("/")[-1]
+        for key in ("base_global_planner", "base_local_planner")
+    }
+    types = {topic.format(**planners): kind for topic, kind in OTHERS.items()}
+    types |= {topic: kind for topic, kind in seen["types"].items() if topic not in types}
+    # Published with show_viz only, which requires a display here.
+    types["/flatland_server/debug/all_models"] = "visualization_msgs/MarkerArray"
+    rviz = yaml.safe_load((package / "rviz" / "navigation.rviz").read_text())[
+        "Visualization Manager"
+    ]
+    assert rviz["Global Options"]["Fixed Frame"] == frames[0]
+    shown = set()
+    for display in rviz["Displays"]:
+        topic = next((display[key] for key in display if key.endswith("Topic")), None)
+        if topic is not None:
+            assert types[topic] == DISPLAYS[display["Class"]], display["Name"]
+            shown.add(topic)
+    assert shown >= {topic.format(**planners) for topic in OTHERS}
+    tools = {tool["Class"]: tool.get("Topic") for tool in rviz["Tools"]}
+    assert tools["rviz/SetGoal"] == "/move_base_simple/goal"
+    assert tools["rviz/SetInitialPose"] == "/initialpose"
+
+
+# Stands for move_base: drives straight to a goal, and aborts goals outside of the room. Sends the
+# frame `estimate`, 0.3 m to the left of base_link and rotated by 0.1 rad, as a localisation.
+DRIVER = dedent(
+    """
+    import math, actionlib, rospy, tf2_ros
+    from geometry_msgs.msg import TransformStamped, Twist
+    from move_base_msgs.msg import MoveBaseAction
+    from nav_msgs.msg import Odometry
+
+    rospy.init_node("driver")
+    pose = None
+    def receive(message):
+        global pose
+        p, q = message.pose.pose.position, message.pose.pose.orientation
+        pose = p.x, p.y, 2 * math.atan2(q.z, q.w)
+    rospy.Subscriber("odometry/ground_truth", Odometry, receive)
+    drive = rospy.Publisher("cmd_vel", Twist, queue_size=1)
+    transform = TransformStamped()
+    transform.header.frame_id, transform.child_frame_id = "base_link", "estimate"
+    transform.transform.translation.y = 0.3
+    transform.transform.rotation.z, transform.transform.rotation.w = math.sin(0.05), math.cos(0.05)
+    broadcaster = tf2_ros.StaticTransformBroadcaster()
+    broadcaster.sendTransform(transform)
+
+    def execute(goal):
+        target = goal.target_pose.pose.position
+        if not 0 < target.x < 8:
+            return server.set_aborted()
+        rate = rospy.Rate(50)
+        while not server.is_preempt_requested() and not rospy.is_shutdown():
+            distance = math.hypot(target.x - pose[0], target.y - pose[1])
+            if distance < 0.02:
+                drive.publish(Twist())
+                return server.set_succeeded()
+            bearing = math.atan2(target.y - pose[1], target.x - pose[0]) - pose[2]
+            bearing = math.remainder(bearing, math.tau)
+            command = Twist()
+            command.linear.x = min(1.0, distance) if abs(bearing) < 0.05 else 0.0
+            command.angular.z = 3 * bearing
+            drive.publish(command)
+            rate.sleep()
+        drive.publish(Twist())
+        server.set_preempted()
+
+    server = actionlib.SimpleActionServer("move_base", MoveBaseAction, execute, auto_start=False)
+    while pose is None:
+        rospy.sleep(0.01)
+    server.start()
+    rospy.spin()
+    """
+)
+TOUR = """
+goals:
+  - {name: east, pose: [3.5, 1.5, 0.0]}
+  - {name: outside, pose: [20, 1.5, 0.0]}
+  - {name: north, pose: [3.5, 3.5, 0.0]}
+"""
+
+
+@pytest.fixture
+def tour_of(shell, package, tmp_path) -> Callable[..., subprocess.CompletedProcess[str]]:
+    """Drives a tour, given as the text of its file."""
+
+    def drive(text: str, *options: str) -> subprocess.CompletedProcess[str]:
+        (tmp_path / "tour.yaml").write_text(text)
+        return subprocess.run(
+            [package / "scripts" / "tour.py", tmp_path / "tour.yaml", *options],
+            env=shell,
+            capture_output=True,
+            text=True,
+            timeout=TIMEOUT,
+        )
+
+    return drive
+
+
+@pytest.mark.ros
+def test_a_tour_reports_times_and_errors(checkout, shell, start, tour_of):
+    world = checkout / "worlds" / "simple" / "world.yaml"
+    launch = ["roslaunch", "flatland", "server.launch", f"world_path:={world}", "show_viz:=false"]
+    server = start([*launch, "update_rate:=1000"], shell)
+    server.wait_for('loaded ".*world.yaml"')
+    driver = start([sys.executable, "-c", DRIVER], shell)
+    driver.wait_for("")
+    done = tour_of(TOUR, "--base-frame", "estimate")
+    assert done.returncode == 1, done.stderr
+    rows = {
+        line.split()[0]: line.split()[1:] for line in done.stdout.splitlines() if "  " in line[2:]
+    }
+    assert rows["east"][0] == "reached"
+    assert rows["outside"][0] == "aborted"
+    assert rows["north"][0] == "reached"
+    # time [s], path [m], distance [m] and angle [deg] off the goal
+    time, path, distance, angle = map(float, rows["east"][1:5])
+    assert 2.0 < time < 10.0
+    assert path == pytest.approx(2.0, abs=0.1)
+    assert distance == pytest.approx(0.0, abs=0.03)
+    assert angle == pytest.approx(0.0, abs=1)
+    assert float(rows["outside"][3]) == pytest.approx(16.5, abs=0.05)
+    assert float(rows["north"][2]) == pytest.approx(2.0, abs=0.2)
+    assert float(rows["north"][4]) == pytest.approx(90, abs=5)
+    # localisation: mean and maximum [m], mean and maximum [deg]
+    for row in ("east", "north"):
+        errors = list(map(float, rows[row][5:]))
+        assert errors[:2] == pytest.approx([0.3, 0.3], abs=2e-3)
+        assert errors[2:] == pytest.approx([math.degrees(0.1)] * 2, abs=0.02)
+    assert rows["all"][:3] == ["2", "of", "3"]
+
+    done = tour_of("goals: [{pose: [1.5, 1.5, 0]}]", "--repeat", "2")
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert "2 of 2" in done.stdout.splitlines()[-1]
+    done = tour_of("goals: [{pose: [2, 5, 0]}]", "--timeout", "1")
+    assert done.returncode == 1
+    assert "timeout" in done.stdout
+    done = tour_of(TOUR, "--wait", "1", "--action", "nobody")
+    assert done.returncode == 1
+    assert "tour: action server /nobody: not within 1 s" in done.stderr
+    assert "Traceback" not in done.stderr + driver.output
+
+
+@pytest.mark.ros
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("goals: []", "expected goals:"),
+        ("goals: [{name: a}]", "expected goals:"),
+        ("goals: [{pose: [1, 2]}]", "expected goals:"),
+        ("[1, 2]", "expected goals:"),
+        ("goals: [{pose: [1, 2, .nan]}]", "goal 1 is not finite"),
+        ("goals: [", "expected goals:"),
+    ],
+)
+def test_an_invalid_tour_is_an_error(text, message, tour_of, tmp_path):
+    done = tour_of(text)
+    assert done.returncode == 1
+    assert done.stderr.startswith(f"tour: {tmp_path / 'tour.yaml'}: ")
+    assert message in done.stderr

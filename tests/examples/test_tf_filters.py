@@ -1,0 +1,70 @@
+"""Scans and transforms of the office pass the message filter of tf2 without a dropped message.
+
+The filter is that of tf2 itself, in a C++ program: amcl, SLAM nodes and costmaps use it.
+"""
+
+from __future__ import annotations
+
+import re
+import shlex
+import subprocess
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+from waiting import BUILD_TIMEOUT
+
+DURATION = 60.0  # simulated time [s]
+SPEEDS = {"real time": 200, "five times": 1000, "as fast as possible": 0}  # update rates [Hz]
+# Topic, chain of frames from the fixed frame to the sensor, period of the scans [s].
+LASERS = [
+    ("/scan", ["map", "odom", "base_link", "laser"], 0.04),
+    ("/tricycle/scan", ["map", "tricycle_base_link", "tricycle_laser"], 0.1),
+]
+PACKAGES = ["roscpp", "message_filters", "sensor_msgs", "tf2_ros"]
+FRAME_TIMEOUT = 500.0  # s; for 60 s of simulated time on a busy machine
+RESULT = re.compile(r"received (\d+) passed (\d+) dropped (\d+) largest gap ([\d.]+)")
+
+
+def build(folder: Path) -> Path:
+    """Compiles the program that counts scans."""
+    source = Path(__file__).parent / "tf_filter" / "tf_filter.cpp"
+    program = folder / "tf_filter"
+    flags = subprocess.run(
+        ["pkg-config", "--cflags", "--libs", *PACKAGES], check=True, capture_output=True, text=True
+    ).stdout
+    command = ["g++", "-std=c++17", "-w", str(source), "-o", str(program), *shlex.split(flags)]
+    subprocess.run(command, check=True, timeout=BUILD_TIMEOUT)
+    return program
+
+
+@pytest.mark.ros
+@pytest.mark.build
+def test_no_scan_of_a_minute_is_dropped_at_any_speed(
+    environment: dict[str, str],
+    unused_port: Callable[[], int],
+    start: Callable[..., Any],
+    tmp_path: Path,
+) -> None:
+    program = build(tmp_path)
+    filters = []
+    for speed, rate in SPEEDS.items():
+        master = {**environment, "ROS_MASTER_URI": f"http://127.0.0.1:{unused_port()}"}
+        launch = ["roslaunch", "flatland", "server.launch", "show_viz:=false"]
+        server = start([*launch, f"update_rate:={rate}"], master)
+        server.wait_for('loaded ".*world.yaml"')
+        for topic, frames, period in LASERS:
+            counter = start([program, str(DURATION), topic, *frames], master)
+            filters.append((f"{topic}, {speed}", counter, rate, period))
+    for name, counter, rate, period in filters:
+        counter.wait_for(RESULT.pattern, FRAME_TIMEOUT)
+        received, passed, dropped, gap = map(float, RESULT.search(counter.output).groups())
+        assert dropped == 0, f"{name}: {counter.output}"
+        assert passed == received, f"{name}: {counter.output}"
+        if rate:
+            # As fast as possible, the node drops scans that a slow subscriber does not take.
+            assert received == pytest.approx(DURATION / period + 1, abs=1), name
+            assert gap == pytest.approx(period, abs=1e-6), name
+        else:
+            assert received > DURATION / period / 10, name
