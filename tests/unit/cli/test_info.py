@@ -121,14 +121,13 @@ def test_an_invalid_file_is_an_error(files, capsys):
 
 def test_services_are_those_of_the_node(checkout: Path):
     tree = ast.parse((checkout / "flatland/ros/services.py").read_text())
-    rows = [
-        (row.elts[0].value, row.elts[1].id)
-        for row in ast.walk(tree)
-        if isinstance(row, ast.Tuple)
-        and len(row.elts) == 3
-        and isinstance(row.elts[0], ast.Constant)
-        and isinstance(row.elts[1], ast.Name)
-    ]
+    rows = []
+    for row in ast.walk(tree):
+        match row:
+            case ast.Tuple([ast.Constant(name), ast.Name(kind), _]):
+                rows.append((name, kind))
+            case ast.Tuple([ast.Constant(name), ast.Call(args=[ast.Constant(kind)]), _]):
+                rows.append((name, kind))
     assert rows == [(name, kind.split("/")[1]) for name, kind in NODE_SERVICES.items()]
 
 
