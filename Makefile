@@ -81,7 +81,9 @@ coverage: setup-dev  ## measure test coverage, write build/coverage/html: make c
 SANITIZER :=
 sanitize_preset := sanitize$(addprefix -,$(SANITIZER))
 libraries_ := libasan.so libubsan.so
-libraries_address := libasan.so
+# The address sanitizer looks up the functions that throw exceptions when it starts; Python does not
+# load the C++ library itself.
+libraries_address := libasan.so libstdc++.so
 libraries_undefined := libubsan.so
 libraries_thread := libtsan.so
 

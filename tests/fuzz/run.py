@@ -14,7 +14,6 @@ import shutil
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
 from pathlib import Path
 
 from fuzz_targets import TARGETS
@@ -25,37 +24,29 @@ SEEDS = CHECKOUT / "tests" / "fuzz" / "corpus"
 # Parts of the total time; 1 for each target that is not listed.
 SHARES = {"physics": 4, "jams": 2}
 NAMES = (*TARGETS, *SHARES)
-# Of one input: much more than any needs, but far below 2 s and 500 MB for a user, since atheris
-# makes Python about ten times as slow and takes memory itself.
+# Limits of one input. Instrumented code is several times as slow, and the memory of the process is
+# included.
 SECONDS, MEGABYTES, BYTES = 10, 600, 4096
 MORE_BYTES = {"preprocessor": 16_384, "image": 16_384, "map": 16_384}
+# Files of the checkout from which a target starts, in addition to its corpus.
 BUNDLED = {
-    "yaml": ("worlds/**/*.yaml",),
-    "preprocessor": ("worlds/**/*.yaml",),
-    "manifest": ("flatland/plugins/*.xml", "examples/**/*plugins.xml"),
-    "package": ("**/package.xml",),
-    "segments": ("worlds/**/*.dat",),
+    "yaml": ("worlds/*/*.yaml",),
+    "preprocessor": ("worlds/*/*.yaml",),
+    "manifest": ("flatland/plugins/*.xml", "examples/*/*.xml"),
+    "package": ("catkin/*/package.xml", "compat/*/package.xml", "examples/*/package.xml"),
+    "segments": ("worlds/*/*.dat",),
 }
 
 
-def seed_folder(name: str) -> Path:
-    """Collects the bundled files for a target, as inputs to start from."""
+def bundled_files(name: str) -> Path:
+    """Returns a folder with copies of the bundled files for a target."""
     folder = BUILD / "bundled" / name
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir(parents=True)
-    for number, path in enumerate(bundled_files(name)):
+    paths = sorted(path for pattern in BUNDLED.get(name, ()) for path in CHECKOUT.glob(pattern))
+    for number, path in enumerate(paths):
         shutil.copyfile(path, folder / f"{number}_{path.name}")
     return folder
-
-
-def bundled_files(name: str) -> Iterator[Path]:
-    for pattern in BUNDLED.get(name, ()):
-        for top in ("worlds", "flatland", "examples", "catkin", "compat"):
-            base = CHECKOUT if "/" in pattern and not pattern.startswith("**") else CHECKOUT / top
-            found = [p for p in base.glob(pattern) if p.stat().st_size < 16_000]
-            yield from sorted(found)
-            if base == CHECKOUT:
-                break
 
 
 def fuzz_reader(name: str, seconds: int) -> tuple[int, str]:
@@ -71,7 +62,7 @@ def fuzz_reader(name: str, seconds: int) -> tuple[int, str]:
         f"-rss_limit_mb={MEGABYTES}",
         f"-artifact_prefix={findings}/",
         "-print_final_stats=1",
-        *map(str, (corpus, SEEDS / name, seed_folder(name))),
+        *map(str, (corpus, SEEDS / name, bundled_files(name))),
     ]
     # A header of a few bytes can claim a large image; the limit of OpenCV is 1 GB.
     environment = {**os.environ, "OPENCV_IO_MAX_IMAGE_PIXELS": str(2**24)}
