@@ -66,6 +66,7 @@ class RandomCalls:
         self.calls = 0
         self.errors = 0
         self.hook_calls = 0
+        self.hook_overflow = False
         self._methods: list[Callable[[], object]] = [
             method
             for name in dir(self)
@@ -350,6 +351,7 @@ class RandomCalls:
         iterations = [self.rng.randint(0, 20) for _ in range(2)]
         if self.rng.random() < self.extremes / 4:
             iterations[self.rng.randint(0, 1)] = -1
+        self.hook_overflow = False
         report = self.world.step(dt, *iterations)
         self.invalid = set() if report is None else set(report.invalid)
         known = set(self.objects.fixtures)
@@ -357,6 +359,8 @@ class RandomCalls:
         self._require(report is None or set(report.limited) <= known, "limits unknown bodies")
         if self.is_ordinary:
             self._require(not self.invalid, "makes bodies invalid without extreme numbers")
+        # Bodies overflow within a step, which is reported at its end.
+        self._require(bool(self.invalid) or not self.hook_overflow, "passes NaN to pre_solve")
         for error in self.world.take_pre_solve_errors():
             self._require(isinstance(error, ERRORS), f"raises {error!r} in pre_solve")
 
@@ -375,7 +379,8 @@ class RandomCalls:
             except StaleHandleError:
                 continue  # a stale or made-up handle
             raise CallError("the world can be changed in pre_solve")
-        self.finite("normal", contact.normal, contact.points, old.points, old.normal_impulses)
+        numbers = (contact.normal, contact.points, old.points, old.normal_impulses)
+        self.hook_overflow |= not all(np.isfinite(values).all() for values in numbers)
         name = self.rng.choice(["enabled", "friction", "restitution", "tangent_speed"])
         setattr(contact, name, self.rng.random() < 0.5 if name == "enabled" else self.positive())
         if self.rng.random() < 0.1:
