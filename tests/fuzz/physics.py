@@ -32,7 +32,8 @@ class MallocInfo(ctypes.Structure):
 def memory_in_use() -> tuple[int, int]:
     """Returns the memory allocated by C++ [bytes], and the number of blocks allocated by Python.
 
-    Unlike the resident memory, they do not depend on fragmentation.
+    Unlike the resident memory, they do not depend on fragmentation. The address sanitizer has an
+    allocator of its own, for which the first number is 0.
     """
     gc.collect()
     get = ctypes.CDLL("libc.so.6").mallinfo2
@@ -64,7 +65,7 @@ def main() -> int:
     after = memory_in_use()
     before = before or after
     print(f"\n{runs} sequences of {CALLS} calls, {errors} of {calls} calls raised an error;")
-    growth = [new / old - 1 for old, new in zip(before, after, strict=True)]
+    growth = [new / max(old, 1) - 1 for old, new in zip(before, after, strict=True)]
     print(f"growth after the first quarter: C++ {growth[0]:.1%}, Python {growth[1]:.1%}")
     if seconds >= SHORT and max(growth) > GROWTH:
         print("the memory grows")
