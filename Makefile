@@ -26,9 +26,12 @@ run: setup  ## run the simulator: make run [WORLD=world.yaml] [ARGS="show_viz:=f
 test: setup-dev  ## run all tests, in two processes: make test [ARGS="-k laser"]
 	@. ./setup.bash && pytest --numprocesses 2 --dist loadgroup $(ARGS)
 
+# Seconds of all targets together.
+DURATION := 600
+
 .PHONY: fuzz
-fuzz: setup-dev  ## test the physics engine with thousands of random jams
-	@. ./setup.bash && FLATLAND_FUZZ=1 pytest --timeout 0 tests/unit/physics/test_jammed_bodies.py $(ARGS)
+fuzz: setup-dev  ## pass random input to readers and the physics engine: make fuzz [DURATION=600] [ARGS="map physics"]
+	@. ./setup.bash && tools/fuzz.sh --duration $(DURATION) $(ARGS)
 
 .PHONY: lint
 lint: setup-dev  ## check formatting, types, and the stubs of the extension
@@ -78,7 +81,9 @@ coverage: setup-dev  ## measure test coverage, write build/coverage/html: make c
 SANITIZER :=
 sanitize_preset := sanitize$(addprefix -,$(SANITIZER))
 libraries_ := libasan.so libubsan.so
-libraries_address := libasan.so
+# The address sanitizer looks up the functions that throw exceptions when it starts; Python does not
+# load the C++ library itself.
+libraries_address := libasan.so libstdc++.so
 libraries_undefined := libubsan.so
 libraries_thread := libtsan.so
 

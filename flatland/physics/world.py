@@ -56,8 +56,9 @@ class PhysicsWorld(PhysicsQueries):
         pre_solve: Function called as `pre_solve(contact, old_manifold)` within `step`, before the
             solver processes a contact of one of `pre_solve_bodies`; None for no function. The
             function may set `enabled`, `friction`, `restitution` and `tangent_speed` of the
-            contact and read the world, but not change the world. `take_pre_solve_errors` returns
-            the exceptions that it raises.
+            contact and read the world, but not change the world. In a step that reports invalid
+            bodies, numbers of contacts may be NaN. `take_pre_solve_errors` returns the exceptions
+            that it raises.
         pre_solve_bodies: Ids of the bodies whose contacts are passed to `pre_solve`. Contacts of
             other bodies cause no overhead.
     """

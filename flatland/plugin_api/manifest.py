@@ -114,6 +114,8 @@ def _class_elements(path: str) -> Iterator[tuple[str | None, ElementTree.Element
         ) from error
     except OSError as error:
         raise PluginError(f'manifest "{path}" cannot be read: {error.strerror}') from error
+    except (LookupError, ValueError) as error:  # an encoding that Python or expat does not support
+        raise PluginError(f'manifest "{path}" cannot be read: {error}') from error
     if root.tag == "library":
         libraries = [root]
     elif root.tag == "class_libraries":

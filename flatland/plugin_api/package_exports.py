@@ -133,6 +133,9 @@ def _search(package_path: str) -> _Scan:
         except ElementTree.ParseError as error:
             problems.append(PluginError(f'"{package_file}" is not XML, {error}'))
             continue
+        except (LookupError, ValueError) as error:  # an encoding that is not supported
+            problems.append(PluginError(f'"{package_file}" cannot be read: {error}'))
+            continue
         exports += [
             Export(name, element.tag, element.get("plugin", "").replace("${prefix}", folder))
             for element in root.iterfind("export/*[@plugin]")

@@ -130,7 +130,10 @@ def _decode_line(line: bytes) -> Record | None:
     checksum, separator, text = line.partition(b" ")
     if not separator or checksum != b"%08x" % zlib.crc32(text):
         return None
-    record = json.loads(text)
+    try:
+        record = json.loads(text)
+    except (ValueError, RecursionError):
+        return None
     return record if isinstance(record, dict) else None
 
 
@@ -174,22 +177,32 @@ def decode_value(value: Any) -> Any:
     """Returns the value that `encode_value` converted.
 
     Raises:
-        RecordingError: The module or class of a dataclass does not exist.
+        RecordingError: The module or class of a dataclass does not exist, or the value was not made
+            by `encode_value`.
     """
+    try:
+        return _decode(value)
+    except RecordingError:
+        raise
+    except Exception as error:  # also of the constructors of dataclasses
+        raise RecordingError(f"a value cannot be read: {type(error).__name__}: {error}") from error
+
+
+def _decode(value: Any) -> Any:
     match value:
         case list():
-            return [decode_value(item) for item in value]
+            return [_decode(item) for item in value]
         case {"array": array, "scalar": True}:
-            return decode_value(array)[()]
-        case {"dtype": dtype, "shape": shape, "data": data}:
+            return _decode(array)[()]
+        case {"dtype": str(dtype), "shape": shape, "data": data}:
             return np.frombuffer(base64.b64decode(data), np.dtype(dtype)).reshape(shape)
         case {"tuple": items}:
-            return tuple(decode_value(item) for item in items)
+            return tuple(_decode(item) for item in items)
         case {"dict": items}:
-            return {key: decode_value(item) for key, item in items.items()}
+            return {key: _decode(item) for key, item in items.items()}
         case {"type": name, "fields": fields}:
             kind = _find_dataclass(name)
-            return kind(**{key: decode_value(item) for key, item in fields.items()})
+            return kind(**{key: _decode(item) for key, item in fields.items()})
         case _:
             return value
 

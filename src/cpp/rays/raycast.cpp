@@ -4,6 +4,7 @@
 #include <box2d/b2_world.h>
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 #include <memory>
 #include <vector>
@@ -26,6 +27,8 @@ class ClosestHit final : public b2RayCastCallback {
     constexpr float kIgnore = -1.0F;
     const std::uint16_t category = fixture->GetFilterData().categoryBits;
     if (fixture->IsSensor() || !masks_.pass(category)) return kIgnore;
+    // An overflow in the solver can make the pose of a body not finite.
+    if (std::isnan(fraction)) return kIgnore;
     hit = RayHit{fraction, point, normal, id_of(fixture), category};
     return fraction;
   }

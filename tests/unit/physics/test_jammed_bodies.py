@@ -13,11 +13,13 @@ from hypothesis import strategies as st
 from flatland.physics import PhysicsBody, PhysicsWorld, StepReport
 
 STEP = (0.005, 10, 10)
-# `make fuzz` draws thousands of new examples; the suite draws the same few in each run.
-IS_FUZZ = bool(os.environ.get("FLATLAND_FUZZ"))
+# `make fuzz` draws this number of new examples again and again; the suite draws the same few in
+# each run.
+EXAMPLES = int(os.environ.get("FLATLAND_FUZZ", "0"))
+IS_FUZZ = EXAMPLES > 0
 STEPS = 2000 if IS_FUZZ else 500
 PROPERTY = settings(
-    max_examples=1000 if IS_FUZZ else 20,
+    max_examples=EXAMPLES or 20,
     deadline=None,
     derandomize=not IS_FUZZ,
     suppress_health_check=list(HealthCheck),
@@ -266,3 +268,16 @@ def test_overflow_is_reported_until_the_body_is_gone() -> None:
     assert world.step(*STEP) is None
     assert far.pose[0] == pytest.approx(5000.005, abs=1e-3)
     assert walls.velocity == (0, 0, 0)
+
+
+def test_rays_do_not_hit_a_body_that_has_overflowed() -> None:
+    world, body, _ = overflowing()
+    body.create_edges([(-1, -1, 1, 1)])
+    assert world.step(*STEP) is not None
+    assert math.isnan(body.pose[0])
+    start, end = (-50, 3), (50, 40)
+    ends = [(end[0] - start[0], end[1] - start[1])]
+    assert world.ray_cast(start, end) is None
+    for cast in (world.cast_rays, world.cast_rays_reference):
+        fractions, _ = cast((*start, 0), ends, 0xFFFF)
+        assert np.isnan(fractions).all()

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from waiting import TIMEOUT
 
-from flatland.errors import WorldLockedError
+from flatland.errors import PhysicsError, StaleHandleError, WorldLockedError
 from flatland.physics import OldManifold, PhysicsBody, PhysicsWorld, PreSolveContact
 
 pytestmark = pytest.mark.threads
@@ -249,3 +249,68 @@ def test_several_threads_cast_rays_in_one_world() -> None:
     for fast, slow in zip(got, expected, strict=True):
         np.testing.assert_allclose(fast, slow, atol=1e-5)
     world.close()
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_scans_beside_steps_spawns_deletions_and_closes(seed: int) -> None:
+    """Threads scan and query one world after the other while another thread changes and closes it.
+
+    Scans are long and short, with and without the GIL. They fail only because the world is stepping
+    or closed.
+    """
+    rng = np.random.default_rng(seed)
+    angles = np.linspace(-np.pi, np.pi, 5000)
+    fan = 8 * np.stack([np.cos(angles), np.sin(angles)], 1).astype(np.float32)
+    poses = rng.uniform(-4, 4, (300, 3))
+    current = [crowd(seed)[0]]
+    stop = threading.Event()
+    done = [0, 0, 0]
+    refused: set[type[PhysicsError]] = set()
+
+    def scan(number: int) -> None:
+        while not stop.wait(1e-5):
+            world = current[0]
+            try:
+                if number == 2:
+                    world.free_discs(poses, 0.2, 0xFFFF)
+                    world.object_counts()
+                else:
+                    world.cast_rays((0, 0, 0), fan[: 5000 if number else 100], 0xFFFF, 1)
+            except PhysicsError as error:
+                refused.add(type(error))
+                continue
+            done[number] += 1
+
+    def change(world: PhysicsWorld) -> None:
+        spawned: list[PhysicsBody] = []
+        for _ in range(20):
+            world.step(0.01, 4, 2)
+            body = world.create_body("dynamic", (*rng.uniform(-3, 3, 2), 0))
+            body.create_circle((0, 0), 0.2, density=1)
+            wall = world.create_body("static", (*rng.uniform(-3, 3, 2), 0))
+            wall.create_edges(rng.uniform(-1, 1, (5, 4)))
+            joint = world.create_revolute_joint(body, wall, (0, 0), (0, 0))
+            spawned += [body, wall]
+            spawned[0].set_pose(*rng.uniform(-3, 3, 3))
+            if rng.random() < 0.5:
+                joint.destroy()
+            spawned.pop(int(rng.integers(len(spawned)))).destroy()
+
+    threads = [threading.Thread(target=scan, args=(number,)) for number in range(3)]
+    for thread in threads:
+        thread.start()
+    worlds = 0
+    deadline = time.monotonic() + TIMEOUT
+    try:
+        while (worlds < 10 or min(done) < 10) and time.monotonic() < deadline:
+            change(current[0])
+            old, current[0] = current[0], crowd(seed + worlds)[0]
+            old.close()
+            worlds += 1
+    finally:
+        stop.set()
+        for thread in threads:
+            thread.join()
+    assert min(done) >= 10
+    assert refused <= {WorldLockedError, StaleHandleError}
+    current[0].close()

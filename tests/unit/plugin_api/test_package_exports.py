@@ -113,6 +113,19 @@ def test_a_package_file_that_is_not_xml_is_reported(search, files):
     assert names(found) == ["c"]
 
 
+@pytest.mark.parametrize("encoding", ["utf-9", "gb2312"])
+def test_a_package_file_in_an_unknown_encoding_is_reported(search, files, encoding):
+    contents = {
+        "a/package.xml": f'<?xml version="1.0" encoding="{encoding}"?>' + package("a", exported()),
+        "c/package.xml": package("c", exported()),
+    }
+    found = search(contents)
+    (problem,) = found.problems
+    path = files.folder / "a" / "package.xml"
+    assert str(problem).startswith(f'Flatland plugin: "{path}" cannot be read: ')
+    assert names(found) == ["c"]
+
+
 def test_an_empty_path_and_missing_folders_have_no_exports(search, monkeypatch):
     assert names(search({}, ["absent"])) == []
     for value in ("", ":"):

@@ -139,6 +139,14 @@ def test_the_error_of_an_unknown_name_lists_the_most_similar_name_first(package)
     [
         ("<library", 'manifest "{0}" is not XML, line 1 col 0, unclosed token'),
         ("", 'manifest "{0}" is not XML, line 1 col 0, '),
+        (
+            '<?xml version="1.0" encoding="utf-9"?><library/>',
+            'manifest "{0}" cannot be read: unknown encoding: utf-9',
+        ),
+        (
+            '<?xml version="1.0" encoding="gb2312"?><library/>',
+            'manifest "{0}" cannot be read: multi-byte encodings are not supported',
+        ),
         ("<a/>", 'manifest "{0}" must contain <library> or <class_libraries>, got <a>'),
         ('<library><class name="X" base_class_type="flatland::ModelPlugin"/></library>',
          'manifest "{0}", class "X": type must be the dotted path of a Python class, got ""'),

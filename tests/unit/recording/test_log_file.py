@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import zlib
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +23,14 @@ from flatland.recording.log_file import (
 
 HEADER = {"format": FORMAT}
 RECORDS = [HEADER, {"step": 1, "kind": "a"}, {"step": 2, "kind": "b", "text": "ä\n"}]
+
+
+def nested(depth: int) -> Any:
+    """Tuples in tuples, which the reader cannot descend into."""
+    value: Any = 1
+    for _ in range(depth):
+        value = {"tuple": [value]}
+    return value
 
 
 @pytest.fixture
@@ -169,6 +178,41 @@ def test_other_values_cannot_be_recorded(value: Any) -> None:
 def test_a_type_that_is_not_there_is_an_error(name: str) -> None:
     with pytest.raises(RecordingError, match=f'the type "{name}" of a command'):
         decode_value({"type": name, "fields": {}})
+
+
+@pytest.mark.parametrize(
+    "value",
+    [
+        {"array": {"tuple": [1]}, "scalar": True},
+        {"array": {"dict": {}}, "scalar": True},
+        {"dtype": "x", "shape": [1], "data": "AA=="},
+        {"dtype": "O", "shape": [1], "data": "AAAAAAAAAAA="},
+        {"dtype": "<f8", "shape": [1], "data": "AA=="},
+        {"dtype": "<f8", "shape": [3], "data": "AAAAAAAAAAA="},
+        {"dtype": "<f8", "shape": "x", "data": 1},
+        {"tuple": 1},
+        {"dict": [1]},
+        {"type": 1, "fields": {}},
+        {"type": "", "fields": {}},
+        {"type": ".x:y", "fields": {}},
+        {"type": "flatland:Twist", "fields": {"other": 1}},
+        {"type": "flatland:Twist", "fields": 1},
+        nested(900),
+    ],
+)
+def test_a_value_that_was_not_recorded_is_an_error(value: Any) -> None:
+    with pytest.raises(RecordingError, match=r"^Flatland recording: (a value|the type)"):
+        decode_value(value)
+
+
+@pytest.mark.parametrize("text", [b"", b"{", b"\x94", b"[" * 100_000, b"1" * 5000])
+def test_a_line_with_the_right_checksum_that_is_not_json_is_damaged(
+    path: Path, text: bytes
+) -> None:
+    with path.open("ab") as file:
+        file.write(b"%08x %s\n" % (zlib.crc32(text), text))
+    with pytest.raises(RecordingError, match=rf"is damaged \[{path}:4\]"):
+        read_recording(path)
 
 
 def test_the_file_is_only_appended_to(tmp_path: Path) -> None:
