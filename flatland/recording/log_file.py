@@ -27,6 +27,26 @@ FORMAT: Final = "flatland recording 1"
 
 Record = dict[str, Any]
 
+_HEADER: Final[dict[str, type[Any]]] = {
+    "world": str,
+    "seed": int,
+    "step_size_ns": int,
+    "simplify_map": int,
+    "plugin_errors": str,
+    "on_invalid_body": str,
+    "state": str,
+    "files": dict,
+    "params": dict,
+}
+# Entries of the kinds of records; all other kinds are requests with arguments.
+_KINDS: Final[dict[str, dict[str, type[Any]]]] = {
+    "command": {"topic": str, "number": int},
+    "lost": {"topic": str},
+    "state": {"state": str, "bodies": str},
+    "end": {"state": str, "bodies": str},
+    "result": {"files": dict, "params": dict},
+}
+
 
 class RecordingError(FlatlandError):
     """A recording cannot be written, or is invalid."""
@@ -123,7 +143,20 @@ def read_recording(path: str | os.PathLike[str]) -> Recording:
         records.append(record)
     if not records or records[0].get("format") != FORMAT:
         raise RecordingError(f'"{name}" is not a recording of flatland ("{FORMAT}")')
+    for number, record in enumerate(records, 1):
+        if not _is_complete(record, is_header=number == 1):
+            raise RecordingError(f'"{name}" has an invalid record [{name}:{number}]')
     return Recording(name, records, bool(rest))
+
+
+def _is_complete(record: Record, is_header: bool) -> bool:
+    """Returns whether a record has the entries of its kind, with values of the right types."""
+    if is_header:
+        required = _HEADER
+    else:
+        required = {"step": int, "kind": str}
+        required |= _KINDS.get(str(record.get("kind")), {"arguments": dict})
+    return all(isinstance(record.get(key), kind) for key, kind in required.items())
 
 
 def _decode_line(line: bytes) -> Record | None:

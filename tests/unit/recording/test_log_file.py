@@ -21,8 +21,23 @@ from flatland.recording.log_file import (
     read_recording,
 )
 
-HEADER = {"format": FORMAT}
-RECORDS = [HEADER, {"step": 1, "kind": "a"}, {"step": 2, "kind": "b", "text": "ä\n"}]
+HEADER = {
+    "format": FORMAT,
+    "world": "world.yaml",
+    "seed": 1,
+    "step_size_ns": 5_000_000,
+    "simplify_map": 0,
+    "plugin_errors": "raise",
+    "on_invalid_body": "raise",
+    "state": "0",
+    "files": {},
+    "params": {},
+}
+RECORDS = [
+    HEADER,
+    {"step": 1, "kind": "lost", "topic": "/a"},
+    {"step": 2, "kind": "delete_model", "arguments": {"name": "ä\n"}},
+]
 
 
 def nested(depth: int) -> Any:
@@ -100,6 +115,23 @@ def test_a_recording_of_another_format_is_refused(tmp_path: Path) -> None:
     writer.close()
     with pytest.raises(RecordingError, match="flatland recording 1"):
         read_recording(tmp_path / "run.flog")
+
+
+@pytest.mark.parametrize(
+    ("record", "change"),
+    [(0, {key: None}) for key in HEADER if key != "format"]
+    + [(1, {"step": "1"}), (1, {"kind": None}), (1, {"topic": 1}), (2, {"arguments": []})],
+)
+def test_a_record_without_its_entries_is_an_error_with_the_line(
+    tmp_path: Path, record: int, change: dict[str, object]
+) -> None:
+    file = tmp_path / "run.flog"
+    writer = LogWriter(file)
+    for number, content in enumerate(RECORDS):
+        writer.write({**content, **change} if number == record else content)
+    writer.close()
+    with pytest.raises(RecordingError, match=rf"has an invalid record \[{file}:{record + 1}\]"):
+        read_recording(file)
 
 
 @pytest.mark.parametrize("name", ["missing/run.flog", "."])
