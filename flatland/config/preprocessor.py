@@ -7,7 +7,8 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 
 from flatland.config.documents import load_documents, parse_documents
-from flatland.config.inputs import next_seed, note_param
+from flatland.config.hints import similar_file
+from flatland.config.inputs import check_allowed, next_seed, note_param
 from flatland.config.lua import EvalError, evaluate
 from flatland.config.node import MAX_NESTING, ListNode, Node, NullNode, ScalarNode, Source
 from flatland.errors import YamlError
@@ -175,12 +176,20 @@ class _Preprocessor:
         written = node.text[len(marker) :].strip()
         path = node.source.resolve(written)
         try:
+            check_allowed(path)
+        except OSError as error:
+            raise self._error(
+                node, f'Failed to read file, path="{path}", {error.strerror}'
+            ) from error
+        try:
             exists = bool(written) and Path(path).exists()
         except (OSError, ValueError):
             exists = False
         if not exists:
             raise self._error(
-                node, f"File specified in {marker} does not exist, path={path}, include={written}"
+                node,
+                f"File specified in {marker} does not exist, path={path}, include={written}",
+                similar_file(path) if written else "",
             )
         self._includes += 1
         if self._includes > _MAX_INCLUDES:
@@ -192,13 +201,13 @@ class _Preprocessor:
         try:
             documents = load_documents(path)
         except YamlError as error:
-            raise self._error(node, error.message) from error
+            raise self._error(node, error.message, error.hint) from error
         if marker == _INCLUDE:
             documents = [_first(documents, Source.of_file(path))]
         chain = (*chain, (identity, path))
         return [self.expand(document, chain, depth) for document in documents]
 
     @staticmethod
-    def _error(node: Node, message: str) -> YamlError:
+    def _error(node: Node, message: str, hint: str = "") -> YamlError:
         place = node.source.place(node.line)
-        return YamlError(message + place.suffix, place=place)
+        return YamlError(message + place.suffix, place=place, hint=hint)

@@ -40,6 +40,7 @@ def test_defaults() -> None:
         map_frame="map",
         map_resolution=0.05,
         msgs_package="flatland",
+        model_path=None,
     )
 
 
@@ -94,6 +95,9 @@ def test_defaults() -> None:
         ("map_resolution", 1, 1.0),
         ("msgs_package", "flatland", "flatland"),
         ("msgs_package", "flatland_msgs", "flatland_msgs"),
+        ("model_path", " ", None),
+        ("model_path", "/usr:/tmp", ("/usr", "/tmp")),
+        ("model_path", ["/usr", "/tmp"], ("/usr", "/tmp")),
     ],
 )
 def test_valid_values(name: str, value: object, expected: object) -> None:
