@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import time
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
@@ -18,8 +19,11 @@ _EVAL = "$eval"
 _INCLUDE = "$include"
 _INCLUDE_ALL = "$[include]"
 _MAX_INCLUDES = (
-    10_000  # of one run; a chain in which each file includes the next one twice explodes
+    5_000  # of one run; a chain in which each file includes the next one twice explodes
 )
+# s of processor time of all expressions of a run together; quick ones do not count.
+_TOTAL_TIME_LIMIT = 1.0
+_QUICK = 0.01  # s
 _MAX_SHOWN = 500  # characters of an expression or a Lua message in an error message
 
 ParamLookup = Callable[[str], object]
@@ -98,6 +102,7 @@ class _Preprocessor:
         self._params = params
         self._on_error = on_error
         self._includes = 0
+        self._spent = 0.0  # s of processor time, by expressions that are not quick
         # The result for each node by its id, so that a node with aliases is expanded once. The
         # original node is kept alive because the id of a deleted object can be reused.
         self._done: dict[int, tuple[Node, Node]] = {}
@@ -153,8 +158,16 @@ class _Preprocessor:
 
     def _evaluate(self, node: ScalarNode) -> str:
         expression = node.text[len(_EVAL) :].strip(" \t\r\n\f\v")
+        start = time.thread_time()
         try:
             result = evaluate(expression, self._param, next_seed())
+            spent = time.thread_time() - start
+            if spent > _QUICK:
+                self._spent += spent
+            if self._spent > _TOTAL_TIME_LIMIT:
+                raise EvalError(
+                    f"all expressions together exceed the time limit of {_TOTAL_TIME_LIMIT:g} s"
+                )
         except EvalError as error:
             message = f'Failed to evaluate "{_shorten(expression)}", {_shorten(str(error))}'
             raise self._error(node, message) from error
