@@ -18,9 +18,7 @@ _LOG = logging.getLogger("flatland")
 _EVAL = "$eval"
 _INCLUDE = "$include"
 _INCLUDE_ALL = "$[include]"
-_MAX_INCLUDES = (
-    5_000  # of one run; a chain in which each file includes the next one twice explodes
-)
+_MAX_INCLUDES = 5_000  # of one run; a chain in which each file includes the next one twice explodes
 # s of processor time of all expressions of a run together; quick ones do not count.
 _TOTAL_TIME_LIMIT = 1.0
 _QUICK = 0.01  # s

@@ -176,6 +176,15 @@ def test_invalid_numbers(name: str, value: object) -> None:
         ("msgs_package", ["flatland"]),
         ("world_path", 5),
         ("world_path", ["a"]),
+        ("model_path", "relative/path"),
+        ("model_path", "/nowhere/at/all"),
+        ("model_path", "/usr:"),
+        ("model_path", "/etc/passwd"),
+        ("model_path", []),
+        ("model_path", [""]),
+        ("model_path", ["/usr", 1]),
+        ("model_path", True),
+        ("model_path", {"a": "/usr"}),
     ],
 )
 def test_invalid_values(name: str, value: object) -> None:

@@ -45,7 +45,8 @@ class Key:
     Attributes:
         name: The key.
         value: A valid value.
-        kind: Kind of the value: a scalar, `list`, `map`, `names`, `string or strings`, `pose`, `color` or `N floats`.
+        kind: Kind of the value: a scalar, `list`, `map`, `names`, `string or strings`, `pose`,
+            `color` or `N floats`.
         required: Whether the key must be there.
         limit: Key of `NUMBER_LIMITS` for numbers, empty for none.
         location: Location in errors, if it is not that of the section.

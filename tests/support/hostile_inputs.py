@@ -44,7 +44,7 @@ def contents(world: flatland.World) -> list[Any]:
         sorted(world.ports.outputs),
         sorted(world.ports.commands),
         threading.active_count(),
-        len(os.listdir("/proc/self/fd")),
+        len(list(Path("/proc/self/fd").iterdir())),
     ]
 
 

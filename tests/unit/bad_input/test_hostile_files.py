@@ -52,7 +52,9 @@ def png(width: int, height: int, rows: int) -> bytes:
     """Returns a grey PNG file with fewer rows than its header says."""
 
     def chunk(name: bytes, data: bytes) -> bytes:
-        return struct.pack(">I", len(data)) + name + data + struct.pack(">I", zlib.crc32(name + data))
+        return (
+            struct.pack(">I", len(data)) + name + data + struct.pack(">I", zlib.crc32(name + data))
+        )
 
     header = struct.pack(">IIBBBBB", width, height, 8, 0, 0, 0, 0)
     pixels = zlib.compress((b"\0" + b"\xff" * width) * rows)
@@ -125,7 +127,8 @@ def special_files() -> Iterator[tuple[str, Hostile]]:
 
 
 BOMB = "a: &a [x, x, x, x, x, x, x, x, x, x]\n" + "".join(
-    f"{b}: &{b} [{', '.join([f'*{a}'] * 10)}]\n" for a, b in zip("abcdefgh", "bcdefghi", strict=True)
+    f"{b}: &{b} [{', '.join([f'*{a}'] * 10)}]\n"
+    for a, b in zip("abcdefgh", "bcdefghi", strict=True)
 )
 LUA = 'Flatland YAML: Failed to evaluate "{0}", {1} [{{path}}:1]'
 
@@ -133,9 +136,7 @@ LUA = 'Flatland YAML: Failed to evaluate "{0}", {1} [{{path}}:1]'
 def lua(expression: str, why: str) -> Hostile:
     """Returns a model file whose bodies are the value of an expression."""
     escaped = expression.replace("{", "{{").replace("}", "}}")
-    return Hostile(
-        "model", content(f"bodies: $eval {expression}\n"), LUA.format(escaped, why)
-    )
+    return Hostile("model", content(f"bodies: $eval {expression}\n"), LUA.format(escaped, why))
 
 
 def not_a_list(expression: str) -> Hostile:
@@ -227,8 +228,8 @@ HOSTILE: dict[str, Hostile] = {
     "model: alias of itself": Hostile(
         "model",
         content("bodies: &b [*b]\n"),
-        'Flatland YAML: Malformatted file, path="{path}", line 1 col 13, alias "b" refers to a node '
-        "that contains it",
+        'Flatland YAML: Malformatted file, path="{path}", line 1 col 13, alias "b" refers to a '
+        "node that contains it",
     ),
     "model: includes itself": Hostile(
         "model",
@@ -316,9 +317,7 @@ HOSTILE: dict[str, Hostile] = {
     "lua: loop in pcall": lua(
         "return pcall(function() while true do end end)", "the time limit of 1 s is exceeded"
     ),
-    "lua: string.rep": lua(
-        "return string.rep('x', 1e9):len()", "$eval:1: not enough memory"
-    ),
+    "lua: string.rep": lua("return string.rep('x', 1e9):len()", "$eval:1: not enough memory"),
     "lua: nested tables": lua(
         "local t = {} while true do t = {t, {t}} end return 1", "not enough memory"
     ),

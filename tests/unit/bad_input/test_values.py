@@ -438,12 +438,12 @@ def extended_folder(folder: Path) -> Path:
 
 def spawn(world: flatland.World, unchanged: Any, path: Path, text: str) -> flatland.FlatlandError:
     path.write_text(text)
-    with unchanged(world), pytest.raises(flatland.FlatlandError) as caught:
-        try:
+    try:
+        with unchanged(world), pytest.raises(flatland.FlatlandError) as caught:
             world.spawn_model(path, "robot", "robot", (9, 9, 0))
-        finally:
-            if len(world.models) > 1:
-                world.delete_model("robot")
+    finally:
+        if len(world.models) > 1:  # so that further cases are not affected
+            world.delete_model("robot")
     return caught.value
 
 
@@ -593,7 +593,7 @@ def test_a_manifest_that_is_no_file(tmp_path: Path, unchanged: Any) -> None:
         ({"plugin_timeout": 0.0}, "plugin_timeout must be positive"),
         ({"plugin_timeout": NAN}, "plugin_timeout must be positive"),
         ({"model_path": []}, "model_path must contain at least one folder"),
-        ({"model_path": "/tmp"}, "model_path must be a list of folders, got '/tmp'"),  # noqa: S108
+        ({"model_path": "/tmp"}, "model_path must be a list of folders, got '/tmp'"),
         ({"model_path": ["/nowhere"]}, "model_path must be a list of folders, '/nowhere' is none"),
     ],
     ids=str,
