@@ -6,7 +6,7 @@ the plugin interface. This package does not require ROS, except for the ROS node
 
 from flatland.requirements import check_requirements
 
-check_requirements()  # otherwise, a traceback would be all that a user sees
+check_requirements()  # Otherwise, a missing package results in a traceback without a remedy.
 
 from flatland.config.reader import YamlReader
 from flatland.drawing import draw

@@ -19,7 +19,7 @@ def check_requirements() -> None:
     """Checks that the required modules exist.
 
     Raises:
-        ImportError: Some are missing; the text says what installs them.
+        ImportError: Some are missing; the text names the command that installs them.
     """
     missing = [name for name in REQUIRED_MODULES if importlib.util.find_spec(name) is None]
     if missing:

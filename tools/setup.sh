@@ -33,8 +33,8 @@ exec 9>build/.setup.lock
 flock 9
 
 case $level in
-  run) tools/apt_packages.sh run; extra= ;;
-  dev) tools/apt_packages.sh run catkin dev; extra='[dev]' ;;
+  run) tools/apt_packages.sh run; extra='[mcap]' ;;
+  dev) tools/apt_packages.sh run catkin dev; extra='[mcap,dev]' ;;
   *) fail "the argument of tools/setup.sh must be run or dev, got '$level'" ;;
 esac
 

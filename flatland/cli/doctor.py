@@ -62,6 +62,7 @@ _ROS = (
     ),
     ("flatland.msg", "messages of flatland", _SETUP, "ROS node"),
     ("rosbag", "rosbag", _APT + "python3-rosbag", "flatland run --bag"),
+    ("mcap_ros1", "mcap-ros1-support", "pip install mcap mcap-ros1-support", "MCAP files"),
     ("PyQt5", "PyQt5", _APT + "python3-pyqt5", "viewer"),
     ("rviz", "RViz for Python", _APT + "python3-rviz", "viewer"),
 )

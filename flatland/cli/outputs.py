@@ -9,10 +9,11 @@ from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from flatland.cli.contents import counted
 from flatland.errors import FlatlandError
 
 if TYPE_CHECKING:
-    from flatland.ros.bag import BagRecorder
+    from flatland.ros.message_recorder import MessageRecorder
 
 
 def path_with(suffixes: Sequence[str]) -> Callable[[str], Path]:
@@ -39,13 +40,59 @@ def replaced(path: Path) -> Iterator[Path]:
         raise
 
 
-def open_bag(path: Path, files: ExitStack) -> BagRecorder:
-    """Creates a bag, which is closed at the end of `files`.
+def recording_arguments() -> argparse.ArgumentParser:
+    """Returns a parser of the arguments of all commands that record messages."""
+    parser = argparse.ArgumentParser(add_help=False)
+    parser.add_argument(
+        "--bag",
+        type=path_with((".bag",)),
+        metavar="FILE",
+        help="bag file (ROS 1) with all outputs and transforms; an existing file is replaced",
+    )
+    parser.add_argument(
+        "--mcap",
+        type=path_with((".mcap",)),
+        metavar="FILE",
+        help="MCAP file with all outputs and transforms as ROS 1 messages; an existing file is "
+        "replaced",
+    )
+    return parser
 
-    Raises:
-        FlatlandError: ROS is not installed.
-        OSError: The file cannot be written.
+
+class Recordings:
+    """The files with messages that the options of a command name.
+
+    Attributes:
+        recorders: Observers of the world, by the path of their file.
     """
+
+    def __init__(self, options: argparse.Namespace, files: ExitStack) -> None:
+        """Creates the files.
+
+        Args:
+            options: Options of `recording_arguments`.
+            files: Closes the files; removes them if an exception is raised.
+
+        Raises:
+            FlatlandError: A required package is not installed.
+            OSError: A file cannot be created.
+        """
+        self.recorders: dict[Path, MessageRecorder] = {}
+        for path, create in ((options.bag, _create_bag), (options.mcap, _create_mcap)):
+            if path is not None:
+                recorder = create(files.enter_context(replaced(path)))
+                files.callback(recorder.close)
+                self.recorders[path] = recorder
+
+    def close(self) -> None:
+        """Completes the files, and prints what they contain."""
+        for path, recorder in self.recorders.items():
+            recorder.close()
+            topics = counted(len(recorder.topics), "topic")
+            print(f"wrote {path}: {counted(recorder.messages, 'message')}, {topics}")
+
+
+def _create_bag(path: Path) -> MessageRecorder:
     try:
         from flatland.ros.bag import BagRecorder
     except ImportError as error:
@@ -53,6 +100,15 @@ def open_bag(path: Path, files: ExitStack) -> BagRecorder:
             f"bags need the messages of ROS and rosbag ({error}): "
             "apt-get install python3-rosbag python3-tf2-msgs python3-nav-msgs python3-sensor-msgs"
         ) from error
-    recorder = BagRecorder(path)
-    files.callback(recorder.close)
-    return recorder
+    return BagRecorder(path)
+
+
+def _create_mcap(path: Path) -> MessageRecorder:
+    try:
+        from flatland.ros.message_recorder import create_mcap_recorder
+    except ImportError as error:
+        raise FlatlandError(
+            f"MCAP files need the messages of ROS ({error}): "
+            "apt-get install python3-tf2-msgs python3-nav-msgs python3-sensor-msgs"
+        ) from error
+    return create_mcap_recorder(path)

@@ -6,16 +6,12 @@ import argparse
 import time
 from contextlib import ExitStack, suppress
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from flatland.cli.arguments import Commands, add_command
 from flatland.cli.contents import counted
-from flatland.cli.outputs import open_bag, path_with, replaced
+from flatland.cli.outputs import Recordings, recording_arguments
 from flatland.cli.progress import StopSignals, progress_bar
 from flatland.recording import Replay
-
-if TYPE_CHECKING:
-    from flatland.ros.bag import BagRecorder
 
 _EXAMPLES = (
     "flatland replay office.flog",
@@ -29,6 +25,7 @@ def add(commands: Commands) -> None:
     parser = add_command(
         commands,
         "replay",
+        parents=[recording_arguments()],
         summary="repeat a recorded run and compare it with the recording",
         description="Repeats a run from a recording of `flatland run --record`, of the node "
         "(record:=FILE) or of World.record, without ROS and as fast as possible. The exit code is "
@@ -41,30 +38,20 @@ def add(commands: Commands) -> None:
         action="store_true",
         help="repeat the run even if files have changed since the recording",
     )
-    parser.add_argument(
-        "--bag",
-        type=path_with((".bag",)),
-        metavar="FILE",
-        help="bag file (ROS 1) with all outputs and transforms; an existing file is replaced",
-    )
     parser.set_defaults(run=_run)
 
 
 def _run(options: argparse.Namespace) -> int:
     with StopSignals() as stop, ExitStack() as files:
-        bag: BagRecorder | None = None
-        if options.bag:
-            bag = open_bag(files.enter_context(replaced(options.bag)), files)
+        recordings = Recordings(options, files)
         replay = Replay(
             options.path,
             check_files=not options.ignore_changes,
-            observers=[] if bag is None else [bag],
+            observers=recordings.recorders.values(),
         )
         files.callback(replay.close)
         _repeat(replay, stop)
-        if bag is not None:
-            bag.close()
-            print(f"wrote {options.bag}: {counted(bag.messages, 'message')}")
+        recordings.close()
         return _report(replay, stop)
 
 

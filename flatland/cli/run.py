@@ -24,19 +24,19 @@ from flatland.cli.arguments import (
     positive,
 )
 from flatland.cli.contents import counted
-from flatland.cli.outputs import open_bag, path_with, replaced
+from flatland.cli.outputs import Recordings, path_with, recording_arguments, replaced
 from flatland.cli.progress import StopSignals, progress_bar
 from flatland.drawing import VIDEO_FORMATS, FrameRenderer, VideoFile, check_matplotlib, check_opencv
 from flatland.errors import FlatlandError
 from flatland.world import World
 
 if TYPE_CHECKING:
-    from flatland.runtime.observer import WorldObserver
+    pass
 
 _EXAMPLES = (
     "flatland run worlds/office/world.yaml --duration 60",
     "flatland run worlds/office/world.yaml --duration 5 --seed 1 --bag office.bag",
-    "flatland run worlds/office/world.yaml --duration 5 --record office.flog",
+    "flatland run worlds/office/world.yaml --duration 5 --mcap office.mcap --record office.flog",
     "flatland run worlds/office/world.yaml --duration 2 --video office.mp4 --size 640x480 "
     '--command "/cmd_vel={linear: {x: 0.5}, angular: {z: 0.3}}"',
 )
@@ -48,7 +48,11 @@ def add(commands: Commands) -> None:
     parser = add_command(
         commands,
         "run",
-        parents=[file_arguments("WORLD", "world file"), picture_arguments()],
+        parents=[
+            file_arguments("WORLD", "world file"),
+            recording_arguments(),
+            picture_arguments(),
+        ],
         summary="simulate a world as fast as possible, into a bag or a video",
         description="Simulates a world without ROS, as fast as possible, and optionally writes all "
         "outputs and transforms to a bag, or a video. After Ctrl-C the files contain what has been "
@@ -79,12 +83,6 @@ def add(commands: Commands) -> None:
         help="command from the start on, in the form of rostopic pub; may be given several times",
     )
     parser.add_argument(
-        "--bag",
-        type=path_with((".bag",)),
-        metavar="FILE",
-        help="bag file (ROS 1) with all outputs and transforms; an existing file is replaced",
-    )
-    parser.add_argument(
         "--record",
         type=Path,
         metavar="FILE",
@@ -110,11 +108,8 @@ def _run(options: argparse.Namespace) -> int:
         check_matplotlib()
         check_opencv()
     with StopSignals() as stop, ExitStack() as files:
-        observers: list[WorldObserver] = []
-        recorder = None
-        if options.bag:
-            recorder = open_bag(files.enter_context(replaced(options.bag)), files)
-            observers.append(recorder)
+        recordings = Recordings(options, files)
+        observers = recordings.recorders.values()
         with load(options, options.seed, step_size=options.step_size, observers=observers) as world:
             if options.record:
                 world.record(options.record)
@@ -128,10 +123,7 @@ def _run(options: argparse.Namespace) -> int:
         if video is not None:
             video.close()
             print(f"wrote {options.video}: {counted(video.frames, 'frame')}")
-        if recorder is not None:
-            recorder.close()
-            topics = counted(len(recorder.topics), "topic")
-            print(f"wrote {options.bag}: {counted(recorder.messages, 'message')}, {topics}")
+        recordings.close()
         if options.record:
             print(f"wrote {options.record}")
     return 128 + stop.signal if stop.signal else 0

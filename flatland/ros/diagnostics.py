@@ -179,7 +179,7 @@ class _Costs:
             self._measured.append((now - self._start, shares))
 
     def reset(self) -> None:
-        """Ends and forgets all measurements."""
+        """Ends all measurements and discards their results."""
         self.end(0.0)
         self._measured.clear()
 

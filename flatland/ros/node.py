@@ -19,6 +19,7 @@ from flatland.ros.parameters import NodeParameters, ParameterError, read_paramet
 from flatland.ros.shutdown import ShutdownWatchdog
 
 if TYPE_CHECKING:
+    from flatland.ros.message_recorder import MessageRecorder
     from flatland.ros.transport.registrar import Registrar
     from flatland.simulation import RunResult, Simulation
     from flatland.world import World
@@ -234,6 +235,7 @@ class ServerNode:
             clock = WallClock()
         bridge = Bridge(self._registrar, clock)
         world = _load(parameters, bridge)
+        message_recorder = _start_recordings(parameters, world)
         self._fault_reports.world = world
         hook_watchdog = HookWatchdog(world)
         simulation = Simulation(
@@ -282,7 +284,39 @@ class ServerNode:
             # unregisters all topics at once.
             bridge.close()
             world.close()
+            if message_recorder is not None:
+                message_recorder.close()
             clock.close()
+
+
+def _start_recordings(parameters: NodeParameters, world: World) -> MessageRecorder | None:
+    """Starts the recordings that the parameters name.
+
+    Returns:
+        The recorder of messages, None if there is none.
+
+    Raises:
+        FlatlandError: A file cannot be created; the world is closed.
+    """
+    recorder: MessageRecorder | None = None
+    try:
+        if parameters.record:
+            world.record(parameters.record)
+            _LOG.info('recording the run to "%s"', parameters.record)
+        if parameters.record_mcap:
+            from flatland.ros.message_recorder import create_mcap_recorder
+
+            recorder = create_mcap_recorder(parameters.record_mcap, ends_on_error=True)
+            recorder.observe(world)
+            _LOG.info('recording messages to "%s"', parameters.record_mcap)
+    except OSError as error:
+        world.close()
+        text = f'cannot create "{parameters.record_mcap}": {error.strerror}'
+        raise FlatlandError(text) from error
+    except FlatlandError:
+        world.close()
+        raise
+    return recorder
 
 
 def _load(parameters: NodeParameters, bridge: Any) -> World:

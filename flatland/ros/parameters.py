@@ -47,6 +47,8 @@ class NodeParameters:
         move_keeps_odometry: Whether the odometry of a model that is moved by a service or by its
             interactive marker continues as if it had not moved.
         initialpose_model: Name of the model that messages on `initialpose` move; empty for none.
+        record: The recording to write, from which the run can be repeated; empty for none.
+        record_mcap: The MCAP file to write, with all messages; empty for none.
         use_sim_time: Whether `/clock` is published and stamps are simulated times; otherwise they
             are wall times.
         clock_rate: Maximum rate of `/clock` in wall time [Hz]; 0 for one message per step.
@@ -72,6 +74,8 @@ class NodeParameters:
     if_blocked: IfBlocked
     move_keeps_odometry: bool
     initialpose_model: str
+    record: str
+    record_mcap: str
     use_sim_time: bool
     clock_rate: float
     publish_map: str | None
@@ -109,6 +113,8 @@ def read_parameters(
         if_blocked=reader.if_blocked("if_blocked", "warn"),
         move_keeps_odometry=reader.boolean("move_keeps_odometry", False),
         initialpose_model=reader.name("initialpose_model"),
+        record=reader.file("record"),
+        record_mcap=reader.file("record_mcap"),
         use_sim_time=reader.boolean("use_sim_time", True),
         clock_rate=reader.rate("clock_rate", 0.0, unlimited="one message per step"),
         publish_map=reader.optional_name("publish_map"),
@@ -237,6 +243,16 @@ class _Reader:
         if isinstance(value, bool) or not isinstance(value, (str, int)):
             raise _invalid(name, wanted, value)
         return str(value).strip()
+
+    def file(self, name: str) -> str:
+        """Reads the path of a file to write; empty by default, otherwise absolute."""
+        value = self._get(name)
+        if value is None:
+            return ""
+        if not isinstance(value, str):
+            raise _invalid(name, "the path of a file", value)
+        path = value.strip()
+        return str(Path(path).expanduser().absolute()) if path else ""
 
     def optional_name(self, name: str) -> str | None:
         """Reads a name; empty by default, None for false."""

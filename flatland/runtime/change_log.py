@@ -1,4 +1,4 @@
-"""What a world tells a recording about: every change that does not come from the world itself."""
+"""The interface through which a world reports requested changes to a recording."""
 
 from __future__ import annotations
 

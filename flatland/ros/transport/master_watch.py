@@ -1,6 +1,6 @@
 """Registers the node again when the ROS master returns after a failure.
 
-rospy registers each topic and service once. A new master does not know the node, although its
+rospy registers each topic and service once. A new master has no entry of the node, although its
 existing connections still work.
 """
 

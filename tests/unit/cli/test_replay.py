@@ -129,3 +129,32 @@ def test_a_signal_ends_the_replay(world: str, recording: Path) -> None:
     process.send_signal(signal.SIGINT)
     output, _ = process.communicate(timeout=TIMEOUT)
     assert process.returncode == 130, output
+
+
+def test_an_mcap_file_contains_the_messages_of_the_bag(world: str) -> None:
+    rosbag = pytest.importorskip("rosbag")
+    reader = pytest.importorskip("mcap_ros1.reader")
+    files = ("--bag", "run.bag", "--mcap", "run.mcap")
+    assert main("run", world, "--duration", "0.5", "--seed", "1", *DRIVE, *files) == 0
+    with rosbag.Bag("run.bag") as bag:
+        expected = [(topic, str(message), max(0, time.to_nsec())) for topic, message, time in bag]
+    messages = [
+        (message.topic, str(message.ros_msg), max(1, message.log_time_ns))
+        for message in reader.read_ros1_messages("run.mcap")
+    ]
+    assert sorted(messages) == sorted(expected)
+    assert len({topic for topic, _, _ in messages}) == 4
+
+
+def test_a_missing_mcap_package_is_named(world: str) -> None:
+    code = (
+        "import sys; sys.modules['mcap_ros1'] = None; sys.modules['mcap_ros1.writer'] = None\n"
+        "from flatland.cli import main\n"
+        f"sys.exit(main(['run', {world!r}, '--duration', '1', '--mcap', 'run.mcap']))"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, timeout=TIMEOUT, check=False
+    )
+    assert done.returncode == 1
+    assert "pip install mcap mcap-ros1-support" in done.stderr
+    assert not list(Path().glob("run*.mcap"))

@@ -1,0 +1,111 @@
+"""Recordings of the node: the run for `flatland replay`, and the messages as MCAP."""
+
+from __future__ import annotations
+
+import signal
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+from geometry_msgs.msg import Twist
+from nav_msgs.msg import Odometry
+from sensor_msgs.msg import LaserScan
+from visualization_msgs.msg import MarkerArray
+
+from flatland.recording import Replay
+from flatland.recording.log_file import read_recording
+
+Drive = Callable[[], tuple[Any, Path, Path]]
+
+
+@pytest.fixture
+def drive(ros: Any, launcher: Any, write_world: Callable[..., Path], tmp_path: Path) -> Drive:
+    """Returns a function that drives a robot of a recorded node, and changes models."""
+
+    def run() -> tuple[Any, Path, Path]:
+        world = write_world("[{name: robot, model: robot.model.yaml}]")
+        recording, messages = tmp_path / "run.flog", tmp_path / "run.mcap"
+        server = launcher.server(
+            world, record=recording, record_mcap=messages, seed=1, show_viz=True
+        )
+        # The recording must be the same with debug markers and subscribers, which a replay has not.
+        ros.topic("/flatland_server/debug/model/robot", MarkerArray)
+        ros.topic("/scan", LaserScan)
+        odometry = ros.topic("/odometry/ground_truth", Odometry)
+        publisher = ros.publisher("/cmd_vel", Twist)
+        command = Twist()
+        command.linear.x = 0.3
+        publisher.publish(command)
+        odometry.until(lambda message: message.pose.pose.position.x > 0.1)
+        assert ros.spawn("ball.model.yaml", "ball", pose=(2.0, 2.0, 0.0)).success
+        assert not ros.spawn("ball.model.yaml", "ball").success
+        assert ros.move("ball", (2.0, -2.0, 1.0)).success
+        command.angular.z = 0.5
+        publisher.publish(command)
+        odometry.until(lambda message: message.twist.twist.angular.z > 0.4)
+        assert ros.delete("ball").success
+        odometry.until(lambda message: message.header.stamp.to_sec() > 1.5)
+        return server, recording, messages
+
+    return run
+
+
+def test_a_run_of_the_node_is_repeated_without_ros(drive: Drive) -> None:
+    server, recording, messages = drive()
+    assert server.stop() == 0
+    kinds = [record.get("kind") for record in read_recording(recording).records]
+    assert kinds.count("command") == 2
+    assert kinds[-1] == "end"
+    replay = Replay(recording)
+    difference = replay.run()
+    replay.close()
+    assert difference is None
+    assert replay.last_step > 300
+
+    read_messages = pytest.importorskip("mcap_ros1.reader").read_ros1_messages
+    poses = [
+        (message.log_time_ns, message.ros_msg.pose.pose.position.x)
+        for message in read_messages(str(messages), topics=["/odometry/ground_truth"])
+    ]
+    assert poses[0] == (0, 0.0)
+    assert len(poses) == poses[-1][0] * 50 // 10**9 + 1  # 50 Hz, with and without subscribers
+    assert poses[-1][1] > 0.1
+
+
+def test_the_recording_survives_the_end_of_the_node(drive: Drive) -> None:
+    server, recording, _ = drive()
+    server.send(signal.SIGKILL)
+    server.wait()
+    replay = Replay(recording)
+    difference = replay.run()
+    replay.close()
+    assert difference is None
+    assert replay.last_step >= 200
+
+
+@pytest.mark.parametrize("parameter", ["record", "record_mcap"])
+def test_a_file_that_cannot_be_created_is_a_fatal_error(
+    launcher: Any, write_world: Callable[..., Path], tmp_path: Path, parameter: str
+) -> None:
+    path = tmp_path / "missing" / "file"
+    server = launcher.start(world_path=write_world(), **{parameter: path})
+    assert server.wait() == 1
+    assert f'cannot create "{path}": No such file or directory' in server.output
+    assert "Traceback" not in server.output
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="no /dev/full")
+def test_a_full_disk_ends_the_recordings_only(
+    ros: Any, launcher: Any, write_world: Callable[..., Path], tmp_path: Path
+) -> None:
+    full = tmp_path / "full.mcap"
+    full.symlink_to("/dev/full")
+    world = write_world("[{name: robot, model: robot.model.yaml}]")
+    server = launcher.server(world, record_mcap=full, update_rate=0)
+    server.wait_for_line("the recording of messages ends: .*No space left on device")
+    odometry = ros.topic("/odometry/ground_truth", Odometry)
+    first = odometry.next().header.stamp
+    assert odometry.until(lambda message: message.header.stamp > first)
+    assert server.stop() == 0
+    assert server.output.count("No space left on device") == 1
