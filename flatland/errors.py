@@ -39,7 +39,8 @@ class FlatlandError(Exception):
     Attributes:
         message: Description of the problem, without the prefix of the class.
         place: The position in a file that the error is about, None if there is none.
-        hint: What probably helps, empty if nothing is known; not part of the message.
+        hint: What probably helps, empty if nothing is known; not part of the message. It is a note
+            of the exception, which Python prints below the text in a traceback.
     """
 
     prefix: ClassVar[str] = ""
@@ -56,6 +57,13 @@ class FlatlandError(Exception):
         self.message = message
         self.place = place
         self.hint = hint
+        if hint:
+            self.add_note(f"hint: {hint}")
+
+    @property
+    def text_with_hint(self) -> str:
+        """The text of the error, then the hint in brackets if there is one."""
+        return f"{self} (hint: {self.hint})" if self.hint else str(self)
 
     def parts(self) -> Sequence[FlatlandError]:
         """Returns the errors that this one consists of, by default only itself."""

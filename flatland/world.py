@@ -135,6 +135,7 @@ class World(Contents):
         plugin_timeout: float | None = None,
         plugin_errors: FaultPolicy = "raise",
         on_invalid_body: InvalidBodyPolicy = "raise",
+        model_path: Iterable[str | os.PathLike[str]] | None = None,
     ) -> World:
         """Loads a world file: properties, layers, models with their plugins, world plugins.
 
@@ -155,6 +156,7 @@ class World(Contents):
             on_invalid_body: What happens if a step leaves a body with a pose or velocity that is
                 not finite. `raise`: `step` raises, and raises again, until the model is moved or
                 deleted; the time stands still. `remove`: the model is removed with a logged error.
+            model_path: Folders outside which `spawn_model` reads no file; None: no restriction.
 
         Raises:
             FlatlandError: A file is invalid; nothing is left behind.
@@ -171,6 +173,7 @@ class World(Contents):
             plugin_timeout=plugin_timeout,
             plugin_errors=plugin_errors,
             on_invalid_body=on_invalid_body,
+            model_path=model_path,
         )
         # Otherwise part of the first step, which would take too long for a loop in real time.
         world.physics.find_new_contacts()

@@ -64,7 +64,10 @@ def _run(arguments: Sequence[str] | None) -> int:
             print(end="", flush=True)
     except BrokenPipeError:
         raise
-    except (FlatlandError, OSError) as error:
+    except FlatlandError as error:
+        print(f"flatland: {error.text_with_hint}", file=sys.stderr)
+        return 1
+    except OSError as error:
         print(f"flatland: {error}", file=sys.stderr)
         return 1
     return code

@@ -14,7 +14,7 @@ from typing import BinaryIO
 
 from flatland.config.composer import Composer, end_position, malformed
 from flatland.config.hints import similar_file
-from flatland.config.inputs import note_file
+from flatland.config.inputs import check_allowed, note_file
 from flatland.config.node import Node, Source
 from flatland.errors import Place, UnreadableFileError
 
@@ -57,6 +57,7 @@ def open_regular(path: str) -> BinaryIO:
     Raises:
         OSError: The file does not exist, is not a regular file, or cannot be read.
     """
+    check_allowed(path)
     try:
         is_regular = stat.S_ISREG(Path(path).stat().st_mode)
     except ValueError as error:  # a null character in the path

@@ -1,9 +1,14 @@
-"""Collects the files and parameters that a world is made from, so that a run can be repeated."""
+"""Collects the files and parameters that a world is made from, so that a run can be repeated.
+
+Access to files can be limited to some folders, for models that clients of the ROS node spawn.
+"""
 
 from __future__ import annotations
 
+import errno
+import os
 import zlib
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass, field
@@ -41,6 +46,59 @@ class Inputs:
 
 
 _current: ContextVar[Inputs | None] = ContextVar("flatland_inputs", default=None)
+
+
+_allowed: ContextVar[tuple[str, ...] | None] = ContextVar("flatland_folders", default=None)
+
+
+def real_folders(folders: Iterable[str | os.PathLike[str]] | None) -> tuple[str, ...] | None:
+    """Returns the absolute paths of some folders without symbolic links, None for None.
+
+    Raises:
+        ValueError: The argument is a single path instead of a list, empty, or one is no folder.
+    """
+    if folders is None:
+        return None
+    if isinstance(folders, str | os.PathLike):
+        raise ValueError(f"model_path must be a list of folders, got {os.fspath(folders)!r}")
+    paths = [Path(folder).expanduser() for folder in folders]
+    if not paths:
+        raise ValueError("model_path must contain at least one folder")
+    for path in paths:
+        if not path.is_dir():
+            raise ValueError(f"model_path must be a list of folders, {str(path)!r} is none")
+    return tuple(os.path.realpath(path) for path in paths)
+
+
+@contextmanager
+def only_files_in(folders: tuple[str, ...] | None) -> Iterator[None]:
+    """Restricts the files that the current thread reads in the block.
+
+    Args:
+        folders: Result of `real_folders`; None for no restriction.
+    """
+    token = _allowed.set(folders)
+    try:
+        yield
+    finally:
+        _allowed.reset(token)
+
+
+def check_allowed(path: str) -> None:
+    """Checks that a file may be read; symbolic links are resolved first.
+
+    Raises:
+        PermissionError: The file is outside the folders of `only_files_in`, whether it exists or
+            not.
+    """
+    folders = _allowed.get()
+    if folders is None or "\0" in path:  # which is no path of any file
+        return
+    real = os.path.realpath(path)
+    if not any(os.path.commonpath((real, folder)) == folder for folder in folders):
+        raise PermissionError(
+            errno.EACCES, f"it is outside the folders of model_path, {', '.join(folders)}", path
+        )
 
 
 def note_file(path: str) -> None:

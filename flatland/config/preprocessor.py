@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import logging
+import time
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
 from flatland.config.documents import load_documents, parse_documents
-from flatland.config.inputs import next_seed, note_param
+from flatland.config.hints import similar_file
+from flatland.config.inputs import check_allowed, next_seed, note_param
 from flatland.config.lua import EvalError, evaluate
 from flatland.config.node import MAX_NESTING, ListNode, Node, NullNode, ScalarNode, Source
 from flatland.errors import YamlError
@@ -16,9 +18,10 @@ _LOG = logging.getLogger("flatland")
 _EVAL = "$eval"
 _INCLUDE = "$include"
 _INCLUDE_ALL = "$[include]"
-_MAX_INCLUDES = (
-    10_000  # of one run; a chain in which each file includes the next one twice explodes
-)
+_MAX_INCLUDES = 5_000  # of one run; a chain in which each file includes the next one twice explodes
+# s of processor time of all expressions of a run together; quick ones do not count.
+_TOTAL_TIME_LIMIT = 1.0
+_QUICK = 0.01  # s
 _MAX_SHOWN = 500  # characters of an expression or a Lua message in an error message
 
 ParamLookup = Callable[[str], object]
@@ -97,6 +100,7 @@ class _Preprocessor:
         self._params = params
         self._on_error = on_error
         self._includes = 0
+        self._spent = 0.0  # s of processor time, by expressions that are not quick
         # The result for each node by its id, so that a node with aliases is expanded once. The
         # original node is kept alive because the id of a deleted object can be reused.
         self._done: dict[int, tuple[Node, Node]] = {}
@@ -152,8 +156,16 @@ class _Preprocessor:
 
     def _evaluate(self, node: ScalarNode) -> str:
         expression = node.text[len(_EVAL) :].strip(" \t\r\n\f\v")
+        start = time.thread_time()
         try:
             result = evaluate(expression, self._param, next_seed())
+            spent = time.thread_time() - start
+            if spent > _QUICK:
+                self._spent += spent
+            if self._spent > _TOTAL_TIME_LIMIT:
+                raise EvalError(
+                    f"all expressions together exceed the time limit of {_TOTAL_TIME_LIMIT:g} s"
+                )
         except EvalError as error:
             message = f'Failed to evaluate "{_shorten(expression)}", {_shorten(str(error))}'
             raise self._error(node, message) from error
@@ -175,12 +187,20 @@ class _Preprocessor:
         written = node.text[len(marker) :].strip()
         path = node.source.resolve(written)
         try:
+            check_allowed(path)
+        except OSError as error:
+            raise self._error(
+                node, f'Failed to read file, path="{path}", {error.strerror}'
+            ) from error
+        try:
             exists = bool(written) and Path(path).exists()
         except (OSError, ValueError):
             exists = False
         if not exists:
             raise self._error(
-                node, f"File specified in {marker} does not exist, path={path}, include={written}"
+                node,
+                f"File specified in {marker} does not exist, path={path}, include={written}",
+                similar_file(path) if written else "",
             )
         self._includes += 1
         if self._includes > _MAX_INCLUDES:
@@ -192,13 +212,13 @@ class _Preprocessor:
         try:
             documents = load_documents(path)
         except YamlError as error:
-            raise self._error(node, error.message) from error
+            raise self._error(node, error.message, error.hint) from error
         if marker == _INCLUDE:
             documents = [_first(documents, Source.of_file(path))]
         chain = (*chain, (identity, path))
         return [self.expand(document, chain, depth) for document in documents]
 
     @staticmethod
-    def _error(node: Node, message: str) -> YamlError:
+    def _error(node: Node, message: str, hint: str = "") -> YamlError:
         place = node.source.place(node.line)
-        return YamlError(message + place.suffix, place=place)
+        return YamlError(message + place.suffix, place=place, hint=hint)

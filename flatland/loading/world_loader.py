@@ -9,7 +9,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from flatland.config.inputs import Inputs
+from flatland.config.inputs import Inputs, real_folders
 from flatland.config.node import Source
 from flatland.config.preprocessor import Params
 from flatland.config.reader import ReadYaml, YamlReader
@@ -35,6 +35,8 @@ _LOG = logging.getLogger("flatland")
 
 LAYER_COLOR = (1.0, 1.0, 1.0, 1.0)
 SIMPLIFICATIONS = (0, 1, 2)
+MAX_ITERATIONS = 1000
+"""Largest number of velocity or position iterations; more only slow down the simulation."""
 
 
 def load_world(
@@ -49,6 +51,7 @@ def load_world(
     plugin_timeout: float | None,
     plugin_errors: FaultPolicy,
     on_invalid_body: InvalidBodyPolicy,
+    model_path: Iterable[str | os.PathLike[str]] | None = None,
     read: ReadYaml = YamlReader.from_file,
 ) -> World:
     """Creates a world of the given class from a file; see `World.from_yaml` for the arguments.
@@ -58,6 +61,7 @@ def load_world(
     """
     if simplify_map not in SIMPLIFICATIONS:
         raise ValueError(f"simplify_map must be 0, 1 or 2, got {simplify_map!r}")
+    folders = real_folders(model_path)
     seed = checked_seed(seed)
     inputs = Inputs(seed, simplify_map)
     with inputs.collecting():
@@ -74,6 +78,7 @@ def load_world(
             on_invalid_body=on_invalid_body,
             read=read,
         )
+    world.model_path = folders  # The models of the world file are not restricted.
     # A recording can start as long as these are unchanged.
     world.change_count = 0
     inputs.commands_received = world.ports.commands_received()
@@ -92,8 +97,8 @@ def _create_world(
     file = Path(Source("", str(Path.cwd())).resolve(os.fspath(path)))
     reader = read(file, params)
     properties = reader.subnode("properties", "map")
-    velocity_iterations = properties.get("velocity_iterations", "int", 10, minimum=1)
-    position_iterations = properties.get("position_iterations", "int", 10, minimum=1)
+    velocity_iterations = _read_iterations(properties, "velocity_iterations")
+    position_iterations = _read_iterations(properties, "position_iterations")
     map_layer: str = properties.get("publish_map", "string", "")
     properties.ensure_accessed_all()
     world = world_class(
@@ -136,6 +141,10 @@ def _create_world(
         world.__exit__(type(error), error, error.__traceback__)
         raise
     return world
+
+
+def _read_iterations(properties: YamlReader, key: str) -> int:
+    return properties.get(key, "int", 10, minimum=1, maximum=MAX_ITERATIONS)
 
 
 def _load_layer(world: World, reader: YamlReader, simplify_map: int) -> None:

@@ -103,6 +103,9 @@ def _class_elements(path: str) -> Iterator[tuple[str | None, ElementTree.Element
     Raises:
         PluginError: The manifest cannot be read, is not XML, or has an unknown root element.
     """
+    if not Path(path).is_dir() and Path(path).exists() and not Path(path).is_file():
+        # Opening a pipe can block.
+        raise PluginError(f'manifest "{path}" cannot be read: it is not a regular file')
     try:
         # Manifests are trusted input: the code that they name is executed anyway.
         root = ElementTree.parse(path).getroot()  # noqa: S314

@@ -74,6 +74,7 @@ class Recorder(WorldObserver):
                     "simplify_map": world.inputs.simplify_map,
                     "plugin_errors": world.plugin_errors,
                     "on_invalid_body": world.on_invalid_body,
+                    "model_path": world.model_path,
                     "state": world.state_hash(),
                     **self._new_inputs(),
                 }

@@ -77,6 +77,8 @@ class Replay:
             plugin_errors=header["plugin_errors"],
             on_invalid_body=header["on_invalid_body"],
         )
+        folders = header.get("model_path")
+        self.world.model_path = None if folders is None else tuple(folders)
         self.last_step: int = max((r["step"] for r in self.recording.records[1:]), default=0)
         self.difference: Difference | None = None
         self.step = 0

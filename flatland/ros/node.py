@@ -127,8 +127,10 @@ class ServerNode:
             )
             watchdog.timeout = parameters.shutdown_timeout
             self._simulate(parameters)
-        except (ParameterError, FlatlandError) as error:
+        except ParameterError as error:
             code = self._fail(str(error))
+        except FlatlandError as error:
+            code = self._fail(error.text_with_hint)
         except Exception:
             code = self._fail("unexpected internal error", exc_info=True)
         else:
@@ -331,6 +333,7 @@ def _load(parameters: NodeParameters, bridge: Any) -> World:
         plugin_timeout=parameters.plugin_timeout,
         plugin_errors="disable",
         on_invalid_body="remove",
+        model_path=parameters.model_path,
     )
     _LOG.info(
         'loaded "%s" in %.2f s: %d layers, %d models',

@@ -57,6 +57,7 @@ class NodeParameters:
         map_frame: Frame of the map.
         map_resolution: Size of a cell of the map of a layer without an image [m].
         msgs_package: Package of the message and service types, `flatland` or `flatland_msgs`.
+        model_path: Folders outside which `spawn_model` reads no file; None for no restriction.
     """
 
     world_path: str
@@ -81,6 +82,7 @@ class NodeParameters:
     map_frame: str
     map_resolution: float
     msgs_package: str
+    model_path: tuple[str, ...] | None
 
 
 def read_parameters(
@@ -119,6 +121,7 @@ def read_parameters(
         map_frame=reader.frame("map_frame", "map"),
         map_resolution=reader.finite_positive("map_resolution", DEFAULT_RESOLUTION),
         msgs_package=reader.msgs_package("msgs_package", default_msgs_package),
+        model_path=reader.folders("model_path"),
     )
 
 
@@ -271,6 +274,22 @@ class _Reader:
         if not isinstance(value, str) or value not in MESSAGE_PACKAGES:
             raise _invalid(name, " or ".join(MESSAGE_PACKAGES), value)
         return value
+
+    def folders(self, name: str) -> tuple[str, ...] | None:
+        """Reads a list of absolute folders, or a text with colons between them; empty for none."""
+        wanted = "a list of existing folders with absolute paths, or a text with colons in between"
+        value = self._get(name)
+        if value is None or (isinstance(value, str) and not value.strip()):
+            return None
+        folders = value.strip().split(":") if isinstance(value, str) else value
+        if not isinstance(folders, list) or not folders:
+            raise _invalid(name, wanted, value)
+        for folder in folders:
+            # The node is started in ~/.ros, so that relative paths would be surprising.
+            path = Path(folder) if isinstance(folder, str) else Path()
+            if not (path.is_absolute() and path.is_dir()):
+                raise _invalid(name, wanted, value)
+        return tuple(folders)
 
     def natural(self, name: str) -> int | None:
         wanted = "an integer that is not negative"

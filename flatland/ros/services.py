@@ -129,7 +129,8 @@ class Services:
             self._registrar.flush(_REGISTRATION_TIMEOUT)
         except (FlatlandError, rospy.ServiceException) as error:
             self._registrar.flush(_REGISTRATION_TIMEOUT)
-            return False, sendable_text(str(error))
+            text = error.text_with_hint if isinstance(error, FlatlandError) else str(error)
+            return False, sendable_text(text)
         except Exception as error:
             _LOG.exception("unexpected internal error in a service call")
             return False, sendable_text(f"{type(error).__name__}: {error}")

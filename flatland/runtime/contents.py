@@ -57,9 +57,13 @@ class Contents:
         change_count: Number of models that were spawned, moved or deleted since the world file was
             loaded, including attempts that failed.
         inputs: The files and parameters that were read.
+        model_path: Real paths of the folders outside which `spawn_model` reads no file; None for no
+            restriction.
     """
 
     read_yaml: ReadYaml = YamlReader.from_file
+
+    model_path: tuple[str, ...] | None = None
 
     layers: list[Layer]
     map_layer: str = ""

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
+from flatland.config.inputs import only_files_in
 from flatland.entities.model import Model
 from flatland.errors import WorldError, YamlError
 from flatland.geometry import Pose, finite_pose
@@ -72,7 +73,7 @@ class ModelSet:
         world = self._world
         checked_pose = self._check_spawn(path, name, namespace, pose)
         path = world.resolve_path(path)
-        with world.inputs.collecting():
+        with world.inputs.collecting(), only_files_in(world.model_path):
             reader = world.read_yaml(path, world.params)
         model = Model(world, name, namespace, path)
         loader = ModelLoader(world.physics, world.collision_filter, model, reader)

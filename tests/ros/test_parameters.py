@@ -42,6 +42,7 @@ def test_defaults() -> None:
         map_frame="map",
         map_resolution=0.05,
         msgs_package="flatland",
+        model_path=None,
     )
 
 
@@ -101,6 +102,9 @@ def test_defaults() -> None:
         ("map_resolution", 1, 1.0),
         ("msgs_package", "flatland", "flatland"),
         ("msgs_package", "flatland_msgs", "flatland_msgs"),
+        ("model_path", " ", None),
+        ("model_path", "/usr:/tmp", ("/usr", "/tmp")),
+        ("model_path", ["/usr", "/tmp"], ("/usr", "/tmp")),
     ],
 )
 def test_valid_values(name: str, value: object, expected: object) -> None:
@@ -181,6 +185,15 @@ def test_invalid_numbers(name: str, value: object) -> None:
         ("msgs_package", ["flatland"]),
         ("world_path", 5),
         ("world_path", ["a"]),
+        ("model_path", "relative/path"),
+        ("model_path", "/nowhere/at/all"),
+        ("model_path", "/usr:"),
+        ("model_path", "/etc/passwd"),
+        ("model_path", []),
+        ("model_path", [""]),
+        ("model_path", ["/usr", 1]),
+        ("model_path", True),
+        ("model_path", {"a": "/usr"}),
     ],
 )
 def test_invalid_values(name: str, value: object) -> None:

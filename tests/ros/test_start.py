@@ -192,6 +192,7 @@ def test_server_launch_passes_all_parameters(launcher: Any, ros: Any, world: Pat
         "shutdown_timeout:=5",
         "clock_rate:=500",
         "publish_map:=2d",
+        f"model_path:={world.parent}:/usr",
     )
     times = [message.clock.to_nsec() for message in ros.topic("/clock", Clock).take(20)]
     assert {time % 10_000_000 for time in times} == {0}
@@ -214,6 +215,9 @@ def test_server_launch_passes_all_parameters(launcher: Any, ros: Any, world: Pat
         "clock_rate": 500,
         "publish_map": "2d",
         "msgs_package": "flatland",
+        "model_path": f"{world.parent}:/usr",
+        "record": "",
+        "record_mcap": "",
     }
     assert ros.master.getParam("/use_sim_time") is True
     ros.log_everything()

@@ -103,7 +103,9 @@ def test_invalid_files_exit_with_1_and_one_line_of_error(world_file, tmp_path):
     done = run("show", "nowhere.yaml", "-o", "a.png", cwd=tmp_path)
     assert done.returncode == 1
     path = tmp_path / "nowhere.yaml"
-    assert done.stderr == f'flatland: Flatland YAML: File does not exist, path="{path}"\n'
+    hint = '(hint: did you mean "world.yaml"?)'
+    expected = f'flatland: Flatland YAML: File does not exist, path="{path}" {hint}\n'
+    assert done.stderr == expected
 
 
 def test_a_picture_that_cannot_be_written_is_an_error(world_file, tmp_path, capsys):

@@ -30,7 +30,7 @@ ERRORS = {
     ),
     "no iterations": (
         "{properties: {position_iterations: 0}, layers: []}",
-        'Invalid "position_iterations", must be at least 1, got 0 (in "properties")',
+        'Invalid "position_iterations", must be from 1 to 1000, got 0 (in "properties")',
     ),
     "map of an unknown layer": (
         "{properties: {publish_map: roof}, layers: [{name: [a, c]}, {name: b}]}",

@@ -1,0 +1,83 @@
+"""Checks that a world and the process are as before after an error."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import flatland
+
+MAX_SECONDS = 2.0  # of processor time for one invalid input
+
+
+def resources() -> dict[str, Any]:
+    """Returns what a world must not leave behind: threads and file descriptors."""
+    return {
+        "threads": set(threading.enumerate()),
+        "descriptors": len(list(Path("/proc/self/fd").iterdir())),
+    }
+
+
+def contents(world: flatland.World) -> dict[str, Any]:
+    """Returns everything in a world that a failed request must not change."""
+    return {
+        "models": [model.name for model in world.models],
+        "objects": world.physics.object_counts(),
+        "outputs": sorted(world.ports.outputs),
+        "commands": sorted(world.ports.commands),
+        "layers": list(world.collision_filter.names),
+        "state": world.state_hash(),
+    }
+
+
+@pytest.fixture
+def unchanged() -> Callable[..., AbstractContextManager[None]]:
+    """A context at whose end a world, if given, and the process are as before, in short time."""
+
+    @contextmanager
+    def check(world: flatland.World | None = None) -> Iterator[None]:
+        process_before = resources()
+        before = contents(world) if world is not None else None
+        start = time.process_time()
+        yield
+        assert time.process_time() - start < MAX_SECONDS
+        assert resources() == process_before
+        if world is not None:
+            assert contents(world) == before
+
+    return check
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with a valid world, the base of all broken ones."""
+    folder = tmp_path_factory.mktemp("broken")
+    files = {
+        "world.yaml": "properties: {}\n"
+        "layers: [{name: 2d, map: map.yaml}, {name: 3d}]\n"
+        "models: [{name: first, model: good.model.yaml}]\n",
+        "map.yaml": "type: line_segments\ndata: walls.dat\nscale: 1\norigin: [0, 0, 0]\n",
+        "walls.dat": "5 -5 5 5\n",
+        "good.model.yaml": "bodies: [{name: base, footprints: [{type: circle, radius: 0.2, "
+        "density: 1}]}]\n"
+        "plugins: [{name: drive, type: DiffDrive, body: base}]\n",
+    }
+    for name, text in files.items():
+        (folder / name).write_text(text)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def running_world(folder: Path) -> Iterator[flatland.World]:
+    """A world that has been stepped, for requests that fail."""
+    with flatland.World.from_yaml(folder / "world.yaml", seed=1) as world:
+        world.step(3)
+        yield world
+        world.step(3)
+        world.spawn_model("good.model.yaml", "later", "later", (2, 0, 0))

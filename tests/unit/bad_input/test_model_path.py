@@ -1,0 +1,92 @@
+"""`model_path`: the folders outside which `spawn_model` reads no file."""
+
+from __future__ import annotations
+
+import traceback
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import flatland
+from flatland.recording import Replay
+
+GOOD = "bodies: [{name: base, footprints: []}]\n"
+
+
+@pytest.fixture
+def outside(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with a model, which is not allowed."""
+    folder = tmp_path_factory.mktemp("outside")
+    (folder / "good.yaml").write_text(GOOD)
+    return folder
+
+
+@pytest.fixture
+def world_file(tmp_path: Path, outside: Path) -> Path:
+    """A world whose own model is outside the allowed folder."""
+    (tmp_path / "allowed").mkdir()
+    (tmp_path / "allowed" / "good.yaml").write_text(GOOD)
+    (tmp_path / "allowed" / "link.yaml").symlink_to(outside / "good.yaml")
+    path = tmp_path / "world.yaml"
+    path.write_text(
+        f"properties: {{}}\nlayers: []\nmodels: [{{name: m, model: {outside}/good.yaml}}]\n"
+    )
+    return path
+
+
+def test_only_later_models_are_restricted(world_file: Path, outside: Path, unchanged: Any) -> None:
+    allowed = world_file.parent / "allowed"
+    with flatland.World.from_yaml(world_file, seed=1, model_path=[allowed]) as world:
+        world.spawn_model("allowed/good.yaml", "a")
+        for path in (outside / "good.yaml", outside / "none.yaml", allowed / "link.yaml"):
+            with unchanged(world), pytest.raises(flatland.YamlError) as caught:
+                world.spawn_model(path, "b")
+            assert str(caught.value) == (
+                f'Flatland YAML: Failed to read file, path="{path}", it is outside the folders of '
+                f"model_path, {allowed}"
+            )
+
+
+def test_by_default_nothing_is_restricted(world_file: Path, outside: Path) -> None:
+    with flatland.World.from_yaml(world_file, seed=1) as world:
+        world.spawn_model(outside / "good.yaml", "a")
+
+
+def test_a_link_can_be_an_allowed_folder(world_file: Path, outside: Path) -> None:
+    link = world_file.parent / "folder_link"
+    link.symlink_to(outside)
+    with flatland.World.from_yaml(world_file, seed=1, model_path=[link]) as world:
+        world.spawn_model(link / "good.yaml", "a")
+        world.spawn_model(outside / "good.yaml", "b")
+
+
+def test_a_replay_refuses_the_same_files(world_file: Path, outside: Path) -> None:
+    recording = world_file.parent / "run.flog"
+    allowed = [world_file.parent / "allowed"]
+    with flatland.World.from_yaml(world_file, seed=1, model_path=allowed) as world:
+        world.record(recording)
+        with pytest.raises(flatland.YamlError):
+            world.spawn_model(outside / "good.yaml", "a")
+        world.step(3)
+    replay = Replay(recording)
+    assert replay.run() is None
+    replay.close()
+
+
+def test_hints_are_shown_with_the_error(world_file: Path) -> None:
+    world_file.write_text("propertys: {}\nlayers: []\n")
+    with pytest.raises(flatland.YamlError) as caught:
+        flatland.World.from_yaml(world_file)
+    hint = '"propertys" in line 1 may be a misspelling of "properties"'
+    text = f'Flatland YAML: Entry "properties" does not exist [{world_file}:1]'
+    assert str(caught.value) == text
+    assert caught.value.text_with_hint == f"{text} (hint: {hint})"
+    shown = "".join(traceback.format_exception_only(caught.value))
+    assert shown == f"flatland.errors.YamlError: {text}\nhint: {hint}\n"
+
+
+def test_an_error_without_a_hint_has_no_note() -> None:
+    error = flatland.WorldError("text")
+    assert error.text_with_hint == "Flatland World: text"
+    assert not hasattr(error, "__notes__")
