@@ -5,6 +5,8 @@
 set -euo pipefail
 cd "$(dirname "$0")/.."
 root=$PWD
+# A shell may have the environment of another clone, whose packages must not count as installed here.
+unset PYTHONPATH VIRTUAL_ENV
 level=${1:-run}
 venv=$root/.venv
 stamps=$venv/flatland-setup
