@@ -2,7 +2,7 @@
 
 Each scenario repeats one operation many times. Memory, threads, file descriptors and objects of the
 physics engine are sampled at regular intervals. After the first tenth, the memory must stay within
-3 % (and 2 MB), and everything else must be constant. The exit code is 1 if anything grows.
+3 % (and 4 MB), and everything else must be constant. The exit code is 1 if anything grows.
 """
 
 from __future__ import annotations
@@ -26,7 +26,9 @@ from ros_session import CHECKOUT, ros_session  # isort: skip
 
 SAMPLES = 40
 MEMORY_TOLERANCE = 0.03
-MEMORY_ALLOWANCE = 2.0  # MB; one arena of the allocator more is not growth
+# MB; one arena of the allocator more is not growth. CPython resizes its table of interned strings,
+# into which pathlib puts the parts of each path, once or twice in a long run: 2 MB each.
+MEMORY_ALLOWANCE = 4.0
 OFFICE = CHECKOUT / "worlds" / "office" / "world.yaml"
 CHAIR = OFFICE.with_name("chair.model.yaml")
 STEP_RATE = 200  # Hz

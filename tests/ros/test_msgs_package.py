@@ -55,6 +55,45 @@ def run_tool(ros_master: dict[str, str], tmp_path: Path) -> Callable[..., str]:
     return run
 
 
+# -- servers of a single test, before that of the fixture: they have the same name -----------
+
+
+def test_invalid_package_is_reported_in_one_fatal_line(launcher: Any, world: Path) -> None:
+    server = launcher.start(world_path=world, msgs_package="std_msgs")
+    assert server.wait() == 1
+    [line] = [line for line in server.lines if "FATAL" in line]
+    assert (
+        "Invalid parameter \"~msgs_package\": it must be flatland or flatland_msgs, got 'std_msgs'"
+        in line
+    )
+
+
+def test_package_that_is_not_installed_is_reported(
+    launcher: Any, world: Path, tmp_path: Path
+) -> None:
+    (tmp_path / "flatland_msgs.py").write_text("raise ImportError('not built')\n")
+    environment = launcher.environment
+    path = f"{tmp_path}:{environment.get('PYTHONPATH', '')}"
+    launcher.environment = {**environment, "PYTHONPATH": path}
+    server = launcher.start(world_path=world, msgs_package="flatland_msgs")
+    assert server.wait() == 1
+    [line] = [line for line in server.lines if "FATAL" in line]
+    assert 'Invalid parameter "~msgs_package": "flatland_msgs" is not installed, not built' in line
+
+
+def test_default_of_the_program_yields_to_the_parameter(
+    launcher: Any, ros: Any, world: Path
+) -> None:
+    launcher.server(world, "--msgs-package", "flatland_msgs")
+    assert ros.types()["/collisions"] == "flatland_msgs/Collisions"
+    launcher.stop()
+    launcher.server(world, "--msgs-package", "flatland_msgs", msgs_package="flatland")
+    assert ros.types()["/collisions"] == "flatland/Collisions"
+
+
+# -- the server of the fixture ------------------------------------------------------------
+
+
 def test_all_types_are_of_the_package(package: str, ros: Any) -> None:
     messages = importlib.import_module(f"{package}.msg")
     assert ros.topic("/flatland_server/debug/topics", messages.DebugTopicList).next().topics
@@ -94,36 +133,3 @@ def test_python_client_of_the_reference(package: str, launcher: Any, world: Path
     assert client.lines == [
         *("spawned", "listed", "collides with a wall", "is free", "no longer listed")
     ]
-
-
-def test_invalid_package_is_reported_in_one_fatal_line(launcher: Any, world: Path) -> None:
-    server = launcher.start(world_path=world, msgs_package="std_msgs")
-    assert server.wait() == 1
-    [line] = [line for line in server.lines if "FATAL" in line]
-    assert (
-        "Invalid parameter \"~msgs_package\": it must be flatland or flatland_msgs, got 'std_msgs'"
-        in line
-    )
-
-
-def test_package_that_is_not_installed_is_reported(
-    launcher: Any, world: Path, tmp_path: Path
-) -> None:
-    (tmp_path / "flatland_msgs.py").write_text("raise ImportError('not built')\n")
-    environment = launcher.environment
-    path = f"{tmp_path}:{environment.get('PYTHONPATH', '')}"
-    launcher.environment = {**environment, "PYTHONPATH": path}
-    server = launcher.start(world_path=world, msgs_package="flatland_msgs")
-    assert server.wait() == 1
-    [line] = [line for line in server.lines if "FATAL" in line]
-    assert 'Invalid parameter "~msgs_package": "flatland_msgs" is not installed, not built' in line
-
-
-def test_default_of_the_program_yields_to_the_parameter(
-    launcher: Any, ros: Any, world: Path
-) -> None:
-    launcher.server(world, "--msgs-package", "flatland_msgs")
-    assert ros.types()["/collisions"] == "flatland_msgs/Collisions"
-    launcher.stop()
-    launcher.server(world, "--msgs-package", "flatland_msgs", msgs_package="flatland")
-    assert ros.types()["/collisions"] == "flatland/Collisions"
