@@ -68,10 +68,22 @@ def open_regular(path: str) -> BinaryIO:
     return Path(path).open("rb")
 
 
+def read_regular(path: str) -> bytes:
+    """Reads a regular file of at most 64 MiB.
+
+    Raises:
+        OSError: The file does not exist, is not a regular file, is too large, or cannot be read.
+    """
+    with open_regular(path) as file:
+        content = file.read(_MAX_FILE_BYTES + 1)
+    if len(content) > _MAX_FILE_BYTES:
+        raise OSError(errno.EFBIG, "it is larger than 64 MiB", path)
+    return content
+
+
 def _read(path: str) -> bytes:
     try:
-        with open_regular(path) as file:
-            content = file.read(_MAX_FILE_BYTES + 1)
+        return read_regular(path)
     except (FileNotFoundError, NotADirectoryError):
         raise UnreadableFileError(
             f'File does not exist, path="{path}"', place=Place(path), hint=similar_file(path)
@@ -80,11 +92,6 @@ def _read(path: str) -> bytes:
         raise UnreadableFileError(
             f'Failed to read file, path="{path}", {error.strerror}', place=Place(path)
         ) from error
-    if len(content) > _MAX_FILE_BYTES:
-        raise UnreadableFileError(
-            f'Failed to read file, path="{path}", it is larger than 64 MiB', place=Place(path)
-        )
-    return content
 
 
 def _decode(content: bytes, source: Source) -> str:

@@ -2,21 +2,17 @@
 
 from __future__ import annotations
 
-import errno
 import io
 import math
-import os
 from pathlib import Path
-from typing import BinaryIO
 
 import numpy as np
 import numpy.typing as npt
 
-from flatland.config.documents import open_regular
+from flatland.config.documents import read_regular
 from flatland.errors import MapFileError, Place
 
 _COLUMNS = 4
-_MAX_FILE_BYTES = 64 * 1024 * 1024
 
 
 def read_line_segments(path: str) -> npt.NDArray[np.float64]:
@@ -34,12 +30,12 @@ def read_line_segments(path: str) -> npt.NDArray[np.float64]:
         OSError: The file cannot be read, or is larger than 64 MiB.
         MapFileError: A line has fewer than four numbers, or a number is NaN or infinite.
     """
-    with io.TextIOWrapper(_open(path), encoding="utf-8-sig", errors="replace") as file:
-        numbered = [
-            (number, line)
-            for number, line in enumerate(file, start=1)
-            if line.strip() and not line.lstrip().startswith("#")
-        ]
+    text = read_regular(path).decode("utf-8-sig", "replace")
+    numbered = [
+        (number, line)
+        for number, line in enumerate(io.StringIO(text, newline=None), start=1)
+        if line.strip() and not line.lstrip().startswith("#")
+    ]
     if not numbered:
         return np.empty((0, _COLUMNS))
     try:
@@ -51,14 +47,6 @@ def read_line_segments(path: str) -> npt.NDArray[np.float64]:
     except ValueError:
         pass
     return np.array([_parse(line, number, path) for number, line in numbered])
-
-
-def _open(path: str) -> BinaryIO:
-    file = open_regular(path)
-    if os.fstat(file.fileno()).st_size > _MAX_FILE_BYTES:
-        file.close()
-        raise OSError(errno.EFBIG, "it is larger than 64 MiB", path)
-    return file
 
 
 def _parse(line: str, number: int, path: str) -> list[float]:
