@@ -100,7 +100,7 @@ class Recorder(WorldObserver):
     @contextmanager
     def change(self, kind: str, arguments: Mapping[str, object]) -> Iterator[None]:
         """Records a request and its outcome; requests of plugins within it are not recorded."""
-        if self._depth:
+        if self._depth or self._writer is None:
             yield
             return
         self._write(kind, arguments={key: encode_value(v) for key, v in arguments.items()})
