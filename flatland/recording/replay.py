@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterable, Iterator, Mapping
-from contextlib import AbstractContextManager, contextmanager, nullcontext
+from collections.abc import Callable, Iterable, Mapping
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
 from typing import Any, Final
 
@@ -227,13 +227,3 @@ _CHANGES: Final[dict[str, Callable[..., object]]] = {
 
 def _outcome(error: str | None) -> str:
     return "succeeds" if error is None else f"fails ({error})"
-
-
-@contextmanager
-def replaying(path: str | os.PathLike[str], **options: Any) -> Iterator[Replay]:
-    """Yields a `Replay`, whose world is closed at the end of the block."""
-    replay = Replay(path, **options)
-    try:
-        yield replay
-    finally:
-        replay.close()
