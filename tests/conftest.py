@@ -28,6 +28,7 @@ _MARKED_FOLDERS = {"ros": "ros", "ros/viewer": "viewer", "build": "build"}
 _GROUPED_FOLDERS = ("build", "ros/viewer")
 
 
+@pytest.hookimpl(tryfirst=True)  # before pytest-xdist reads the groups
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Marks all tests by their folder, and assigns those that share fixtures to one process."""
     for item in items:
