@@ -243,13 +243,26 @@ class Contents:
         def checked() -> R:
             self._check_open()
             self.change_count += 1
-            if self._change_log is None or not is_external:
-                return action()
-            with self._change_log.change(kind, arguments):
-                return action()
+            return self._logged(kind, arguments if is_external else None, action)
 
         name = arguments.get("name")
         return self.requests.change(checked, kind if name is None else f'{kind} "{name}"')
+
+    def _logged(
+        self, kind: str, arguments: Mapping[str, object] | None, action: Callable[[], R]
+    ) -> R:
+        """Carries out a change, which is added to a recording if there is one.
+
+        Args:
+            kind: Name of the method.
+            arguments: Arguments of the method; None if a hook repeats the change in a replay.
+            action: The change.
+        """
+        log = self._change_log
+        if log is None:
+            return action()
+        with log.repeated() if arguments is None else log.change(kind, arguments):
+            return action()
 
     # -- requests --------------------------------------------------------------------------
 
@@ -352,7 +365,8 @@ class Contents:
                 cannot be copied; see *Snapshots* in `docs/write_a_plugin.md`.
         """
         self.requests.refuse_in_plugin("snapshot")
-        return self._read(self._states.take)
+        number = {"number": self._states.taken}
+        return self._read(lambda: self._logged("snapshot", number, self._states.take))
 
     def restore(self, snapshot: WorldSnapshot) -> None:
         """Returns to an earlier state: the same steps have the same results, bit by bit.
@@ -369,7 +383,8 @@ class Contents:
                 world, or a plugin of a deleted model had a connection that has ended.
         """
         self.requests.refuse_in_plugin("restore")
-        self._read(lambda: self._states.restore(snapshot))
+        number = {"number": snapshot.number}
+        self._read(lambda: self._logged("restore", number, lambda: self._states.restore(snapshot)))
 
     def clone(self) -> World:
         """Returns an independent copy of the world in its current state.
