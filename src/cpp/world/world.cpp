@@ -61,6 +61,7 @@ World::~World() = default;
 void World::close() {
   if (closed()) return;
   check_changeable();
+  threads_.stop();
   rays_.clear();
   bodies_.clear();
   fixtures_.clear();

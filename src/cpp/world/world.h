@@ -19,6 +19,7 @@
 #include <thread>
 #include <vector>
 
+#include "parallel/thread_pool.h"
 #include "rays/ray_scene.h"
 #include "world/contacts.h"
 #include "world/slot_map.h"
@@ -90,6 +91,9 @@ class World final : private b2DestructionListener {
   ContactRecorder& contacts() { return contacts_; }
   const ContactRecorder& contacts() const { return contacts_; }
   RayScene& rays() { return rays_; }
+  // Workers for calls on this world, or on several worlds of which this is the first. They may be
+  // used while the world is in shared or exclusive use by the calling thread.
+  ThreadPool& threads() { return threads_; }
 
   static constexpr const char* kStepping = "is stepping";
 
@@ -137,6 +141,7 @@ class World final : private b2DestructionListener {
   SlotMap<JointRecord, IdKind::kJoint> joints_;
   ContactRecorder contacts_;
   RayScene rays_;
+  ThreadPool threads_;
   double last_step_time_ = 1.0;  // the first step may be long
   std::vector<Id> invalid_;      // bodies that the last step left so
 
