@@ -12,6 +12,7 @@ from flatland.physics.body import PhysicsBody
 from flatland.physics.contact import ContactEvent, ContactInfo, to_events, to_infos
 from flatland.physics.fixture import PhysicsFixture
 from flatland.physics.joint import PhysicsJoint
+from flatland.physics.plan import StepPlan
 from flatland.physics.queries import PhysicsQueries
 
 PreSolveHook = Callable[[_core.PreSolveContact, _core.OldManifold], object]
@@ -61,13 +62,15 @@ class PhysicsWorld(PhysicsQueries):
             that it raises.
         pre_solve_bodies: Ids of the bodies whose contacts are passed to `pre_solve`. Contacts of
             other bodies cause no overhead.
+        plan: What the steps of a `flatland.World` do besides the physics; `step` ignores it.
     """
 
-    __slots__ = ("_pre_solve_errors", "pre_solve", "pre_solve_bodies")
+    __slots__ = ("_pre_solve_errors", "plan", "pre_solve", "pre_solve_bodies")
 
     def __init__(self) -> None:
         """Creates an empty world."""
         self._core = _core.World()
+        self.plan = StepPlan(self._core)
         self.pre_solve: PreSolveHook | None = None
         self.pre_solve_bodies: set[int] = set()
         self._pre_solve_errors: list[BaseException] = []

@@ -31,15 +31,22 @@ class PortObserver(Protocol):
 class PortRegistry:
     """All open ports of a world by resolved topic."""
 
-    def __init__(self, observer: PortObserver, on_fault: SubscriberFault | None = None) -> None:
+    def __init__(
+        self,
+        observer: PortObserver,
+        on_fault: SubscriberFault | None = None,
+        on_wanted: Callable[[], None] | None = None,
+    ) -> None:
         """Creates an empty registry.
 
         Args:
             observer: Notified when ports open and close.
             on_fault: Called with the exceptions of subscribers of outputs, see `Output`.
+            on_wanted: Called from any thread when an output may be wanted or not any more.
         """
         self._observer = observer
         self._on_fault = on_fault
+        self._on_wanted = on_wanted
         self._outputs: dict[str, Output[Any]] = {}
         self._commands: dict[str, list[Command[Any]]] = {}
 
@@ -73,7 +80,7 @@ class PortRegistry:
             _check_type(output, output.owners[0], value_type)
             output.owners.append(owner)
             return output
-        output = Output(name, value_type, owner, self._on_fault)
+        output = Output(name, value_type, owner, self._on_fault, self._on_wanted)
         self._observer.output_opened(output)
         self._outputs[output.topic] = output
         return output

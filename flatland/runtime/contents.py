@@ -33,6 +33,7 @@ if TYPE_CHECKING:
     from flatland.runtime.placement import Placement
     from flatland.runtime.plugin_host import PluginHost
     from flatland.runtime.requests import Requests
+    from flatland.runtime.stepping import Stepping
     from flatland.runtime.transforms import FramePair, TransformBuffer
     from flatland.timekeeper import Timekeeper
     from flatland.values import Transform
@@ -77,13 +78,13 @@ class Contents:
     change_count: int
     inputs: Inputs
 
-    _change_log: ChangeLog | None
     _contacts: ContactReporter
     _files: Source
     _models: ModelSet
     _observers: Observers
     _paused: bool
     _placement: Placement
+    _stepping: Stepping
 
     @property
     def models(self) -> list[Model]:
@@ -121,7 +122,7 @@ class Contents:
 
     def log_changes(self, log: ChangeLog | None) -> None:
         """Notifies a log of all further changes and steps, instead of the previous one."""
-        self._change_log = log
+        self._stepping.change_log = log
 
     def resolve_path(self, path: str) -> str:
         """Returns the absolute path of a model or map file.
@@ -234,9 +235,10 @@ class Contents:
         def checked() -> R:
             self._check_open()
             self.change_count += 1
-            if self._change_log is None or not is_external:
+            log = self._stepping.change_log
+            if log is None or not is_external:
                 return action()
-            with self._change_log.change(kind, arguments):
+            with log.change(kind, arguments):
                 return action()
 
         return self.requests.change(checked, f'{kind} "{arguments["name"]}"')
@@ -262,6 +264,7 @@ class Contents:
     def pause(self) -> None:
         """Pauses the world from the next step on."""
         self._paused = True
+        self.physics.plan.interrupt()
 
     def resume(self) -> None:
         """Resumes a paused world."""
@@ -270,6 +273,7 @@ class Contents:
     def toggle_pause(self) -> None:
         """Pauses a running world, resumes a paused one."""
         self._paused = not self._paused
+        self.physics.plan.interrupt()
 
     # -- observers -------------------------------------------------------------------------
 
@@ -313,6 +317,7 @@ class Contents:
     @property
     def transforms(self) -> dict[FramePair, Transform]:
         """The latest transform of each (parent, child)."""
+        self.plugin_host.schedule.settle()
         return self.transform_buffer.latest
 
     @property
@@ -335,9 +340,14 @@ class Contents:
         Raises:
             WorldError: The world is closed, or the state of a plugin cannot be hashed.
         """
-        return self._read(
-            lambda: state_hash(self.seed, self.timekeeper, self.physics, self.models, self.plugins)
-        )
+
+        def read() -> str:
+            self.plugin_host.schedule.settle()
+            return state_hash(
+                self.seed, self.timekeeper, self.physics, self.models, self.plugins
+            )
+
+        return self._read(read)
 
     # -- free places -----------------------------------------------------------------------
 

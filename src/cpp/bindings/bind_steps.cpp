@@ -52,12 +52,6 @@ Id add_controller(World& world, Id body, Motion motion) {
   return world.plan().add_controller(controller);
 }
 
-Triple to_triple(const PyTriple& triple, const char* what) {
-  const auto& [x, y, z] = triple;
-  for (const double number : {x, y, z}) checked_finite(number, what);
-  return {x, y, z};
-}
-
 PyTriple to_python(const Triple& t) { return {t[0], t[1], t[2]}; }
 
 void bind_controllers(WorldClass& world) {
@@ -78,14 +72,15 @@ void bind_controllers(WorldClass& world) {
   });
   world.def("set_twist_target", [](World& self, Id id, double forward, double sideways,
                                    double omega) {
-    motion_of<TwistMotion>(self, id).target = to_triple({forward, sideways, omega}, "target");
+    // A velocity that is out of range is refused when it is applied to the body.
+    motion_of<TwistMotion>(self, id).target = {forward, sideways, omega};
   });
   world.def("twist_velocity", [](World& self, Id id) {
     return to_python(motion_of<TwistMotion>(self, id).velocity);
   });
   world.def("set_twist_velocity", [](World& self, Id id, double forward, double sideways,
                                      double omega) {
-    motion_of<TwistMotion>(self, id).velocity = to_triple({forward, sideways, omega}, "velocity");
+    motion_of<TwistMotion>(self, id).velocity = {forward, sideways, omega};
   });
   world.def("has_controller", [](World& self, Id id) {
     return self.plan().find_controller(id) != nullptr;
@@ -122,9 +117,11 @@ std::uint32_t add_clock(World& world, bool is_after, const std::string& kind,
     checked = RateClock::Kind::kAlways;
   } else if (kind == "at_start") {
     checked = RateClock::Kind::kAtStart;
+  } else if (kind == "never") {
+    checked = RateClock::Kind::kNever;
   } else if (kind != "periodic" || half_step == 0 || cycle >> 63U != 0 || half_step >= cycle / 2) {
-    throw py::value_error("a clock must be always, at_start, or periodic with a step of less than "
-                          "its cycle below 2^63");
+    throw py::value_error("a clock must be always, at_start, never, or periodic with a step of less "
+                          "than its cycle, which must be below 2^63");
   }
   return world.plan().add_clock(phase_of(is_after), RateClock(checked, half_step, cycle));
 }
