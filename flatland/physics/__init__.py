@@ -19,6 +19,7 @@ from flatland.physics.fixture import PhysicsFixture
 from flatland.physics.joint import PhysicsJoint
 from flatland.physics.plan import END_OF_ORDER, RunEnd, StepPlan
 from flatland.physics.queries import RayHit
+from flatland.physics.touches import Touch, Touches
 from flatland.physics.world import PhysicsWorld, StepReport
 
 __all__ = [
@@ -38,5 +39,7 @@ __all__ = [
     "RunEnd",
     "StepPlan",
     "StepReport",
+    "Touch",
+    "Touches",
     "VelocityController",
 ]

@@ -73,18 +73,21 @@ class StepPlan:
         """Sets whether code is to be called in steps in which a clock is due."""
         self._core.set_clock_calls(clock, has_calls)
 
-    def add_record(self, clock: int, order: int, body_id: int | None) -> int:
+    def add_record(
+        self, clock: int, order: int, body_id: int | None, touches_id: int | None
+    ) -> int:
         """Adds a record of the updates that were due without a call; disabled at first.
 
         Args:
             clock: Clock of the updates.
             order: Place of the plugin in the order of hooks.
             body_id: Body whose pose is recorded at each update.
+            touches_id: Collector of contacts that is cleared at each update.
 
         Returns:
             The id of the record.
         """
-        return self._core.add_record(clock, order, body_id)
+        return self._core.add_record(clock, order, body_id, touches_id)
 
     def enable_record(self, record: int, is_enabled: bool) -> None:
         """Sets whether updates are recorded."""

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from flatland.entities.body import Body
     from flatland.entities.model import Model
     from flatland.geometry import Pose
-    from flatland.physics import Controller, OldManifold
+    from flatland.physics import Controller, OldManifold, Touches
     from flatland.plugin_api.update_timer import UpdateTimer
     from flatland.timekeeper import Timekeeper
     from flatland.world import World
@@ -170,6 +170,8 @@ class FlatlandPlugin:
         transforms: bool = False,
         body: Body | None = None,
         skipped: SkippedHandler | None = None,
+        touches: Touches | None = None,
+        calls_at_touches: bool = False,
     ) -> None:
         """Restricts the calls of a hook to steps in which an update is due; for `on_initialize`.
 
@@ -191,6 +193,9 @@ class FlatlandPlugin:
                 last one [ns], and the pose of `body` at that time, None without a body. It is
                 called before the next call of the hook and before the state of the plugin or the
                 transforms are read, and must not emit anything.
+            touches: Contacts that `clear` is called for at updates without a call of the hook.
+            calls_at_touches: Whether to call the hook also after steps in which there are contacts
+                in `touches`; for `after_physics_step`.
 
         Raises:
             ValueError: The hook is unknown.
@@ -198,7 +203,13 @@ class FlatlandPlugin:
         if hook not in ("before_physics_step", "after_physics_step"):
             raise ValueError(f"hook must be before_physics_step or after_physics_step, got {hook}")
         self._schedules[hook] = HookSchedule(
-            timer, None if outputs is None else tuple(outputs), transforms, body, skipped
+            timer,
+            None if outputs is None else tuple(outputs),
+            transforms,
+            body,
+            skipped,
+            touches,
+            calls_at_touches,
         )
         self.world.plugin_host.schedule.change()
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Final, TypeVar
 if TYPE_CHECKING:
     from flatland.entities.body import Body
     from flatland.geometry import Pose
+    from flatland.physics import Touches
     from flatland.plugin_api.ports import Output
     from flatland.plugin_api.update_timer import UpdateTimer
     from flatland.timekeeper import Timekeeper
@@ -31,6 +32,9 @@ class HookSchedule:
         transforms: Whether the hook sends transforms.
         body: Body whose pose `skipped` needs.
         skipped: Makes up for updates without a call.
+        touches: Contacts that are to be cleared at updates without a call, and after whose steps
+            the hook is called if `calls_at_touches` is set.
+        calls_at_touches: Whether to call the hook also in steps with contacts.
     """
 
     timer: UpdateTimer
@@ -38,6 +42,8 @@ class HookSchedule:
     transforms: bool
     body: Body | None
     skipped: SkippedHandler | None
+    touches: Touches | None
+    calls_at_touches: bool
 
 
 def when_due(hook: H) -> H:

@@ -186,6 +186,10 @@ class HookTable:
         """Returns whether any plugin overrides one of some contact hooks."""
         return any(self._contact_hooks[hook] for hook in hooks)
 
+    def concern_all(self, hook: str) -> bool:
+        """Returns whether a contact hook of a plugin receives the contacts of all models."""
+        return self._contact_hooks[hook].concern_all
+
     def bodies_concerned(self, hook: str, bodies: Iterable[Body]) -> Iterator[Body]:
         """Returns those of some bodies whose contacts concern a plugin with a contact hook."""
         table = self._contact_hooks[hook]
@@ -215,6 +219,10 @@ class _ContactHooks:
             hooks = self._by_entity.get(plugin.model)
             if hooks is not None and hooks.pop(plugin, None) is not None and not hooks:
                 del self._by_entity[plugin.model]
+
+    @property
+    def concern_all(self) -> bool:
+        return bool(self._of_all)
 
     def concerns(self, entity: Entity) -> bool:
         return bool(self._of_all) or entity in self._by_entity

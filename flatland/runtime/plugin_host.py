@@ -232,6 +232,26 @@ class PluginHost:
         """Whether any plugin overrides `pre_solve`."""
         return self.hooks.has_any("pre_solve")
 
+    def contact_kinds(self, bodies: Iterable[Body]) -> tuple[dict[int, int], int]:
+        """Returns the contact events that concern hooks.
+
+        Args:
+            bodies: The bodies of all models and layers.
+
+        Returns:
+            The kinds of events by the id of the body, and those of all bodies, as in
+            `PhysicsWorld.record_contacts_of`.
+        """
+        kinds: dict[int, int] = {}
+        kinds_of_all = 0
+        for number, hook in enumerate(CONTACT_HOOKS):
+            if self.hooks.concern_all(hook):
+                kinds_of_all |= 1 << number
+            elif self.hooks.has_any(hook):
+                for body in self.hooks.bodies_concerned(hook, bodies):
+                    kinds[body.id] = kinds.get(body.id, 0) | 1 << number
+        return kinds, kinds_of_all
+
     def pre_solve_bodies(self, bodies: Mapping[int, Body]) -> set[int]:
         """Returns the physics ids of the bodies whose contacts concern a `pre_solve` hook."""
         concerned = self.hooks.bodies_concerned("pre_solve", bodies.values())

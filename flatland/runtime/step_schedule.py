@@ -101,7 +101,8 @@ class StepSchedule:
         found = ScheduledHook(plugin, hook, order, clock)
         if asked.skipped is not None:
             body_id = None if asked.body is None else asked.body.id
-            found.record = self._plan.add_record(clock, order, body_id)
+            touches_id = None if asked.touches is None else asked.touches.id
+            found.record = self._plan.add_record(clock, order, body_id, touches_id)
             self._records[found.record] = found
         phase = self._phases[hook]
         phase.hooks[plugin] = found
