@@ -135,6 +135,19 @@ class _Set(MutableKind):
         return made
 
 
+class _View(MutableKind):
+    """A view of a dictionary; its copy is one of a new dictionary."""
+
+    def record(self, obj: Any, recorder: Recorder) -> None:
+        recorder.follow(list(obj.mapping))
+        recorder.follow(list(obj.mapping.values()))
+
+    def copy(self, obj: Any, copier: Copier) -> Any:
+        whole = copier.copy(dict(obj.mapping))
+        methods = {type({}.keys()): dict.keys, type({}.values()): dict.values}
+        return copier.add(obj, methods.get(type(obj), dict.items)(whole))
+
+
 class _Array(MutableKind):
     """An array of numpy or of the module `array`, or a `bytearray`; a read-only array is shared."""
 
@@ -184,6 +197,9 @@ CONTAINERS: Final[tuple[tuple[type[Any], Kind], ...]] = (
     (collections.deque, _List()),
     (set, _Set()),
     (dict, _Dict()),
+    (type({}.keys()), _View()),
+    (type({}.values()), _View()),
+    (type({}.items()), _View()),
     (collections.OrderedDict, _Dict()),
     (collections.defaultdict, _Dict()),
     (collections.Counter, _Dict()),
