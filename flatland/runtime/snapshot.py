@@ -145,6 +145,7 @@ class WorldStates:
         ports, time_ns = _Ports(world), world.timekeeper.sim_time_ns
         world.physics.become_copy_of(snapshot._physics)
         snapshot._record.write_back()
+        world.plugin_host.schedule.change()  # Other outputs may be wanted than at that time.
         if world.timekeeper.sim_time_ns != time_ns:
             world._observers.time_advanced(world.timekeeper.sim_time_ns)
         self._notify(ports, snapshot, revived)
@@ -241,7 +242,8 @@ class WorldStates:
             copier.finish()
         except UncopyableError as error:
             raise self._located(error) from None
-        clone._change_log = None
+        clone.requests.on_post = clone.physics.plan.interrupt
+        clone.plugin_host.schedule.change()
         clone._paused = clone._closed = False
         clone._states = WorldStates(clone, self._attributes)
         if costs is not None:
