@@ -14,7 +14,14 @@ from flatland._core import BOX2D_VERSION, OldManifold, PreSolveContact
 from flatland.geometry import Pose
 from flatland.physics.body import PhysicsBody
 from flatland.physics.contact import ContactEvent, ContactInfo
-from flatland.physics.controller import Controller, VelocityController
+from flatland.physics.controller import (
+    Controller,
+    TricycleController,
+    TweenController,
+    VelocityController,
+    ease,
+    easings,
+)
 from flatland.physics.fixture import PhysicsFixture
 from flatland.physics.joint import PhysicsJoint
 from flatland.physics.plan import END_OF_ORDER, RunEnd, RunResult, StepPlan, StepRun, run_worlds
@@ -43,7 +50,11 @@ __all__ = [
     "StepRun",
     "Touch",
     "Touches",
+    "TricycleController",
+    "TweenController",
     "VelocityController",
+    "ease",
+    "easings",
     "run_worlds",
     "to_report",
 ]

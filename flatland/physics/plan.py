@@ -187,6 +187,10 @@ class StepPlan:
         """
         return self._core.carry_out(is_after, until, dt)
 
+    def has_touches(self) -> bool:
+        """Returns whether there are contacts after which runs of steps end."""
+        return self._core.has_ending_touches()
+
     def take_failed(self) -> list[int]:
         """Returns the ids of the controllers that have failed since the last call."""
         return self._core.take_failed_controllers()

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 
     from flatland.config.inputs import Inputs
     from flatland.config.node import Source
+    from flatland.entities.body import Body
     from flatland.entities.contact import Contact
     from flatland.entities.layer import Layer
     from flatland.entities.model import Model
@@ -325,6 +326,17 @@ class Contents:
     def contacts(self) -> list[Contact]:
         """All pairs of fixtures that touch now."""
         return self._contacts.touching
+
+    def body_of_id(self, body_id: int) -> Body:
+        """Returns the body of a model or a layer by its id, as in `flatland.physics.Touch`.
+
+        Raises:
+            WorldError: No model or layer has it.
+        """
+        body = self._contacts.find_body(self.physics.body(body_id))
+        if body is None:
+            raise WorldError(f"no model or layer has the body {body_id}")
+        return body
 
     # -- state -----------------------------------------------------------------------------
 

@@ -252,6 +252,7 @@ class Stepping:
         self._contacts.dispatch()
         timekeeper.advance()
         self._observers.time_advanced(timekeeper.sim_time_ns)
+        due = self._host.schedule.with_contacts(due)
         self._host.call_step_hooks("after_physics_step", due, timekeeper)
         if self._plan.is_used:
             self._plan.carry_out(True, END_OF_ORDER, timekeeper.step_size)

@@ -89,7 +89,7 @@ class StepPlan {
   void clear();
 
  private:
-  enum class Kind : std::uint8_t { kAdvance, kRecord };
+  enum class Kind : std::uint8_t { kAdvance, kHold, kRecord };
   struct Action {
     std::int64_t order;
     Kind kind;
@@ -98,6 +98,7 @@ class StepPlan {
 
   void sort();
   void carry_out_one(World& world, const Action& action, double dt);
+  void make_record(World& world, Record& record);
 
   std::vector<RateClock> clocks_;
   std::uint64_t after_clocks_ = 0;  // the clocks of the phase kAfter, as bits
