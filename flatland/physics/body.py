@@ -8,7 +8,13 @@ from typing import TYPE_CHECKING
 import numpy.typing as npt
 
 from flatland.geometry import FloatArray, Pose, Vector2
-from flatland.physics.controller import NO_LIMITS, SpeedLimits, VelocityController
+from flatland.physics.controller import (
+    NO_LIMITS,
+    SpeedLimits,
+    TricycleController,
+    TweenController,
+    VelocityController,
+)
 from flatland.physics.fixture import ALL_BITS
 from flatland.physics.handle import Handle
 
@@ -121,6 +127,56 @@ class PhysicsBody(Handle):
         controller.schedule(0, automatic=True)
         self.world.plan.is_used = True
         return controller
+
+    def control_tricycle(
+        self,
+        front_joint: PhysicsJoint,
+        *,
+        steering_sign: float,
+        wheelbase: float,
+        rear_center: Vector2,
+        takes_twist: bool,
+    ) -> TricycleController:
+        """Creates a controller of a tricycle, which is not carried out automatically yet.
+
+        Args:
+            front_joint: Revolute joint of the steered wheel at the origin of the body; its limits
+                are set to the steering angle.
+            steering_sign: Sign of the angle of the joint if the wheel is steered to the left.
+            wheelbase: Distance from the rear center to the front wheel [m].
+            rear_center: Midpoint of the rear wheels in the frame of the body [m].
+            takes_twist: Whether commands are velocities of the rear center and yaw rates.
+
+        Raises:
+            ValueError: The wheelbase is not positive.
+            StaleHandleError: The body or the joint was destroyed.
+            WorldLockedError: The world is stepping.
+        """
+        self.world.plan.is_used = True
+        controller = self._core.add_tricycle_controller(
+            self.id, front_joint.id, steering_sign, wheelbase, rear_center, takes_twist
+        )
+        return TricycleController(self.world, controller)
+
+    def control_tween(
+        self, delta: Pose, *, duration: float, mode: str, easing: str
+    ) -> TweenController:
+        """Creates a controller of a prescribed motion, which is not carried out automatically yet.
+
+        Args:
+            delta: Offset of the other end from the current pose [m, rad].
+            duration: Duration of the motion to the other end [s].
+            mode: `yoyo`, `loop`, `once` or `trigger`.
+            easing: Name of the easing curve.
+
+        Raises:
+            ValueError: An argument is invalid.
+            StaleHandleError: The body was destroyed.
+            WorldLockedError: The world is stepping.
+        """
+        self.world.plan.is_used = True
+        controller = self._core.add_tween_controller(self.id, delta, duration, mode, easing)
+        return TweenController(self.world, controller)
 
     def apply_force(self, force: Sequence[float], point: Sequence[float]) -> None:
         """Applies a force to a dynamic body during the next step and wakes the body.

@@ -67,6 +67,7 @@ class FlatlandPlugin:
     _sent: set[tuple[str, str]]
     _schedules: dict[str, HookSchedule]
     _controllers: list[Controller]
+    _touch_collectors: list[Touches]
     _detached: bool
     _label: str
 
@@ -93,6 +94,7 @@ class FlatlandPlugin:
         self._sent = set()
         self._schedules = {}
         self._controllers = []
+        self._touch_collectors = []
         self._detached = False
         self._label = describe(self)
 
@@ -105,6 +107,9 @@ class FlatlandPlugin:
             self.world.ports.close_command(command)
         self._outputs.clear()
         self._commands.clear()
+        for touches in self._touch_collectors:
+            if touches.alive:
+                touches.remove()
         self.world.transform_buffer.forget(self, self._sent)
         self._sent.clear()
 
@@ -224,6 +229,24 @@ class FlatlandPlugin:
         controller.schedule(0, automatic=False)
         self._controllers.append(controller)
         return controller
+
+    def collect_touches(
+        self,
+        bodies: Iterable[Body],
+        *,
+        exclude: Iterable[Body] = (),
+        sensors: bool = True,
+    ) -> Touches:
+        """Collects the contacts of bodies without a call at each contact; ends with the plugin.
+
+        Args:
+            bodies: The bodies.
+            exclude: Bodies whose contacts are ignored.
+            sensors: Whether to collect contacts with sensors, which have no effect on bodies.
+        """
+        touches = self.world.physics.collect_touches(bodies, exclude=exclude, sensors=sensors)
+        self._touch_collectors.append(touches)
+        return touches
 
     def set_before_step(self, function: Callable[[], None]) -> None:
         """Calls a function before the next step; safe from any thread.

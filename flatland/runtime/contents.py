@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 
     from flatland.config.inputs import Inputs
     from flatland.config.node import Source
+    from flatland.entities.body import Body
     from flatland.entities.contact import Contact
     from flatland.entities.layer import Layer
     from flatland.entities.model import Model
@@ -56,6 +57,7 @@ class Contents:
         plugin_host: Starts plugins and calls their hooks.
         ports: All outputs and commands by resolved topic.
         requests: The queue of actions that run between two steps.
+        stepping: Makes the steps.
         transform_buffer: Collects the transforms of plugins.
         read_yaml: Loads a model file; `YamlReader.from_file`, or a method that collects errors.
         change_count: Number of models that were spawned, moved or deleted since the world file was
@@ -75,6 +77,7 @@ class Contents:
     plugin_host: PluginHost
     ports: PortRegistry
     requests: Requests
+    stepping: Stepping
     seed: int
     timekeeper: Timekeeper
     transform_buffer: TransformBuffer
@@ -89,7 +92,6 @@ class Contents:
     _former_layers: dict[str, Layer]
     _placement: Placement
     _states: WorldStates
-    _stepping: Stepping
 
     @property
     def models(self) -> list[Model]:
@@ -131,7 +133,7 @@ class Contents:
 
     def log_changes(self, log: ChangeLog | None) -> None:
         """Notifies a log of all further changes and steps, instead of the previous one."""
-        self._stepping.change_log = log
+        self.stepping.change_log = log
 
     def resolve_path(self, path: str) -> str:
         """Returns the absolute path of a model or map file.
@@ -242,7 +244,7 @@ class Contents:
         is_external = not self.requests.in_hook
 
         def checked() -> R:
-            self._check_open()
+            self.check_open()
             self.change_count += 1
             return self._logged(kind, arguments if is_external else None, action)
 
@@ -259,7 +261,7 @@ class Contents:
             arguments: Arguments of the method; None if a hook repeats the change in a replay.
             action: The change.
         """
-        log = self._stepping.change_log
+        log = self.stepping.change_log
         if log is None:
             return action()
         with log.repeated() if arguments is None else log.change(kind, arguments):
@@ -346,6 +348,17 @@ class Contents:
     def contacts(self) -> list[Contact]:
         """All pairs of fixtures that touch now."""
         return self._contacts.touching
+
+    def body_of_id(self, body_id: int) -> Body:
+        """Returns the body of a model or a layer by its id, as in `flatland.physics.Touch`.
+
+        Raises:
+            WorldError: No model or layer has it.
+        """
+        body = self._contacts.find_body(self.physics.body(body_id))
+        if body is None:
+            raise WorldError(f"no model or layer has the body {body_id}")
+        return body
 
     # -- state -----------------------------------------------------------------------------
 
@@ -536,10 +549,11 @@ class Contents:
         )
 
     def _read(self, action: Callable[[], R]) -> R:
-        self._check_open()
+        self.check_open()
         return self.requests.read(action)
 
-    def _check_open(self) -> None:
+    def check_open(self) -> None:
+        """Raises `WorldError` if the world is closed."""
         raise NotImplementedError
 
 

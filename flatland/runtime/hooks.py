@@ -156,7 +156,7 @@ class HookTable:
         done = 0
         for plugin, method in self.of_step(hook):
             scheduled = None if schedule is None else schedule.find(plugin, hook)
-            if scheduled is not None and not (scheduled.is_called and due >> scheduled.clock & 1):
+            if scheduled is not None and not (scheduled.is_called and due & scheduled.bits):
                 continue
             order = self._order[plugin]
             yield StepCall(plugin, method, order if needs_work(orders, done, order) else 0)

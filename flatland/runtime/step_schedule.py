@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 
 _AFTER: Final = "after_physics_step"
 _MOST_CLOCKS: Final = 60  # of the sets of due clocks, which are integers of 64 bits
+_TOUCHING: Final = 1 << _MOST_CLOCKS  # a clock that is due in steps with contacts
 
 
 @dataclass(slots=True, eq=False)
@@ -30,6 +31,7 @@ class ScheduledHook:
         name: Name of the hook.
         order: Place of the plugin in the order of hooks.
         clock: Number of the clock of the core.
+        bits: The clocks in whose steps the hook is called, as bits.
         record: Record of the updates without a call, None if nothing is made up for.
         is_called: Whether the hook is called when an update is due.
         was_called: Whether it was called at least once, or at least is no longer to be.
@@ -39,6 +41,7 @@ class ScheduledHook:
     name: str
     order: int
     clock: int
+    bits: int
     record: int | None = None
     is_called: bool = True
     was_called: bool = False
@@ -81,6 +84,7 @@ class StepSchedule:
         self._is_stale = False
         self._new: list[ScheduledHook] = []  # not called yet
         self._transforms_wanted = False
+        self._touching = 0  # hooks that are called in steps with contacts
         self.version = 0
         self.targets: deque[Callable[[], None]] = deque()
 
@@ -98,12 +102,15 @@ class StepSchedule:
         clock = self._clock(asked.timer, hook == _AFTER)
         if clock is None:
             return None
-        found = ScheduledHook(plugin, hook, order, clock)
-        if asked.skipped is not None:
+        found = ScheduledHook(plugin, hook, order, clock, 1 << clock)
+        if asked.calls_at_touches:
+            found.bits |= _TOUCHING
+        if asked.skipped is not None or asked.touches is not None:
             body_id = None if asked.body is None else asked.body.id
             touches_id = None if asked.touches is None else asked.touches.id
             found.record = self._plan.add_record(clock, order, body_id, touches_id)
             self._records[found.record] = found
+        self._set_called(found, True)
         phase = self._phases[hook]
         phase.hooks[plugin] = found
         self._new.append(found)
@@ -112,10 +119,13 @@ class StepSchedule:
 
     def add_controllers(self, plugin: FlatlandPlugin, order: int) -> None:
         """Has the core carry out the controllers of a plugin whose hook is not always called."""
-        automatic = plugin in self._phases["before_physics_step"].hooks
+        before, after = self._phases["before_physics_step"], self._phases[_AFTER]
         for controller in getattr(plugin, "_controllers", ()):
-            controller.schedule(order, automatic=automatic)
-        self._changed(self._phases["before_physics_step"])
+            controller.schedule(
+                order, automatic=plugin in before.hooks, holds=plugin in after.hooks
+            )
+        self._changed(before)
+        self._changed(after)
 
     def _clock(self, timer: UpdateTimer, is_after: bool) -> int | None:
         kind = type(timer)
@@ -135,6 +145,8 @@ class StepSchedule:
             hook = phase.hooks.pop(plugin, None)
             if hook is None:
                 continue
+            if hook.is_called:
+                self._set_called(hook, False)
             if hook.record is not None:
                 del self._records[hook.record]
                 self._plan.remove_record(hook.record)
@@ -206,9 +218,12 @@ class StepSchedule:
 
     def _set_called(self, hook: ScheduledHook, is_called: bool) -> None:
         if hook.record is not None:
-            if is_called:
+            if is_called and not hook.is_called:
                 self.settle()
             self._plan.enable_record(hook.record, not is_called)
+        if hook.bits & _TOUCHING and hook.schedule.touches is not None:
+            hook.schedule.touches.end_runs(is_called)
+            self._touching += 1 if is_called else -1
         hook.is_called = is_called
 
     def call_all(self) -> int:
@@ -228,6 +243,10 @@ class StepSchedule:
         self.version += 1
         return (1 << _MOST_CLOCKS) - 1
 
+    def with_contacts(self, due: int) -> int:
+        """Returns the clocks that are due after a physics step, including that of contacts."""
+        return due | _TOUCHING if self._touching and self._plan.has_touches() else due
+
     def calls_made(self, due: int) -> None:
         """Takes over that all hooks of a step were called.
 
@@ -238,7 +257,7 @@ class StepSchedule:
             return
         waiting = []
         for hook in self._new:
-            if due >> hook.clock & 1:
+            if due & hook.bits:
                 hook.was_called = True
                 self._is_stale = True
             else:

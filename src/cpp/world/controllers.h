@@ -8,6 +8,7 @@
 #include <cstdint>
 #include <variant>
 
+#include "world/easing.h"
 #include "world/slot_map.h"
 #include "world/triple.h"
 
@@ -36,13 +37,48 @@ struct TwistMotion {
   Triple velocity{};  // within the limits
 };
 
-using Motion = std::variant<TwistMotion>;
+// A body with a steered and driven front wheel and two passive rear wheels.
+struct TricycleMotion {
+  SpeedLimits linear, angular;  // of the front wheel, and of its steering angle
+  double max_angle = 0.0;       // of the steering [rad], 0 for no limit
+  bool takes_twist = false;     // otherwise, the target is (front speed, 0, steering angle)
+  Id joint = 0;                 // of the front wheel
+  double steering_sign = 1.0;   // of the angle of the joint if the wheel is steered to the left
+  double wheelbase = 1.0;       // from the rear center to the front wheel [m]
+  double rear_center[2] = {};   // midpoint of the rear wheels in the frame of the body [m]
+  Triple target{};
+  double angle = 0.0;           // of the front wheel, counter-clockwise [rad]
+  double angle_velocity = 0.0;  // its rate of change [rad/s]
+  double speed = 0.0;           // of the front wheel along its heading [m/s]
+  double target_angle = 0.0;    // that the last twist required
+  bool is_displayed = false;    // whether the joint has `displayed_angle`
+  double displayed_angle = 0.0;
+};
+
+// A prescribed motion between two poses.
+struct TweenMotion {
+  enum class Mode : std::uint8_t { kYoyo, kLoop, kOnce, kTrigger };
+
+  Mode mode = Mode::kYoyo;
+  Easing easing;
+  double duration = 1.0;  // [s]
+  Triple start{}, delta{};
+  bool is_dynamic = false;    // whether the body is
+  bool is_triggered = false;  // in mode kTrigger
+  float progress = 0.0F;
+  double exact_progress = 0.0;
+  bool is_forward = true;
+  Triple pose{};  // of the body
+};
+
+using Motion = std::variant<TwistMotion, TricycleMotion, TweenMotion>;
 
 // A motion of a body, carried out once in each step, in the order of `order` and `place`.
 struct Controller {
   Id body = 0;
-  std::int64_t order = 0;  // of the plugin
-  bool is_automatic = false;  // otherwise, it is carried out only by `advance`
+  std::int64_t order = 0;       // of the plugin
+  bool is_automatic = false;    // otherwise, it is carried out only by `advance_now`
+  bool holds = false;           // whether `hold` is carried out after each step
   std::uint64_t last_step = 0;  // number of the step in which it was carried out last
   Motion motion;
 };
@@ -50,5 +86,9 @@ struct Controller {
 // Advances the motion by dt seconds and sets the velocity of the body. Throws std::invalid_argument
 // if the velocity is out of range; the motion has advanced all the same.
 void advance(World& world, b2Body* body, Motion& motion, double dt);
+// Reverts the effect of the physics step on a body whose motion is prescribed. Throws as `advance`.
+void hold(World& world, b2Body* body, const Motion& motion);
+// Whether `hold` has an effect.
+bool has_hold(const Motion& motion);
 
 }  // namespace flatland

@@ -86,8 +86,8 @@ void StepPlan::begin(std::int64_t k) {
 void StepPlan::sort() {
   for (auto& actions : actions_) actions.clear();
   controllers_.for_each([&](Id id, const Controller& controller) {
-    if (!controller.is_automatic) return;
-    actions_[0].push_back({controller.order, Kind::kAdvance, id});
+    if (controller.is_automatic) actions_[0].push_back({controller.order, Kind::kAdvance, id});
+    if (controller.holds) actions_[1].push_back({controller.order, Kind::kHold, id});
   });
   records_.for_each([&](Id id, const Record& record) {
     const std::size_t phase = (after_clocks_ & bit(record.clock)) != 0 ? 1 : 0;
@@ -113,25 +113,22 @@ void StepPlan::carry_out(World& world, Phase phase, std::int64_t until, double d
 void StepPlan::carry_out_one(World& world, const Action& action, double dt) {
   if (action.kind == Kind::kRecord) {
     Record* record = records_.find(action.id);
-    if (record == nullptr || !record->is_enabled || !clocks_[record->clock].is_due()) return;
-    ++record->count;
-    record->step = (after_clocks_ & bit(record->clock)) != 0 ? step_ + 1 : step_;
-    if (record->touches != 0) {
-      TouchCollector* touches = world.contacts().touches.find(record->touches);
-      if (touches != nullptr) touches->was_touched = false;
-    }
-    if (record->body == 0) return;
-    const b2Body* body = world.find_body(record->body);
-    if (body != nullptr) record->pose = pose_of(*body);
+    if (record != nullptr) make_record(world, *record);
     return;
   }
   Controller* controller = controllers_.find(action.id);
-  if (controller == nullptr || !controller->is_automatic || controller->last_step == number_) {
+  b2Body* body = controller == nullptr ? nullptr : world.find_body(controller->body);
+  if (body == nullptr) return;
+  if (action.kind == Kind::kHold) {
+    try {
+      if (controller->holds) hold(world, body, controller->motion);
+    } catch (const std::invalid_argument&) {
+      failed_.push_back(action.id);
+    }
     return;
   }
+  if (!controller->is_automatic || controller->last_step == number_) return;
   controller->last_step = number_;
-  b2Body* body = world.find_body(controller->body);
-  if (body == nullptr) return;
   const Motion before = controller->motion;
   try {
     advance(world, body, controller->motion, dt);
@@ -139,6 +136,18 @@ void StepPlan::carry_out_one(World& world, const Action& action, double dt) {
     controller->motion = before;
     failed_.push_back(action.id);
   }
+}
+
+void StepPlan::make_record(World& world, Record& record) {
+  if (!record.is_enabled || !clocks_[record.clock].is_due()) return;
+  ++record.count;
+  record.step = (after_clocks_ & bit(record.clock)) != 0 ? step_ + 1 : step_;
+  if (record.touches != 0) {
+    TouchCollector* touches = world.contacts().touches.find(record.touches);
+    if (touches != nullptr) touches->was_touched = false;
+  }
+  const b2Body* body = record.body == 0 ? nullptr : world.find_body(record.body);
+  if (body != nullptr) record.pose = pose_of(*body);
 }
 
 std::vector<Id> StepPlan::take_failed() { return std::exchange(failed_, {}); }

@@ -47,9 +47,7 @@ class StepPlan {
   static constexpr std::size_t kMostClocks = 62;
   static constexpr std::int64_t kEnd = INT64_MAX;  // after all plugins
 
-  bool empty() const {
-    return clocks_.empty() && controllers_.size() == 0 && records_.size() == 0;
-  }
+  bool empty() const { return clocks_.empty() && controllers_.size() == 0 && records_.size() == 0; }
 
   // Throws std::invalid_argument if there are kMostClocks clocks already.
   std::uint32_t add_clock(Phase phase, const RateClock& clock);
@@ -95,7 +93,7 @@ class StepPlan {
   void exclude_ids_of(const StepPlan& other);
 
  private:
-  enum class Kind : std::uint8_t { kAdvance, kRecord };
+  enum class Kind : std::uint8_t { kAdvance, kHold, kRecord };
   struct Action {
     std::int64_t order;
     Kind kind;
@@ -104,6 +102,7 @@ class StepPlan {
 
   void sort();
   void carry_out_one(World& world, const Action& action, double dt);
+  void make_record(World& world, Record& record);
 
   std::vector<RateClock> clocks_;
   std::uint64_t after_clocks_ = 0;  // the clocks of the phase kAfter, as bits

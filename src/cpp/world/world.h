@@ -126,10 +126,14 @@ class World final : private b2DestructionListener {
   const ContactRecorder& contacts() const { return contacts_; }
   RayScene& rays() { return rays_; }
   StepPlan& plan() { return plan_; }
-  // Null if the body was destroyed; for the steps of a plan.
+  // Null if the object was destroyed; for the steps of a plan.
   b2Body* find_body(Id id) {
     b2Body* const* body = bodies_.find(id);
     return body == nullptr ? nullptr : *body;
+  }
+  b2Joint* find_joint(Id id) {
+    const JointRecord* joint = joints_.find(id);
+    return joint == nullptr ? nullptr : joint->joint;
   }
   // Workers for calls on this world, or on several worlds of which this is the first. They may be
   // used while the world is in shared or exclusive use by the calling thread.
