@@ -29,6 +29,7 @@ MODULES = (
     "large_map",
     "markers",
     "placement",
+    "copies",
 )
 
 
