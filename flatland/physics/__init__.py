@@ -17,6 +17,7 @@ from flatland.physics.contact import ContactEvent, ContactInfo
 from flatland.physics.fixture import PhysicsFixture
 from flatland.physics.joint import PhysicsJoint
 from flatland.physics.queries import RayHit
+from flatland.physics.range_finder import RangeFinder, RangeNoise, Scan, ScanRequest, scan_all
 from flatland.physics.world import PhysicsWorld, StepReport
 
 __all__ = [
@@ -30,6 +31,11 @@ __all__ = [
     "PhysicsWorld",
     "Pose",
     "PreSolveContact",
+    "RangeFinder",
+    "RangeNoise",
     "RayHit",
+    "Scan",
+    "ScanRequest",
     "StepReport",
+    "scan_all",
 ]
