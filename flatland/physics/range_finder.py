@@ -62,7 +62,8 @@ class RangeFinder:
             origin: Pose (x, y, theta) of the sensor in the frame of its body [m, rad].
             mask: Categories that stop a beam; see `PhysicsWorld.cast_rays`.
             reflect_mask: Categories that reflect a beam; 0 if intensities are not needed.
-            range_min: Shortest range that is reported [m]; a shorter one is -inf.
+            range_min: Shortest range that is reported [m]; a shorter one is -inf. With 0, noise
+                can make ranges negative.
             no_hit: Range that is reported for a beam without a hit [m].
             noise: Noise model; None for exact ranges.
 

@@ -8,7 +8,8 @@ struct Limits {
   Floats shortest, no_hit;
 
   explicit FLATLAND_INLINE Limits(const RangeLimits& limits)
-      : shortest(Lanes::broadcast(limits.range_min)), no_hit(Lanes::broadcast(limits.no_hit)) {}
+      : shortest(Lanes::broadcast(limits.range_min > 0.0F ? limits.range_min : -kInfinity)),
+        no_hit(Lanes::broadcast(limits.no_hit)) {}
 
   FLATLAND_INLINE Floats apply(Floats range) const {
     const Floats low = Lanes::broadcast(-kInfinity);

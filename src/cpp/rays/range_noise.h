@@ -13,7 +13,8 @@ struct NoiseKey {
   std::uint64_t update;
 };
 
-// What a sensor does not report: hits closer than `range_min` [m] are -inf, misses are `no_hit`.
+// What a sensor does not report: readings below `range_min` [m] are -inf, misses are `no_hit`. If
+// `range_min` is 0, readings remain as they are, even if noise makes them negative.
 struct RangeLimits {
   float range_min;
   float no_hit;
