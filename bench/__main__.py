@@ -21,6 +21,7 @@ GROWTH = "growth"  # the module that measures curves
 # Each module defines `rows(unit)`, which measures and returns its rows; `unit` is U [s].
 MODULES = (
     "scans",
+    "lasers",
     "steps",
     "jam",
     "plugin_steps",

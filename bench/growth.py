@@ -11,6 +11,7 @@ import flatland
 from flatland.physics import PhysicsWorld
 from flatland.physics.boundaries import boundary_edges
 
+import lasers  # isort: skip
 from crowd import MAX_ROBOTS, crowd  # isort: skip
 from curves import Curve, Panel
 from large_map import load, write_world
@@ -33,7 +34,8 @@ SCAN, LOOP = "flatland", "b2World::RayCast"
 
 def panels() -> list[Panel]:
     """Measures all curves."""
-    return [_beams(), _edges(), _moving(), _robots(), _touching(), _spawning(), _loading()]
+    scans = [_beams(), _edges(), _moving(), lasers.panel()]
+    return [*scans, _robots(), _touching(), _spawning(), _loading()]
 
 
 def _compare(

@@ -68,7 +68,8 @@ class RangeFinder:
             noise: Noise model; None for exact ranges.
 
         Raises:
-            ValueError: An array has a wrong shape, or a number is not finite or out of range.
+            ValueError: An array has a wrong shape, a number is not finite or out of range, or
+                `length` is above the maximum range of the noise model.
         """
         self._core = _core.RangeFinder(
             ends=ends,

@@ -16,7 +16,16 @@ from typing import Any, Final
 import numpy as np
 
 from flatland.errors import PhysicsError, StaleHandleError, WorldLockedError
-from flatland.physics import PhysicsBody, PhysicsFixture, PhysicsJoint, PhysicsWorld
+from flatland.physics import (
+    PhysicsBody,
+    PhysicsFixture,
+    PhysicsJoint,
+    PhysicsWorld,
+    RangeFinder,
+    RangeNoise,
+    ScanRequest,
+    scan_all,
+)
 from flatland.physics.boundaries import boundary_edges, boundary_loops
 from flatland.physics.handle import Handle
 
@@ -488,6 +497,51 @@ class RandomCalls:
         self._require(fractions.shape == reflects.shape == (len(ends),), "returns wrong shapes")
         inside = np.isnan(fractions) | ((fractions >= 0) & (fractions <= 1))
         self._require(bool(inside.all()), f"returns the fractions {fractions}")
+
+    def do_scan(self) -> None:
+        requests = [
+            ScanRequest(
+                self._range_finder(), body, self.rng.getrandbits(64), self.rng.getrandbits(9)
+            )
+            for body in self.some_bodies()
+        ]
+        for scan, request in zip(scan_all(requests, None, 2), requests, strict=True):
+            alone = request.finder.scan(request.body, request.stream, request.update)
+            shape = (request.finder.beams,)
+            self._require(scan.ranges.shape == shape, "returns a wrong shape")
+            same = np.array_equal(scan.ranges, alone.ranges, equal_nan=True)
+            self._require(same, "returns other ranges than a single scan")
+            if scan.intensities is not None and alone.intensities is not None:
+                known = np.isin(scan.intensities, (0.0, 255.0)).all()
+                same = np.array_equal(scan.intensities, alone.intensities)
+                self._require(bool(known) and same, "returns wrong intensities")
+
+    def _range_finder(self) -> RangeFinder:
+        noises: list[Callable[[], RangeNoise | None]] = [
+            lambda: None,
+            lambda: RangeNoise.additive(self.positive()),
+            lambda: RangeNoise.proportional(self.positive()),
+            lambda: RangeNoise.beam(
+                z_hit=self.positive(1.0),
+                z_short=self.positive(1.0),
+                z_max=self.positive(1.0),
+                z_rand=self.positive(1.0),
+                sigma_hit=self.positive(1.0),
+                lambda_short=self.positive(),
+                max_range=self.positive(20.0),
+            ),
+        ]
+        noise = self.rng.choice(noises)
+        return RangeFinder(
+            self.array(40, 2),
+            self.positive(9.0),
+            origin=self.triple(),
+            mask=self.bits(),
+            reflect_mask=self.bits() if self.rng.random() < 0.5 else 0,
+            range_min=self.positive(1.0),
+            no_hit=self.rng.choice(EXTREME),
+            noise=noise(),
+        )
 
     def do_overlaps(self) -> None:
         least_gap = self.rng.choice([0.0, self.number(-0.1, 0.1)])

@@ -1,6 +1,7 @@
 #include <pybind11/numpy.h>
 #include <pybind11/stl.h>
 
+#include <cmath>
 #include <memory>
 #include <optional>
 #include <string>
@@ -32,7 +33,7 @@ using PyJob = std::tuple<std::shared_ptr<World>, std::shared_ptr<RangeFinder>, I
 constexpr std::size_t kShortScans = 2000;
 
 RangeFinder make_finder(const Ends& ends, const PyPose& origin, double length, std::int64_t mask,
-                        std::int64_t reflect_mask, double range_min, float no_hit,
+                        std::int64_t reflect_mask, double range_min, double no_hit,
                         std::optional<RangeNoise> noise) {
   if (ends.ndim() != 2 || ends.shape(1) != 2) {
     throw py::value_error("ends must have shape (n, 2), got " +
@@ -42,12 +43,14 @@ RangeFinder make_finder(const Ends& ends, const PyPose& origin, double length, s
   const auto& [x, y, theta] = origin;
   checked_vector(x, y, "origin");
   checked_finite(theta, "origin angle");
-  const RangeFinder::Parameters parameters{{x, y, theta},
-                                           checked_not_negative(length, "length"),
-                                           checked_bits(mask, "mask"),
-                                           checked_bits(reflect_mask, "reflect_mask"),
-                                           {checked_not_negative(range_min, "range_min"), no_hit},
-                                           std::move(noise)};
+  const RangeFinder::Parameters parameters{
+      {x, y, theta},
+      checked_not_negative(length, "length"),
+      checked_bits(mask, "mask"),
+      checked_bits(reflect_mask, "reflect_mask"),
+      {checked_not_negative(range_min, "range_min"),
+       std::isfinite(no_hit) ? checked_finite(no_hit, "no_hit") : static_cast<float>(no_hit)},
+      std::move(noise)};
   return RangeFinder(std::vector<float>(ends.data(), ends.data() + ends.size()), parameters);
 }
 

@@ -3,7 +3,10 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <stdexcept>
 #include <utility>
+
+#include "world/errors.h"
 
 namespace flatland {
 namespace {
@@ -15,7 +18,13 @@ constexpr float kReflective = 255.0F;
 RangeFinder::RangeFinder(std::vector<float> ends, const Parameters& parameters)
     : fan_(std::make_shared<const BeamFan>(ends.data(), ends.size() / 2)),
       beams_(ends.size() / 2),
-      parameters_(parameters) {}
+      parameters_(parameters) {
+  if (parameters.noise && !(parameters.length <= parameters.noise->max_range())) {
+    throw std::invalid_argument("length must be at most the max_range of the noise, " +
+                                to_text(static_cast<double>(parameters.noise->max_range())) +
+                                ", got " + to_text(static_cast<double>(parameters.length)));
+  }
+}
 
 std::array<double, 3> RangeFinder::pose_of(const std::array<double, 3>& body) const {
   // The operations of flatland.geometry.compose.

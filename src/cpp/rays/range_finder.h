@@ -44,7 +44,8 @@ class RangeFinder {
     std::optional<RangeNoise> noise;
   };
 
-  // `ends` are the end points of the beams in the frame of the sensor.
+  // `ends` are the end points of the beams in the frame of the sensor. Throws std::invalid_argument
+  // if the noise model is not defined for all ranges up to `length`.
   RangeFinder(std::vector<float> ends, const Parameters& parameters);
 
   std::size_t beams() const { return beams_; }

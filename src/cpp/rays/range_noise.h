@@ -4,6 +4,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 
 namespace flatland {
 
@@ -46,6 +47,9 @@ class RangeNoise {
   // sigma_hit is not from 0 to the maximum range, or if lambda_short or max_range is not positive.
   static RangeNoise beam(const BeamModel& model);
 
+  // The greatest exact range for which the model is defined [m].
+  float max_range() const { return max_range_; }
+
   // Changes exact ranges, NaN for a miss, to measured ones, and applies the limits. `is_hit`,
   // unless null, becomes false for each reading that is not a measurement of what the beam hit.
   // Arrays have whole blocks (see AlignedFloats) for `count` beams.
@@ -64,7 +68,7 @@ class RangeNoise {
   std::uint64_t bounds_[3] = {};
   float sigma_ = 0.0F;
   double lambda_ = 1.0;
-  float max_range_ = 0.0F;
+  float max_range_ = std::numeric_limits<float>::max();
 };
 
 // Applies the limits to ranges without noise.

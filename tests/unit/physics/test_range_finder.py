@@ -289,6 +289,11 @@ class TestManyScans:
         ({"reflect_mask": -1}, "reflect_mask"),
         ({"range_min": -0.1}, "range_min must not be negative"),
         ({"range_min": math.nan}, "range_min"),
+        ({"no_hit": 1e300}, "no_hit"),
+        (
+            {"noise": NOISES[-1], "length": 20.1},
+            "length must be at most the max_range of the noise",
+        ),
     ],
 )
 def test_invalid_range_finders(arguments: dict[str, Any], message: str) -> None:

@@ -13,7 +13,15 @@ import pytest
 from waiting import TIMEOUT
 
 from flatland.errors import PhysicsError, StaleHandleError, WorldLockedError
-from flatland.physics import OldManifold, PhysicsBody, PhysicsWorld, PreSolveContact
+from flatland.physics import (
+    OldManifold,
+    PhysicsBody,
+    PhysicsWorld,
+    PreSolveContact,
+    RangeFinder,
+    ScanRequest,
+    scan_all,
+)
 
 pytestmark = pytest.mark.threads
 
@@ -231,6 +239,9 @@ def test_long_calls_release_the_gil() -> None:
     assert releases_gil(lambda: wall.create_edges(edges))
     assert releases_gil(lambda: world.step(0.01, 1, 1))
     assert releases_gil(lambda: world.cast_rays((50, 50, 0), ends, 0xFFFF))
+    finder = RangeFinder(ends, 50.0, origin=(0, 0, 0), mask=0xFFFF)
+    assert releases_gil(lambda: [finder.scan(wall, 0, 0) for _ in range(50)])
+    assert releases_gil(lambda: scan_all([ScanRequest(finder, wall, 0, 0)] * 50, num_threads=2))
     assert releases_gil(lambda: world.cast_rays_reference((50, 50, 0), ends[:20_000], 0xFFFF))
     assert not releases_gil(lambda: sum(range(1000))), "the check must be able to fail"
     world.close()
@@ -262,16 +273,21 @@ def test_scans_beside_steps_spawns_deletions_and_closes(seed: int) -> None:
     angles = np.linspace(-np.pi, np.pi, 5000)
     fan = 8 * np.stack([np.cos(angles), np.sin(angles)], 1).astype(np.float32)
     poses = rng.uniform(-4, 4, (300, 3))
-    current = [crowd(seed)[0]]
+    finder = RangeFinder(fan[::20], 8.0, origin=(0, 0, 0), mask=0xFFFF, reflect_mask=1)
+    # Another world is used together with each of them.
+    current, other = [crowd(seed)], crowd(seed)[1][0]
     stop = threading.Event()
-    done = [0, 0, 0]
+    done = [0, 0, 0, 0]
     refused: set[type[PhysicsError]] = set()
 
     def scan(number: int) -> None:
         while not stop.wait(1e-5):
-            world = current[0]
+            world, bodies = current[0]
             try:
-                if number == 2:
+                if number == 3:
+                    requests = [ScanRequest(finder, body, 1, 1) for body in (other, bodies[0])]
+                    scan_all(requests * 20, num_threads=3)
+                elif number == 2:
                     world.free_discs(poses, 0.2, 0xFFFF)
                     world.object_counts()
                 else:
@@ -296,15 +312,15 @@ def test_scans_beside_steps_spawns_deletions_and_closes(seed: int) -> None:
                 joint.destroy()
             spawned.pop(int(rng.integers(len(spawned)))).destroy()
 
-    threads = [threading.Thread(target=scan, args=(number,)) for number in range(3)]
+    threads = [threading.Thread(target=scan, args=(number,)) for number in range(4)]
     for thread in threads:
         thread.start()
     worlds = 0
     deadline = time.monotonic() + TIMEOUT
     try:
         while (worlds < 10 or min(done) < 10) and time.monotonic() < deadline:
-            change(current[0])
-            old, current[0] = current[0], crowd(seed + worlds)[0]
+            change(current[0][0])
+            old, current[0] = current[0][0], crowd(seed + worlds)
             old.close()
             worlds += 1
     finally:
@@ -313,4 +329,5 @@ def test_scans_beside_steps_spawns_deletions_and_closes(seed: int) -> None:
             thread.join()
     assert min(done) >= 10
     assert refused <= {WorldLockedError, StaleHandleError}
-    current[0].close()
+    current[0][0].close()
+    other.world.close()
