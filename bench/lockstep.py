@@ -1,16 +1,26 @@
-"""Control of the node from outside: steps on request."""
+"""Control of the node from outside: steps on request, many models."""
 
 from __future__ import annotations
 
 import os
+import time
 from pathlib import Path
 
-from ros_session import RosSession, ros_session  # isort: skip
+from node import SPAWNED
+
+from ros_session import CHECKOUT, RosSession, ros_session  # isort: skip
 from scenes import benchmark_world_path
 from table import Row
 from timing import best_of
 
 CALLS = 200  # of step_world in one measurement
+MODELS = 200
+CRATE = """
+bodies:
+  - name: crate
+    footprints: [{type: polygon, points: [[0, 0], [0.4, 0], [0.4, 0.4], [0, 0.4]], density: 10}]
+"""
+OFFICE = CHECKOUT / "worlds" / "office" / "world.yaml"
 
 
 def rows(unit: float) -> list[Row]:
@@ -19,6 +29,8 @@ def rows(unit: float) -> list[Row]:
     with ros_session() as session:
         os.environ.update({k: v for k, v in session.environment.items() if k.startswith("ROS_")})
         steps = _steps_per_second(session, benchmark_world_path())
+        crates = _spawn_many(session, CRATE)
+        robots = _spawn_many(session, SPAWNED)
     return [
         Row(
             "calls of /step_world, one step, one robot, persistent connection",
@@ -26,6 +38,13 @@ def rows(unit: float) -> list[Row]:
             "1/s",
             2000.0,
             at_least=True,
+        ),
+        Row(f"{MODELS} models in one call of /spawn_models, office", crates, "s", 0.2),
+        Row(
+            f"{MODELS} robots with drive and laser in one call of /spawn_models",
+            robots,
+            "s",
+            note=f"{5 * MODELS} topics",
         ),
     ]
 
@@ -47,3 +66,31 @@ def _steps_per_second(session: RosSession, world: Path) -> float:
     step_world.close()
     session.stop(server)
     return CALLS / seconds
+
+
+def _spawn_many(session: RosSession, model: str) -> float:
+    """Returns the time of a call of /spawn_models with YAML text [s], with all registrations."""
+    import rospy
+    from geometry_msgs.msg import Pose2D
+
+    from flatland.msg import ModelSpec
+    from flatland.srv import DeleteModels, SpawnModels
+
+    server = session.server(world_path=OFFICE, lockstep=True, seed=1)
+    rospy.wait_for_service("/toggle_pause", 30.0)
+    times = []
+    for _ in range(5):
+        names = [f"m{i}" for i in range(MODELS)]
+        # Beside the building, so that no model is blocked.
+        specs = [
+            ModelSpec(model, name, name, Pose2D(30.0 + i % 20, i // 20, 0.0))
+            for i, name in enumerate(names)
+        ]
+        start = time.perf_counter()
+        response = rospy.ServiceProxy("/spawn_models", SpawnModels)(specs)
+        times.append(time.perf_counter() - start)
+        if not response.success:
+            raise RuntimeError(f"the models were not spawned: {response.message}")
+        rospy.ServiceProxy("/delete_models", DeleteModels)(names)
+    session.stop(server)
+    return min(times)

@@ -16,6 +16,7 @@ from flatland.entities.joint import Joint
 from flatland.entities.layer import Layer
 from flatland.entities.model import Model
 from flatland.errors import (
+    BatchError,
     FlatlandError,
     MapFileError,
     PhysicsError,
@@ -26,6 +27,7 @@ from flatland.errors import (
     WorldLockedError,
     YamlError,
 )
+from flatland.loading.model_source import ModelSpec
 from flatland.plugin_api.dynamics_limits import DynamicsLimits
 from flatland.plugin_api.plugin import ModelPlugin, WorldPlugin
 from flatland.plugin_api.ports import Command, Output
@@ -51,6 +53,7 @@ load_world = World.from_yaml
 __version__ = VERSION
 
 __all__ = [
+    "BatchError",
     "Body",
     "Collision",
     "Collisions",
@@ -67,6 +70,7 @@ __all__ = [
     "Model",
     "ModelContact",
     "ModelPlugin",
+    "ModelSpec",
     "MutableContact",
     "NavSatFix",
     "Odometry",

@@ -35,6 +35,11 @@ class Inputs:
     params: dict[str, object] = field(default_factory=dict)
     _expressions: int = 0
 
+    @property
+    def expression_count(self) -> int:
+        """Number of expressions (`$eval`) that were evaluated."""
+        return self._expressions
+
     @contextmanager
     def collecting(self) -> Iterator[None]:
         """Adds everything that the current thread reads in the block."""

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import logging
+import math
 from collections.abc import Callable
 from concurrent.futures import Future
-from typing import Final, TypeVar
+from typing import Any, Final, TypeVar
 
 import rospy
 
-from flatland.errors import FlatlandError
+from flatland.entities.model import Model
+from flatland.errors import BatchError, FlatlandError
+from flatland.geometry import Pose
 from flatland.ros.names import sendable_text
 from flatland.ros.transport.registrar import Registrar
 from flatland.ros.transport.service import wait_for
@@ -76,10 +79,26 @@ class ServiceCalls:
             return wait_for(done, self.simulation.world.requests)
         except (FlatlandError, rospy.ServiceException) as error:
             text = error.text_with_hint if isinstance(error, FlatlandError) else str(error)
-            index = getattr(error, "index", None)
-            raise CallError(text, -1 if index is None else index) from error
+            raise CallError(text, error.index if isinstance(error, BatchError) else -1) from error
         except Exception as error:
             _LOG.exception("unexpected internal error in a service call")
             raise CallError(f"{type(error).__name__}: {error}") from error
         finally:
             self.registrar.flush(REGISTRATION_TIMEOUT)
+
+
+def describe_displacement(model: Model | None, requested: Pose) -> str:
+    """Describes where a model was put instead of the requested pose; empty if it is there."""
+    if model is None or model.displacement == (0.0, 0.0):
+        return ""
+    dx, dy = model.displacement
+    x, y, theta = requested[0] + dx, requested[1] + dy, requested[2]
+    return (
+        f'the requested pose is blocked: model "{model.name}" was put at '
+        f"({x:.3f}, {y:.3f}, {theta:.3f}), {math.hypot(dx, dy):.3f} m away"
+    )
+
+
+def pose_of(message: Any) -> Pose:
+    """Converts a `geometry_msgs/Pose2D`."""
+    return (message.x, message.y, message.theta)

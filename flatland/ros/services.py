@@ -9,12 +9,17 @@ from typing import Any
 import rospy
 from std_srvs.srv import Empty, EmptyResponse
 
-from flatland.entities.model import Model
-from flatland.geometry import Pose
+from flatland.ros.batch_services import BatchServices
 from flatland.ros.clock import NodeClock
 from flatland.ros.message_types import service_class
 from flatland.ros.names import sendable_text
-from flatland.ros.service_calls import REGISTRATION_TIMEOUT, CallError, ServiceCalls
+from flatland.ros.service_calls import (
+    REGISTRATION_TIMEOUT,
+    CallError,
+    ServiceCalls,
+    describe_displacement,
+    pose_of,
+)
 from flatland.ros.step_service import StepService
 from flatland.ros.transport.registrar import Registrar
 from flatland.ros.transport.service import Service
@@ -57,6 +62,7 @@ class Services:
         self._keep_odometry = move_keeps_odometry
         world = simulation.world
         StepService(self._calls, clock)
+        BatchServices(self._calls, if_blocked, move_keeps_odometry=move_keeps_odometry)
         for name, service_type, handler in (
             ("spawn_model", service_class("SpawnModel"), self._spawn_model),
             ("delete_model", service_class("DeleteModel"), self._delete_model),
@@ -71,9 +77,9 @@ class Services:
     # rospy converts the returned fields to the response class of the service.
 
     def _spawn_model(self, request: Any) -> tuple[bool, str]:
-        pose = _pose(request.pose)
+        pose = pose_of(request.pose)
         return self._carry_out(
-            lambda: _displacement(
+            lambda: describe_displacement(
                 self._simulation.world.spawn_model(
                     request.yaml_path, request.name, request.ns, pose, self._if_blocked
                 ),
@@ -85,9 +91,9 @@ class Services:
         return self._carry_out(lambda: self._simulation.world.delete_model(request.name))
 
     def _move_model(self, request: Any) -> tuple[bool, str]:
-        pose = _pose(request.pose)
+        pose = pose_of(request.pose)
         return self._carry_out(
-            lambda: _displacement(
+            lambda: describe_displacement(
                 self._simulation.world.move_model(
                     request.name, pose, self._if_blocked, keep_odometry=self._keep_odometry
                 ),
@@ -127,19 +133,3 @@ class Services:
             return True, sendable_text(self._calls.carry_out(action) or "")
         except CallError as error:
             return False, str(error)
-
-
-def _displacement(model: Model | None, requested: Pose) -> str:
-    """Describes where a model was put instead of the requested pose; empty if it is there."""
-    if model is None or model.displacement == (0.0, 0.0):
-        return ""
-    dx, dy = model.displacement
-    x, y, theta = requested[0] + dx, requested[1] + dy, requested[2]
-    return (
-        f'the requested pose is blocked: model "{model.name}" was put at '
-        f"({x:.3f}, {y:.3f}, {theta:.3f}), {math.hypot(dx, dy):.3f} m away"
-    )
-
-
-def _pose(pose: Any) -> Pose:
-    return (pose.x, pose.y, pose.theta)
