@@ -32,6 +32,7 @@ from flatland.runtime.observer import Observers, WorldObserver
 from flatland.runtime.placement import Placement
 from flatland.runtime.plugin_host import PluginHost
 from flatland.runtime.requests import Requests
+from flatland.runtime.snapshot import WorldStates
 from flatland.runtime.transforms import TransformBuffer
 from flatland.timekeeper import Timekeeper
 
@@ -97,7 +98,7 @@ class World(Contents):
         self.velocity_iterations = velocity_iterations
         self.position_iterations = position_iterations
         self.collision_filter = CollisionFilter()
-        self.layers: list[Layer] = []
+        self.layers, self._former_layers = list[Layer](), dict[str, Layer]()
         self.physics = PhysicsWorld()
         self._files = Source("", str(Path(base_dir).absolute()))
         self.requests = Requests()
@@ -120,6 +121,7 @@ class World(Contents):
         self._paused = False
         self._closed = False
         self.add_observer(self._body_monitor)
+        self._states = WorldStates(self, (*vars(self), "map_layer"))
         for observer in observers:
             self.add_observer(observer)
 

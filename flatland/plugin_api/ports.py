@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable, Hashable
-from typing import Any, Generic, TypeVar
+from typing import Any, ClassVar, Generic, TypeVar
 
 from flatland.errors import PLUGIN_FAULTS, WorldError
 from flatland.graph_names import global_name
@@ -28,6 +28,12 @@ class Output(Generic[T]):
         owners: Names of the plugins that opened it, for messages.
         closed: Whether the last of these plugins has ended.
     """
+
+    outside_state: ClassVar[dict[str, Callable[[], object]]] = {
+        "_lock": threading.Lock,
+        "_subscribers": tuple,
+        "_wanters": frozenset,
+    }
 
     __slots__ = (
         "_lock",
@@ -150,6 +156,8 @@ class Command(Generic[T]):
             accepted; None for no function.
     """
 
+    outside_state: ClassVar[dict[str, Callable[[], object]]] = {"on_set": lambda: None}
+
     __slots__ = (
         "accept",
         "closed",
@@ -188,6 +196,11 @@ class Command(Generic[T]):
         self.closed = False
         self.accept = accept
         self.on_set: Callable[[Command[T], T], None] | None = None
+
+    def renew(self, new: Command[T]) -> None:
+        """Becomes equal to a new command of the same topic; `on_set` remains."""
+        self.name, self.owner, self.accept = new.name, new.owner, new.accept
+        self.value, self.received, self.closed = new.value, 0, False
 
     def set(self, value: T) -> None:
         """Sets the value if `accept` allows it.

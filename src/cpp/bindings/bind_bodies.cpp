@@ -89,6 +89,14 @@ void bind_bodies(WorldClass& world) {
   world.def("saved_motions", [](const World& self) { return SavedMotions{saved_motions(self)}; });
   world.def("restore_motions",
             [](World& self, const SavedMotions& saved) { restore_motions(self, saved.motions); });
+  world.def(
+      "motions",
+      [](const World& self, const std::vector<Id>& bodies) {
+        py::array_t<double> rows({bodies.size(), std::size_t{6}});
+        motions_of(self, bodies.data(), bodies.size(), rows.mutable_data());
+        return rows;
+      },
+      py::arg("bodies"));
   world.def("fixtures", &fixtures_of);
   world.def("joints", &joints_of);
 }
