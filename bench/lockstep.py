@@ -1,4 +1,4 @@
-"""Control of the node from outside: steps on request, many models."""
+"""Control of the node from outside: steps on request, reset, many models."""
 
 from __future__ import annotations
 
@@ -31,6 +31,7 @@ def rows(unit: float) -> list[Row]:
         steps = _steps_per_second(session, benchmark_world_path())
         crates = _spawn_many(session, CRATE)
         robots = _spawn_many(session, SPAWNED)
+        reset = _reset(session)
     return [
         Row(
             "calls of /step_world, one step, one robot, persistent connection",
@@ -39,6 +40,7 @@ def rows(unit: float) -> list[Row]:
             2000.0,
             at_least=True,
         ),
+        Row("call of /reset_world, office, persistent connection", 1e3 * reset, "ms", 20.0),
         Row(f"{MODELS} models in one call of /spawn_models, office", crates, "s", 0.2),
         Row(
             f"{MODELS} robots with drive and laser in one call of /spawn_models",
@@ -94,3 +96,18 @@ def _spawn_many(session: RosSession, model: str) -> float:
         rospy.ServiceProxy("/delete_models", DeleteModels)(names)
     session.stop(server)
     return min(times)
+
+
+def _reset(session: RosSession) -> float:
+    """Returns the time of a call of /reset_world [s]."""
+    import rospy
+
+    from flatland.srv import ResetWorld
+
+    server = session.server(world_path=OFFICE, lockstep=True, seed=1)
+    rospy.wait_for_service("/toggle_pause", 30.0)
+    reset_world = rospy.ServiceProxy("/reset_world", ResetWorld, persistent=True)
+    seconds = best_of(lambda: reset_world(False, -1), seconds=2.0)
+    reset_world.close()
+    session.stop(server)
+    return seconds

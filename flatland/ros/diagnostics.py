@@ -113,6 +113,8 @@ class _Rate:
         timekeeper = simulation.world.timekeeper
         elapsed = max(now - self._start, 1e-9)
         advanced_ns = timekeeper.sim_time_ns - self._start_ns
+        if advanced_ns < 0:
+            advanced_ns = timekeeper.sim_time_ns  # The world was reset.
         lost = simulation.lost_time - self._lost
         self._start, self._start_ns = now, timekeeper.sim_time_ns
         self._lost = simulation.lost_time

@@ -13,6 +13,7 @@ from flatland.ros.batch_services import BatchServices
 from flatland.ros.clock import NodeClock
 from flatland.ros.message_types import service_class
 from flatland.ros.names import sendable_text
+from flatland.ros.reset_service import ResetService
 from flatland.ros.service_calls import (
     REGISTRATION_TIMEOUT,
     CallError,
@@ -62,6 +63,7 @@ class Services:
         self._keep_odometry = move_keeps_odometry
         world = simulation.world
         StepService(self._calls, clock)
+        ResetService(self._calls)
         BatchServices(self._calls, if_blocked, move_keeps_odometry=move_keeps_odometry)
         for name, service_type, handler in (
             ("spawn_model", service_class("SpawnModel"), self._spawn_model),

@@ -207,8 +207,8 @@ class Simulation:
             if self.lockstep:
                 continue
             begin = clock()
-            if self._period != period:
-                # Due times of the old rate are void.
+            if self._period != period or timekeeper.sim_time_ns < window.start_ns:
+                # Due times of the old rate, or of the time before a reset, are void.
                 period, due = self._period, begin
                 window = self._new_window(begin)
                 monitor.reset()
