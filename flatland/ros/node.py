@@ -264,6 +264,7 @@ class ServerNode:
                 clock,
                 parameters.if_blocked,
                 move_keeps_odometry=parameters.move_keeps_odometry,
+                model_states_rate=parameters.model_states_rate,
             )
             if parameters.initialpose_model:
                 from flatland.ros.initial_pose import InitialPose

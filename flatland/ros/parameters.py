@@ -53,6 +53,8 @@ class NodeParameters:
         use_sim_time: Whether `/clock` is published and stamps are simulated times; otherwise they
             are wall times.
         clock_rate: Maximum rate of `/clock` in wall time [Hz]; 0 for one message per step.
+        model_states_rate: Rate of the topic `model_states` in simulated time [Hz]; 0 for one
+            message per step.
         publish_map: Name of the layer that is published as a map; empty for that of the world file,
             None for no map.
         map_frame: Frame of the map.
@@ -80,6 +82,7 @@ class NodeParameters:
     record_mcap: str
     use_sim_time: bool
     clock_rate: float
+    model_states_rate: float
     publish_map: str | None
     map_frame: str
     map_resolution: float
@@ -125,6 +128,7 @@ def read_parameters(
         record_mcap=reader.file("record_mcap"),
         use_sim_time=reader.boolean("use_sim_time", True),
         clock_rate=reader.rate("clock_rate", 0.0, unlimited="one message per step"),
+        model_states_rate=reader.rate("model_states_rate", 50.0, "one message per step"),
         publish_map=reader.optional_name("publish_map"),
         map_frame=reader.frame("map_frame", "map"),
         map_resolution=reader.finite_positive("map_resolution", DEFAULT_RESOLUTION),

@@ -12,6 +12,7 @@ from std_srvs.srv import Empty, EmptyResponse
 from flatland.ros.batch_services import BatchServices
 from flatland.ros.clock import NodeClock
 from flatland.ros.message_types import service_class
+from flatland.ros.model_states import ModelStatesService, ModelStatesTopic
 from flatland.ros.names import sendable_text
 from flatland.ros.reset_service import ResetService
 from flatland.ros.service_calls import (
@@ -43,6 +44,7 @@ class Services:
         if_blocked: IfBlocked = "warn",
         *,
         move_keeps_odometry: bool = False,
+        model_states_rate: float = 0.0,
     ) -> None:
         """Advertises the services asynchronously.
 
@@ -52,6 +54,8 @@ class Services:
             clock: Publishes the time.
             if_blocked: Behaviour of `spawn_model` and `move_model` at poses that are not free.
             move_keeps_odometry: Whether `move_model` keeps the odometry of the model.
+            model_states_rate: Rate of the topic `model_states` in simulated time [Hz]; 0 for one
+                message per step.
 
         Raises:
             FlatlandError: A plugin has a service of the same name.
@@ -64,6 +68,8 @@ class Services:
         world = simulation.world
         StepService(self._calls, clock)
         ResetService(self._calls)
+        ModelStatesService(self._calls)
+        ModelStatesTopic(self._calls, model_states_rate)
         BatchServices(self._calls, if_blocked, move_keeps_odometry=move_keeps_odometry)
         for name, service_type, handler in (
             ("spawn_model", service_class("SpawnModel"), self._spawn_model),

@@ -39,6 +39,7 @@ def test_defaults() -> None:
         record_mcap="",
         use_sim_time=True,
         clock_rate=0.0,
+        model_states_rate=50.0,
         publish_map="",
         map_frame="map",
         map_resolution=0.05,
@@ -125,6 +126,7 @@ def test_valid_values(name: str, value: object, expected: object) -> None:
         "plugin_timeout",
         "shutdown_timeout",
         "clock_rate",
+        "model_states_rate",
         "map_resolution",
     ],
 )
