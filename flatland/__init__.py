@@ -28,6 +28,7 @@ from flatland.errors import (
     YamlError,
 )
 from flatland.loading.model_source import ModelSpec
+from flatland.maps.occupancy_grid import OccupancyGrid
 from flatland.plugin_api.dynamics_limits import DynamicsLimits
 from flatland.plugin_api.plugin import ModelPlugin, WorldPlugin
 from flatland.plugin_api.ports import Command, Output
@@ -73,6 +74,7 @@ __all__ = [
     "ModelSpec",
     "MutableContact",
     "NavSatFix",
+    "OccupancyGrid",
     "Odometry",
     "Output",
     "PhysicsError",

@@ -26,11 +26,13 @@ class InputCache:
         files: Content of each file.
         results: What was made of other files, such as images, by the arguments of the function.
         params: Values of the parameters.
+        grids: The last grid of each layer whose map is received from a topic, by its first name.
     """
 
     files: dict[str, bytes] = field(default_factory=dict)
     results: dict[Hashable, object] = field(default_factory=dict)
     params: dict[str, object] = field(default_factory=dict)
+    grids: dict[str, object] = field(default_factory=dict)
 
 
 @dataclass(slots=True)

@@ -11,6 +11,7 @@ from std_srvs.srv import Empty, EmptyResponse
 
 from flatland.ros.batch_services import BatchServices
 from flatland.ros.clock import NodeClock
+from flatland.ros.layer_maps import LayerMaps
 from flatland.ros.message_types import service_class
 from flatland.ros.model_states import ModelStatesService, ModelStatesTopic
 from flatland.ros.names import sendable_text
@@ -68,6 +69,7 @@ class Services:
         world = simulation.world
         StepService(self._calls, clock)
         ResetService(self._calls)
+        LayerMaps(self._calls)
         ModelStatesService(self._calls)
         ModelStatesTopic(self._calls, model_states_rate)
         BatchServices(self._calls, if_blocked, move_keeps_odometry=move_keeps_odometry)

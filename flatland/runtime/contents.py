@@ -13,6 +13,7 @@ from flatland.errors import WorldError
 from flatland.geometry import DoubleArray
 from flatland.loading.model_source import ModelSpec
 from flatland.plugin_api.noise import checked_seed
+from flatland.runtime.layer_maps import LayerMaps
 from flatland.runtime.many_models import ManyModels, plain_pose
 from flatland.runtime.model_states import ModelStates, model_states
 from flatland.runtime.placement import IfBlocked, Models, check_if_blocked
@@ -46,7 +47,7 @@ if TYPE_CHECKING:
 R = TypeVar("R")
 
 
-class Contents(ManyModels):
+class Contents(ManyModels, LayerMaps):
     """Everything that is in a world; the base class of `World`, which creates and steps it.
 
     Changes that a plugin's hook requests take effect after the step.
