@@ -26,6 +26,7 @@ MODULES = (
     "jam",
     "plugin_steps",
     "node",
+    "lockstep",
     "real_time",
     "large_map",
     "markers",

@@ -16,6 +16,7 @@ from flatland.entities.joint import Joint
 from flatland.entities.layer import Layer
 from flatland.entities.model import Model
 from flatland.errors import (
+    BatchError,
     FlatlandError,
     MapFileError,
     PhysicsError,
@@ -26,6 +27,8 @@ from flatland.errors import (
     WorldLockedError,
     YamlError,
 )
+from flatland.loading.model_source import ModelSpec
+from flatland.maps.occupancy_grid import OccupancyGrid
 from flatland.plugin_api.dynamics_limits import DynamicsLimits
 from flatland.plugin_api.plugin import ModelPlugin, WorldPlugin
 from flatland.plugin_api.ports import Command, Output
@@ -53,6 +56,7 @@ load_world = World.from_yaml
 __version__ = VERSION
 
 __all__ = [
+    "BatchError",
     "Body",
     "Collision",
     "Collisions",
@@ -69,9 +73,11 @@ __all__ = [
     "Model",
     "ModelContact",
     "ModelPlugin",
+    "ModelSpec",
     "ModelStates",
     "MutableContact",
     "NavSatFix",
+    "OccupancyGrid",
     "Odometry",
     "Output",
     "PhysicsError",

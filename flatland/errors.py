@@ -98,6 +98,25 @@ class WorldError(FlatlandError):
     prefix = "Flatland World: "
 
 
+class BatchError(WorldError):
+    """One item of a request is invalid; nothing was changed. The cause is the error of the item.
+
+    Attributes:
+        index: Index of the item.
+    """
+
+    def __init__(self, what: str, index: int, cause: FlatlandError) -> None:
+        """Initializes the error.
+
+        Args:
+            what: Description of the item, such as `models[3]`.
+            index: Index of the item.
+            cause: The error of the item.
+        """
+        super().__init__(f"{what}: {cause.message}", place=cause.place, hint=cause.hint)
+        self.index = index
+
+
 class PhysicsError(FlatlandError):
     """The physics engine rejects a request."""
 

@@ -218,14 +218,14 @@ class World(Contents):
         """Simulated time [s]."""
         return self.timekeeper.sim_time
 
-    def step(self, n: int = 1) -> None:
-        """Steps `n` times; has no effect while paused.
+    def step(self, n: int = 1, *, while_paused: bool = False) -> None:
+        """Steps `n` times; has no effect on a paused world unless `while_paused` is true.
 
         Raises:
             WorldError: The world is closed, a plugin calls this, or a body is not finite.
             Exception: Raised by a plugin, subscriber or observer, with `plugin_errors="raise"`.
         """
-        self.stepping.step(n)
+        self.stepping.step(n, while_paused)
 
     # -- recordings and images -------------------------------------------------------------
 

@@ -26,11 +26,13 @@ class InputCache:
         files: Content of each file.
         results: What was made of other files, such as images, by the arguments of the function.
         params: Values of the parameters.
+        grids: The last grid of each layer whose map is received from a topic, by its first name.
     """
 
     files: dict[str, bytes] = field(default_factory=dict)
     results: dict[Hashable, object] = field(default_factory=dict)
     params: dict[str, object] = field(default_factory=dict)
+    grids: dict[str, object] = field(default_factory=dict)
 
 
 @dataclass(slots=True)
@@ -55,6 +57,11 @@ class Inputs:
     cache: InputCache = field(default_factory=InputCache)
     _expressions: int = 0
     _is_caching: bool = False
+
+    @property
+    def expression_count(self) -> int:
+        """Number of expressions (`$eval`) that were evaluated."""
+        return self._expressions
 
     @contextmanager
     def collecting(self, *, caching: bool = False) -> Iterator[None]:

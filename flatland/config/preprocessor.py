@@ -51,18 +51,19 @@ def preprocess_file(
     return _Preprocessor(params, on_error).expand(root, ((_identity(path), path),), 0)
 
 
-def preprocess_text(text: str, base_dir: str, params: Params = None) -> Node:
+def preprocess_text(text: str, base_dir: str, params: Params = None, name: str = "") -> Node:
     """Parses a text and preprocesses its first document.
 
     Args:
         text: The YAML text.
         base_dir: Folder that relative paths start from.
         params: As for `preprocess_file`.
+        name: Name of the text in error messages, in place of a file.
 
     Raises:
         YamlError: The text is not valid YAML, or cannot be preprocessed.
     """
-    source = Source("", str(Path.cwd() / base_dir))
+    source = Source(name, str(Path.cwd() / base_dir))
     root = _first(parse_documents(text, source), source)
     return _Preprocessor(params).expand(root, (), 0)
 

@@ -51,7 +51,11 @@ class TreeReader:
 
     @classmethod
     def from_string(
-        cls, text: str, params: Params = None, base_dir: str | os.PathLike[str] = "."
+        cls,
+        text: str,
+        params: Params = None,
+        base_dir: str | os.PathLike[str] = ".",
+        name: str = "",
     ) -> Self:
         """Parses and preprocesses a text.
 
@@ -59,11 +63,18 @@ class TreeReader:
             text: One YAML document.
             params: As for `from_file`.
             base_dir: Folder that relative paths start from.
+            name: Name of the text in error messages, in place of a file.
 
         Raises:
             YamlError: The text is not valid YAML, or cannot be preprocessed.
         """
-        return cls(preprocess_text(text, os.fspath(base_dir), params))
+        return cls(preprocess_text(text, os.fspath(base_dir), params, name))
+
+    def unread(self) -> Self:
+        """Returns a reader of the same node that has a record of its own, without any keys."""
+        reader = copy.copy(self)
+        reader._accessed = set()
+        return reader
 
     def __repr__(self) -> str:
         return f"<{type(self).__name__} {self.location} {self.name}{self.place.suffix}>"

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from flatland.entities.body import Body, Color, Entity
 from flatland.geometry import DoubleArray, FloatArray, Pose, transform_points
 from flatland.physics import PhysicsWorld
+
+if TYPE_CHECKING:
+    from flatland.maps.occupancy_grid import OccupancyGrid
 
 WALL_FRICTION = 0.2  # default of Box2D fixtures
 
@@ -26,7 +29,10 @@ class Layer(Entity):
         body: Static body at the origin of the layer.
         exact_edge_count: Number of edges of the map before simplification.
         unknown_map_keys: Keys of the map file that flatland does not use, sorted.
-        map_path: The map file; empty for a layer without a map.
+        map_path: The map file; empty for a layer without one.
+        map_topic: Topic that the map is received from; empty for none.
+        grid: The map, if it was given as a grid.
+        map_version: Number of replacements of the map since the layer was loaded.
     """
 
     def __init__(
@@ -42,6 +48,7 @@ class Layer(Entity):
         exact_edge_count: int = 0,
         unknown_map_keys: Sequence[str] = (),
         map_path: str = "",
+        map_topic: str = "",
     ) -> None:
         """Creates the body of the layer and its edges.
 
@@ -55,7 +62,8 @@ class Layer(Entity):
             edges: Edges (x1, y1, x2, y2) in the frame of the body [m], shape (n, 4).
             exact_edge_count: Number of edges of the map before simplification.
             unknown_map_keys: Keys of the map file that flatland does not use.
-            map_path: The map file; empty for a layer without a map.
+            map_path: The map file; empty for a layer without one.
+            map_topic: Topic that the map is received from; empty for none.
         """
         self.name = names[0]
         self.names = list(names)
@@ -65,6 +73,9 @@ class Layer(Entity):
         self.exact_edge_count = exact_edge_count
         self.unknown_map_keys = tuple(unknown_map_keys)
         self.map_path = map_path
+        self.map_topic = map_topic
+        self.grid: OccupancyGrid | None = None
+        self.map_version = 0
         self.body = Body(physics.create_body("static", origin), self, self.name, color)
         if edges is not None and len(edges):
             self.add_edges(edges)

@@ -7,7 +7,7 @@ import os
 from collections.abc import Iterable
 from contextlib import suppress
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 from flatland.config.inputs import Inputs, real_folders
 from flatland.config.node import Source
@@ -16,6 +16,8 @@ from flatland.config.reader import ReadYaml, YamlReader
 from flatland.entities.layer import Layer
 from flatland.errors import Place, UnreadableFileError, WorldError, YamlError
 from flatland.geometry import IDENTITY
+from flatland.graph_names import resolve_topic
+from flatland.maps.grid_map import grid_map
 from flatland.maps.map_file import LayerMap, load_map
 from flatland.plugin_api.missing_plugins import (
     MissingPluginsError,
@@ -26,6 +28,7 @@ from flatland.plugin_api.missing_plugins import (
 from flatland.plugin_api.noise import checked_seed
 
 if TYPE_CHECKING:
+    from flatland.maps.occupancy_grid import OccupancyGrid
     from flatland.runtime.body_monitor import InvalidBodyPolicy
     from flatland.runtime.faults import FaultPolicy
     from flatland.runtime.observer import WorldObserver
@@ -33,6 +36,8 @@ if TYPE_CHECKING:
 
 _LOG = logging.getLogger("flatland")
 
+TOPIC_SCHEME = "topic://"
+"""Begin of the map of a layer that is received from a topic."""
 LAYER_COLOR = (1.0, 1.0, 1.0, 1.0)
 SIMPLIFICATIONS = (0, 1, 2)
 MAX_ITERATIONS = 1000
@@ -196,15 +201,29 @@ def _load_layer(world: World, reader: YamlReader, simplify_map: int) -> None:
     with reader.collect_errors():
         _register_layer(world, reader, names)
         is_registered = True
-    layer_map = None
-    if map_path:
+    layer_map, map_topic, grid = None, "", None
+    if map_path.startswith(TOPIC_SCHEME):
+        map_topic = _map_topic(reader, map_path)
+        grid = cast("OccupancyGrid | None", world.inputs.cache.grids.get(names[0]))
+        if grid is None:
+            _LOG.warning(
+                'Layer "%s" is empty until a map is received from topic "%s" or given to '
+                "set_layer_map",
+                names[0],
+                map_topic,
+            )
+        else:
+            layer_map = grid_map(grid, simplify_map)
+    elif map_path:
         with reader.collect_errors():
             layer_map = _load_map(world, reader, map_path, names[0], simplify_map)
     if not is_registered:
         return
     bits = world.collision_filter.category_bits(names)
     if layer_map is None:
-        layer = Layer(world.physics, names, bits, color, properties.plain() or {})
+        layer = Layer(
+            world.physics, names, bits, color, properties.plain() or {}, map_topic=map_topic
+        )
     else:
         try:
             layer = Layer(
@@ -218,13 +237,29 @@ def _load_layer(world: World, reader: YamlReader, simplify_map: int) -> None:
                 exact_edge_count=layer_map.exact_edge_count,
                 unknown_map_keys=layer_map.unknown_keys,
                 map_path=layer_map.path,
+                map_topic=map_topic,
             )
+            layer.grid = grid
         except ValueError as error:  # finite, but outside the range of the physics
             raise YamlError(
                 f'Invalid map in layer "{names[0]}", {error} [{layer_map.path}]',
                 place=Place(layer_map.path),
             ) from error
     world.add_layer(layer)
+
+
+def _map_topic(reader: YamlReader, map_path: str) -> str:
+    """Returns the topic of a map `topic://NAME`.
+
+    Raises:
+        YamlError: It is not a legal name, if errors are not collected.
+    """
+    topic = map_path.removeprefix(TOPIC_SCHEME)
+    try:
+        return resolve_topic(topic)
+    except ValueError as error:
+        reader.report(reader.invalid("map", f"{error}, expected {TOPIC_SCHEME}/map"))
+        return "/map"  # only if errors are collected
 
 
 def _register_layer(world: World, reader: YamlReader, names: list[str]) -> None:

@@ -137,7 +137,23 @@ class EdgeGrid:
         return OccupancyGrid((x, y, 0.0), self._resolution, cells)
 
 
-def layer_grid(layer: Layer, params: Params, resolution: float) -> ImageGrid | EdgeGrid:
+class GivenGrid:
+    """The grid that a layer was made from."""
+
+    def __init__(self, grid: OccupancyGrid) -> None:
+        """Stores the grid."""
+        self._grid = grid
+
+    def load(self) -> OccupancyGrid:
+        """Returns the grid."""
+        return self._grid
+
+
+GridSource = ImageGrid | EdgeGrid | GivenGrid
+"""Loads the occupancy grid of a layer."""
+
+
+def layer_grid(layer: Layer, params: Params, resolution: float) -> GridSource:
     """Returns the source of the occupancy grid of a layer.
 
     Walls that plugins added to the map of a layer are not part of the grid.
@@ -152,6 +168,8 @@ def layer_grid(layer: Layer, params: Params, resolution: float) -> ImageGrid | E
         WorldError: The layer has no walls, or too large a grid.
     """
     edges = layer.world_edges
+    if layer.grid is not None:
+        return GivenGrid(layer.grid)
     if layer.map_path:
         location = f'layer "{layer.name}"'
         reader = YamlReader.from_file(layer.map_path, params).with_location(location)

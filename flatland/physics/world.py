@@ -342,6 +342,19 @@ class PhysicsWorld(PhysicsQueries):
         """
         return self._core.body_states()
 
+    def saved_motions(self) -> _core.World.SavedMotions:
+        """Returns the poses, velocities and sleep of all bodies, for `restore_motions`."""
+        return self._core.saved_motions()
+
+    def restore_motions(self, saved: _core.World.SavedMotions) -> None:
+        """Restores poses, velocities and sleep bit by bit.
+
+        Args:
+            saved: Result of `saved_motions`. Bodies that do not exist any more are ignored, and
+                bodies that were created since are unchanged.
+        """
+        self._core.restore_motions(saved)
+
     def motions(self, bodies: Iterable[PhysicsBody]) -> DoubleArray:
         """Returns the poses and velocities of the origins of some bodies, in one call.
 

@@ -34,6 +34,7 @@ class NodeParameters:
         update_rate: Steps per second of wall time [Hz]; 0 for as many as possible.
         max_lag: Limit of the lost wall time that is made up for [s]; 0 for one cycle.
         step_size: Simulated time of one step [s].
+        lockstep: Whether time passes only on request.
         show_viz: Whether debug markers are published.
         viz_pub_rate: Rate of the debug markers in wall time [Hz].
         simplify_map: 0 exact, 1 simplified, 2 opened and simplified map boundaries.
@@ -52,6 +53,8 @@ class NodeParameters:
         use_sim_time: Whether `/clock` is published and stamps are simulated times; otherwise they
             are wall times.
         clock_rate: Maximum rate of `/clock` in wall time [Hz]; 0 for one message per step.
+        model_states_rate: Rate of the topic `model_states` in simulated time [Hz]; 0 for one
+            message per step.
         publish_map: Name of the layer that is published as a map; empty for that of the world file,
             None for no map.
         map_frame: Frame of the map.
@@ -64,6 +67,7 @@ class NodeParameters:
     update_rate: float
     max_lag: float
     step_size: float
+    lockstep: bool
     show_viz: bool
     viz_pub_rate: float
     simplify_map: int
@@ -78,6 +82,7 @@ class NodeParameters:
     record_mcap: str
     use_sim_time: bool
     clock_rate: float
+    model_states_rate: float
     publish_map: str | None
     map_frame: str
     map_resolution: float
@@ -98,11 +103,17 @@ def read_parameters(
         ParameterError: A parameter is missing or invalid.
     """
     reader = _Reader(get)
+    if reader.boolean("lockstep", False) and get("benchmark_duration") is not None:
+        raise ParameterError(
+            'Invalid parameter "~lockstep": it must be false with "~benchmark_duration", because '
+            "time passes only on request"
+        )
     return NodeParameters(
         world_path=reader.path("world_path"),
         update_rate=reader.rate("update_rate", 200.0),
         max_lag=reader.lag("max_lag", MAX_LAG),
         step_size=reader.step_size("step_size", 0.005),
+        lockstep=reader.boolean("lockstep", False),
         show_viz=reader.boolean("show_viz", False),
         viz_pub_rate=reader.positive("viz_pub_rate", 30.0),
         simplify_map=reader.choice("simplify_map", 0, _SIMPLIFICATIONS),
@@ -117,6 +128,7 @@ def read_parameters(
         record_mcap=reader.file("record_mcap"),
         use_sim_time=reader.boolean("use_sim_time", True),
         clock_rate=reader.rate("clock_rate", 0.0, unlimited="one message per step"),
+        model_states_rate=reader.rate("model_states_rate", 50.0, "one message per step"),
         publish_map=reader.optional_name("publish_map"),
         map_frame=reader.frame("map_frame", "map"),
         map_resolution=reader.finite_positive("map_resolution", DEFAULT_RESOLUTION),

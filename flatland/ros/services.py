@@ -2,27 +2,32 @@
 
 from __future__ import annotations
 
-import logging
 import math
 from collections.abc import Callable
-from typing import Any, Final
+from typing import Any
 
 import rospy
 from std_srvs.srv import Empty, EmptyResponse
 
-from flatland.entities.model import Model
-from flatland.errors import FlatlandError
-from flatland.geometry import Pose
+from flatland.ros.batch_services import BatchServices
+from flatland.ros.clock import NodeClock
+from flatland.ros.layer_maps import LayerMaps
 from flatland.ros.message_types import service_class
+from flatland.ros.model_states import ModelStatesService, ModelStatesTopic
 from flatland.ros.names import sendable_text
+from flatland.ros.reset_service import ResetService
+from flatland.ros.service_calls import (
+    REGISTRATION_TIMEOUT,
+    CallError,
+    ServiceCalls,
+    describe_displacement,
+    pose_of,
+)
+from flatland.ros.step_service import StepService
 from flatland.ros.transport.registrar import Registrar
-from flatland.ros.transport.service import Service, wait_for
+from flatland.ros.transport.service import Service
 from flatland.runtime.placement import IfBlocked
 from flatland.simulation import Simulation
-
-_LOG = logging.getLogger("flatland")
-
-_REGISTRATION_TIMEOUT: Final = 5.0  # s, for the registration of the topics of a new model
 
 
 class Services:
@@ -36,26 +41,38 @@ class Services:
         self,
         registrar: Registrar,
         simulation: Simulation,
+        clock: NodeClock,
         if_blocked: IfBlocked = "warn",
         *,
         move_keeps_odometry: bool = False,
+        model_states_rate: float = 0.0,
     ) -> None:
         """Advertises the services asynchronously.
 
         Args:
             registrar: Registers the services with the ROS master.
             simulation: Simulation that the services control.
+            clock: Publishes the time.
             if_blocked: Behaviour of `spawn_model` and `move_model` at poses that are not free.
             move_keeps_odometry: Whether `move_model` keeps the odometry of the model.
+            model_states_rate: Rate of the topic `model_states` in simulated time [Hz]; 0 for one
+                message per step.
 
         Raises:
             FlatlandError: A plugin has a service of the same name.
         """
         self._registrar = registrar
         self._simulation = simulation
+        self._calls = ServiceCalls(registrar, simulation)
         self._if_blocked = if_blocked
         self._keep_odometry = move_keeps_odometry
         world = simulation.world
+        StepService(self._calls, clock)
+        ResetService(self._calls)
+        LayerMaps(self._calls)
+        ModelStatesService(self._calls)
+        ModelStatesTopic(self._calls, model_states_rate)
+        BatchServices(self._calls, if_blocked, move_keeps_odometry=move_keeps_odometry)
         for name, service_type, handler in (
             ("spawn_model", service_class("SpawnModel"), self._spawn_model),
             ("delete_model", service_class("DeleteModel"), self._delete_model),
@@ -70,9 +87,9 @@ class Services:
     # rospy converts the returned fields to the response class of the service.
 
     def _spawn_model(self, request: Any) -> tuple[bool, str]:
-        pose = _pose(request.pose)
+        pose = pose_of(request.pose)
         return self._carry_out(
-            lambda: _displacement(
+            lambda: describe_displacement(
                 self._simulation.world.spawn_model(
                     request.yaml_path, request.name, request.ns, pose, self._if_blocked
                 ),
@@ -84,9 +101,9 @@ class Services:
         return self._carry_out(lambda: self._simulation.world.delete_model(request.name))
 
     def _move_model(self, request: Any) -> tuple[bool, str]:
-        pose = _pose(request.pose)
+        pose = pose_of(request.pose)
         return self._carry_out(
-            lambda: _displacement(
+            lambda: describe_displacement(
                 self._simulation.world.move_model(
                     request.name, pose, self._if_blocked, keep_odometry=self._keep_odometry
                 ),
@@ -103,7 +120,7 @@ class Services:
             # Clients read the current rate from the parameter.
             value = 0.0 if math.isinf(rate) else rate
             self._registrar.set_parameter("~update_rate", value)
-            self._registrar.flush(_REGISTRATION_TIMEOUT)
+            self._registrar.flush(REGISTRATION_TIMEOUT)
         return done, message
 
     def _switch(self, action: Callable[[], None]) -> Callable[[Any], EmptyResponse]:
@@ -123,31 +140,6 @@ class Services:
             Whether it succeeded, and the text that it returned or the error.
         """
         try:
-            requests = self._simulation.world.requests
-            message = wait_for(self._simulation.post(action), requests) or ""
-            # A client may use the topics of a model as soon as it receives the response.
-            self._registrar.flush(_REGISTRATION_TIMEOUT)
-        except (FlatlandError, rospy.ServiceException) as error:
-            self._registrar.flush(_REGISTRATION_TIMEOUT)
-            text = error.text_with_hint if isinstance(error, FlatlandError) else str(error)
-            return False, sendable_text(text)
-        except Exception as error:
-            _LOG.exception("unexpected internal error in a service call")
-            return False, sendable_text(f"{type(error).__name__}: {error}")
-        return True, sendable_text(message)
-
-
-def _displacement(model: Model | None, requested: Pose) -> str:
-    """Describes where a model was put instead of the requested pose; empty if it is there."""
-    if model is None or model.displacement == (0.0, 0.0):
-        return ""
-    dx, dy = model.displacement
-    x, y, theta = requested[0] + dx, requested[1] + dy, requested[2]
-    return (
-        f'the requested pose is blocked: model "{model.name}" was put at '
-        f"({x:.3f}, {y:.3f}, {theta:.3f}), {math.hypot(dx, dy):.3f} m away"
-    )
-
-
-def _pose(pose: Any) -> Pose:
-    return (pose.x, pose.y, pose.theta)
+            return True, sendable_text(self._calls.carry_out(action) or "")
+        except CallError as error:
+            return False, str(error)

@@ -11,7 +11,10 @@ import numpy as np
 from flatland.config.reader import ReadYaml, YamlReader
 from flatland.errors import WorldError
 from flatland.geometry import DoubleArray
+from flatland.loading.model_source import ModelSpec
 from flatland.plugin_api.noise import checked_seed
+from flatland.runtime.layer_maps import LayerMaps
+from flatland.runtime.many_models import ManyModels, plain_pose
 from flatland.runtime.model_states import ModelStates, model_states
 from flatland.runtime.placement import IfBlocked, Models, check_if_blocked
 from flatland.runtime.state_hash import state_hash
@@ -46,7 +49,7 @@ if TYPE_CHECKING:
 R = TypeVar("R")
 
 
-class Contents:
+class Contents(ManyModels, LayerMaps):
     """Everything that is in a world; the base class of `World`, which creates and steps it.
 
     Changes that a plugin's hook requests take effect after the step.
@@ -155,7 +158,9 @@ class Contents:
         """Reads a model file and adds the model to the world.
 
         Args:
-            yaml_path: Model file; a relative path starts from the folder of the world file.
+            yaml_path: Model file; a relative path starts from the folder of the world file. Or YAML
+                text that begins with a line break or with `{`; relative paths in it start there,
+                too.
             name: Name of the model, unique in the world.
             namespace: Namespace of its topics and frames, may be empty.
             pose: (x, y, theta) of its first body in the world frame [m, rad].
@@ -179,10 +184,10 @@ class Contents:
                 "yaml_path": path,
                 "name": name,
                 "namespace": namespace,
-                "pose": _numbers(pose),
+                "pose": plain_pose(pose),
                 "if_blocked": if_blocked,
             },
-            lambda: self._models.spawn(path, name, namespace, pose, if_blocked),
+            lambda: self._models.spawn(ModelSpec(path, name, namespace, pose), if_blocked),
         )
 
     def move_model(
@@ -216,7 +221,7 @@ class Contents:
             "move_model",
             {
                 "name": name,
-                "pose": _numbers(pose),
+                "pose": plain_pose(pose),
                 "if_blocked": if_blocked,
                 "keep_odometry": keep_odometry,
             },
@@ -555,11 +560,3 @@ class Contents:
     def check_open(self) -> None:
         """Raises `WorldError` if the world is closed."""
         raise NotImplementedError
-
-
-def _numbers(pose: object) -> object:
-    """Returns a pose as plain numbers if it is one; an invalid one is rejected later."""
-    try:
-        return tuple(float(number) for number in pose)  # type: ignore[attr-defined]
-    except (TypeError, ValueError):
-        return repr(pose)

@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from flatland.config.inputs import only_files_in
 from flatland.entities.model import Model
 from flatland.errors import WorldError, YamlError
 from flatland.geometry import Pose, finite_pose
 from flatland.graph_names import is_legal_namespace
 from flatland.loading.model_loader import ModelLoader
+from flatland.loading.model_source import ModelSources, ModelSpec
 
 if TYPE_CHECKING:
     from flatland.runtime.contacts import ContactReporter
@@ -66,16 +66,27 @@ class ModelSet:
         except KeyError:
             raise WorldError(f'model with name "{name}" does not exist') from None
 
-    def spawn(
-        self, path: str, name: str, namespace: str, pose: Sequence[float], if_blocked: IfBlocked
-    ) -> Model:
-        """Creates a model from a file; see `World.spawn_model`."""
-        world = self._world
-        checked_pose = self._check_spawn(path, name, namespace, pose)
-        path = world.resolve_path(path)
-        with world.inputs.collecting(), only_files_in(world.model_path):
-            reader = world.read_yaml(path, world.params)
-        model = Model(world, name, namespace, path)
+    def spawn(self, spec: ModelSpec, if_blocked: IfBlocked) -> Model:
+        """Creates a model; see `World.spawn_model`."""
+        model = self.create(spec, if_blocked, ModelSources(self._world))
+        self.announce(model, if_blocked)
+        return model
+
+    def create(self, spec: ModelSpec, if_blocked: IfBlocked, sources: ModelSources) -> Model:
+        """Adds a model to the world; `announce` or `discard` must follow.
+
+        Args:
+            spec: The model.
+            if_blocked: As for `World.spawn_model`.
+            sources: Reads the model file.
+
+        Raises:
+            FlatlandError: The model is invalid, or the pose is blocked; nothing was changed.
+        """
+        world, name = self._world, spec.name
+        checked_pose = self._check_spawn(spec)
+        path, reader = sources.read(spec.yaml_path)
+        model = Model(world, name, spec.namespace, path)
         loader = ModelLoader(world.physics, world.collision_filter, model, reader)
         try:
             loader.load_bodies_and_joints(checked_pose)
@@ -88,16 +99,37 @@ class ModelSet:
             self._remove(model)
             raise
         self.by_name[name] = model
+        return model
+
+    def announce(self, model: Model, if_blocked: IfBlocked) -> None:
+        """Notifies the observers of a created model, and logs if its pose is blocked."""
         if if_blocked == "warn":
             self._placement.warn_if_blocked(model)
         self._observers.model_added(model)
-        return model
+
+    def discard(self, model: Model) -> None:
+        """Removes a created model of which the observers were not notified."""
+        # A plugin of a later model may have deleted it.
+        if self.by_name.get(model.name) is model:
+            del self.by_name[model.name]
+            self._remove(model)
+
+    def put(self, model: Model, pose: Pose) -> None:
+        """Moves a model to a pose, whether it is blocked or not.
+
+        Raises:
+            WorldError: The pose is out of the range of the physics.
+        """
+        try:
+            model.set_pose(*pose)
+        except ValueError as error:
+            raise WorldError(f'failed to move model "{model.name}", {error}') from None
 
     def move(
         self, name: str, pose: Sequence[float], if_blocked: IfBlocked, keep_odometry: bool
     ) -> Model:
         """Moves a model; see `World.move_model`."""
-        model = self._find_to("move", name)
+        model = self.find_to("move", name)
         previous = {body.name: body.pose for body in model.bodies}
         try:
             self._place(model, finite_pose(pose), if_blocked, "move")
@@ -111,17 +143,18 @@ class ModelSet:
 
     def delete(self, name: str) -> None:
         """Deletes a model; see `World.delete_model`."""
-        model = self._find_to("delete", name)
+        model = self.find_to("delete", name)
         del self.by_name[name]
         self._remove(model)
         self._observers.model_removed(model)
 
-    def _check_spawn(self, path: str, name: str, namespace: str, pose: Sequence[float]) -> Pose:
+    def _check_spawn(self, spec: ModelSpec) -> Pose:
+        name, namespace = spec.name, spec.namespace
         if not name:
             raise WorldError("failed to spawn model, its name must not be empty")
         if name in self.by_name:
             raise YamlError(f'Model with name "{name}" already exists')
-        if not path:
+        if not spec.yaml_path:
             raise WorldError(f'failed to spawn model "{name}", the path must not be empty')
         if not is_legal_namespace(namespace):
             raise WorldError(
@@ -129,11 +162,16 @@ class ModelSet:
                 'name: it must start with a letter and hold only letters, digits, "_" and "/"'
             )
         try:
-            return finite_pose(pose)
+            return finite_pose(spec.pose)
         except ValueError as error:
             raise WorldError(f'failed to spawn model "{name}", {error}') from None
 
-    def _find_to(self, verb: str, name: str) -> Model:
+    def find_to(self, verb: str, name: str) -> Model:
+        """Returns the model of a name.
+
+        Raises:
+            WorldError: It does not exist; the text names the operation.
+        """
         try:
             return self.by_name[name]
         except KeyError:

@@ -59,7 +59,7 @@ class Stepping:
         self._observers = observers
         self._faults = faults
 
-    def step(self, n: int) -> None:
+    def step(self, n: int, while_paused: bool = False) -> None:
         """Steps n times; see `World.step`."""
         requests, faults = self._requests, self._faults
         requests.refuse_in_plugin("step")
@@ -68,7 +68,7 @@ class Stepping:
         while left > 0:
             with requests.lock:
                 self._start()
-                if self._world.paused:
+                if self._world.paused and not while_paused:
                     left -= 1
                 else:
                     requests.hook_thread = thread

@@ -23,6 +23,8 @@ FIELDS = {
     "float64[] magnitude_forces, Vector2[] contact_positions, Vector2[] contact_normals",
     "Collisions": "Header header, Collision[] collisions",
     "DebugTopicList": "string[] topics",
+    "ModelPose": "string name, Pose2D pose",
+    "ModelSpec": "string yaml_path, string name, string ns, Pose2D pose",
 }
 ANSWER = "bool success, string message"
 REQUESTS = {
@@ -37,7 +39,7 @@ OF_THE_REFERENCE = {
     "MoveModel": "47b5f16cf15e326c7400f4504d3a0f75",
     "DebugTopicList": "b0eef9a05d4e829092fc2f2c3c2aad3d",
 }
-MESSAGES = ("Vector2", "Collision", "Collisions", "DebugTopicList")
+MESSAGES = ("Vector2", "Collision", "Collisions", "DebugTopicList", "ModelPose", "ModelSpec")
 
 
 def text_of(fields: str) -> str:

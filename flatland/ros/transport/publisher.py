@@ -95,7 +95,7 @@ class Publisher:
         self._closed = True
         self._update()
         self._registrar.release("publisher", self.topic, self._owner)
-        self._registrar.submit(self._end)
+        self._registrar.submit_closing(self._end)
 
     # -- in the registrar's thread ---------------------------------------------------------
 

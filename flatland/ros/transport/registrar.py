@@ -11,7 +11,7 @@ import contextlib
 import logging
 import queue
 import threading
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
 import rospy
@@ -31,6 +31,8 @@ class Registrar:
     def __init__(self) -> None:
         """Starts the thread."""
         self._actions: queue.SimpleQueue[Callable[[], object]] = queue.SimpleQueue()
+        self._postponed: list[Callable[[], object]] | None = None
+        self._unfinished = 0  # actions in the queue, and the one that is carried out
         self._closed = False
         self.master_lost = False
         self._lock = threading.Lock()
@@ -44,7 +46,32 @@ class Registrar:
 
     def submit(self, action: Callable[[], object]) -> None:
         """Queues an action and returns immediately."""
+        with self._lock:
+            self._unfinished += 1
         self._actions.put(action)
+
+    def submit_closing(self, action: Callable[[], object]) -> None:
+        """Queues an action that closes a topic; at the end of `closing_last` if that is active."""
+        if self._postponed is None:
+            self.submit(action)
+        else:
+            self._postponed.append(action)
+
+    @contextlib.contextmanager
+    def closing_last(self) -> Iterator[None]:
+        """Closes topics after those that are opened in the block.
+
+        A topic that is closed and opened again in the block stays registered, with the same
+        connections, because rospy counts its publishers and subscriptions. To be used in the thread
+        that steps the world, which is the one that closes topics.
+        """
+        self._postponed = []
+        try:
+            yield
+        finally:
+            postponed, self._postponed = self._postponed, None
+            for action in postponed:
+                self.submit(action)
 
     def flush(self, timeout: float) -> bool:
         """Waits until all actions queued so far are done; not while the master is lost.
@@ -55,6 +82,8 @@ class Registrar:
         Returns:
             Whether they are done.
         """
+        if not self._unfinished:
+            return True  # A wait would cost two changes of threads.
         if self.master_lost:
             return False
         done = threading.Event()
@@ -147,11 +176,16 @@ class Registrar:
     def _run(self) -> None:
         while not self._closed:
             action = self._actions.get()
-            # A node that registers while it ends would take its name back from the node that
-            # replaces it.
-            if self._closed or rospy.core.is_shutdown_requested():
-                continue
-            try:
-                action()
-            except Exception:
-                _LOG.exception("cannot register or unregister a topic or service")
+            self._run_one(action)
+            with self._lock:
+                self._unfinished -= 1
+
+    def _run_one(self, action: Callable[[], object]) -> None:
+        # A node that registers while it ends would take its name back from the node that
+        # replaces it.
+        if self._closed or rospy.core.is_shutdown_requested():
+            return
+        try:
+            action()
+        except Exception:
+            _LOG.exception("cannot register or unregister a topic or service")

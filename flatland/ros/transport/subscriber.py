@@ -54,7 +54,7 @@ class Subscriber:
             return
         self._closed = True
         self._registrar.release("subscriber", self.topic, self._owner)
-        self._registrar.submit(self._end)
+        self._registrar.submit_closing(self._end)
 
     def _receive(self, message: Any) -> None:
         if not self._closed:

@@ -7,6 +7,7 @@
 
 #include "bindings/bindings.h"
 #include "world/bodies.h"
+#include "world/motions.h"
 
 namespace py = pybind11;
 
@@ -15,6 +16,10 @@ namespace {
 
 using PyTriple = std::tuple<double, double, double>;
 using PyPair = std::tuple<double, double>;
+
+struct SavedMotions {
+  std::vector<Motion> motions;
+};
 
 PyTriple to_python(const Triple& t) { return {t[0], t[1], t[2]}; }
 PyPair to_python(const b2Vec2& v) { return {static_cast<double>(v.x), static_cast<double>(v.y)}; }
@@ -79,6 +84,11 @@ void bind_bodies(WorldClass& world) {
     if (!states.empty()) std::memcpy(rows.mutable_data(), states.data(), rows.nbytes());
     return rows;
   });
+  // Opaque to Python, hence a class instead of a list.
+  py::class_<SavedMotions>(world, "SavedMotions");
+  world.def("saved_motions", [](const World& self) { return SavedMotions{saved_motions(self)}; });
+  world.def("restore_motions",
+            [](World& self, const SavedMotions& saved) { restore_motions(self, saved.motions); });
   world.def(
       "motions",
       [](const World& self, const std::vector<Id>& bodies) {

@@ -1,0 +1,91 @@
+"""What models are created from: files, or YAML text given instead of a path."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Final
+
+from flatland.config.inputs import only_files_in
+from flatland.config.reader import YamlReader
+
+if TYPE_CHECKING:
+    from flatland.world import World
+
+TEXT_NAME: Final = "<text>"
+"""Name of a YAML text in error messages, and `Model.path` of its model."""
+
+
+@dataclass(frozen=True, slots=True)
+class ModelSpec:
+    """A model to spawn; see `World.spawn_models`.
+
+    Attributes:
+        yaml_path: Model file, or YAML text that begins with a line break or with `{`.
+        name: Name of the model, unique in the world.
+        namespace: Namespace of its topics and frames, may be empty.
+        pose: (x, y, theta) of the model in the world frame [m, rad].
+    """
+
+    yaml_path: str
+    name: str
+    namespace: str = ""
+    pose: Sequence[float] = (0.0, 0.0, 0.0)
+
+
+def is_yaml_text(yaml_path: str) -> bool:
+    """Returns whether a path is YAML text instead: it begins with a line break or with `{`."""
+    return yaml_path[:1] in ("\n", "\r", "{") and yaml_path != ""
+
+
+class ModelSources:
+    """Reads the sources of the models of one request.
+
+    Each source is parsed once, unless its expressions (`$eval`) may differ from model to model.
+    """
+
+    def __init__(self, world: World) -> None:
+        """Creates a reader without sources.
+
+        Args:
+            world: The world of the models.
+        """
+        self._world = world
+        self._known: dict[str, tuple[str, YamlReader]] = {}
+
+    def read(self, yaml_path: str) -> tuple[str, YamlReader]:
+        """Reads a source.
+
+        Relative paths in a text start from the folder of the world file. The files that a text
+        includes are subject to `World.model_path`.
+
+        Args:
+            yaml_path: As in `ModelSpec`.
+
+        Returns:
+            The absolute path of the file, or `TEXT_NAME`, and a reader of the root.
+
+        Raises:
+            YamlError: The source cannot be read, is not valid YAML, or cannot be preprocessed.
+        """
+        known = self._known.get(yaml_path)
+        if known is None:
+            known = self._load(yaml_path)
+        path, reader = known
+        return path, reader.unread()
+
+    def _load(self, yaml_path: str) -> tuple[str, YamlReader]:
+        world = self._world
+        inputs = world.inputs
+        before = inputs.expression_count
+        with inputs.collecting(), only_files_in(world.model_path):
+            if is_yaml_text(yaml_path):
+                folder = world.resolve_path("")
+                reader = YamlReader.from_string(yaml_path, world.params, folder, TEXT_NAME)
+                loaded = TEXT_NAME, reader
+            else:
+                path = world.resolve_path(yaml_path)
+                loaded = path, world.read_yaml(path, world.params)
+        if inputs.expression_count == before:
+            self._known[yaml_path] = loaded
+        return loaded

@@ -1,0 +1,27 @@
+// The motions of all bodies, saved to undo changes of poses exactly.
+#pragma once
+
+#include <vector>
+
+#include "world/world.h"
+
+namespace flatland {
+
+// Pose, velocity and sleep of a body, as Box2D stores them.
+struct Motion {
+  Id body = 0;
+  b2Transform transform;
+  b2Sweep sweep;
+  b2Vec2 linear_velocity;
+  float angular_velocity = 0.0F;
+  float sleep_time = 0.0F;
+  bool awake = false;
+};
+
+std::vector<Motion> saved_motions(const World& world);
+
+// Restores the motions bit by bit. Bodies that were destroyed in the meantime are ignored, bodies
+// that were created keep theirs.
+void restore_motions(World& world, const std::vector<Motion>& motions);
+
+}  // namespace flatland

@@ -1,0 +1,182 @@
+"""The topic `model_states` and the service `get_model_states` of a running node."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+from geometry_msgs.msg import Pose2D, Twist
+from nav_msgs.msg import Odometry
+from raw_subscriber import RawSubscriber
+from std_srvs.srv import Empty
+
+from flatland.msg import ModelPose, ModelSpec, ModelStates
+from flatland.srv import (
+    DeleteModels,
+    GetModelStates,
+    MoveModels,
+    ResetWorld,
+    SpawnModels,
+    StepWorld,
+)
+
+STEP_NS = 5_000_000
+MODELS = """
+  - {name: first, model: robot.model.yaml, namespace: first, pose: [3, 3, 0]}
+  - {name: ball, model: ball.model.yaml, pose: [-3, 1, 0.5]}
+"""
+
+
+@pytest.fixture(scope="module")
+def world(write_world: Callable[..., Path]) -> Path:
+    return write_world(MODELS)
+
+
+@pytest.fixture(scope="module", autouse=True)
+def server(module_launcher: Any, world: Path) -> Any:
+    return module_launcher.server(world, lockstep=True, seed=1)
+
+
+@pytest.fixture(autouse=True)
+def fresh_world(ros: Any) -> None:
+    assert ros.call("/reset_world", ResetWorld, False, -1).success
+
+
+def step(ros: Any, duration: float = 0.0) -> int:
+    answer = ros.call("/step_world", StepWorld, duration)
+    assert answer.success, answer.message
+    return int(answer.stamp.to_nsec())
+
+
+def states(ros: Any, *names: str) -> Any:
+    answer = ros.call("/get_model_states", GetModelStates, list(names))
+    assert (answer.success, answer.message) == (True, "")
+    return answer.states
+
+
+def test_states_of_all_models(ros: Any) -> None:
+    got = states(ros)
+    assert (got.name, got.ns) == (["first", "ball"], ["first", ""])
+    assert got.header.frame_id == "map"
+    assert got.header.stamp.to_nsec() == 0
+    assert got.pose == [Pose2D(3, 3, 0), Pose2D(-3, 1, 0.5)]
+    assert got.twist == [Twist(), Twist()]
+
+
+def test_states_of_a_moving_model(ros: Any) -> None:
+    commands = ros.publisher("/first/cmd_vel", Twist)
+    truth = ros.topic("/first/odometry/ground_truth", Odometry)
+    command = Twist()
+    command.linear.x, command.angular.z = 0.5, 0.25
+    while states(ros, "first").twist[0].angular.z == 0:
+        commands.publish(command)
+        now = step(ros, 0.1)
+    got = states(ros, "first")
+    assert got.header.stamp.to_nsec() == now
+    # The ground truth of the next step is that of its start.
+    truth.drop()
+    step(ros)
+    odometry = truth.until(lambda m: m.header.stamp.to_nsec() == now)
+    position = odometry.pose.pose.position
+    assert (got.pose[0].x, got.pose[0].y) == (position.x, position.y)
+    twist = got.twist[0]
+    assert twist.linear.x**2 + twist.linear.y**2 == pytest.approx(0.25, rel=1e-3)
+    assert twist.angular.z == pytest.approx(0.25)
+    assert (twist.linear.z, twist.angular.x, twist.angular.y) == (0, 0, 0)
+
+
+def test_states_are_returned_in_the_order_of_the_request(ros: Any) -> None:
+    got = states(ros, "ball", "first", "ball")
+    assert got.name == ["ball", "first", "ball"]
+    assert got.ns == ["", "first", ""]
+    assert [pose.x for pose in got.pose] == [-3, 3, -3]
+
+
+@pytest.mark.parametrize("name", ["ghost", "", "n" * 9999])
+def test_an_unknown_model_is_an_error(ros: Any, name: str) -> None:
+    answer = ros.call("/get_model_states", GetModelStates, ["first", name])
+    assert answer.success is False
+    assert answer.message == f'Flatland World: model with name "{name}" does not exist'
+    assert answer.states == ModelStates()
+
+
+def test_states_can_be_sent_back(ros: Any) -> None:
+    before = states(ros)
+    far = [ModelPose("first", Pose2D(0.1, 0.2, 0.3)), ModelPose("ball", Pose2D(1, 2, 3))]
+    assert ros.call("/move_models", MoveModels, far).success
+    assert states(ros).pose != before.pose
+    back = [ModelPose(n, pose) for n, pose in zip(before.name, before.pose, strict=True)]
+    assert ros.call("/move_models", MoveModels, back).success
+    assert states(ros).pose == before.pose
+
+
+def test_topic_equals_the_service_at_its_rate(ros: Any) -> None:
+    raw = RawSubscriber(ros.master, "/model_states", ModelStates)
+    first = raw.next()  # without a step
+    assert first.name == ["first", "ball"]
+    step(ros, 0.1)
+    raw.received()
+    # At 50 Hz, every fourth step of 5 ms, with the time after the step.
+    step(ros, 0.1)
+    received = raw.received()
+    assert len(received) == 5
+    times = [message.header.stamp.to_nsec() for message in received]
+    assert times == list(range(times[0], times[0] + 5 * 4 * STEP_NS, 4 * STEP_NS))
+    while raw.received() == []:
+        step(ros)
+    step(ros, 0.02)
+    (last,) = raw.received()
+    expected = states(ros)
+    last.header.seq = expected.header.seq = 0
+    assert last == expected
+    raw.close()
+
+
+def test_changes_of_a_paused_world_are_published_once(ros: Any) -> None:
+    ros.call("/pause", Empty)
+    topic = ros.topic("/model_states", ModelStates)
+    topic.next()
+    topic.rest()
+    models = [ModelSpec("ball.model.yaml", f"b{i}", "", Pose2D(i, 0, 0)) for i in range(3)]
+    assert ros.call("/spawn_models", SpawnModels, models).success
+    (message,) = topic.rest()
+    assert message.name == ["first", "ball", "b0", "b1", "b2"]
+    moves = [ModelPose("b0", Pose2D(0, 1, 0)), ModelPose("b1", Pose2D(1, 1, 0))]
+    assert ros.call("/move_models", MoveModels, moves).success
+    (message,) = topic.rest()
+    assert message.pose[2] == Pose2D(0, 1, 0)
+    assert ros.call("/delete_models", DeleteModels, ["ball", "b1"]).success
+    (message,) = topic.rest()
+    assert message.name == ["first", "b0", "b2"]
+    assert ros.call("/reset_world", ResetWorld, False, -1).success
+    assert topic.rest()[-1].name == ["first", "ball"]
+    ros.call("/resume", Empty)
+
+
+def test_names_outside_ascii(ros: Any) -> None:
+    topic = ros.topic("/model_states", ModelStates)
+    assert ros.spawn("ball.model.yaml", "ä☃\n").success
+    assert topic.until(lambda message: len(message.name) == 3).name[2] == "ä☃\n"
+    assert states(ros).name[2] == "ä☃\n"
+
+
+def test_a_world_without_models(ros: Any) -> None:
+    topic = ros.topic("/model_states", ModelStates)
+    assert ros.call("/delete_models", DeleteModels, ["first", "ball"]).success
+    message = topic.until(lambda message: message.name == [])
+    assert (message.pose, message.twist) == ([], [])
+    assert states(ros).name == []
+
+
+def test_one_message_per_step(launcher: Any, ros: Any, world: Path, server: Any) -> None:
+    server.stop()
+    launcher.server(world, lockstep=True, model_states_rate=0)
+    raw = RawSubscriber(ros.master, "/model_states", ModelStates)
+    raw.next()
+    step(ros, 0.1)
+    raw.received()
+    step(ros, 0.1)
+    assert len(raw.received()) == 20
+    raw.close()

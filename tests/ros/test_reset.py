@@ -1,0 +1,299 @@
+"""`reset_world` of a running node: the state, the time, topics and subscribers."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import pytest
+from nav_msgs.msg import Odometry
+from raw_subscriber import RawSubscriber
+from rosgraph_msgs.msg import Clock
+from sensor_msgs.msg import LaserScan
+from std_msgs.msg import Bool, String
+from std_srvs.srv import Empty
+from tf2_msgs.msg import TFMessage
+from visualization_msgs.msg import InteractiveMarkerUpdate, MarkerArray
+from waiting import wait_until
+
+from flatland.srv import ResetWorld, StepWorld
+
+STEP_NS = 5_000_000
+NOISY = """
+bodies: [{name: base, footprints: [{type: circle, radius: 0.2, density: 1}]}]
+plugins:
+  - {type: DiffDrive, name: drive, body: base, pub_rate: 50, odom_pose_noise: [0.01, 0.01, 0.01]}
+  - {type: Laser, name: laser, body: base, range: 20, update_rate: 10, noise_std_dev: 0.05,
+     angle: {min: -1.5, max: 1.5, increment: 0.5}}
+  - {type: Talker, name: talker}
+"""
+TALKER = """
+import pathlib
+
+from std_msgs.msg import String
+
+import flatland
+
+
+class Talker(flatland.ModelPlugin):
+    def on_initialize(self, config):
+        marker = pathlib.Path(__file__).with_name("fail")
+        if marker.exists():
+            raise RuntimeError("cannot start")
+        self.talk = self.ros.advertise("talk", String)
+        self.ros.subscribe("listen", String, lambda message: self.talk.publish(message))
+"""
+MANIFEST = """
+<library path=".">
+  <class name="Talker" type="reset_talker.Talker" base_class_type="flatland::ModelPlugin"/>
+</library>
+"""
+KEPT = {
+    "publishers": {
+        "/first/scan",
+        "/first/odometry/filtered",
+        "/first/odometry/ground_truth",
+        "/first/twist",
+        "/first/talk",
+        "/clock",
+        "/tf",
+        "/flatland_server/debug/model/first",
+        "/flatland_server/debug/layer/2d",
+        "/interactive_model_markers/update",
+        "/flatland_server/paused",
+    },
+    "subscribers": {"/first/cmd_vel", "/first/listen", "/interactive_model_markers/feedback"},
+    "services": {"/spawn_model", "/step_world", "/reset_world"},
+}
+
+
+@pytest.fixture(scope="module")
+def world(write_world: Callable[..., Path]) -> Path:
+    path = write_world(
+        "[{name: first, model: noisy.model.yaml, namespace: first, pose: [3, 3, 0]}]", noisy=NOISY
+    )
+    (path.parent / "reset_talker.py").write_text(TALKER)
+    (path.parent / "manifest.xml").write_text(MANIFEST)
+    return path
+
+
+@pytest.fixture(scope="module", autouse=True)
+def server(module_launcher: Any, world: Path) -> Any:
+    manifest = str(world.parent / "manifest.xml")
+    module_launcher.environment = {
+        **module_launcher.environment,
+        "FLATLAND_PLUGIN_PATH": manifest,
+    }
+    return module_launcher.server(world, lockstep=True, seed=1, show_viz=True)
+
+
+@pytest.fixture
+def raw(ros: Any) -> Iterator[Callable[..., RawSubscriber]]:
+    opened = []
+
+    def subscribe(topic: str, message_type: type[Any]) -> RawSubscriber:
+        opened.append(RawSubscriber(ros.master, topic, message_type))
+        return opened[-1]
+
+    yield subscribe
+    for subscriber in opened:
+        subscriber.close()
+
+
+def step(ros: Any, duration: float = 0.0) -> int:
+    answer = ros.call("/step_world", StepWorld, duration)
+    assert answer.success, answer.message
+    return int(answer.stamp.to_nsec())
+
+
+def reset(ros: Any, *, keep_time: bool = False, seed: int = -1) -> None:
+    answer = ros.call("/reset_world", ResetWorld, keep_time, seed)
+    assert (answer.success, answer.message) == (True, "")
+
+
+@contextmanager
+def watched_master(ros: Any, kept: dict[str, set[str]]) -> Iterator[None]:
+    """Polls the registrations of the node all the time, and checks that none is missing."""
+    missing: list[str] = []
+    polls = [0]
+    ended = threading.Event()
+
+    def poll() -> None:
+        while not ended.is_set():
+            state = ros.master.getSystemState()
+            for kind, entries in zip(("publishers", "subscribers", "services"), state, strict=True):
+                there = {name for name, nodes in entries if "/flatland_server" in nodes}
+                missing.extend(kept[kind] - there)
+            polls[0] += 1
+
+    thread = threading.Thread(target=poll)
+    thread.start()
+    try:
+        yield
+    finally:
+        ended.set()
+        thread.join()
+    assert polls[0] > 3
+    assert not missing
+
+
+def episode(ros: Any, *subscribers: RawSubscriber) -> list[str]:
+    """Returns the messages of half a second, without their sequence numbers."""
+    for subscriber in subscribers:
+        subscriber.received()
+    step(ros, 0.5)
+    texts = []
+    for subscriber in subscribers:
+        for message in subscriber.received():
+            if hasattr(message, "header"):
+                message.header.seq = 0
+            texts.append(str(message))
+    return texts
+
+
+def test_the_same_messages_result_after_a_reset(ros: Any, raw: Any) -> None:
+    subscribers = [
+        raw("/first/scan", LaserScan),
+        raw("/first/odometry/filtered", Odometry),
+        raw("/tf", TFMessage),
+        raw("/clock", Clock),
+    ]
+    step(ros, 0.1)  # All connections are known to the node.
+    runs = []
+    for seed in (-1, -1, 7, -1, 1):
+        reset(ros, seed=seed)
+        runs.append(episode(ros, *subscribers))
+    assert len(runs[0]) > 100
+    assert runs[1] == runs[0]
+    assert runs[2] != runs[0]
+    assert runs[3] == runs[2]
+    assert runs[4] == runs[0]
+
+
+def test_time_starts_at_0_again_or_continues(ros: Any) -> None:
+    clock = ros.topic("/clock", Clock)
+    reset(ros)
+    assert step(ros) == STEP_NS
+    clock.until(lambda message: message.clock.to_nsec() == STEP_NS)
+    step(ros, 0.1)
+    reset(ros)
+    times = [message.clock.to_nsec() for message in clock.rest()]
+    assert times[-2:] == [21 * STEP_NS, 0]
+    assert step(ros, 0.1) == 20 * STEP_NS
+    reset(ros, keep_time=True)
+    assert step(ros) == 21 * STEP_NS
+
+
+def test_models_of_the_file_are_back_and_others_are_gone(ros: Any) -> None:
+    reset(ros)
+    step(ros)
+    before = ros.registered()
+    assert ros.spawn("ball.model.yaml", "more").success
+    assert ros.spawn("robot.model.yaml", "other", "other", (-3, -3, 0)).success
+    assert ros.delete("first").success
+    reset(ros)
+    # Marker topics of deleted models are closed after a delay.
+    wait_until("the topics of the file", lambda: ros.registered() == before)
+    assert not ros.delete("more").success
+    assert not ros.delete("other").success
+    truth = ros.topic("/first/odometry/ground_truth", Odometry)
+    step(ros, 0.1)
+    position = truth.next().pose.pose.position
+    assert (position.x, position.y) == pytest.approx((3, 3), abs=1e-6)
+
+
+def test_topics_do_not_flicker_and_subscribers_stay_connected(ros: Any, raw: Any) -> None:
+    scans, talk = raw("/first/scan", LaserScan), ros.topic("/first/talk", String)
+    raw_talk = raw("/first/talk", String)
+    listen = ros.publisher("/first/listen", String)
+    step(ros, 0.2)
+    connections = talk._subscriber.impl.connections[:]
+    with watched_master(ros, KEPT):
+        for number in range(20):
+            reset(ros, keep_time=number % 2 == 0)
+            scans.received()
+            step(ros, 0.1)
+            # A new connection would be received neither here nor by `raw_talk`.
+            assert len(scans.received()) == 1
+    assert talk._subscriber.impl.connections == connections
+    assert listen.get_num_connections() == 1
+    listen.publish(String("still connected"))
+    assert talk.next().data == "still connected"
+    assert raw_talk.next().data == "still connected"
+
+
+def test_markers_follow(ros: Any) -> None:
+    markers = ros.topic("/flatland_server/debug/model/first", MarkerArray)
+    updates = ros.topic("/interactive_model_markers/update", InteractiveMarkerUpdate)
+
+    def is_at(x: float) -> Callable[[Any], bool]:
+        return lambda message: any(abs(m.pose.position.x - x) < 1e-3 for m in message.markers)
+
+    def marker_at(x: float) -> Callable[[Any], bool]:
+        return lambda message: any(
+            item.name == "first" and abs(item.pose.position.x - x) < 1e-3
+            for item in (*message.markers, *message.poses)
+        )
+
+    assert ros.move("first", (0, 0, 0)).success
+    markers.until(is_at(0))
+    updates.until(marker_at(0))
+    reset(ros)
+    markers.until(is_at(3))
+    updates.until(marker_at(3))
+
+
+def test_a_pause_continues(ros: Any) -> None:
+    ros.call("/pause", Empty)
+    reset(ros)
+    assert ros.topic("/flatland_server/paused", Bool).next().data is True
+    ros.call("/resume", Empty)
+
+
+@pytest.mark.parametrize("seed", [-2, -(2**63)])
+def test_an_invalid_seed_is_refused(ros: Any, seed: int) -> None:
+    before = step(ros)
+    answer = ros.call("/reset_world", ResetWorld, False, seed)
+    assert (answer.success, answer.message) == (
+        False,
+        f"seed must be at least 0, or -1 for the current one, got {seed}",
+    )
+    assert step(ros) == before + STEP_NS
+
+
+def test_largest_seed(ros: Any) -> None:
+    reset(ros, seed=2**63 - 1)
+    reset(ros, seed=1)
+
+
+def test_a_failed_reset_is_reported(ros: Any, world: Path) -> None:
+    fail = world.parent / "fail"
+    fail.touch()
+    try:
+        answer = ros.call("/reset_world", ResetWorld, False, -1)
+    finally:
+        fail.unlink()
+    assert answer.success is False
+    assert 'Plugin "talker" type "Talker" model "first": ' in answer.message
+    assert "cannot start" in answer.message
+    reset(ros)
+    step(ros)
+
+
+def test_reset_of_a_running_world(launcher: Any, ros: Any, world: Path, server: Any) -> None:
+    server.stop()
+    launcher.environment = {
+        **launcher.environment,
+        "FLATLAND_PLUGIN_PATH": str(world.parent / "manifest.xml"),
+    }
+    process = launcher.server(world, seed=1, update_rate=200)
+    clock = ros.topic("/clock", Clock)
+    for _ in range(5):
+        clock.until(lambda message: message.clock.to_sec() > 0.3)
+        reset(ros)
+        clock.until(lambda message: message.clock.to_sec() < 0.1)
+    assert "cannot be held" not in process.output
+    assert process.stop() == 0
