@@ -47,9 +47,7 @@ def make(message_type: type[Any], *fields: Any) -> Any:
 def time(nanoseconds: int, time_type: type[Time] = Time) -> Time:
     """Converts simulated nanoseconds to the ROS time of a stamp without rounding."""
     result: Time = object.__new__(time_type)
-    if _stamps is not None:
-        nanoseconds = _stamps(nanoseconds)
-    result.secs, result.nsecs = divmod(nanoseconds, NANOSECONDS)
+    result.secs, result.nsecs = divmod(stamp(nanoseconds), NANOSECONDS)
     return result
 
 
