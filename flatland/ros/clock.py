@@ -84,7 +84,7 @@ class SimulatedClock:
         """Sets the ROS time, and publishes it unless the rate is limited."""
         self._set(convert.time(time_ns, rospy.Time))
         if self._ticker is None and self._topic.connected:
-            self._topic.publish(self._message)
+            self._topic.publish_current(self._message.packed)
 
     def _set(self, now: rospy.Time) -> None:
         self._message.clock = now
@@ -94,7 +94,7 @@ class SimulatedClock:
         """Publishes the time if it has changed; with a limited rate, also after the last step."""
         if self._message.clock is not self._sent:
             self._sent = self._message.clock
-            self._topic.publish(self._message)
+            self._topic.publish_current(self._message.packed)
         return self._topic.connected
 
     def _connection_changed(self, _connected: bool) -> None:
@@ -119,16 +119,20 @@ class SimulatedClock:
 class _CurrentTime(Clock):  # type: ignore[misc]
     """The current time at the moment of serialization.
 
-    rospy serializes all messages of a topic one after the other, so that no subscriber receives a
+    All messages of a topic are serialized one after the other, so that no subscriber receives a
     time that is earlier than the previous one, whichever thread publishes it.
     """
 
     _TIME: Final = struct.Struct("<2I")
 
     def serialize(self, buffer: BytesIO) -> None:
-        """Writes the message; reads the time once, because another thread replaces it."""
-        now = self.clock
-        buffer.write(self._TIME.pack(now.secs, now.nsecs))
+        """Writes the message; called by rospy."""
+        buffer.write(self.packed())
+
+    def packed(self) -> bytes:
+        """Returns the serialized message."""
+        now = self.clock  # Read once, because another thread replaces it.
+        return self._TIME.pack(now.secs, now.nsecs)
 
 
 class WallClock:
