@@ -10,6 +10,7 @@ from concurrent.futures import Future
 from typing import Any
 
 from flatland.ros.transport.registrar import Registrar
+from flatland.ros.transport.ticker import TickerThread
 from flatland.simulation import Simulation
 
 _LOG = logging.getLogger("flatland")
@@ -57,19 +58,21 @@ class DeferredTopics:
     def _load(self) -> None:
         """Imports the modules and opens the topics of each between two steps."""
         markers = "flatland.ros.markers"
+        thread = TickerThread("flatland-markers", self._simulation.post)
         try:
             if self._debug_rate is not None:
                 debug = [
                     importlib.import_module(f"{markers}.debug_topics").DebugTopics,
                     importlib.import_module(f"{markers}.combined_markers").CombinedMarkers,
                 ]
-                self._start("debug markers", *debug, rate=self._debug_rate)
+                self._start("debug markers", *debug, rate=self._debug_rate, thread=thread)
             pause_topic = importlib.import_module("flatland.ros.pause_topic")
             self._start("the pause state", pause_topic.PauseTopic)
             interactive = importlib.import_module("flatland.ros.interactive.interactive_markers")
             self._start(
                 "interactive markers",
                 interactive.InteractiveMarkers,
+                thread=thread,
                 move_keeps_odometry=self._move_keeps_odometry,
             )
             diagnostics = importlib.import_module("flatland.ros.diagnostics")

@@ -130,7 +130,7 @@ class Publisher:
             else:
                 data = _SIZE.pack(len(message)) + message
             if impl.is_latch:  # because of another publisher of the topic
-                impl.latch = _SerializedMessage(data[_SIZE.size :])
+                impl.latch = SerializedMessage(data[_SIZE.size :])
             for connection in connections:
                 try:
                     connection.write_data(data)
@@ -203,10 +203,11 @@ class Publisher:
                 self._on_connection(connected)
 
 
-class _SerializedMessage:
-    """A message that rospy stores for later subscribers."""
+class SerializedMessage:
+    """A serialized message that rospy stores or sends like a message object."""
 
     def __init__(self, data: bytes) -> None:
+        """Stores the bytes, which rospy writes without a change of the sequence number."""
         self._data = data
 
     def serialize(self, buff: Any) -> None:
