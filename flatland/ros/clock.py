@@ -15,7 +15,7 @@ import rospy
 from rosgraph_msgs.msg import Clock
 from rospy import rostime
 
-from flatland.ros.adapters import convert
+from flatland.ros import stamps
 from flatland.ros.transport.registrar import Registrar
 from flatland.ros.transport.state_topic import StateTopic
 from flatland.ros.transport.ticker import Ticker
@@ -82,7 +82,7 @@ class SimulatedClock:
 
     def time_advanced(self, time_ns: int) -> None:
         """Sets the ROS time, and publishes it unless the rate is limited."""
-        self._set(convert.time(time_ns, rospy.Time))
+        self._set(stamps.time(time_ns, rospy.Time))
         if self._ticker is None and self._topic.connected:
             self._topic.publish_current(self._message.packed)
 
@@ -147,7 +147,7 @@ class WallClock:
     """
 
     def __init__(self, now: Callable[[], int] = time.time_ns) -> None:
-        """Makes `convert` use these stamps.
+        """Makes `stamps` use these stamps.
 
         Args:
             now: Returns the wall time since the epoch [ns].
@@ -157,11 +157,11 @@ class WallClock:
         # other threads read it.
         start = (0, now())
         self._anchors = start, start
-        convert.set_stamps(self.stamp)
+        stamps.set_stamps(self.stamp)
 
     def close(self) -> None:
-        """Makes `convert` use simulated time again."""
-        convert.set_stamps(None)
+        """Makes `stamps` use simulated time again."""
+        stamps.set_stamps(None)
 
     def step_started(self, time_ns: int) -> None:
         """Renews the stamp of the current simulated time if it is too old."""

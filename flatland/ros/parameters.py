@@ -8,11 +8,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TypeVar
 
-from flatland.maps.occupancy_grid import DEFAULT_RESOLUTION
+from flatland.defaults import DEFAULT_RESOLUTION, IF_BLOCKED, MAX_LAG, IfBlocked
 from flatland.ros.message_types import MESSAGE_PACKAGES, OWN_PACKAGE
 from flatland.ros.shutdown import DEFAULT_SHUTDOWN_TIMEOUT
-from flatland.runtime.placement import IF_BLOCKED, IfBlocked
-from flatland.simulation import MAX_LAG
 from flatland.timekeeper import MAX_STEP_SIZE, MIN_STEP_SIZE
 
 W = TypeVar("W", bound=str)
