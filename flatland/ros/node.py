@@ -31,6 +31,7 @@ NODE_NAME: Final = "flatland_server"
 _MASTER_POLL_PERIOD: Final = 0.2  # s between two attempts to reach the ROS master
 _MASTER_WARNING_TIMEOUT: Final = 1.0  # s without a ROS master until a warning is logged
 _SWITCH_INTERVAL: Final = 0.0002  # s for which a thread keeps the GIL while others wait for it
+_REGISTRATION_TIMEOUT: Final = 0.1  # s, for the registration of `/clock`
 _UNREGISTER_TIMEOUT: Final = 0.5  # s
 _STOP_POLL_PERIOD: Final = 0.05  # s between two checks for a stop request without a master
 _SHUTDOWN_POLL_PERIOD: Final = 0.002  # s
@@ -231,7 +232,8 @@ class ServerNode:
         else:
             clock = WallClock()
         # Other nodes have a valid time while the following modules are imported, which takes as
-        # long as everything before.
+        # long as everything before. The import would delay the registration.
+        self._registrar.flush(_REGISTRATION_TIMEOUT)
         from flatland.ros.bridge import Bridge
         from flatland.ros.deferred_topics import DeferredTopics
         from flatland.ros.frame_monitor import FrameMonitor
