@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 import os
+import socket
 from collections import deque
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -17,6 +18,7 @@ from flatland_sweep.columns import row_of
 from flatland_sweep.episode import run_cell
 
 MAX_ATTEMPTS: Final = 4
+_CONNECT_TIMEOUT: Final = 10.0  # s
 _OBJECT_STORE: Final = 100_000_000  # bytes; rows are small
 
 
@@ -33,6 +35,8 @@ def connection(address: str | None, workers: int | None, working_dir: str | None
     Raises:
         SweepError: The cluster cannot be reached.
     """
+    if address is not None:
+        _check_reachable(address)
     package = str(Path(__file__).resolve().parent)
     environment: dict[str, Any] = {"py_modules": [package]}
     if working_dir is not None:
@@ -40,6 +44,7 @@ def connection(address: str | None, workers: int | None, working_dir: str | None
     options: dict[str, Any] = {}
     if address is None:
         options = {
+            "address": "local",  # even if another cluster runs on this machine
             "num_cpus": workers or os.cpu_count(),
             "include_dashboard": False,
             "object_store_memory": _OBJECT_STORE,
@@ -59,6 +64,19 @@ def connection(address: str | None, workers: int | None, working_dir: str | None
         yield
     finally:
         ray.shutdown()
+
+
+def _check_reachable(address: str) -> None:
+    """Checks that a server accepts connections, for which Ray itself waits several minutes."""
+    if address == "auto":
+        return
+    host, colon, port = address.removeprefix("ray://").rpartition(":")
+    if not (colon and host and port.isdigit()):
+        raise SweepError(f"--address must be auto or HOST:PORT, got {address!r}")
+    try:
+        socket.create_connection((host, int(port)), _CONNECT_TIMEOUT).close()
+    except (OSError, OverflowError) as error:
+        raise SweepError(f"Ray cannot be reached at {address}: {error}") from error
 
 
 def run_on_cluster(

@@ -10,7 +10,7 @@ import os
 import signal
 import sys
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Generator, Iterator, Sequence
 from pathlib import Path
 from types import FrameType
 from typing import TYPE_CHECKING, Any, Final
@@ -187,8 +187,10 @@ def _run(options: argparse.Namespace) -> int:
 
 
 def _settings(options: argparse.Namespace) -> Settings:
-    values = {name: getattr(options, name, None) for name in Settings().as_dict()}
-    return Settings(**{**values, "params": dict(options.param)})
+    values: dict[str, Any] = {
+        name: getattr(options, name) for name in Settings().as_dict() if name != "params"
+    }
+    return Settings(params=dict(options.param), **values)
 
 
 def _check_packages(options: argparse.Namespace) -> None:
@@ -280,7 +282,9 @@ def _run_cells(
             results.flush()
 
 
-def _rows(cells: Sequence[Cell], settings: Settings, options: argparse.Namespace) -> Iterator[Row]:
+def _rows(
+    cells: Sequence[Cell], settings: Settings, options: argparse.Namespace
+) -> Generator[Row, None, None]:
     folder = str(Path.cwd())
     if options.local:
         from flatland_sweep.local import run_locally

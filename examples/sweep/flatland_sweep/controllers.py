@@ -141,9 +141,9 @@ class FollowGap:
         across = scan.points @ np.stack((-self._units[1], self._units[0]))
         lane = self._task.radius + self._MARGIN
         is_in_lane = (along > 0) & (np.abs(across) < lane)
-        lengths = np.where(is_in_lane, along, scan.max_range)
-        free = lengths.min(axis=0, initial=scan.max_range) - self._task.radius
-        return np.maximum(free, 0.0)
+        nearest = np.where(is_in_lane, along, scan.max_range).min(axis=0, initial=scan.max_range)
+        lengths: DoubleArray = np.maximum(nearest - self._task.radius, 0.0)
+        return lengths
 
 
 class RandomWalk:

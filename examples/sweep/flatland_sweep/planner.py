@@ -98,7 +98,8 @@ class _Grid:
         while queue:
             _, point = heapq.heappop(queue)
             if point == last:
-                return self._points[_chain(previous, last)]
+                path: DoubleArray = self._points[_chain(previous, last)]
+                return path
             if point in done:
                 continue
             done.add(point)

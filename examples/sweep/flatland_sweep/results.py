@@ -7,6 +7,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import fcntl
 import json
 import os
@@ -94,8 +95,9 @@ class Results:
         self._settings = json.loads(json.dumps(settings, default=str))
         self._pending: list[Row] = []
         definition = folder / _DEFINITION
+        self._is_new = not definition.exists()
         try:
-            if not definition.exists():
+            if self._is_new:
                 if folder.exists() and any(entry.name != _LOCK for entry in folder.iterdir()):
                     raise SweepError(f"{folder} contains other files; choose another --out")
                 folder.mkdir(parents=True, exist_ok=True)
@@ -103,7 +105,7 @@ class Results:
         except OSError as error:
             raise SweepError(f"{folder} cannot be used as --out: {error.strerror}") from error
         try:
-            known = self._read_definition() if definition.exists() else {}
+            known = {} if self._is_new else self._read_definition()
             self._check(known)
             (folder / "parts").mkdir(exist_ok=True)
             for leftover in folder.rglob("*.tmp"):
@@ -212,10 +214,20 @@ class Results:
         return self.frame()
 
     def close(self) -> None:
-        """Lets other processes write to the folder; further calls have no effect."""
-        if self._lock >= 0:
-            os.close(self._lock)
-            self._lock = -1
+        """Lets other processes write to the folder; further calls have no effect.
+
+        Removes the folder of a new sweep if it contains no rows, because it could not be started.
+        """
+        if self._lock < 0:
+            return
+        if self._is_new and not _files(self.folder):
+            for name in (_DEFINITION, _LOCK):
+                (self.folder / name).unlink(missing_ok=True)
+            with contextlib.suppress(OSError):
+                (self.folder / "parts").rmdir()
+                self.folder.rmdir()
+        os.close(self._lock)
+        self._lock = -1
 
 
 def _replace(path: Path, write: Callable[[Path], object]) -> None:
