@@ -34,7 +34,7 @@ _EXAMPLES: Final = """examples:
   sweep.py --worlds worlds/office/world.yaml --seeds 0:100 --controllers gap,pursuit --out results
   sweep.py --worlds a/*.yaml --seeds 0:10,50 --controllers my.py:MyController --out r --local
   sweep.py --worlds w.yaml --seeds 0:1000 --controllers gap --out r --address auto
-  sweep.py --worlds w.yaml --seeds 0:9 --controllers gap --out r --address auto --working-dir .
+  sweep.py --worlds w.yaml --seeds 0:9 --controllers gap --out r --address auto --working-dir w
 
 The same command continues a sweep that was interrupted. More seeds, worlds or controllers can be
 added later. The exit code is 0 if all cells were run, 1 if some of them have an error, 2 for
@@ -215,6 +215,12 @@ def _folder(options: argparse.Namespace) -> str:
     folder = Path(options.working_dir).absolute()
     if not folder.is_dir():
         raise SweepError(f"--working-dir is not a folder: {folder}")
+    if (folder / "flatland").is_dir():
+        # Its sources have no extension.
+        raise SweepError(
+            f"--working-dir {folder} contains a folder flatland, which the workers would import "
+            "instead of the installed package; choose a folder inside of it"
+        )
     sys.path.insert(0, str(folder))  # as in the workers
     return str(folder)
 

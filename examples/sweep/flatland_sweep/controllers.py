@@ -175,7 +175,7 @@ class PurePursuit:
     It knows the map and its pose exactly and does not use the scan: an upper bound for others.
     """
 
-    _LOOKAHEAD: Final = 0.5  # [m]
+    _LOOKAHEAD: Final = 0.35  # [m]
     _SLOW_DOWN: Final = (
         0.8  # distance to the goal, or length of free path, below which it slows [m]
     )
@@ -199,7 +199,7 @@ class PurePursuit:
         dx, dy = float(target[0]) - pose[0], float(target[1]) - pose[1]
         distance = max(math.hypot(dx, dy), 1e-6)
         bearing = math.remainder(math.atan2(dy, dx) - pose[2], math.tau)
-        if abs(bearing) > math.pi / 3:
+        if abs(bearing) > math.pi / 6:
             return Twist(angular_z=math.copysign(self._task.max_turn, bearing))
         left = math.hypot(goal[0] - pose[0], goal[1] - pose[1])
         speed = self._task.max_speed * min(1.0, left / self._SLOW_DOWN) * math.cos(bearing)
