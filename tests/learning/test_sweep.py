@@ -533,7 +533,7 @@ KILLER = """
 def environment() -> dict[str, str]:
     """Returns the environment of a sweep."""
     package = str(Path(flatland.__file__).resolve().parents[1])
-    # Ray would send statistics of its use.
+    # The cluster of the fixture would send statistics of its use.
     return {**os.environ, "PYTHONPATH": package, "RAY_USAGE_STATS_ENABLED": "0"}
 
 

@@ -43,6 +43,8 @@ def connection(address: str | None, workers: int | None, working_dir: str | None
         environment["working_dir"] = working_dir
     options: dict[str, Any] = {}
     if address is None:
+        # Ray would send statistics of its use; the owner of another cluster decides on that.
+        os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")
         options = {
             "address": "local",  # even if another cluster runs on this machine
             "num_cpus": workers or os.cpu_count(),

@@ -121,7 +121,7 @@ class FollowGap:
         best = int(np.argmin(np.where(free >= needed, cost, np.inf)))
         angle = float(self._angles[best])
         self._heading = pose[2] + angle
-        # At which the robot can stop before it leaves the lane, and now.
+        # The free length ahead matters as well, until the robot has turned.
         room = max(0.0, min(float(free[best]), float(free[self._DIRECTIONS // 2])))
         speed = self._task.max_speed * max(0.0, math.cos(1.5 * min(abs(angle), 1.0)))
         return Twist(
@@ -176,9 +176,8 @@ class PurePursuit:
     """
 
     _LOOKAHEAD: Final = 0.35  # [m]
-    _SLOW_DOWN: Final = (
-        0.8  # distance to the goal, or length of free path, below which it slows [m]
-    )
+    _SLOW_DOWN: Final = 0.8  # distance to the goal below which it slows down [m]
+    _TURN: Final = math.radians(30)  # deviation above which it turns on the spot
 
     def __init__(self, task: Task) -> None:
         """Plans the path."""
@@ -190,16 +189,15 @@ class PurePursuit:
 
     def command(self, scan: Scan, pose: Pose, goal: Vector2) -> Twist:
         """Steers towards a point on the path ahead."""
-        ahead = np.hypot(*(self._path[self._next :] - pose[:2]).T)
+        distances = np.hypot(*(self._path - pose[:2]).T)
         # Only a short part ahead: the path may return to the same place.
-        self._next += int(np.argmin(ahead[:20]))
-        reachable = np.hypot(*(self._path[self._next :] - pose[:2]).T)
-        far = np.flatnonzero(reachable >= self._LOOKAHEAD)
+        self._next += int(np.argmin(distances[self._next : self._next + 20]))
+        far = np.flatnonzero(distances[self._next :] >= self._LOOKAHEAD)
         target = self._path[self._next + far[0]] if len(far) else self._path[-1]
         dx, dy = float(target[0]) - pose[0], float(target[1]) - pose[1]
         distance = max(math.hypot(dx, dy), 1e-6)
         bearing = math.remainder(math.atan2(dy, dx) - pose[2], math.tau)
-        if abs(bearing) > math.pi / 6:
+        if abs(bearing) > self._TURN:
             return Twist(angular_z=math.copysign(self._task.max_turn, bearing))
         left = math.hypot(goal[0] - pose[0], goal[1] - pose[1])
         speed = self._task.max_speed * min(1.0, left / self._SLOW_DOWN) * math.cos(bearing)
@@ -243,7 +241,7 @@ def find_controller(name: str, folder: str) -> type[Controller]:
             module = importlib.import_module(module_name)
     except SweepError:
         raise
-    except Exception as error:
+    except (Exception, SystemExit) as error:
         raise SweepError(
             f"controller {name!r}: {type(error).__name__}: {error}, while it was imported"
         ) from error

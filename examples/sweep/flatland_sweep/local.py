@@ -26,9 +26,9 @@ def run_locally(
 ) -> Iterator[Row]:
     """Yields the row of each cell when it is completed.
 
-    A cell whose process ends is run again. The pool does not report which process of several has
-    ended, so that all cells that were running are repeated one at a time. One that ends its process
-    `MAX_ATTEMPTS` times gets a row with this error.
+    If a process ends, the pool does not report which of the cells that were running has caused
+    this. Therefore, they are repeated one at a time. One that then ends its process in
+    `MAX_ATTEMPTS` attempts gets a row with this error.
 
     Args:
         cells: The cells.
@@ -85,8 +85,8 @@ def _run_in_pool(
 
 def _run_alone(cell: Cell, settings: Settings, folder: str) -> Iterator[Row]:
     """Yields the row of a cell that may end its process."""
-    for attempt in range(2, MAX_ATTEMPTS + 1):
-        _LOG.warning("a worker process ended; attempt %d of %s", attempt, cell)
+    for _ in range(MAX_ATTEMPTS):
+        _LOG.warning("a worker process ended; repeating %s", cell)
         pool = _pool(1)
         try:
             yield pool.submit(run_cell, cell, settings, folder).result()
@@ -101,7 +101,7 @@ def _run_alone(cell: Cell, settings: Settings, folder: str) -> Iterator[Row]:
 
 
 def _pool(workers: int) -> ProcessPoolExecutor:
-    # Forked processes would share the threads' locks of this one.
+    # A forked process could inherit a lock that another thread holds.
     context = multiprocessing.get_context("spawn")
     return ProcessPoolExecutor(workers, context, initializer=_prepare_worker)
 

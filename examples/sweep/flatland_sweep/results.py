@@ -129,12 +129,13 @@ class Results:
         path = self.folder / _DEFINITION
         try:
             known = json.loads(path.read_text(encoding="utf-8"))
-            if known["format"] != _FORMAT:
-                raise SweepError(f"{path} has the format {known['format']}, expected {_FORMAT}")
-            known["settings"].items(), known["names"].items()
-        except (ValueError, KeyError, TypeError, AttributeError) as error:
-            raise SweepError(f"{path} is not the description of a sweep: {error!r}") from error
-        return dict(known)
+        except (OSError, ValueError) as error:
+            raise SweepError(f"{path} cannot be read: {error}") from error
+        if not isinstance(known, dict) or known.get("format") != _FORMAT:
+            raise SweepError(f"{path} is not the description of a sweep of format {_FORMAT}")
+        if not all(isinstance(known.get(key), dict) for key in ("settings", "names")):
+            raise SweepError(f"{path} must have the maps settings and names")
+        return known
 
     def _check(self, known: Mapping[str, Any]) -> None:
         if not known:
