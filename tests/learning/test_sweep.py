@@ -34,6 +34,8 @@ import flatland
 SIMPLE = Path(__file__).resolve().parents[2] / "worlds" / "simple"
 WORLD = str(SIMPLE / "world.yaml")
 SCRIPT = Path(command_line.__file__).resolve().parents[1] / "sweep.py"
+# Limit of a program that runs many episodes [s].
+SWEEP_TIMEOUT = 3 * TIMEOUT
 
 
 # -- cells and settings --------------------------------------------------------------------
@@ -553,7 +555,7 @@ def start_sweep(arguments: dict[str, Any], *options: str, folder: Path) -> subpr
 def sweep(arguments: dict[str, Any], *options: str, folder: Path, code: int = 0) -> pd.DataFrame:
     """Runs a sweep in a folder, and returns its rows."""
     with start_sweep(arguments, *options, folder=folder) as process:
-        output, _ = process.communicate(timeout=TIMEOUT)
+        output, _ = process.communicate(timeout=SWEEP_TIMEOUT)
     assert process.returncode == code, output
     return read_results(folder / arguments["--out"])
 
@@ -621,7 +623,7 @@ def test_an_interrupted_sweep_continues_where_it_stopped(number, options, argume
     process = start_sweep(arguments, "--workers", "1", *options, folder=tmp_path)
     wait_until("the first rows", lambda: any(parts.glob("*.parquet")), TIMEOUT, poll_period=0.01)
     process.send_signal(number)
-    output, _ = process.communicate(timeout=TIMEOUT)
+    output, _ = process.communicate(timeout=SWEEP_TIMEOUT)
     before = read_results(tmp_path / "out")
     assert 0 < len(before) < 150
     if number == signal.SIGKILL:
@@ -649,7 +651,7 @@ def test_a_sweep_can_be_extended(arguments, tmp_path):
     assert (kept["wall_time"] == kept["wall_time_before"]).all()
     arguments["--time-limit"] = "5"
     with start_sweep(arguments, "--local", folder=tmp_path) as process:
-        output, _ = process.communicate(timeout=TIMEOUT)
+        output, _ = process.communicate(timeout=SWEEP_TIMEOUT)
     assert process.returncode == 2
     assert "another sweep: time_limit is 60.0 there and 5.0 here" in output
 
@@ -727,7 +729,7 @@ def test_a_node_that_fails_changes_no_result(cluster, write, arguments, tmp_path
         print("remove", file=cluster.stdin, flush=True)
         answer(cluster, "removed")
         assert len(read_results(tmp_path / "out")) < 160
-        output, _ = process.communicate(timeout=TIMEOUT)
+        output, _ = process.communicate(timeout=SWEEP_TIMEOUT)
     assert process.returncode == 0, output
     disturbed = read_results(tmp_path / "out")
     del arguments["--address"], arguments["--working-dir"]
@@ -748,7 +750,7 @@ def test_a_cluster_that_does_not_exist_is_reported(
 ):
     address = address.format(port=unused_port)
     with start_sweep(arguments, "--address", address, folder=tmp_path) as process:
-        output, _ = process.communicate(timeout=TIMEOUT)
+        output, _ = process.communicate(timeout=SWEEP_TIMEOUT)
     assert process.returncode == 2, output
     assert message.format(port=unused_port) in output
     assert not (tmp_path / "out").exists()
