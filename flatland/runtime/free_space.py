@@ -83,6 +83,32 @@ class FreeSpace:
         reached = self._regions_around(np.array(connected_to))
         return self._candidates[np.isin(self._regions[self._candidates], reached)]
 
+    @property
+    def size(self) -> int:
+        """Number of cells."""
+        return self._rows * self._columns
+
+    def cell_at(self, x: float, y: float) -> int | None:
+        """Returns the cell of a point in the world frame [m], None out of bounds."""
+        column = math.floor((x - float(self._origin[0])) / self._cell)
+        row = math.floor((y - float(self._origin[1])) / self._cell)
+        if not (0 <= column < self._columns and 0 <= row < self._rows):
+            return None
+        return row * self._columns + column
+
+    def point_in(self, cell: int, u: float, v: float) -> tuple[float, float]:
+        """Returns a point of a cell in the world frame [m].
+
+        Args:
+            cell: The cell.
+            u: Position along x within the cell, from 0 to 1.
+            v: Position along y within the cell, from 0 to 1.
+        """
+        row, column = divmod(cell, self._columns)
+        x = min((column + u) * self._cell, float(self._extent[0]))
+        y = min((row + v) * self._cell, float(self._extent[1]))
+        return (float(self._origin[0]) + x, float(self._origin[1]) + y)
+
     def places_in(self, cells: IntArray, rng: np.random.Generator) -> DoubleArray:
         """Returns a random point of each cell in the world frame [m], shape (n, 2)."""
         corners = np.stack((cells % self._columns, cells // self._columns), axis=1)

@@ -1,0 +1,3 @@
+"""Environments for Gymnasium and PettingZoo."""
+from flatland.gym.env import FlatlandEnv
+from flatland.gym.vector import FlatlandVectorEnv

@@ -1,0 +1,154 @@
+"""The episodes of several agents: the part that all environments share."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from flatland.errors import WorldError
+from flatland.geometry import BoolArray, DoubleArray, FloatArray, finite_pose
+from flatland.gym.backend import compute_scans, step_worlds
+from flatland.gym.situation import Rows, Situation
+from flatland.gym.tasks import Occupied
+from flatland.values import Twist
+
+if TYPE_CHECKING:
+    from flatland.gym.agents import Agent
+    from flatland.gym.settings import Settings
+    from flatland.world import World
+
+
+class Episodes:
+    """Agents of one or several worlds, whose episodes begin and advance.
+
+    All numbers of a row are the same functions of its world for any number of rows, so that a
+    vector of environments equals as many single ones, bit by bit.
+
+    Attributes:
+        agents: The agents.
+        situation: Their state after the last step.
+        layout: The observation space and its columns.
+        observations: The observations of the last `look`, shape (n, layout.size), float32.
+    """
+
+    def __init__(self, agents: Sequence[Agent], settings: Settings, num_threads: int = 1) -> None:
+        """Prepares the episodes; the state of the worlds is that of the start of each episode.
+
+        Args:
+            agents: The agents, each in a world of its own or all in the same.
+            settings: What is observed, rewarded and so on.
+            num_threads: Number of threads that step and scan, 0 for one per core.
+
+        Raises:
+            WorldError: The task is impossible.
+            ValueError: The observation does not fit the laser.
+        """
+        first = agents[0]
+        self.agents = tuple(agents)
+        self._settings = settings
+        self._num_threads = num_threads
+        self.task = copy.copy(settings.task)  # It is prepared for these worlds.
+        self.task.prepare(first)
+        beams = first.laser.angles.count
+        self.layout = settings.observation.layout(beams)
+        low, high = settings.action.bounds(first)
+        n = len(agents)
+        self.situation = Situation(n, beams, first.laser.range, low, high)
+        self.observations: FloatArray = np.zeros((n, self.layout.size), np.float32)
+        self._worlds = [agent.world for agent in agents]
+        self._lasers = [agent.laser for agent in agents]
+        self._all = np.arange(n)
+
+    def begin(
+        self, row: int, rng: np.random.Generator, occupied: Occupied, options: Mapping[str, Any]
+    ) -> None:
+        """Begins an episode of an agent whose world is in its initial state.
+
+        Raises:
+            WorldError: The start or the goal is not free.
+            ValueError: An option is unknown or invalid.
+        """
+        agent, s = self.agents[row], self.situation
+        start, goal = self.task.draw(agent, rng, occupied)
+        if options:
+            unknown = sorted(set(options) - {"start", "goal"})
+            if unknown:
+                raise ValueError(f"options must be among goal and start, got {', '.join(unknown)}")
+            start = finite_pose(options.get("start", start))
+            goal = finite_pose((*options.get("goal", goal), 0.0))[:2]
+        agent.world.move_model(agent.model.name, start, "refuse")
+        s.goals[row] = goal
+        s.steps[row] = 0
+        s.actions[row] = s.previous_actions[row] = 0.0
+        s.collided[row] = False
+
+    def advance(self, actions: DoubleArray, rows: Rows | None = None) -> None:
+        """Carries out actions for one step of the environment.
+
+        Args:
+            actions: Actions in [-1, 1] of all agents, shape (n, 2).
+            rows: Agents that act; None for all. The others stand still.
+        """
+        s = self.situation
+        commands = (s.low + (actions + 1.0) * (0.5 * (s.high - s.low))).tolist()
+        chosen = self._all if rows is None else rows
+        s.previous_actions[chosen] = s.actions[chosen]
+        s.actions[chosen] = actions[chosen]
+        s.previous_distance[chosen] = s.distance[chosen]
+        s.steps[chosen] += 1
+        worlds = {}
+        for row in chosen.tolist():
+            v, omega = commands[row]
+            self.agents[row].command.set(Twist(v, 0.0, omega))
+            worlds[id(self._worlds[row])] = self._worlds[row]
+        step_worlds(list(worlds.values()), self._settings.physics_steps, self._num_threads)
+        for row in chosen.tolist():
+            agent = self.agents[row]
+            s.collided[row] = any(agent.body in (c.body_a, c.body_b) for c in agent.world.contacts)
+
+    def look(self, rows: Rows | None = None) -> None:
+        """Scans, and computes the observations.
+
+        Args:
+            rows: Agents that look; None for all.
+        """
+        s, goal_radius = self.situation, self.task.goal_radius
+        chosen = self._all if rows is None else rows
+        for row in chosen.tolist():
+            body = self.agents[row].body
+            s.poses[row] = body.pose
+            s.velocities[row] = body.velocity
+        if rows is None:
+            compute_scans(self._lasers, s.ranges, self._num_threads)
+            s.locate(goal_radius)
+            self.layout.write(s, self.observations)
+            return
+        lasers = [self._lasers[row] for row in rows.tolist()]
+        part = s.take(rows)
+        compute_scans(lasers, part.ranges, self._num_threads)
+        part.locate(goal_radius)
+        observations = np.empty((len(rows), self.layout.size), np.float32)
+        self.layout.write(part, observations)
+        self.observations[rows] = observations
+        s.put(rows, part)
+
+    def judge(self) -> tuple[DoubleArray, BoolArray, BoolArray]:
+        """Returns reward, whether the episode terminated, and whether it was truncated, (n,) each."""
+        s, settings = self.situation, self._settings
+        rewards = settings.reward.compute(s)
+        terminated = settings.ending.check(s)
+        truncated: BoolArray = (s.steps >= settings.max_steps) & ~terminated
+        return rewards, terminated, truncated
+
+    def infos(self) -> dict[str, npt.NDArray[Any]]:
+        """Returns the info of all agents after their last step, arrays of shape (n,)."""
+        s = self.situation
+        return {"distance": s.distance, "is_success": s.arrived, "collision": s.collided}
+
+    def info(self, row: int) -> dict[str, Any]:
+        """Returns the info of one agent after its last step."""
+        return {name: values[row].item() for name, values in self.infos().items()}
