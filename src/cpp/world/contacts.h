@@ -62,6 +62,7 @@ class ContactRecorder final : public b2ContactListener {
 
   // Returns the events since the last call, in chronological order.
   std::vector<ContactRow> take_rows();
+  bool has_rows() const { return !rows_.empty(); }
   // Returns whether events were lost since the last call.
   bool take_failure();
 

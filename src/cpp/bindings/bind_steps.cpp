@@ -1,0 +1,226 @@
+#include <pybind11/stl.h>
+
+#include <optional>
+#include <string>
+#include <tuple>
+#include <vector>
+
+#include "bindings/bindings.h"
+#include "world/errors.h"
+
+namespace py = pybind11;
+
+namespace flatland {
+namespace {
+
+using Limits = std::tuple<double, double, double>;
+using PyTriple = std::tuple<double, double, double>;
+
+Phase phase_of(bool is_after) { return is_after ? Phase::kAfter : Phase::kBefore; }
+
+double checked_limit(double limit) {
+  if (!(limit >= 0.0)) {
+    throw py::value_error("a limit must not be negative or NaN, got " + to_text(limit));
+  }
+  return limit;
+}
+
+SpeedLimits to_limits(const Limits& limits) {
+  const auto& [velocity, acceleration, deceleration] = limits;
+  return {checked_limit(velocity), checked_limit(acceleration), checked_limit(deceleration)};
+}
+
+Controller& changed_controller(World& world, Id id) {
+  world.check_changeable();
+  Controller* controller = world.plan().find_controller(id);
+  if (controller == nullptr) throw StaleHandleError("the controller was removed");
+  return *controller;
+}
+
+template <typename Kind>
+Kind& motion_of(World& world, Id id) {
+  Kind* motion = std::get_if<Kind>(&changed_controller(world, id).motion);
+  if (motion == nullptr) throw PhysicsError("the controller is of another kind");
+  return *motion;
+}
+
+Id add_controller(World& world, Id body, Motion motion) {
+  world.change_body(body);  // throws if it does not exist
+  Controller controller;
+  controller.body = body;
+  controller.motion = std::move(motion);
+  return world.plan().add_controller(controller);
+}
+
+Triple to_triple(const PyTriple& triple, const char* what) {
+  const auto& [x, y, z] = triple;
+  for (const double number : {x, y, z}) checked_finite(number, what);
+  return {x, y, z};
+}
+
+PyTriple to_python(const Triple& t) { return {t[0], t[1], t[2]}; }
+
+void bind_controllers(WorldClass& world) {
+  world.def("add_twist_controller", [](World& self, Id body, bool is_holonomic) {
+    TwistMotion motion;
+    motion.is_holonomic = is_holonomic;
+    return add_controller(self, body, motion);
+  });
+  world.def("set_twist_limits",
+            [](World& self, Id id, const Limits& linear, const Limits& angular) {
+              auto& motion = motion_of<TwistMotion>(self, id);
+              const SpeedLimits checked = to_limits(linear);
+              motion.angular = to_limits(angular);
+              motion.linear = checked;
+            });
+  world.def("twist_target", [](World& self, Id id) {
+    return to_python(motion_of<TwistMotion>(self, id).target);
+  });
+  world.def("set_twist_target", [](World& self, Id id, double forward, double sideways,
+                                   double omega) {
+    motion_of<TwistMotion>(self, id).target = to_triple({forward, sideways, omega}, "target");
+  });
+  world.def("twist_velocity", [](World& self, Id id) {
+    return to_python(motion_of<TwistMotion>(self, id).velocity);
+  });
+  world.def("set_twist_velocity", [](World& self, Id id, double forward, double sideways,
+                                     double omega) {
+    motion_of<TwistMotion>(self, id).velocity = to_triple({forward, sideways, omega}, "velocity");
+  });
+  world.def("has_controller", [](World& self, Id id) {
+    return self.plan().find_controller(id) != nullptr;
+  });
+  world.def("controller_body",
+            [](World& self, Id id) { return changed_controller(self, id).body; });
+  world.def("remove_controller", [](World& self, Id id) {
+    changed_controller(self, id);
+    self.plan().remove_controller(id);
+  });
+  world.def(
+      "schedule_controller",
+      [](World& self, Id id, std::int64_t order, bool is_automatic) {
+        Controller& controller = changed_controller(self, id);
+        controller.order = order;
+        controller.is_automatic = is_automatic;
+        self.plan().order_changed();
+      },
+      py::arg("controller"), py::arg("order"), py::arg("is_automatic"));
+  world.def("advance_controller", [](World& self, Id id, double dt) {
+    self.plan().advance_now(self, changed_controller(self, id), dt);
+  });
+  world.def("take_failed_controllers", [](World& self) {
+    self.check_changeable();
+    return self.plan().take_failed();
+  });
+}
+
+std::uint32_t add_clock(World& world, bool is_after, const std::string& kind,
+                        std::uint64_t half_step, std::uint64_t cycle) {
+  world.check_changeable();
+  RateClock::Kind checked = RateClock::Kind::kPeriodic;
+  if (kind == "always") {
+    checked = RateClock::Kind::kAlways;
+  } else if (kind == "at_start") {
+    checked = RateClock::Kind::kAtStart;
+  } else if (kind != "periodic" || half_step == 0 || cycle >> 63U != 0 || half_step >= cycle / 2) {
+    throw py::value_error("a clock must be always, at_start, or periodic with a step of less than "
+                          "its cycle below 2^63");
+  }
+  return world.plan().add_clock(phase_of(is_after), RateClock(checked, half_step, cycle));
+}
+
+Record& changed_record(World& world, Id id) {
+  world.check_changeable();
+  Record* record = world.plan().find_record(id);
+  if (record == nullptr) throw StaleHandleError("the record was removed");
+  return *record;
+}
+
+void bind_clocks(WorldClass& world) {
+  world.def("add_clock", &add_clock, py::arg("is_after"), py::arg("kind"), py::arg("half_step"),
+            py::arg("cycle"));
+  world.def("set_clock_calls", [](World& self, std::uint32_t clock, bool has_calls) {
+    self.check_changeable();
+    self.plan().set_calls(clock, has_calls);
+  });
+  world.def(
+      "add_record",
+      [](World& self, std::uint32_t clock, std::int64_t order, std::optional<Id> body) {
+        self.check_changeable();
+        Record record;
+        record.clock = clock;
+        record.order = order;
+        if (body) {
+          self.read_body(*body);  // throws if it does not exist
+          record.body = *body;
+        }
+        return self.plan().add_record(record);
+      },
+      py::arg("clock"), py::arg("order"), py::arg("body"));
+  world.def("enable_record", [](World& self, Id id, bool is_enabled) {
+    changed_record(self, id).is_enabled = is_enabled;
+  });
+  world.def("remove_record", [](World& self, Id id) {
+    changed_record(self, id);
+    self.plan().remove_record(id);
+  });
+  world.def("take_skipped", [](World& self) {
+    self.check_changeable();
+    std::vector<std::tuple<Id, std::int64_t, std::int64_t, PyTriple>> rows;
+    for (const SkippedUpdates& each : self.plan().take_skipped()) {
+      rows.emplace_back(each.record, each.count, each.step, to_python(each.pose));
+    }
+    return rows;
+  });
+}
+
+py::tuple to_python(const RunResult& result) {
+  return py::make_tuple(result.steps, static_cast<int>(result.end), to_python(result.report));
+}
+
+void bind_run(WorldClass& world) {
+  world.def("calls_due", [](World& self, std::int64_t step) {
+    self.check_changeable();
+    return self.plan().calls_due(step);
+  });
+  world.def("begin_step", [](World& self, std::int64_t step) {
+    self.check_changeable();
+    const std::uint64_t due = self.plan().calls_due(step);
+    self.plan().begin(step);
+    return due;
+  });
+  world.def(
+      "carry_out",
+      [](World& self, bool is_after, std::int64_t until, double dt) {
+        self.check_changeable();
+        self.plan().carry_out(self, phase_of(is_after), until, dt);
+        return self.plan().has_failed();
+      },
+      py::arg("is_after"), py::arg("until"), py::arg("dt"));
+  world.def(
+      "run",
+      [](World& self, std::int64_t step, std::int64_t n, double dt, int velocity_iterations,
+         int position_iterations, bool only_physics) {
+        // Safe without the GIL: the world is in exclusive use by this thread, and the run accesses
+        // no Python object.
+        World::ExclusiveUse use(self, World::kStepping);
+        const bool is_long = self.last_step_time() * static_cast<double>(n) > kShortStep;
+        return to_python(without_gil_if(is_long, use, [&] {
+          return self.run(step, n, dt, velocity_iterations, position_iterations, only_physics);
+        }));
+      },
+      py::arg("step"), py::arg("n"), py::arg("dt"), py::arg("velocity_iterations"),
+      py::arg("position_iterations"), py::arg("only_physics"));
+  world.def("interrupt", &World::interrupt);
+  world.def("clear_interrupt", &World::clear_interrupt);
+}
+
+}  // namespace
+
+void bind_steps(WorldClass& world) {
+  bind_controllers(world);
+  bind_clocks(world);
+  bind_run(world);
+}
+
+}  // namespace flatland
