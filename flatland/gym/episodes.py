@@ -10,10 +10,11 @@ import numpy as np
 import numpy.typing as npt
 
 from flatland.errors import WorldError
-from flatland.geometry import BoolArray, DoubleArray, FloatArray, finite_pose
+from flatland.geometry import BoolArray, DoubleArray, FloatArray, Pose, Vector2, finite_pose
 from flatland.gym.backend import compute_scans, step_worlds
 from flatland.gym.situation import Rows, Situation
 from flatland.gym.tasks import Occupied
+from flatland.runtime.placement import TOLERANCE
 from flatland.values import Twist
 
 if TYPE_CHECKING:
@@ -80,11 +81,25 @@ class Episodes:
                 raise ValueError(f"options must be among goal and start, got {', '.join(unknown)}")
             start = finite_pose(options.get("start", start))
             goal = finite_pose((*options.get("goal", goal), 0.0))[:2]
-        agent.world.move_model(agent.model.name, start, "refuse")
+        self._refuse_taken(agent, start, goal, occupied)
+        # The agents that have not been placed yet may still be there.
+        agent.world.move_model(agent.model.name, start, "allow")
         s.goals[row] = goal
         s.steps[row] = 0
         s.actions[row] = s.previous_actions[row] = 0.0
         s.collided[row] = False
+
+    @staticmethod
+    def _refuse_taken(agent: Agent, start: Pose, goal: Vector2, occupied: Occupied) -> None:
+        physics, bodies = agent.world.physics, agent.model.bodies
+        unplaced = list(occupied.unplaced)
+        if not physics.free_poses(bodies, [start], ignored=unplaced, least_gap=-TOLERANCE)[0]:
+            x, y, theta = start
+            raise WorldError(f"the start ({x:g}, {y:g}, {theta:g}) is not free")
+        if not physics.free_discs(
+            [(*goal, 0.0)], agent.radius, agent.bits, ignored=[*bodies, *unplaced]
+        )[0]:
+            raise WorldError(f"the goal ({goal[0]:g}, {goal[1]:g}) is not free")
 
     def advance(self, actions: DoubleArray, rows: Rows | None = None) -> None:
         """Carries out actions for one step of the environment.

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
@@ -38,7 +38,7 @@ class Places:
             agent: The agent; models do not block the way.
             clearance: Distance to keep from walls and models [m].
             origin: A place in the world frame [m] from which all others can be reached; None for
-                the place of the agent in the world file, or any region if there is no room there.
+                the place of the agent, or, if it does not fit there, for the largest region.
 
         Raises:
             WorldError: The world has no walls, or no free place.
@@ -62,11 +62,14 @@ class Places:
 
         self._space = FreeSpace(walls, bounds, agent.radius, clearance, fits)
         start = agent.body.pose[:2] if origin is None else origin
-        self._cells = self._space.cells(start)
+        if origin is None and not _fits_at(start, bounds, agent.radius, fits):
+            self._cells = self._space.largest_region()
+        else:
+            self._cells = self._space.cells(start)
         if not len(self._cells):
             raise WorldError(
-                f"no place within reach of ({start[0]:g}, {start[1]:g}) is free for a disc of "
-                f"radius {agent.radius:g} m with a clearance of {clearance:g} m"
+                f"no place is free for a disc of radius {agent.radius:g} m with a clearance of "
+                f"{clearance:g} m"
             )
         self._reachable = np.zeros(self._space.size, np.bool_)
         self._reachable[self._cells] = True
@@ -147,6 +150,14 @@ class Places:
     def _is_near(self, place: Vector2, others: Sequence[Vector2]) -> bool:
         least = 2 * self.radius + self.clearance
         return any(math.hypot(x - place[0], y - place[1]) < least for x, y in others)
+
+
+def _fits_at(
+    place: Vector2, bounds: Bounds, radius: float, fits: Callable[[DoubleArray, float], BoolArray]
+) -> bool:
+    x_min, y_min, x_max, y_max = bounds
+    is_inside = x_min <= place[0] <= x_max and y_min <= place[1] <= y_max
+    return is_inside and bool(fits(np.array([place]), radius)[0])
 
 
 def random_pose(place: Vector2, rng: np.random.Generator) -> Pose:

@@ -168,7 +168,7 @@ class FlatlandVectorEnv(VectorEnv[Any, Any, Any]):
             )
         numbers = checked_actions(actions, self.num_envs)
         # Only in the mode NEXT_STEP has any episode ended here.
-        fresh = self._has_ended
+        fresh = self._has_ended.copy()
         if fresh.any():
             self._begin(np.flatnonzero(fresh), {})
             self._episodes.advance(numbers, np.flatnonzero(~fresh))

@@ -83,6 +83,12 @@ class FreeSpace:
         reached = self._regions_around(np.array(connected_to))
         return self._candidates[np.isin(self._regions[self._candidates], reached)]
 
+    def largest_region(self) -> IntArray:
+        """Returns the cells, as `cells` does, of the connected region with the most of them."""
+        regions = self._regions[self._candidates]
+        sizes = np.bincount(regions[regions > 0], minlength=1)
+        return self._candidates[regions == sizes.argmax()] if sizes.any() else regions[:0]
+
     @property
     def size(self) -> int:
         """Number of cells."""
