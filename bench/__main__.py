@@ -25,6 +25,7 @@ MODULES = (
     "jam",
     "plugin_steps",
     "node",
+    "lockstep",
     "real_time",
     "large_map",
     "markers",

@@ -212,8 +212,8 @@ class World(Contents):
         """Simulated time [s]."""
         return self.timekeeper.sim_time
 
-    def step(self, n: int = 1) -> None:
-        """Steps `n` times; has no effect while paused.
+    def step(self, n: int = 1, *, while_paused: bool = False) -> None:
+        """Steps `n` times; has no effect on a paused world unless `while_paused` is true.
 
         Raises:
             WorldError: The world is closed, a plugin calls this, or a body is not finite.
@@ -227,7 +227,7 @@ class World(Contents):
                 self._check_open()
                 if actions:
                     requests.process()
-                if not self._paused:
+                if while_paused or not self._paused:
                     requests.hook_thread = thread
                     self._observers.step_started()
                     try:
