@@ -32,6 +32,7 @@ from flatland.runtime.observer import Observers, WorldObserver
 from flatland.runtime.placement import Placement
 from flatland.runtime.plugin_host import PluginHost
 from flatland.runtime.requests import Requests
+from flatland.runtime.snapshot import WorldStates
 from flatland.runtime.transforms import TransformBuffer
 from flatland.timekeeper import Timekeeper
 
@@ -120,6 +121,7 @@ class World(Contents):
         self._paused = False
         self._closed = False
         self.add_observer(self._body_monitor)
+        self._states = WorldStates(self, (*vars(self), "map_layer"))
         for observer in observers:
             self.add_observer(observer)
 

@@ -81,6 +81,7 @@ class Places:
         *,
         near: Sequence[float] | None = None,
         distance: tuple[float, float] = (0.0, math.inf),
+        margin: float | None = None,
         ignored: Iterable[PhysicsBody] = (),
         apart_from: Sequence[Vector2] = (),
     ) -> Vector2:
@@ -91,6 +92,8 @@ class Places:
             rng: Source of the random numbers.
             near: Point in the world frame [m] that limits `distance`.
             distance: Least and greatest straight distance from `near` [m].
+            margin: Distance by which a path from `near` may leave the rectangle around it and the
+                place [m]; None for any path.
             ignored: Other bodies that may be overlapped.
             apart_from: Places from which a disc there must have the clearance [m].
 
@@ -105,7 +108,9 @@ class Places:
             place = self._any(rng) if near is None else self._around(rng, near, distance)
             if place is None or self._is_near(place, apart_from):
                 continue
-            if self.is_free(agent, place, skipped):
+            if not self.is_free(agent, place, skipped):
+                continue
+            if near is None or margin is None or self._is_close(near, place, margin):
                 return place
         where = ""
         if near is not None:
@@ -146,6 +151,9 @@ class Places:
         phi = math.tau * float(numbers[1])
         place = (near[0] + r * math.cos(phi), near[1] + r * math.sin(phi))
         return place if self.is_reachable(place) else None
+
+    def _is_close(self, near: Sequence[float], place: Vector2, margin: float) -> bool:
+        return self._space.is_connected_within((near[0], near[1]), place, margin)
 
     def _is_near(self, place: Vector2, others: Sequence[Vector2]) -> bool:
         least = 2 * self.radius + self.clearance

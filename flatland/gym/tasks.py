@@ -70,8 +70,12 @@ class RandomGoal(Task):
     The start is uniform over the free space that the agent can reach from its place in the world
     file; the goal is uniform over the part of it that has the right distance from the start.
 
+    A path leads to the goal that does not leave the rectangle around start and goal by more than a
+    margin. Goals behind a wall, whose door is far away, are the task of a planner with a map.
+
     Attributes:
         distance: Least and greatest distance of the goal from the start, along a straight line [m].
+        margin: Distance by which the path may leave the rectangle [m]; None for any path.
         clearance: Distance of starts and goals from walls and models [m].
     """
 
@@ -80,6 +84,7 @@ class RandomGoal(Task):
         distance: tuple[float, float] = (1.0, 5.0),
         clearance: float = 0.15,
         goal_radius: float = 0.3,
+        margin: float | None = 0.5,
         origin: Vector2 | None = None,
     ) -> None:
         """Creates the task.
@@ -88,6 +93,8 @@ class RandomGoal(Task):
             distance: Least and greatest distance of the goal from the start [m].
             clearance: Distance of starts and goals from walls and models [m].
             goal_radius: Distance to the goal at which an agent has arrived [m].
+            margin: Distance by which a path may leave the rectangle around start and goal [m]; None
+                for any path.
             origin: A place from which all others can be reached [m]; None for that of the agent.
 
         Raises:
@@ -101,7 +108,10 @@ class RandomGoal(Task):
                 "distance must be two increasing lengths of at least the goal_radius of "
                 f"{goal_radius:g} m, got {distance}"
             )
+        if margin is not None and not (math.isfinite(margin) and margin >= 0):
+            raise ValueError(f"margin must be finite and not negative [m], got {margin}")
         self.distance = (float(low), float(high))
+        self.margin = margin
         self.clearance = clearance
         self.goal_radius = goal_radius
         self.origin = origin
@@ -135,6 +145,7 @@ class RandomGoal(Task):
                     rng,
                     near=start,
                     distance=self.distance,
+                    margin=self.margin,
                     ignored=occupied.unplaced,
                     apart_from=occupied.goals,
                 )

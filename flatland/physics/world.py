@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
 from flatland import _core
-from flatland.geometry import FloatArray
+from flatland.geometry import DoubleArray, FloatArray
 from flatland.physics.body import PhysicsBody
 from flatland.physics.contact import ContactEvent, ContactInfo, to_events, to_infos
 from flatland.physics.fixture import PhysicsFixture
@@ -85,6 +85,46 @@ class PhysicsWorld(PhysicsQueries):
     def closed(self) -> bool:
         """Whether the world is closed."""
         return self._core.closed
+
+    # -- copies ----------------------------------------------------------------------------
+
+    def copy(self) -> PhysicsWorld:
+        """Returns an independent copy with the same ids and without a function `pre_solve`.
+
+        The copy is exact: the same calls have the same results, bit by bit. It shares only what
+        never changes: trees of edges and sorted rays. Copies may be used in different threads.
+
+        Raises:
+            StaleHandleError: The world is closed.
+            WorldLockedError: The world is stepping.
+        """
+        copy = type(self)()
+        copy._core = self._core.copy()
+        return copy
+
+    def become_copy_of(self, source: PhysicsWorld) -> None:
+        """Replaces all objects by exact copies of those of another world, with the same ids.
+
+        Handles of objects whose ids do not exist in the other world become stale, and their ids are
+        not used again.
+
+        Args:
+            source: The other world, such as an earlier copy of this one.
+
+        Raises:
+            StaleHandleError: One of the worlds is closed.
+            WorldLockedError: One of the worlds is stepping.
+        """
+        self._core.become_copy_of(source._core)
+
+    def clear(self) -> None:
+        """Destroys all objects; the results of the same further calls are those of a new world.
+
+        Raises:
+            StaleHandleError: The world is closed.
+            WorldLockedError: The world is stepping.
+        """
+        self._core.clear()
 
     def step(
         self, dt: float, velocity_iterations: int, position_iterations: int
@@ -292,6 +332,21 @@ class PhysicsWorld(PhysicsQueries):
             WorldLockedError: The world is stepping.
         """
         return self._core.body_states()
+
+    def motions(self, bodies: Iterable[PhysicsBody]) -> DoubleArray:
+        """Returns the poses and velocities of the origins of some bodies, in one call.
+
+        Args:
+            bodies: The bodies.
+
+        Returns:
+            (x, y, theta, vx, vy, omega) of each body in the world frame [m, rad, s], shape (n, 6).
+
+        Raises:
+            StaleHandleError: A body was destroyed, or the world is closed.
+            WorldLockedError: The world is stepping.
+        """
+        return self._core.motions([body.id for body in bodies])
 
     # -- handles by id ---------------------------------------------------------------------
 

@@ -47,6 +47,7 @@ class FlatlandPlugin:
     """
 
     base_class_type: ClassVar[str] = ""
+    outside_state: ClassVar[dict[str, Callable[[], object]]] = {"ros": lambda: None}
 
     name: str
     type: str

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable, Hashable
-from typing import Any, Generic, TypeVar
+from typing import Any, ClassVar, Generic, TypeVar
 
 from flatland.errors import PLUGIN_FAULTS, WorldError
 from flatland.graph_names import global_name
@@ -28,6 +28,12 @@ class Output(Generic[T]):
         owners: Names of the plugins that opened it, for messages.
         closed: Whether the last of these plugins has ended.
     """
+
+    outside_state: ClassVar[dict[str, Callable[[], object]]] = {
+        "_lock": threading.Lock,
+        "_subscribers": tuple,
+        "_wanters": frozenset,
+    }
 
     __slots__ = (
         "_lock",
@@ -149,6 +155,8 @@ class Command(Generic[T]):
         on_set: Called as `on_set(command, value)` before each `set`, also for values that are not
             accepted; None for no function.
     """
+
+    outside_state: ClassVar[dict[str, Callable[[], object]]] = {"on_set": lambda: None}
 
     __slots__ = (
         "accept",

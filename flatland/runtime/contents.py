@@ -11,6 +11,7 @@ import numpy as np
 from flatland.config.reader import ReadYaml, YamlReader
 from flatland.errors import WorldError
 from flatland.geometry import DoubleArray
+from flatland.runtime.model_states import ModelStates, model_states
 from flatland.runtime.placement import IfBlocked, Models, check_if_blocked
 from flatland.runtime.state_hash import state_hash
 
@@ -33,6 +34,7 @@ if TYPE_CHECKING:
     from flatland.runtime.placement import Placement
     from flatland.runtime.plugin_host import PluginHost
     from flatland.runtime.requests import Requests
+    from flatland.runtime.snapshot import WorldSnapshot, WorldStates
     from flatland.runtime.transforms import FramePair, TransformBuffer
     from flatland.timekeeper import Timekeeper
     from flatland.values import Transform
@@ -84,6 +86,7 @@ class Contents:
     _observers: Observers
     _paused: bool
     _placement: Placement
+    _states: WorldStates
 
     @property
     def models(self) -> list[Model]:
@@ -321,6 +324,60 @@ class Contents:
         return self._contacts.touching
 
     # -- state -----------------------------------------------------------------------------
+
+    def state(self) -> ModelStates:
+        """Returns the names, poses and velocities of all models.
+
+        Raises:
+            WorldError: The world is closed.
+        """
+        return self._read(lambda: model_states(self.physics, self._models.by_name))
+
+    def snapshot(self) -> WorldSnapshot:
+        """Returns the current state of the world, for `restore`.
+
+        It includes everything that affects the further steps: bodies, contacts, the attributes of
+        all plugins with all that they refer to, random numbers, commands, the time and the last
+        values of outputs. Requests, the pause, observers and subscribers are not part of it.
+
+        Raises:
+            WorldError: The world is closed, a plugin calls this, or a plugin has an attribute that
+                cannot be copied; see *Snapshots* in `docs/write_a_plugin.md`.
+        """
+        self.requests.refuse_in_plugin("snapshot")
+        return self._read(self._states.take)
+
+    def restore(self, snapshot: WorldSnapshot) -> None:
+        """Returns to an earlier state: the same steps have the same results, bit by bit.
+
+        Models, bodies, plugins, outputs and commands that exist in both states are the same
+        objects. Models that were spawned since are deleted, and deleted ones are there again. A
+        snapshot can be restored any number of times.
+
+        Args:
+            snapshot: Result of `snapshot` of this world.
+
+        Raises:
+            WorldError: The world is closed, a plugin calls this, the snapshot is one of another
+                world, or a plugin of a deleted model had a connection that has ended.
+        """
+        self.requests.refuse_in_plugin("restore")
+        self._read(lambda: self._states.restore(snapshot))
+
+    def clone(self) -> World:
+        """Returns an independent copy of the world in its current state.
+
+        The same steps have the same results in both, bit by bit. They share only what never
+        changes, such as parsed files and trees of map edges; the clone can be used in another
+        thread and outlives the original. It has no observers, no subscribers other than its own
+        plugins, no requests, is not paused, and its plugins have no access to ROS.
+
+        Raises:
+            WorldError: The world is closed, a plugin calls this, or a plugin has an attribute that
+                cannot be copied; see *Snapshots* in `docs/write_a_plugin.md`.
+        """
+        self.requests.refuse_in_plugin("clone")
+        return self._read(self._states.clone)
 
     def state_hash(self) -> str:
         """Returns a hash of the state: equal for two runs that have been the same so far.

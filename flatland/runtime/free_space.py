@@ -102,6 +102,34 @@ class FreeSpace:
             return None
         return row * self._columns + column
 
+    def is_connected_within(
+        self, start: tuple[float, float], goal: tuple[float, float], margin: float
+    ) -> bool:
+        """Returns whether a path of the disc connects two points without a wide detour.
+
+        Args:
+            start: A point in the world frame [m].
+            goal: Another point.
+            margin: Distance by which the path may leave the rectangle whose opposite corners are
+                the points [m].
+        """
+        corners = np.array((start, goal))
+        low = np.floor((corners.min(axis=0) - margin - self._origin) / self._cell).astype(int)
+        high = np.ceil((corners.max(axis=0) + margin - self._origin) / self._cell).astype(int)
+        first_column, first_row = np.maximum(low, 0).tolist()
+        grid = self._regions.reshape(self._rows, self._columns)
+        window = grid[first_row : int(high[1]), first_column : int(high[0])] > 0
+        cv2 = importlib.import_module("cv2")
+        regions = cv2.connectedComponents(window.view(np.uint8), connectivity=8)[1]
+        ends = []
+        for x, y in (start, goal):
+            cell = self.cell_at(x, y)
+            if cell is None:
+                return False
+            row, column = divmod(cell, self._columns)
+            ends.append(int(regions[row - first_row, column - first_column]))
+        return ends[0] > 0 and ends[0] == ends[1]
+
     def point_in(self, cell: int, u: float, v: float) -> tuple[float, float]:
         """Returns a point of a cell in the world frame [m].
 

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Iterable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from flatland.entities.contact import Contact, ContactImpulse, MutableContact
 from flatland.errors import PLUGIN_FAULTS, FlatlandError, PluginError, YamlError
@@ -46,6 +46,8 @@ class PluginHost:
         costs: The costs that are being measured, None if none are.
         disabled: The plugins that were disabled because a hook raised repeatedly.
     """
+
+    outside_state: ClassVar[dict[str, Callable[[], object]]] = {"costs": lambda: None}
 
     def __init__(
         self,

@@ -14,7 +14,7 @@ FLOORS = (
     ("errors", "geometry", "graph_names", "requirements", "timekeeper", "version"),
     ("physics", "values"),
     ("config", "entities"),
-    ("maps", "plugin_api"),
+    ("copying", "maps", "plugin_api"),
     ("loading", "plugins"),
     ("runtime",),
     ("world",),

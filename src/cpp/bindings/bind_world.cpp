@@ -27,6 +27,14 @@ WorldClass bind_world(py::module_& module) {
         }));
       },
       py::arg("dt"), py::arg("velocity_iterations"), py::arg("position_iterations"));
+  world.def("copy", [](World& self) {
+    auto copy = std::make_shared<World>();
+    copy->become_copy_of(self);
+    copy->rays().fans().share(self.rays().fans());
+    return copy;
+  });
+  world.def("become_copy_of", &World::become_copy_of, py::arg("source"));
+  world.def("clear", &World::clear, "Destroys all objects; unlike a new world, ids go on.");
   world.def("find_new_contacts", &World::find_new_contacts);
   world.def("destroy_body", &World::destroy_body, py::arg("body"));
   world.def("destroy_joint", &World::destroy_joint, py::arg("joint"));

@@ -76,4 +76,9 @@ std::shared_ptr<const BeamFan> FanCache::get(const float* ends, std::size_t coun
   return fans_.front();
 }
 
+void FanCache::share(FanCache& other) {
+  const std::scoped_lock lock(mutex_, other.mutex_);
+  fans_ = other.fans_;
+}
+
 }  // namespace flatland

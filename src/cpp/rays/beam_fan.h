@@ -51,6 +51,8 @@ class BeamFan {
 class FanCache {
  public:
   std::shared_ptr<const BeamFan> get(const float* ends, std::size_t count);
+  // Shares the fans of another cache.
+  void share(FanCache& other);
 
  private:
   static constexpr std::size_t kMaxFans = 16;

@@ -124,6 +124,13 @@ std::vector<BodyState> states_of(const World& world) {
   return states;
 }
 
+void motions_of(const World& world, const Id* bodies, std::size_t count, double* motions) {
+  for (std::size_t i = 0; i < count; ++i) {
+    motions = std::copy_n(pose_of(world, bodies[i]).begin(), 3, motions);
+    motions = std::copy_n(velocity_of(world, bodies[i]).begin(), 3, motions);
+  }
+}
+
 void apply_force(World& world, Id body_id, double fx, double fy, double px, double py) {
   b2Body* body = world.change_body(body_id);
   const b2Vec2 force = checked_vector(fx, fy, "force");

@@ -40,6 +40,10 @@ using BodyState = std::array<float, 9>;
 // States of all bodies, in order of creation.
 std::vector<BodyState> states_of(const World& world);
 
+// Poses and velocities of the origins of some bodies, one after the other: x, y, theta, vx, vy,
+// omega.
+void motions_of(const World& world, const Id* bodies, std::size_t count, double* motions);
+
 void apply_force(World& world, Id body, double fx, double fy, double px, double py);
 void apply_torque(World& world, Id body, double torque);
 

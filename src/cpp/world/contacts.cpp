@@ -64,6 +64,13 @@ std::vector<ContactRow> ContactRecorder::take_rows() { return std::exchange(rows
 
 bool ContactRecorder::take_failure() { return std::exchange(failed_, false); }
 
+void ContactRecorder::replace_contacts(
+    const std::unordered_map<const b2Contact*, const b2Contact*>& copies) {
+  std::unordered_map<const b2Contact*, std::uint64_t> ids;
+  for (const auto& [contact, id] : ids_) ids[copies.at(contact)] = id;
+  ids_ = std::move(ids);
+}
+
 std::vector<ContactRow> ContactRecorder::touching(const b2World& world) const {
   std::vector<ContactRow> rows;
   // make_row only reads the contact, but the accessors of b2Contact are not const-correct.

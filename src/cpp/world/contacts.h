@@ -66,6 +66,9 @@ class ContactRecorder final : public b2ContactListener {
   // Returns whether events were lost since the last call.
   bool take_failure();
 
+  // Replaces the contacts that have ids; to be called for the copy of a recorder.
+  void replace_contacts(const std::unordered_map<const b2Contact*, const b2Contact*>& copies);
+
   // Returns the contacts of all fixtures that currently touch.
   std::vector<ContactRow> touching(const b2World& world) const;
 

@@ -57,6 +57,10 @@ class WakeDynamicBodies final : public b2QueryCallback {
 
 World::World() : engine_(std::make_unique<b2World>(b2Vec2(0.0F, 0.0F))) {
   initialize_contact_table();
+  listen();
+}
+
+void World::listen() {
   engine_->SetDestructionListener(this);
   engine_->SetContactListener(&contacts_);
 }

@@ -60,6 +60,14 @@ class World final : private b2DestructionListener {
   void close();
   bool closed() const { return engine_ == nullptr; }
 
+  // Makes this world an exact copy of another one, with the same ids; see copy.cpp. Ids of this
+  // world that do not exist in the other one become stale and are not used again. If there is not
+  // enough memory, this world is unchanged. The caches of ray casting are shared.
+  void become_copy_of(World& source);
+  // Destroys all objects. The results of the same further calls are those of a new world, except
+  // for the generations of ids.
+  void clear();
+
   // Advances the world by dt > 0 seconds. The hook may be null. The caller has exclusive use of the
   // world. While a body is invalid the world does not advance, and the report names the body again.
   StepReport step(double dt, int velocity_iterations, int position_iterations, PreSolveHook* hook);
@@ -159,6 +167,8 @@ class World final : private b2DestructionListener {
   };
 
  private:
+  // Receives the events of a new engine.
+  void listen();
   void SayGoodbye(b2Joint* joint) override;
   void SayGoodbye(b2Fixture* fixture) override;
   std::vector<Id> still_invalid() const;
