@@ -63,7 +63,7 @@ class SlotMap {
   template <typename Visit>
   void for_each(Visit&& visit) {
     for (std::uint32_t slot = 0; slot < slots_.size(); ++slot) {
-      if (slots_[slot].used) visit(make_id(slot), slots_[slot].value);
+      if (slots_[slot].is_used()) visit(make_id(slot), slots_[slot].value);
     }
   }
 
