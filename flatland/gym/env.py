@@ -56,7 +56,7 @@ class FlatlandEnv(gymnasium.Env[Any, FloatArray]):
         try:
             agent = settings.find_agent(self.world)
             self._episodes = Episodes([agent], settings)
-            self._start = StartState(self.world, [agent])
+            self._start = StartState(self.world)
         except BaseException:
             self.world.close()
             raise

@@ -84,7 +84,7 @@ class FleetEnv(ParallelEnv[str, Any, FloatArray]):  # type: ignore[misc, unused-
         try:
             self._agents = self._spawn(robot, settings)
             self._episodes = Episodes(self._agents, settings)
-            self._start = StartState(self.world, self._agents)
+            self._start = StartState(self.world)
         except BaseException:
             self.world.close()
             raise

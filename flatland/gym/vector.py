@@ -82,7 +82,7 @@ class FlatlandVectorEnv(VectorEnv[Any, Any, Any]):
         try:
             agents = [settings.find_agent(world) for world in self._worlds]
             self._episodes = Episodes(agents, settings, num_threads)
-            self._starts = [StartState(agent.world, [agent]) for agent in agents]
+            self._starts = [StartState(agent.world) for agent in agents]
         except BaseException:
             self.close()
             raise

@@ -154,6 +154,21 @@ class FlatlandPlugin:
         self._noise_streams.append(stream)
         return stream
 
+    def reseed(self, rng: np.random.Generator) -> None:
+        """Continues `rng` and all noise streams from states that are drawn from a generator.
+
+        Args:
+            rng: Equal states of it give equal random numbers.
+        """
+        words = rng.bit_generator.random_raw(2 + len(self._noise_streams)).tolist()
+        generator = self.rng.bit_generator
+        state = generator.state
+        state["state"]["state"] = words[0] << 64 | words[1]
+        state["has_uint32"] = 0
+        generator.state = state
+        for stream, word in zip(self._noise_streams, words[2:], strict=True):
+            stream.updates = word >> 2
+
     def _random_state(self) -> tuple[Any, list[int]]:
         """Returns the states of `rng` and of the noise streams, for `World.state_hash`."""
         updates = [stream.updates for stream in self._noise_streams]
