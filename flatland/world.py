@@ -98,7 +98,7 @@ class World(Contents):
         self.velocity_iterations = velocity_iterations
         self.position_iterations = position_iterations
         self.collision_filter = CollisionFilter()
-        self.layers: list[Layer] = []
+        self.layers, self._former_layers = list[Layer](), dict[str, Layer]()
         self.physics = PhysicsWorld()
         self._files = Source("", str(Path(base_dir).absolute()))
         self.requests = Requests()

@@ -197,6 +197,11 @@ class Command(Generic[T]):
         self.accept = accept
         self.on_set: Callable[[Command[T], T], None] | None = None
 
+    def renew(self, new: Command[T]) -> None:
+        """Becomes equal to a new command of the same topic; `on_set` remains."""
+        self.name, self.owner, self.accept = new.name, new.owner, new.accept
+        self.value, self.received, self.closed = new.value, 0, False
+
     def set(self, value: T) -> None:
         """Sets the value if `accept` allows it.
 

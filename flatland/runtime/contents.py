@@ -11,6 +11,7 @@ import numpy as np
 from flatland.config.reader import ReadYaml, YamlReader
 from flatland.errors import WorldError
 from flatland.geometry import DoubleArray
+from flatland.plugin_api.noise import checked_seed
 from flatland.runtime.model_states import ModelStates, model_states
 from flatland.runtime.placement import IfBlocked, Models, check_if_blocked
 from flatland.runtime.state_hash import state_hash
@@ -85,6 +86,7 @@ class Contents:
     _models: ModelSet
     _observers: Observers
     _paused: bool
+    _former_layers: dict[str, Layer]
     _placement: Placement
     _states: WorldStates
 
@@ -114,6 +116,10 @@ class Contents:
 
     def add_layer(self, layer: Layer) -> None:
         """Adds a layer whose names are registered; for the loader."""
+        former = self._former_layers.pop(layer.name, None)
+        if former is not None:
+            former.renew(layer)
+            layer = former
         self.layers.append(layer)
         self._contacts.add_bodies([layer.body])
         self.layer_changed(layer)
@@ -242,7 +248,8 @@ class Contents:
             with self._change_log.change(kind, arguments):
                 return action()
 
-        return self.requests.change(checked, f'{kind} "{arguments["name"]}"')
+        name = arguments.get("name")
+        return self.requests.change(checked, kind if name is None else f'{kind} "{name}"')
 
     # -- requests --------------------------------------------------------------------------
 
@@ -378,6 +385,32 @@ class Contents:
         """
         self.requests.refuse_in_plugin("clone")
         return self._read(self._states.clone)
+
+    def reset(self, seed: int | None = None, keep_time: bool = False) -> None:
+        """Returns to the state after loading: the same steps have the same results, bit by bit.
+
+        All models and plugins end, and those of the world file start anew, with the files and
+        parameters as they were when the world was loaded; models spawned since are gone. Look up
+        models, bodies and plugins again, since they are new objects. Outputs and commands that
+        exist before and after, layers, observers and subscribers remain. Requests that wait and the
+        pause do not change. A hook of a plugin may call this: it takes effect after the step.
+
+        Args:
+            seed: Seed of all random numbers, also of those in expressions of the files: the state
+                is that after loading with this seed. None for the present seed.
+            keep_time: Whether the simulated time continues, instead of starting at 0 again. Updates
+                at a rate then continue in phase.
+
+        Raises:
+            WorldError: The world is closed or was not loaded from a file.
+            FlatlandError: With this seed, a file is invalid, or a plugin fails; the world is as
+                before, or empty if a plugin cannot be copied (see `snapshot`).
+            ValueError: The seed is negative.
+        """
+        if seed is not None:
+            checked_seed(seed)
+        arguments = {"seed": seed, "keep_time": keep_time}
+        self._change("reset", arguments, lambda: self._states.reset(seed, keep_time))
 
     def state_hash(self) -> str:
         """Returns a hash of the state: equal for two runs that have been the same so far.

@@ -58,7 +58,10 @@ class WorldObserver:
         """A step starts; no hook has run yet."""
 
     def time_advanced(self, time_ns: int) -> None:
-        """The simulated time [ns] advanced; hooks after the step have not run yet."""
+        """The simulated time [ns] advanced; hooks after the step have not run yet.
+
+        Also called if `World.reset` or `World.restore` set it, to an earlier time as a rule.
+        """
 
     @property
     def wants_transforms(self) -> bool:

@@ -59,6 +59,10 @@ class Placement:
         # Walls and free spaces by the arguments of the query; they do not depend on models.
         self._spaces: dict[tuple[object, ...], tuple[DoubleArray, FreeSpace]] = {}
 
+    def forget_random_state(self) -> None:
+        """Returns to the initial state of the generator for samples of free places."""
+        self._rng = None
+
     # -- models ----------------------------------------------------------------------------
 
     def choose_pose(self, model: Model, pose: Pose, if_blocked: IfBlocked, verb: str) -> Pose:

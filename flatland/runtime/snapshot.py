@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any, Final
 
 from flatland.copying.copier import Copier
 from flatland.copying.kind import UncopyableError
 from flatland.copying.record import Recorder
+from flatland.entities.collision_filter import CollisionFilter
 from flatland.errors import WorldError
+from flatland.loading.world_loader import reload_world
 from flatland.plugin_api.plugin import FlatlandPlugin, describe
 from flatland.runtime.observer import Observers
 from flatland.runtime.requests import Requests
@@ -20,6 +23,8 @@ if TYPE_CHECKING:
     from flatland.entities.model import Model
     from flatland.physics import PhysicsWorld
     from flatland.world import World
+
+_LOG = logging.getLogger("flatland")
 
 OUTSIDE: Final = frozenset(
     [
@@ -78,8 +83,9 @@ class _Ports:
     """The open ports of a world."""
 
     def __init__(self, world: World) -> None:
-        self.outputs = list(world.ports.outputs.values())
-        self.commands = [c for same in world.ports.commands.values() for c in same]
+        outputs, commands = world.ports.kept
+        self.outputs = [*world.ports.outputs.values(), *outputs]
+        self.commands = [c for same in world.ports.commands.values() for c in same] + commands
 
 
 class WorldStates:
@@ -129,9 +135,11 @@ class WorldStates:
         for model in reversed(models):
             if model not in kept:
                 world._models.delete(model.name)
-        ports = _Ports(world)
+        ports, time_ns = _Ports(world), world.timekeeper.sim_time_ns
         world.physics.become_copy_of(snapshot._physics)
         snapshot._record.write_back()
+        if world.timekeeper.sim_time_ns != time_ns:
+            world._observers.time_advanced(world.timekeeper.sim_time_ns)
         self._notify(ports, snapshot, revived)
 
     def _notify(self, before: _Ports, snapshot: WorldSnapshot, revived: list[Model]) -> None:
@@ -151,6 +159,55 @@ class WorldStates:
             for plugin in model.plugins:
                 plugin.ros = observers.plugin_ros(plugin)
             observers.model_added(model)
+
+    # -- reset -----------------------------------------------------------------------------
+
+    def reset(self, seed: int | None, keep_time: bool) -> None:
+        """Loads the world again; see `World.reset`."""
+        world = self.world
+        if not world.path:
+            raise WorldError("only a world that was loaded from a file can be reset")
+        try:
+            before = self.take()
+        except WorldError:
+            before = None  # A plugin cannot be copied.
+        with world.ports.keeping():
+            self._empty()
+            if not keep_time:
+                world.timekeeper.sim_time_ns = 0
+                world._observers.time_advanced(0)
+            try:
+                reload_world(world, world.seed if seed is None else seed)
+                world.physics.find_new_contacts()
+            except BaseException:
+                self._empty()
+                self._roll_back(before)
+                raise
+            finally:
+                world._former_layers.clear()
+
+    def _roll_back(self, before: WorldSnapshot | None) -> None:
+        """Restores the state before a reset that failed, if it can be restored."""
+        try:
+            if before is not None:
+                self.restore(before)
+                return
+        except WorldError as error:
+            _LOG.error("%s", error)
+        _LOG.error("the reset failed, and the world is empty: a plugin cannot be restored")
+
+    def _empty(self) -> None:
+        """Removes all contents of the world."""
+        world = self.world
+        world.plugin_host.shut_down(list(world.plugin_host.world_plugins))
+        for model in reversed(world.models):
+            world._models.delete(model.name)
+        world._former_layers.update({layer.name: layer for layer in world.layers})
+        world.layers.clear()
+        world.collision_filter = CollisionFilter()
+        world._contacts.clear()
+        world._placement.forget_random_state()
+        world.physics.clear()
 
     # -- clones ----------------------------------------------------------------------------
 
