@@ -33,12 +33,12 @@ from flatland.runtime.placement import Placement
 from flatland.runtime.plugin_host import PluginHost
 from flatland.runtime.requests import Requests
 from flatland.runtime.snapshot import WorldStates
+from flatland.runtime.stepping import Stepping
 from flatland.runtime.transforms import TransformBuffer
 from flatland.timekeeper import Timekeeper
 
 if TYPE_CHECKING:
     from flatland.recording import Recorder
-    from flatland.runtime.change_log import ChangeLog
 
 _LOG = logging.getLogger("flatland")
 
@@ -53,8 +53,6 @@ class World(Contents):
         timekeeper: The simulated time.
         physics: The physics world: ray casts, and all that is not part of models and layers.
         collision_filter: Layer names and their bits.
-        velocity_iterations: Velocity iterations of the Box2D solver.
-        position_iterations: Position iterations of the Box2D solver.
         seed: Seed of all random numbers.
         params: Source of the values of `param()` in YAML files.
         path: The world file, as given; relative model paths start from its folder.
@@ -95,18 +93,18 @@ class World(Contents):
         self.params = params
         self.path = ""
         self.inputs = Inputs()
-        self.velocity_iterations = velocity_iterations
-        self.position_iterations = position_iterations
         self.collision_filter = CollisionFilter()
         self.layers, self._former_layers = list[Layer](), dict[str, Layer]()
         self.physics = PhysicsWorld()
         self._files = Source("", str(Path(base_dir).absolute()))
         self.requests = Requests()
         self._observers = Observers(self._faults)
-        self.ports = PortRegistry(self._observers, self._faults.add_of_subscriber)
         self.transform_buffer = TransformBuffer(self._observers)
         self.plugin_host = PluginHost(
             self, self._observers, self.requests, self._faults, plugin_timeout
+        )
+        self.ports = PortRegistry(
+            self._observers, self._faults.add_of_subscriber, self.plugin_host.schedule.change
         )
         self._contacts = ContactReporter(self.physics, self.plugin_host)
         self._placement = Placement(self, self._contacts)
@@ -116,8 +114,18 @@ class World(Contents):
         self._body_monitor = BodyMonitor(
             self.physics, self._contacts, self._models, on_invalid_body
         )
+        self._stepping = Stepping(
+            self.physics,
+            self.timekeeper,
+            self.plugin_host,
+            self._contacts,
+            self._body_monitor,
+            self._observers,
+            self.transform_buffer,
+            (velocity_iterations, position_iterations),
+        )
+        self.requests.on_post = self.physics.plan.interrupt
         self.change_count = 0
-        self._change_log: ChangeLog | None = None
         self._paused = False
         self._closed = False
         self.add_observer(self._body_monitor)
@@ -210,6 +218,24 @@ class World(Contents):
     # -- time ------------------------------------------------------------------------------
 
     @property
+    def velocity_iterations(self) -> int:
+        """Velocity iterations of the Box2D solver."""
+        return self._stepping.velocity_iterations
+
+    @velocity_iterations.setter
+    def velocity_iterations(self, count: int) -> None:
+        self._stepping.velocity_iterations = count
+
+    @property
+    def position_iterations(self) -> int:
+        """Position iterations of the Box2D solver."""
+        return self._stepping.position_iterations
+
+    @position_iterations.setter
+    def position_iterations(self, count: int) -> None:
+        self._stepping.position_iterations = count
+
+    @property
     def time(self) -> float:
         """Simulated time [s]."""
         return self.timekeeper.sim_time
@@ -224,16 +250,20 @@ class World(Contents):
         requests, faults = self.requests, self._faults
         requests.refuse_in_plugin("step")
         actions, thread = requests.actions, threading.get_ident()
-        for _ in range(n):
+        left = n
+        while left > 0:
             with requests.lock:
                 self._check_open()
+                self.physics.plan.clear_interrupt()
                 if actions:
                     requests.process()
-                if while_paused or not self._paused:
+                if self._paused and not while_paused:
+                    left -= 1
+                else:
                     requests.hook_thread = thread
                     self._observers.step_started()
                     try:
-                        self._step_once()
+                        left -= self._stepping.advance(left)
                     finally:
                         self._observers.step_finished()
                         requests.hook_thread = None
@@ -241,23 +271,6 @@ class World(Contents):
                     requests.process()
             if faults.first is not None:
                 faults.raise_first()
-
-    def _step_once(self) -> None:
-        timekeeper, host = self.timekeeper, self.plugin_host
-        self._contacts.update()
-        host.before_physics_step(timekeeper)
-        report = self.physics.step(
-            timekeeper.step_size, self.velocity_iterations, self.position_iterations
-        )
-        if report is not None:
-            self._body_monitor.examine(report, timekeeper)
-        self._contacts.dispatch()
-        timekeeper.advance()
-        self._observers.time_advanced(timekeeper.sim_time_ns)
-        host.after_physics_step(timekeeper)
-        self.transform_buffer.flush()
-        if self._change_log is not None:
-            self._change_log.step_done()
 
     # -- recordings and images -------------------------------------------------------------
 
@@ -336,8 +349,8 @@ class World(Contents):
         with self.requests.lock:
             if self._closed:
                 return
-            if self._change_log is not None:
-                self._change_log.world_closing()
+            if self._stepping.change_log is not None:
+                self._stepping.change_log.world_closing()
             self.plugin_host.shut_down(list(self.plugin_host.world_plugins))
             for model in reversed(self.models):
                 self._models.delete(model.name)

@@ -14,15 +14,20 @@ from flatland._core import BOX2D_VERSION, OldManifold, PreSolveContact
 from flatland.geometry import Pose
 from flatland.physics.body import PhysicsBody
 from flatland.physics.contact import ContactEvent, ContactInfo
+from flatland.physics.controller import Controller, VelocityController
 from flatland.physics.fixture import PhysicsFixture
 from flatland.physics.joint import PhysicsJoint
+from flatland.physics.plan import END_OF_ORDER, RunEnd, StepPlan
 from flatland.physics.queries import RayHit
+from flatland.physics.touches import Touch, Touches
 from flatland.physics.world import PhysicsWorld, StepReport
 
 __all__ = [
     "BOX2D_VERSION",
+    "END_OF_ORDER",
     "ContactEvent",
     "ContactInfo",
+    "Controller",
     "OldManifold",
     "PhysicsBody",
     "PhysicsFixture",
@@ -31,5 +36,10 @@ __all__ = [
     "Pose",
     "PreSolveContact",
     "RayHit",
+    "RunEnd",
+    "StepPlan",
     "StepReport",
+    "Touch",
+    "Touches",
+    "VelocityController",
 ]

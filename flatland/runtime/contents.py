@@ -36,6 +36,7 @@ if TYPE_CHECKING:
     from flatland.runtime.plugin_host import PluginHost
     from flatland.runtime.requests import Requests
     from flatland.runtime.snapshot import WorldSnapshot, WorldStates
+    from flatland.runtime.stepping import Stepping
     from flatland.runtime.transforms import FramePair, TransformBuffer
     from flatland.timekeeper import Timekeeper
     from flatland.values import Transform
@@ -80,7 +81,6 @@ class Contents:
     change_count: int
     inputs: Inputs
 
-    _change_log: ChangeLog | None
     _contacts: ContactReporter
     _files: Source
     _models: ModelSet
@@ -89,6 +89,7 @@ class Contents:
     _former_layers: dict[str, Layer]
     _placement: Placement
     _states: WorldStates
+    _stepping: Stepping
 
     @property
     def models(self) -> list[Model]:
@@ -130,7 +131,7 @@ class Contents:
 
     def log_changes(self, log: ChangeLog | None) -> None:
         """Notifies a log of all further changes and steps, instead of the previous one."""
-        self._change_log = log
+        self._stepping.change_log = log
 
     def resolve_path(self, path: str) -> str:
         """Returns the absolute path of a model or map file.
@@ -243,9 +244,10 @@ class Contents:
         def checked() -> R:
             self._check_open()
             self.change_count += 1
-            if self._change_log is None or not is_external:
+            log = self._stepping.change_log
+            if log is None or not is_external:
                 return action()
-            with self._change_log.change(kind, arguments):
+            with log.change(kind, arguments):
                 return action()
 
         name = arguments.get("name")
@@ -272,6 +274,7 @@ class Contents:
     def pause(self) -> None:
         """Pauses the world from the next step on."""
         self._paused = True
+        self.physics.plan.interrupt()
 
     def resume(self) -> None:
         """Resumes a paused world."""
@@ -280,6 +283,7 @@ class Contents:
     def toggle_pause(self) -> None:
         """Pauses a running world, resumes a paused one."""
         self._paused = not self._paused
+        self.physics.plan.interrupt()
 
     # -- observers -------------------------------------------------------------------------
 
@@ -323,6 +327,7 @@ class Contents:
     @property
     def transforms(self) -> dict[FramePair, Transform]:
         """The latest transform of each (parent, child)."""
+        self.plugin_host.schedule.settle()
         return self.transform_buffer.latest
 
     @property
@@ -425,9 +430,14 @@ class Contents:
         Raises:
             WorldError: The world is closed, or the state of a plugin cannot be hashed.
         """
-        return self._read(
-            lambda: state_hash(self.seed, self.timekeeper, self.physics, self.models, self.plugins)
-        )
+
+        def read() -> str:
+            self.plugin_host.schedule.settle()
+            return state_hash(
+                self.seed, self.timekeeper, self.physics, self.models, self.plugins
+            )
+
+        return self._read(read)
 
     # -- free places -----------------------------------------------------------------------
 

@@ -52,12 +52,6 @@ Id add_controller(World& world, Id body, Motion motion) {
   return world.plan().add_controller(controller);
 }
 
-Triple to_triple(const PyTriple& triple, const char* what) {
-  const auto& [x, y, z] = triple;
-  for (const double number : {x, y, z}) checked_finite(number, what);
-  return {x, y, z};
-}
-
 PyTriple to_python(const Triple& t) { return {t[0], t[1], t[2]}; }
 
 void bind_controllers(WorldClass& world) {
@@ -78,14 +72,15 @@ void bind_controllers(WorldClass& world) {
   });
   world.def("set_twist_target", [](World& self, Id id, double forward, double sideways,
                                    double omega) {
-    motion_of<TwistMotion>(self, id).target = to_triple({forward, sideways, omega}, "target");
+    // A velocity that is out of range is refused when it is applied to the body.
+    motion_of<TwistMotion>(self, id).target = {forward, sideways, omega};
   });
   world.def("twist_velocity", [](World& self, Id id) {
     return to_python(motion_of<TwistMotion>(self, id).velocity);
   });
   world.def("set_twist_velocity", [](World& self, Id id, double forward, double sideways,
                                      double omega) {
-    motion_of<TwistMotion>(self, id).velocity = to_triple({forward, sideways, omega}, "velocity");
+    motion_of<TwistMotion>(self, id).velocity = {forward, sideways, omega};
   });
   world.def("has_controller", [](World& self, Id id) {
     return self.plan().find_controller(id) != nullptr;
@@ -122,9 +117,11 @@ std::uint32_t add_clock(World& world, bool is_after, const std::string& kind,
     checked = RateClock::Kind::kAlways;
   } else if (kind == "at_start") {
     checked = RateClock::Kind::kAtStart;
+  } else if (kind == "never") {
+    checked = RateClock::Kind::kNever;
   } else if (kind != "periodic" || half_step == 0 || cycle >> 63U != 0 || half_step >= cycle / 2) {
-    throw py::value_error("a clock must be always, at_start, or periodic with a step of less than "
-                          "its cycle below 2^63");
+    throw py::value_error("a clock must be always, at_start, never, or periodic with a step of less "
+                          "than its cycle, which must be below 2^63");
   }
   return world.plan().add_clock(phase_of(is_after), RateClock(checked, half_step, cycle));
 }
@@ -145,18 +142,20 @@ void bind_clocks(WorldClass& world) {
   });
   world.def(
       "add_record",
-      [](World& self, std::uint32_t clock, std::int64_t order, std::optional<Id> body) {
+      [](World& self, std::uint32_t clock, std::int64_t order, std::optional<Id> body,
+         std::optional<Id> touches) {
         self.check_changeable();
         Record record;
         record.clock = clock;
         record.order = order;
+        record.touches = touches.value_or(0);
         if (body) {
           self.read_body(*body);  // throws if it does not exist
           record.body = *body;
         }
         return self.plan().add_record(record);
       },
-      py::arg("clock"), py::arg("order"), py::arg("body"));
+      py::arg("clock"), py::arg("order"), py::arg("body"), py::arg("touches"));
   world.def("enable_record", [](World& self, Id id, bool is_enabled) {
     changed_record(self, id).is_enabled = is_enabled;
   });
@@ -215,9 +214,90 @@ void bind_run(WorldClass& world) {
   world.def("clear_interrupt", &World::clear_interrupt);
 }
 
+TouchCollector& changed_collector(World& world, Id id) {
+  world.check_changeable();
+  TouchCollector* collector = world.contacts().touches.find(id);
+  if (collector == nullptr) throw StaleHandleError("the collector of contacts was removed");
+  return *collector;
+}
+
+// Contact id, this body, other body, whether this body is body A, solver calls in the last step,
+// sums of normal and of tangent impulses, points, normal; the last three are those of the points.
+py::list to_rows(const World& world, const TouchCollector& collector) {
+  py::list rows;
+  for (const Touch& touch : collector.touches) {
+    const bool is_solved = touch.solved_in == world.contacts().step() && touch.solver_calls > 0;
+    py::list normal_impulses, tangent_impulses, points;
+    for (std::size_t i = 0; is_solved && i < touch.point_count; ++i) {
+      normal_impulses.append(touch.normal_impulses[i]);
+      tangent_impulses.append(touch.tangent_impulses[i]);
+      points.append(py::make_tuple(touch.points[i][0], touch.points[i][1]));
+    }
+    rows.append(py::make_tuple(touch.contact_id, touch.this_body, touch.other_body, touch.is_a,
+                               is_solved ? touch.solver_calls : 0, normal_impulses,
+                               tangent_impulses, points,
+                               py::make_tuple(touch.normal[0], touch.normal[1])));
+  }
+  return rows;
+}
+
+void bind_touches(WorldClass& world) {
+  world.def(
+      "add_touches",
+      [](World& self, std::vector<Id> bodies, std::vector<Id> excluded, bool counts_sensors,
+         bool counts_own) {
+        for (const Id body : bodies) self.change_body(body);  // throws if it does not exist
+        TouchCollector collector;
+        collector.bodies = std::move(bodies);
+        collector.excluded = std::move(excluded);
+        collector.counts_sensors = counts_sensors;
+        collector.counts_own = counts_own;
+        return self.contacts().touches.add(collector, self.contacts().touching(self.engine()));
+      },
+      py::arg("bodies"), py::arg("excluded"), py::arg("counts_sensors"), py::arg("counts_own"));
+  world.def("has_touches",
+            [](World& self, Id id) { return self.contacts().touches.find(id) != nullptr; });
+  world.def("remove_touches", [](World& self, Id id) {
+    changed_collector(self, id);
+    self.contacts().touches.remove(id);
+  });
+  world.def("is_touched", [](World& self, Id id) {
+    const TouchCollector& collector = changed_collector(self, id);
+    return collector.was_touched || !collector.touches.empty();
+  });
+  world.def("was_touched", [](World& self, Id id) {
+    return changed_collector(self, id).was_touched;
+  });
+  world.def("clear_touches",
+            [](World& self, Id id) { changed_collector(self, id).was_touched = false; });
+  world.def("count_touches",
+            [](World& self, Id id) { return changed_collector(self, id).touches.size(); });
+  world.def("touch_rows",
+            [](World& self, Id id) { return to_rows(self, changed_collector(self, id)); });
+  world.def("end_runs_at_touches", [](World& self, Id id, bool ends_runs) {
+    self.contacts().touches.set_ends_runs(changed_collector(self, id), ends_runs);
+  });
+  world.def("own_bodies", [](World& self, const std::vector<Id>& bodies, bool are_owned) {
+    self.check_changeable();
+    for (const Id body : bodies) {
+      // Those of destroyed bodies are forgotten with them.
+      if (!are_owned || self.has_body(body)) self.contacts().touches.set_owned(body, are_owned);
+    }
+  });
+  world.def("record_body_contacts", [](World& self, Id body, std::uint8_t kinds) {
+    self.change_body(body);
+    self.contacts().record_body(body, kinds);
+  });
+  world.def("record_all_contacts", [](World& self, std::uint8_t kinds) {
+    self.check_changeable();
+    self.contacts().record_all(kinds);
+  });
+}
+
 }  // namespace
 
 void bind_steps(WorldClass& world) {
+  bind_touches(world);
   bind_controllers(world);
   bind_clocks(world);
   bind_run(world);

@@ -14,6 +14,7 @@ class RateClock {
     kPeriodic,  // due in step k if (2 k + 1) * half_step mod cycle < 2 * half_step
     kAlways,
     kAtStart,  // in step 0 only
+    kNever,
   };
 
   RateClock(Kind kind, std::uint64_t half_step, std::uint64_t cycle)
@@ -28,7 +29,7 @@ class RateClock {
       if (phase_ >= cycle_) phase_ -= cycle_;
       is_due_ = phase_ < 2 * half_step_;
     } else {
-      is_due_ = kind_ == Kind::kAlways || step == 0;
+      is_due_ = kind_ == Kind::kAlways || (kind_ == Kind::kAtStart && step == 0);
     }
     step_ = step;
   }

@@ -38,6 +38,14 @@ void StepPlan::remove_controller(Id id) {
   is_sorted_ = false;
 }
 
+void StepPlan::remove_body(Id body) {
+  std::vector<Id> removed;
+  controllers_.for_each([&](Id id, const Controller& controller) {
+    if (controller.body == body) removed.push_back(id);
+  });
+  for (const Id id : removed) remove_controller(id);
+}
+
 Id StepPlan::add_record(const Record& record) {
   if (record.clock >= clocks_.size()) throw std::invalid_argument("the clock does not exist");
   is_sorted_ = false;
@@ -108,6 +116,10 @@ void StepPlan::carry_out_one(World& world, const Action& action, double dt) {
     if (record == nullptr || !record->is_enabled || !clocks_[record->clock].is_due()) return;
     ++record->count;
     record->step = (after_clocks_ & bit(record->clock)) != 0 ? step_ + 1 : step_;
+    if (record->touches != 0) {
+      TouchCollector* touches = world.contacts().touches.find(record->touches);
+      if (touches != nullptr) touches->was_touched = false;
+    }
     if (record->body == 0) return;
     const b2Body* body = world.find_body(record->body);
     if (body != nullptr) record->pose = pose_of(*body);

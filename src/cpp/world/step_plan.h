@@ -61,6 +61,8 @@ class StepPlan {
   // Null if it does not exist.
   Controller* find_controller(Id id) { return controllers_.find(id); }
   void remove_controller(Id id);
+  // Removes the controllers of a body that was destroyed.
+  void remove_body(Id body);
   // To be called after a change of the order of a controller or of whether it is automatic.
   void order_changed() { is_sorted_ = false; }
 

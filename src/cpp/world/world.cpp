@@ -117,6 +117,7 @@ StepReport World::step_unchecked(double dt, int velocity_iterations, int positio
   StepGuard& guard = contacts_.guard;
   guard.begin(*engine_, seconds);
   contacts_.hook = hook;
+  contacts_.begin_step();
   engine_->Step(seconds, velocity_iterations, position_iterations);
   contacts_.hook = nullptr;
   StepReport report = guard.end(*engine_);
@@ -157,7 +158,8 @@ RunResult World::run(std::int64_t k, std::int64_t n, double dt, int velocity_ite
       break;
     }
     result.report = step_unchecked(dt, velocity_iterations, position_iterations, nullptr);
-    if (only_physics || !result.report.empty() || contacts_.has_rows()) {
+    if (only_physics || !result.report.empty() || contacts_.has_rows() ||
+        contacts_.touches.end_run()) {
       result.end = End::kPhysics;
       break;
     }
@@ -293,6 +295,9 @@ void World::destroy_body(Id id) {
   rays_.remove_body(body);
   engine_->DestroyBody(body);  // calls SayGoodbye for its fixtures and joints
   bodies_.erase(id);
+  plan_.remove_body(id);
+  contacts_.record_body(id, 0);
+  contacts_.touches.set_owned(id, false);
 }
 
 void World::destroy_joint(Id id) {
