@@ -234,7 +234,8 @@ class WorldStates:
             copier.finish()
         except UncopyableError as error:
             raise self._located(error) from None
-        clone._change_log = None
+        clone._stepping.change_log = None
+        clone.requests.on_post = clone.physics.plan.interrupt
         clone._paused = clone._closed = False
         clone._states = WorldStates(clone, self._attributes)
         if costs is not None:

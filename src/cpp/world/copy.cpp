@@ -243,6 +243,7 @@ void World::become_copy_of(World& source) {
   joints.exclude_ids_of(joints_);
   ContactRecorder contacts = source.contacts_;
   contacts.replace_contacts(copier.contacts());
+  StepPlan plan = source.plan_;
   std::vector<Id> invalid = source.invalid_;
   rays_.become_copy_of(
       source.rays_, [&](const b2Body* body) { return copier.copy_of(body); },
@@ -253,6 +254,7 @@ void World::become_copy_of(World& source) {
   fixtures_ = std::move(fixtures);
   joints_ = std::move(joints);
   contacts_ = std::move(contacts);
+  plan_ = std::move(plan);
   invalid_ = std::move(invalid);
   last_step_time_ = source.last_step_time_;
   listen();
