@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import logging
 import os
-import threading
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 from types import TracebackType
@@ -53,6 +52,8 @@ class World(Contents):
         timekeeper: The simulated time.
         physics: The physics world: ray casts, and all that is not part of models and layers.
         collision_filter: Layer names and their bits.
+        velocity_iterations: Velocity iterations of the Box2D solver.
+        position_iterations: Position iterations of the Box2D solver.
         seed: Seed of all random numbers.
         params: Source of the values of `param()` in YAML files.
         path: The world file, as given; relative model paths start from its folder.
@@ -90,6 +91,8 @@ class World(Contents):
         self.plugin_errors, self.on_invalid_body = plugin_errors, on_invalid_body
         self._faults = Faults(plugin_errors)
         self.seed = checked_seed(seed)
+        self.velocity_iterations = velocity_iterations
+        self.position_iterations = position_iterations
         self.params = params
         self.path = ""
         self.inputs = Inputs()
@@ -114,15 +117,8 @@ class World(Contents):
         self._body_monitor = BodyMonitor(
             self.physics, self._contacts, self._models, on_invalid_body
         )
-        self._stepping = Stepping(
-            self.physics,
-            self.timekeeper,
-            self.plugin_host,
-            self._contacts,
-            self._body_monitor,
-            self._observers,
-            self.transform_buffer,
-            (velocity_iterations, position_iterations),
+        self.stepping = Stepping(
+            self, self._contacts, self._body_monitor, self._observers, self._faults
         )
         self.requests.on_post = self.physics.plan.interrupt
         self.change_count = 0
@@ -218,24 +214,6 @@ class World(Contents):
     # -- time ------------------------------------------------------------------------------
 
     @property
-    def velocity_iterations(self) -> int:
-        """Velocity iterations of the Box2D solver."""
-        return self._stepping.velocity_iterations
-
-    @velocity_iterations.setter
-    def velocity_iterations(self, count: int) -> None:
-        self._stepping.velocity_iterations = count
-
-    @property
-    def position_iterations(self) -> int:
-        """Position iterations of the Box2D solver."""
-        return self._stepping.position_iterations
-
-    @position_iterations.setter
-    def position_iterations(self, count: int) -> None:
-        self._stepping.position_iterations = count
-
-    @property
     def time(self) -> float:
         """Simulated time [s]."""
         return self.timekeeper.sim_time
@@ -247,30 +225,7 @@ class World(Contents):
             WorldError: The world is closed, a plugin calls this, or a body is not finite.
             Exception: Raised by a plugin, subscriber or observer, with `plugin_errors="raise"`.
         """
-        requests, faults = self.requests, self._faults
-        requests.refuse_in_plugin("step")
-        actions, thread = requests.actions, threading.get_ident()
-        left = n
-        while left > 0:
-            with requests.lock:
-                self._check_open()
-                self.physics.plan.clear_interrupt()
-                if actions:
-                    requests.process()
-                if self._paused and not while_paused:
-                    left -= 1
-                else:
-                    requests.hook_thread = thread
-                    self._observers.step_started()
-                    try:
-                        left -= self._stepping.advance(left)
-                    finally:
-                        self._observers.step_finished()
-                        requests.hook_thread = None
-                if actions:
-                    requests.process()
-            if faults.first is not None:
-                faults.raise_first()
+        self.stepping.step(n, while_paused=while_paused)
 
     # -- recordings and images -------------------------------------------------------------
 
@@ -334,7 +289,8 @@ class World(Contents):
         """Whether `close` was called."""
         return self._closed
 
-    def _check_open(self) -> None:
+    def check_open(self) -> None:
+        """Raises `WorldError` if the world is closed."""
         if self._closed:
             raise WorldError("the world is closed")
 
@@ -349,8 +305,8 @@ class World(Contents):
         with self.requests.lock:
             if self._closed:
                 return
-            if self._stepping.change_log is not None:
-                self._stepping.change_log.world_closing()
+            if self.stepping.change_log is not None:
+                self.stepping.change_log.world_closing()
             self.plugin_host.shut_down(list(self.plugin_host.world_plugins))
             for model in reversed(self.models):
                 self._models.delete(model.name)

@@ -17,10 +17,10 @@ from flatland.physics.contact import ContactEvent, ContactInfo
 from flatland.physics.controller import Controller, VelocityController
 from flatland.physics.fixture import PhysicsFixture
 from flatland.physics.joint import PhysicsJoint
-from flatland.physics.plan import END_OF_ORDER, RunEnd, StepPlan
+from flatland.physics.plan import END_OF_ORDER, RunEnd, RunResult, StepPlan, StepRun, run_worlds
 from flatland.physics.queries import RayHit
 from flatland.physics.touches import Touch, Touches
-from flatland.physics.world import PhysicsWorld, StepReport
+from flatland.physics.world import PhysicsWorld, StepReport, to_report
 
 __all__ = [
     "BOX2D_VERSION",
@@ -37,9 +37,13 @@ __all__ = [
     "PreSolveContact",
     "RayHit",
     "RunEnd",
+    "RunResult",
     "StepPlan",
     "StepReport",
+    "StepRun",
     "Touch",
     "Touches",
     "VelocityController",
+    "run_worlds",
+    "to_report",
 ]

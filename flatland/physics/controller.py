@@ -66,8 +66,8 @@ class Controller(Handle):
 class VelocityController(Controller):
     """Moves the origin of a body with a velocity in the frame of the body, before each step.
 
-    A velocity is (forward, sideways, omega) [m/s, rad/s]. It is set in every step, so that friction,
-    damping and contacts do not slow the body down.
+    A velocity is (forward, sideways, omega) [m/s, rad/s]. It is set in every step, so that
+    friction, damping and contacts do not slow the body down.
     """
 
     __slots__ = ()

@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 from enum import IntEnum
-from typing import TYPE_CHECKING, Final, Literal
+from typing import TYPE_CHECKING, Final, Literal, NamedTuple
+
+from flatland import _core
 
 if TYPE_CHECKING:
-    from flatland import _core
+    from collections.abc import Sequence
+
     from flatland.geometry import Pose
+    from flatland.physics.world import PhysicsWorld
 
 ClockKind = Literal["periodic", "always", "at_start", "never"]
 
@@ -31,6 +35,45 @@ class RunEnd(IntEnum):
     FAILED = 2
     PHYSICS = 3
     STOPPED = 4
+
+
+RunResult = tuple[int, int, tuple[list[int], list[int]] | None]
+"""Number of complete steps, a `RunEnd`, and the ids of limited and of invalid bodies."""
+
+
+class StepRun(NamedTuple):
+    """Steps to be made without calling code.
+
+    Attributes:
+        world: The physics world.
+        step: Number of the first step.
+        n: Maximum number of steps.
+        dt: Duration of a step [s].
+        velocity_iterations: Velocity iterations of the Box2D solver.
+        position_iterations: Position iterations of the Box2D solver.
+        only_physics: Whether to end after the first physics step.
+    """
+
+    world: PhysicsWorld
+    step: int
+    n: int
+    dt: float
+    velocity_iterations: int
+    position_iterations: int
+    only_physics: bool
+
+
+def run_worlds(runs: Sequence[StepRun], num_threads: int) -> list[RunResult | Exception]:
+    """Makes steps of several worlds in parallel, without the GIL if that takes long.
+
+    Args:
+        runs: The steps, each of another world.
+        num_threads: Maximum number of threads; 0 for all processors.
+
+    Returns:
+        What `StepPlan.run` returns or raises, for each world.
+    """
+    return _core.run_worlds([(run.world._core, *run[1:]) for run in runs], num_threads)
 
 
 class StepPlan:
@@ -106,36 +149,22 @@ class StepPlan:
         """
         return self._core.take_skipped()
 
-    def run(
-        self,
-        step: int,
-        n: int,
-        dt: float,
-        velocity_iterations: int,
-        position_iterations: int,
-        only_physics: bool,
-    ) -> tuple[int, int, tuple[list[int], list[int]] | None]:
-        """Makes up to n steps without calling code; releases the GIL if that takes long.
+    def run(self, run: StepRun) -> RunResult:
+        """Makes steps without calling code; releases the GIL if that takes long.
 
         Args:
-            step: Number of the first step.
-            n: Number of steps.
-            dt: Duration of a step [s].
-            velocity_iterations: Velocity iterations of the Box2D solver.
-            position_iterations: Position iterations of the Box2D solver.
-            only_physics: Whether to end after the first physics step.
+            run: The steps of this world.
 
         Returns:
-            Number of complete steps, a `RunEnd`, and the report of the last step.
+            Number of complete steps, a `RunEnd`, and the ids of limited and of invalid bodies in
+            the last step if there are any.
 
         Raises:
             ValueError: A number is out of range.
             StaleHandleError: The world is closed.
             WorldLockedError: The world is in use.
         """
-        return self._core.run(
-            step, n, dt, velocity_iterations, position_iterations, only_physics
-        )
+        return self._core.run(*run[1:])
 
     def begin_step(self, step: int) -> int:
         """Begins a step in which code is called.

@@ -49,6 +49,11 @@ class StepReport:
     invalid: tuple[int, ...]
 
 
+def to_report(ids: tuple[list[int], list[int]] | None) -> StepReport | None:
+    """Converts the report of the core: the ids of limited and of invalid bodies."""
+    return None if ids is None else StepReport(tuple(ids[0]), tuple(ids[1]))
+
+
 class PhysicsWorld(PhysicsQueries):
     """A Box2D world without gravity; owns its bodies, fixtures, joints and contacts.
 
@@ -172,7 +177,7 @@ class PhysicsWorld(PhysicsQueries):
                 self.pre_solve_bodies,
                 self._pre_solve_errors,
             )
-        return None if ids is None else StepReport(tuple(ids[0]), tuple(ids[1]))
+        return to_report(ids)
 
     def find_new_contacts(self) -> None:
         """Searches for pairs of fixtures that may touch, which the next step would do otherwise.

@@ -236,9 +236,7 @@ class Odometer:
             noise.begin_update(count)
         if self.sends_transform and pose is not None:
             noisy_pose = self._noisy_estimate(pose)
-            self._plugin.send_past_transform(
-                stamp, self.frame_id, self.child_frame_id, *noisy_pose
-            )
+            self._plugin.send_past_transform(stamp, self.frame_id, self.child_frame_id, *noisy_pose)
 
     @property
     def wanted(self) -> bool:

@@ -16,8 +16,9 @@ def step_worlds(worlds: Sequence[World], n: int = 1, num_threads: int = 0) -> No
     """Steps each of some worlds n times; the same as `for world in worlds: world.step(n)`.
 
     Steps in which no code of plugins is due are made in the core, with the worlds in parallel and
-    without the GIL; the results do not depend on the number of threads. Worlds that are observed or
-    recorded are stepped one after the other.
+    without the GIL; the results do not depend on the number of threads. Worlds that are observed,
+    recorded or paused, and those with hooks that are called in every step, are stepped one after
+    the other.
 
     Args:
         worlds: The worlds, each at most once.
@@ -34,27 +35,61 @@ def step_worlds(worlds: Sequence[World], n: int = 1, num_threads: int = 0) -> No
         raise ValueError(f"num_threads must not be negative, got {num_threads}")
     if len({id(world) for world in worlds}) != len(worlds):
         raise ValueError("each world must be given at most once")
-    left = {index: n for index in range(len(worlds))} if n > 0 else {}
-    errors: dict[int, BaseException] = {}
-    # Threads that step overlapping sets of worlds take their locks in the same order.
-    by_address = sorted(left, key=lambda index: id(worlds[index]))
-    while left:
+    batch = _Batch(worlds, n)
+    while batch.left:
+        batch.run(num_threads)
+    if batch.errors:
+        raise batch.errors[min(batch.errors)]
+
+
+class _Batch:
+    """Steps that are still to be made.
+
+    Attributes:
+        left: Steps by the index of the world, in the order in which worlds are locked.
+        errors: What the worlds raised, by index.
+    """
+
+    def __init__(self, worlds: Sequence[World], n: int) -> None:
+        self._worlds = worlds
+        # Threads that step overlapping sets of worlds lock them in the same order.
+        order = sorted(range(len(worlds)), key=lambda index: id(worlds[index]))
+        self.left = dict.fromkeys(order, n) if n > 0 else {}
+        self.errors: dict[int, BaseException] = {}
+
+    def run(self, num_threads: int) -> None:
+        """Makes steps in the core, in all worlds as far as possible, and then those with calls."""
         with ExitStack() as locks:
-            runs, prepared = [], []
-            for index in by_address:
-                if index not in left:
-                    continue
+            runs = {}
+            for index in list(self.left):
                 try:
-                    run = worlds[index]._begin_run(left[index], locks)
+                    run = self._worlds[index].stepping.begin_batch(self.left[index], locks)
                 except Exception as error:
-                    errors[index] = error
-                    del left[index]
+                    self._fail(index, error)
                     continue
                 if run is not None:
-                    runs.append(run)
-                    prepared.append(index)
-            results = run_worlds(runs, num_threads)
-            for index, result in zip(prepared, results, strict=True):
-                ...
-    if errors:
-        raise errors[min(errors)]
+                    runs[index] = run
+            results = run_worlds(list(runs.values()), num_threads)
+            for (index, run), result in zip(runs.items(), results, strict=True):
+                try:
+                    made = self._worlds[index].stepping.end_batch(run, result)
+                except Exception as error:
+                    self._fail(index, error)
+                else:
+                    self._take(index, made)
+        for index in [index for index in self.left if index not in runs]:
+            try:
+                self._worlds[index].step(self.left[index])
+            except Exception as error:
+                self._fail(index, error)
+            else:
+                del self.left[index]
+
+    def _take(self, index: int, made: int) -> None:
+        self.left[index] -= made
+        if not self.left[index]:
+            del self.left[index]
+
+    def _fail(self, index: int, error: Exception) -> None:
+        self.errors[index] = error
+        del self.left[index]

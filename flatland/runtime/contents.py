@@ -56,6 +56,7 @@ class Contents:
         plugin_host: Starts plugins and calls their hooks.
         ports: All outputs and commands by resolved topic.
         requests: The queue of actions that run between two steps.
+        stepping: Makes the steps.
         transform_buffer: Collects the transforms of plugins.
         read_yaml: Loads a model file; `YamlReader.from_file`, or a method that collects errors.
         change_count: Number of models that were spawned, moved or deleted since the world file was
@@ -75,6 +76,7 @@ class Contents:
     plugin_host: PluginHost
     ports: PortRegistry
     requests: Requests
+    stepping: Stepping
     seed: int
     timekeeper: Timekeeper
     transform_buffer: TransformBuffer
@@ -89,7 +91,6 @@ class Contents:
     _former_layers: dict[str, Layer]
     _placement: Placement
     _states: WorldStates
-    _stepping: Stepping
 
     @property
     def models(self) -> list[Model]:
@@ -131,7 +132,7 @@ class Contents:
 
     def log_changes(self, log: ChangeLog | None) -> None:
         """Notifies a log of all further changes and steps, instead of the previous one."""
-        self._stepping.change_log = log
+        self.stepping.change_log = log
 
     def resolve_path(self, path: str) -> str:
         """Returns the absolute path of a model or map file.
@@ -242,9 +243,9 @@ class Contents:
         is_external = not self.requests.in_hook
 
         def checked() -> R:
-            self._check_open()
+            self.check_open()
             self.change_count += 1
-            log = self._stepping.change_log
+            log = self.stepping.change_log
             if log is None or not is_external:
                 return action()
             with log.change(kind, arguments):
@@ -433,9 +434,7 @@ class Contents:
 
         def read() -> str:
             self.plugin_host.schedule.settle()
-            return state_hash(
-                self.seed, self.timekeeper, self.physics, self.models, self.plugins
-            )
+            return state_hash(self.seed, self.timekeeper, self.physics, self.models, self.plugins)
 
         return self._read(read)
 
@@ -524,10 +523,11 @@ class Contents:
         )
 
     def _read(self, action: Callable[[], R]) -> R:
-        self._check_open()
+        self.check_open()
         return self.requests.read(action)
 
-    def _check_open(self) -> None:
+    def check_open(self) -> None:
+        """Raises `WorldError` if the world is closed."""
         raise NotImplementedError
 
 

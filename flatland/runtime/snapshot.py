@@ -234,7 +234,7 @@ class WorldStates:
             copier.finish()
         except UncopyableError as error:
             raise self._located(error) from None
-        clone._stepping.change_log = None
+        clone.stepping.change_log = None
         clone.requests.on_post = clone.physics.plan.interrupt
         clone._paused = clone._closed = False
         clone._states = WorldStates(clone, self._attributes)

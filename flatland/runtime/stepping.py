@@ -2,65 +2,138 @@
 
 from __future__ import annotations
 
+import threading
 from typing import TYPE_CHECKING
 
-from flatland.physics import END_OF_ORDER, RunEnd, StepReport
+from flatland.physics import END_OF_ORDER, RunEnd, StepRun, to_report
 
 if TYPE_CHECKING:
-    from flatland.physics import PhysicsWorld
+    from contextlib import ExitStack
+
+    from flatland.physics import RunResult, StepReport
     from flatland.runtime.body_monitor import BodyMonitor
     from flatland.runtime.change_log import ChangeLog
     from flatland.runtime.contacts import ContactReporter
+    from flatland.runtime.faults import Faults
     from flatland.runtime.observer import Observers
-    from flatland.runtime.plugin_host import PluginHost
-    from flatland.runtime.transforms import TransformBuffer
-    from flatland.timekeeper import Timekeeper
+    from flatland.world import World
 
 
 class Stepping:
-    """Makes the steps of a world; `World.step` adds requests, faults and the pause.
+    """Makes the steps of a world.
 
     Attributes:
-        velocity_iterations: Velocity iterations of the Box2D solver.
-        position_iterations: Position iterations of the Box2D solver.
         change_log: Notified of each step, None if there is none.
     """
 
     def __init__(
         self,
-        physics: PhysicsWorld,
-        timekeeper: Timekeeper,
-        host: PluginHost,
+        world: World,
         contacts: ContactReporter,
         body_monitor: BodyMonitor,
         observers: Observers,
-        transforms: TransformBuffer,
-        iterations: tuple[int, int],
+        faults: Faults,
     ) -> None:
         """Creates the steps of a world from its parts.
 
         Args:
-            physics: The physics world.
-            timekeeper: The simulated time.
-            host: Calls the hooks of plugins.
+            world: The world.
             contacts: Reports contacts to plugins.
             body_monitor: Handles the bodies that a physics step reports.
             observers: Notified of each step.
-            transforms: The transforms of plugins.
-            iterations: Velocity and position iterations of the Box2D solver.
+            faults: The exceptions of hooks.
         """
-        self.velocity_iterations, self.position_iterations = iterations
         self.change_log: ChangeLog | None = None
-        self._physics = physics
-        self._plan = physics.plan
-        self._timekeeper = timekeeper
-        self._host = host
+        self._world = world
+        self._physics = world.physics
+        self._plan = world.physics.plan
+        self._timekeeper = world.timekeeper
+        self._host = world.plugin_host
+        self._requests = world.requests
+        self._transforms = world.transform_buffer
         self._contacts = contacts
         self._body_monitor = body_monitor
         self._observers = observers
-        self._transforms = transforms
+        self._faults = faults
 
-    def advance(self, n: int) -> int:
+    def step(self, n: int, *, while_paused: bool = False) -> None:
+        """Steps n times; see `World.step`."""
+        requests, faults = self._requests, self._faults
+        requests.refuse_in_plugin("step")
+        actions, thread = requests.actions, threading.get_ident()
+        left = n
+        while left > 0:
+            with requests.lock:
+                self._start()
+                if self._world.paused and not while_paused:
+                    left -= 1
+                else:
+                    requests.hook_thread = thread
+                    self._observers.step_started()
+                    try:
+                        left -= self._advance(left)
+                    finally:
+                        self._observers.step_finished()
+                        requests.hook_thread = None
+                if actions:
+                    requests.process()
+            if faults.first is not None:
+                faults.raise_first()
+
+    def begin_batch(self, n: int, locks: ExitStack) -> StepRun | None:
+        """Prepares up to n steps in the core; for `flatland.runtime.batch`.
+
+        Args:
+            n: Number of steps.
+            locks: Holds the lock of the requests until the run ends.
+
+        Returns:
+            The run; None if `step` has to make the steps.
+
+        Raises:
+            WorldError: The world is closed, or a plugin calls this.
+        """
+        self._requests.refuse_in_plugin("step")
+        locks.enter_context(self._requests.lock)
+        self._start()
+        if self._world.paused or self._is_watched:
+            return None
+        return self._begin_run(n)
+
+    def end_batch(self, run: StepRun, result: RunResult | Exception) -> int:
+        """Takes over the steps of a run, and makes the next one if code is to be called in it.
+
+        Args:
+            run: What `begin_batch` returned.
+            result: How the run ended.
+
+        Returns:
+            The number of steps.
+
+        Raises:
+            Exception: As `World.step`.
+        """
+        if isinstance(result, Exception):
+            raise result
+        requests = self._requests
+        requests.hook_thread = threading.get_ident()
+        try:
+            made = self._end_run(run, result)
+        finally:
+            requests.hook_thread = None
+        if requests.actions:
+            requests.process()
+        self._faults.raise_first()
+        return made
+
+    def _start(self) -> None:
+        """Runs the actions that wait before a step."""
+        self._world.check_open()
+        self._plan.clear_interrupt()
+        if self._requests.actions:
+            self._requests.process()
+
+    def _advance(self, n: int) -> int:
         """Makes up to n steps, at least one unless another thread interrupts.
 
         Returns:
@@ -69,29 +142,64 @@ class Stepping:
         Raises:
             WorldError: A body is not finite, with the policy `raise`.
         """
+        run = self._begin_run(n)
+        if run is not None:
+            return self._end_run(run, self._plan.run(run))
+        timekeeper = self._timekeeper
+        step, rest = divmod(timekeeper.sim_time_ns, timekeeper.step_size_ns)
+        self._make_step(step, is_aligned=not rest)
+        return 1
+
+    @property
+    def _is_watched(self) -> bool:
+        """Whether something is to be notified in every step."""
+        return self._observers.watch_steps or self.change_log is not None
+
+    def _begin_run(self, n: int) -> StepRun | None:
+        """Prepares up to n steps in the core.
+
+        Returns:
+            The run; None if hooks are to be called in the first step.
+        """
         self._prepare()
         timekeeper = self._timekeeper
         step, rest = divmod(timekeeper.sim_time_ns, timekeeper.step_size_ns)
         if rest or self._physics.pre_solve is not None or self._host.hooks.has_unscheduled:
-            self._make_step(step, is_aligned=not rest)
-            return 1
-        is_watched = self._observers.watch_steps or self.change_log is not None
-        made, end, report = self._plan.run(
+            return None
+        is_watched = self._is_watched
+        return StepRun(
+            self._physics,
             step,
             1 if is_watched else n,
             timekeeper.step_size,
-            self.velocity_iterations,
-            self.position_iterations,
+            self._world.velocity_iterations,
+            self._world.position_iterations,
             is_watched,
         )
+
+    def _end_run(self, run: StepRun, result: RunResult) -> int:
+        """Takes over the steps of a run, and makes the step in which code is to be called.
+
+        Args:
+            run: The run.
+            result: How it ended.
+
+        Returns:
+            The number of steps.
+
+        Raises:
+            WorldError: A body is not finite, with the policy `raise`.
+        """
+        timekeeper = self._timekeeper
+        made, end, report = result
         if made:
             timekeeper.sim_time_ns += made * timekeeper.step_size_ns
         if end in (RunEnd.DONE, RunEnd.STOPPED):
             return made
         if end == RunEnd.CALL:
-            self._make_step(step + made, is_aligned=True)
+            self._make_step(run.step + made, is_aligned=True)
         elif end == RunEnd.PHYSICS:
-            self._finish_step(0, None if report is None else StepReport(*map(tuple, report)))
+            self._finish_step(0, to_report(report))
         else:
             self._host.call_failed(timekeeper)
             self._finish_step(0, self._physics_step())
@@ -126,8 +234,9 @@ class Stepping:
         host.schedule.calls_made(due)
 
     def _physics_step(self) -> StepReport | None:
+        world = self._world
         return self._physics.step(
-            self._timekeeper.step_size, self.velocity_iterations, self.position_iterations
+            self._timekeeper.step_size, world.velocity_iterations, world.position_iterations
         )
 
     def _finish_step(self, due: int, report: StepReport | None) -> None:

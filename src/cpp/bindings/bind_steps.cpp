@@ -1,8 +1,11 @@
 #include <pybind11/stl.h>
 
+#include <memory>
 #include <optional>
+#include <stdexcept>
 #include <string>
 #include <tuple>
+#include <utility>
 #include <vector>
 
 #include "bindings/bindings.h"
@@ -67,24 +70,22 @@ void bind_controllers(WorldClass& world) {
               motion.angular = to_limits(angular);
               motion.linear = checked;
             });
-  world.def("twist_target", [](World& self, Id id) {
-    return to_python(motion_of<TwistMotion>(self, id).target);
-  });
-  world.def("set_twist_target", [](World& self, Id id, double forward, double sideways,
-                                   double omega) {
-    // A velocity that is out of range is refused when it is applied to the body.
-    motion_of<TwistMotion>(self, id).target = {forward, sideways, omega};
-  });
+  world.def("twist_target",
+            [](World& self, Id id) { return to_python(motion_of<TwistMotion>(self, id).target); });
+  world.def("set_twist_target",
+            [](World& self, Id id, double forward, double sideways, double omega) {
+              // A velocity that is out of range is refused when it is applied to the body.
+              motion_of<TwistMotion>(self, id).target = {forward, sideways, omega};
+            });
   world.def("twist_velocity", [](World& self, Id id) {
     return to_python(motion_of<TwistMotion>(self, id).velocity);
   });
-  world.def("set_twist_velocity", [](World& self, Id id, double forward, double sideways,
-                                     double omega) {
-    motion_of<TwistMotion>(self, id).velocity = {forward, sideways, omega};
-  });
-  world.def("has_controller", [](World& self, Id id) {
-    return self.plan().find_controller(id) != nullptr;
-  });
+  world.def("set_twist_velocity",
+            [](World& self, Id id, double forward, double sideways, double omega) {
+              motion_of<TwistMotion>(self, id).velocity = {forward, sideways, omega};
+            });
+  world.def("has_controller",
+            [](World& self, Id id) { return self.plan().find_controller(id) != nullptr; });
   world.def("controller_body",
             [](World& self, Id id) { return changed_controller(self, id).body; });
   world.def("remove_controller", [](World& self, Id id) {
@@ -120,8 +121,9 @@ std::uint32_t add_clock(World& world, bool is_after, const std::string& kind,
   } else if (kind == "never") {
     checked = RateClock::Kind::kNever;
   } else if (kind != "periodic" || half_step == 0 || cycle >> 63U != 0 || half_step >= cycle / 2) {
-    throw py::value_error("a clock must be always, at_start, never, or periodic with a step of less "
-                          "than its cycle, which must be below 2^63");
+    throw py::value_error(
+        "a clock must be always, at_start, never, or periodic with a step of less "
+        "than its cycle, which must be below 2^63");
   }
   return world.plan().add_clock(phase_of(is_after), RateClock(checked, half_step, cycle));
 }
@@ -173,8 +175,92 @@ void bind_clocks(WorldClass& world) {
   });
 }
 
-py::tuple to_python(const RunResult& result) {
+py::tuple run_to_python(const RunResult& result) {
   return py::make_tuple(result.steps, static_cast<int>(result.end), to_python(result.report));
+}
+
+// The steps of one world: World.run with its arguments.
+using WorldRun =
+    std::tuple<std::shared_ptr<World>, std::int64_t, std::int64_t, double, int, int, bool>;
+
+// A run of several worlds at the same time, each by one thread.
+class Runs {
+ public:
+  explicit Runs(const std::vector<WorldRun>& runs)
+      : runs_(runs), uses_(runs.size()), results_(runs.size()), errors_(runs.size()) {
+    for (std::size_t i = 0; i < runs.size(); ++i) {
+      World& world = *std::get<0>(runs_[i]);
+      try {
+        uses_[i] = std::make_unique<World::ExclusiveUse>(world, World::kStepping);
+        seconds_ += world.last_step_time() * static_cast<double>(std::get<2>(runs_[i]));
+      } catch (const std::exception&) {
+        errors_[i] = std::current_exception();
+      }
+    }
+  }
+
+  // Expected wall time on one processor [s].
+  double seconds() const { return seconds_; }
+
+  void run(std::size_t i) {
+    if (!uses_[i]) return;
+    try {
+      const auto& [world, step, n, dt, velocity, position, only_physics] = runs_[i];
+      results_[i] = world->run(step, n, dt, velocity, position, only_physics);
+    } catch (const std::exception&) {
+      errors_[i] = std::current_exception();
+    }
+  }
+
+  // To be called before the GIL is acquired: other threads that hold it may wait for the end.
+  void end() { uses_.clear(); }
+
+  py::list to_python() const {
+    py::list list;
+    for (std::size_t i = 0; i < runs_.size(); ++i) {
+      list.append(errors_[i] ? error_of(errors_[i]) : run_to_python(results_[i]));
+    }
+    return list;
+  }
+
+ private:
+  // Converts an exception to an instance of the Python class that pybind11 would raise.
+  static py::object error_of(const std::exception_ptr& error) {
+    const auto errors = py::module_::import("flatland.errors");
+    try {
+      std::rethrow_exception(error);
+    } catch (const StaleHandleError& stale) {
+      return errors.attr("StaleHandleError")(stale.what());
+    } catch (const WorldLockedError& locked) {
+      return errors.attr("WorldLockedError")(locked.what());
+    } catch (const std::invalid_argument& invalid) {
+      return py::module_::import("builtins").attr("ValueError")(invalid.what());
+    } catch (const std::exception& other) {
+      return py::module_::import("builtins").attr("MemoryError")(other.what());
+    }
+  }
+
+  const std::vector<WorldRun>& runs_;
+  std::vector<std::unique_ptr<World::ExclusiveUse>> uses_;
+  std::vector<RunResult> results_;
+  std::vector<std::exception_ptr> errors_;
+  double seconds_ = 0.0;
+};
+
+py::list run_worlds(const std::vector<WorldRun>& given, std::size_t num_threads) {
+  Runs runs(given);
+  const auto run = [&](std::size_t i) { runs.run(i); };
+  if (given.empty() || runs.seconds() <= kShortStep) {
+    for (std::size_t i = 0; i < given.size(); ++i) run(i);
+    runs.end();
+  } else {
+    // The pool of the first world, which exists during the call.
+    ThreadPool& threads = std::get<0>(given.front())->threads();
+    const py::gil_scoped_release unlocked;
+    threads.parallel_for(given.size(), num_threads, run);
+    runs.end();
+  }
+  return runs.to_python();
 }
 
 void bind_run(WorldClass& world) {
@@ -204,7 +290,7 @@ void bind_run(WorldClass& world) {
         // no Python object.
         World::ExclusiveUse use(self, World::kStepping);
         const bool is_long = self.last_step_time() * static_cast<double>(n) > kShortStep;
-        return to_python(without_gil_if(is_long, use, [&] {
+        return run_to_python(without_gil_if(is_long, use, [&] {
           return self.run(step, n, dt, velocity_iterations, position_iterations, only_physics);
         }));
       },
@@ -265,9 +351,8 @@ void bind_touches(WorldClass& world) {
     const TouchCollector& collector = changed_collector(self, id);
     return collector.was_touched || !collector.touches.empty();
   });
-  world.def("was_touched", [](World& self, Id id) {
-    return changed_collector(self, id).was_touched;
-  });
+  world.def("was_touched",
+            [](World& self, Id id) { return changed_collector(self, id).was_touched; });
   world.def("clear_touches",
             [](World& self, Id id) { changed_collector(self, id).was_touched = false; });
   world.def("count_touches",
@@ -296,7 +381,8 @@ void bind_touches(WorldClass& world) {
 
 }  // namespace
 
-void bind_steps(WorldClass& world) {
+void bind_steps(py::module_& module, WorldClass& world) {
+  module.def("run_worlds", &run_worlds, py::arg("runs"), py::arg("num_threads"));
   bind_touches(world);
   bind_controllers(world);
   bind_clocks(world);

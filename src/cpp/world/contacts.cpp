@@ -5,6 +5,7 @@
 #include <box2d/b2_fixture.h>
 #include <box2d/b2_world.h>
 
+#include <algorithm>
 #include <exception>
 #include <utility>
 
@@ -37,6 +38,12 @@ void ContactRecorder::record_body(Id body, std::uint8_t kinds) {
     kinds_of_body_.resize(slot + 1);
   }
   kinds_of_body_[slot] = kinds;
+}
+
+bool ContactRecorder::is_recording() const {
+  return recording || kinds_of_all_ != 0 ||
+         std::any_of(kinds_of_body_.begin(), kinds_of_body_.end(),
+                     [](std::uint8_t kinds) { return kinds != 0; });
 }
 
 bool ContactRecorder::records(const b2Contact* contact, ContactKind kind) const {

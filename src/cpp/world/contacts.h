@@ -66,6 +66,8 @@ class ContactRecorder final : public b2ContactListener {
   // Makes the events of some kinds recorded: of one body, or of all. Kinds are bits 1 << kind.
   void record_body(Id body, std::uint8_t kinds);
   void record_all(std::uint8_t kinds) { kinds_of_all_ = kinds; }
+  // Whether any events are recorded.
+  bool is_recording() const;
   // To be called before each physics step.
   void begin_step() { ++step_; }
   // Number of the physics steps so far.

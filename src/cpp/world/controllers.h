@@ -41,8 +41,8 @@ using Motion = std::variant<TwistMotion>;
 // A motion of a body, carried out once in each step, in the order of `order` and `place`.
 struct Controller {
   Id body = 0;
-  std::int64_t order = 0;  // of the plugin
-  bool is_automatic = false;  // otherwise, it is carried out only by `advance`
+  std::int64_t order = 0;       // of the plugin
+  bool is_automatic = false;    // otherwise, it is carried out only by `advance`
   std::uint64_t last_step = 0;  // number of the step in which it was carried out last
   Motion motion;
 };

@@ -47,9 +47,7 @@ class StepPlan {
   static constexpr std::size_t kMostClocks = 62;
   static constexpr std::int64_t kEnd = INT64_MAX;  // after all plugins
 
-  bool empty() const {
-    return clocks_.empty() && controllers_.size() == 0 && records_.size() == 0;
-  }
+  bool empty() const { return clocks_.empty() && controllers_.size() == 0 && records_.size() == 0; }
 
   // Throws std::invalid_argument if there are kMostClocks clocks already.
   std::uint32_t add_clock(Phase phase, const RateClock& clock);

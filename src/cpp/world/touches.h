@@ -20,8 +20,8 @@ struct Touch {
   std::uint64_t contact_id = 0;
   Id this_body = 0;
   Id other_body = 0;
-  bool is_a = false;             // whether `this_body` is body A, from which the normal points away
-  std::uint64_t solved_in = 0;   // number of that step, 0 for none
+  bool is_a = false;            // whether `this_body` is body A, from which the normal points away
+  std::uint64_t solved_in = 0;  // number of that step, 0 for none
   std::int64_t solver_calls = 0;  // in that step
   // Sums over these calls, by point; a call contributes nothing to points that it did not have.
   double normal_impulses[b2_maxManifoldPoints] = {};
@@ -35,12 +35,12 @@ struct Touch {
 // The contacts of some bodies with other bodies.
 struct TouchCollector {
   std::vector<Id> bodies;
-  std::vector<Id> excluded;     // contacts of these bodies are ignored
-  bool counts_sensors = true;   // whether contacts of sensors are collected
-  bool counts_own = true;       // whether contacts between two of the bodies are collected
-  bool ends_runs = false;       // whether a run of steps ends after a step with contacts
-  bool was_touched = false;     // since the last call of `clear`
-  std::vector<Touch> touches;   // that exist now, the oldest first
+  std::vector<Id> excluded;    // contacts of these bodies are ignored
+  bool counts_sensors = true;  // whether contacts of sensors are collected
+  bool counts_own = true;      // whether contacts between two of the bodies are collected
+  bool ends_runs = false;      // whether a run of steps ends after a step with contacts
+  bool was_touched = false;    // since the last call of `clear`
+  std::vector<Touch> touches;  // that exist now, the oldest first
 };
 
 class TouchCollectors {
