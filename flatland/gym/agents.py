@@ -12,6 +12,7 @@ import numpy as np
 from flatland.entities.body import Body
 from flatland.entities.model import Model
 from flatland.errors import WorldError
+from flatland.physics import Touches
 from flatland.plugin_api.dynamics_limits import DynamicsLimits
 from flatland.plugin_api.plugin import describe
 from flatland.plugin_api.ports import Command
@@ -32,6 +33,7 @@ class Agent:
         body: Its first body, which defines the pose of the agent.
         laser: The laser that is observed.
         command: The velocity command that actions set.
+        touches: Whether the model touches anything.
         radius: Radius of the smallest disc around the origin of the first body that contains all
             solid footprints of the model [m].
         bits: Category bits of the solid footprints.
@@ -44,6 +46,7 @@ class Agent:
     body: Body
     laser: Laser
     command: Command[Twist]
+    touches: Touches
     radius: float
     bits: int
     max_speed: float
@@ -65,14 +68,15 @@ def find_agent(world: World, name: str, laser: str | None, command: str | None) 
             footprint.
     """
     model = world.model(name)
-    plugin, source = _find_command(model, command)
+    velocity, source = _find_command(model, command)
     radius, bits = _footprint(model)
     return Agent(
         world,
         model,
         model.bodies[0],
         _find_laser(model, laser),
-        plugin,
+        velocity,
+        model.watch_contacts(),
         radius,
         bits,
         _velocity_limit(source, "linear_dynamics"),

@@ -6,10 +6,6 @@ if TYPE_CHECKING:
     from flatland.plugins.laser import Laser
     from flatland.world import World
 
-def step_worlds(worlds, n, num_threads=0):
-    for w in worlds:
-        w.step(n)
-
 def compute_scans(lasers, out=None, num_threads=0):
     for i, l in enumerate(lasers):
         out[i] = l.compute_ranges()

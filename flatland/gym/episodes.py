@@ -11,9 +11,10 @@ import numpy.typing as npt
 
 from flatland.errors import WorldError
 from flatland.geometry import BoolArray, DoubleArray, FloatArray, Pose, Vector2, finite_pose
-from flatland.gym.backend import compute_scans, step_worlds
+from flatland.gym.backend import compute_scans
 from flatland.gym.situation import Rows, Situation
 from flatland.gym.tasks import Occupied
+from flatland.runtime.batch import step_worlds
 from flatland.runtime.placement import TOLERANCE
 from flatland.values import Twist
 
@@ -118,12 +119,13 @@ class Episodes:
         worlds = {}
         for row in chosen.tolist():
             v, omega = commands[row]
-            self.agents[row].command.set(Twist(v, 0.0, omega))
+            agent = self.agents[row]
+            agent.command.set(Twist(v, 0.0, omega))
+            agent.touches.clear()
             worlds[id(self._worlds[row])] = self._worlds[row]
         step_worlds(list(worlds.values()), self._settings.physics_steps, self._num_threads)
         for row in chosen.tolist():
-            agent = self.agents[row]
-            s.collided[row] = any(agent.body in (c.body_a, c.body_b) for c in agent.world.contacts)
+            s.collided[row] = self.agents[row].touches.touched
 
     def look(self, rows: Rows | None = None) -> None:
         """Scans, and computes the observations.
