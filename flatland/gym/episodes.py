@@ -61,7 +61,6 @@ class Episodes:
         n = len(agents)
         self.situation = Situation(n, beams, first.laser.range, low, high)
         self.observations: FloatArray = np.zeros((n, self.layout.size), np.float32)
-        self._worlds = [agent.world for agent in agents]
         self._lasers = [agent.laser for agent in agents]
         self._all = np.arange(n)
 
@@ -110,22 +109,20 @@ class Episodes:
             rows: Agents that act; None for all. The others stand still.
         """
         s = self.situation
-        commands = (s.low + (actions + 1.0) * (0.5 * (s.high - s.low))).tolist()
         chosen = self._all if rows is None else rows
+        commands = (s.low + (actions[chosen] + 1.0) * (0.5 * (s.high - s.low))).tolist()
         s.previous_actions[chosen] = s.actions[chosen]
         s.actions[chosen] = actions[chosen]
         s.previous_distance[chosen] = s.distance[chosen]
         s.steps[chosen] += 1
-        worlds = {}
-        for row in chosen.tolist():
-            v, omega = commands[row]
-            agent = self.agents[row]
+        agents = [self.agents[row] for row in chosen.tolist()]
+        for agent, (v, omega) in zip(agents, commands, strict=True):
             agent.command.set(Twist(v, 0.0, omega))
             agent.touches.clear()
-            worlds[id(self._worlds[row])] = self._worlds[row]
-        step_worlds(list(worlds.values()), self._settings.physics_steps, self._num_threads)
-        for row in chosen.tolist():
-            s.collided[row] = self.agents[row].touches.touched
+        # Agents may share a world.
+        worlds = list({id(agent.world): agent.world for agent in agents}.values())
+        step_worlds(worlds, self._settings.physics_steps, self._num_threads)
+        s.collided[chosen] = [agent.touches.touched for agent in agents]
 
     def look(self, rows: Rows | None = None) -> None:
         """Scans, and computes the observations.
@@ -135,10 +132,9 @@ class Episodes:
         """
         s, goal_radius = self.situation, self.task.goal_radius
         chosen = self._all if rows is None else rows
-        for row in chosen.tolist():
-            body = self.agents[row].body
-            s.poses[row] = body.pose
-            s.velocities[row] = body.velocity
+        bodies = [self.agents[row].body for row in chosen.tolist()]
+        s.poses[chosen] = [body.pose for body in bodies]
+        s.velocities[chosen] = [body.velocity for body in bodies]
         if rows is None:
             compute_scans(self._lasers, s.ranges, self._num_threads)
             s.locate(goal_radius)
