@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
-"""Runs a trained policy in plain Python, or on the ROS node in lockstep, and counts its successes.
+r"""Runs a trained policy in plain Python, or on the ROS node in lockstep, and counts its successes.
 
 Both use the same episodes. For ROS, start the simulator first:
-  roslaunch flatland server.launch show_viz:=false lockstep:=true \\
+  roslaunch flatland server.launch show_viz:=false lockstep:=true \
     world_path:=$(rospack find flatland)/worlds/learning/navigate.yaml
 """
 

@@ -93,7 +93,7 @@ class StableVector(VecEnv):
         """Returns False for each environment."""
         return [False for _ in self._get_indices(indices)]
 
-    def _get_indices(self, indices: None | int | Iterable[int]) -> Iterable[int]:
+    def _get_indices(self, indices: int | Iterable[int] | None) -> Iterable[int]:
         if indices is None:
             return range(self.num_envs)
         return [indices] if isinstance(indices, int) else indices

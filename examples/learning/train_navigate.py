@@ -79,9 +79,7 @@ class Progress(BaseCallback):
 class PPOByTime(PPO):
     """PPO whose schedules follow the time that is left, as set by `Progress`."""
 
-    def _update_current_progress_remaining(
-        self, num_timesteps: int, total_timesteps: int
-    ) -> None:
+    def _update_current_progress_remaining(self, num_timesteps: int, total_timesteps: int) -> None:
         """Keeps what the callback has set."""
 
 

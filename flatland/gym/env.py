@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from typing import Any, ClassVar
+from typing import Any
 
 import gymnasium
 import numpy as np
@@ -29,7 +29,10 @@ class FlatlandEnv(gymnasium.Env[Any, FloatArray]):
         world: The world; a step of another program with it is not part of an episode.
     """
 
-    metadata: ClassVar[dict[str, Any]] = {"render_modes": ["rgb_array", "human"], "render_fps": 10}
+    metadata: dict[str, Any] = {  # noqa: RUF012 - as in the base class
+        "render_modes": ["rgb_array", "human"],
+        "render_fps": 10,
+    }
 
     def __init__(
         self,
@@ -61,7 +64,8 @@ class FlatlandEnv(gymnasium.Env[Any, FloatArray]):
             self.world.close()
             raise
         self.observation_space = self._episodes.layout.space
-        self.action_space = settings.action.space
+        action_space: Any = settings.action.space
+        self.action_space = action_space
         self._renderer = Renderer(self.render_mode, settings.dt)
         self._running = False
 
@@ -125,7 +129,7 @@ class FlatlandEnv(gymnasium.Env[Any, FloatArray]):
         self._show()
         return self._observation(), float(rewards[0]), *ended, self._episodes.info(0)
 
-    def render(self) -> npt.NDArray[np.uint8] | None:  # type: ignore[override]
+    def render(self) -> npt.NDArray[np.uint8] | None:
         """Returns an image for `rgb_array`; updates the window for `human`.
 
         Raises:

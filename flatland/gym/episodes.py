@@ -11,9 +11,9 @@ import numpy.typing as npt
 
 from flatland.errors import WorldError
 from flatland.geometry import BoolArray, DoubleArray, FloatArray, Pose, Vector2, finite_pose
-from flatland.gym.backend import compute_scans
 from flatland.gym.situation import Rows, Situation
 from flatland.gym.tasks import Occupied
+from flatland.plugins.laser import compute_scans
 from flatland.runtime.batch import step_worlds
 from flatland.runtime.placement import TOLERANCE
 from flatland.values import Twist
@@ -21,7 +21,6 @@ from flatland.values import Twist
 if TYPE_CHECKING:
     from flatland.gym.agents import Agent
     from flatland.gym.settings import Settings
-    from flatland.world import World
 
 
 class Episodes:
@@ -150,7 +149,7 @@ class Episodes:
         s.put(rows, part)
 
     def judge(self) -> tuple[DoubleArray, BoolArray, BoolArray]:
-        """Returns reward, whether the episode terminated, and whether it was truncated, (n,) each."""
+        """Returns rewards, which episodes terminated and which were truncated, (n,) each."""
         s, settings = self.situation, self._settings
         rewards = settings.reward.compute(s)
         terminated = settings.ending.check(s)

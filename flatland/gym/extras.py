@@ -29,4 +29,6 @@ def check_pettingzoo() -> None:
 def _check(module: str, user: str, package: str) -> None:
     if importlib.util.find_spec(module) is None:
         verb = "require" if user.endswith("s") else "requires"
-        raise ImportError(f"{user} {verb} {package}, which is not installed: {INSTALL}", name=module)
+        raise ImportError(
+            f"{user} {verb} {package}, which is not installed: {INSTALL}", name=module
+        )

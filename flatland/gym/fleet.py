@@ -89,11 +89,11 @@ class FleetEnv(ParallelEnv[str, Any, FloatArray]):  # type: ignore[misc, unused-
             self.world.close()
             raise
         self._observation_space = self._episodes.layout.space
-        self._action_spaces = {name: settings.action.space for name in self.possible_agents}
+        self._action_spaces = dict.fromkeys(self.possible_agents, settings.action.space)
         self._renderer = Renderer(self.render_mode, settings.dt)
         self._rng: np.random.Generator | None = None
 
-    def observation_space(self, agent: str) -> spaces.Space[Any]:
+    def observation_space(self, agent: str) -> spaces.Space[Any]:  # noqa: ARG002
         """Returns the observation space, the same for all robots."""
         return self._observation_space
 

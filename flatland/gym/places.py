@@ -121,9 +121,7 @@ class Places:
             f"{self.clearance:g} m: {_TRIES} tries"
         )
 
-    def is_free(
-        self, agent: Agent, place: Sequence[float], ignored: Iterable[PhysicsBody]
-    ) -> bool:
+    def is_free(self, agent: Agent, place: Sequence[float], ignored: Iterable[PhysicsBody]) -> bool:
         """Returns whether a disc of the size of the agent has the clearance at a place."""
         pose = np.array([[place[0], place[1], 0.0]])
         free = agent.world.physics.free_discs(

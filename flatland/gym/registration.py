@@ -87,6 +87,5 @@ def make_parallel(name: str = "flatland/Fleet-v0", **arguments: Any) -> FleetEnv
 
 def _refuse(name: str, **_arguments: Any) -> NoReturn:
     raise UnsupportedMode(
-        f"{name} has several robots and the API of PettingZoo: "
-        f'flatland.gym.make_parallel("{name}")'
+        f'{name} has several robots and the API of PettingZoo: flatland.gym.make_parallel("{name}")'
     )

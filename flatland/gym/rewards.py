@@ -74,7 +74,7 @@ class Arrival(Reward):
 
     def compute(self, situation: Situation) -> DoubleArray:
         """Returns 1 where the agent has arrived."""
-        return situation.arrived.astype(np.float64)
+        return np.asarray(situation.arrived, np.float64)
 
 
 class Contact(Reward):
@@ -82,7 +82,7 @@ class Contact(Reward):
 
     def compute(self, situation: Situation) -> DoubleArray:
         """Returns 1 where the agent collided."""
-        return situation.collided.astype(np.float64)
+        return np.asarray(situation.collided, np.float64)
 
 
 class Step(Reward):
@@ -99,7 +99,7 @@ class Jerkiness(Reward):
     def compute(self, situation: Situation) -> DoubleArray:
         """Returns the sum of the squared changes of both numbers."""
         change = situation.actions - situation.previous_actions
-        return change[:, 0] * change[:, 0] + change[:, 1] * change[:, 1]
+        return np.asarray(change[:, 0] * change[:, 0] + change[:, 1] * change[:, 1])
 
 
 class Proximity(Reward):
@@ -126,7 +126,7 @@ class Proximity(Reward):
         nearest = np.fmin.reduce(situation.ranges, axis=1).astype(np.float64)
         # Without any hit, the nearest range may be NaN.
         near = np.fmin(np.maximum(nearest, 0.0), self.distance)
-        return 1.0 - near / self.distance
+        return np.asarray(1.0 - near / self.distance)
 
 
 def navigation_reward() -> Reward:

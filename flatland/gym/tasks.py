@@ -180,7 +180,10 @@ class FixedGoal(Task):
         self.goal_radius = goal_radius
 
     def draw(
-        self, agent: Agent, rng: np.random.Generator, occupied: Occupied
+        self,
+        agent: Agent,  # noqa: ARG002 - nothing is drawn
+        rng: np.random.Generator,  # noqa: ARG002
+        occupied: Occupied,  # noqa: ARG002
     ) -> tuple[Pose, Vector2]:
         """Returns the start and the goal."""
         return self.start, self.goal

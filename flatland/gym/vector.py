@@ -13,7 +13,7 @@ from gymnasium.utils import seeding
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
-from flatland.geometry import BoolArray, DoubleArray, FloatArray
+from flatland.geometry import BoolArray, DoubleArray
 from flatland.gym.actions import checked_actions
 from flatland.gym.env import FlatlandEnv
 from flatland.gym.episodes import Episodes
@@ -95,7 +95,7 @@ class FlatlandVectorEnv(VectorEnv[Any, Any, Any]):
         self._has_begun = np.zeros(num_envs, np.bool_)
         self._has_ended = np.zeros(num_envs, np.bool_)
 
-    @property
+    @property  # type: ignore[misc]
     def np_random(self) -> tuple[np.random.Generator, ...]:  # type: ignore[override]
         """The random number generators of the environments."""
         return tuple(self._rng(row) for row in range(self.num_envs))
@@ -140,9 +140,7 @@ class FlatlandVectorEnv(VectorEnv[Any, Any, Any]):
         self._episodes.look(None if len(rows) == self.num_envs else rows)
         return self._present(), self._infos(mask)
 
-    def step(
-        self, actions: Any
-    ) -> tuple[Any, DoubleArray, BoolArray, BoolArray, dict[str, Any]]:
+    def step(self, actions: Any) -> tuple[Any, DoubleArray, BoolArray, BoolArray, dict[str, Any]]:
         """Carries out one action in each environment.
 
         Args:

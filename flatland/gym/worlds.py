@@ -6,7 +6,6 @@ import os
 from pathlib import Path
 from typing import Final
 
-import flatland
 from flatland.errors import WorldError
 
 FOLDER: Final = Path("worlds") / "learning"
@@ -45,7 +44,7 @@ def included_folder() -> Path:
     Raises:
         WorldError: This installation lacks the worlds.
     """
-    package = Path(flatland.__file__).resolve().parent
+    package = Path(__file__).resolve().parents[1]
     # In a source tree the worlds are beside the package; otherwise in the data of the environment.
     for parent in package.parents:
         for folder in (parent / FOLDER, parent / "share" / "flatland" / FOLDER):

@@ -24,6 +24,8 @@ from flatland.plugins._range_noise import read_range_noise
 from flatland.values import LaserScan
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from flatland.config.reader import YamlReader
     from flatland.timekeeper import Timekeeper
 
@@ -285,3 +287,29 @@ class Laser(ModelPlugin):
         pose = compose(self.body.pose, self.origin)
         fractions, _ = self.world.physics.cast_rays(pose, self.beam_ends, self._mask)
         return pose, fractions * self._length
+
+
+def compute_scans(
+    lasers: Sequence[Laser], out: FloatArray | None = None, num_threads: int = 0
+) -> list[FloatArray]:
+    """Computes a scan of each of many lasers; equal to `compute_ranges` of each.
+
+    Args:
+        lasers: The lasers, of one or of several worlds.
+        out: Array for the ranges, shape (len(lasers), n), float32, if all lasers have n beams.
+        num_threads: Maximum number of threads; 0 for all processors.
+
+    Returns:
+        Range of each beam of each laser [m], shapes (n,), float32.
+
+    Raises:
+        ValueError: `out` has a wrong shape, or `num_threads` is negative.
+    """
+    if num_threads < 0:
+        raise ValueError(f"num_threads must not be negative, got {num_threads}")
+    scans = [laser.compute_ranges() for laser in lasers]
+    if out is None:
+        return scans
+    for row, ranges in zip(out, scans, strict=True):
+        row[:] = ranges
+    return list(out)

@@ -87,7 +87,9 @@ class FreeSpace:
         """Returns the cells, as `cells` does, of the connected region with the most of them."""
         regions = self._regions[self._candidates]
         sizes = np.bincount(regions[regions > 0], minlength=1)
-        return self._candidates[regions == sizes.argmax()] if sizes.any() else regions[:0]
+        largest = sizes.argmax() if sizes.any() else -1
+        cells: IntArray = self._candidates[regions == largest]
+        return cells
 
     @property
     def size(self) -> int:

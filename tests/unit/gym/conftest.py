@@ -57,7 +57,9 @@ def make() -> Iterator[Make]:
     """Creates environments that are closed at the end of the test."""
     made: list[Any] = []
 
-    def create(kind: Callable[..., Any] = flatland.gym.FlatlandEnv, *args: Any, **kwargs: Any) -> Any:
+    def create(
+        kind: Callable[..., Any] = flatland.gym.FlatlandEnv, *args: Any, **kwargs: Any
+    ) -> Any:
         env = kind(*args, **kwargs)
         made.append(env)
         return env

@@ -151,20 +151,24 @@ def test_a_contact_ends_the_episode(make: Make) -> None:
 
 
 def test_a_brief_contact_within_a_step_counts(make: Make, room: Path) -> None:
-    # It bounces off the wall, and no longer touches it at the end of the step.
-    (room.parent / "robot.model.yaml").write_text(
-        (room.parent / "robot.model.yaml").read_text().replace(
-            "density: 100", "density: 100, restitution: 1"
-        )
+    # It bumps into a box, which bounces off before the end of the step.
+    (room.parent / "box.model.yaml").write_text(
+        "bodies:\n  - name: box\n    footprints:\n"
+        "      - {type: circle, radius: 0.1, density: 1, restitution: 1}\n"
     )
-    env = make(world=room, physics_steps=100, task=FixedGoal((5, 2, 0), (1, 2)))
+    text = room.read_text() + "  - {name: box, model: box.model.yaml, pose: [1.5, 2, 0]}\n"
+    room.write_text(text)
+    env = make(
+        world=room,
+        physics_steps=40,
+        action=VelocityAction(speed=(0.0, 3.0)),
+        task=FixedGoal((1, 2, 0), (5, 3)),
+    )
     env.reset(seed=0)
-    collided = [env.step(np.array([-1.0, 0.0]))[4]["collision"]]
-    assert collided == [False]
-    body = env.world.model("robot").bodies[0]
-    body.set_velocity(3.0, 0.0, 0.0)
-    drive = env.world.model("robot").plugin("drive")
-    assert drive is not None
+    _, _, terminated, _, info = env.step(AHEAD)
+    assert env.world.contacts == []
+    assert info["collision"]
+    assert terminated
 
 
 def test_the_time_limit_truncates(make: Make) -> None:
@@ -242,8 +246,14 @@ def test_an_invalid_world_is_an_error(tmp_path: Path) -> None:
     ("model", "message"),
     [
         (lambda text: text[: text.index("  - type: Laser")], "no plugin of type Laser"),
-        (lambda text: text.replace("  - {type: DiffDrive, name: drive, body: base}\n", ""), "no velocity command"),
-        (lambda text: text.replace("density: 100", "density: 100, sensor: true"), "no solid footprint"),
+        (
+            lambda text: text.replace("  - {type: DiffDrive, name: drive, body: base}\n", ""),
+            "no velocity command",
+        ),
+        (
+            lambda text: text.replace("density: 100", "density: 100, sensor: true"),
+            "no solid footprint",
+        ),
     ],
 )
 def test_a_model_that_is_no_agent_is_an_error(

@@ -50,9 +50,7 @@ def test_it_equals_single_environments(
 ) -> None:
     n, steps = 5, 250
     kwargs: dict[str, Any] = {"world": room if world == "room" else world, "max_steps": 40}
-    vector = make(
-        FlatlandVectorEnv, n, autoreset_mode=mode, num_threads=num_threads, **kwargs
-    )
+    vector = make(FlatlandVectorEnv, n, autoreset_mode=mode, num_threads=num_threads, **kwargs)
     single = make(
         SyncVectorEnv, [partial(FlatlandEnv, **kwargs) for _ in range(n)], autoreset_mode=mode
     )
