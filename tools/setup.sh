@@ -4,30 +4,13 @@
 #   tools/setup.sh dev    also requirements of the tests, the linters and catkin
 set -euo pipefail
 cd "$(dirname "$0")/.."
+. tools/common.bash
 root=$PWD
 # A shell may have the environment of another clone, whose packages must not count as installed here.
 unset PYTHONPATH VIRTUAL_ENV
 level=${1:-run}
 venv=$root/.venv
 stamps=$venv/flatland-setup
-
-fail() {
-  echo "flatland: $*" >&2
-  exit 1
-}
-
-# quietly NAME COMMAND...: runs a command and prints its output only if it fails.
-quietly() {
-  local name=$1 log
-  shift
-  log=$(mktemp)
-  if ! "$@" >"$log" 2>&1; then
-    cat "$log" >&2
-    rm -f "$log"
-    fail "$name failed (see above)"
-  fi
-  rm -f "$log"
-}
 
 # Concurrent runs, for example in two terminals, would build in the same folder.
 mkdir -p build
@@ -55,7 +38,6 @@ if [[ ! -x $venv/bin/python || $(cat "$stamps/venv" 2>/dev/null) != "$venv_ident
 fi
 # Excludes the installed ROS packages from searches of a workspace that contains this folder.
 touch "$venv/CATKIN_IGNORE"
-pip=("$venv/bin/python" -m pip --disable-pip-version-check --no-input)
 
 # Prints all files that are installed from the source tree, without build results in flatland/.
 sources() {
@@ -74,13 +56,10 @@ if [[ $(cat "$stamps/dev" 2>/dev/null) == "$content" || $(cat "$stamps/$level" 2
 fi
 
 # Builds without isolation reuse the build folder, so that a changed source is rebuilt within seconds.
-requires=()
-while IFS= read -r requirement; do requires+=("$requirement"); done < <("$venv/bin/python" -c '
-import tomllib
-print(*tomllib.load(open("pyproject.toml", "rb"))["build-system"]["requires"], sep="\n")')
+requires=$(requirements "$venv/bin/python" build-system requires)
 echo "flatland: building and installing into $venv"
-quietly "pip install of the build requirements" "${pip[@]}" install "${requires[@]}"
-quietly "pip install" "${pip[@]}" install --no-build-isolation --config-settings=build-dir=build/pip ".$extra"
+pip_install "pip install of the build requirements" "$venv/bin/python" -r <(echo "$requires")
+pip_install "pip install" "$venv/bin/python" --no-build-isolation --config-settings=build-dir=build/pip ".$extra"
 
 # Python started in this folder imports the source package, which therefore requires the build results as
 # well. Each file is replaced atomically, since other processes may be reading it.

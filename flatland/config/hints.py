@@ -57,9 +57,14 @@ _VALUES = {
 
 def did_you_mean(word: str, candidates: Iterable[str]) -> str:
     """Returns a question with the candidate that is most similar to a word; empty if none is."""
+    similar = _most_similar(word, candidates)
+    return "" if similar is None else f'did you mean "{similar}"?'
+
+
+def _most_similar(word: str, candidates: Iterable[str]) -> str | None:
     by_lower = {candidate.lower(): candidate for candidate in candidates}
     found = difflib.get_close_matches(word.lower(), by_lower, 1, _MIN_SIMILARITY)
-    return f'did you mean "{by_lower[found[0]]}"?' if found else ""
+    return by_lower[found[0]] if found else None
 
 
 def unknown_key(key: str, known: Iterable[str]) -> str:
@@ -85,9 +90,9 @@ def missing_key(key: str, unread: dict[str, int]) -> str:
         key: The key.
         unread: Lines of the keys of the map that have not been read.
     """
-    found = difflib.get_close_matches(key.lower(), unread, 1, _MIN_SIMILARITY)
-    if found:
-        return f'"{found[0]}" in line {unread[found[0]]} may be a misspelling of "{key}"'
+    similar = _most_similar(key, unread)
+    if similar is not None:
+        return f'"{similar}" in line {unread[similar]} may be a misspelling of "{key}"'
     return _MISSING_KEYS.get(key, "")
 
 

@@ -83,7 +83,7 @@ def real_folders(folders: Iterable[str | os.PathLike[str]] | None) -> tuple[str,
     """Returns the absolute paths of some folders without symbolic links, None for None.
 
     Raises:
-        ValueError: The argument is a single path instead of a list, empty, or one is no folder.
+        ValueError: The argument is a single path or empty, or a path is not a folder.
     """
     if folders is None:
         return None
@@ -94,7 +94,7 @@ def real_folders(folders: Iterable[str | os.PathLike[str]] | None) -> tuple[str,
         raise ValueError("model_path must contain at least one folder")
     for path in paths:
         if not path.is_dir():
-            raise ValueError(f"model_path must be a list of folders, {str(path)!r} is none")
+            raise ValueError(f"model_path must be a list of folders, {str(path)!r} is not a folder")
     return tuple(os.path.realpath(path) for path in paths)
 
 
@@ -120,7 +120,8 @@ def check_allowed(path: str) -> None:
             not.
     """
     folders = _allowed.get()
-    if folders is None or "\0" in path:  # which is no path of any file
+    # No file has a name with a null character.
+    if folders is None or "\0" in path:
         return
     real = os.path.realpath(path)
     if not any(os.path.commonpath((real, folder)) == folder for folder in folders):

@@ -9,8 +9,8 @@ import numpy as np
 import numpy.typing as npt
 
 from flatland.drawing.capture import Scene, capture_scene
-from flatland.drawing.layout import Layout, checked_view, default_view
-from flatland.drawing.render import MATPLOTLIB_LOCK, check_drawing_options, check_matplotlib
+from flatland.drawing.layout import Layout
+from flatland.drawing.render import MATPLOTLIB_LOCK, checked_layers, lay_out
 from flatland.runtime.observer import WorldObserver
 
 if TYPE_CHECKING:
@@ -44,14 +44,10 @@ class FrameRenderer(WorldObserver):
             FlatlandError: The world is closed, a layer does not exist, or matplotlib is missing.
             ValueError: `size`, `dpi`, `view` or `layers` is invalid.
         """
-        check_matplotlib()
-        check_drawing_options(dpi, layers)
         self._world = world
-        self._layers = None if layers is None else list(layers)
+        self._layers = checked_layers(layers)
         self._dpi, self._scans, self._names = dpi, scans, names
-        bounds = None if view is None else checked_view(view)
-        scene = capture_scene(world, self._layers, scans)
-        layout = Layout.make(size, dpi, bounds or default_view(scene), axes)
+        _, layout = lay_out(world, size, dpi, view, self._layers, scans, axes)
         columns, rows = (side // 2 * 2 for side in layout.size)
         self._layout = Layout.make((max(columns, 2), max(rows, 2)), dpi, layout.view, axes)
         self._figure: Any = None

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 import numpy.typing as npt
 
-from flatland.drawing.capture import capture_scene
+from flatland.drawing.capture import Scene, capture_scene
 from flatland.drawing.layout import Layout, checked_view, default_view
 from flatland.errors import FlatlandError
 
@@ -118,13 +118,9 @@ def make_figure(
         FlatlandError: The world is closed, a layer does not exist, or matplotlib is missing.
         ValueError: `size`, `dpi`, `view` or `layers` is invalid.
     """
-    check_matplotlib()
+    scene, layout = lay_out(world, size, dpi, view, checked_layers(layers), scans, axes)
     from flatland.drawing.painter import paint
 
-    check_drawing_options(dpi, layers)
-    bounds = None if view is None else checked_view(view)
-    scene = world.between_steps(lambda: capture_scene(world, layers, scans))
-    layout = Layout.make(size, dpi, bounds or default_view(scene), axes)
     with MATPLOTLIB_LOCK:
         return paint(scene, layout, dpi, names)
 
@@ -180,16 +176,47 @@ def save(
             figure.savefig(path, format=suffix[1:])
 
 
-def check_drawing_options(dpi: float, layers: Iterable[str] | None) -> None:
-    """Checks arguments of `draw`.
+def lay_out(
+    world: World,
+    size: tuple[int, int] | None,
+    dpi: float,
+    view: Sequence[float] | None,
+    layers: Sequence[str] | None,
+    scans: bool,
+    axes: bool,
+) -> tuple[Scene, Layout]:
+    """Returns the contents and the layout of an image of the current state; see `draw`.
+
+    Args:
+        world: The world to draw.
+        size: See `draw`.
+        dpi: See `draw`.
+        view: See `draw`.
+        layers: Result of `checked_layers`.
+        scans: See `draw`.
+        axes: See `draw`.
 
     Raises:
-        ValueError: An argument is invalid.
+        FlatlandError: The world is closed, a layer does not exist, or matplotlib is missing.
+        ValueError: `size`, `dpi` or `view` is invalid.
     """
+    check_matplotlib()
     if not (math.isfinite(dpi) and 10 <= dpi <= 2400):
         raise ValueError(f"dpi must be from 10 to 2400, got {dpi}")
+    bounds = None if view is None else checked_view(view)
+    scene = world.between_steps(lambda: capture_scene(world, layers, scans))
+    return scene, Layout.make(size, dpi, bounds or default_view(scene), axes)
+
+
+def checked_layers(layers: Iterable[str] | None) -> list[str] | None:
+    """Returns the names of layers, an argument of `draw`, as a list; None for None.
+
+    Raises:
+        ValueError: The argument is a single name.
+    """
     if isinstance(layers, str):
         raise ValueError(f"layers must be a list of names, got {layers!r}")
+    return None if layers is None else list(layers)
 
 
 def draw_png(world: World) -> bytes | None:

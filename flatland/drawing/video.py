@@ -20,14 +20,17 @@ VIDEO_FORMATS: Final = (".mp4",)
 _CODECS: Final = ("avc1", "mp4v")
 
 
-def check_opencv() -> None:
+def check_opencv() -> Any:
     """Checks that OpenCV can be imported.
+
+    Returns:
+        The module `cv2`.
 
     Raises:
         FlatlandError: OpenCV is missing or broken.
     """
     try:
-        importlib.import_module("cv2")
+        return importlib.import_module("cv2")
     except ImportError as error:
         raise FlatlandError(
             f"videos need OpenCV ({error}): apt-get install python3-opencv"
@@ -54,8 +57,7 @@ class VideoFile:
             FlatlandError: OpenCV is missing.
             OSError: The file cannot be written.
         """
-        check_opencv()
-        cv2: Any = importlib.import_module("cv2")
+        cv2 = check_opencv()
         self._path = Path(path)
         with self._path.open("wb"):
             pass  # OpenCV does not say why it cannot write a file

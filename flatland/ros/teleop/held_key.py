@@ -24,7 +24,7 @@ SLOWER_KEYS: Final = ("-", "_")
 _ARROWS: Final = {b"A": "w", b"B": "s", b"C": "d", b"D": "a"}
 _ESCAPE: Final = re.compile(rb"\x1b(?:\[[0-9;]*([A-Za-z~])|O([A-Za-z]))")
 _PARTIAL_ESCAPE: Final = re.compile(rb"\x1b(?:\[[0-9;]*|O)?\Z")
-_MAX_ESCAPE: Final = 16  # bytes; a longer sequence is none of a key
+_MAX_ESCAPE: Final = 16  # bytes; no key sends a longer sequence
 
 
 def decode(data: bytes) -> tuple[list[str], bytes]:

@@ -594,7 +594,10 @@ def test_a_manifest_that_is_no_file(tmp_path: Path, unchanged: Any) -> None:
         ({"plugin_timeout": NAN}, "plugin_timeout must be positive"),
         ({"model_path": []}, "model_path must contain at least one folder"),
         ({"model_path": "/tmp"}, "model_path must be a list of folders, got '/tmp'"),
-        ({"model_path": ["/nowhere"]}, "model_path must be a list of folders, '/nowhere' is none"),
+        (
+            {"model_path": ["/nowhere"]},
+            "model_path must be a list of folders, '/nowhere' is not a folder",
+        ),
     ],
     ids=str,
 )
