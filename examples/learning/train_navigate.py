@@ -105,8 +105,8 @@ def train(minutes: float, num_envs: int, seed: int) -> tuple[PPO, Progress]:
         learning_rate=lambda left: 1e-4 + 4e-4 * left,
         gamma=0.99,
         gae_lambda=0.95,
-        ent_coef=0.002,
-        policy_kwargs={"net_arch": [128, 128]},
+        ent_coef=0.0,
+        policy_kwargs={"net_arch": [128, 128], "log_std_init": -0.7},
         seed=seed,
         device="cpu",
     )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from abc import ABC, abstractmethod
 from typing import TYPE_CHECKING, Any, Final
 
@@ -46,20 +47,26 @@ class Scan(ObservationPart):
     """The scan: ranges divided by the range of the laser, 1 without a hit, 0 if too close.
 
     With `sectors`, neighbouring beams are combined and the nearest range of each sector is kept.
+    With `half`, a range r is observed as r / (r + half): near obstacles, on which the next action
+    depends, differ more than distant ones.
     """
 
     name = "scan"
     low = 0.0
 
-    def __init__(self, sectors: int | None = None) -> None:
+    def __init__(self, sectors: int | None = None, half: float | None = None) -> None:
         """Creates the part.
 
         Args:
             sectors: Number of sectors, a divisor of the number of beams; None for all beams.
+            half: Range that is observed as 0.5 [m]; None for a linear scale.
 
         Raises:
-            ValueError: It is less than 1.
+            ValueError: There are less than 1 sectors, or `half` is not positive.
         """
+        if half is not None and not (math.isfinite(half) and half > 0):
+            raise ValueError(f"half must be positive [m], got {half}")
+        self.half = half
         if sectors is not None and sectors < 1:
             raise ValueError(f"sectors must be at least 1, got {sectors}")
         self.sectors = sectors
@@ -79,9 +86,15 @@ class Scan(ObservationPart):
         if self.sectors is not None:
             # A range of NaN is a beam without a hit.
             ranges = np.fmin.reduce(ranges.reshape(len(ranges), self.sectors, -1), axis=2)
-        np.fmin(ranges, limit, out=out)
-        np.maximum(out, np.float32(0.0), out=out)
-        np.divide(out, limit, out=out)
+        if self.half is None:
+            np.fmin(ranges, limit, out=out)
+            np.maximum(out, np.float32(0.0), out=out)
+            np.divide(out, limit, out=out)
+            return
+        is_hit = ranges < limit
+        np.maximum(ranges, np.float32(0.0), out=out)
+        np.divide(out, out + np.float32(self.half), out=out, where=is_hit)
+        out[~is_hit] = 1.0
 
 
 class Goal(ObservationPart):

@@ -64,6 +64,11 @@ def test_a_scan_is_scaled_by_the_range(situation: Situation) -> None:
     np.testing.assert_array_equal(out, [[0.25, 0.5, 1, 1, 0, 1], [1] * 6])
 
 
+def test_near_ranges_are_spread(situation: Situation) -> None:
+    out = written(Observation(Scan(half=1.0)), situation)
+    np.testing.assert_allclose(out, [[0.5, 2 / 3, 1, 1, 0, 1], [1] * 6], rtol=1e-6)
+
+
 def test_a_sector_has_its_nearest_range(situation: Situation) -> None:
     out = written(Observation(Scan(3)), situation)
     np.testing.assert_array_equal(out, [[0.25, 1, 0], [1, 1, 1]])
@@ -102,6 +107,7 @@ def test_two_parts_of_one_name_are_an_error() -> None:
     "make",
     [
         lambda: Scan(0),
+        lambda: Scan(half=0.0),
         lambda: Goal(scale=0.0),
         lambda: Proximity(-1.0),
         lambda: Strayed(math.nan),
