@@ -33,6 +33,7 @@ MODULES = (
     "markers",
     "placement",
     "copies",
+    "gym_steps",
 )
 
 

@@ -225,7 +225,7 @@ class World(Contents):
             WorldError: The world is closed, a plugin calls this, or a body is not finite.
             Exception: Raised by a plugin, subscriber or observer, with `plugin_errors="raise"`.
         """
-        self.stepping.step(n, while_paused)
+        self.stepping.step(n, while_paused=while_paused)
 
     # -- recordings and images -------------------------------------------------------------
 

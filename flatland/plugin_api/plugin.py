@@ -167,6 +167,28 @@ class FlatlandPlugin:
         self._noise_streams.append(stream)
         return stream
 
+    def reseed(self, rng: np.random.Generator) -> None:
+        """Continues `rng` and all noise streams from states that are drawn from a generator.
+
+        Args:
+            rng: Equal states of it give equal random numbers.
+        """
+        streams = list(self._noise_streams)
+        streams += [
+            value
+            for value in vars(self).values()
+            if isinstance(value, NoiseStream) and value not in streams
+        ]
+        words = rng.bit_generator.random_raw(2 + len(streams)).tolist()
+        generator = self.rng.bit_generator
+        state: Any = generator.state
+        state["state"]["state"] = words[0] << 64 | words[1]
+        state["has_uint32"] = 0
+        generator.state = state
+        for stream, word in zip(streams, words[2:], strict=True):
+            stream.updates = word >> 2
+            stream.begin_update()
+
     def call_when_due(
         self,
         hook: str,

@@ -234,6 +234,15 @@ class PortRegistry:
                 f'command "{topic}" does not exist; existing commands: {_names(self._commands)}'
             ) from None
 
+    def commands_of(self, owner: str) -> list[Command[Any]]:
+        """Returns the open commands of a plugin in order of their topics.
+
+        Args:
+            owner: Name of the plugin, as passed to `open_command`.
+        """
+        commands = [command for topic in self._commands.values() for command in topic]
+        return sorted((c for c in commands if c.owner == owner), key=lambda c: c.topic)
+
 
 class _KeptPorts:
     """Ports that were closed and may be opened again, in the order in which they were opened."""

@@ -59,7 +59,7 @@ class Stepping:
         self._observers = observers
         self._faults = faults
 
-    def step(self, n: int, while_paused: bool = False) -> None:
+    def step(self, n: int, *, while_paused: bool = False) -> None:
         """Steps n times; see `World.step`."""
         requests, faults = self._requests, self._faults
         requests.refuse_in_plugin("step")

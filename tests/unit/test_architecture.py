@@ -19,7 +19,7 @@ FLOORS = (
     ("runtime",),
     ("world",),
     ("simulation", "drawing", "recording"),
-    ("ros", "tools"),
+    ("gym", "ros", "tools"),
     ("viewer",),
     ("cli",),
     ("__main__",),
