@@ -38,6 +38,7 @@ if TYPE_CHECKING:
     from flatland.plugin_api.dynamics_limits import DynamicsLimits
     from flatland.plugin_api.plugin import ModelPlugin, WorldPlugin
     from flatland.plugin_api.ports import Command, Output
+    from flatland.plugin_api.schedule import when_due
     from flatland.plugin_api.update_timer import UpdateTimer
     from flatland.runtime.model_states import ModelStates
     from flatland.runtime.observer import WorldObserver
@@ -104,6 +105,7 @@ __all__ = [
     "YamlReader",
     "draw",
     "load_world",
+    "when_due",
 ]
 
 # Imported when they are first used: the ROS node publishes its time before it needs any of them.
@@ -150,6 +152,7 @@ _MODULES = {
     "YamlError": "flatland.errors",
     "YamlReader": "flatland.config.reader",
     "draw": "flatland.drawing",
+    "when_due": "flatland.plugin_api.schedule",
 }
 
 

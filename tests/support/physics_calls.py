@@ -23,7 +23,10 @@ from flatland.physics import (
     PhysicsWorld,
     RangeFinder,
     RangeNoise,
+    RunEnd,
     ScanRequest,
+    StepRun,
+    easings,
     scan_all,
 )
 from flatland.physics.boundaries import boundary_edges, boundary_loops
@@ -329,6 +332,44 @@ class RandomCalls:
 
     def do_set_velocity(self) -> None:
         self.body().set_velocity(*self.triple())
+
+    def do_control_velocity(self) -> None:
+        controller = self.body().control_velocity(
+            (0.0, abs(self.number(0.0, 3.0)), 1.0), holonomic=self.rng.random() < 0.5
+        )
+        controller.set_target(*self.triple())
+        if self.rng.random() < 0.2:
+            controller.advance(0.01)
+
+    def do_control_tween(self) -> None:
+        mode = self.rng.choice(["yoyo", "loop", "once", "trigger", "none"])
+        easing = self.rng.choice(easings())
+        duration = self.number(0.01, 2.0)
+        controller = self.body().control_tween(
+            self.triple(), duration=duration, mode=mode, easing=easing
+        )
+        controller.schedule(1, automatic=True, holds=self.rng.random() < 0.7)
+
+    def do_run(self) -> None:
+        plan = self.world.plan
+        run = StepRun(
+            self.world, self.rng.randint(0, 1000), self.rng.randint(0, 20), 0.005, 8, 3, False
+        )
+        made, end, report = plan.run(run)
+        self._require(0 <= made <= run.n, "makes too many steps")
+        self._require(end != RunEnd.DONE or made == run.n, "ends too early")
+        self.invalid = set() if report is None else set(report[1])
+        self._require(self.invalid <= set(self.objects.fixtures), "reports unknown bodies")
+        plan.take_failed()
+
+    def do_collect_touches(self) -> None:
+        bodies = self.some_bodies()
+        self.world.own_bodies(bodies, self.rng.random() < 0.9)
+        touches = self.world.collect_touches(bodies, own=self.rng.random() < 0.5)
+        self._require(len(touches) == len(touches.read()), "counts contacts that do not exist")
+        touches.clear()
+        if self.rng.random() < 0.5:
+            touches.remove()
 
     def do_apply_force(self) -> None:
         self.body().apply_force(self.pair(), self.pair())

@@ -132,7 +132,7 @@ class PythonTween(ModelPlugin):
 
 
 class ContactWitness(ModelPlugin):
-    """Collects (bodies, forces, points, normals) of the contacts of its model by hooks, per step."""
+    """Collects (bodies, forces, points, normals) of the contacts of its model, by step."""
 
     def on_initialize(self, config: YamlReader) -> None:
         self.touches: dict[int, tuple[str, str, str, float]] = {}

@@ -63,7 +63,9 @@ void bind_tricycle(WorldClass& world) {
       "add_tricycle_controller",
       [](World& self, Id body, Id joint, double steering_sign, double wheelbase,
          const std::pair<double, double>& rear_center, bool takes_twist) {
-        self.read_joint(joint);  // throws if it does not exist
+        if (self.read_joint(joint).joint->GetType() != e_revoluteJoint) {
+          throw py::value_error("the joint of the front wheel must be a revolute joint");
+        }
         TricycleMotion motion;
         motion.joint = joint;
         motion.steering_sign = steering_sign;
@@ -265,6 +267,15 @@ py::tuple run_to_python(const RunResult& result) {
   return py::make_tuple(result.steps, static_cast<int>(result.end), to_python(result.report));
 }
 
+// Steps are counted in 64 bits with a margin.
+std::int64_t checked_step(std::int64_t step) {
+  constexpr std::int64_t kMost = std::int64_t{1} << 61;
+  if (step < 0 || step > kMost) {
+    throw py::value_error("numbers of steps must be from 0 to 2^61, got " + std::to_string(step));
+  }
+  return step;
+}
+
 // The steps of one world: World.run with its arguments.
 using WorldRun =
     std::tuple<std::shared_ptr<World>, std::int64_t, std::int64_t, double, int, int, bool>;
@@ -334,6 +345,10 @@ class Runs {
 };
 
 py::list run_worlds(const std::vector<WorldRun>& given, std::size_t num_threads) {
+  for (const WorldRun& run : given) {
+    checked_step(std::get<1>(run));
+    checked_step(std::get<2>(run));
+  }
   Runs runs(given);
   const auto run = [&](std::size_t i) { runs.run(i); };
   if (given.empty() || runs.seconds() <= kShortStep) {
@@ -352,11 +367,11 @@ py::list run_worlds(const std::vector<WorldRun>& given, std::size_t num_threads)
 void bind_run(WorldClass& world) {
   world.def("calls_due", [](World& self, std::int64_t step) {
     self.check_changeable();
-    return self.plan().calls_due(step);
+    return self.plan().calls_due(checked_step(step));
   });
   world.def("begin_step", [](World& self, std::int64_t step) {
     self.check_changeable();
-    const std::uint64_t due = self.plan().calls_due(step);
+    const std::uint64_t due = self.plan().calls_due(checked_step(step));
     self.plan().begin(step);
     return due;
   });
@@ -374,6 +389,8 @@ void bind_run(WorldClass& world) {
          int position_iterations, bool only_physics) {
         // Safe without the GIL: the world is in exclusive use by this thread, and the run accesses
         // no Python object.
+        checked_step(step);
+        checked_step(n);
         World::ExclusiveUse use(self, World::kStepping);
         const bool is_long = self.last_step_time() * static_cast<double>(n) > kShortStep;
         return run_to_python(without_gil_if(is_long, use, [&] {

@@ -57,7 +57,8 @@ plugins:
 DOOR = """
 bodies:
   - {{name: leaf,
-     footprints: [{{type: polygon, density: 1, points: [[0, -0.1], [1, -0.1], [1, 0.1], [0, 0.1]]}}]}}
+     footprints: [{{type: polygon, density: 1,
+       points: [[0, -0.1], [1, -0.1], [1, 0.1], [0, 0.1]]}}]}}
 plugins:
   - {{type: {tween}, name: tween, body: leaf, delta: [0.5, -0.3, 0.7], duration: 0.37{easing}}}
 """
