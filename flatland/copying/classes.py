@@ -18,6 +18,7 @@ from typing import Any, Final
 
 import numpy as np
 
+from flatland.config.inputs import InputCache
 from flatland.config.node import Source
 from flatland.config.tree_reader import TreeReader
 from flatland.copying.containers import ARRAYS, CONTAINERS, FROZEN_DATACLASS, NAMED_TUPLE
@@ -56,7 +57,7 @@ _IMMUTABLE: Final = (
     *(types.GenericAlias, types.UnionType, types.MappingProxyType, types.GetSetDescriptorType),
     *(types.WrapperDescriptorType, types.MethodDescriptorType, types.MemberDescriptorType),
     # Parsed files never change.
-    *(TreeReader, Source),
+    *(TreeReader, Source, InputCache),
 )
 _KINDS: Final[tuple[tuple[tuple[type[Any], ...], Kind], ...]] = (
     *ARRAYS,
