@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -18,6 +19,7 @@ from scenes import benchmark_world_path  # isort: skip
 CLEARANCE = 0.5  # minimum distance of a robot from the walls [m]
 SPACING = 0.9  # minimum distance of two robots [m]
 MAX_ROBOTS = 100
+GRID = 5.0  # m between the robots of a grid
 
 ROBOT = """
 bodies:
@@ -111,3 +113,29 @@ def crowd(which: slice, *, scans: bool) -> Iterator[flatland.World]:
             loaded.command(f"/robot{index}/cmd_vel").set(turn)
         loaded.step(200)
         yield loaded
+
+
+@contextmanager
+def grid(count: int, *, scans: bool) -> Iterator[flatland.World]:
+    """Loads robots on a grid without walls in the range of their lasers, driving in circles."""
+    side = math.ceil(math.sqrt(count))
+    models = [
+        {
+            "name": f"robot{index}",
+            "namespace": f"robot{index}",
+            "model": "robot.model.yaml",
+            "pose": [GRID * (index % side), GRID * (index // side), float(index)],
+        }
+        for index in range(count)
+    ]
+    world = {"properties": {}, "layers": [{"name": "2d"}], "models": models}
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        (folder / "robot.model.yaml").write_text(ROBOT.format(scans=str(scans).lower()))
+        (folder / "world.yaml").write_text(yaml.safe_dump(world))
+        with flatland.World.from_yaml(folder / "world.yaml", seed=1) as loaded:
+            for index in range(count):
+                turn = flatland.Twist(linear_x=0.2, angular_z=1.0 if index % 2 else -1.0)
+                loaded.command(f"/robot{index}/cmd_vel").set(turn)
+            loaded.step(200)
+            yield loaded

@@ -29,6 +29,7 @@ from flatland.errors import (
 from flatland.plugin_api.dynamics_limits import DynamicsLimits
 from flatland.plugin_api.plugin import ModelPlugin, WorldPlugin
 from flatland.plugin_api.ports import Command, Output
+from flatland.plugin_api.schedule import when_due
 from flatland.plugin_api.update_timer import UpdateTimer
 from flatland.runtime.model_states import ModelStates
 from flatland.runtime.observer import WorldObserver
@@ -93,4 +94,5 @@ __all__ = [
     "YamlReader",
     "draw",
     "load_world",
+    "when_due",
 ]

@@ -279,6 +279,57 @@ class World:
         least_gap: float,
     ) -> _Bools: ...
 
+# --- range finders; documented in flatland.physics.range_finder ---
+
+_Floats = npt.NDArray[np.float32]
+_Scan = tuple[_Pose, _Floats, _Floats | None]  # pose of the sensor, ranges, intensities
+
+class RangeNoise:
+    """A noise model of a range finder; immutable."""
+
+    @staticmethod
+    def additive(deviation: float) -> RangeNoise: ...
+    @staticmethod
+    def proportional(deviation: float) -> RangeNoise: ...
+    @staticmethod
+    def beam(
+        *,
+        z_hit: float,
+        z_short: float,
+        z_max: float,
+        z_rand: float,
+        sigma_hit: float,
+        lambda_short: float,
+        max_range: float,
+    ) -> RangeNoise: ...
+
+class RangeFinder:
+    """A fan of beams with what stops them and how they are read; immutable."""
+
+    def __init__(
+        self,
+        *,
+        ends: npt.ArrayLike,
+        origin: _Pose,
+        length: float,
+        mask: int,
+        reflect_mask: int,
+        range_min: float,
+        no_hit: float,
+        noise: RangeNoise | None,
+    ) -> None: ...
+    @property
+    def beams(self) -> int: ...
+    def scan(self, world: World, body: int, stream: int, update: int) -> _Scan: ...
+
+def scan_all(
+    jobs: Sequence[tuple[World, RangeFinder, int, int, int]],
+    out: _Floats | None,
+    num_threads: int,
+) -> list[_Scan]: ...
+
+# --- contacts within a step ---
+
 class PreSolveContact:
     """A contact before it is solved; its settable attributes expire after `pre_solve`."""
 

@@ -26,6 +26,7 @@ from flatland.physics.fixture import PhysicsFixture
 from flatland.physics.joint import PhysicsJoint
 from flatland.physics.plan import END_OF_ORDER, RunEnd, RunResult, StepPlan, StepRun, run_worlds
 from flatland.physics.queries import RayHit
+from flatland.physics.range_finder import RangeFinder, RangeNoise, Scan, ScanRequest, scan_all
 from flatland.physics.touches import Touch, Touches
 from flatland.physics.world import PhysicsWorld, StepReport, to_report
 
@@ -42,9 +43,13 @@ __all__ = [
     "PhysicsWorld",
     "Pose",
     "PreSolveContact",
+    "RangeFinder",
+    "RangeNoise",
     "RayHit",
     "RunEnd",
     "RunResult",
+    "Scan",
+    "ScanRequest",
     "StepPlan",
     "StepReport",
     "StepRun",
@@ -56,5 +61,6 @@ __all__ = [
     "ease",
     "easings",
     "run_worlds",
+    "scan_all",
     "to_report",
 ]

@@ -37,7 +37,7 @@ class NoiseStream:
         updates: Number of updates that were due.
     """
 
-    __slots__ = ("_bits", "_counter", "_is_positioned", "_rng", "_state", "updates")
+    __slots__ = ("_bits", "_entropy", "_is_positioned", "_key", "_rng", "_state", "updates")
 
     def __init__(self, entropy: Sequence[int]) -> None:
         """Creates the stream; `begin_update` precedes the first draw.
@@ -45,12 +45,19 @@ class NoiseStream:
         Args:
             entropy: Integers of at least 0 that identify the stream.
         """
-        self._bits = np.random.Philox(np.random.SeedSequence(entropy))
-        self._rng = np.random.Generator(self._bits)
-        self._state = self._bits.state
-        self._counter = self._state["state"]["counter"]
+        self._entropy = tuple(entropy)
+        self._key: int | None = None
+        self._bits: np.random.Philox | None = None
         self._is_positioned = False
         self.updates = 0
+
+    @property
+    def key(self) -> int:
+        """A 64-bit integer that identifies the stream, for generators of the core."""
+        if self._key is None:
+            seeds = np.random.SeedSequence(self._entropy)
+            self._key = int(seeds.generate_state(1, np.uint64)[0])
+        return self._key
 
     def begin_update(self, count: int = 1) -> None:
         """Advances to the next update; to be called for each update due, emitted or not.
@@ -64,10 +71,15 @@ class NoiseStream:
     @property
     def rng(self) -> np.random.Generator:
         """The generator, at the start of the current update or after the draws of this update."""
+        if self._bits is None:
+            # Created when it is needed, since many streams draw no numbers.
+            self._bits = np.random.Philox(np.random.SeedSequence(self._entropy))
+            self._rng = np.random.Generator(self._bits)
+            self._state = self._bits.state
         if not self._is_positioned:
             self._is_positioned = True
             # The lowest word is the counter of the draws within an update.
-            self._counter[1] = self.updates
+            self._state["state"]["counter"][1] = self.updates
             self._bits.state = self._state
         return self._rng
 

@@ -163,7 +163,7 @@ class FlatlandPlugin:
         Args:
             output: Name of the output or quantity, unique within the plugin.
         """
-        stream = NoiseStream([*self._entropy, zlib.crc32(output.encode())])
+        stream = self._uncounted_stream(output)
         self._noise_streams.append(stream)
         return stream
 
@@ -254,6 +254,10 @@ class FlatlandPlugin:
         For `Command.on_change`, to pass the value to a controller.
         """
         self.world.plugin_host.schedule.set_later(function)
+
+    def _uncounted_stream(self, output: str) -> NoiseStream:
+        """Returns a noise stream whose number of updates is left to `state`."""
+        return NoiseStream([*self._entropy, zlib.crc32(output.encode())])
 
     def _random_state(self) -> tuple[Any, list[int]]:
         """Returns the states of `rng` and of the noise streams, for `World.state_hash`."""

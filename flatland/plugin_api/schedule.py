@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Final, TypeVar
+from typing import TYPE_CHECKING, Any, Final, NamedTuple, TypeVar
 
 if TYPE_CHECKING:
     from flatland.entities.body import Body
@@ -20,6 +20,7 @@ SkippedHandler = Callable[[int, int, "Pose | None"], None]
 """Called as `handler(count, stamp, pose)`, see `FlatlandPlugin.call_when_due`."""
 
 _MARK: Final = "_flatland_when_due"
+_BATCH: Final = "_flatland_batch"
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,6 +56,35 @@ def when_due(hook: H) -> H:
     """
     setattr(hook, _MARK, True)
     return hook
+
+
+class HookBatch(NamedTuple):
+    """The parts of a hook that serves the plugins that follow each other in one step together.
+
+    A step calls `begin` of all plugins, then `perform` once with those for which it returned true,
+    then `finish` of each of these. The parts must not move bodies.
+
+    Attributes:
+        begin: Name of the method `begin(timekeeper)`.
+        perform: Function of a sequence of plugins, of one or several models. If it raises, it has
+            done nothing.
+        finish: Name of the method `finish(timekeeper)`.
+    """
+
+    begin: str
+    perform: Callable[[Sequence[Any]], object]
+    finish: str
+
+
+def in_batches(hook: Callable[..., None], batch: HookBatch) -> None:
+    """Allows steps to call the parts of a hook instead of the hook itself."""
+    setattr(hook, _BATCH, batch)
+
+
+def batch_of(hook: Callable[..., None]) -> HookBatch | None:
+    """Returns the parts of a hook, None if it is called as a whole."""
+    found: HookBatch | None = getattr(hook, _BATCH, None)
+    return found
 
 
 def is_called_when_due(hook: Callable[..., None]) -> bool:

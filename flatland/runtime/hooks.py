@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable, Iterator
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 from flatland.plugin_api.plugin import FlatlandPlugin, ModelPlugin
-from flatland.plugin_api.schedule import not_called
+from flatland.plugin_api.schedule import HookBatch, batch_of, not_called
 from flatland.runtime.step_schedule import needs_work
 
 if TYPE_CHECKING:
@@ -24,18 +24,22 @@ HookList = list[tuple[FlatlandPlugin, Hook]]
 
 
 class StepCall(NamedTuple):
-    """A call of a hook in a step.
+    """A call of a hook in a step, or of the parts of the hooks of several plugins.
 
     Attributes:
         plugin: The plugin.
         hook: Its method.
         until: The place of the plugin in the order of hooks if the core does something before the
             call, else 0.
+        batch: The parts of the hook if it is called together with others.
+        members: The calls that are made together, including this one; empty for a single call.
     """
 
     plugin: FlatlandPlugin
     hook: Hook
     until: int
+    batch: HookBatch | None = None
+    members: tuple[StepCall, ...] = ()
 
 
 def overrides(plugin: FlatlandPlugin, hook: str) -> bool:
@@ -147,7 +151,7 @@ class HookTable:
         if found is None:
             if len(self._calls) >= _MOST_LISTS:
                 self._calls.clear()
-            found = self._calls[hook, due] = list(self._find_calls(hook, due))
+            found = self._calls[hook, due] = self._in_batches(self._find_calls(hook, due))
         return found
 
     def _find_calls(self, hook: str, due: int) -> Iterator[StepCall]:
@@ -161,6 +165,22 @@ class HookTable:
             order = self._order[plugin]
             yield StepCall(plugin, method, order if needs_work(orders, done, order) else 0)
             done = order
+
+    def _in_batches(self, calls: Iterator[StepCall]) -> list[StepCall]:
+        """Joins successive calls of hooks that allow it."""
+        joined: list[StepCall] = []
+        for call in calls:
+            last = joined[-1] if joined else None
+            batch = None if self._wrap is not None else batch_of(call.hook)
+            if batch is None or last is None or last.batch != batch or self._moves_body(call):
+                joined.append(call._replace(batch=batch))
+            else:
+                joined[-1] = last._replace(members=(*(last.members or (last,)), call))
+        return joined
+
+    def _moves_body(self, call: StepCall) -> bool:
+        """Returns whether the core may move bodies, not only set velocities, before a call."""
+        return bool(call.until) and self._schedule is not None and self._schedule.moves_bodies
 
     @property
     def has_unscheduled(self) -> bool:

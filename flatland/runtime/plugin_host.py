@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar, TypeVar
 
 from flatland.entities.contact import Contact, ContactImpulse, MutableContact
 from flatland.errors import PLUGIN_FAULTS, FlatlandError, PluginError, YamlError
 from flatland.plugin_api.missing_plugins import missing_plugins_error, read_entries
 from flatland.plugin_api.plugin import FlatlandPlugin, ModelPlugin, WorldPlugin, describe
 from flatland.plugin_api.registry import PluginRegistry
-from flatland.runtime.hooks import CONTACT_HOOKS, HookList, HookTable
+from flatland.runtime.hooks import CONTACT_HOOKS, HookList, HookTable, StepCall
 from flatland.runtime.step_schedule import StepSchedule
 from flatland.runtime.time_limit import TimeLimitExceeded, time_limit
 
@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from flatland.entities.model import Model
     from flatland.geometry import Pose
     from flatland.physics import ContactEvent, OldManifold, PreSolveContact
+    from flatland.plugin_api.schedule import HookBatch
     from flatland.runtime.faults import Faults
     from flatland.runtime.observer import Observers
     from flatland.runtime.plugin_costs import PluginCosts
@@ -29,6 +30,8 @@ if TYPE_CHECKING:
     from flatland.world import World
 
 _LOG = logging.getLogger("flatland")
+
+R = TypeVar("R")
 
 _EVENT_HOOKS = {"begin": "begin_contact", "end": "end_contact", "post_solve": "post_solve"}
 
@@ -267,19 +270,69 @@ class PluginHost:
             due: The clocks of updates that are due, as bits.
             timekeeper: The simulated time.
         """
-        plan, targets = self._plan, self.schedule.targets
-        counts, is_after = self._faults.counts, hook == "after_physics_step"
-        for plugin, method, until in self.hooks.calls(hook, due):
-            if until:
-                plan.carry_out(is_after, until, timekeeper.step_size)
-            try:
-                method(timekeeper)
-                if counts:
-                    self._faults.succeeded(plugin, hook)
-            except PLUGIN_FAULTS as error:
-                self._add_fault(plugin, hook, error)
-            if targets:
-                self.schedule.push_targets()
+        is_after = hook == "after_physics_step"
+        for call in self.hooks.calls(hook, due):
+            if call.members and call.batch is not None:
+                self._call_batch(hook, call.members, call.batch, timekeeper)
+            else:
+                self._carry_out_before(call, is_after, timekeeper)
+                self._call_one(hook, call.plugin, call.hook, timekeeper)
+
+    def _carry_out_before(self, call: StepCall, is_after: bool, timekeeper: Timekeeper) -> None:
+        if call.until:
+            self._plan.carry_out(is_after, call.until, timekeeper.step_size)
+
+    def _call_one(
+        self,
+        hook: str,
+        plugin: FlatlandPlugin,
+        function: Callable[[Timekeeper], R],
+        timekeeper: Timekeeper,
+    ) -> R | None:
+        """Calls a hook, or a part of it, and takes what it raises.
+
+        Returns:
+            What it returned, None if it raised.
+        """
+        result = None
+        try:
+            result = function(timekeeper)
+            # A part that returns true is followed by others.
+            if self._faults.counts and not result:
+                self._faults.succeeded(plugin, hook)
+        except PLUGIN_FAULTS as error:
+            self._add_fault(plugin, hook, error)
+        if self.schedule.targets:
+            self.schedule.push_targets()
+        return result
+
+    def _call_batch(
+        self, hook: str, members: Sequence[StepCall], batch: HookBatch, timekeeper: Timekeeper
+    ) -> None:
+        """Calls the hooks of several plugins part by part."""
+        is_after = hook == "after_physics_step"
+        # What the core does in between sets velocities only, see `HookTable.calls`.
+        begun = [
+            call
+            for call in members
+            if self._call_one(hook, call.plugin, getattr(call.plugin, batch.begin), timekeeper)
+        ]
+        performed = {call.plugin for call in begun}
+        try:
+            if begun:
+                batch.perform([call.plugin for call in begun])
+        except PLUGIN_FAULTS:
+            # One by one, to find out which of them raises.
+            for call in begun:
+                try:
+                    batch.perform([call.plugin])
+                except PLUGIN_FAULTS as error:
+                    performed.discard(call.plugin)
+                    self._add_fault(call.plugin, hook, error)
+        for call in members:
+            self._carry_out_before(call, is_after, timekeeper)
+            if call.plugin in performed:
+                self._call_one(hook, call.plugin, getattr(call.plugin, batch.finish), timekeeper)
 
     def call_failed(self, timekeeper: Timekeeper) -> None:
         """Calls the hooks of the plugins whose controllers failed, which raise the same error."""

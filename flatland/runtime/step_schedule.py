@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Final
 
+from flatland.physics import TweenController
 from flatland.plugin_api.schedule import HookSchedule, is_called_when_due
 from flatland.plugin_api.update_timer import UpdateTimer
 
@@ -163,6 +164,15 @@ class StepSchedule:
     def find(self, plugin: FlatlandPlugin, hook: str) -> ScheduledHook | None:
         """Returns the scheduled hook of a plugin, None if it is called in every step."""
         return self._phases[hook].hooks.get(plugin)
+
+    @property
+    def moves_bodies(self) -> bool:
+        """Whether the core moves bodies before the physics step, besides setting velocities."""
+        return any(
+            isinstance(controller, TweenController)
+            for plugin in self._phases["before_physics_step"].hooks
+            for controller in plugin._controllers
+        )
 
     def work_orders(self, hook: str) -> list[int]:
         """Returns the places of the plugins for which the core does something, ascending."""

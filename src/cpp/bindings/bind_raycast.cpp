@@ -1,6 +1,7 @@
 #include <pybind11/numpy.h>
 #include <pybind11/stl.h>
 
+#include <memory>
 #include <string>
 #include <tuple>
 
@@ -39,14 +40,20 @@ py::tuple scan(World& world, const PyPose& pose, const Ends& ends, std::int64_t 
   request.count = static_cast<std::size_t>(ends.shape(0));
   request.mask = checked_bits(mask, "mask");
   request.reflect_mask = checked_bits(reflect_mask, "reflect_mask");
-  check_all_finite(request.ends, 2 * request.count, 2, "ends");
+  // A known fan needs no check.
+  FanCache& fans = world.rays().fans();
+  std::shared_ptr<const BeamFan> fan = fans.find(request.ends, request.count);
+  if (fan == nullptr) {
+    check_all_finite(request.ends, 2 * request.count, 2, "ends");
+    fan = fans.make(request.ends, request.count);
+  }
   py::array_t<float> fractions(ends.shape(0));
   py::array_t<bool> reflect(ends.shape(0));
   const ScanResult result{fractions.mutable_data(), reflect.mutable_data()};
   // Safe without the GIL: `use` prevents changes of the world, the results are not shared yet, and
   // `ends` keeps its memory alive. If another thread writes to `ends`, the results are unspecified.
   World::SharedUse use(world);
-  without_gil_if(ends.shape(0) > max_short, use, [&] { cast(request, result); });
+  without_gil_if(ends.shape(0) > max_short, use, [&] { cast(*fan, request, result); });
   return py::make_tuple(std::move(fractions), std::move(reflect));
 }
 
@@ -54,15 +61,15 @@ py::tuple py_cast_rays(World& world, const PyPose& pose, const Ends& ends, std::
                        std::int64_t reflect_mask) {
   constexpr py::ssize_t kShortScan = 2000;  // about 30 us
   return scan(world, pose, ends, mask, reflect_mask, kShortScan,
-              [&](const ScanRequest& request, const ScanResult& result) {
-                cast_rays(world.rays(), request, result);
+              [&](const BeamFan& fan, const ScanRequest& request, const ScanResult& result) {
+                cast_rays(world.rays(), fan, request, result);
               });
 }
 
 py::tuple py_cast_rays_reference(World& world, const PyPose& pose, const Ends& ends,
                                  std::int64_t mask, std::int64_t reflect_mask) {
   return scan(world, pose, ends, mask, reflect_mask, 0,
-              [&](const ScanRequest& request, const ScanResult& result) {
+              [&](const BeamFan&, const ScanRequest& request, const ScanResult& result) {
                 cast_rays_reference(world.engine(), request, result);
               });
 }

@@ -21,6 +21,7 @@ void bind_fixtures(WorldClass& world);
 void bind_joints(WorldClass& world);
 void bind_contacts(pybind11::module_& module, WorldClass& world);
 void bind_raycast(WorldClass& world);
+void bind_range_finder(pybind11::module_& module);
 void bind_steps(pybind11::module_& module, WorldClass& world);
 void bind_overlap(WorldClass& world);
 void bind_map_edges(pybind11::module_& module);

@@ -56,6 +56,25 @@ BeamFan::BeamFan(const float* ends, std::size_t count) : ends_(ends, ends + 2 * 
     }
     first_in_cell_[cell] = static_cast<std::int32_t>(ray);
   }
+  find_runs(count);
+}
+
+void BeamFan::find_runs(std::size_t count) {
+  constexpr std::size_t kMaxRuns = 16;
+  if (order_.size() != count) return;
+  for (std::size_t i = 0; i < count; ++i) {
+    if (i > 0 && order_[i] == order_[i - 1] + 1) {
+      ++runs_.back().count;
+    } else {
+      runs_.push_back({i, order_[i], 1});
+    }
+    if (runs_.size() > kMaxRuns) {
+      runs_.clear();
+      return;
+    }
+  }
+  std::sort(runs_.begin(), runs_.end(),
+            [](const Run& a, const Run& b) { return a.original < b.original; });
 }
 
 bool BeamFan::matches(const float* ends, std::size_t count) const {
@@ -63,22 +82,26 @@ bool BeamFan::matches(const float* ends, std::size_t count) const {
          (count == 0 || std::memcmp(ends_.data(), ends, 2 * count * sizeof(float)) == 0);
 }
 
-std::shared_ptr<const BeamFan> FanCache::get(const float* ends, std::size_t count) {
+std::shared_ptr<const BeamFan> FanCache::find(const float* ends, std::size_t count) {
   const std::lock_guard<std::mutex> lock(mutex_);
   const auto known = std::find_if(fans_.begin(), fans_.end(),
                                   [&](const auto& fan) { return fan->matches(ends, count); });
-  if (known != fans_.end()) {
-    std::rotate(fans_.begin(), known, known + 1);
-  } else {
-    if (fans_.size() == kMaxFans) fans_.pop_back();
-    fans_.insert(fans_.begin(), std::make_shared<const BeamFan>(ends, count));
-  }
+  if (known == fans_.end()) return nullptr;
+  std::rotate(fans_.begin(), known, known + 1);
   return fans_.front();
 }
 
 void FanCache::share(FanCache& other) {
   const std::scoped_lock lock(mutex_, other.mutex_);
   fans_ = other.fans_;
+}
+
+std::shared_ptr<const BeamFan> FanCache::make(const float* ends, std::size_t count) {
+  auto fan = std::make_shared<const BeamFan>(ends, count);
+  const std::lock_guard<std::mutex> lock(mutex_);
+  if (fans_.size() == kMaxFans) fans_.pop_back();
+  fans_.insert(fans_.begin(), fan);
+  return fan;
 }
 
 }  // namespace flatland

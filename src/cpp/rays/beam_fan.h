@@ -29,6 +29,15 @@ class BeamFan {
   // For each sorted ray, its index in the array of end points.
   const std::vector<std::uint32_t>& order() const { return order_; }
 
+  // Rays that are consecutive in both orders: `count` rays from `sorted` on, whose indices in the
+  // array of end points begin at `original`.
+  struct Run {
+    std::size_t sorted, original, count;
+  };
+  // All rays in order of their indices, so that the vector of the last rays of a run may extend
+  // into the next one; empty if there are too many runs or rays of zero length.
+  const std::vector<Run>& runs() const { return runs_; }
+
   float min_length() const { return min_length_; }
   float max_length() const { return max_length_; }
 
@@ -38,8 +47,11 @@ class BeamFan {
   const std::int32_t* first_in_cell() const { return first_in_cell_.data(); }
 
  private:
+  void find_runs(std::size_t count);
+
   std::vector<float> ends_;
   std::vector<std::uint32_t> order_;
+  std::vector<Run> runs_;
   AlignedFloats x_, y_, length_;
   std::vector<std::int32_t> first_in_cell_;
   int cell_bits_ = 8;
@@ -50,7 +62,10 @@ class BeamFan {
 // The most recently used fans, so that the rays of a laser are sorted only once. Thread-safe.
 class FanCache {
  public:
-  std::shared_ptr<const BeamFan> get(const float* ends, std::size_t count);
+  // Null if the fan is unknown.
+  std::shared_ptr<const BeamFan> find(const float* ends, std::size_t count);
+  // The end points must be finite.
+  std::shared_ptr<const BeamFan> make(const float* ends, std::size_t count);
   // Shares the fans of another cache.
   void share(FanCache& other);
 

@@ -138,9 +138,11 @@ struct Kernel {
     simd::store(out.distance, distance * kBoxRounding);
   }
 
-  // Calls draw_leaf(index) for the visible leaves of a tree, approximately from front to back.
+  // Calls draw_leaf(index, rays) for the visible leaves of a tree, approximately from front to
+  // back. Distances of boxes are multiplied by `rounding`.
   template <typename DrawLeaf>
-  FLATLAND_INLINE void traverse(const EdgeTree::Node* nodes, DrawLeaf&& draw_leaf) const {
+  FLATLAND_INLINE void traverse(const EdgeTree::Node* nodes, float rounding,
+                                DrawLeaf&& draw_leaf) const {
     StackEntry stack[EdgeTree::kMaxDepth * EdgeTree::kFanOut];
     std::size_t size = 0;
     stack[size++] = {0.0F, {0, scan.count}, 0};
@@ -157,7 +159,7 @@ struct Kernel {
       const std::size_t first = size;
       for (std::uint32_t i = 0; i < node.count; ++i) {
         const Interval rays{found.begin[i], found.end[i]};
-        const float distance = found.distance[i];
+        const float distance = found.distance[i] * rounding;
         if (!frame.masks.pass(node.category_bits[i]) || !is_visible(rays, distance)) continue;
         // Insertion sort, with the nearest entry on top of the stack.
         std::size_t top = size++;
@@ -360,7 +362,7 @@ void set_frame(const ScanView& scan, const ScanFrame& frame, const b2Transform& 
 void draw_tree(const ScanView& scan, const ScanFrame& frame, const EdgeTree::Node* nodes,
                const EdgeTree::Leaf* leaves) {
   const Kernel kernel{scan, frame};
-  kernel.traverse(nodes,
+  kernel.traverse(nodes, 1.0F,
                   [&](std::uint32_t leaf, Interval rays) { kernel.draw_leaf(leaves[leaf], rays); });
 }
 
@@ -370,4 +372,13 @@ void draw_solids(const ScanView& scan, const ScanFrame& frame, b2Fixture* const*
   for (std::size_t i = 0; i < count; i += simd::kWidth) {
     kernel.draw_solids(solids + i, count - i < simd::kWidth ? count - i : simd::kWidth);
   }
+}
+
+void draw_solid_tree(const ScanView& scan, const ScanFrame& frame, const EdgeTree::Node* nodes,
+                     b2Fixture* const* solids, std::size_t count) {
+  const Kernel kernel{scan, frame};
+  kernel.traverse(nodes, kCircleRounding, [&](std::uint32_t leaf, Interval) {
+    const std::size_t first = simd::kWidth * leaf;
+    kernel.draw_solids(solids + first, count - first < simd::kWidth ? count - first : simd::kWidth);
+  });
 }

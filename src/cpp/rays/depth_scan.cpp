@@ -103,6 +103,7 @@ struct Functions {
   decltype(&baseline::set_frame) set_frame;
   decltype(&baseline::draw_tree) draw_tree;
   decltype(&baseline::draw_solids) draw_solids;
+  decltype(&baseline::draw_solid_tree) draw_solid_tree;
 };
 
 const Functions& functions() {
@@ -110,20 +111,22 @@ const Functions& functions() {
 #if defined(__x86_64__)
     switch (instruction_set()) {
       case InstructionSet::kAvx512:
-        return Functions{avx512::set_frame, avx512::draw_tree, avx512::draw_solids};
+        return Functions{avx512::set_frame, avx512::draw_tree, avx512::draw_solids,
+                         avx512::draw_solid_tree};
       case InstructionSet::kAvx2:
-        return Functions{avx2::set_frame, avx2::draw_tree, avx2::draw_solids};
+        return Functions{avx2::set_frame, avx2::draw_tree, avx2::draw_solids,
+                         avx2::draw_solid_tree};
       case InstructionSet::kBaseline:
         break;
     }
 #endif
-    return Functions{baseline::set_frame, baseline::draw_tree, baseline::draw_solids};
+    return Functions{baseline::set_frame, baseline::draw_tree, baseline::draw_solids,
+                     baseline::draw_solid_tree};
   }();
   return kSelected;
 }
 
-ScanView view_of(const BeamFan& fan, const b2Transform& pose, float* d_x, float* d_y,
-                 float* fraction) {
+ScanView view_of(const BeamFan& fan, const b2Transform& pose, ScanBuffer& buffer) {
   // A bit less than the reciprocal, so that rounding does not matter.
   const float fraction_per_metre = (1.0F - 1e-6F) / fan.max_length();
   return {fan.x(),
@@ -131,9 +134,9 @@ ScanView view_of(const BeamFan& fan, const b2Transform& pose, float* d_x, float*
           fan.first_in_cell(),
           fan.cell_bits(),
           static_cast<std::int32_t>(fan.count()),
-          d_x,
-          d_y,
-          fraction,
+          buffer.d_x.data(),
+          buffer.d_y.data(),
+          buffer.fraction.data(),
           fraction_per_metre,
           pose};
 }
@@ -147,19 +150,26 @@ float angle_margin(const BeamFan& fan, const b2Transform& pose, const b2Transfor
   return std::min(4e-6F + 1e-6F * coordinates / fan.min_length(), kFullCircle);
 }
 
+ScanFrame world_frame(const BeamFan& fan, const b2Transform& pose, RayMasks masks) {
+  b2Transform world;
+  world.SetIdentity();
+  return {pose.p, pose.q.c, -pose.q.s, angle_margin(fan, pose, world), masks};
+}
+
 }  // namespace
 
 DepthScan::DepthScan(const BeamFan& fan, const b2Transform& pose, ScanBuffer& buffer)
     : fan_(fan), pose_(pose), buffer_(buffer) {
-  buffer.d_x_.resize(fan.count());
-  buffer.d_y_.resize(fan.count());
-  buffer.fraction_.resize(fan.count());
-  std::fill_n(buffer.fraction_.data(), buffer.fraction_.size(), kMissFraction);
+  buffer.d_x.resize(fan.count());
+  buffer.d_y.resize(fan.count());
+  // Whole vectors are read from the start of any run of rays on.
+  buffer.fraction.resize(fan.count() + AlignedFloats::kBlock);
+  std::fill_n(buffer.fraction.data(), buffer.fraction.size(), kMissFraction);
 }
 
 void DepthScan::draw(const EdgeTree& tree, const b2Transform& body, RayMasks masks) {
   if (tree.nodes().empty() || !masks.pass(tree.category_bits()) || fan_.count() == 0) return;
-  const ScanView view = view_of(fan_, pose_, buffer_.d_x_.data(), buffer_.d_y_.data(), fractions());
+  const ScanView view = view_of(fan_, pose_, buffer_);
   const b2Rot to_sensor = b2MulT(pose_.q, body.q);
   const ScanFrame frame{b2MulT(body.q, pose_.p - body.p), to_sensor.c, to_sensor.s,
                         angle_margin(fan_, pose_, body), masks};
@@ -173,11 +183,15 @@ void DepthScan::draw(const EdgeTree& tree, const b2Transform& body, RayMasks mas
 
 void DepthScan::draw(const std::vector<b2Fixture*>& solids, RayMasks masks) {
   if (solids.empty() || fan_.count() == 0) return;
-  const ScanView view = view_of(fan_, pose_, buffer_.d_x_.data(), buffer_.d_y_.data(), fractions());
-  b2Transform world;
-  world.SetIdentity();
-  const ScanFrame frame{pose_.p, pose_.q.c, -pose_.q.s, angle_margin(fan_, pose_, world), masks};
-  functions().draw_solids(view, frame, solids.data(), solids.size());
+  functions().draw_solids(view_of(fan_, pose_, buffer_), world_frame(fan_, pose_, masks),
+                          solids.data(), solids.size());
+}
+
+void DepthScan::draw(const SolidTree& tree, RayMasks masks) {
+  draw(tree.loose(), masks);
+  if (tree.is_empty() || fan_.count() == 0) return;
+  functions().draw_solid_tree(view_of(fan_, pose_, buffer_), world_frame(fan_, pose_, masks),
+                              tree.nodes().data(), tree.solids().data(), tree.solids().size());
 }
 
 }  // namespace flatland

@@ -18,6 +18,7 @@
 #include "rays/aligned_floats.h"
 #include "rays/beam_fan.h"
 #include "rays/edge_tree.h"
+#include "rays/solid_tree.h"
 
 namespace flatland {
 
@@ -31,12 +32,10 @@ struct RayMasks {
   }
 };
 
-// The memory of scans, for any number of them one after the other.
-class ScanBuffer {
- private:
-  friend class DepthScan;
-
-  AlignedFloats d_x_, d_y_, fraction_;
+// The memory of scans, for any number of them one after the other: for each ray, the vector along
+// it in some frame, and the fraction of the nearest hit.
+struct ScanBuffer {
+  AlignedFloats d_x, d_y, fraction;
 };
 
 class DepthScan {
@@ -48,11 +47,12 @@ class DepthScan {
   void draw(const EdgeTree& tree, const b2Transform& body, RayMasks masks);
   // Draws circles and polygons.
   void draw(const std::vector<b2Fixture*>& solids, RayMasks masks);
+  void draw(const SolidTree& solids, RayMasks masks);
 
   // Fraction of the nearest hit of each ray, in sorted order; greater than 1 for a miss. While
   // drawing, hits at or beyond these fractions are ignored; the caller may change them in between.
-  float* fractions() { return buffer_.fraction_.data(); }
-  const float* fractions() const { return buffer_.fraction_.data(); }
+  float* fractions() { return buffer_.fraction.data(); }
+  const float* fractions() const { return buffer_.fraction.data(); }
 
  private:
   const BeamFan& fan_;

@@ -6,17 +6,15 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <memory>
 #include <vector>
 
 #include "rays/depth_scan.h"
 #include "rays/ray_scene.h"
+#include "rays/scene_view.h"
 #include "world/contacts.h"
 
 namespace flatland {
 namespace {
-
-constexpr std::uint16_t kAnyCategory = 0xFFFF;
 
 class ClosestHit final : public b2RayCastCallback {
  public:
@@ -73,45 +71,20 @@ void cast_rays_reference(const b2World& world, const ScanRequest& request,
   }
 }
 
-namespace {
-
-void draw_all(DepthScan& scan, RayScene& scene, RayMasks masks) {
-  for (const EdgeGroup& edges : scene.edge_groups()) {
-    scan.draw(*edges.tree, edges.bodies.front()->GetTransform(), masks);
-  }
-  scan.draw(scene.solids(), masks);
-}
-
-// Casts the rays again at the reflecting fixtures only, up to the distances of the nearest hits.
-void find_reflections(DepthScan& scan, const BeamFan& fan, RayScene& scene,
-                      const ScanRequest& request, bool* reflect) {
-  float* fractions = scan.fractions();
-  std::vector<float> limits(fan.count());
-  for (std::size_t i = 0; i < fan.count(); ++i) {
-    const bool is_hit = fractions[i] <= 1.0F;
-    const float limit = fractions[i] + kFractionTolerance + kDistanceTolerance / fan.length()[i];
-    fractions[i] = limits[i] = is_hit ? limit : -1.0F;
-  }
-  draw_all(scan, scene, {request.mask, request.reflect_mask});
-  for (std::size_t i = 0; i < fan.count(); ++i) {
-    reflect[fan.order()[i]] = fractions[i] < limits[i];
-  }
-}
-
-}  // namespace
-
-void cast_rays(RayScene& scene, const ScanRequest& request, const ScanResult& result) {
+void cast_rays(RayScene& scene, const BeamFan& fan, const ScanRequest& request,
+               const ScanResult& result) {
   std::fill_n(result.fractions, request.count, std::numeric_limits<float>::quiet_NaN());
   std::fill_n(result.reflect, request.count, false);
-  const std::shared_ptr<const BeamFan> fan = scene.fans().get(request.ends, request.count);
   ScanBuffer buffer;
-  DepthScan scan(*fan, request.pose, buffer);
-  draw_all(scan, scene, {request.mask, kAnyCategory});
-  for (std::size_t i = 0; i < fan->count(); ++i) {
-    if (scan.fractions()[i] <= 1.0F) result.fractions[fan->order()[i]] = scan.fractions()[i];
+  DepthScan scan(fan, request.pose, buffer);
+  const SceneView view(scene);
+  view.draw(scan, {request.mask, kAnyCategory});
+  for (std::size_t i = 0; i < fan.count(); ++i) {
+    if (scan.fractions()[i] <= 1.0F) result.fractions[fan.order()[i]] = scan.fractions()[i];
   }
   if (request.reflect_mask != 0) {
-    find_reflections(scan, *fan, scene, request, result.reflect);
+    std::vector<float> limits;
+    find_reflections(scan, view, fan, {request.mask, request.reflect_mask}, limits, result.reflect);
   }
 }
 

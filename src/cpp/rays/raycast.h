@@ -13,6 +13,7 @@ class b2World;
 
 namespace flatland {
 
+class BeamFan;
 class RayScene;
 
 // The nearest hit of a ray, in the world frame.
@@ -55,7 +56,8 @@ std::optional<RayHit> ray_cast(const b2World& world, const b2Vec2& from, const b
 void cast_rays_reference(const b2World& world, const ScanRequest& request,
                          const ScanResult& result);
 
-// Performs a scan with a depth buffer; see depth_scan.h.
-void cast_rays(RayScene& scene, const ScanRequest& request, const ScanResult& result);
+// Performs a scan with a depth buffer; see depth_scan.h. The fan is that of the end points.
+void cast_rays(RayScene& scene, const BeamFan& fan, const ScanRequest& request,
+               const ScanResult& result);
 
 }  // namespace flatland

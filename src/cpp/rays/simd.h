@@ -73,12 +73,56 @@ FLATLAND_INLINE Floats wrap_difference(Floats d) {
   return d < -2.0F ? d + 4.0F : d;
 }
 
+// One ray, for the arithmetic of all vectors on single numbers.
+struct Lanes1 {
+  static constexpr std::int32_t kWidth = 1;
+  using Floats = float;
+  using Ints = std::int32_t;
+  using Words = std::uint32_t;
+
+  static FLATLAND_INLINE Floats broadcast(float x) { return x; }
+  static FLATLAND_INLINE Floats sqrt(Floats a) { return std::sqrt(a); }
+  static FLATLAND_INLINE Floats to_floats(Ints a) { return static_cast<float>(a); }
+  static FLATLAND_INLINE Floats as_floats(Words a) { return __builtin_bit_cast(float, a); }
+  static FLATLAND_INLINE Words as_words(Floats a) { return __builtin_bit_cast(Words, a); }
+  static FLATLAND_INLINE Ints as_ints(Words a) { return static_cast<Ints>(a); }
+  static FLATLAND_INLINE Words as_words(Ints a) { return static_cast<Words>(a); }
+  static FLATLAND_INLINE Words words(std::uint32_t x) { return x; }
+  static FLATLAND_INLINE Words count_from(std::uint32_t x) { return x; }
+  // The upper and the lower half of each product.
+  static FLATLAND_INLINE void multiply(Words a, std::uint32_t b, Words& high, Words& low) {
+    const std::uint64_t product = std::uint64_t{a} * b;
+    high = static_cast<Words>(product >> 32U);
+    low = static_cast<Words>(product);
+  }
+};
+
 // Vectors of rays, for any instruction set. Lanes8Avx2 and Lanes16 in simd_x86.h have the same
 // members. Comparisons with NaN are false, except for `not_equal`.
 struct Lanes8 {
   static constexpr std::int32_t kWidth = 8;
   using Floats = simd::Floats;
   using Mask = simd::Ints;
+  using Ints = simd::Ints;
+  using Words = std::uint32_t __attribute__((vector_size(32), aligned(4), may_alias));
+
+  static FLATLAND_INLINE Floats to_floats(Ints a) { return __builtin_convertvector(a, Floats); }
+  static FLATLAND_INLINE Floats as_floats(Words a) { return reinterpret_cast<Floats>(a); }
+  static FLATLAND_INLINE Words as_words(Floats a) { return reinterpret_cast<Words>(a); }
+  static FLATLAND_INLINE Ints as_ints(Words a) { return reinterpret_cast<Ints>(a); }
+  static FLATLAND_INLINE Words as_words(Ints a) { return reinterpret_cast<Words>(a); }
+  static FLATLAND_INLINE Words words(std::uint32_t x) { return Words{} + x; }
+  static FLATLAND_INLINE Words count_from(std::uint32_t x) {
+    return Words{0, 1, 2, 3, 4, 5, 6, 7} + x;
+  }
+  static FLATLAND_INLINE void store(std::uint32_t* p, Words v) { *reinterpret_cast<Words*>(p) = v; }
+  static FLATLAND_INLINE void multiply(Words a, std::uint32_t b, Words& high, Words& low) {
+    for (std::size_t i = 0; i < simd::kWidth; ++i) {
+      const std::uint64_t product = std::uint64_t{a[i]} * b;
+      high[i] = static_cast<std::uint32_t>(product >> 32U);
+      low[i] = static_cast<std::uint32_t>(product);
+    }
+  }
 
   static FLATLAND_INLINE Floats load(const float* p) { return simd::load(p); }
   static FLATLAND_INLINE void store(float* p, Floats v) { simd::store(p, v); }

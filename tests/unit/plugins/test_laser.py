@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import flatland
+from flatland.physics import RangeFinder
 
 ROOM = [
     "##########",
@@ -271,10 +272,16 @@ class TestNoise:
         assert scan(3) != scan(4)
 
     def test_no_random_numbers_are_drawn_without_noise(self, walls: Walls) -> None:
-        plugin = eye(walls.room())
-        before = plugin.rng.bit_generator.state
-        plugin.compute_ranges()
-        assert plugin.rng.bit_generator.state == before
+        world = walls.room()
+        before = world.state_hash()
+        eye(world).compute_ranges()
+        assert world.state_hash() == before
+
+    def test_the_number_of_calls_is_part_of_the_state(self, walls: Walls) -> None:
+        world = walls.room("noise_std_dev: 0.2")
+        before = world.state_hash()
+        eye(world).compute_ranges()
+        assert world.state_hash() != before
 
     def test_calls_of_compute_ranges_do_not_change_published_scans(self, walls: Walls) -> None:
         def scans(calls: int) -> list[float]:
@@ -385,13 +392,13 @@ class TestMessage:
 class TestUpdates:
     def count_scans(self, world: flatland.World, steps: int, monkeypatch: Any) -> int:
         calls: list[int] = []
-        cast = world.physics.cast_rays
+        scan = RangeFinder.scan
 
         def count(*arguments: Any) -> Any:
             calls.append(1)
-            return cast(*arguments)
+            return scan(*arguments)
 
-        monkeypatch.setattr(type(world.physics), "cast_rays", lambda _, *rest: count(*rest))
+        monkeypatch.setattr(RangeFinder, "scan", count)
         world.step(steps)
         return len(calls)
 

@@ -1,0 +1,203 @@
+#include <pybind11/numpy.h>
+#include <pybind11/stl.h>
+
+#include <memory>
+#include <optional>
+#include <string>
+#include <tuple>
+#include <unordered_set>
+#include <utility>
+#include <vector>
+
+#include "bindings/bindings.h"
+#include "rays/range_finder.h"
+#include "rays/scan_batch.h"
+#include "world/bodies.h"
+#include "world/errors.h"
+
+namespace py = pybind11;
+
+namespace flatland {
+namespace {
+
+using Ends = py::array_t<float, py::array::c_style | py::array::forcecast>;
+using Ranges = py::array_t<float, py::array::c_style>;
+using PyPose = std::tuple<double, double, double>;
+using Finder = std::shared_ptr<const RangeFinder>;
+// World, range finder, body, stream and number of the update of the noise.
+using PyJob = std::tuple<std::shared_ptr<World>, std::shared_ptr<RangeFinder>, Id, std::uint64_t,
+                         std::uint64_t>;
+
+// Scans of more beams release the GIL; they take more than about 0.03 ms.
+constexpr std::size_t kShortScans = 2000;
+
+RangeFinder make_finder(const Ends& ends, const PyPose& origin, double length, std::int64_t mask,
+                        std::int64_t reflect_mask, double range_min, float no_hit,
+                        std::optional<RangeNoise> noise) {
+  if (ends.ndim() != 2 || ends.shape(1) != 2) {
+    throw py::value_error("ends must have shape (n, 2), got " +
+                          std::string(py::str(ends.attr("shape"))));
+  }
+  check_all_finite(ends.data(), static_cast<std::size_t>(ends.size()), 2, "ends");
+  const auto& [x, y, theta] = origin;
+  checked_vector(x, y, "origin");
+  checked_finite(theta, "origin angle");
+  const RangeFinder::Parameters parameters{{x, y, theta},
+                                           checked_not_negative(length, "length"),
+                                           checked_bits(mask, "mask"),
+                                           checked_bits(reflect_mask, "reflect_mask"),
+                                           {checked_not_negative(range_min, "range_min"), no_hit},
+                                           std::move(noise)};
+  return RangeFinder(std::vector<float>(ends.data(), ends.data() + ends.size()), parameters);
+}
+
+b2Transform to_transform(const Triple& pose) {
+  b2Transform transform;
+  transform.p = checked_vector(pose[0], pose[1], "pose");
+  transform.q.Set(checked_finite(pose[2], "pose angle"));
+  return transform;
+}
+
+// Several shared uses that end together.
+class SharedUses {
+ public:
+  void add(World& world) { uses_.push_back(std::make_unique<World::SharedUse>(world)); }
+  void end() {
+    for (const auto& use : uses_) use->end();
+  }
+
+ private:
+  std::vector<std::unique_ptr<World::SharedUse>> uses_;
+};
+
+// The scans of one call, with the Python objects of their results.
+class PyScans {
+ public:
+  // Readings are written to new arrays.
+  void add(World& world, const RangeFinder& finder, Id body, const NoiseKey& key) {
+    add(world, finder, body, key, Ranges(static_cast<py::ssize_t>(finder.beams())));
+  }
+
+  void add(World& world, const RangeFinder& finder, Id body, const NoiseKey& key, Ranges ranges) {
+    const Triple pose = finder.pose_of(pose_of(world, body));
+    Readings out{ranges.mutable_data(), nullptr};
+    py::object intensities = py::none();
+    if (finder.has_intensities()) {
+      Ranges values(static_cast<py::ssize_t>(finder.beams()));
+      out.intensities = values.mutable_data();
+      intensities = std::move(values);
+    }
+    jobs_.push_back({&world.rays(), &finder, to_transform(pose), key, out});
+    results_.push_back(py::make_tuple(py::make_tuple(pose[0], pose[1], pose[2]), std::move(ranges),
+                                      std::move(intensities)));
+    beams_ += finder.beams();
+  }
+
+  // Returns (pose, ranges, intensities) of each scan. Safe without the GIL: `uses` prevents changes
+  // of the worlds, and the caller keeps them and the range finders alive. If another thread
+  // accesses the arrays, their contents are unspecified.
+  template <typename Use>
+  std::vector<py::tuple> run(Use& uses, ThreadPool& pool, std::size_t num_threads) {
+    without_gil_if(beams_ > kShortScans, uses, [&] { scan_all(jobs_, pool, num_threads); });
+    return std::move(results_);
+  }
+
+ private:
+  std::vector<ScanJob> jobs_;
+  std::vector<py::tuple> results_;
+  std::size_t beams_ = 0;
+};
+
+py::tuple py_scan(const RangeFinder& finder, World& world, Id body, std::uint64_t stream,
+                  std::uint64_t update) {
+  World::SharedUse use(world);
+  PyScans scans;
+  scans.add(world, finder, body, {stream, update});
+  return scans.run(use, world.threads(), 1).front();
+}
+
+// A view of row `i` of the output array.
+Ranges row_of(const Ranges& out, py::ssize_t i) {
+  return Ranges({out.shape(1)}, {out.strides(1)}, out.data(i, 0), out);
+}
+
+Ranges checked_output(const py::object& out, const std::vector<PyJob>& jobs) {
+  if (!py::isinstance<Ranges>(out)) {
+    throw py::type_error("out must be a C-contiguous array of type float32");
+  }
+  auto array = py::cast<Ranges>(out);
+  const std::size_t beams = jobs.empty() ? 0 : std::get<1>(jobs.front())->beams();
+  for (const PyJob& job : jobs) {
+    if (std::get<1>(job)->beams() != beams) {
+      throw py::value_error("out requires scans with the same number of beams, got " +
+                            std::to_string(beams) + " and " +
+                            std::to_string(std::get<1>(job)->beams()));
+    }
+  }
+  const bool fits = array.ndim() == 2 && array.shape(0) == static_cast<py::ssize_t>(jobs.size()) &&
+                    (jobs.empty() || array.shape(1) == static_cast<py::ssize_t>(beams));
+  if (!fits) {
+    throw py::value_error("out must have shape (" + std::to_string(jobs.size()) + ", " +
+                          std::to_string(beams) + "), got " +
+                          std::string(py::str(array.attr("shape"))));
+  }
+  if (!array.writeable()) throw py::value_error("out must be writeable");
+  return array;
+}
+
+std::vector<py::tuple> py_scan_all(const std::vector<PyJob>& jobs, const py::object& out,
+                                   std::int64_t num_threads) {
+  if (num_threads < 0) {
+    throw py::value_error("num_threads must not be negative, got " + std::to_string(num_threads));
+  }
+  std::optional<Ranges> array;
+  if (!out.is_none()) array = checked_output(out, jobs);
+  if (jobs.empty()) return {};
+  SharedUses uses;
+  std::unordered_set<const World*> worlds;
+  PyScans scans;
+  for (std::size_t i = 0; i < jobs.size(); ++i) {
+    const auto& [world, finder, body, stream, update] = jobs[i];
+    if (world == nullptr || finder == nullptr) {
+      throw py::type_error("a scan requires a world and a range finder, got None");
+    }
+    if (worlds.insert(world.get()).second) uses.add(*world);
+    if (array) {
+      scans.add(*world, *finder, body, {stream, update},
+                row_of(*array, static_cast<py::ssize_t>(i)));
+    } else {
+      scans.add(*world, *finder, body, {stream, update});
+    }
+  }
+  return scans.run(uses, std::get<0>(jobs.front())->threads(),
+                   static_cast<std::size_t>(num_threads));
+}
+
+}  // namespace
+
+void bind_range_finder(py::module_& module) {
+  py::class_<RangeNoise>(module, "RangeNoise", "A noise model of a range finder; immutable.")
+      .def_static("additive", &RangeNoise::additive, py::arg("deviation"))
+      .def_static("proportional", &RangeNoise::proportional, py::arg("deviation"))
+      .def_static(
+          "beam",
+          [](double z_hit, double z_short, double z_max, double z_rand, double sigma_hit,
+             double lambda_short, double max_range) {
+            return RangeNoise::beam(
+                {z_hit, z_short, z_max, z_rand, sigma_hit, lambda_short, max_range});
+          },
+          py::kw_only(), py::arg("z_hit"), py::arg("z_short"), py::arg("z_max"), py::arg("z_rand"),
+          py::arg("sigma_hit"), py::arg("lambda_short"), py::arg("max_range"));
+  py::class_<RangeFinder, std::shared_ptr<RangeFinder>>(
+      module, "RangeFinder",
+      "A fan of beams with what stops them and how they are read; immutable.")
+      .def(py::init(&make_finder), py::kw_only(), py::arg("ends"), py::arg("origin"),
+           py::arg("length"), py::arg("mask"), py::arg("reflect_mask"), py::arg("range_min"),
+           py::arg("no_hit"), py::arg("noise"))
+      .def_property_readonly("beams", &RangeFinder::beams)
+      .def("scan", &py_scan, py::arg("world"), py::arg("body"), py::arg("stream"),
+           py::arg("update"));
+  module.def("scan_all", &py_scan_all, py::arg("jobs"), py::arg("out"), py::arg("num_threads"));
+}
+
+}  // namespace flatland

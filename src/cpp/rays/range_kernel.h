@@ -1,0 +1,79 @@
+// The loops over the ranges of a scan. range_noise.cpp includes this file once for each instruction
+// set, in a namespace with a type `Lanes` (see simd.h). Arrays have whole blocks.
+
+// Replaces the ranges that the sensor does not report: hits that are too close, and misses (NaN).
+struct Limits {
+  using Floats = Lanes::Floats;
+
+  Floats shortest, no_hit;
+
+  explicit FLATLAND_INLINE Limits(const RangeLimits& limits)
+      : shortest(Lanes::broadcast(limits.range_min > 0.0F ? limits.range_min : -kInfinity)),
+        no_hit(Lanes::broadcast(limits.no_hit)) {}
+
+  FLATLAND_INLINE Floats apply(Floats range) const {
+    const Floats low = Lanes::broadcast(-kInfinity);
+    const Floats measured = Lanes::select(Lanes::less(range, shortest), low, range);
+    return Lanes::select(Lanes::not_equal(range, range), no_hit, measured);
+  }
+};
+
+void limit(float* ranges, std::size_t count, const RangeLimits& limits) {
+  const Limits kept(limits);
+  for (std::size_t i = 0; i < count; i += Lanes::kWidth) {
+    Lanes::store(ranges + i, kept.apply(Lanes::load(ranges + i)));
+  }
+}
+
+// Ranges from the fractions of consecutive rays, NaN for a miss; `count` is rounded up.
+void scale(const float* fractions, std::size_t count, float length, float* ranges) {
+  const Lanes::Floats nan = Lanes::broadcast(kNaN);
+  const Lanes::Floats one = Lanes::broadcast(1.0F);
+  for (std::size_t i = 0; i < count; i += Lanes::kWidth) {
+    const Lanes::Floats fraction = Lanes::load(fractions + i);
+    Lanes::store(ranges + i,
+                 Lanes::select(Lanes::less_equal(fraction, one), fraction * length, nan));
+  }
+}
+
+// Adds normal noise to exact ranges, and applies the limits. Beams are numbered in groups of 64:
+// the four words of a counter belong to four beams of a group, 16 beams apart.
+void add_normal_noise(float* ranges, std::size_t count, const NoiseKey& key, float deviation,
+                      bool is_proportional, const RangeLimits& limits) {
+  using Floats = Lanes::Floats;
+  const Limits kept(limits);
+  const auto add = [&](std::size_t i, Floats normal) {
+    if (i >= count) return;
+    const Floats range = Lanes::load(ranges + i);
+    Floats noise = normal * deviation;
+    if (is_proportional) noise = noise * range;
+    Lanes::store(ranges + i, kept.apply(range + noise));
+  };
+  for (std::size_t group = 0; group < count; group += kBeamsPerGroup) {
+    const auto first_counter = static_cast<std::uint32_t>(group / 4);
+    for (std::size_t lane = 0; lane < kBeamsPerGroup / 4; lane += Lanes::kWidth) {
+      const RandomWords random(key, first_counter + static_cast<std::uint32_t>(lane), 0);
+      const NormalPair low(random.word[0], random.word[1]);
+      const NormalPair high(random.word[2], random.word[3]);
+      const std::size_t beam = group + lane;
+      add(beam, low.first);
+      add(beam + kBeamsPerGroup / 4, low.second);
+      add(beam + kBeamsPerGroup / 2, high.first);
+      add(beam + 3 * kBeamsPerGroup / 4, high.second);
+    }
+  }
+}
+
+// The random numbers of 16 beams: all words of one counter per beam, and two normal numbers made of
+// the second and the third word.
+void draw_beams(const NoiseKey& key, std::uint32_t first_beam, BeamDraws& out) {
+  for (std::size_t i = 0; i < kBeamsPerDraw; i += Lanes::kWidth) {
+    const RandomWords random(key, first_beam + static_cast<std::uint32_t>(i), 0);
+    const NormalPair normals(random.word[1], random.word[2]);
+    Lanes::store(out.kind + i, random.word[0]);
+    Lanes::store(out.exponent + i, random.word[1]);
+    Lanes::store(out.uniform + i, random.word[3]);
+    Lanes::store(out.normal[0] + i, normals.first);
+    Lanes::store(out.normal[1] + i, normals.second);
+  }
+}

@@ -1,0 +1,46 @@
+#include "rays/scene_view.h"
+
+#include <box2d/b2_body.h>
+
+#include "rays/raycast.h"
+
+namespace flatland {
+namespace {
+
+// Numbers of solids and of scans for which a tree pays off.
+constexpr std::size_t kManySolids = 64;
+constexpr std::size_t kManyScans = 4;
+
+}  // namespace
+
+void SceneView::prepare(std::size_t scans) {
+  if (scans >= kManyScans && solids_.size() >= kManySolids) tree_ = SolidTree(solids_);
+}
+
+void SceneView::draw(DepthScan& scan, RayMasks masks) const {
+  for (const EdgeGroup& edges : edges_) {
+    scan.draw(*edges.tree, edges.bodies.front()->GetTransform(), masks);
+  }
+  if (tree_.is_empty()) {
+    scan.draw(solids_, masks);
+  } else {
+    scan.draw(tree_, masks);
+  }
+}
+
+void find_reflections(DepthScan& scan, const SceneView& scene, const BeamFan& fan, RayMasks masks,
+                      std::vector<float>& limits, bool* reflects) {
+  float* fractions = scan.fractions();
+  limits.resize(fan.count());
+  for (std::size_t i = 0; i < fan.count(); ++i) {
+    const bool is_hit = fractions[i] <= 1.0F;
+    const float limit = fractions[i] + kFractionTolerance + kDistanceTolerance / fan.length()[i];
+    fractions[i] = limits[i] = is_hit ? limit : -1.0F;
+  }
+  scene.draw(scan, masks);
+  for (std::size_t i = 0; i < fan.count(); ++i) {
+    reflects[fan.order()[i]] = fractions[i] < limits[i];
+  }
+}
+
+}  // namespace flatland

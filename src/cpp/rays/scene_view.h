@@ -1,0 +1,38 @@
+// What the rays of a scan can hit.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "rays/depth_scan.h"
+#include "rays/ray_scene.h"
+#include "rays/solid_tree.h"
+
+namespace flatland {
+
+inline constexpr std::uint16_t kAnyCategory = 0xFFFF;
+
+// The fixtures of a world while it does not change. Several threads may use a view at a time.
+class SceneView {
+ public:
+  explicit SceneView(RayScene& scene) : edges_(scene.edge_groups()), solids_(scene.solids()) {}
+
+  // Prepares for this number of scans, which may be worth a tree of circles and polygons.
+  void prepare(std::size_t scans);
+
+  void draw(DepthScan& scan, RayMasks masks) const;
+
+ private:
+  const std::vector<EdgeGroup>& edges_;
+  const std::vector<b2Fixture*>& solids_;
+  SolidTree tree_;
+};
+
+// Marks the rays with a reflecting fixture at the distance of the nearest hit: casts the rays of a
+// complete scan again at these fixtures only, up to the distances of the hits. `reflects` has an
+// entry for each end point of the fan, initially false. Overwrites the fractions of the scan;
+// `limits` is memory.
+void find_reflections(DepthScan& scan, const SceneView& scene, const BeamFan& fan, RayMasks masks,
+                      std::vector<float>& limits, bool* reflects);
+
+}  // namespace flatland

@@ -1,0 +1,375 @@
+"""Runs of steps in the core: the same results as steps with calls of Python, one by one."""
+
+from __future__ import annotations
+
+import math
+import random
+import threading
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import flatland
+from flatland.physics import PhysicsWorld
+from flatland.plugin_api.update_timer import UpdateTimer
+from flatland.runtime.batch import step_worlds
+from flatland.runtime.observer import WorldObserver
+from tests.support import python_plugins
+
+MANIFEST = """<library path=".">
+{}
+</library>
+"""
+CLASS = (
+    '<class name="test::{0}" type="tests.support.python_plugins.{0}" '
+    'base_class_type="flatland::ModelPlugin"/>'
+)
+CART = """
+bodies:
+  - {{name: base, footprints: [{{type: circle, radius: 0.2, density: 5, restitution: 0.3}}]}}
+plugins:
+  - {{type: {drive}, name: drive, body: base, linear_dynamics: {{acceleration_limit: 0.7,
+     deceleration_limit: 1.3}}, angular_dynamics: {{velocity_limit: 0.9, acceleration_limit: 2.1}}}}
+"""
+TRICYCLE = """
+bodies:
+  - {{name: base, footprints: [{{type: circle, radius: 0.3, density: 5}}]}}
+  - {{name: front, footprints: [{{type: circle, radius: 0.05, density: 1, layers: []}}]}}
+  - {{name: left, pose: [-0.4, 0.2, 0],
+     footprints: [{{type: circle, radius: 0.05, density: 1, layers: []}}]}}
+  - {{name: right, pose: [-0.4, -0.2, 0],
+     footprints: [{{type: circle, radius: 0.05, density: 1, layers: []}}]}}
+joints:
+  - {{name: front, type: revolute,
+     bodies: [{{name: base, anchor: [0, 0]}}, {{name: front, anchor: [0, 0]}}]}}
+  - {{name: left, type: weld,
+     bodies: [{{name: base, anchor: [-0.4, 0.2]}}, {{name: left, anchor: [0, 0]}}]}}
+  - {{name: right, type: weld,
+     bodies: [{{name: base, anchor: [-0.4, -0.2]}}, {{name: right, anchor: [0, 0]}}]}}
+plugins:
+  - {{type: {drive}, name: drive, body: base, front_wheel_joint: front, rear_left_wheel_joint: left,
+     rear_right_wheel_joint: right, command: {command}, max_steer_angle: 1.2,
+     linear_dynamics: {{acceleration_limit: 0.7}},
+     angular_dynamics: {{velocity_limit: 1.5, acceleration_limit: 3}}}}
+"""
+DOOR = """
+bodies:
+  - {{name: leaf,
+     footprints: [{{type: polygon, density: 1,
+       points: [[0, -0.1], [1, -0.1], [1, 0.1], [0, 0.1]]}}]}}
+plugins:
+  - {{type: {tween}, name: tween, body: leaf, delta: [0.5, -0.3, 0.7], duration: 0.37{easing}}}
+"""
+SENSORS = """
+bodies:
+  - {name: base, footprints: [{type: circle, radius: 0.2, density: 5, restitution: 0.3}]}
+plugins:
+  - {type: DiffDrive, name: drive, body: base}
+  - {type: Bumper, name: bumper}
+  - {type: BoolSensor, name: touch}
+"""
+WITNESS = "  - {type: 'test::ContactWitness', name: witness}\n"
+
+
+@pytest.fixture(autouse=True)
+def plugins(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """Declares the plugins of this module."""
+    names = ("PythonDrive", "PythonTricycle", "PythonTween", "ContactWitness")
+    manifest = tmp_path / "manifest.xml"
+    manifest.write_text(MANIFEST.format("\n".join(map(CLASS.format, names))))
+    monkeypatch.setenv("FLATLAND_PLUGIN_PATH", str(manifest))
+
+
+def room(files: Any, models: dict[str, str], **options: Any) -> flatland.World:
+    """Loads a world of models, side by side, in a closed room."""
+    files.write("room.lines", "-2 -2 9 -2\n9 -2 9 3\n9 3 -2 3\n-2 3 -2 -2\n")
+    files.write("room.yaml", "type: line_segments\ndata: room.lines\nscale: 1\norigin: [0, 0, 0]\n")
+    entries = ""
+    for index, (name, text) in enumerate(models.items()):
+        files.write(f"{name}.model.yaml", text)
+        entries += f"  - {{name: {name}, namespace: {name}, model: {name}.model.yaml, "
+        entries += f"pose: [{1.1 * index}, {0.2 * index}, {0.3 * index}]}}\n"
+    text = f"properties: {{}}\nlayers: [{{name: 2d, map: room.yaml}}]\nmodels:\n{entries}"
+    world: flatland.World = files.load(text, seed=3, **options)
+    return world
+
+
+def commands(seed: int) -> Iterator[flatland.Twist]:
+    """Yields random commands, among them zeros and reversals."""
+    rng = random.Random(seed)
+    while True:
+        v, omega = rng.choice([0.0, rng.uniform(-1, 1)]), rng.choice([0.0, rng.uniform(-2, 2)])
+        yield flatland.Twist(linear_x=v, angular_z=omega)
+
+
+def drive(world: flatland.World, lengths: list[int], single: bool = False) -> list[bytes]:
+    """Drives all robots at random; returns the states of all bodies after each run of steps."""
+    states, source = [], commands(7)
+    topics = [topic for topic in world.ports.commands if topic.endswith("cmd_vel")]
+    for n in lengths:
+        for topic in topics:
+            world.command(topic).set(next(source))
+        if single:
+            for _ in range(n):
+                world.step()
+        else:
+            world.step(n)
+        states.append(world.physics.body_states().tobytes())
+    return states
+
+
+LENGTHS = [1, 2, 3, 5, 8, 13, 40, 17, 90, 4, 60, 100, 33, 150]
+
+
+class TestTheCoreEqualsPython:
+    def test_a_differential_drive(self, files: Any) -> None:
+        core = drive(room(files, {"a": CART.format(drive="DiffDrive")}), LENGTHS)
+        python = drive(room(files, {"a": CART.format(drive="test::PythonDrive")}), LENGTHS)
+        assert core == python
+
+    @pytest.mark.parametrize("command", ["steering", "twist"])
+    def test_a_tricycle(self, files: Any, command: str) -> None:
+        core = room(files, {"a": TRICYCLE.format(drive="TricycleDrive", command=command)})
+        python = room(files, {"a": TRICYCLE.format(drive="test::PythonTricycle", command=command)})
+        assert drive(core, LENGTHS) == drive(python, LENGTHS)
+
+    def test_a_tween_that_pushes_a_robot(self, files: Any) -> None:
+        cart = CART.format(drive="DiffDrive")
+        core = DOOR.format(tween="Tween", easing=", easing: cubicInOut")
+        python = DOOR.format(tween="test::PythonTween", easing="")
+        assert drive(room(files, {"a": cart, "door": core}), LENGTHS) == drive(
+            room(files, {"a": cart, "door": python}), LENGTHS
+        )
+
+    def test_the_contacts_of_a_bumper(self, files: Any) -> None:
+        world = room(files, {"a": SENSORS + WITNESS, "b": SENSORS, "c": SENSORS})
+        found: list[Any] = []
+        world.ports.outputs["/a/collisions"].subscribe(found.append)
+        witness = world.model("a").plugin("witness")
+        assert isinstance(witness, python_plugins.ContactWitness)
+        drive(world, LENGTHS)
+        for turn in (0.0, 0.7, -0.7):
+            world.command("/a/cmd_vel").set(flatland.Twist(linear_x=-1.0, angular_z=turn))
+            world.step(300)
+        assert len(found) == len(witness.steps) == sum(LENGTHS) + 900
+        assert any(forces for step in witness.steps for _, forces, _, _ in step)
+        for value, expected in zip(found, witness.steps, strict=True):
+            assert [
+                (
+                    [each.body_a, each.entity_b, each.body_b],
+                    each.magnitude_forces.tolist(),
+                    each.contact_positions.tolist(),
+                    each.contact_normals.tolist(),
+                )
+                for each in value.collisions
+            ] == expected
+
+
+MIXED = {
+    "a": CART.format(drive="DiffDrive"),
+    "b": SENSORS,
+    "door": DOOR.format(tween="Tween", easing=", easing: bounceOut"),
+    "c": TRICYCLE.format(drive="TricycleDrive", command="twist"),
+}
+
+
+class TestRunsEqualSingleSteps:
+    @pytest.mark.parametrize("witness", [False, True])
+    def test_states_transforms_and_hashes(self, files: Any, witness: bool) -> None:
+        models = {**MIXED, "d": SENSORS + WITNESS} if witness else MIXED
+        runs, single = room(files, models), room(files, models)
+        assert drive(runs, LENGTHS) == drive(single, LENGTHS, single=True)
+        assert runs.transforms == single.transforms
+        assert runs.state_hash() == single.state_hash()
+
+    def test_outputs_that_become_wanted_later(self, files: Any) -> None:
+        values: list[list[Any]] = []
+        for single in (False, True):
+            world = room(files, MIXED)
+            drive(world, [37], single=single)
+            found: list[Any] = []
+            for topic in ("/a/odometry/filtered", "/b/collisions", "/b/bool_sensor"):
+                world.ports.outputs[topic].subscribe(
+                    lambda value, found=found: found.append(repr(value))
+                )
+            drive(world, [50], single=single)
+            values.append(found)
+        assert values[0] == values[1]
+        assert len(values[0]) > 100
+
+    def test_noise_does_not_depend_on_runs(self, files: Any) -> None:
+        noisy = CART.format(drive="DiffDrive").replace(
+            "body: base,", "body: base, pub_rate: 33.3, odom_pose_noise: [0.1, 0.1, 0.1],"
+        )
+        runs, single = room(files, {"a": noisy}), room(files, {"a": noisy})
+        drive(runs, LENGTHS)
+        drive(single, LENGTHS, single=True)
+        assert runs.transforms == single.transforms
+        assert runs.state_hash() == single.state_hash()
+
+    def test_many_worlds_at_once(self, files: Any) -> None:
+        worlds = [room(files, MIXED) for _ in range(5)]
+        alone = [room(files, MIXED) for _ in range(5)]
+        for threads in (1, 2, 0):
+            for index, (world, other) in enumerate(zip(worlds, alone, strict=True)):
+                for each in (world, other):
+                    each.command("/a/cmd_vel").set(flatland.Twist(linear_x=0.2 * index))
+            step_worlds(worlds, 57, threads)
+            for other in alone:
+                other.step(57)
+        hashes = [world.state_hash() for world in worlds]
+        assert hashes == [world.state_hash() for world in alone]
+        assert len(set(hashes)) == 5
+
+
+class TestUnwantedUpdates:
+    def test_a_quiet_robot_needs_no_call(self, files: Any, monkeypatch: Any) -> None:
+        world = room(files, {"a": CART.format(drive="DiffDrive")})
+        world.step(10)  # the first update is always called
+        calls: list[int] = []
+        host = world.plugin_host
+        monkeypatch.setattr(host, "call_step_hooks", lambda *arguments: calls.append(1))
+        world.step(200)
+        assert not calls
+        assert world.timekeeper.sim_time_ns == 210 * 5_000_000
+
+    def test_a_subclass_that_overrides_a_hook_is_called_in_each_step(self, files: Any) -> None:
+        world = room(files, {"a": CART.format(drive="DiffDrive")})
+        plugin = world.model("a").plugin("drive")
+        calls: list[int] = []
+
+        class Slow(type(plugin)):  # type: ignore[misc]
+            def before_physics_step(self, timekeeper: flatland.Timekeeper) -> None:
+                super().before_physics_step(timekeeper)
+                calls.append(timekeeper.sim_time_ns)
+                self.body.set_velocity(0.25, 0.0, 0.0)
+
+        world.plugin_host.hooks.remove(plugin)
+        plugin.__class__ = Slow
+        plugin._controllers[:] = [plugin.body.control_velocity(holonomic=False)]
+        plugin._controller = plugin._controllers[0]
+        world.plugin_host.hooks.add(plugin)
+        world.command("/a/cmd_vel").set(flatland.Twist(linear_x=1.0))
+        world.step(20)
+        assert len(calls) == 20
+        # What the subclass set after the drive remains.
+        assert plugin.body.velocity == pytest.approx((0.25, 0.0, 0.0))
+
+
+class TestInterruptions:
+    def test_a_request_of_another_thread_runs_between_two_steps_of_a_run(self, files: Any) -> None:
+        world = room(files, MIXED)
+        times: list[int] = []
+        posted = threading.Event()
+
+        def request() -> None:
+            world.post(lambda: times.append(world.timekeeper.sim_time_ns))
+            posted.set()
+
+        thread = threading.Thread(target=request)
+        thread.start()
+        world.step(200_000)
+        thread.join()
+        assert posted.is_set()
+        assert len(times) == 1
+        assert times[0] < world.timekeeper.sim_time_ns
+
+    def test_an_observer_of_time_is_notified_in_each_step(self, files: Any) -> None:
+        class Clock(WorldObserver):
+            def __init__(self) -> None:
+                self.times: list[int] = []
+
+            def time_advanced(self, time_ns: int) -> None:
+                self.times.append(time_ns)
+
+        clock = Clock()
+        world = room(files, MIXED, observers=[clock])
+        world.step(10)
+        assert clock.times == [5_000_000 * (index + 1) for index in range(10)]
+
+    def test_a_pause_ends_a_run(self, files: Any) -> None:
+        world = room(files, {"a": CART.format(drive="DiffDrive")})
+        world.post(world.pause)
+        world.step(100)
+        assert world.timekeeper.sim_time_ns == 0
+
+
+class TestController:
+    def test_a_controller_sets_the_velocity_in_the_frame_of_the_body(self, files: Any) -> None:
+        world = room(
+            files, {"a": SENSORS.replace("  - {type: DiffDrive, name: drive, body: base}\n", "")}
+        )
+        body = world.model("a").bodies[0]
+        controller = body.control_velocity(linear=(0.0, 2.0, 2.0))
+        controller.set_target(0.5, 0.25, 0.0)
+        world.step(10)
+        assert controller.velocity == pytest.approx((0.1, 0.1, 0.0))
+        world.step(50)
+        yaw = body.pose[2]
+        assert body.velocity[:2] == pytest.approx(
+            (
+                0.5 * math.cos(yaw) - 0.25 * math.sin(yaw),
+                0.5 * math.sin(yaw) + 0.25 * math.cos(yaw),
+            ),
+            abs=1e-6,
+        )
+
+    def test_a_controller_ends_with_its_body(self) -> None:
+        world = PhysicsWorld()
+        body = world.create_body("dynamic", (0, 0, 0))
+        controller = body.control_velocity()
+        assert controller.alive
+        body.destroy()
+        assert not controller.alive
+        with pytest.raises(flatland.StaleHandleError):
+            controller.set_target(1, 0, 0)
+
+    def test_a_velocity_that_is_not_finite_is_a_fault_of_the_plugin(self, files: Any) -> None:
+        world = room(files, MIXED)
+        world.step(20)
+        world.ports.commands["/a/cmd_vel"][0].value = flatland.Twist(linear_x=math.nan)
+        with pytest.raises(ValueError, match="velocity must be finite and within") as caught:
+            world.step(20)
+        assert "before_physics_step" in caught.value.__notes__[0]
+        # The step of the fault is complete.
+        assert world.timekeeper.sim_time_ns == 21 * 5_000_000
+
+
+class TestTouches:
+    def test_a_contact_is_remembered_until_it_is_cleared(self, files: Any) -> None:
+        world = room(files, {"a": SENSORS})
+        model = world.model("a")
+        touches = model.watch_contacts()
+        assert not touches.touched
+        world.command("/a/cmd_vel").set(flatland.Twist(linear_x=-1.0))
+        world.step(600)
+        assert touches.touched
+        assert len(touches) == 1
+        world.command("/a/cmd_vel").set(flatland.Twist(linear_x=1.0))
+        world.step(100)
+        assert len(touches) == 0
+        assert touches.touched
+        touches.clear()
+        assert not touches.touched
+
+    def test_contacts_that_exist_already_count(self, files: Any) -> None:
+        world = room(files, {"a": SENSORS})
+        world.move_model("a", (-1.8, 0.0, 0.0), if_blocked="allow")
+        world.command("/a/cmd_vel").set(flatland.Twist(linear_x=-1.0))
+        world.step(50)
+        assert world.model("a").watch_contacts().touched
+
+
+@pytest.mark.parametrize("rate", [0.0, math.inf, 50.0, 10.0, 33.3, 0.1, 199.9, 7e-3, 1e9])
+@pytest.mark.parametrize("step_size", [0.005, 0.001, 0.0166])
+def test_the_clock_of_the_core_agrees_with_the_timer(rate: float, step_size: float) -> None:
+    timekeeper = flatland.Timekeeper(step_size)
+    timer, plan = UpdateTimer(rate), PhysicsWorld().plan
+    clock = timer.clock(timekeeper.step_size_ns)
+    assert clock is not None
+    plan.set_calls(plan.add_clock(False, *clock), True)
+    for step in [*range(3000), 10**9, 10**9 + 1, 10**12 + 7]:
+        timekeeper.sim_time_ns = step * timekeeper.step_size_ns
+        assert bool(plan.begin_step(step)) == UpdateTimer(rate).check_update(timekeeper)
