@@ -18,6 +18,7 @@ from typing import Any, Final
 
 import numpy as np
 
+from flatland.config.inputs import InputCache
 from flatland.config.node import Source
 from flatland.config.tree_reader import TreeReader
 from flatland.copying.containers import ARRAYS, CONTAINERS, FROZEN_DATACLASS, NAMED_TUPLE
@@ -25,6 +26,7 @@ from flatland.copying.functions import FUNCTIONS
 from flatland.copying.kind import Connection, Kind, Lock
 from flatland.copying.objects import kind_of_object
 from flatland.copying.random_numbers import GENERATORS
+from flatland.physics import RangeFinder
 
 # Objects of these packages connect a plugin to something outside the world.
 _OUTSIDE_PACKAGES: Final = frozenset(
@@ -55,8 +57,9 @@ _IMMUTABLE: Final = (
     *(operator.attrgetter, operator.itemgetter, operator.methodcaller, types.CodeType),
     *(types.GenericAlias, types.UnionType, types.MappingProxyType, types.GetSetDescriptorType),
     *(types.WrapperDescriptorType, types.MethodDescriptorType, types.MemberDescriptorType),
-    # Parsed files never change.
-    *(TreeReader, Source),
+    # Parsed files and range finders never change.
+    *(TreeReader, Source, InputCache),
+    RangeFinder,
 )
 _KINDS: Final[tuple[tuple[tuple[type[Any], ...], Kind], ...]] = (
     *ARRAYS,

@@ -9,6 +9,7 @@ from flatland.copying.classes import kind_of
 from flatland.copying.kind import Kind
 
 Write = Callable[[Any, Any], None]
+Entry = tuple[Write, Any, Any]
 
 
 class Recorder:
@@ -33,8 +34,8 @@ class Recorder:
         self._excluded = tuple(excluded)
         self._seen = set(map(id, self._excluded))
         self._pending: list[object] = []
-        self._written: list[tuple[Write, Any, Any]] = []
-        self._last: list[tuple[Write, Any, Any]] = []
+        self._written: list[Entry] = []
+        self._last: list[Entry] = []
 
     def follow(self, objects: Iterable[object]) -> None:
         """Saves some more objects, which must be kept alive by ones that were saved."""
@@ -68,21 +69,34 @@ class Recorder:
                 continue
             seen.add(id(obj))
             kind.record(obj, self)
-        return StateRecord([*self._written, *self._last])
+        return StateRecord(self._written, self._last)
 
 
 class StateRecord:
     """Contents of objects; they can be written back many times."""
 
-    def __init__(self, entries: list[tuple[Write, Any, Any]]) -> None:
+    def __init__(self, entries: list[Entry], last: list[Entry]) -> None:
         """Creates a record.
 
         Args:
-            entries: A function that writes a content back, the object, and the content.
+            entries: Functions that write a content back, with the object and the content.
+            last: Calls of `__setstate__`, which are made when all content was written back.
         """
         self._entries = entries
+        self._last = last
 
-    def write_back(self) -> None:
-        """Writes the contents back."""
+    def write_back(self) -> Exception | None:
+        """Writes the contents back.
+
+        Returns:
+            The first exception of a `__setstate__`, None if there was none.
+        """
         for write, obj, content in self._entries:
             write(obj, content)
+        first: Exception | None = None
+        for write, obj, content in self._last:
+            try:
+                write(obj, content)
+            except Exception as error:
+                first = first or error
+        return first

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import functools
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
@@ -106,6 +107,9 @@ class Laser(ModelPlugin):
         last_scan: Pose of the sensor in the world frame and ranges [m], shape (n,), of the last
             scan computed; None before the first one. The ranges are those of the emitted scan.
     """
+
+    # The ranges may be in an array of the caller of `compute_scans`, which belongs to no state.
+    outside_state: ClassVar[dict[str, Callable[[], object]]] = {"last_scan": lambda: None}
 
     def on_initialize(self, config: YamlReader) -> None:
         """Reads the parameters and declares the output.

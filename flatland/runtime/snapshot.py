@@ -6,15 +6,13 @@ import logging
 from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any, Final
 
-from flatland.copying.copier import Copier
 from flatland.copying.kind import UncopyableError
 from flatland.copying.record import Recorder
 from flatland.entities.collision_filter import CollisionFilter
 from flatland.errors import WorldError
 from flatland.loading.world_loader import reload_world
-from flatland.plugin_api.plugin import FlatlandPlugin, describe
-from flatland.runtime.observer import Observers
-from flatland.runtime.requests import Requests
+from flatland.runtime.clone import clone_world
+from flatland.runtime.uncopyable import check_revivable, located, parts_outside
 from flatland.timekeeper import NANOSECONDS
 
 if TYPE_CHECKING:
@@ -117,13 +115,13 @@ class WorldStates:
     def take(self) -> WorldSnapshot:
         """Takes a snapshot; see `World.snapshot`."""
         world = self.world
-        recorder = Recorder(self._kinds, self._excluded())
+        recorder = Recorder(self._kinds, parts_outside(world))
         attributes = {name: getattr(world, name) for name in self._attributes}
         recorder.add(_set_attributes, world, attributes)
         try:
             record = recorder.record(attributes.values())
         except UncopyableError as error:
-            raise self._located(error) from None
+            raise located(world, self._kinds, error) from None
         snapshot = WorldSnapshot(self, world.physics.copy(), record)
         self.taken += 1
         return snapshot
@@ -133,22 +131,24 @@ class WorldStates:
         world = self.world
         if snapshot._owner is not self:
             raise WorldError("the snapshot is one of another world")
-        models = list(world._models.by_name.values())
-        kept = {model for model in snapshot._models.values() if model in models}
-        revived = [model for model in snapshot._models.values() if model not in kept]
+        models, saved = world.models, snapshot._models
+        kept = set(models) & set(saved.values())
+        revived = [model for model in saved.values() if model not in kept]
         for model in revived:
             for plugin in model.plugins:
-                self._check_revivable(plugin)
+                check_revivable(world, self._kinds, plugin)
         for model in reversed(models):
             if model not in kept:
                 world._models.delete(model.name)
         ports, time_ns = _Ports(world), world.timekeeper.sim_time_ns
         world.physics.become_copy_of(snapshot._physics)
-        snapshot._record.write_back()
+        error = snapshot._record.write_back()
         world.plugin_host.schedule.change()  # Other outputs may be wanted than at that time.
         if world.timekeeper.sim_time_ns != time_ns:
             world._observers.time_advanced(world.timekeeper.sim_time_ns)
         self._notify(ports, snapshot, revived)
+        if error is not None:
+            raise error
 
     def _notify(self, before: _Ports, snapshot: WorldSnapshot, revived: list[Model]) -> None:
         """Notifies the observers of what is there again, and of what is gone."""
@@ -221,112 +221,9 @@ class WorldStates:
 
     def clone(self) -> World:
         """Returns an independent copy; see `World.clone`."""
-        world = self.world
-        copier = Copier(self._kinds)
-        clone: World = copier.add(world, object.__new__(type(world)))
-        copier.add(world.physics._core, world.physics._core.copy())
-        clone.requests = copier.add(world.requests, Requests())
-        copier.add(world.plugin_host.registry, world.plugin_host.registry)
-        clone._observers = copier.add(world._observers, Observers(copier.copy(world._faults)))
-        costs = world.plugin_host.costs
-        if costs is not None:
-            copier.add(costs, costs)
-        try:
-            for name, value in vars(world).items():
-                if name in self._attributes:
-                    setattr(clone, name, copier.copy(value))
-                elif not hasattr(clone, name) or name not in vars(clone):
-                    setattr(clone, name, value)
-            copier.finish()
-            self._copy_subscriptions(copier)
-            copier.finish()
-        except UncopyableError as error:
-            raise self._located(error) from None
-        clone.requests.on_post = clone.physics.plan.interrupt
-        clone.plugin_host.schedule.change()
-        clone._paused = clone._closed = False
+        clone = clone_world(self.world, self._attributes, self._kinds)
         clone._states = WorldStates(clone, self._attributes)
-        if costs is not None:
-            clone.plugin_host.measure(None)
-        clone.add_observer(clone._body_monitor)
         return clone
-
-    def _copy_subscriptions(self, copier: Copier) -> None:
-        """Copies the subscriptions that plugins have made, and what they want."""
-        for output in self.world.ports.outputs.values():
-            copy = copier.find(output)
-            subscribers = []
-            wanters = {copier.find(who) for who in output._wanters} - {None}
-            for token, callback in output._subscribers:
-                owner = getattr(callback, "__self__", None)
-                if owner is not None and copier.find(owner) is not None:
-                    subscribers.append((token, copier.copy(callback)))
-                    if token in output._wanters:
-                        wanters.add(token)
-            copy._subscribers, copy._wanters = tuple(subscribers), frozenset(wanters)
-
-    # -- errors ----------------------------------------------------------------------------
-
-    def _excluded(self) -> list[object]:
-        world = self.world
-        host = world.plugin_host
-        costs = host.costs
-        return [
-            self,
-            world,
-            world.requests,
-            world._observers,
-            host.registry,
-            *(() if costs is None else (costs, *vars(costs).values())),
-        ]
-
-    def _plugins(self) -> list[FlatlandPlugin]:
-        world = self.world
-        return [
-            *(plugin for model in world.models for plugin in model.plugins),
-            *world.plugin_host.world_plugins,
-        ]
-
-    def _located(self, error: UncopyableError) -> WorldError:
-        """Returns the error for an object that cannot be copied, with the plugin that has it."""
-        advice = (
-            "which cannot be copied; the class can define __getstate__ and __setstate__, see "
-            '"Snapshots" in docs/write_a_plugin.md'
-        )
-        for plugin in self._plugins():
-            name = self._find_outside(plugin)
-            if name:
-                return WorldError(f'{describe(plugin)}: attribute "{name}" holds {error}, {advice}')
-        return WorldError(f"the world holds {error}, {advice}")
-
-    def _find_outside(self, plugin: FlatlandPlugin) -> str:
-        """Returns the attribute of a plugin that cannot be copied, empty for none."""
-        attributes = plugin.__getstate__()
-        if not isinstance(attributes, dict):
-            return ""
-        others = [*self._excluded(), *self.world.models, *self._plugins(), plugin]
-        name: str
-        for name, value in attributes.items():
-            recorder = Recorder(self._kinds, others)
-            try:
-                recorder.record([value])
-            except UncopyableError:
-                return name
-            if name not in type(plugin).outside_state and recorder.outside:
-                return name
-        return ""
-
-    def _check_revivable(self, plugin: FlatlandPlugin) -> None:
-        """Raises if a deleted plugin was connected to something outside the world."""
-        if type(plugin).__getstate__ is not object.__getstate__:
-            return
-        name = self._find_outside(plugin)
-        if name:
-            raise WorldError(
-                f'{describe(plugin)}: attribute "{name}" holds a connection that ended when the '
-                "model was deleted; the class can define __getstate__ and __setstate__, see "
-                '"Snapshots" in docs/write_a_plugin.md'
-            )
 
 
 def _set_attributes(world: World, attributes: dict[str, Any]) -> None:

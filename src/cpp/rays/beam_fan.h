@@ -62,12 +62,12 @@ class BeamFan {
 // The most recently used fans, so that the rays of a laser are sorted only once. Thread-safe.
 class FanCache {
  public:
-  // Shares the fans of another cache.
-  void share(FanCache& other);
   // Null if the fan is unknown.
   std::shared_ptr<const BeamFan> find(const float* ends, std::size_t count);
   // The end points must be finite.
   std::shared_ptr<const BeamFan> make(const float* ends, std::size_t count);
+  // Shares the fans of another cache.
+  void share(FanCache& other);
 
  private:
   static constexpr std::size_t kMaxFans = 16;
