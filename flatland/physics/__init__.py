@@ -17,11 +17,19 @@ from flatland.physics.contact import ContactEvent, ContactInfo
 from flatland.physics.fixture import PhysicsFixture
 from flatland.physics.joint import PhysicsJoint
 from flatland.physics.queries import RayHit
-from flatland.physics.range_finder import RangeFinder, RangeNoise, Scan, ScanRequest, scan_all
+from flatland.physics.range_finder import (
+    BeamFan,
+    RangeFinder,
+    RangeNoise,
+    Scan,
+    ScanRequest,
+    scan_all,
+)
 from flatland.physics.world import PhysicsWorld, StepReport
 
 __all__ = [
     "BOX2D_VERSION",
+    "BeamFan",
     "ContactEvent",
     "ContactInfo",
     "OldManifold",
