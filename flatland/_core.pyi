@@ -288,6 +288,13 @@ class World:
 _Floats = npt.NDArray[np.float32]
 _Scan = tuple[_Pose, _Floats, _Floats | None]  # pose of the sensor, ranges, intensities
 
+class BeamFan:
+    """The beams of a range finder, sorted by direction; immutable."""
+
+    def __init__(self, ends: npt.ArrayLike) -> None: ...
+    @property
+    def beams(self) -> int: ...
+
 class RangeNoise:
     """A noise model of a range finder; immutable."""
 
@@ -313,7 +320,7 @@ class RangeFinder:
     def __init__(
         self,
         *,
-        ends: npt.ArrayLike,
+        fan: BeamFan,
         origin: _Pose,
         length: float,
         mask: int,

@@ -26,13 +26,21 @@ from flatland.physics.fixture import PhysicsFixture
 from flatland.physics.joint import PhysicsJoint
 from flatland.physics.plan import END_OF_ORDER, RunEnd, RunResult, StepPlan, StepRun, run_worlds
 from flatland.physics.queries import RayHit
-from flatland.physics.range_finder import RangeFinder, RangeNoise, Scan, ScanRequest, scan_all
+from flatland.physics.range_finder import (
+    BeamFan,
+    RangeFinder,
+    RangeNoise,
+    Scan,
+    ScanRequest,
+    scan_all,
+)
 from flatland.physics.touches import Touch, Touches
 from flatland.physics.world import PhysicsWorld, StepReport, to_report
 
 __all__ = [
     "BOX2D_VERSION",
     "END_OF_ORDER",
+    "BeamFan",
     "ContactEvent",
     "ContactInfo",
     "Controller",

@@ -14,6 +14,9 @@ from flatland.physics.body import PhysicsBody
 if TYPE_CHECKING:
     from typing import Self
 
+BeamFan = _core.BeamFan
+"""End points of beams, shape (n, 2), prepared for scans; may be shared by range finders."""
+
 RangeNoise = _core.RangeNoise
 """A noise model of a range finder, made by `additive`, `proportional` or `beam`."""
 
@@ -44,7 +47,7 @@ class RangeFinder:
 
     def __init__(
         self,
-        ends: npt.ArrayLike,
+        beams: BeamFan | npt.ArrayLike,
         length: float,
         *,
         origin: Pose,
@@ -57,7 +60,8 @@ class RangeFinder:
         """Creates a range finder.
 
         Args:
-            ends: End points of the beams in the frame of the sensor [m], shape (n, 2).
+            beams: End points of the beams in the frame of the sensor [m], shape (n, 2), or a
+                `BeamFan` made from them.
             length: Length of the beams [m].
             origin: Pose (x, y, theta) of the sensor in the frame of its body [m, rad].
             mask: Categories that stop a beam; see `PhysicsWorld.cast_rays`.
@@ -72,7 +76,7 @@ class RangeFinder:
                 `length` is above the maximum range of the noise model.
         """
         self._core = _core.RangeFinder(
-            ends=ends,
+            fan=beams if isinstance(beams, BeamFan) else BeamFan(beams),
             origin=origin,
             length=length,
             mask=mask,

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 
 from flatland.geometry import FloatArray, Pose, compose
-from flatland.physics import RangeFinder, Scan, ScanRequest, scan_all
+from flatland.physics import BeamFan, RangeFinder, Scan, ScanRequest, scan_all
 from flatland.plugin_api.after_step import update_after_step
 from flatland.plugin_api.parameters import (
     at_key,
@@ -88,6 +88,11 @@ class BeamAngles:
         points.flags.writeable = False
         return points
 
+    @functools.lru_cache(maxsize=16)  # noqa: B019 - shared by all robots of one kind
+    def fan(self, length: float, upside_down: bool) -> BeamFan:
+        """Returns the beams of a length [m] prepared for scans, sensor frame."""
+        return BeamFan(self.end_points(length, upside_down))
+
 
 class Laser(ModelPlugin):
     """Measures the distance to the nearest fixture along each of its beams.
@@ -144,7 +149,7 @@ class Laser(ModelPlugin):
         self.intensities: FloatArray = _no_intensities()
         self._cast: Scan | None = None
         self._finder = RangeFinder(
-            self.beam_ends,
+            self.angles.fan(self.range, upside_down),
             self.range,
             origin=self.origin,
             mask=self._mask,

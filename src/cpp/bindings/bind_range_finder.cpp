@@ -32,14 +32,18 @@ using PyJob = std::tuple<std::shared_ptr<World>, std::shared_ptr<RangeFinder>, I
 // Scans of more beams release the GIL; they take more than about 0.03 ms.
 constexpr std::size_t kShortScans = 2000;
 
-RangeFinder make_finder(const Ends& ends, const PyPose& origin, double length, std::int64_t mask,
-                        std::int64_t reflect_mask, double range_min, double no_hit,
-                        std::optional<RangeNoise> noise) {
+std::shared_ptr<BeamFan> make_fan(const Ends& ends) {
   if (ends.ndim() != 2 || ends.shape(1) != 2) {
     throw py::value_error("ends must have shape (n, 2), got " +
                           std::string(py::str(ends.attr("shape"))));
   }
   check_all_finite(ends.data(), static_cast<std::size_t>(ends.size()), 2, "ends");
+  return std::make_shared<BeamFan>(ends.data(), static_cast<std::size_t>(ends.shape(0)));
+}
+
+RangeFinder make_finder(const std::shared_ptr<BeamFan>& fan, const PyPose& origin, double length,
+                        std::int64_t mask, std::int64_t reflect_mask, double range_min,
+                        double no_hit, std::optional<RangeNoise> noise) {
   const auto& [x, y, theta] = origin;
   checked_vector(x, y, "origin");
   checked_finite(theta, "origin angle");
@@ -51,7 +55,7 @@ RangeFinder make_finder(const Ends& ends, const PyPose& origin, double length, s
       {checked_not_negative(range_min, "range_min"),
        std::isfinite(no_hit) ? checked_finite(no_hit, "no_hit") : static_cast<float>(no_hit)},
       std::move(noise)};
-  return RangeFinder(std::vector<float>(ends.data(), ends.data() + ends.size()), parameters);
+  return RangeFinder(fan, parameters);
 }
 
 b2Transform to_transform(const Triple& pose) {
@@ -191,10 +195,14 @@ void bind_range_finder(py::module_& module) {
           },
           py::kw_only(), py::arg("z_hit"), py::arg("z_short"), py::arg("z_max"), py::arg("z_rand"),
           py::arg("sigma_hit"), py::arg("lambda_short"), py::arg("max_range"));
+  py::class_<BeamFan, std::shared_ptr<BeamFan>>(
+      module, "BeamFan", "The beams of a range finder, sorted by direction; immutable.")
+      .def(py::init(&make_fan), py::arg("ends"))
+      .def_property_readonly("beams", &BeamFan::size);
   py::class_<RangeFinder, std::shared_ptr<RangeFinder>>(
       module, "RangeFinder",
       "A fan of beams with what stops them and how they are read; immutable.")
-      .def(py::init(&make_finder), py::kw_only(), py::arg("ends"), py::arg("origin"),
+      .def(py::init(&make_finder), py::kw_only(), py::arg("fan").none(false), py::arg("origin"),
            py::arg("length"), py::arg("mask"), py::arg("reflect_mask"), py::arg("range_min"),
            py::arg("no_hit"), py::arg("noise"))
       .def_property_readonly("beams", &RangeFinder::beams)

@@ -20,6 +20,9 @@ class BeamFan {
   // Whether the fan was made from these end points.
   bool matches(const float* ends, std::size_t count) const;
 
+  // Number of end points.
+  std::size_t size() const { return ends_.size() / 2; }
+
   // Number of rays of non-zero length. Rays of zero length fill the last block of the sorted
   // arrays.
   std::size_t count() const { return order_.size(); }

@@ -15,10 +15,8 @@ constexpr float kReflective = 255.0F;
 
 }  // namespace
 
-RangeFinder::RangeFinder(std::vector<float> ends, const Parameters& parameters)
-    : fan_(std::make_shared<const BeamFan>(ends.data(), ends.size() / 2)),
-      beams_(ends.size() / 2),
-      parameters_(parameters) {
+RangeFinder::RangeFinder(std::shared_ptr<const BeamFan> fan, const Parameters& parameters)
+    : fan_(std::move(fan)), parameters_(parameters) {
   if (parameters.noise && !(parameters.length <= parameters.noise->max_range())) {
     throw std::invalid_argument("length must be at most the max_range of the noise, " +
                                 to_text(static_cast<double>(parameters.noise->max_range())) +
@@ -39,30 +37,30 @@ void RangeFinder::scan(const SceneView& scene, const b2Transform& pose, const No
                        const Readings& out, ScanMemory& memory) const {
   DepthScan hits(*fan_, pose, memory.buffer);
   scene.draw(hits, {parameters_.mask, kAnyCategory});
-  memory.ranges.resize(beams_ + AlignedFloats::kBlock);
+  memory.ranges.resize(beams() + AlignedFloats::kBlock);
   float* ranges = memory.ranges.data();
   write_ranges(hits.fractions(), ranges);
 
   bool* is_hit = nullptr;
   if (out.intensities != nullptr) {
-    if (memory.flags < beams_) {
-      memory.reflects = std::make_unique<bool[]>(beams_);
-      memory.is_hit = std::make_unique<bool[]>(beams_);
-      memory.flags = beams_;
+    if (memory.flags < beams()) {
+      memory.reflects = std::make_unique<bool[]>(beams());
+      memory.is_hit = std::make_unique<bool[]>(beams());
+      memory.flags = beams();
     }
-    std::fill_n(memory.reflects.get(), beams_, false);
+    std::fill_n(memory.reflects.get(), beams(), false);
     is_hit = memory.is_hit.get();
     find_reflections(hits, scene, *fan_, {parameters_.mask, parameters_.reflect_mask},
                      memory.limits, memory.reflects.get());
   }
   if (parameters_.noise) {
-    parameters_.noise->apply(ranges, beams_, key, parameters_.limits, is_hit);
+    parameters_.noise->apply(ranges, beams(), key, parameters_.limits, is_hit);
   } else {
-    if (is_hit != nullptr) std::fill_n(is_hit, beams_, true);
-    apply_limits(ranges, beams_, parameters_.limits);
+    if (is_hit != nullptr) std::fill_n(is_hit, beams(), true);
+    apply_limits(ranges, beams(), parameters_.limits);
   }
-  std::copy_n(ranges, beams_, out.ranges);
-  for (std::size_t i = 0; out.intensities != nullptr && i < beams_; ++i) {
+  std::copy_n(ranges, beams(), out.ranges);
+  for (std::size_t i = 0; out.intensities != nullptr && i < beams(); ++i) {
     out.intensities[i] = memory.reflects[i] && is_hit[i] ? kReflective : 0.0F;
   }
 }
@@ -72,7 +70,7 @@ void RangeFinder::write_ranges(const float* fractions, float* ranges) const {
     to_ranges(fractions + run.sorted, run.count, parameters_.length, ranges + run.original);
   }
   if (!fan_->runs().empty()) return;
-  std::fill_n(ranges, beams_, std::numeric_limits<float>::quiet_NaN());
+  std::fill_n(ranges, beams(), std::numeric_limits<float>::quiet_NaN());
   for (std::size_t i = 0; i < fan_->count(); ++i) {
     if (fractions[i] <= 1.0F) ranges[fan_->order()[i]] = fractions[i] * parameters_.length;
   }

@@ -44,11 +44,11 @@ class RangeFinder {
     std::optional<RangeNoise> noise;
   };
 
-  // `ends` are the end points of the beams in the frame of the sensor. Throws std::invalid_argument
-  // if the noise model is not defined for all ranges up to `length`.
-  RangeFinder(std::vector<float> ends, const Parameters& parameters);
+  // The fan has the end points of the beams in the frame of the sensor. Throws
+  // std::invalid_argument if the noise model is not defined for all ranges up to `length`.
+  RangeFinder(std::shared_ptr<const BeamFan> fan, const Parameters& parameters);
 
-  std::size_t beams() const { return beams_; }
+  std::size_t beams() const { return fan_->size(); }
   bool has_intensities() const { return parameters_.reflect_mask != 0; }
 
   // Pose of the sensor in the world frame from that of its body.
@@ -63,7 +63,6 @@ class RangeFinder {
   void write_ranges(const float* fractions, float* ranges) const;
 
   std::shared_ptr<const BeamFan> fan_;
-  std::size_t beams_;
   Parameters parameters_;
 };
 

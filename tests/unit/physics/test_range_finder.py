@@ -279,8 +279,8 @@ class TestManyScans:
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        ({"ends": np.zeros((5, 3))}, r"ends must have shape \(n, 2\), got \(5, 3\)"),
-        ({"ends": [[1.0, math.nan]]}, "ends"),
+        ({"beams": np.zeros((5, 3))}, r"ends must have shape \(n, 2\), got \(5, 3\)"),
+        ({"beams": [[1.0, math.nan]]}, "ends"),
         ({"origin": (0.0, math.inf, 0.0)}, "origin"),
         ({"origin": (0.0, 0.0, math.nan)}, "origin angle"),
         ({"length": -1.0}, "length must not be negative, got -1"),
@@ -297,7 +297,7 @@ class TestManyScans:
     ],
 )
 def test_invalid_range_finders(arguments: dict[str, Any], message: str) -> None:
-    valid: dict[str, Any] = {"ends": fan(5), "length": 20.0, "origin": (0, 0, 0), "mask": 1}
+    valid: dict[str, Any] = {"beams": fan(5), "length": 20.0, "origin": (0, 0, 0), "mask": 1}
     RangeFinder(**valid)
     with pytest.raises(ValueError, match=message):
         RangeFinder(**{**valid, **arguments})
