@@ -30,6 +30,7 @@ MODULES = (
     "large_map",
     "markers",
     "placement",
+    "copies",
 )
 
 

@@ -33,7 +33,9 @@ from flatland.plugin_api.dynamics_limits import DynamicsLimits
 from flatland.plugin_api.plugin import ModelPlugin, WorldPlugin
 from flatland.plugin_api.ports import Command, Output
 from flatland.plugin_api.update_timer import UpdateTimer
+from flatland.runtime.model_states import ModelStates
 from flatland.runtime.observer import WorldObserver
+from flatland.runtime.snapshot import WorldSnapshot
 from flatland.timekeeper import Timekeeper
 from flatland.values import (
     Collision,
@@ -72,6 +74,7 @@ __all__ = [
     "ModelContact",
     "ModelPlugin",
     "ModelSpec",
+    "ModelStates",
     "MutableContact",
     "NavSatFix",
     "OccupancyGrid",
@@ -91,6 +94,7 @@ __all__ = [
     "WorldLockedError",
     "WorldObserver",
     "WorldPlugin",
+    "WorldSnapshot",
     "YamlError",
     "YamlReader",
     "draw",

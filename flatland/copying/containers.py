@@ -5,6 +5,7 @@ from __future__ import annotations
 import array
 import collections
 import dataclasses
+import gc
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
@@ -14,6 +15,12 @@ from flatland.copying.kind import Kind, MutableKind
 if TYPE_CHECKING:
     from flatland.copying.copier import Copier
     from flatland.copying.record import Recorder
+
+_VIEWS: Final[dict[type[Any], str]] = {
+    type({}.keys()): "keys",
+    type({}.values()): "values",
+    type({}.items()): "items",
+}
 
 
 class _Tuple(MutableKind):
@@ -135,6 +142,17 @@ class _Set(MutableKind):
         return made
 
 
+class _View(MutableKind):
+    """A view of a dictionary, such as `items.keys()`."""
+
+    def record(self, obj: Any, recorder: Recorder) -> None:
+        recorder.follow(gc.get_referents(obj))
+
+    def copy(self, obj: Any, copier: Copier) -> Any:
+        (viewed,) = gc.get_referents(obj)
+        return copier.add(obj, getattr(copier.copy(viewed), _VIEWS[type(obj)])())
+
+
 class _Array(MutableKind):
     """An array of numpy or of the module `array`, or a `bytearray`; a read-only array is shared."""
 
@@ -184,6 +202,7 @@ CONTAINERS: Final[tuple[tuple[type[Any], Kind], ...]] = (
     (collections.deque, _List()),
     (set, _Set()),
     (dict, _Dict()),
+    *((view, _View()) for view in _VIEWS),
     (collections.OrderedDict, _Dict()),
     (collections.defaultdict, _Dict()),
     (collections.Counter, _Dict()),

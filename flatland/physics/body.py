@@ -8,6 +8,13 @@ from typing import TYPE_CHECKING
 import numpy.typing as npt
 
 from flatland.geometry import FloatArray, Pose, Vector2
+from flatland.physics.controller import (
+    NO_LIMITS,
+    SpeedLimits,
+    TricycleController,
+    TweenController,
+    VelocityController,
+)
 from flatland.physics.fixture import ALL_BITS
 from flatland.physics.handle import Handle
 
@@ -81,6 +88,95 @@ class PhysicsBody(Handle):
             WorldLockedError: The world is stepping.
         """
         self._core.set_velocity(self.id, vx, vy, omega)
+
+    def control_velocity(
+        self,
+        linear: SpeedLimits = NO_LIMITS,
+        angular: SpeedLimits = NO_LIMITS,
+        *,
+        holonomic: bool = True,
+    ) -> VelocityController:
+        """Makes each step of a `World` set the velocity of the body in its own frame.
+
+        The core carries it out before the hooks of plugins; it costs a tenth of a call of
+        `set_velocity` in a hook. The commanded velocity is 0 at first.
+
+        Args:
+            linear: Limits of the forward and sideways velocity [m/s], acceleration and deceleration
+                [m/s²]; 0 for no limit.
+            angular: Limits of the angular velocity [rad/s], acceleration and deceleration
+                [rad/s²]; 0 for no limit.
+            holonomic: Whether the body can move sideways.
+
+        Returns:
+            The controller, which sets the commanded velocity.
+
+        Raises:
+            ValueError: A limit is negative or NaN.
+            StaleHandleError: The body was destroyed.
+            WorldLockedError: The world is stepping.
+        """
+        controller = VelocityController(
+            self.world, self._core.add_twist_controller(self.id, holonomic)
+        )
+        try:
+            controller.set_limits(linear, angular)
+        except BaseException:
+            controller.remove()
+            raise
+        controller.schedule(0, automatic=True)
+        self.world.plan.is_used = True
+        return controller
+
+    def control_tricycle(
+        self,
+        front_joint: PhysicsJoint,
+        *,
+        steering_sign: float,
+        wheelbase: float,
+        rear_center: Vector2,
+        takes_twist: bool,
+    ) -> TricycleController:
+        """Creates a controller of a tricycle, which is not carried out automatically yet.
+
+        Args:
+            front_joint: Revolute joint of the steered wheel at the origin of the body; its limits
+                are set to the steering angle.
+            steering_sign: Sign of the angle of the joint if the wheel is steered to the left.
+            wheelbase: Distance from the rear center to the front wheel [m].
+            rear_center: Midpoint of the rear wheels in the frame of the body [m].
+            takes_twist: Whether commands are velocities of the rear center and yaw rates.
+
+        Raises:
+            ValueError: The wheelbase is not positive.
+            StaleHandleError: The body or the joint was destroyed.
+            WorldLockedError: The world is stepping.
+        """
+        self.world.plan.is_used = True
+        controller = self._core.add_tricycle_controller(
+            self.id, front_joint.id, steering_sign, wheelbase, rear_center, takes_twist
+        )
+        return TricycleController(self.world, controller)
+
+    def control_tween(
+        self, delta: Pose, *, duration: float, mode: str, easing: str
+    ) -> TweenController:
+        """Creates a controller of a prescribed motion, which is not carried out automatically yet.
+
+        Args:
+            delta: Offset of the other end from the current pose [m, rad].
+            duration: Duration of the motion to the other end [s].
+            mode: `yoyo`, `loop`, `once` or `trigger`.
+            easing: Name of the easing curve.
+
+        Raises:
+            ValueError: An argument is invalid.
+            StaleHandleError: The body was destroyed.
+            WorldLockedError: The world is stepping.
+        """
+        self.world.plan.is_used = True
+        controller = self._core.add_tween_controller(self.id, delta, duration, mode, easing)
+        return TweenController(self.world, controller)
 
     def apply_force(self, force: Sequence[float], point: Sequence[float]) -> None:
         """Applies a force to a dynamic body during the next step and wakes the body.

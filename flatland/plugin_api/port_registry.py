@@ -33,15 +33,22 @@ class PortObserver(Protocol):
 class PortRegistry:
     """All open ports of a world by resolved topic."""
 
-    def __init__(self, observer: PortObserver, on_fault: SubscriberFault | None = None) -> None:
+    def __init__(
+        self,
+        observer: PortObserver,
+        on_fault: SubscriberFault | None = None,
+        on_wanted: Callable[[], None] | None = None,
+    ) -> None:
         """Creates an empty registry.
 
         Args:
             observer: Notified when ports open and close.
             on_fault: Called with the exceptions of subscribers of outputs, see `Output`.
+            on_wanted: Called from any thread when an output may be wanted or not any more.
         """
         self._observer = observer
         self._on_fault = on_fault
+        self._on_wanted = on_wanted
         self._outputs: dict[str, Output[Any]] = {}
         self._commands: dict[str, list[Command[Any]]] = {}
         # Ports that were closed and may be opened again, None if they are not kept.
@@ -114,7 +121,7 @@ class PortRegistry:
             output.owners.append(owner)
             self._outputs[output.topic] = output
             return output
-        output = Output(name, value_type, owner, self._on_fault)
+        output = Output(name, value_type, owner, self._on_fault, self._on_wanted)
         self._observer.output_opened(output)
         self._outputs[output.topic] = output
         return output

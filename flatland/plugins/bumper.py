@@ -2,34 +2,24 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from flatland.geometry import DoubleArray
+from flatland.plugin_api.after_step import AFTER
 from flatland.plugin_api.parameters import read_bodies, read_rate
 from flatland.plugin_api.plugin import ModelPlugin
+from flatland.plugin_api.schedule import when_due
 from flatland.plugin_api.update_timer import UpdateTimer
 from flatland.values import Collision, Collisions
 
 if TYPE_CHECKING:
     from flatland.config.reader import YamlReader
-    from flatland.entities.contact import Contact, ContactImpulse
+    from flatland.physics import Touch
     from flatland.timekeeper import Timekeeper
 
 _NO_FORCES = np.zeros(0)
 _NO_POINTS = np.zeros((0, 2))
-
-
-@dataclass(frozen=True, slots=True)
-class _Touch:
-    """The bodies of a current contact, and the sign that turns its normal away from the model."""
-
-    body: str
-    other_entity: str
-    other_body: str
-    sign: float
 
 
 class Bumper(ModelPlugin):
@@ -40,85 +30,59 @@ class Bumper(ModelPlugin):
         self._frame_id: str = config.get("world_frame_id", "string", "map")
         self._publish_all: bool = config.get("publish_all_collisions", "bool", True)
         self._timer = UpdateTimer(read_rate(config))
-        self._excluded = set(read_bodies(config, self.model, "exclude"))
+        self._touches = self.collect_touches(
+            self.model.bodies, exclude=read_bodies(config, self.model, "exclude")
+        )
         self._output = self.output(config.get("topic", "string", "collisions"), Collisions)
-        # Maintained without subscribers too: the first message must contain existing contacts.
-        self._touches: dict[int, _Touch] = {}
-        # Contact and impulse of each solver call of the current step, by contact id.
-        self._solved: dict[int, list[tuple[Contact, ContactImpulse]]] = {}
-
-    def begin_contact(self, contact: Contact) -> None:
-        """Adds a record of the contact, unless one of its bodies is excluded."""
-        mine = self.filter_contact(contact)
-        # Both bodies are checked, as a contact may be between two bodies of this model.
-        if mine is None or not self._excluded.isdisjoint((mine.this_body, mine.other_body)):
-            return
-        self._touches[contact.contact_id] = _Touch(
-            mine.this_body.name,
-            mine.other_entity.name,
-            mine.other_body.name,
-            1.0 if mine.is_a else -1.0,
+        self.call_when_due(
+            AFTER,
+            self._timer,
+            outputs=[self._output],
+            touches=self._touches,
+            calls_at_touches=self._publish_all,
         )
 
-    def end_contact(self, contact: Contact) -> None:
-        """Removes the record of the contact."""
-        self._touches.pop(contact.contact_id, None)
-
-    def post_solve(self, contact: Contact, impulse: ContactImpulse) -> None:
-        """Stores the impulse of a recorded contact."""
-        if contact.contact_id in self._touches:
-            self._solved.setdefault(contact.contact_id, []).append((contact, impulse))
-
+    @when_due
     def after_physics_step(self, timekeeper: Timekeeper) -> None:
         """Emits all records at the update rate, or always if `publish_all_collisions` is set."""
-        every_step = self._publish_all and bool(self._touches)
-        if self._output.wanted and (every_step or self._timer.check_update(timekeeper)):
+        if not self._output.wanted:
+            return
+        touches = self._touches.read()
+        if (self._publish_all and touches) or self._timer.check_update(timekeeper):
             self._output.emit(
                 Collisions(
                     timekeeper.sim_time_ns,
                     self._frame_id,
-                    tuple(
-                        self._collision(contact_id, touch, timekeeper.step_size)
-                        for contact_id, touch in self._touches.items()
-                    ),
+                    tuple(self._collision(touch, timekeeper.step_size) for touch in touches),
                 )
             )
-        self._solved.clear()
 
     def state(self) -> object:
         """Returns the bodies of all current contacts."""
-        touches = self._touches.values()
-        return sorted((touch.body, touch.other_entity, touch.other_body) for touch in touches)
+        return sorted(self._names(touch) for touch in self._touches.read())
 
-    def _collision(self, contact_id: int, touch: _Touch, dt: float) -> Collision:
+    def _names(self, touch: Touch) -> tuple[str, str, str]:
+        """Returns the names of this body, the other entity and the other body."""
+        this_body = self.world.body_of_id(touch.this_body)
+        other_body = self.world.body_of_id(touch.other_body)
+        return (this_body.name, other_body.entity.name, other_body.name)
+
+    def _collision(self, touch: Touch, dt: float) -> Collision:
         forces, positions, normals = _NO_FORCES, _NO_POINTS, _NO_POINTS
-        calls = self._solved.get(contact_id)
-        if calls:
-            last = calls[-1][0]
-            forces = _mean_forces([impulse for _, impulse in calls], len(last.points), dt)
-            positions = last.points
-            normals = np.tile(touch.sign * last.normal, (len(last.points), 1))
+        if touch.solver_calls:
+            # The mean force at each contact point over all solver calls of the step [N].
+            total = np.hypot(touch.normal_impulses, touch.tangent_impulses)
+            forces = total / (touch.solver_calls * dt)
+            positions = np.array(touch.points).reshape(-1, 2)
+            sign = 1.0 if touch.is_a else -1.0
+            normals = np.tile(sign * np.array(touch.normal), (len(touch.points), 1))
+        body, other_entity, other_body = self._names(touch)
         return Collision(
             self.model.name,
-            touch.body,
-            touch.other_entity,
-            touch.other_body,
+            body,
+            other_entity,
+            other_body,
             forces,
             positions,
             normals,
         )
-
-
-def _mean_forces(impulses: list[ContactImpulse], n_points: int, dt: float) -> DoubleArray:
-    """Returns the mean force at each contact point over all solver calls of a step [N].
-
-    The number of points may differ between calls; a call contributes nothing to points that it
-    did not have.
-    """
-    total = np.zeros((2, n_points))
-    for impulse in impulses:
-        n = min(n_points, len(impulse.normal_impulses))
-        total[0, :n] += impulse.normal_impulses[:n]
-        total[1, :n] += impulse.tangent_impulses[:n]
-    forces: DoubleArray = np.hypot(total[0], total[1]) / (len(impulses) * dt)
-    return forces

@@ -18,6 +18,7 @@ from flatland.plugin_api.parameters import (
     read_rate,
 )
 from flatland.plugin_api.plugin import ModelPlugin
+from flatland.plugin_api.schedule import when_due
 from flatland.plugin_api.update_timer import UpdateTimer
 from flatland.plugins._range_noise import read_range_noise
 from flatland.values import LaserScan
@@ -115,8 +116,8 @@ class Laser(ModelPlugin):
         self.angles = BeamAngles.from_config(config.subnode("angle", "map"))
         self.origin = read_pose(config, "origin")
         self.timer = UpdateTimer(read_rate(config))
-        update_after_step(self, config, self.timer)
-        self.always_publish: bool = config.get("always_publish", "bool", False)
+        hook = update_after_step(self, config, self.timer)
+        self._always_publish: bool = config.get("always_publish", "bool", False)
         self._length = np.float32(self.range)
         self.range_min = self._read_range_min(config)
         self.scan_time, self.time_increment = self._read_times(config)
@@ -135,6 +136,36 @@ class Laser(ModelPlugin):
         self._body_frame_id = self.model.frame(self.body.name)
         self.frame_id = self.model.frame(config.get("frame", "string", self.name))
         self._scan = self.output(config.get("topic", "string", "scan"), LaserScan)
+        self._hook = hook
+        self._schedule()
+
+    @property
+    def always_publish(self) -> bool:
+        """Whether to compute scans that nothing wants; settable."""
+        return self._always_publish
+
+    @always_publish.setter
+    def always_publish(self, value: bool) -> None:
+        self._always_publish = value
+        self._schedule()
+
+    def _schedule(self) -> None:
+        self.call_when_due(
+            self._hook,
+            self.timer,
+            outputs=None if self._always_publish else [self._scan],
+            transforms=self._sends_transform,
+            skipped=self._skip,
+        )
+
+    def _skip(self, count: int, stamp: int, pose: Pose | None) -> None:
+        """Makes up for updates that nothing wanted; see `FlatlandPlugin.call_when_due`."""
+        del pose
+        self._noise.begin_update(count)
+        if self._sends_transform:
+            self.send_past_transform(
+                stamp, self._body_frame_id, self.frame_id, *self.origin, roll=self._roll
+            )
 
     @staticmethod
     def _read_range(config: YamlReader) -> float:
@@ -186,6 +217,7 @@ class Laser(ModelPlugin):
             raise at_key(config, "layers").error(f"Cannot find layer(s): {{{','.join(unknown)}}}")
         return collision_filter.category_bits(layers)
 
+    @when_due
     def before_physics_step(self, timekeeper: Timekeeper) -> None:
         """Sends the transform and emits a scan, if it is wanted, when an update is due."""
         if not self.timer.check_update(timekeeper):

@@ -9,6 +9,7 @@ from flatland.plugin_api.drive import Odometer, open_twist_command
 from flatland.plugin_api.dynamics_limits import DynamicsLimits
 from flatland.plugin_api.parameters import at_key, read_body, read_not_negative
 from flatland.plugin_api.plugin import ModelPlugin
+from flatland.plugin_api.schedule import when_due
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -19,7 +20,6 @@ if TYPE_CHECKING:
     from flatland.entities.model import Model
     from flatland.geometry import Pose, Vector2
     from flatland.timekeeper import Timekeeper
-    from flatland.values import Twist
 
 _TOLERANCE = 1e-5  # m between an anchor and its required position
 _COMMANDS = ("steering", "twist")
@@ -123,11 +123,10 @@ def _foot(point: Vector2, start: Vector2, end: Vector2) -> Vector2:
 class TricycleDrive(ModelPlugin):
     """Steers and drives the front wheel as commanded; the body follows without slip.
 
+    The core carries it out in each step (`flatland.physics.TricycleController`).
+
     Attributes:
         geometry: Positions of the wheels.
-        steering_angle: Angle of the front wheel, counter-clockwise [rad].
-        steering_velocity: Rate of change of the steering angle [rad/s].
-        front_velocity: Speed of the front wheel along its heading [m/s].
     """
 
     def on_initialize(self, config: YamlReader) -> None:
@@ -138,11 +137,11 @@ class TricycleDrive(ModelPlugin):
             PluginError: A topic is not a legal name.
         """
         self.body = read_body(config, self.model)
-        self.max_steer_angle = read_not_negative(config, "max_steer_angle", 0.0)
-        self.linear_dynamics = DynamicsLimits.from_config(
+        self._max_steer_angle = read_not_negative(config, "max_steer_angle", 0.0)
+        self._linear_dynamics = DynamicsLimits.from_config(
             config.optional_subnode("linear_dynamics", "map")
         )
-        self.angular_dynamics = self._read_angular_dynamics(config)
+        self._angular_dynamics = self._read_angular_dynamics(config)
         self.geometry = TricycleGeometry(config, self.model, self.body)
         # Unlike the reference: odometry has its own frame, not that of the ground truth.
         self._odometer = Odometer(
@@ -154,16 +153,19 @@ class TricycleDrive(ModelPlugin):
             center=self.geometry.rear_center,
         )
         self.world_frame_id = self._odometer.world_frame_id
-        self.timer = self._odometer.schedule(
-            config, lambda timekeeper: self._publish(timekeeper.sim_time_ns, self.body.pose)
-        )
+        self.timer = self._odometer.schedule(config, self._publish_now)
         self._command = open_twist_command(self, config.get("twist_sub", "string", "cmd_vel"))
-        self._takes_twist = self._read_command_type(config) == "twist"
-        self._target_angle = 0.0
-        self.steering_angle = 0.0
-        self.steering_velocity = 0.0
-        self.front_velocity = 0.0
-        self._displayed_angle: float | None = None
+        self._command.on_change = self._command_changed
+        self._controller = self.control(
+            self.body.control_tricycle(
+                self.geometry.front_joint,
+                steering_sign=self.geometry.steering_sign,
+                wheelbase=self.geometry.wheelbase,
+                rear_center=self.geometry.rear_center,
+                takes_twist=self._read_command_type(config) == "twist",
+            )
+        )
+        self._set_limits()
 
     @staticmethod
     def _read_command_type(config: YamlReader) -> str:
@@ -186,28 +188,90 @@ class TricycleDrive(ModelPlugin):
             deceleration = acceleration
         return DynamicsLimits(limits.velocity_limit or velocity, acceleration, deceleration)
 
+    # -- limits and state, which the core has ----------------------------------------------
+
+    @property
+    def linear_dynamics(self) -> DynamicsLimits:
+        """Limits of the front wheel; settable."""
+        return self._linear_dynamics
+
+    @linear_dynamics.setter
+    def linear_dynamics(self, limits: DynamicsLimits) -> None:
+        self._linear_dynamics = limits
+        self._set_limits()
+
+    @property
+    def angular_dynamics(self) -> DynamicsLimits:
+        """Limits of the steering angle; settable."""
+        return self._angular_dynamics
+
+    @angular_dynamics.setter
+    def angular_dynamics(self, limits: DynamicsLimits) -> None:
+        self._angular_dynamics = limits
+        self._set_limits()
+
+    @property
+    def max_steer_angle(self) -> float:
+        """Largest steering angle [rad], 0 for no limit; settable."""
+        return self._max_steer_angle
+
+    @max_steer_angle.setter
+    def max_steer_angle(self, angle: float) -> None:
+        self._max_steer_angle = angle
+        self._set_limits()
+
+    def _set_limits(self) -> None:
+        self._controller.set_limits(
+            self._linear_dynamics.as_tuple(),
+            self._angular_dynamics.as_tuple(),
+            self._max_steer_angle,
+        )
+
+    @property
+    def steering_angle(self) -> float:
+        """Angle of the front wheel, counter-clockwise [rad]; settable."""
+        return self._controller.state[0]
+
+    @steering_angle.setter
+    def steering_angle(self, angle: float) -> None:
+        self._controller.state = (angle, *self._controller.state[1:])
+
+    @property
+    def steering_velocity(self) -> float:
+        """Rate of change of the steering angle [rad/s]; settable."""
+        return self._controller.state[1]
+
+    @steering_velocity.setter
+    def steering_velocity(self, velocity: float) -> None:
+        angle, _, speed, target = self._controller.state
+        self._controller.state = (angle, velocity, speed, target)
+
+    @property
+    def front_velocity(self) -> float:
+        """Speed of the front wheel along its heading [m/s]; settable."""
+        return self._controller.state[2]
+
+    @front_velocity.setter
+    def front_velocity(self, velocity: float) -> None:
+        angle, steering_velocity, _, target = self._controller.state
+        self._controller.state = (angle, steering_velocity, velocity, target)
+
+    def _command_changed(self) -> None:
+        self.set_before_step(self._set_target)
+
+    def _set_target(self) -> None:
+        command = self._command.value
+        self._controller.set_target(command.linear_x, command.angular_z)
+
+    # -- steps -----------------------------------------------------------------------------
+
+    @when_due
     def before_physics_step(self, timekeeper: Timekeeper) -> None:
         """Emits the odometry if an update is due, then steers and sets the velocity of the body."""
-        body = self.body
-        pose = body.pose
         if self.timer.check_update(timekeeper):
-            self._publish(timekeeper.sim_time_ns, pose)
-        dt = timekeeper.step_size
-        command = self._command.value
-        if self._takes_twist:
-            speed = self._steer_for_twist(command, dt)
-        else:
-            self._steer(command.angular_z, dt)
-            speed = command.linear_x
-        v = self.front_velocity = self.linear_dynamics.limit(self.front_velocity, speed, dt)
-        geometry = self.geometry
-        steering_angle = self.steering_angle
-        omega = v * math.sin(steering_angle) / geometry.wheelbase
-        # The rear center moves straight ahead; the velocity of the origin follows, body frame.
-        forward = v * math.cos(steering_angle) + omega * geometry.rear_center[1]
-        sideways = -omega * geometry.rear_center[0]
-        c, s = math.cos(pose[2]), math.sin(pose[2])
-        body.set_velocity(c * forward - s * sideways, s * forward + c * sideways, omega)
+            self._publish(timekeeper.sim_time_ns, self.body.pose)
+        self._set_target()
+        self._controller.advance(timekeeper.step_size)
 
     def model_moved(self, previous: Mapping[str, Pose], keep_odometry: bool) -> None:
         """Keeps the odometry, or displaces it along with the model."""
@@ -215,56 +279,14 @@ class TricycleDrive(ModelPlugin):
 
     def state(self) -> object:
         """Returns the state of the front wheel and of the odometry."""
-        wheel = (self.steering_angle, self.steering_velocity, self.front_velocity)
-        return (wheel, self._target_angle, self._odometer.state())
+        *wheel, target_angle = self._controller.state
+        return (tuple(wheel), target_angle, self._odometer.state())
+
+    def _publish_now(self, timekeeper: Timekeeper) -> None:
+        self._publish(timekeeper.sim_time_ns, self.body.pose)
 
     def _publish(self, stamp: int, pose: Pose) -> None:
         odometer = self._odometer
         odometer.begin_update()
         if odometer.wanted or odometer.sends_transform:
             odometer.report(stamp, pose, self.body.velocity)
-
-    def _steer_for_twist(self, command: Twist, dt: float) -> float:
-        """Turns the front wheel for a velocity of the rear center and a yaw rate.
-
-        The front wheel moves with the forward velocity v of the rear center and, across the
-        wheelbase L, with L * omega to the left; its heading is the direction of the sum.
-
-        Returns:
-            The speed of the front wheel for the command [m/s].
-        """
-        v, across = command.linear_x, self.geometry.wheelbase * command.angular_z
-        if v or across:
-            # From -90 to 90 degrees; the wheel rolls backwards to reverse.
-            angle = math.atan2(-across if v < 0 else across, abs(v))
-            limit = self.max_steer_angle
-            if limit and abs(angle) > limit:
-                # The narrowest possible curve at the commanded speed of the rear center.
-                angle = math.copysign(limit, angle)
-                across = v * math.tan(angle)
-            self._target_angle = angle
-        # A command to stop keeps the steering angle.
-        self._steer(self._target_angle, dt)
-        speed = math.copysign(math.hypot(v, across), v if v else 1.0)
-        # The robot waits for a front wheel that points elsewhere.
-        return speed * max(0.0, math.cos(self._target_angle - self.steering_angle))
-
-    def _steer(self, target: float, dt: float) -> None:
-        """Turns the front wheel towards an angle within the limits."""
-        remaining = target - self.steering_angle
-        acceleration = self.angular_dynamics.acceleration_limit
-        if acceleration and abs(remaining) < self.steering_velocity**2 / (2 * acceleration):
-            # Deceleration must start now to stop at the target.
-            velocity = 0.0
-        else:
-            velocity = remaining / dt
-        self.steering_velocity = self.angular_dynamics.limit(self.steering_velocity, velocity, dt)
-        angle = self.steering_angle + self.steering_velocity * dt
-        limit = self.max_steer_angle
-        if limit:
-            angle = min(max(angle, -limit), limit)
-        self.steering_angle = angle
-        if angle != self._displayed_angle:
-            self._displayed_angle = angle
-            joint_angle = angle * self.geometry.steering_sign
-            self.geometry.front_joint.set_limits(joint_angle, joint_angle)

@@ -5,11 +5,10 @@ from __future__ import annotations
 import logging
 from typing import TYPE_CHECKING
 
-import numpy as np
-
-from flatland.geometry import Pose
+from flatland.plugin_api.after_step import AFTER, BEFORE, NeverDue
 from flatland.plugin_api.parameters import at_key, read_body, read_finite, read_pose
 from flatland.plugin_api.plugin import ModelPlugin
+from flatland.plugin_api.schedule import when_due
 from flatland.plugins._easing import EASINGS
 
 if TYPE_CHECKING:
@@ -21,15 +20,12 @@ _LOG = logging.getLogger("flatland")
 
 MODES = ("yoyo", "loop", "once", "trigger")
 
-# Difference at which the 32-bit progress is corrected to the exact one, and progress below which a
-# backward motion is complete.
-_ROUNDING_TOLERANCE = 1e-5
-
 
 class Tween(ModelPlugin):
     """Moves a body between its initial pose and the pose at the offset `delta`.
 
-    The motion is prescribed: contacts neither stop nor deflect the body.
+    The motion is prescribed: contacts neither stop nor deflect the body. The core carries it out in
+    each step (`flatland.physics.TweenController`).
     """
 
     def on_initialize(self, config: YamlReader) -> None:
@@ -47,15 +43,16 @@ class Tween(ModelPlugin):
         easing = config.get("easing", "string", "linear")
         if easing not in EASINGS:
             raise at_key(config, "easing").error(f"Easing {easing} does not exist")
-        self._ease = EASINGS[easing]
         self._trigger = self._read_trigger(config)
-
-        self._start = self._body.pose
-        self._is_dynamic = self._body.type == "dynamic"
-        self._progress = np.float32(0.0)
-        self._exact_progress = 0.0
-        self._forward = True
-        self._pose: Pose = self._start
+        self._controller = self.control(
+            self._body.control_tween(
+                self._delta, duration=self._duration, mode=self._mode, easing=easing
+            )
+        )
+        if self._trigger is not None:
+            self._trigger.on_change = self._trigger_changed
+        for hook in (BEFORE, AFTER):
+            self.call_when_due(hook, NeverDue())
 
     def _read_trigger(self, config: YamlReader) -> Command[bool] | None:
         topic = config.get("trigger_topic", "string", "")
@@ -76,54 +73,25 @@ class Tween(ModelPlugin):
             )
         return None
 
+    def _trigger_changed(self) -> None:
+        self.set_before_step(self._set_trigger)
+
+    def _set_trigger(self) -> None:
+        if self._trigger is not None:
+            self._controller.set_trigger(self._trigger.value)
+
+    @when_due
     def before_physics_step(self, timekeeper: Timekeeper) -> None:
         """Advances the motion by one step."""
-        self._advance(min(timekeeper.step_size / self._duration, 1.0))
-        eased = self._ease(float(self._progress))
-        start, delta = self._start, self._delta
-        self._pose = (
-            start[0] + delta[0] * eased,
-            start[1] + delta[1] * eased,
-            start[2] + delta[2] * eased,
-        )
-        self._hold()
+        self._set_trigger()
+        self._controller.advance(timekeeper.step_size)
 
+    @when_due
     def after_physics_step(self, timekeeper: Timekeeper) -> None:
         """Reverts the effect of the physics step on the body."""
-        self._hold()
+        del timekeeper
+        self._controller.hold()
 
     def state(self) -> object:
         """Returns the progress along the path, and whether the motion is forward."""
-        return (self._progress, self._exact_progress, self._forward)
-
-    def _hold(self) -> None:
-        # Also wakes the body: Box2D puts bodies without velocity to sleep and then finds no new
-        # contacts for them.
-        self._body.set_pose(*self._pose)
-        # A dynamic body would keep the velocity from contacts and act like a conveyor belt.
-        if self._is_dynamic:
-            self._body.set_velocity(0.0, 0.0, 0.0)
-
-    def _advance(self, step: float) -> None:
-        if self._mode == "trigger":
-            self._forward = self._trigger is not None and self._trigger.value
-        elif self._mode == "loop" and self._progress == 1.0:
-            self._set_progress(0.0)
-        elif self._mode == "yoyo" and self._progress in (0.0, 1.0):
-            self._forward = self._progress == 0.0
-        signed = step if self._forward else -step
-        # The reference accumulates 32-bit floats, whose rounding decides in which of two steps the
-        # motion ends; the same sum is used here. Unlike the reference: an additional exact sum
-        # corrects it where the steps are too small or too many for 32 bits.
-        self._progress += np.float32(signed)
-        self._exact_progress += signed
-        if abs(self._progress - self._exact_progress) > _ROUNDING_TOLERANCE:
-            self._progress = np.float32(self._exact_progress)
-        if self._forward and self._progress >= 1.0:
-            self._set_progress(1.0)
-        elif not self._forward and self._progress < _ROUNDING_TOLERANCE:
-            self._set_progress(0.0)
-
-    def _set_progress(self, progress: float) -> None:
-        self._progress = np.float32(progress)
-        self._exact_progress = progress
+        return self._controller.state

@@ -57,6 +57,7 @@ class Recorder(WorldObserver):
         self._world = world
         self._timekeeper = timekeeper
         self._depth = 0
+        self._step = 0  # of the recording; the time may be set back
         self._known_files: set[str] = set()
         self._known_params: dict[str, object] = {}
         self._checksums: list[int] = []
@@ -116,6 +117,15 @@ class Recorder(WorldObserver):
             text = None if error is None else f"{type(error).__name__}: {error}"
             self._write("result", error=text, **self._new_inputs())
 
+    @contextmanager
+    def repeated(self) -> Iterator[None]:
+        """Records nothing that happens in a change of a hook."""
+        self._depth += 1
+        try:
+            yield
+        finally:
+            self._depth -= 1
+
     def _command_set(self, command: Command[Any], value: Any) -> None:
         # What hooks, and plugins within a request, set is repeated by the same plugins.
         if self._depth or self._world.requests.in_hook or self._writer is None:
@@ -139,8 +149,9 @@ class Recorder(WorldObserver):
         """Adds the checksum of the bodies, and each simulated second the hash of the world."""
         if self._writer is None:
             return
+        self._step += 1
         self._checksums.append(checksum(self._world.physics))
-        if self._timekeeper.sim_time_ns >= self._next_hash_ns:
+        if self._step * self._timekeeper.step_size_ns >= self._next_hash_ns:
             self._next_hash_ns += NANOSECONDS
             self._write_hash("state")
 
@@ -174,13 +185,11 @@ class Recorder(WorldObserver):
     def _write(self, kind: str, **fields: Any) -> None:
         if self._writer is None:
             return
-        timekeeper = self._timekeeper
-        step = timekeeper.sim_time_ns // timekeeper.step_size_ns
-        record: Record = {"step": step, "kind": kind, **fields}
+        record: Record = {"step": self._step, "kind": kind, **fields}
         try:
             self._writer.write(record)
         except RecordingError as error:
-            _LOG.error("%s; the recording ends at step %d", error, step)
+            _LOG.error("%s; the recording ends at step %d", error, self._step)
             self._stop()
 
     def _new_inputs(self) -> Record:

@@ -12,6 +12,7 @@ from flatland.errors import FlatlandError
 from flatland.recording.log_file import Record, RecordingError, decode_value, read_recording
 from flatland.recording.recorder import checksum, digests
 from flatland.runtime.observer import WorldObserver
+from flatland.runtime.snapshot import WorldSnapshot
 from flatland.timekeeper import NANOSECONDS
 from flatland.world import World
 
@@ -82,6 +83,7 @@ class Replay:
         self.last_step: int = max((r["step"] for r in self.recording.records[1:]), default=0)
         self.difference: Difference | None = None
         self.step = 0
+        self._snapshots: dict[int, WorldSnapshot] = {}  # by their numbers in the recording
         self._on_step: Callable[[int], object] | None = None
         # Of the steps since the last comparison, and of the steps with a recorded hash: taken at
         # the same point of a step as by the recorder, before requests of hooks are carried out.
@@ -137,6 +139,10 @@ class Replay:
         del kind, arguments
         return nullcontext()
 
+    def repeated(self) -> AbstractContextManager[None]:
+        """Does nothing."""
+        return nullcontext()
+
     def step_done(self) -> None:
         """Takes the checksum of the bodies, and the hash of the world if one was recorded."""
         self.step += 1
@@ -179,12 +185,11 @@ class Replay:
         has_result = following is not None and following["kind"] == "result"
         if following is not None and has_result:
             self._set_params(following)
-        method = _CHANGES.get(kind)
-        if method is None:
-            raise RecordingError(f'unknown request "{kind}" at step {self.step}')
         error: str | None = None
         try:
-            method(self.world, **{key: decode_value(v) for key, v in arguments.items()})
+            self._repeat(kind, {key: decode_value(v) for key, v in arguments.items()})
+        except RecordingError:
+            raise
         except (FlatlandError, ValueError) as raised:
             error = f"{type(raised).__name__}: {raised}"
         if following is not None and has_result and error != following["error"]:
@@ -192,6 +197,20 @@ class Replay:
                 self.step,
                 f"{kind} {_outcome(following['error'])} in the recording, but {_outcome(error)}",
             )
+
+    def _repeat(self, kind: str, arguments: dict[str, Any]) -> None:
+        if kind == "snapshot":
+            self._snapshots[arguments["number"]] = self.world.snapshot()
+        elif kind == "restore":
+            snapshot = self._snapshots.get(arguments["number"])
+            if snapshot is None:
+                self._differ(self.step, "the snapshot was taken before the recording started")
+            else:
+                self.world.restore(snapshot)
+        elif kind in _CHANGES:
+            _CHANGES[kind](self.world, **arguments)
+        else:
+            raise RecordingError(f'unknown request "{kind}" at step {self.step}')
 
     def _set_params(self, record: Record) -> None:
         self._params.update({n: decode_value(v) for n, v in record["params"].items()})
@@ -226,6 +245,7 @@ _CHANGES: Final[dict[str, Callable[..., object]]] = {
     "spawn_models": World.spawn_models,
     "move_models": World.move_models,
     "delete_models": World.delete_models,
+    "reset": World.reset,
 }
 
 

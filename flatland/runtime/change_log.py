@@ -18,6 +18,9 @@ class ChangeLog(Protocol):
             arguments: Its arguments by name.
         """
 
+    def repeated(self) -> AbstractContextManager[None]:
+        """Returns a context in which a change of a hook is carried out, which repeats it."""
+
     def step_done(self) -> None:
         """Called after each step with all of its hooks."""
 

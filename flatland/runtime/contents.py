@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 
     from flatland.config.inputs import Inputs
     from flatland.config.node import Source
+    from flatland.entities.body import Body
     from flatland.entities.contact import Contact
     from flatland.entities.layer import Layer
     from flatland.entities.model import Model
@@ -39,6 +40,7 @@ if TYPE_CHECKING:
     from flatland.runtime.plugin_host import PluginHost
     from flatland.runtime.requests import Requests
     from flatland.runtime.snapshot import WorldSnapshot, WorldStates
+    from flatland.runtime.stepping import Stepping
     from flatland.runtime.transforms import FramePair, TransformBuffer
     from flatland.timekeeper import Timekeeper
     from flatland.values import Transform
@@ -58,6 +60,7 @@ class Contents(ManyModels, LayerMaps):
         plugin_host: Starts plugins and calls their hooks.
         ports: All outputs and commands by resolved topic.
         requests: The queue of actions that run between two steps.
+        stepping: Makes the steps.
         transform_buffer: Collects the transforms of plugins.
         read_yaml: Loads a model file; `YamlReader.from_file`, or a method that collects errors.
         change_count: Number of models that were spawned, moved or deleted since the world file was
@@ -77,13 +80,13 @@ class Contents(ManyModels, LayerMaps):
     plugin_host: PluginHost
     ports: PortRegistry
     requests: Requests
+    stepping: Stepping
     seed: int
     timekeeper: Timekeeper
     transform_buffer: TransformBuffer
     change_count: int
     inputs: Inputs
 
-    _change_log: ChangeLog | None
     _contacts: ContactReporter
     _files: Source
     _models: ModelSet
@@ -133,7 +136,7 @@ class Contents(ManyModels, LayerMaps):
 
     def log_changes(self, log: ChangeLog | None) -> None:
         """Notifies a log of all further changes and steps, instead of the previous one."""
-        self._change_log = log
+        self.stepping.change_log = log
 
     def resolve_path(self, path: str) -> str:
         """Returns the absolute path of a model or map file.
@@ -246,15 +249,28 @@ class Contents(ManyModels, LayerMaps):
         is_external = not self.requests.in_hook
 
         def checked() -> R:
-            self._check_open()
+            self.check_open()
             self.change_count += 1
-            if self._change_log is None or not is_external:
-                return action()
-            with self._change_log.change(kind, arguments):
-                return action()
+            return self._logged(kind, arguments if is_external else None, action)
 
         name = arguments.get("name")
         return self.requests.change(checked, kind if name is None else f'{kind} "{name}"')
+
+    def _logged(
+        self, kind: str, arguments: Mapping[str, object] | None, action: Callable[[], R]
+    ) -> R:
+        """Carries out a change, which is added to a recording if there is one.
+
+        Args:
+            kind: Name of the method.
+            arguments: Arguments of the method; None if a hook repeats the change in a replay.
+            action: The change.
+        """
+        log = self.stepping.change_log
+        if log is None:
+            return action()
+        with log.repeated() if arguments is None else log.change(kind, arguments):
+            return action()
 
     # -- requests --------------------------------------------------------------------------
 
@@ -277,6 +293,7 @@ class Contents(ManyModels, LayerMaps):
     def pause(self) -> None:
         """Pauses the world from the next step on."""
         self._paused = True
+        self.physics.plan.interrupt()
 
     def resume(self) -> None:
         """Resumes a paused world."""
@@ -285,6 +302,7 @@ class Contents(ManyModels, LayerMaps):
     def toggle_pause(self) -> None:
         """Pauses a running world, resumes a paused one."""
         self._paused = not self._paused
+        self.physics.plan.interrupt()
 
     # -- observers -------------------------------------------------------------------------
 
@@ -328,12 +346,24 @@ class Contents(ManyModels, LayerMaps):
     @property
     def transforms(self) -> dict[FramePair, Transform]:
         """The latest transform of each (parent, child)."""
+        self.plugin_host.schedule.settle()
         return self.transform_buffer.latest
 
     @property
     def contacts(self) -> list[Contact]:
         """All pairs of fixtures that touch now."""
         return self._contacts.touching
+
+    def body_of_id(self, body_id: int) -> Body:
+        """Returns the body of a model or a layer by its id, as in `flatland.physics.Touch`.
+
+        Raises:
+            WorldError: No model or layer has it.
+        """
+        body = self._contacts.find_body(self.physics.body(body_id))
+        if body is None:
+            raise WorldError(f"no model or layer has the body {body_id}")
+        return body
 
     # -- state -----------------------------------------------------------------------------
 
@@ -357,7 +387,8 @@ class Contents(ManyModels, LayerMaps):
                 cannot be copied; see *Snapshots* in `docs/write_a_plugin.md`.
         """
         self.requests.refuse_in_plugin("snapshot")
-        return self._read(self._states.take)
+        number = {"number": self._states.taken}
+        return self._read(lambda: self._logged("snapshot", number, self._states.take))
 
     def restore(self, snapshot: WorldSnapshot) -> None:
         """Returns to an earlier state: the same steps have the same results, bit by bit.
@@ -374,7 +405,8 @@ class Contents(ManyModels, LayerMaps):
                 world, or a plugin of a deleted model had a connection that has ended.
         """
         self.requests.refuse_in_plugin("restore")
-        self._read(lambda: self._states.restore(snapshot))
+        number = {"number": snapshot.number}
+        self._read(lambda: self._logged("restore", number, lambda: self._states.restore(snapshot)))
 
     def clone(self) -> World:
         """Returns an independent copy of the world in its current state.
@@ -430,9 +462,12 @@ class Contents(ManyModels, LayerMaps):
         Raises:
             WorldError: The world is closed, or the state of a plugin cannot be hashed.
         """
-        return self._read(
-            lambda: state_hash(self.seed, self.timekeeper, self.physics, self.models, self.plugins)
-        )
+
+        def read() -> str:
+            self.plugin_host.schedule.settle()
+            return state_hash(self.seed, self.timekeeper, self.physics, self.models, self.plugins)
+
+        return self._read(read)
 
     # -- free places -----------------------------------------------------------------------
 
@@ -519,8 +554,9 @@ class Contents(ManyModels, LayerMaps):
         )
 
     def _read(self, action: Callable[[], R]) -> R:
-        self._check_open()
+        self.check_open()
         return self.requests.read(action)
 
-    def _check_open(self) -> None:
+    def check_open(self) -> None:
+        """Raises `WorldError` if the world is closed."""
         raise NotImplementedError

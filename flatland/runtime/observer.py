@@ -169,6 +169,16 @@ class Observers:
         """Notifies all observers."""
         self._notify("layer_changed", layer_name)
 
+    @property
+    def watch_steps(self) -> bool:
+        """Whether an observer is to be notified in every step."""
+        return bool(self._of_start or self._of_finish or self._of_time or self._of_transforms)
+
+    @property
+    def want_transforms(self) -> bool:
+        """Whether an observer wants the transforms of this step."""
+        return any(observer.wants_transforms for observer in self._of_transforms)
+
     def step_started(self) -> None:
         """Notifies the observers that override the method."""
         for observer in self._of_start:

@@ -50,9 +50,11 @@ class WorldSnapshot:
 
     Attributes:
         time_ns: Simulated time [ns].
+        number: Number of the snapshot, from 0 on, in the order in which those of a world were
+            taken.
     """
 
-    __slots__ = ("_models", "_owner", "_physics", "_ports", "_record", "time_ns")
+    __slots__ = ("_models", "_owner", "_physics", "_ports", "_record", "number", "time_ns")
 
     def __init__(self, owner: WorldStates, physics: PhysicsWorld, record: StateRecord) -> None:
         """Creates a snapshot.
@@ -64,6 +66,7 @@ class WorldSnapshot:
         """
         world = owner.world
         self.time_ns = world.timekeeper.sim_time_ns
+        self.number = owner.taken
         self._owner = owner
         self._physics = physics
         self._record = record
@@ -93,6 +96,7 @@ class WorldStates:
 
     Attributes:
         world: The world.
+        taken: Number of snapshots that were taken.
     """
 
     def __init__(self, world: World, attributes: Iterable[str]) -> None:
@@ -105,6 +109,7 @@ class WorldStates:
         """
         self.world = world
         self._attributes = tuple(name for name in attributes if name not in OUTSIDE)
+        self.taken = 0
         self._kinds: dict[type[Any], Kind] = {}
 
     # -- snapshots -------------------------------------------------------------------------
@@ -119,7 +124,9 @@ class WorldStates:
             record = recorder.record(attributes.values())
         except UncopyableError as error:
             raise self._located(error) from None
-        return WorldSnapshot(self, world.physics.copy(), record)
+        snapshot = WorldSnapshot(self, world.physics.copy(), record)
+        self.taken += 1
+        return snapshot
 
     def restore(self, snapshot: WorldSnapshot) -> None:
         """Restores a snapshot; see `World.restore`."""
@@ -138,6 +145,7 @@ class WorldStates:
         ports, time_ns = _Ports(world), world.timekeeper.sim_time_ns
         world.physics.become_copy_of(snapshot._physics)
         snapshot._record.write_back()
+        world.plugin_host.schedule.change()  # Other outputs may be wanted than at that time.
         if world.timekeeper.sim_time_ns != time_ns:
             world._observers.time_advanced(world.timekeeper.sim_time_ns)
         self._notify(ports, snapshot, revived)
@@ -234,7 +242,8 @@ class WorldStates:
             copier.finish()
         except UncopyableError as error:
             raise self._located(error) from None
-        clone._change_log = None
+        clone.requests.on_post = clone.physics.plan.interrupt
+        clone.plugin_host.schedule.change()
         clone._paused = clone._closed = False
         clone._states = WorldStates(clone, self._attributes)
         if costs is not None:

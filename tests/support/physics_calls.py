@@ -6,6 +6,7 @@ compared with a model of what should exist in it.
 
 from __future__ import annotations
 
+import copy
 import random
 import time
 from collections.abc import Callable
@@ -83,6 +84,7 @@ class RandomCalls:
         self.fixtures: list[PhysicsFixture] = []
         self.joints: list[PhysicsJoint] = []
         self.invalid: set[int] = set()
+        self.saved: tuple[PhysicsWorld, Objects, set[int]] | None = None
 
     # -- the run -----------------------------------------------------------------------------
 
@@ -405,6 +407,36 @@ class RandomCalls:
                     fixture in self.objects.fixtures.get(body, ()), f"returns {contact} of nothing"
                 )
 
+    # -- copies ------------------------------------------------------------------------------
+
+    def do_save(self) -> None:
+        self.saved = (self.world.copy(), copy.deepcopy(self.objects), set(self.invalid))
+
+    def do_restore(self) -> None:
+        if self.saved is not None:
+            world, objects, invalid = self.saved
+            self.world.become_copy_of(world)
+            self.objects, self.invalid = copy.deepcopy(objects), set(invalid)
+            self._require(
+                self.world.body_states().tobytes() == world.body_states().tobytes(),
+                "restores another state",
+            )
+
+    def do_continue_with_a_copy(self) -> None:
+        made = self.world.copy()
+        before = self._snapshot()
+        self.bodies = [made.body(body.id) for body in self.bodies]
+        self.fixtures = [made.fixture(fixture.id) for fixture in self.fixtures]
+        self.joints = [made.joint(joint.id) for joint in self.joints]
+        if self.rng.random() < 0.5:
+            self.world.close()
+        self.world, self.saved = made, None
+        self._require(self._snapshot() == before, "makes a copy with another state")
+
+    def do_clear(self) -> None:
+        self.world.clear()
+        self.objects, self.invalid = Objects(), set()
+
     # -- queries -----------------------------------------------------------------------------
 
     def do_read_body(self) -> None:
@@ -514,5 +546,6 @@ _WEIGHTS: Final = {
     "do_destroy_body": 3,
     "do_step": 20,
     "do_boundaries": 1,
+    "do_clear": 1,
     "do_close": 1,
 }

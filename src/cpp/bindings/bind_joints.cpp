@@ -53,7 +53,9 @@ void bind_joints(WorldClass& world) {
     return self.read_joint(id).joint->GetCollideConnected();
   });
   world.def("joint_limits", &limits_of);
-  world.def("set_joint_limits", &set_limits);
+  world.def("set_joint_limits", [](World& self, Id id, const std::optional<AngleLimits>& limits) {
+    set_limits(self, id, limits);
+  });
   world.def("joint_reference_angle", &reference_angle_of);
   world.def("joint_frequency",
             [](const World& self, Id id) { return self.read_joint(id).frequency; });

@@ -5,12 +5,6 @@
 namespace py = pybind11;
 
 namespace flatland {
-namespace {
-
-// A step that is expected to be shorter is not worth a release of the GIL [s].
-constexpr double kShortStep = 1e-4;
-
-}  // namespace
 
 py::object to_python(const StepReport& report) {
   if (report.empty()) return py::none();

@@ -243,6 +243,9 @@ void World::become_copy_of(World& source) {
   joints.exclude_ids_of(joints_);
   ContactRecorder contacts = source.contacts_;
   contacts.replace_contacts(copier.contacts());
+  contacts.touches.exclude_ids_of(contacts_.touches);
+  StepPlan plan = source.plan_;
+  plan.exclude_ids_of(plan_);
   std::vector<Id> invalid = source.invalid_;
   rays_.become_copy_of(
       source.rays_, [&](const b2Body* body) { return copier.copy_of(body); },
@@ -253,6 +256,7 @@ void World::become_copy_of(World& source) {
   fixtures_ = std::move(fixtures);
   joints_ = std::move(joints);
   contacts_ = std::move(contacts);
+  plan_ = std::move(plan);
   invalid_ = std::move(invalid);
   last_step_time_ = source.last_step_time_;
   listen();
@@ -267,12 +271,15 @@ void World::clear() {
   bodies.exclude_ids_of(bodies_);
   fixtures.exclude_ids_of(fixtures_);
   joints.exclude_ids_of(joints_);
+  ContactRecorder contacts;
+  contacts.touches.exclude_ids_of(contacts_.touches);
+  plan_.remove_all();
   rays_.clear();
   engine_ = std::move(engine);
   bodies_ = std::move(bodies);
   fixtures_ = std::move(fixtures);
   joints_ = std::move(joints);
-  contacts_ = ContactRecorder();
+  contacts_ = std::move(contacts);
   invalid_.clear();
   last_step_time_ = 1.0;
   listen();

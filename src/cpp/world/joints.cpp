@@ -73,7 +73,10 @@ std::optional<AngleLimits> limits_of(const World& world, Id joint_id) {
 }
 
 void set_limits(World& world, Id joint_id, const std::optional<AngleLimits>& limits) {
-  b2Joint* joint = world.change_joint(joint_id);
+  set_limits(world.change_joint(joint_id), limits);
+}
+
+void set_limits(b2Joint* joint, const std::optional<AngleLimits>& limits) {
   if (joint->GetType() != e_revoluteJoint) {
     throw PhysicsError("only revolute joints have limits, but the joint is a weld joint");
   }

@@ -28,6 +28,7 @@ Id create_weld_joint(World& world, const JointBodies& bodies, double reference_a
 std::optional<AngleLimits> limits_of(const World& world, Id joint);
 // Throws PhysicsError if the joint is not a revolute joint. Nullopt removes the limits.
 void set_limits(World& world, Id joint, const std::optional<AngleLimits>& limits);
+void set_limits(b2Joint* joint, const std::optional<AngleLimits>& limits);
 
 double reference_angle_of(const World& world, Id joint);
 // Returns the anchor points in the frames of body A and body B.

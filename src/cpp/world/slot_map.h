@@ -14,7 +14,14 @@ namespace flatland {
 // different kinds differ, no id is 0, and ids are positive as signed integers.
 using Id = std::uint64_t;
 
-enum class IdKind : std::uint64_t { kBody = 1, kFixture = 2, kJoint = 3 };
+enum class IdKind : std::uint64_t {
+  kBody = 1,
+  kFixture = 2,
+  kJoint = 3,
+  kController = 4,
+  kRecord = 5,
+  kTouches = 6
+};
 
 // Values by id. The id of an erased value is never valid again, even if its slot is reused.
 template <typename Value, IdKind kKind>
@@ -50,6 +57,14 @@ class SlotMap {
     slots_[slot].generation = kUnused;
     --size_;
     if (slots_[slot].is_reusable()) free_.push_back(slot);
+  }
+
+  // Calls visit(id, value) for each value in order of slots.
+  template <typename Visit>
+  void for_each(Visit&& visit) {
+    for (std::uint32_t slot = 0; slot < slots_.size(); ++slot) {
+      if (slots_[slot].is_used()) visit(make_id(slot), slots_[slot].value);
+    }
   }
 
   void reserve(std::size_t more) { slots_.reserve(slots_.size() + more); }

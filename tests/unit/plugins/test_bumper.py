@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import flatland
-from flatland import Collisions, Contact, ContactImpulse
+from flatland import Collisions
 
 DT = 0.005
 DISC = """
@@ -318,67 +318,6 @@ def test_contacts_between_other_models_are_ignored(plugin_world: Any, files: Any
     output = world.output("/collisions")
     world.step()
     assert len(world.contacts) == 1
-    assert output.latest.collisions == ()
-
-
-def contact_of(world: flatland.World, points: list[list[float]], normal: list[float]) -> Contact:
-    """Returns a synthetic contact of the robot with the wall."""
-    base = world.model("robot").body("base")
-    other = world.model("obstacle").body("slab")
-    return Contact(
-        99,
-        other,
-        base,
-        other.fixtures[0],
-        base.fixtures[0],
-        np.array(points),
-        np.array(normal),
-        False,
-    )
-
-
-def test_mean_over_the_solver_calls_of_a_step(plugin_world: Any, files: Any) -> None:
-    world = plugin_world(BUMPER, bodies=DISC)
-    put(world, files, WALL, 5.0)
-    output = world.output("/collisions")
-    bumper = world.model("robot").plugin("bumper")
-    first = contact_of(world, [[1.0, 2.0], [3.0, 4.0]], [0.0, 1.0])
-    last = contact_of(world, [[5.0, 6.0]], [1.0, 0.0])
-    bumper.begin_contact(first)
-    bumper.post_solve(first, ContactImpulse(np.array([0.02, 9.0]), np.array([0.0, 9.0])))
-    bumper.post_solve(last, ContactImpulse(np.array([0.04]), np.array([0.08])))
-    bumper.after_physics_step(world.timekeeper)
-    (collision,) = output.latest.collisions
-    # The means 0.03 and 0.04 add up to 0.05.
-    assert collision.magnitude_forces == pytest.approx([0.05 / DT])
-    assert collision.contact_positions.tolist() == [[5.0, 6.0]]
-    # The normal of the contact points from the wall to the robot, that of the message away from it.
-    assert collision.contact_normals.tolist() == [[-1.0, 0.0]]
-
-
-def test_a_point_missing_in_a_solver_call_contributes_zero(plugin_world: Any, files: Any) -> None:
-    world = plugin_world(BUMPER, bodies=DISC)
-    put(world, files, WALL, 5.0)
-    output = world.output("/collisions")
-    bumper = world.model("robot").plugin("bumper")
-    first = contact_of(world, [[1.0, 2.0]], [1.0, 0.0])
-    last = contact_of(world, [[1.0, 2.0], [3.0, 4.0]], [1.0, 0.0])
-    bumper.begin_contact(first)
-    bumper.post_solve(first, ContactImpulse(np.array([0.02]), np.zeros(1)))
-    bumper.post_solve(last, ContactImpulse(np.array([0.04, 0.06]), np.zeros(2)))
-    bumper.after_physics_step(world.timekeeper)
-    (collision,) = output.latest.collisions
-    assert collision.magnitude_forces == pytest.approx([0.03 / DT, 0.03 / DT])
-
-
-def test_solver_calls_of_unknown_contacts_are_ignored(plugin_world: Any, files: Any) -> None:
-    world = plugin_world(BUMPER, bodies=DISC)
-    put(world, files, WALL, 5.0)
-    output = world.output("/collisions")
-    bumper = world.model("robot").plugin("bumper")
-    contact = contact_of(world, [[1.0, 2.0]], [1.0, 0.0])
-    bumper.post_solve(contact, ContactImpulse(np.array([0.02]), np.zeros(1)))
-    bumper.after_physics_step(world.timekeeper)
     assert output.latest.collisions == ()
 
 

@@ -17,6 +17,7 @@ import pytest
 import flatland
 from flatland import ModelPlugin, Twist, World
 from flatland.errors import FlatlandError, WorldError
+from flatland.plugins.diff_drive import DiffDrive
 from flatland.recording import RecordingError, Replay
 from flatland.recording.log_file import read_recording
 
@@ -356,3 +357,72 @@ def test_random_numbers_of_files_derive_from_the_seed(world_files: Any) -> None:
     assert first[0] != first[1]
     assert radii(1) == first
     assert radii(2) != first
+
+
+def test_resets_and_snapshots_are_repeated(world_files: Any) -> None:
+    path = world_files.folder / "run.log"
+    world = world_files.load(WORLD)
+    recorder = world.record(path)
+    drive(world)
+    world.reset()
+    drive(world)
+    snapshot = world.snapshot()
+    world.step(50)
+    world.reset(seed=5, keep_time=True)
+    world.command("/cmd_vel").set(Twist(linear_x=0.7))
+    world.step(300)
+    for steps in (290, 30):
+        world.restore(snapshot)
+        world.step(steps)
+    recorder.close()
+    result = Replay(path)
+    assert result.run() is None
+    assert result.step == 550 + 550 + 50 + 300 + 290 + 30
+    assert result.world.state_hash() == world.state_hash()
+    result.close()
+
+
+def test_a_hook_that_requests_a_reset_repeats_it(
+    world_files: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def after_physics_step(self: ModelPlugin, timekeeper: flatland.Timekeeper) -> None:
+        if timekeeper.sim_time_ns == 500_000_000:
+            self.world.reset()
+
+    monkeypatch.setattr(DiffDrive, "after_physics_step", after_physics_step)
+    path = world_files.folder / "run.log"
+    world = world_files.load(WORLD)
+    recorder = world.record(path)
+    world.command("/cmd_vel").set(Twist(linear_x=0.7))
+    world.step(150)
+    recorder.close()
+    assert world.time == pytest.approx(0.25)
+    kinds = [record.get("kind") for record in read_recording(path).records]
+    assert "reset" not in kinds
+    result = Replay(path)
+    assert result.run() is None
+    assert result.world.time == pytest.approx(0.25)
+    result.close()
+
+
+def test_a_snapshot_from_before_the_recording_cannot_be_restored_in_a_replay(
+    world_files: Any,
+) -> None:
+    path = world_files.folder / "run.log"
+    world = world_files.load(WORLD)
+    world.step(3)
+    snapshot = world.snapshot()
+    world.reset()
+    recorder = world.record(path)
+    world.step(10)
+    world.restore(snapshot)
+    world.step(10)
+    recorder.close()
+    result = Replay(path)
+    difference = result.run()
+    assert difference is not None
+    assert (difference.step, difference.text) == (
+        10,
+        "the snapshot was taken before the recording started",
+    )
+    result.close()

@@ -93,6 +93,8 @@ class Everything(ModelPlugin):
         self.body = self.model.bodies[0]
         self.by_body = {self.body: 0, "other": 0}
         self.all = {self.body, self}
+        self.of_key_values = collections.defaultdict(int)
+        self.values = self.of_key_values.values()
         self.last = collections.deque(maxlen=3)
         self.counts = collections.Counter()
         self.of_key = collections.defaultdict(list)
@@ -135,6 +137,7 @@ class Everything(ModelPlugin):
             self.view += 1.0
             self.bytes[0] = (self.bytes[0] + 1) % 256
             self.partial("more")
+            self.of_key_values[self.slots.value % 7] += 1
             if self.slots.value % 10 == 0:
                 self.append(str(self.slots.value))
             self.seen.emit(self.slots.value)
@@ -145,7 +148,8 @@ class Everything(ModelPlugin):
             self.inner.count, self.slots.value, getattr(self.slots, "unset", None), self.names,
             self.by_body[self.body], list(self.last), self.counts, dict(self.of_key), self.array,
             self.view, self.bytes, self.random.getstate(), self.lambdas[0](), self.heard[-3:],
-            self in self.all, self.body in self.all, self.inner.owner is self, self.add.__name__,
+            list(self.values), self in self.all, self.body in self.all, self.inner.owner is self,
+            self.add.__name__,
         ]
 
 

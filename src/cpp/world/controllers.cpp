@@ -1,0 +1,207 @@
+// Compiled with -fno-builtin: the compiler must not replace functions of the C library, such as
+// pow(x, 2) by x * x, which Python calls, too.
+#include "world/controllers.h"
+
+#include <math.h>
+
+#include <cstddef>
+
+#include "world/bodies.h"
+#include "world/joints.h"
+
+namespace flatland {
+namespace {
+
+// min and max of Python, which return the first one of two equal numbers.
+double lesser(double a, double b) { return b < a ? b : a; }
+double greater(double a, double b) { return b > a ? b : a; }
+
+// Returns the maximum change of velocity in a step whose target has the opposite sign.
+double crossing_change(const SpeedLimits& limits, double speed, double dt) {
+  const double acceleration = limits.acceleration;
+  const double deceleration = limits.deceleration;
+  if (deceleration != 0.0 && speed > deceleration * dt) return deceleration * dt;
+  if (acceleration == 0.0) return HUGE_VAL;
+  const double time_to_zero = deceleration != 0.0 ? speed / deceleration : 0.0;
+  return speed + acceleration * (dt - time_to_zero);
+}
+
+void advance_motion(World&, b2Body* body, TwistMotion& motion, double dt) {
+  const double forward = motion.velocity[0] =
+      motion.linear.step(motion.velocity[0], motion.target[0], dt);
+  const double omega = motion.velocity[2] =
+      motion.angular.step(motion.velocity[2], motion.target[2], dt);
+  const double yaw = pose_of(*body)[2];
+  const double c = cos(yaw);
+  const double s = sin(yaw);
+  if (!motion.is_holonomic) {
+    // Without the terms of a sideways velocity of 0, which could change the sign of a zero.
+    set_velocity(body, {forward * c, forward * s, omega});
+    return;
+  }
+  const double sideways = motion.velocity[1] =
+      motion.linear.step(motion.velocity[1], motion.target[1], dt);
+  set_velocity(body, {c * forward - s * sideways, s * forward + c * sideways, omega});
+}
+
+// sqrt(x^2 + y^2), correctly rounded in all but a few cases, as math.hypot of Python; that of the C
+// library is not.
+double exact_hypot(double x, double y) {
+  x = fabs(x);
+  y = fabs(y);
+  const double larger = greater(x, y);
+  if (!isfinite(x + y) || larger == 0.0) return x + y;
+  int exponent = 0;
+  frexp(larger, &exponent);
+  x = ldexp(x, -exponent);
+  y = ldexp(y, -exponent);
+  // The sum of squares as high + low.
+  const double xx = x * x;
+  const double yy = y * y;
+  const double high = xx + yy;
+  const double rest = xx > yy ? (xx - high) + yy : (yy - high) + xx;
+  const double low = rest + fma(x, x, -xx) + fma(y, y, -yy);
+  // One Newton step from the rounded root.
+  const double root = sqrt(high);
+  return ldexp(root + (fma(-root, root, high) + low) / (2.0 * root), exponent);
+}
+
+// Turns the front wheel towards an angle within the limits.
+void steer(World& world, TricycleMotion& motion, double target, double dt) {
+  const double remaining = target - motion.angle;
+  const double acceleration = motion.angular.acceleration;
+  double velocity = remaining / dt;
+  if (acceleration != 0.0 &&
+      fabs(remaining) < pow(motion.angle_velocity, 2.0) / (2.0 * acceleration)) {
+    velocity = 0.0;  // Deceleration must start now to stop at the target.
+  }
+  motion.angle_velocity = motion.angular.step(motion.angle_velocity, velocity, dt);
+  double angle = motion.angle + motion.angle_velocity * dt;
+  const double limit = motion.max_angle;
+  if (limit != 0.0) angle = lesser(greater(angle, -limit), limit);
+  motion.angle = angle;
+  if (motion.is_displayed && angle == motion.displayed_angle) return;
+  motion.is_displayed = true;
+  motion.displayed_angle = angle;
+  b2Joint* joint = world.find_joint(motion.joint);
+  const double joint_angle = angle * motion.steering_sign;
+  if (joint != nullptr) set_limits(joint, AngleLimits(joint_angle, joint_angle));
+}
+
+// Turns the front wheel for a velocity of the rear center and a yaw rate. The front wheel moves
+// with the forward velocity v of the rear center and, across the wheelbase L, with L * omega to the
+// left; its heading is the direction of the sum. Returns its speed.
+double steer_for_twist(World& world, TricycleMotion& motion, double dt) {
+  const double v = motion.target[0];
+  double across = motion.wheelbase * motion.target[2];
+  if (v != 0.0 || across != 0.0) {
+    // From -90 to 90 degrees; the wheel rolls backwards to reverse.
+    double angle = atan2(v < 0.0 ? -across : across, fabs(v));
+    const double limit = motion.max_angle;
+    if (limit != 0.0 && fabs(angle) > limit) {
+      // The narrowest possible curve at the commanded speed of the rear center.
+      angle = copysign(limit, angle);
+      across = v * tan(angle);
+    }
+    motion.target_angle = angle;
+  }
+  // A command to stop keeps the steering angle.
+  steer(world, motion, motion.target_angle, dt);
+  const double speed = copysign(exact_hypot(v, across), v != 0.0 ? v : 1.0);
+  // The robot waits for a front wheel that points elsewhere.
+  return speed * greater(0.0, cos(motion.target_angle - motion.angle));
+}
+
+void advance_motion(World& world, b2Body* body, TricycleMotion& motion, double dt) {
+  const double yaw = pose_of(*body)[2];
+  double speed = motion.target[0];
+  if (motion.takes_twist) {
+    speed = steer_for_twist(world, motion, dt);
+  } else {
+    steer(world, motion, motion.target[2], dt);
+  }
+  const double v = motion.speed = motion.linear.step(motion.speed, speed, dt);
+  const double omega = v * sin(motion.angle) / motion.wheelbase;
+  // The rear center moves straight ahead; the velocity of the origin follows, body frame.
+  const double forward = v * cos(motion.angle) + omega * motion.rear_center[1];
+  const double sideways = -omega * motion.rear_center[0];
+  const double c = cos(yaw);
+  const double s = sin(yaw);
+  set_velocity(body, {c * forward - s * sideways, s * forward + c * sideways, omega});
+}
+
+void set_progress(TweenMotion& motion, double progress) {
+  motion.progress = static_cast<float>(progress);
+  motion.exact_progress = progress;
+}
+
+void advance_progress(TweenMotion& motion, double step) {
+  using Mode = TweenMotion::Mode;
+  // Difference at which the 32-bit progress is corrected to the exact one, and progress below which
+  // a backward motion is complete.
+  constexpr double kTolerance = 1e-5;
+  if (motion.mode == Mode::kTrigger) {
+    motion.is_forward = motion.is_triggered;
+  } else if (motion.mode == Mode::kLoop && motion.progress == 1.0F) {
+    set_progress(motion, 0.0);
+  } else if (motion.mode == Mode::kYoyo && (motion.progress == 0.0F || motion.progress == 1.0F)) {
+    motion.is_forward = motion.progress == 0.0F;
+  }
+  const double signed_step = motion.is_forward ? step : -step;
+  // The reference accumulates 32-bit floats, whose rounding decides in which of two steps the
+  // motion ends; the same sum is used here. Unlike the reference: an additional exact sum corrects
+  // it where the steps are too small or too many for 32 bits.
+  motion.progress += static_cast<float>(signed_step);
+  motion.exact_progress += signed_step;
+  if (fabs(static_cast<double>(motion.progress) - motion.exact_progress) > kTolerance) {
+    motion.progress = static_cast<float>(motion.exact_progress);
+  }
+  if (motion.is_forward && motion.progress >= 1.0F) {
+    set_progress(motion, 1.0);
+  } else if (!motion.is_forward && static_cast<double>(motion.progress) < kTolerance) {
+    set_progress(motion, 0.0);
+  }
+}
+
+void hold_motion(World& world, b2Body* body, const TweenMotion& motion) {
+  // Also wakes the body: Box2D puts bodies without velocity to sleep and then finds no new contacts
+  // for them.
+  set_pose(world, body, motion.pose);
+  // A dynamic body would keep the velocity from contacts and act like a conveyor belt.
+  if (motion.is_dynamic) set_velocity(body, {0.0, 0.0, 0.0});
+}
+
+void advance_motion(World& world, b2Body* body, TweenMotion& motion, double dt) {
+  advance_progress(motion, lesser(dt / motion.duration, 1.0));
+  const double eased = motion.easing(static_cast<double>(motion.progress));
+  for (std::size_t i = 0; i < 3; ++i) motion.pose[i] = motion.start[i] + motion.delta[i] * eased;
+  hold_motion(world, body, motion);
+}
+
+}  // namespace
+
+double SpeedLimits::step(double v, double target, double dt) const {
+  if (velocity != 0.0) target = lesser(greater(target, -velocity), velocity);
+  if (target == v) return target;
+  double change = HUGE_VAL;
+  if (v * target < 0.0) {
+    change = crossing_change(*this, fabs(v), dt);
+  } else if (fabs(target) > fabs(v)) {
+    if (acceleration != 0.0) change = acceleration * dt;
+  } else if (deceleration != 0.0) {
+    change = deceleration * dt;
+  }
+  return v + lesser(greater(target - v, -change), change);
+}
+
+void advance(World& world, b2Body* body, Motion& motion, double dt) {
+  std::visit([&](auto& kind) { advance_motion(world, body, kind, dt); }, motion);
+}
+
+void hold(World& world, b2Body* body, const Motion& motion) {
+  if (const auto* tween = std::get_if<TweenMotion>(&motion)) hold_motion(world, body, *tween);
+}
+
+bool has_hold(const Motion& motion) { return std::holds_alternative<TweenMotion>(motion); }
+
+}  // namespace flatland
