@@ -24,6 +24,7 @@ MODULES = (
     "steps",
     "jam",
     "plugin_steps",
+    "messages",
     "node",
     "lockstep",
     "real_time",

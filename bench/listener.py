@@ -1,4 +1,6 @@
-"""A node that subscribes to topics: python listener.py topic:package/Type...
+"""A node that subscribes to topics: python listener.py [--drive TOPIC] topic:package/Type...
+
+With --drive, it publishes a velocity command, so that a robot drives in a circle.
 
 Prints `ready` after all subscriptions, then the arrival time of the first message of each topic on
 the monotonic clock [s], and at exit the number of messages of each topic.
@@ -14,6 +16,9 @@ from collections import Counter
 
 import roslib.message
 import rospy
+from geometry_msgs.msg import Twist, Vector3
+
+CIRCLE = Twist(Vector3(0.5, 0.0, 0.0), Vector3(0.0, 0.0, 1.0))  # m/s and rad/s
 
 counts: Counter[str] = Counter()
 
@@ -30,7 +35,12 @@ def main() -> None:
     stopped = threading.Event()
     rospy.init_node("bench_listener", anonymous=True, disable_signals=True, disable_rostime=True)
     signal.signal(signal.SIGINT, lambda *_: stopped.set())
-    for argument in sys.argv[1:]:
+    arguments = sys.argv[1:]
+    if arguments[0] == "--drive":
+        driver = rospy.Publisher(arguments[1], Twist, queue_size=1, latch=True)
+        driver.publish(CIRCLE)
+        arguments = arguments[2:]
+    for argument in arguments:
         topic, message_type = argument.split(":")
         rospy.Subscriber(
             topic, roslib.message.get_message_class(message_type), count_message, topic

@@ -27,6 +27,11 @@ SIMULATED = 100.0  # simulated time of a benchmark run [s]
 CLOCK = "/clock:rosgraph_msgs/Clock"
 SCAN = "/scan:sensor_msgs/LaserScan"
 ODOMETRY = "/odometry/filtered:nav_msgs/Odometry"
+TF = "/tf:tf2_msgs/TFMessage"
+TWIST = "/twist:geometry_msgs/TwistWithCovarianceStamped"
+MARKERS = "visualization_msgs/MarkerArray"
+DEBUG = "/flatland_server/debug"
+HANDLES = "/interactive_model_markers"
 
 SPAWNED = """
 bodies:
@@ -46,15 +51,24 @@ def rows(unit: float) -> list[Row]:
         laser = _fastest(session, world)
         quiet = _fastest(session, quiet_world)
         subscribed = _fastest(session, world, CLOCK, SCAN, ODOMETRY)
-        use = min(_processor_use(session, quiet_world) for _ in range(RUNS))
+        four = _fastest(session, world, SCAN, TF, ODOMETRY, TWIST)
+        markers = _markers(world)
+        displayed = _fastest(session, world, *markers, show_viz=True)
+        use = min(_processor_use(session, quiet_world, SCAN) for _ in range(RUNS))
+        displayed_use = min(
+            _processor_use(session, world, *markers, show_viz=True) for _ in range(RUNS)
+        )
         starts, peaks = zip(*(_start(session, world) for _ in range(RUNS)), strict=True)
         spawn = _spawn(session, quiet_world)
     return [
         _step_row("step of the node, laser computed, no subscribers", laser, unit, 0.03),
         _step_row("step of the node, laser not wanted", quiet, unit, 0.009),
         _step_row("step of the node, /scan, /odometry, /clock subscribed", subscribed, unit, 0.06),
+        _step_row("step of the node, /scan, /tf, /odometry, /twist subscribed", four, unit, 0.05),
+        _step_row("step of the node, all markers and handles subscribed", displayed, unit, 0.0115),
+        Row("processor use at 200 Hz, all markers and handles", 100 * displayed_use, "%", 3.5),
         Row("processor use at 200 Hz, one subscriber of /scan", 100 * use, "%", 12.0),
-        Row("time from the start of the node to the first /clock", min(starts), "s", 1.0),
+        Row("time from the start of the node to the first /clock", min(starts), "s", 0.4),
         Row("peak memory of the node", max(peaks), "MB", 150.0),
         Row("call of /spawn_model while the simulation runs", 1e3 * spawn, "ms", 10.0),
     ]
@@ -84,13 +98,34 @@ def _quiet(world_path: Path) -> Iterator[Path]:
         yield folder / world_path.name
 
 
-def _fastest(session: RosSession, world: Path, *topics: str) -> float:
-    """Returns the time of a step [s] as logged by the node in `benchmark.launch`."""
+def _markers(world: Path) -> list[str]:
+    """Returns the topics of all markers and of the handles, after the option to drive."""
+    properties = yaml.safe_load(world.read_text())
+    layers = [layer["name"] for layer in properties["layers"]]
+    first = [name if isinstance(name, str) else name[0] for name in layers]
+    names = ["all_layers", "all_layers_3d", "all_models"]
+    names += [f"layer/{name}{suffix}" for name in first for suffix in ("", "_3d")]
+    names += [f"model/{model['name']}" for model in properties["models"]]
+    return [
+        "--drive",
+        "/cmd_vel",
+        *(f"{DEBUG}/{name}:{MARKERS}" for name in names),
+        f"{DEBUG}/topics:flatland/DebugTopicList",
+        f"{HANDLES}/update:visualization_msgs/InteractiveMarkerUpdate",
+        f"{HANDLES}/update_full:visualization_msgs/InteractiveMarkerInit",
+    ]
+
+
+def _fastest(session: RosSession, world: Path, *topics: str, show_viz: bool = False) -> float:
+    """Returns the time of a step [s] as logged by the node."""
     listener = _subscribe(session, *topics) if topics else None
+    arguments = {"world_path": world, "benchmark_duration": SIMULATED, "seed": 1}
     rates = []
     for _ in range(RUNS):
-        program = session.launch(
-            "benchmark.launch", world_path=world, benchmark_duration=SIMULATED, seed=1
+        program = (
+            session.server(update_rate=0, show_viz=True, **arguments)
+            if show_viz
+            else session.launch("benchmark.launch", **arguments)
         )
         match = program.wait_for(r"wall time, ([\d.]+) iterations a second")
         rates.append(float(match[1]))
@@ -107,11 +142,11 @@ def _subscribe(session: RosSession, *topics: str) -> Program:
     return listener
 
 
-def _processor_use(session: RosSession, world: Path) -> float:
-    """Returns the fraction of a core that the node uses in real time with one subscriber."""
-    listener = _subscribe(session, SCAN)
-    server = session.server(world_path=world, update_rate=200, seed=1)
-    listener.wait_for(r"first /scan")
+def _processor_use(session: RosSession, world: Path, *topics: str, show_viz: bool = False) -> float:
+    """Returns the fraction of a core that the node uses in real time with a subscriber."""
+    listener = _subscribe(session, *topics)
+    server = session.server(world_path=world, update_rate=200, seed=1, show_viz=show_viz)
+    listener.wait_for(r"first /")
     time.sleep(1.0)  # until the start of the node is complete
     before, start = processor_time(server.pid), time.monotonic()
     time.sleep(5.0)

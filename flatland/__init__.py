@@ -4,54 +4,59 @@
 the plugin interface. This package does not require ROS, except for the ROS node `flatland.ros`.
 """
 
+from importlib import import_module
+from importlib.util import find_spec
+from typing import TYPE_CHECKING, Any
+
 from flatland.requirements import check_requirements
+from flatland.version import VERSION
 
 check_requirements()  # Otherwise, a missing package results in a traceback without a remedy.
 
-from flatland.config.reader import YamlReader
-from flatland.drawing import draw
-from flatland.entities.body import Body
-from flatland.entities.contact import Contact, ContactImpulse, ModelContact, MutableContact
-from flatland.entities.joint import Joint
-from flatland.entities.layer import Layer
-from flatland.entities.model import Model
-from flatland.errors import (
-    BatchError,
-    FlatlandError,
-    MapFileError,
-    PhysicsError,
-    Place,
-    PluginError,
-    StaleHandleError,
-    WorldError,
-    WorldLockedError,
-    YamlError,
-)
-from flatland.loading.model_source import ModelSpec
-from flatland.maps.occupancy_grid import OccupancyGrid
-from flatland.plugin_api.dynamics_limits import DynamicsLimits
-from flatland.plugin_api.plugin import ModelPlugin, WorldPlugin
-from flatland.plugin_api.ports import Command, Output
-from flatland.plugin_api.update_timer import UpdateTimer
-from flatland.runtime.model_states import ModelStates
-from flatland.runtime.observer import WorldObserver
-from flatland.runtime.snapshot import WorldSnapshot
-from flatland.timekeeper import Timekeeper
-from flatland.values import (
-    Collision,
-    Collisions,
-    Imu,
-    LaserScan,
-    NavSatFix,
-    Odometry,
-    Transform,
-    Twist,
-    TwistWithCovariance,
-)
-from flatland.version import VERSION
-from flatland.world import World
+if TYPE_CHECKING:
+    from flatland.config.reader import YamlReader
+    from flatland.drawing import draw
+    from flatland.entities.body import Body
+    from flatland.entities.contact import Contact, ContactImpulse, ModelContact, MutableContact
+    from flatland.entities.joint import Joint
+    from flatland.entities.layer import Layer
+    from flatland.entities.model import Model
+    from flatland.errors import (
+        BatchError,
+        FlatlandError,
+        MapFileError,
+        PhysicsError,
+        Place,
+        PluginError,
+        StaleHandleError,
+        WorldError,
+        WorldLockedError,
+        YamlError,
+    )
+    from flatland.loading.model_source import ModelSpec
+    from flatland.maps.occupancy_grid import OccupancyGrid
+    from flatland.plugin_api.dynamics_limits import DynamicsLimits
+    from flatland.plugin_api.plugin import ModelPlugin, WorldPlugin
+    from flatland.plugin_api.ports import Command, Output
+    from flatland.plugin_api.update_timer import UpdateTimer
+    from flatland.runtime.model_states import ModelStates
+    from flatland.runtime.observer import WorldObserver
+    from flatland.runtime.snapshot import WorldSnapshot
+    from flatland.timekeeper import Timekeeper
+    from flatland.values import (
+        Collision,
+        Collisions,
+        Imu,
+        LaserScan,
+        NavSatFix,
+        Odometry,
+        Transform,
+        Twist,
+        TwistWithCovariance,
+    )
+    from flatland.world import World
 
-load_world = World.from_yaml
+    load_world = World.from_yaml
 
 __version__ = VERSION
 
@@ -100,3 +105,69 @@ __all__ = [
     "draw",
     "load_world",
 ]
+
+# Imported when they are first used: the ROS node publishes its time before it needs any of them.
+_MODULES = {
+    "BatchError": "flatland.errors",
+    "Body": "flatland.entities.body",
+    "Collision": "flatland.values",
+    "Collisions": "flatland.values",
+    "Command": "flatland.plugin_api.ports",
+    "Contact": "flatland.entities.contact",
+    "ContactImpulse": "flatland.entities.contact",
+    "DynamicsLimits": "flatland.plugin_api.dynamics_limits",
+    "FlatlandError": "flatland.errors",
+    "Imu": "flatland.values",
+    "Joint": "flatland.entities.joint",
+    "LaserScan": "flatland.values",
+    "Layer": "flatland.entities.layer",
+    "MapFileError": "flatland.errors",
+    "Model": "flatland.entities.model",
+    "ModelContact": "flatland.entities.contact",
+    "ModelPlugin": "flatland.plugin_api.plugin",
+    "ModelSpec": "flatland.loading.model_source",
+    "ModelStates": "flatland.runtime.model_states",
+    "MutableContact": "flatland.entities.contact",
+    "NavSatFix": "flatland.values",
+    "OccupancyGrid": "flatland.maps.occupancy_grid",
+    "Odometry": "flatland.values",
+    "Output": "flatland.plugin_api.ports",
+    "PhysicsError": "flatland.errors",
+    "Place": "flatland.errors",
+    "PluginError": "flatland.errors",
+    "StaleHandleError": "flatland.errors",
+    "Timekeeper": "flatland.timekeeper",
+    "Transform": "flatland.values",
+    "Twist": "flatland.values",
+    "TwistWithCovariance": "flatland.values",
+    "UpdateTimer": "flatland.plugin_api.update_timer",
+    "World": "flatland.world",
+    "WorldError": "flatland.errors",
+    "WorldLockedError": "flatland.errors",
+    "WorldObserver": "flatland.runtime.observer",
+    "WorldPlugin": "flatland.plugin_api.plugin",
+    "WorldSnapshot": "flatland.runtime.snapshot",
+    "YamlError": "flatland.errors",
+    "YamlReader": "flatland.config.reader",
+    "draw": "flatland.drawing",
+}
+
+
+def __getattr__(name: str) -> Any:
+    """Returns a member of `__all__` or a module of the package, importing it."""
+    value: Any
+    if name in _MODULES:
+        value = getattr(import_module(_MODULES[name]), name)
+    elif name == "load_world":
+        value = import_module("flatland.world").World.from_yaml
+    elif not name.startswith("_") and find_spec(f"{__name__}.{name}") is not None:
+        return import_module(f"{__name__}.{name}")
+    else:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    """Returns the members of the package, including those that have not been imported."""
+    return sorted({*globals(), *__all__})

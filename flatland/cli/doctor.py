@@ -54,12 +54,6 @@ _ROS = (
     ("tf2_msgs", "tf2_msgs", _APT + "python3-tf2-msgs", "ROS node"),
     ("tf2_ros", "tf2_ros", _APT + "python3-tf2-ros", "ROS node"),
     ("visualization_msgs", "visualization_msgs", _APT + "python3-visualization-msgs", "ROS node"),
-    (
-        "interactive_markers",
-        "interactive_markers",
-        _APT + "python3-interactive-markers",
-        "ROS node",
-    ),
     ("flatland.msg", "messages of flatland", _SETUP, "ROS node"),
     ("rosbag", "rosbag", _APT + "python3-rosbag", "flatland run --bag"),
     ("mcap_ros1", "mcap-ros1-support", "pip install mcap mcap-ros1-support", "MCAP files"),

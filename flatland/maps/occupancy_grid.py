@@ -21,7 +21,6 @@ FREE: Final = 0
 OCCUPIED: Final = 100
 UNKNOWN: Final = -1
 DEFAULT_FREE_THRESH: Final = 0.196  # the default of map_server
-DEFAULT_RESOLUTION: Final = 0.05  # m
 MAX_CELLS: Final = 2**28  # of a grid of line segments; 256 MiB
 _MODES: Final = ("trinary", "scale", "raw")
 

@@ -252,6 +252,11 @@ class PhysicsBody(Handle):
         """Fixtures of the body in order of creation."""
         return [self.world.fixture(i) for i in self._core.fixtures(self.id)]
 
+    @property
+    def fixture_ids(self) -> list[int]:
+        """Ids of the fixtures of the body in order of creation."""
+        return self._core.fixtures(self.id)
+
     def fixture(self, fixture_id: int) -> PhysicsFixture:
         """Returns the handle of a fixture of the same world by its id, without checking the id."""
         return self.world.fixture(fixture_id)

@@ -12,7 +12,7 @@ from tf2_msgs.msg import TFMessage
 from flatland.errors import PLUGIN_FAULTS
 from flatland.plugin_api.plugin import FlatlandPlugin
 from flatland.plugin_api.ports import Command, Output
-from flatland.ros.adapters import find_adapter, transform
+from flatland.ros.adapters import Adapter, find_adapter, transform
 from flatland.ros.clock import NodeClock
 from flatland.ros.plugin_ros import PluginRos
 from flatland.ros.transport.publisher import Publisher
@@ -80,7 +80,7 @@ class Bridge(WorldObserver):
 
     def transforms_sent(self, transforms: Sequence[Transform]) -> None:
         """Publishes all transforms of a step in one `/tf` message."""
-        self._tf.publish(TFMessage([transform.to_message(each) for each in transforms]))
+        self._tf.publish_serialized(transform.serialize_all(transforms))
 
     def step_finished(self) -> None:
         """Publishes the messages of the step."""
@@ -121,7 +121,7 @@ class Bridge(WorldObserver):
             on_connection=lambda connected: (output.want if connected else output.unwant)(self),
             owner=output.owners[0],
         )
-        self._outputs[output] = _OutputTopic(output, publisher, adapter.to_message, self._send)
+        self._outputs[output] = _OutputTopic(output, publisher, adapter, self._send)
 
     def output_closed(self, output: Output[Any]) -> None:
         """Closes the topic of an output."""
@@ -203,29 +203,34 @@ class _OutputTopic:
         self,
         output: Output[Any],
         publisher: Publisher,
-        to_message: Callable[[Any], Any],
+        adapter: Adapter,
         send: Callable[[Callable[[Any], None], Any], None],
     ) -> None:
         self.publisher = publisher
         self._output = output
         self._send = send
-        self._to_message = to_message
+        # To the serialized message if the adapter supports it, otherwise to a message object.
+        self._convert: Callable[[Any], Any] | None = adapter.serialize or adapter.to_message
+        self._is_serialized = adapter.serialize is not None
         # The subscribers of the topic decide whether the output is wanted, see `on_connection`.
         self.unsubscribe = output.subscribe(self, wants=False)
 
     def __call__(self, value: Any) -> None:
-        if self.publisher.connected:
+        if self.publisher.connected and self._convert is not None:
             # Converted now, because the value may change until the end of the step.
-            self._send(self._publish, self._to_message(value))
+            self._send(self._publish, self._convert(value))
 
     def _publish(self, message: Any) -> None:
         try:
-            self.publisher.publish(message)
+            if self._is_serialized:
+                self.publisher.publish_serialized(message)
+            else:
+                self.publisher.publish(message)
         except PLUGIN_FAULTS as error:
             self._output.report_fault(self, error)
 
     def __repr__(self) -> str:
         """Returns the name of the subscriber in the log."""
-        adapter = getattr(self._to_message, "__qualname__", repr(self._to_message))
-        module = getattr(self._to_message, "__module__", "")
+        adapter = getattr(self._convert, "__qualname__", repr(self._convert))
+        module = getattr(self._convert, "__module__", "")
         return f'ROS topic "{self.publisher.topic}" (adapter {module}.{adapter})'

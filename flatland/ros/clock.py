@@ -15,7 +15,7 @@ import rospy
 from rosgraph_msgs.msg import Clock
 from rospy import rostime
 
-from flatland.ros.adapters import convert
+from flatland.ros import stamps
 from flatland.ros.transport.registrar import Registrar
 from flatland.ros.transport.state_topic import StateTopic
 from flatland.ros.transport.ticker import Ticker
@@ -85,9 +85,9 @@ class SimulatedClock:
 
     def time_advanced(self, time_ns: int) -> None:
         """Sets the ROS time, and publishes it unless the rate is limited."""
-        self._set(convert.time(time_ns, rospy.Time))
+        self._set(stamps.time(time_ns, rospy.Time))
         if self._ticker is None and self._topic.connected:
-            self._topic.publish(self._message)
+            self._topic.publish_current(self._message.packed)
 
     def flush(self) -> None:
         """Publishes the current time if its rate is limited and it has not been published yet."""
@@ -102,7 +102,7 @@ class SimulatedClock:
         """Publishes the time if it has changed; with a limited rate, also after the last step."""
         if self._message.clock is not self._sent:
             self._sent = self._message.clock
-            self._topic.publish(self._message)
+            self._topic.publish_current(self._message.packed)
         return self._topic.connected
 
     def _connection_changed(self, _connected: bool) -> None:
@@ -127,16 +127,20 @@ class SimulatedClock:
 class _CurrentTime(Clock):  # type: ignore[misc]
     """The current time at the moment of serialization.
 
-    rospy serializes all messages of a topic one after the other, so that no subscriber receives a
+    All messages of a topic are serialized one after the other, so that no subscriber receives a
     time that is earlier than the previous one, whichever thread publishes it.
     """
 
     _TIME: Final = struct.Struct("<2I")
 
     def serialize(self, buffer: BytesIO) -> None:
-        """Writes the message; reads the time once, because another thread replaces it."""
-        now = self.clock
-        buffer.write(self._TIME.pack(now.secs, now.nsecs))
+        """Writes the message; called by rospy."""
+        buffer.write(self.packed())
+
+    def packed(self) -> bytes:
+        """Returns the serialized message."""
+        now = self.clock  # Read once, because another thread replaces it.
+        return self._TIME.pack(now.secs, now.nsecs)
 
 
 class WallClock:
@@ -151,7 +155,7 @@ class WallClock:
     """
 
     def __init__(self, now: Callable[[], int] = time.time_ns) -> None:
-        """Makes `convert` use these stamps.
+        """Makes `stamps` use these stamps.
 
         Args:
             now: Returns the wall time since the epoch [ns].
@@ -161,14 +165,14 @@ class WallClock:
         # other threads read it.
         start = (0, now())
         self._anchors = start, start
-        convert.set_stamps(self.stamp)
+        stamps.set_stamps(self.stamp)
 
     def flush(self) -> None:
         """Has no effect."""
 
     def close(self) -> None:
-        """Makes `convert` use simulated time again."""
-        convert.set_stamps(None)
+        """Makes `stamps` use simulated time again."""
+        stamps.set_stamps(None)
 
     def step_started(self, time_ns: int) -> None:
         """Renews the stamp of the current simulated time if it is too old."""

@@ -5,10 +5,12 @@ from __future__ import annotations
 import importlib
 import logging
 import threading
+from collections.abc import Callable
 from concurrent.futures import Future
 from typing import Any
 
 from flatland.ros.transport.registrar import Registrar
+from flatland.ros.transport.ticker import TickerThread
 from flatland.simulation import Simulation
 
 _LOG = logging.getLogger("flatland")
@@ -55,56 +57,46 @@ class DeferredTopics:
 
     def _load(self) -> None:
         """Imports the modules and opens the topics of each between two steps."""
+        markers = "flatland.ros.markers"
+        thread = TickerThread("flatland-markers", self._simulation.post)
         try:
             if self._debug_rate is not None:
-                importlib.import_module("flatland.ros.markers.debug_topics")
-                importlib.import_module("flatland.ros.markers.combined_markers")
-                self._start(self._start_debug_markers, "debug markers")
-            importlib.import_module("flatland.ros.pause_topic")
-            self._start(self._start_pause_topic, "the pause state")
-            importlib.import_module("flatland.ros.interactive.interactive_markers")
-            self._start(self._start_interactive_markers, "interactive markers")
-            importlib.import_module("flatland.ros.diagnostics")
-            self._start(self._start_diagnostics, "diagnostics")
+                debug = [
+                    importlib.import_module(f"{markers}.debug_topics").DebugTopics,
+                    importlib.import_module(f"{markers}.combined_markers").CombinedMarkers,
+                ]
+                self._start("debug markers", *debug, rate=self._debug_rate, thread=thread)
+            pause_topic = importlib.import_module("flatland.ros.pause_topic")
+            self._start("the pause state", pause_topic.PauseTopic)
+            interactive = importlib.import_module("flatland.ros.interactive.interactive_markers")
+            self._start(
+                "interactive markers",
+                interactive.InteractiveMarkers,
+                thread=thread,
+                move_keeps_odometry=self._move_keeps_odometry,
+            )
+            diagnostics = importlib.import_module("flatland.ros.diagnostics")
+            self._start("diagnostics", diagnostics.Diagnostics)
         except ImportError as error:
             _LOG.warning("markers or diagnostics are disabled: %s", error)
 
-    def _start(self, action: Any, what: str) -> None:
+    def _start(self, what: str, *parts: Callable[..., Any], **options: object) -> None:
+        """Creates parts between two steps.
+
+        Args:
+            what: What they publish, for the log.
+            parts: Their classes.
+            options: Arguments of their constructors.
+        """
+
+        def create() -> None:
+            if not self._closed:
+                for part in parts:
+                    self._parts.append(part(self._registrar, self._simulation, **options))
+
         def log_failure(done: Future[Any]) -> None:
             error = done.exception()
             if error is not None:
                 _LOG.error("cannot publish %s: %s", what, error, exc_info=error)
 
-        self._simulation.post(action).add_done_callback(log_failure)
-
-    def _start_debug_markers(self) -> None:
-        from flatland.ros.markers.combined_markers import CombinedMarkers
-        from flatland.ros.markers.debug_topics import DebugTopics
-
-        if not self._closed and self._debug_rate is not None:
-            for part in (DebugTopics, CombinedMarkers):
-                self._parts.append(part(self._registrar, self._simulation, self._debug_rate))
-
-    def _start_pause_topic(self) -> None:
-        from flatland.ros.pause_topic import PauseTopic
-
-        if not self._closed:
-            self._parts.append(PauseTopic(self._registrar, self._simulation))
-
-    def _start_interactive_markers(self) -> None:
-        from flatland.ros.interactive.interactive_markers import InteractiveMarkers
-
-        if not self._closed:
-            self._parts.append(
-                InteractiveMarkers(
-                    self._registrar,
-                    self._simulation,
-                    move_keeps_odometry=self._move_keeps_odometry,
-                )
-            )
-
-    def _start_diagnostics(self) -> None:
-        from flatland.ros.diagnostics import Diagnostics
-
-        if not self._closed:
-            self._parts.append(Diagnostics(self._registrar, self._simulation))
+        self._simulation.post(create).add_done_callback(log_failure)

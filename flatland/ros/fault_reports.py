@@ -10,10 +10,10 @@ from collections.abc import Iterator
 from types import TracebackType
 from typing import TYPE_CHECKING
 
-from flatland.plugin_api.plugin import FlatlandPlugin
 from flatland.ros.stacks import plugin_name, plugin_of
 
 if TYPE_CHECKING:
+    from flatland.plugin_api.plugin import FlatlandPlugin
     from flatland.world import World
 
 _LOG = logging.getLogger("flatland")

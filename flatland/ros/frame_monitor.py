@@ -5,7 +5,6 @@ from __future__ import annotations
 import logging
 import time
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from typing import Any, Final
 
 from tf2_msgs.msg import TFMessage
@@ -24,18 +23,6 @@ GRACE_PERIOD: Final = 5.0  # s of wall time after the first subscriber
 LISTENING_PERIOD: Final = 10.0  # s of wall time; afterwards a warning is logged
 RATE: Final = 1.0  # Hz, wall time
 _WORLD_FRAMES: Final = frozenset(("map", "odom", "world"))
-
-
-@dataclass(slots=True)
-class _Check:
-    """The check of one laser.
-
-    Attributes:
-        start: Time from which the laser has had a subscriber and the world has run
-            (`time.monotonic`); None if it has not.
-    """
-
-    start: float | None = None
 
 
 class FrameMonitor(WorldObserver):
@@ -72,7 +59,9 @@ class FrameMonitor(WorldObserver):
         self._subscribed = subscribed
         self._grace_period = grace_period
         self._listening_period = listening_period
-        self._checks: dict[Output[Any], _Check] = {}
+        # By laser, the time from which it has had a subscriber and the world has run
+        # (`time.monotonic`); None if it has not.
+        self._checks: dict[Output[Any], float | None] = {}
         self._listener: _TransformListener | None = None
         self._ticker = Ticker("flatland-frames", rate, simulation.post, self._tick)
         for output in self._world.ports.outputs.values():
@@ -86,7 +75,7 @@ class FrameMonitor(WorldObserver):
     def output_opened(self, output: Output[Any]) -> None:
         """Adds the check of a laser."""
         if issubclass(output.value_type, LaserScan):
-            self._checks[output] = _Check()
+            self._checks[output] = None
             self._ticker.wake()
 
     def output_closed(self, output: Output[Any]) -> None:
@@ -97,19 +86,19 @@ class FrameMonitor(WorldObserver):
         """Checks all lasers; returns whether there are lasers left."""
         own_parents: dict[str, str] | None = None
         is_listening = False
-        for output, check in list(self._checks.items()):
+        for output, start in list(self._checks.items()):
             scan = output.latest
             if scan is None or self._world.paused or not self._subscribed(output):
-                check.start = None
+                self._checks[output] = None
                 continue
-            if check.start is None:
-                check.start = now
+            if start is None:
+                start = self._checks[output] = now
             if own_parents is None:
                 own_parents = {child: parent for parent, child in self._world.transforms}
             if self._is_connected(scan.frame_id, own_parents):
                 del self._checks[output]
-            elif now - check.start >= self._grace_period:
-                if self._check_all_nodes(output, scan.frame_id, own_parents, now - check.start):
+            elif now - start >= self._grace_period:
+                if self._check_all_nodes(output, scan.frame_id, own_parents, now - start):
                     del self._checks[output]
                 else:
                     is_listening = True

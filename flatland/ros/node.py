@@ -20,6 +20,7 @@ from flatland.ros.shutdown import ShutdownWatchdog
 
 if TYPE_CHECKING:
     from flatland.ros.message_recorder import MessageRecorder
+    from flatland.ros.parameter_server import ParameterServer
     from flatland.ros.transport.registrar import Registrar
     from flatland.simulation import RunResult, Simulation
     from flatland.world import World
@@ -30,14 +31,12 @@ NODE_NAME: Final = "flatland_server"
 _MASTER_POLL_PERIOD: Final = 0.2  # s between two attempts to reach the ROS master
 _MASTER_WARNING_TIMEOUT: Final = 1.0  # s without a ROS master until a warning is logged
 _SWITCH_INTERVAL: Final = 0.0002  # s for which a thread keeps the GIL while others wait for it
+_REGISTRATION_TIMEOUT: Final = 0.1  # s, for the registration of `/clock`
 _UNREGISTER_TIMEOUT: Final = 0.5  # s
 _STOP_POLL_PERIOD: Final = 0.05  # s between two checks for a stop request without a master
 _SHUTDOWN_POLL_PERIOD: Final = 0.002  # s
-_USE_SIM_TIME: Final = "/use_sim_time"
 # The reason that the ROS master gives to a node whose name another node has taken.
 _REPLACED: Final = "new node registered with same name"
-# Some forks of the reference read these from the global namespace, others from the private one.
-_GLOBAL_IN_FORKS: Final = ("world_path", "update_rate", "step_size", "show_viz", "viz_pub_rate")
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -121,12 +120,15 @@ class ServerNode:
         # Before the hook of rospy that unregisters the node. `rospy.on_shutdown` passes no reason.
         rospy.core._preshutdown_hooks.insert(0, shut_down)
         log_to_ros()
+        from flatland.ros.parameter_server import ParameterServer
+
         try:
+            server = ParameterServer()
             parameters = read_parameters(
-                _private_parameter, default_msgs_package=self._default_msgs_package
+                server.get, default_msgs_package=self._default_msgs_package
             )
             watchdog.timeout = parameters.shutdown_timeout
-            self._simulate(parameters)
+            self._simulate(parameters, server)
         except ParameterError as error:
             code = self._fail(str(error))
         except FlatlandError as error:
@@ -199,8 +201,12 @@ class ServerNode:
         _LOG.critical("%s", text, **options)
         return 1
 
-    def _simulate(self, parameters: NodeParameters) -> None:
+    def _simulate(self, parameters: NodeParameters, server: ParameterServer) -> None:
         """Loads the world and steps it until a stop is requested.
+
+        Args:
+            parameters: The parameters of the node.
+            server: Where they were found.
 
         Raises:
             ParameterError: The package of the message types is not installed.
@@ -214,25 +220,29 @@ class ServerNode:
             raise ParameterError(
                 f'Invalid parameter "~msgs_package": "{package}" is not installed, {error}'
             ) from error
-        from flatland.ros.bridge import Bridge
         from flatland.ros.clock import NodeClock, SimulatedClock, WallClock
-        from flatland.ros.deferred_topics import DeferredTopics
-        from flatland.ros.frame_monitor import FrameMonitor
-        from flatland.ros.hook_watchdog import HookWatchdog
-        from flatland.ros.services import Services
-        from flatland.ros.transport.master_watch import MasterWatch
         from flatland.ros.transport.registrar import Registrar
-        from flatland.simulation import Simulation
 
-        _check_time_of_other_nodes(parameters.use_sim_time)
+        _check_time_of_other_nodes(parameters.use_sim_time, server.use_sim_time is True)
         self._registrar = Registrar()
-        self._registrar.keep_parameters(_current_parameters())
-        master_watch = MasterWatch(self._registrar, self._replace)
+        self._registrar.keep_parameters(server.found())
         clock: NodeClock
         if parameters.use_sim_time:
             clock = SimulatedClock(self._registrar, parameters.clock_rate)
         else:
             clock = WallClock()
+        # Other nodes have a valid time while the following modules are imported, which takes as
+        # long as everything before. The import would delay the registration.
+        self._registrar.flush(_REGISTRATION_TIMEOUT)
+        from flatland.ros.bridge import Bridge
+        from flatland.ros.deferred_topics import DeferredTopics
+        from flatland.ros.frame_monitor import FrameMonitor
+        from flatland.ros.hook_watchdog import HookWatchdog
+        from flatland.ros.services import Services
+        from flatland.ros.transport.master_watch import MasterWatch
+        from flatland.simulation import Simulation
+
+        master_watch = MasterWatch(self._registrar, self._replace)
         bridge = Bridge(self._registrar, clock)
         world = _load(parameters, bridge)
         message_recorder = _start_recordings(parameters, world)
@@ -323,13 +333,14 @@ def _start_recordings(parameters: NodeParameters, world: World) -> MessageRecord
 
 
 def _load(parameters: NodeParameters, bridge: Any) -> World:
+    from flatland.ros.parameter_server import yaml_parameter
     from flatland.world import World
 
     start = time.perf_counter()
     world = World.from_yaml(
         parameters.world_path,
         seed=parameters.seed,
-        params=_yaml_parameter,
+        params=yaml_parameter,
         simplify_map=parameters.simplify_map,
         step_size=parameters.step_size,
         observers=[bridge],
@@ -378,45 +389,13 @@ def _log_benchmark(result: RunResult) -> None:
     )
 
 
-def _private_parameter(name: str) -> object:
-    """Returns a private parameter.
+def _check_time_of_other_nodes(use_sim_time: bool, others: bool) -> None:
+    """Logs a warning if other nodes use another time than the stamps of this one.
 
-    `simplify_map` is searched for in outer namespaces too; without a `~world_path`, so are the
-    parameters that the launch files of some forks of the reference set there.
+    Args:
+        use_sim_time: Whether this node uses simulated time.
+        others: Whether other nodes do.
     """
-    import rospy
-
-    resolved = rospy.resolve_name(f"~{name}")
-    is_searched = name in _GLOBAL_IN_FORKS and not rospy.has_param("~world_path")
-    if name == "simplify_map" or is_searched:
-        # Searches the namespace of the node, then each one above it.
-        resolved = rospy.search_param(name) or resolved
-    return rospy.get_param(resolved, None)
-
-
-def _yaml_parameter(name: str) -> object:
-    """Returns the value of `param()` in YAML files; relative names are in the node's namespace."""
-    import rospy
-
-    return rospy.get_param(name, None)
-
-
-def _current_parameters() -> dict[str, object]:
-    """Returns the private parameters and `/use_sim_time`, as far as they are set, by name."""
-    import rospy
-
-    private = rospy.get_param("~", {})
-    found = {rospy.resolve_name(f"~{name}"): value for name, value in private.items()}
-    if rospy.has_param(_USE_SIM_TIME):
-        found[_USE_SIM_TIME] = rospy.get_param(_USE_SIM_TIME)
-    return found
-
-
-def _check_time_of_other_nodes(use_sim_time: bool) -> None:
-    """Logs a warning if other nodes use another time than the stamps of this one."""
-    import rospy
-
-    others = rospy.get_param(_USE_SIM_TIME, False) is True
     if use_sim_time and not others:
         _LOG.warning("/use_sim_time is not true: other nodes do not follow the simulated time")
     elif others and not use_sim_time:

@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TypeVar
 
-from flatland.maps.occupancy_grid import DEFAULT_RESOLUTION
+from flatland.defaults import DEFAULT_RESOLUTION, IF_BLOCKED, MAX_LAG, IfBlocked
 from flatland.ros.message_types import MESSAGE_PACKAGES, OWN_PACKAGE
 from flatland.ros.shutdown import DEFAULT_SHUTDOWN_TIMEOUT
-from flatland.runtime.placement import IF_BLOCKED, IfBlocked
-from flatland.simulation import MAX_LAG
 from flatland.timekeeper import MAX_STEP_SIZE, MIN_STEP_SIZE
 
+W = TypeVar("W", bound=str)
 ParameterSource = Callable[[str], object]
 """Returns the value of a parameter, None if it is not set."""
 
@@ -121,7 +121,7 @@ def read_parameters(
         benchmark_duration=reader.optional_positive("benchmark_duration"),
         plugin_timeout=reader.timeout("plugin_timeout", 60.0),
         shutdown_timeout=reader.timeout("shutdown_timeout", DEFAULT_SHUTDOWN_TIMEOUT),
-        if_blocked=reader.if_blocked("if_blocked", "warn"),
+        if_blocked=reader.word("if_blocked", "warn", IF_BLOCKED, "one of " + ", ".join(IF_BLOCKED)),
         move_keeps_odometry=reader.boolean("move_keeps_odometry", False),
         initialpose_model=reader.name("initialpose_model"),
         record=reader.file("record"),
@@ -132,7 +132,9 @@ def read_parameters(
         publish_map=reader.optional_name("publish_map"),
         map_frame=reader.frame("map_frame", "map"),
         map_resolution=reader.finite_positive("map_resolution", DEFAULT_RESOLUTION),
-        msgs_package=reader.msgs_package("msgs_package", default_msgs_package),
+        msgs_package=reader.word(
+            "msgs_package", default_msgs_package, MESSAGE_PACKAGES, " or ".join(MESSAGE_PACKAGES)
+        ),
         model_path=reader.folders("model_path"),
     )
 
@@ -238,14 +240,15 @@ class _Reader:
             raise _invalid(name, wanted, value)
         return value
 
-    def if_blocked(self, name: str, default: IfBlocked) -> IfBlocked:
+    def word(self, name: str, default: W, words: Sequence[W], wanted: str) -> W:
+        """Reads one of several words."""
         value = self._get(name)
         if value is None:
             return default
-        for choice in IF_BLOCKED:
-            if value == choice:
-                return choice
-        raise _invalid(name, "one of " + ", ".join(IF_BLOCKED), value)
+        for word in words:
+            if value == word:
+                return word
+        raise _invalid(name, wanted, value)
 
     def name(self, name: str, wanted: str = "a name") -> str:
         """Reads a name; empty by default. rosrun passes a name of digits as a number."""
@@ -278,14 +281,6 @@ class _Reader:
         if not isinstance(value, str) or not value.strip(" /"):
             raise _invalid(name, "the name of a frame", value)
         return value.strip().lstrip("/")
-
-    def msgs_package(self, name: str, default: str) -> str:
-        value = self._get(name)
-        if value is None:
-            return default
-        if not isinstance(value, str) or value not in MESSAGE_PACKAGES:
-            raise _invalid(name, " or ".join(MESSAGE_PACKAGES), value)
-        return value
 
     def folders(self, name: str) -> tuple[str, ...] | None:
         """Reads a list of absolute folders, or a text with colons between them; empty for none."""

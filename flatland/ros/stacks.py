@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import sys
 from types import FrameType
-from typing import Final
+from typing import TYPE_CHECKING, Final, TypeGuard
 
-from flatland.plugin_api.plugin import FlatlandPlugin, describe
+if TYPE_CHECKING:
+    from flatland.plugin_api.plugin import FlatlandPlugin
 
 _STACK_DEPTH: Final = 10  # calls shown of a stack
 
@@ -56,7 +58,13 @@ def plugin_call(frame: FrameType) -> tuple[FlatlandPlugin, FrameType] | None:
 def plugin_of(frame: FrameType) -> FlatlandPlugin | None:
     """Returns the plugin whose method a frame executes, None for other functions."""
     owner = frame.f_locals.get("self") if "self" in frame.f_code.co_varnames else None
-    return owner if isinstance(owner, FlatlandPlugin) else None
+    return owner if _is_plugin(owner) else None
+
+
+def _is_plugin(owner: object) -> TypeGuard[FlatlandPlugin]:
+    # The node imports the module late, and until then there are no plugins.
+    module = sys.modules.get("flatland.plugin_api.plugin")
+    return isinstance(owner, getattr(module, "FlatlandPlugin", ()))
 
 
 def call_name(plugin: FlatlandPlugin, frame: FrameType) -> str:
@@ -66,6 +74,8 @@ def call_name(plugin: FlatlandPlugin, frame: FrameType) -> str:
 
 def plugin_name(plugin: FlatlandPlugin) -> str:
     """Returns the description of a plugin, also of one that has no name yet."""
+    from flatland.plugin_api.plugin import describe  # imported, since there is a plugin
+
     try:
         return describe(plugin)
     except AttributeError:  # A plugin has no name or model before it is attached to a world.

@@ -6,10 +6,12 @@ import logging
 import math
 import zlib
 from collections.abc import Callable, Iterable, Sequence
-from typing import TYPE_CHECKING, ClassVar, Final, Literal, TypeAlias, get_args
+from typing import TYPE_CHECKING, ClassVar, Final, TypeAlias
 
 import numpy as np
 
+from flatland.defaults import IF_BLOCKED
+from flatland.defaults import IfBlocked as IfBlocked
 from flatland.entities.layer import Layer
 from flatland.entities.model import Model
 from flatland.errors import WorldError
@@ -25,9 +27,6 @@ if TYPE_CHECKING:
 _LOG = logging.getLogger("flatland")
 
 Models: TypeAlias = str | Model | Iterable[str | Model]
-
-IfBlocked = Literal["allow", "warn", "refuse", "nearest"]
-IF_BLOCKED: Final[tuple[IfBlocked, ...]] = get_args(IfBlocked)
 
 TOLERANCE: Final = 0.005  # m of penetration that is allowed, as by the Box2D solver
 _ROUNDING: Final = 1e-4  # m of overlap of touching shapes that single precision may cause

@@ -1,6 +1,7 @@
 """The loop that steps a world in real time or as fast as possible."""
 
+from flatland.defaults import MAX_LAG
 from flatland.simulation.cycle_statistics import CycleStatistics
-from flatland.simulation.simulation import MAX_LAG, RunResult, Simulation
+from flatland.simulation.simulation import RunResult, Simulation
 
 __all__ = ["MAX_LAG", "CycleStatistics", "RunResult", "Simulation"]

@@ -10,15 +10,13 @@ from concurrent.futures import Future
 from dataclasses import dataclass
 from typing import Final, TypeVar
 
+from flatland.defaults import MAX_LAG
 from flatland.errors import WorldError
 from flatland.simulation.cycle_statistics import CycleStatistics, CycleWindow
 from flatland.simulation.rate_monitor import RateMonitor
 from flatland.simulation.step_requests import StepRequests
 from flatland.timekeeper import NANOSECONDS
 from flatland.world import World
-
-MAX_LAG: Final = 0.1
-"""Default of the maximum lag that a loop catches up on [s]."""
 
 _PAUSED_PERIOD: Final = 0.01  # s between two cycles of a paused world without a rate
 _MAX_WAIT: Final = 3600.0  # s; Python raises for a timeout of several centuries

@@ -16,7 +16,12 @@ class RawSubscriber:
     """A subscriber that completes the handshake of TCPROS, and then reads only on demand."""
 
     def __init__(
-        self, master: Any, topic: str, message_type: type[Any], receive_buffer: int | None = None
+        self,
+        master: Any,
+        topic: str,
+        message_type: type[Any],
+        receive_buffer: int | None = None,
+        name: str = "/raw",
     ) -> None:
         """Connects to the publisher of a topic.
 
@@ -25,11 +30,12 @@ class RawSubscriber:
             topic: Resolved name of the topic.
             message_type: ROS message class.
             receive_buffer: Size of the receive buffer of the socket [bytes]; None for the default.
+            name: Name of the node; a publisher keeps one connection for each name.
         """
         self._message_type = message_type
         (publisher,) = next(nodes for name, nodes in master.getSystemState()[0] if name == topic)
         node = ServerProxy(master.lookupNode(publisher))
-        code, text, protocol = node.requestTopic("/raw", topic, [["TCPROS"]])
+        code, text, protocol = node.requestTopic(name, topic, [["TCPROS"]])
         assert code == 1, text
         self.socket = socket.socket()
         if receive_buffer is not None:
@@ -37,7 +43,7 @@ class RawSubscriber:
         self.socket.settimeout(TIMEOUT)
         self.socket.connect((urlparse(f"//{protocol[1]}").hostname, protocol[2]))
         fields = {
-            "callerid": "/raw",
+            "callerid": name,
             "topic": topic,
             "type": message_type._type,
             "md5sum": message_type._md5sum,

@@ -11,7 +11,7 @@ import pytest
 
 # From the bottom up. A module imports only from floors below its own and from its own room.
 FLOORS = (
-    ("errors", "geometry", "graph_names", "requirements", "timekeeper", "version"),
+    ("defaults", "errors", "geometry", "graph_names", "requirements", "timekeeper", "version"),
     ("physics", "values"),
     ("config", "entities"),
     ("copying", "maps", "plugin_api"),

@@ -38,12 +38,15 @@ class Adapter:
         message_type: The ROS message class.
         to_message: Converts a value to a message; None if values are only received.
         from_message: Converts a message to a value; None if values are only published.
+        serialize: Converts a value to a serialized message; None to serialize the result of
+            `to_message`.
     """
 
     value_type: type[Any]
     message_type: type[Any]
     to_message: Callable[[Any], Any] | None
     from_message: Callable[[Any], Any] | None
+    serialize: Callable[[Any], bytes] | None = None
 
 
 _adapters: dict[type[Any], Adapter] = {}
@@ -54,6 +57,7 @@ def register_adapter(
     message_type: type[Any],
     to_message: Callable[[Any], Any] | None = None,
     from_message: Callable[[Any], Any] | None = None,
+    serialize: Callable[[Any], bytes] | None = None,
 ) -> None:
     """Registers the conversion between the values of a type and ROS messages.
 
@@ -65,13 +69,19 @@ def register_adapter(
         to_message: Converts a value to a new message; called in the thread that steps the world.
             The message is sent at the end of the step.
         from_message: Converts a message to a value; called in a rospy thread.
+        serialize: Converts a value to the bytes that `serialize` of the message of `to_message`
+            writes, with the sequence number 0 in the header. Messages are then published without
+            creating Python objects for their parts; `to_message` is used by recorders only.
 
     Raises:
-        ValueError: Neither function is given.
+        ValueError: Neither `to_message` nor `from_message` is given, or `serialize` is given
+            without `to_message`.
     """
     if to_message is None and from_message is None:
         raise ValueError(f"an adapter for {value_type.__name__} needs at least one function")
-    _adapters[value_type] = Adapter(value_type, message_type, to_message, from_message)
+    if serialize is not None and to_message is None:
+        raise ValueError(f"an adapter for {value_type.__name__} needs to_message for serialize")
+    _adapters[value_type] = Adapter(value_type, message_type, to_message, from_message, serialize)
 
 
 def find_adapter(value_type: type[Any]) -> Adapter | None:

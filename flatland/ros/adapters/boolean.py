@@ -10,9 +10,14 @@ def to_message(value: bool) -> Bool:
     return Bool(value)
 
 
+def serialize(value: bool) -> bytes:
+    """Converts a value to a serialized message."""
+    return b"\1" if value else b"\0"
+
+
 def from_message(message: Bool) -> bool:
     """Converts a message to a value."""
     return bool(message.data)
 
 
-register_adapter(bool, Bool, to_message, from_message)
+register_adapter(bool, Bool, to_message, from_message, serialize)

@@ -2,7 +2,8 @@
 
 from typing import Any
 
-from flatland.ros.adapters import convert, register_adapter
+from flatland.geometry import DoubleArray
+from flatland.ros.adapters import convert, packing, register_adapter
 from flatland.ros.message_types import message_class
 from flatland.values import Collision, Collisions
 
@@ -31,4 +32,32 @@ def _collision(value: Collision) -> Any:
     )
 
 
-register_adapter(Collisions, _Collisions, to_message)
+def serialize(value: Collisions) -> bytes:
+    """Converts a value to a serialized message."""
+    parts = [
+        packing.header(value.stamp, value.frame_id),
+        packing.COUNT.pack(len(value.collisions)),
+    ]
+    for collision in value.collisions:
+        forces = collision.magnitude_forces
+        parts += (
+            packing.text(collision.entity_a),
+            packing.text(collision.body_a),
+            packing.text(collision.entity_b),
+            packing.text(collision.body_b),
+            packing.COUNT.pack(len(forces)),
+            packing.doubles(forces),
+            _points(collision.contact_positions),
+            _points(collision.contact_normals),
+        )
+    return b"".join(parts)
+
+
+def _points(points: DoubleArray) -> bytes:
+    """Serializes an array of points (x, y), shape (k, 2)."""
+    if points.ndim != 2 or points.shape[1] != 2:
+        raise ValueError(f"points must have shape (k, 2), got {points.shape}")
+    return packing.COUNT.pack(len(points)) + packing.doubles(points)
+
+
+register_adapter(Collisions, _Collisions, to_message, serialize=serialize)

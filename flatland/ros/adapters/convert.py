@@ -3,34 +3,17 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Any
 
-from genpy import Time
 from geometry_msgs.msg import Point, Pose, Quaternion, Twist, Vector3
 from std_msgs.msg import Header
 
 from flatland import geometry
 from flatland.geometry import DoubleArray, quaternion_from_yaw
-from flatland.timekeeper import NANOSECONDS
-
-_stamps: Callable[[int], int] | None = None
-
-
-def set_stamps(stamps: Callable[[int], int] | None) -> None:
-    """Sets the stamps of all messages of this process.
-
-    Args:
-        stamps: Returns the stamp [ns] of a simulated time [ns]; called in any thread. None if
-            stamps are simulated times.
-    """
-    global _stamps
-    _stamps = stamps
-
-
-def stamp(nanoseconds: int) -> int:
-    """Returns the stamp [ns] of a simulated time [ns]: that time, or wall time."""
-    return nanoseconds if _stamps is None else _stamps(nanoseconds)
+from flatland.ros.stamps import set_stamps as set_stamps
+from flatland.ros.stamps import stamp as stamp
+from flatland.ros.stamps import time as time
 
 
 def make(message_type: type[Any], *fields: Any) -> Any:
@@ -42,15 +25,6 @@ def make(message_type: type[Any], *fields: Any) -> Any:
     for name, value in zip(message_type.__slots__, fields, strict=True):
         setattr(message, name, value)
     return message
-
-
-def time(nanoseconds: int, time_type: type[Time] = Time) -> Time:
-    """Converts simulated nanoseconds to the ROS time of a stamp without rounding."""
-    result: Time = object.__new__(time_type)
-    if _stamps is not None:
-        nanoseconds = _stamps(nanoseconds)
-    result.secs, result.nsecs = divmod(nanoseconds, NANOSECONDS)
-    return result
 
 
 def header(stamp: int, frame_id: str) -> Header:

@@ -1,10 +1,17 @@
 """`NavSatFix` as `sensor_msgs/NavSatFix`."""
 
+import struct
+from typing import Final
+
 from sensor_msgs.msg import NavSatFix as NavSatFixMessage
 from sensor_msgs.msg import NavSatStatus
 
-from flatland.ros.adapters import convert, register_adapter
+from flatland.ros.adapters import convert, packing, register_adapter
 from flatland.values import NavSatFix
+
+_STATUS: Final = struct.pack("<bH", NavSatStatus.STATUS_FIX, NavSatStatus.SERVICE_GPS)
+_POSITION: Final = struct.Struct("<3d")
+_UNKNOWN_COVARIANCE: Final = bytes(9 * 8) + bytes([NavSatFixMessage.COVARIANCE_TYPE_UNKNOWN])
 
 
 def to_message(value: NavSatFix) -> NavSatFixMessage:
@@ -19,4 +26,16 @@ def to_message(value: NavSatFix) -> NavSatFixMessage:
     )
 
 
-register_adapter(NavSatFix, NavSatFixMessage, to_message)
+def serialize(value: NavSatFix) -> bytes:
+    """Converts a value to a serialized message with unknown covariance."""
+    return b"".join(
+        (
+            packing.header(value.stamp, value.frame_id),
+            _STATUS,
+            _POSITION.pack(value.latitude, value.longitude, value.altitude),
+            _UNKNOWN_COVARIANCE,
+        )
+    )
+
+
+register_adapter(NavSatFix, NavSatFixMessage, to_message, serialize=serialize)

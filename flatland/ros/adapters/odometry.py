@@ -3,7 +3,7 @@
 from geometry_msgs.msg import PoseWithCovariance, TwistWithCovariance
 from nav_msgs.msg import Odometry as OdometryMessage
 
-from flatland.ros.adapters import convert, register_adapter
+from flatland.ros.adapters import convert, packing, register_adapter
 from flatland.values import Odometry
 
 
@@ -27,4 +27,18 @@ def to_message(value: Odometry) -> OdometryMessage:
     )
 
 
-register_adapter(Odometry, OdometryMessage, to_message)
+def serialize(value: Odometry) -> bytes:
+    """Converts a value to a serialized message."""
+    return b"".join(
+        (
+            packing.header(value.stamp, value.frame_id),
+            packing.text(value.child_frame_id),
+            packing.pose(*value.pose),
+            packing.covariance(value.pose_covariance, 6),
+            packing.twist(value.twist),
+            packing.covariance(value.twist_covariance, 6),
+        )
+    )
+
+
+register_adapter(Odometry, OdometryMessage, to_message, serialize=serialize)

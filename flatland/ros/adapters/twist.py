@@ -2,7 +2,7 @@
 
 from geometry_msgs.msg import Twist as TwistMessage
 
-from flatland.ros.adapters import convert, register_adapter
+from flatland.ros.adapters import convert, packing, register_adapter
 from flatland.values import Twist
 
 
@@ -16,4 +16,9 @@ def from_message(message: TwistMessage) -> Twist:
     return Twist(message.linear.x, message.linear.y, message.angular.z)
 
 
-register_adapter(Twist, TwistMessage, to_message, from_message)
+def serialize(value: Twist) -> bytes:
+    """Converts a value to a serialized message."""
+    return packing.twist((value.linear_x, value.linear_y, value.angular_z))
+
+
+register_adapter(Twist, TwistMessage, to_message, from_message, serialize)

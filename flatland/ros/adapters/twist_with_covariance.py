@@ -3,7 +3,7 @@
 from geometry_msgs.msg import TwistWithCovariance as TwistWithCovarianceMessage
 from geometry_msgs.msg import TwistWithCovarianceStamped
 
-from flatland.ros.adapters import convert, register_adapter
+from flatland.ros.adapters import convert, packing, register_adapter
 from flatland.values import TwistWithCovariance
 
 
@@ -17,4 +17,15 @@ def to_message(value: TwistWithCovariance) -> TwistWithCovarianceStamped:
     )
 
 
-register_adapter(TwistWithCovariance, TwistWithCovarianceStamped, to_message)
+def serialize(value: TwistWithCovariance) -> bytes:
+    """Converts a value to a serialized message."""
+    return b"".join(
+        (
+            packing.header(value.stamp, value.frame_id),
+            packing.twist(value.twist),
+            packing.covariance(value.covariance, 6),
+        )
+    )
+
+
+register_adapter(TwistWithCovariance, TwistWithCovarianceStamped, to_message, serialize=serialize)

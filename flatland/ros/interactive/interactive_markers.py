@@ -6,7 +6,6 @@ import logging
 import math
 from typing import Final
 
-from interactive_markers.menu_handler import MenuHandler
 from visualization_msgs.msg import InteractiveMarkerFeedback
 
 from flatland.entities.model import Model
@@ -15,11 +14,11 @@ from flatland.geometry import Pose, wrap_angle
 from flatland.ros.adapters import convert
 from flatland.ros.interactive.drag import Drags
 from flatland.ros.interactive.marker_server import MarkerServer
-from flatland.ros.interactive.model_handle import model_handle, pose_message
+from flatland.ros.interactive.model_handle import DELETE_ENTRY, model_handle
 from flatland.ros.markers.packed_markers import FRAME
 from flatland.ros.names import UniqueNames, sendable_text
 from flatland.ros.transport.registrar import Registrar
-from flatland.ros.transport.ticker import Ticker
+from flatland.ros.transport.ticker import Ticker, TickerThread
 from flatland.runtime.observer import WorldObserver
 from flatland.simulation import Simulation
 
@@ -38,13 +37,19 @@ class InteractiveMarkers(WorldObserver):
     """
 
     def __init__(
-        self, registrar: Registrar, simulation: Simulation, *, move_keeps_odometry: bool = False
+        self,
+        registrar: Registrar,
+        simulation: Simulation,
+        thread: TickerThread,
+        *,
+        move_keeps_odometry: bool = False,
     ) -> None:
         """Advertises the topics asynchronously; must be called between two steps.
 
         Args:
             registrar: Registers the topics with the ROS master.
             simulation: Simulation of the world.
+            thread: Posts the periodic work.
             move_keeps_odometry: Whether a drag keeps the odometry of the model.
         """
         self._keep_odometry = move_keeps_odometry
@@ -55,9 +60,7 @@ class InteractiveMarkers(WorldObserver):
         self._published: dict[str, Pose] = {}  # last published pose of each marker
         self._drags = Drags(self._world)
         self._keep_alive_due = 0.0
-        self._menu = MenuHandler()
-        self._menu.insert("Delete Model", callback=self._delete)
-        self._ticker = Ticker("flatland-handles", UPDATE_RATE, simulation.post, self._tick)
+        self._ticker = Ticker("flatland-handles", UPDATE_RATE, simulation.post, self._tick, thread)
         self._server = MarkerServer(
             registrar,
             SERVER_NAME,
@@ -85,7 +88,6 @@ class InteractiveMarkers(WorldObserver):
         self._models[name] = model
         self._published[name] = model.pose
         self._server.insert(model_handle(model, name))
-        self._menu.apply(self._server, name)
         self._apply_without_clients()
 
     def model_removed(self, model: Model) -> None:
@@ -102,7 +104,7 @@ class InteractiveMarkers(WorldObserver):
     def _apply_without_clients(self) -> None:
         # Without clients nothing is published, so that the update rate does not matter.
         if not self._server.connected:
-            self._server.applyChanges()
+            self._server.apply_changes()
 
     # -- feedback of clients ---------------------------------------------------------------
 
@@ -124,7 +126,8 @@ class InteractiveMarkers(WorldObserver):
             return  # Another client is dragging it.
         event, pose = feedback.event_type, self._pose_in_map(feedback)
         if event == feedback.MENU_SELECT:
-            self._menu.processFeedback(feedback)
+            if feedback.menu_entry_id == DELETE_ENTRY:
+                self._world.delete_model(model.name)
         elif event == feedback.MOUSE_UP:
             self._release(name, pose)
         elif event in (feedback.MOUSE_DOWN, feedback.POSE_UPDATE):
@@ -158,9 +161,6 @@ class InteractiveMarkers(WorldObserver):
                 keep_odometry=self._keep_odometry,
             )
 
-    def _delete(self, feedback: InteractiveMarkerFeedback) -> None:
-        self._world.delete_model(self._models[feedback.marker_name].name)
-
     # -- updates to clients ----------------------------------------------------------------
 
     def _on_connection(self) -> None:
@@ -190,9 +190,10 @@ class InteractiveMarkers(WorldObserver):
     def _send_changes(self) -> None:
         for name, published in self._published.items():
             pose = self._pose_of(name)
-            if _differ(pose, published) and self._server.setPose(name, pose_message(pose)):
+            if pose != published and _differ(pose, published):
+                self._server.move(name)
                 self._published[name] = pose
-        self._server.applyChanges()
+        self._server.apply_changes()
 
 
 def _differ(a: Pose, b: Pose) -> bool:

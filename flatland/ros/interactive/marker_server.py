@@ -1,40 +1,52 @@
-"""Interactive marker server of ROS on non-blocking connections."""
+"""The protocol of interactive markers on non-blocking connections, in serialized form.
+
+A client receives the full state on `update_full`, and numbered changes of it on `update`. It starts
+to display markers once it has a full state with a number among those of the updates that it has
+received, and starts again if a number is missing. Keep-alive messages repeat the last number.
+"""
 
 from __future__ import annotations
 
+import struct
 import time
 from collections.abc import Callable
 from concurrent.futures import Future
-from threading import Lock
+from io import BytesIO
 from typing import Any, Final
 
 import rospy
-from interactive_markers.interactive_marker_server import InteractiveMarkerServer
 from visualization_msgs.msg import (
+    InteractiveMarker,
     InteractiveMarkerFeedback,
     InteractiveMarkerInit,
+    InteractiveMarkerPose,
     InteractiveMarkerUpdate,
 )
 
 from flatland.geometry import Pose
-from flatland.ros.interactive.model_handle import pose_message
+from flatland.ros.adapters import packing
 from flatland.ros.transport.publisher import Publisher
 from flatland.ros.transport.registrar import Registrar
 from flatland.ros.transport.state_topic import StateTopic
 from flatland.ros.transport.subscriber import Subscriber
 
+CONNECTING_TIME: Final = 3.0
+"""Time after a new connection in which each update is followed by the full state [s]."""
+FULL_STATE_PERIOD: Final = 1.0
+"""Time between two full states afterwards [s], for clients that need longer."""
 _UPDATE_QUEUE: Final = 100  # messages; a client that misses one requests the full state again
+_NUMBER_AND_TYPE: Final = struct.Struct("<QB")
+_NUMBER: Final = struct.Struct("<Q")
+_HEADER_SIZE: Final = 3 * 4  # bytes of a header before the frame
 
 Feedback = Callable[[InteractiveMarkerFeedback, float], None]
 """Callback with feedback and the time at which it was received (`time.monotonic`) [s]."""
 
 
-class MarkerServer(InteractiveMarkerServer):  # type: ignore[misc]
-    """Manages the markers and their numbered updates like the base class.
+class MarkerServer:
+    """Manages interactive markers and publishes their changes.
 
-    Unlike the base class, it publishes without blocking and without a timer of its own, and passes
-    all feedback to the thread that steps the world. The base class sends keep-alive messages and
-    arbitrates between clients in ROS time, which does not advance while the world is paused.
+    All methods must be called in the thread that steps the world.
     """
 
     def __init__(
@@ -57,60 +69,171 @@ class MarkerServer(InteractiveMarkerServer):  # type: ignore[misc]
             receive: Called with feedback, between two steps.
             on_connection: Called in a rospy thread when a client connects or disconnects.
         """
-        # super().__init__ is not called: it opens connections and starts a timer.
-        self.topic_ns = name
-        self.server_id = rospy.get_name()
-        self.seq_num = 0
-        self.mutex = Lock()
-        self.marker_contexts: dict[str, Any] = {}
-        self.pending_updates: dict[str, Any] = {}
+        self._server_id = packing.text(rospy.get_name())
+        self._number = 0  # of the last update
+        self._markers: dict[str, _PackedMarker] = {}
+        # Changes since the last update: markers added or replaced, moved, erased.
+        self._inserted: dict[str, None] = {}
+        self._moved: dict[str, None] = {}
+        self._erased: list[str] = []
         self._pose_of = pose_of
         self._post = post
         self._receive = receive
-        self.init_pub = StateTopic(
+        self._on_connection = on_connection
+        self._connecting_until = 0.0  # s, `time.monotonic`
+        self._full_state_due = 0.0
+        self._full_state_is_outdated = False  # for those who have subscribed to it for long
+        self._init = StateTopic(
             registrar,
             f"{name}/update_full",
             InteractiveMarkerInit,
             self._full_state,
             post,
-            on_connection=lambda _connected: on_connection(),
+            on_connection=self._connection_changed,
         )
-        self.update_pub = Publisher(
+        self._update = Publisher(
             registrar,
             f"{name}/update",
             InteractiveMarkerUpdate,
             queue_size=_UPDATE_QUEUE,
-            on_connection=lambda _connected: on_connection(),
+            on_connection=self._connection_changed,
         )
         self._feedback = Subscriber(
-            registrar, f"{name}/feedback", InteractiveMarkerFeedback, self.processFeedback
+            registrar, f"{name}/feedback", InteractiveMarkerFeedback, self._receive_feedback
         )
-
-    def __del__(self) -> None:
-        """Overrides the base class, which would delete the markers."""
 
     @property
     def connected(self) -> bool:
         """Whether there are clients."""
-        return self.update_pub.connected or self.init_pub.connected
+        return self._update.connected or self._init.connected
 
-    def publishInit(self) -> None:  # noqa: N802
-        """Publishes the full state to clients that are still initializing."""
-        self.init_pub.send()
+    # -- changes ---------------------------------------------------------------------------
+
+    def insert(self, marker: InteractiveMarker) -> None:
+        """Adds or replaces a marker; takes effect with the next update."""
+        self._markers[marker.name] = _PackedMarker(marker)
+        self._inserted[marker.name] = None
+
+    def move(self, name: str) -> None:
+        """Publishes the current pose of a marker with the next update."""
+        if name not in self._inserted:
+            self._moved[name] = None
+
+    def erase(self, name: str) -> None:
+        """Removes a marker; takes effect with the next update."""
+        del self._markers[name]
+        self._moved.pop(name, None)
+        if name in self._inserted:
+            del self._inserted[name]  # It has not been published.
+        else:
+            self._erased.append(name)
+
+    def apply_changes(self) -> None:
+        """Publishes one update with all changes since the last one, if any."""
+        if not (self._inserted or self._moved or self._erased):
+            return
+        self._number += 1
+        if self._update.connected:
+            self._update.publish_serialized(self._changes())
+        only_moved = not (self._inserted or self._erased)
+        self._inserted.clear()
+        self._moved.clear()
+        # A name that was erased may have been inserted again.
+        self._erased.clear()
+        self._send_full_state(only_moved)
 
     def keep_alive(self) -> None:
-        """Publishes a keep-alive message."""
-        if self.update_pub.connected:
-            self.keepAlive(None)
+        """Publishes a keep-alive message, and the full state if it was omitted."""
+        if self._full_state_is_outdated:
+            self._send_full_state(False)
+        if self._update.connected:
+            head = self._update_head(InteractiveMarkerUpdate.KEEP_ALIVE)
+            self._update.publish_serialized(head + 3 * packing.COUNT.pack(0))
 
-    def processFeedback(self, feedback: InteractiveMarkerFeedback) -> None:  # noqa: N802
-        """Posts feedback to the thread that steps the world; called in a rospy thread."""
+    def _send_full_state(self, only_moved: bool) -> None:
+        """Publishes the full state, but not after each of many updates in which markers only move.
+
+        Clients unsubscribe once they have a full state that matches the updates.
+        """
+        now = time.monotonic()
+        if only_moved and self._connecting_until < now < self._full_state_due:
+            self._full_state_is_outdated = True
+            return
+        self._full_state_is_outdated = False
+        self._full_state_due = now + FULL_STATE_PERIOD
+        self._init.send()
+
+    # -- messages --------------------------------------------------------------------------
+
+    def _update_head(self, kind: int) -> bytes:
+        return self._server_id + _NUMBER_AND_TYPE.pack(self._number, kind)
+
+    def _changes(self) -> bytes:
+        markers, pose_of = self._markers, self._pose_of
+        erased = [name for name in self._erased if name not in markers]
+        return b"".join(
+            (
+                self._update_head(InteractiveMarkerUpdate.UPDATE),
+                packing.COUNT.pack(len(self._inserted)),
+                *(markers[name].at(pose_of(name)) for name in self._inserted),
+                packing.COUNT.pack(len(self._moved)),
+                *(markers[name].pose_update(pose_of(name)) for name in self._moved),
+                packing.COUNT.pack(len(erased)),
+                *map(packing.text, erased),
+            )
+        )
+
+    def _full_state(self) -> bytes:
+        """Returns all markers that have been published, with their current poses."""
+        published = [
+            (name, marker) for name, marker in self._markers.items() if name not in self._inserted
+        ]
+        return b"".join(
+            (
+                self._server_id,
+                _NUMBER.pack(self._number),
+                packing.COUNT.pack(len(published)),
+                *(marker.at(self._pose_of(name)) for name, marker in published),
+            )
+        )
+
+    # -- in rospy's threads ----------------------------------------------------------------
+
+    def _connection_changed(self, _connected: bool) -> None:
+        self._connecting_until = time.monotonic() + CONNECTING_TIME
+        self._on_connection()
+
+    def _receive_feedback(self, feedback: InteractiveMarkerFeedback) -> None:
+        """Posts feedback to the thread that steps the world."""
         now = time.monotonic()
         self._post(lambda: self._receive(feedback, now))
 
-    def _full_state(self) -> InteractiveMarkerInit:
-        """Returns all published markers with their current poses."""
-        markers = [context.int_marker for context in self.marker_contexts.values()]
-        for marker in markers:
-            marker.pose = pose_message(self._pose_of(marker.name))
-        return InteractiveMarkerInit(self.server_id, self.seq_num, markers)
+
+class _PackedMarker:
+    """A serialized interactive marker, and the serialized update of its pose."""
+
+    def __init__(self, marker: InteractiveMarker) -> None:
+        frame = packing.text(marker.header.frame_id)
+        self._pose_offset = _HEADER_SIZE + len(frame)
+        self._marker = _serialized(marker)
+        update = InteractiveMarkerPose(marker.header, marker.pose, marker.name)
+        self._pose_update = _serialized(update)
+
+    def at(self, pose: Pose) -> bytes:
+        """Returns the marker at a pose."""
+        return self._replace(self._marker, pose)
+
+    def pose_update(self, pose: Pose) -> bytes:
+        """Returns the change of the pose alone."""
+        return self._replace(self._pose_update, pose)
+
+    def _replace(self, data: bytes, pose: Pose) -> bytes:
+        packed = packing.pose(*pose)
+        start = self._pose_offset
+        return b"".join((data[:start], packed, data[start + len(packed) :]))
+
+
+def _serialized(message: Any) -> bytes:
+    buffer = BytesIO()
+    message.serialize(buffer)
+    return buffer.getvalue()

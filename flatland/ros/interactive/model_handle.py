@@ -9,7 +9,7 @@ import numpy as np
 from geometry_msgs.msg import Point, Quaternion, Vector3
 from geometry_msgs.msg import Pose as PoseMessage
 from std_msgs.msg import ColorRGBA
-from visualization_msgs.msg import InteractiveMarker, InteractiveMarkerControl, Marker
+from visualization_msgs.msg import InteractiveMarker, InteractiveMarkerControl, Marker, MenuEntry
 
 from flatland.entities.body import Body
 from flatland.entities.model import Model
@@ -26,12 +26,15 @@ NAME_COLOR: Final = (1.0, 1.0, 1.0, 1.0)
 LINE_WIDTH: Final = 0.03  # m
 MIN_SCALE: Final = 1.0  # m; diameter of the ring that rotates the model
 
+DELETE_ENTRY: Final = 1
+"""Id of the menu entry that deletes the model."""
+
 # Rotates the x axis, about which a control acts, to the z axis.
 _ABOUT_Z: Final = Quaternion(0.0, math.sqrt(0.5), 0.0, math.sqrt(0.5))
 
 
 def model_handle(model: Model, name: str) -> InteractiveMarker:
-    """Creates the interactive marker of a model, with the pose of its first body.
+    """Creates the interactive marker of a model, with the pose of its first body and a menu.
 
     Args:
         model: The model.
@@ -47,6 +50,9 @@ def model_handle(model: Model, name: str) -> InteractiveMarker:
         _control("move_xy", InteractiveMarkerControl.MOVE_PLANE, [_handle()]),
         _control("rotate_z", InteractiveMarkerControl.ROTATE_AXIS, []),
         _control("model", InteractiveMarkerControl.NONE, [_name(name), *model_outline.markers]),
+    ]
+    marker.menu_entries = [
+        MenuEntry(id=DELETE_ENTRY, title="Delete Model", command_type=MenuEntry.FEEDBACK)
     ]
     return marker
 

@@ -20,7 +20,7 @@ from flatland.ros.markers.model_markers import ModelMarkers
 from flatland.ros.markers.packed_markers import JoinedMarkers, PackedMarkers
 from flatland.ros.transport.registrar import Registrar
 from flatland.ros.transport.state_topic import StateTopic
-from flatland.ros.transport.ticker import Ticker
+from flatland.ros.transport.ticker import Ticker, TickerThread
 from flatland.runtime.observer import WorldObserver
 from flatland.simulation import Simulation
 
@@ -37,20 +37,23 @@ class CombinedMarkers(WorldObserver):
     individually in RViz.
     """
 
-    def __init__(self, registrar: Registrar, simulation: Simulation, rate: float) -> None:
+    def __init__(
+        self, registrar: Registrar, simulation: Simulation, rate: float, thread: TickerThread
+    ) -> None:
         """Advertises the topics asynchronously; must be called between two steps.
 
         Args:
             registrar: Registers the topics with the ROS master.
             simulation: Simulation of the world.
             rate: Rate of the model markers in wall time [Hz].
+            thread: Posts the periodic work.
         """
         self._world = simulation.world
         self._closed = False
         self._layers: dict[str, LayerMarkers] = {}
         self._models: dict[str, ModelMarkers] = {}
         self._delete_until = 0.0  # s, time.monotonic
-        self._ticker = Ticker("flatland-all-markers", rate, simulation.post, self._tick)
+        self._ticker = Ticker("flatland-all-markers", rate, simulation.post, self._tick, thread)
 
         def topic(
             name: str, make: Callable[[], JoinedMarkers], *, periodic: bool = False
@@ -59,7 +62,7 @@ class CombinedMarkers(WorldObserver):
                 registrar,
                 name,
                 MarkerArray,
-                make,
+                lambda: make().packed,
                 simulation.post,
                 on_connection=(lambda _connected: self._ticker.wake()) if periodic else None,
             )

@@ -20,7 +20,7 @@ from flatland.ros.message_types import message_class
 from flatland.ros.names import UniqueNames, legal_name
 from flatland.ros.transport.registrar import Registrar
 from flatland.ros.transport.state_topic import StateTopic
-from flatland.ros.transport.ticker import Ticker
+from flatland.ros.transport.ticker import Ticker, TickerThread
 from flatland.runtime.observer import WorldObserver
 from flatland.simulation import Simulation
 
@@ -46,13 +46,16 @@ class DebugTopics(WorldObserver):
     state, even if the world is paused.
     """
 
-    def __init__(self, registrar: Registrar, simulation: Simulation, rate: float) -> None:
+    def __init__(
+        self, registrar: Registrar, simulation: Simulation, rate: float, thread: TickerThread
+    ) -> None:
         """Advertises the topics asynchronously; must be called between two steps.
 
         Args:
             registrar: Registers the topics with the ROS master.
             simulation: Simulation of the world.
             rate: Rate of the markers of each model in wall time [Hz].
+            thread: Posts the periodic work.
         """
         self._registrar = registrar
         self._post = simulation.post
@@ -62,7 +65,7 @@ class DebugTopics(WorldObserver):
         self._layers: dict[str, list[_Entry]] = {}
         self._models: dict[str, _Entry] = {}
         self._closing: dict[str, tuple[StateTopic, float]] = {}  # by name, with the closing time
-        self._ticker = Ticker("flatland-markers", rate, self._post, self._tick)
+        self._ticker = Ticker("flatland-markers", rate, self._post, self._tick, thread)
         self._topics = self._open("topics", _DebugTopicList, self._topic_list)
         for layer in self._world.layers:
             self._add_layer(layer)
@@ -166,8 +169,8 @@ class DebugTopics(WorldObserver):
             on_connection=on_connection,
         )
 
-    def _with_time(self, make: Callable[[int], PackedMarkers]) -> Callable[[], PackedMarkers]:
-        return lambda: make(self._world.timekeeper.sim_time_ns)
+    def _with_time(self, make: Callable[[int], PackedMarkers]) -> Callable[[], bytes]:
+        return lambda: make(self._world.timekeeper.sim_time_ns).packed
 
     def _topic_list(self) -> Any:
         layers = [entry for entries in self._layers.values() for entry in entries]

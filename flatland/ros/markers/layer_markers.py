@@ -64,8 +64,7 @@ class LayerMarkers:
 
     def _finish(self, markers: PackedMarkers, time_ns: int) -> PackedMarkers:
         markers.set_stamp(time_ns)
-        for number in range(len(markers)):
-            markers.set_pose(number, self._layer.body.pose)
+        markers.set_poses(range(len(markers)), self._layer.body.pose)
         return markers
 
 

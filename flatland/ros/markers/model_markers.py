@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import struct
+from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Final
 
 from visualization_msgs.msg import Marker
@@ -9,6 +12,7 @@ from visualization_msgs.msg import Marker
 from flatland.entities.body import Body, Color
 from flatland.entities.joint import Joint
 from flatland.entities.model import Model
+from flatland.geometry import Pose, Vector2, compose
 from flatland.ros.markers.marker_geometry import (
     CIRCLE_HEIGHT,
     Footprint,
@@ -23,12 +27,30 @@ LINE_WIDTH: Final = (0.03, 0.0, 0.0)
 JOINT_LINE_WIDTH: Final = (0.01, 0.0, 0.0)
 JOINT_CUBE: Final = (0.03, 0.03, 0.03)
 
-Shapes = list[tuple[Color, tuple[int, ...]]]
+_LINE_POINTS: Final = struct.Struct("<18d")
+_CUBE_POINTS: Final = struct.Struct("<12d")
+
+Shapes = list[tuple[Color, list[int]]]
 """Colour of each body, and the ids of its fixtures; a change means that markers are outdated."""
 
 
+@dataclass(frozen=True, slots=True)
+class _JointMarkers:
+    """The two markers of a joint.
+
+    Attributes:
+        number: Number of the first marker, the lines; the second one is the cubes.
+        bodies: Indices of body A and body B in the model.
+        anchors: Anchor of each body in the body frame [m].
+    """
+
+    number: int
+    bodies: tuple[int, int]
+    anchors: tuple[Vector2, Vector2]
+
+
 class ModelMarkers:
-    """Caches the markers of a model, so that only poses are updated for each message."""
+    """Caches the serialized markers of a model, so that only poses are replaced in each message."""
 
     def __init__(self, model: Model) -> None:
         """Creates an empty cache; the first message fills it.
@@ -39,8 +61,9 @@ class ModelMarkers:
         self._model = model
         self._shapes: Shapes | None = None
         self._markers = PackedMarkers()
-        self._bodies: list[tuple[int, Body]] = []
-        self._joints: list[tuple[int, Joint]] = []
+        self._footprints: list[list[int]] = []  # numbers of the markers of each body
+        self._joints: list[_JointMarkers] = []
+        self._poses: list[Pose] = []  # of all bodies, as in the markers
 
     def message(self, time_ns: int) -> PackedMarkers:
         """Returns the markers of the current state; the next call modifies the result.
@@ -48,37 +71,46 @@ class ModelMarkers:
         Args:
             time_ns: Stamp of the markers, simulated time [ns].
         """
+        bodies = self._model.bodies
         # Plugins can change footprints and colours.
-        shapes = self._current_shapes()
+        shapes = [(body.color, body.fixture_ids) for body in bodies]
         if shapes != self._shapes:
             self._build()
             self._shapes = shapes
         markers = self._markers
         markers.set_stamp(time_ns)
-        for number, body in self._bodies:
-            markers.set_pose(number, body.pose)
-        for number, joint in self._joints:
-            body_a, body_b = joint.bodies
-            points = joint_points(body_a.pose, body_b.pose, joint.anchors)
-            markers.set_points(number, joint_lines(points))
-            markers.set_points(number + 1, points)
+        poses = [body.pose for body in bodies]
+        if poses != self._poses:
+            self._poses = poses
+            for numbers, pose in zip(self._footprints, poses, strict=True):
+                markers.set_poses(numbers, pose)
+            for joint in self._joints:
+                self._move_joint(joint)
         return markers
 
-    def _current_shapes(self) -> Shapes:
-        return [
-            (body.color, tuple(fixture.id for fixture in body.fixtures))
-            for body in self._model.bodies
-        ]
+    def _move_joint(self, joint: _JointMarkers) -> None:
+        (pose_a, pose_b), (anchor_a, anchor_b) = (
+            [self._poses[index] for index in joint.bodies],
+            joint.anchors,
+        )
+        a, b = (pose_a[0], pose_a[1], 0.0), (pose_b[0], pose_b[1], 0.0)
+        end_a = (*compose(pose_a, (*anchor_a, 0.0))[:2], 0.0)
+        end_b = (*compose(pose_b, (*anchor_b, 0.0))[:2], 0.0)
+        # The points of `joint_lines` and `joint_points`, without arrays.
+        lines = _LINE_POINTS.pack(*a, *end_a, *b, *end_b, *end_a, *end_b)
+        self._markers.set_points(joint.number, lines)
+        cubes = _CUBE_POINTS.pack(*a, *end_a, *b, *end_b)
+        self._markers.set_points(joint.number + 1, cubes)
 
     def _build(self) -> None:
         previous_count = len(self._markers)
         model, markers = self._model, PackedMarkers(self._model.name)
-        self._bodies = [
-            (add_footprint(markers, fixture, body.color), body)
+        self._footprints = [
+            [add_footprint(markers, fixture, body.color) for fixture in body.fixtures]
             for body in model.bodies
-            for fixture in body.fixtures
         ]
-        self._joints = [(_add_joint(markers, joint), joint) for joint in model.joints]
+        self._joints = [_add_joint(markers, joint, model.bodies) for joint in model.joints]
+        self._poses = []
         while len(markers) < previous_count:
             markers.add_deletion()
         self._markers = markers
@@ -97,12 +129,14 @@ def add_footprint(markers: PackedMarkers, footprint: Footprint, color: Color) ->
     return markers.add(Marker.LINE_LIST, ends, scale=LINE_WIDTH, color=color)
 
 
-def _add_joint(markers: PackedMarkers, joint: Joint) -> int:
-    """Adds the two markers of a joint in the world frame; returns the number of the first."""
+def _add_joint(markers: PackedMarkers, joint: Joint, bodies: Sequence[Body]) -> _JointMarkers:
+    """Adds the two markers of a joint in the world frame."""
     body_a, body_b = joint.bodies
-    points = joint_points(body_a.pose, body_b.pose, joint.anchors)
+    anchors = joint.anchors
+    points = joint_points(body_a.pose, body_b.pose, anchors)
     number = markers.add(
         Marker.LINE_LIST, joint_lines(points), scale=JOINT_LINE_WIDTH, color=joint.color
     )
     markers.add(Marker.CUBE_LIST, points, scale=JOINT_CUBE, color=joint.color)
-    return number
+    (ax, ay), (bx, by) = anchors.tolist()
+    return _JointMarkers(number, (bodies.index(body_a), bodies.index(body_b)), ((ax, ay), (bx, by)))

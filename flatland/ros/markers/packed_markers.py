@@ -8,7 +8,7 @@ one message to the next, are overwritten in place.
 from __future__ import annotations
 
 import struct
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from io import BytesIO
 from typing import Any, Final
 
@@ -27,6 +27,7 @@ FRAME: Final = "map"
 _COUNT: Final = struct.Struct("<I")
 _STAMP: Final = struct.Struct("<II")
 _POSE: Final = struct.Struct("<7d")
+_POINT_SIZE: Final = 3 * 8  # bytes
 _SEQUENCE_SIZE: Final = 4  # bytes of a header before the stamp
 _BEFORE_POSE: Final = 3 * 4  # bytes of id, type, action
 # Bytes from the pose to the points: pose, scale, color, lifetime, frame_locked.
@@ -45,6 +46,7 @@ class PackedMarkers(MarkerArray):  # type: ignore[misc]
         # super().__init__ is not called: it would assign to `markers`, a property here.
         self._namespace = sendable_text(namespace)
         self._data = bytearray(_COUNT.size)
+        self._stamp: tuple[int, int] | None = None  # of all markers, None if one was added since
         self._stamps: list[int] = []
         self._poses: list[int] = []
         self._points: list[tuple[int, int]] = []
@@ -103,37 +105,49 @@ class PackedMarkers(MarkerArray):  # type: ignore[misc]
     def set_stamp(self, time_ns: int) -> None:
         """Sets the stamp of all markers to a simulated time [ns]."""
         stamp = divmod(convert.stamp(time_ns), NANOSECONDS)
+        if stamp == self._stamp:
+            return
+        self._stamp = stamp
+        data, packed = self._data, _STAMP.pack(*stamp)
         for offset in self._stamps:
-            _STAMP.pack_into(self._data, offset, *stamp)
+            data[offset : offset + _STAMP.size] = packed
 
-    def set_pose(self, number: int, pose: tuple[float, float, float]) -> None:
-        """Sets the planar pose (x, y, theta) of a marker."""
+    def set_poses(self, numbers: Iterable[int], pose: tuple[float, float, float]) -> None:
+        """Sets the planar pose (x, y, theta) of several markers."""
         x, y, theta = pose
-        _POSE.pack_into(self._data, self._poses[number], x, y, 0.0, *quaternion_from_yaw(theta))
+        data = _POSE.pack(x, y, 0.0, *quaternion_from_yaw(theta))
+        for number in numbers:
+            offset = self._poses[number]
+            self._data[offset : offset + _POSE.size] = data
 
-    def set_points(self, number: int, points: npt.NDArray[np.float64]) -> None:
+    def set_points(self, number: int, points: bytes) -> None:
         """Replaces the points of a marker.
 
         Args:
             number: Number of the marker.
-            points: (x, y, z) in the frame of the marker [m], shape (n, 3).
+            points: The same number of points (x, y, z) in the frame of the marker [m], as float64.
 
         Raises:
             ValueError: The number of points differs from that of the marker.
         """
         offset, count = self._points[number]
-        if len(points) != count:
-            raise ValueError(f"marker {number} has {count} points, got {len(points)}")
-        data = _packed(points)
-        self._data[offset : offset + len(data)] = data
+        if len(points) != count * _POINT_SIZE:
+            raise ValueError(f"marker {number} has {count} points, got {len(points)} bytes")
+        self._data[offset : offset + len(points)] = points
+
+    @property
+    def packed(self) -> bytes:
+        """The serialized message."""
+        return bytes(self._data)
+
+    @property
+    def packed_markers(self) -> memoryview:
+        """The serialized markers without their count; a view of the message."""
+        return memoryview(self._data)[_COUNT.size :]
 
     def serialize(self, buff: Any) -> None:
         """Serializes the message; called by rospy."""
         buff.write(self._data)
-
-    def write_markers(self, buff: Any) -> None:
-        """Writes the serialized markers without their count."""
-        buff.write(memoryview(self._data)[_COUNT.size :])
 
     @property
     def markers(self) -> list[Marker]:
@@ -162,6 +176,7 @@ class PackedMarkers(MarkerArray):  # type: ignore[misc]
         self._data += data[:points_count] + _COUNT.pack(count)
         self._data += points
         self._data += data[points_start:]
+        self._stamp = None
         self._stamps.append(start + stamp)
         self._poses.append(start + pose)
         self._points.append((start + points_start, count))
@@ -176,11 +191,15 @@ class JoinedMarkers(MarkerArray):  # type: ignore[misc]
         """Stores references; the parts must not change before the message is published."""
         self._parts = parts
 
+    @property
+    def packed(self) -> bytes:
+        """The serialized message."""
+        count = _COUNT.pack(sum(map(len, self._parts)))
+        return b"".join((count, *(part.packed_markers for part in self._parts)))
+
     def serialize(self, buff: Any) -> None:
         """Serializes the message; called by rospy."""
-        buff.write(_COUNT.pack(sum(map(len, self._parts))))
-        for part in self._parts:
-            part.write_markers(buff)
+        buff.write(self.packed)
 
     @property
     def markers(self) -> list[Marker]:

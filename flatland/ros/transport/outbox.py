@@ -78,11 +78,13 @@ class Outbox:
         if self._transport.done:
             raise TransportTerminated("connection closed")
         with self._lock:
-            if len(self._queue) == self._queue.maxlen:
-                self.dropped += 1
+            if self._partial is not None or self._queue:
+                # The flusher already watches the socket; keep the order.
+                if len(self._queue) == self._queue.maxlen:
+                    self.dropped += 1
+                self._queue.append(data)
+                return
             self._queue.append(data)
-            if self._partial is not None or len(self._queue) > 1:
-                return  # The flusher already watches the socket; keep the order.
             if not self._send():
                 _flusher().watch(self)
 

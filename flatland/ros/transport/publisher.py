@@ -2,21 +2,29 @@
 
 from __future__ import annotations
 
+import logging
+import struct
 import threading
 from collections.abc import Callable
-from typing import Any
+from typing import Any, Final
 
 import rospy
 
 from flatland.ros.transport.outbox import Outbox
 from flatland.ros.transport.registrar import Registrar
 
+_LOG = logging.getLogger("flatland")
+
+_SIZE: Final = struct.Struct("<I")
+_SIZE_AND_SEQUENCE: Final = struct.Struct("<II")
+_MAX_SEQUENCE: Final = 0xFFFF_FFFF
+
 
 class Publisher:
     """Publishes messages on a topic from the thread that steps the world.
 
-    Registration, connections and serialization are those of rospy; only the writes to sockets are
-    replaced, see `outbox`.
+    Registration and connections are those of rospy; the writes to sockets are replaced, see
+    `outbox`. Messages are serialized by rospy, or passed as bytes.
 
     Attributes:
         topic: Resolved name of the topic.
@@ -54,6 +62,7 @@ class Publisher:
         self.connected = False
         self._registrar = registrar
         self._message_type = message_type
+        self._has_header: bool = message_type._has_header
         self._queue_size = queue_size
         self._latch = latch
         self._on_connection = on_connection
@@ -87,6 +96,50 @@ class Publisher:
             # During a shutdown, rospy closes its topics in another thread.
             if not rospy.core.is_shutdown_requested():
                 raise
+
+    def publish_serialized(self, message: bytes) -> None:
+        """Sends a serialized message to all subscribers, if the topic is advertised.
+
+        Args:
+            message: The serialized message, with any sequence number in its header.
+        """
+        self.publish_current(lambda: message)
+
+    def publish_current(self, serialize: Callable[[], bytes]) -> None:
+        """Sends a message that is serialized while no other thread publishes on the topic.
+
+        Args:
+            serialize: Returns the serialized message, with any sequence number in its header; not
+                called without subscribers.
+        """
+        publisher = self._publisher
+        impl: Any = publisher.impl if publisher is not None else None
+        lock = getattr(impl, "publock", None)  # None once rospy has closed the topic
+        if self._closed or lock is None:
+            return
+        broken = []
+        with lock:
+            connections = impl.connections
+            if impl.closed or not connections:
+                return
+            message = serialize()
+            impl.seq += 1
+            if self._has_header:
+                sequence = impl.seq & _MAX_SEQUENCE
+                data = _SIZE_AND_SEQUENCE.pack(len(message), sequence) + message[_SIZE.size :]
+            else:
+                data = _SIZE.pack(len(message)) + message
+            if impl.is_latch:  # because of another publisher of the topic
+                impl.latch = SerializedMessage(data[_SIZE.size :])
+            for connection in connections:
+                try:
+                    connection.write_data(data)
+                except Exception as error:
+                    broken.append(connection)
+                    _LOG.debug("%s: connection closed: %s", self.topic, error)
+            impl.message_data_sent += len(data)
+        for connection in broken:
+            connection.close()
 
     def close(self) -> None:
         """Unregisters the topic asynchronously, unless this node has another publisher of it."""
@@ -148,6 +201,18 @@ class Publisher:
             self.connected = connected
             if self._on_connection is not None:
                 self._on_connection(connected)
+
+
+class SerializedMessage:
+    """A serialized message that rospy stores or sends like a message object."""
+
+    def __init__(self, data: bytes) -> None:
+        """Stores the bytes, which rospy writes without a change of the sequence number."""
+        self._data = data
+
+    def serialize(self, buff: Any) -> None:
+        """Writes the message; called by rospy."""
+        buff.write(self._data)
 
 
 class _ConnectionListener(rospy.SubscribeListener):  # type: ignore[misc]

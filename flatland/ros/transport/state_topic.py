@@ -9,7 +9,7 @@ from typing import Any
 
 import rospy
 
-from flatland.ros.transport.publisher import Publisher
+from flatland.ros.transport.publisher import Publisher, SerializedMessage
 from flatland.ros.transport.registrar import Registrar
 
 _LOG = logging.getLogger("flatland")
@@ -38,7 +38,8 @@ class StateTopic(Publisher):
             registrar: Registers the topic with the ROS master.
             topic: Name in the namespace of the node, private with a leading `~`.
             message_type: ROS message class.
-            make: Creates the message of the current state; called between two steps.
+            make: Creates the message of the current state, as an object or as its bytes; called
+                between two steps.
             post: Runs an action between two steps.
             on_connection: Called in a rospy thread whenever a subscriber may have connected or
                 disconnected, with whether there are subscribers.
@@ -58,13 +59,17 @@ class StateTopic(Publisher):
             # A subscriber that connects from here on is added again; at worst it receives the
             # message twice.
             self._new_subscribers.clear()
-            self.publish(self._make())
+            message = self._make()
+            if isinstance(message, bytes):
+                self.publish_serialized(message)
+            else:
+                self.publish(message)
 
     def replace(self, make: Callable[[], Any]) -> None:
         """Publishes another state from now on; must be called in the thread that steps the world.
 
         Args:
-            make: Creates the message of the new state; called between two steps.
+            make: Creates the message of the new state, as the argument of the constructor.
         """
         self._make = make
         self.send()
@@ -79,6 +84,8 @@ class StateTopic(Publisher):
             return
         try:
             message = self._make()
+            if isinstance(message, bytes):
+                message = SerializedMessage(message)
             while self._new_subscribers:
                 self._publish_single(self._new_subscribers.pop(), message)
         except Exception:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import threading
 import time
 from collections.abc import Callable
@@ -9,7 +10,116 @@ from concurrent.futures import Future
 from typing import Any, Final
 
 _MIN_PERIOD: Final = 0.001  # s
-_CLOSE_POLL_PERIOD: Final = 0.2  # s between two checks whether the ticker is closed
+
+
+class TickerThread:
+    """The thread of one or several tickers.
+
+    Tickers with the same period tick together, in one action of the thread that steps the world:
+    each switch between two threads costs more than most ticks.
+    """
+
+    def __init__(self, name: str, post: Callable[[Callable[[], object]], Future[Any]]) -> None:
+        """Starts the thread, which ends when its last ticker is closed.
+
+        Args:
+            name: Name of the thread.
+            post: Runs an action between two steps.
+        """
+        self._post = post
+        self._tickers: list[Ticker] = []
+        self._changed = threading.Condition()  # guards all members of the tickers as well
+        self._is_queued = False  # whether an action is queued or running
+        self._wakes_at = math.inf  # s, `time.monotonic`; time until which the thread waits
+        self._closed = False
+        threading.Thread(target=self._run, name=name, daemon=True).start()
+
+    def add(self, ticker: Ticker) -> None:
+        """Adds a ticker; called by its constructor."""
+        with self._changed:
+            self._tickers.append(ticker)
+
+    def wake(self, ticker: Ticker) -> None:
+        """Starts ticking, with the first tick as soon as possible."""
+        with self._changed:
+            ticker.awake = True
+            self._notify()
+
+    def close(self, ticker: Ticker) -> None:
+        """Removes a ticker."""
+        with self._changed:
+            ticker.closed = True
+            if ticker in self._tickers:
+                self._tickers.remove(ticker)
+            self._closed = not self._tickers
+            self._changed.notify()
+
+    def _run(self) -> None:
+        while True:
+            with self._changed:
+                tickers = self._wait_for_due()
+                if self._closed:
+                    return
+                self._is_queued = True
+            now = time.monotonic()
+            self._post(lambda tickers=tickers, now=now: self._tick(tickers, now))  # type: ignore[misc]
+
+    def _wait_for_due(self) -> list[Ticker]:
+        """Waits for tickers that are due, and for the end of the previous action.
+
+        Returns:
+            The tickers, with the times of their next ticks set; none if the thread is to end.
+        """
+        while not self._closed:
+            awake = [ticker for ticker in self._tickers if ticker.awake]
+            now = time.monotonic()
+            due = [ticker for ticker in awake if ticker.due <= now]
+            if due and not self._is_queued:
+                periods = {ticker.period for ticker in due}
+                for ticker in awake:
+                    # Those that are not due yet are delayed, so that they tick together from then
+                    # on; times of ticks that do so already are equal.
+                    if ticker.period in periods:
+                        ticker.due = now + ticker.period
+                return due
+            # With tickers that are due, it waits for the end of the action that is queued.
+            self._wakes_at = math.inf if due else self._next_due()
+            limit = None if math.isinf(self._wakes_at) else self._wakes_at - now
+            self._changed.wait(limit)
+            self._wakes_at = -math.inf
+        return []
+
+    def _next_due(self) -> float:
+        return min((ticker.due for ticker in self._tickers if ticker.awake), default=math.inf)
+
+    def _notify(self) -> None:
+        """Wakes the thread if it would otherwise wait for too long."""
+        if self._next_due() < self._wakes_at:
+            self._changed.notify()
+
+    def _tick(self, tickers: list[Ticker], now: float) -> None:
+        """Calls the functions of tickers; in the thread that steps the world."""
+        try:
+            failure: BaseException | None = None
+            for ticker in tickers:
+                # Sleep before the call, not after it: `wake` may be called while the tick decides
+                # that there is nothing left to do.
+                with self._changed:
+                    ticker.awake = False
+                stay_awake = True
+                try:
+                    stay_awake = not ticker.closed and ticker.tick(now)
+                except BaseException as error:
+                    failure = error
+                if stay_awake:
+                    with self._changed:
+                        ticker.awake = True
+            if failure is not None:
+                raise failure
+        finally:
+            with self._changed:
+                self._is_queued = False
+                self._notify()
 
 
 class Ticker:
@@ -17,6 +127,14 @@ class Ticker:
 
     Two ticks are at least one period apart, and at most one tick is queued. A sleeping ticker uses
     no CPU time.
+
+    Attributes:
+        period: Time between two ticks [s].
+        tick: The function.
+        due: Time of the next tick (`time.monotonic`) [s]; the attributes from here on belong to the
+            thread.
+        awake: Whether it ticks.
+        closed: Whether it was closed.
     """
 
     def __init__(
@@ -25,6 +143,7 @@ class Ticker:
         rate: float,
         post: Callable[[Callable[[], object]], Future[Any]],
         tick: Callable[[float], bool],
+        thread: TickerThread | None = None,
     ) -> None:
         """Creates a sleeping ticker.
 
@@ -35,45 +154,20 @@ class Ticker:
             tick: Called between two steps with the time at which the tick was due
                 (`time.monotonic`); returns whether to stay awake. An exception does not end the
                 ticker.
+            thread: The thread to share with other tickers; None for a thread of its own.
         """
-        self._period = max(_MIN_PERIOD, 1.0 / rate)
-        self._post = post
-        self._tick = tick
-        self._awake = threading.Event()
-        self._closed = threading.Event()
-        threading.Thread(target=self._run, name=name, daemon=True).start()
+        self.period = max(_MIN_PERIOD, 1.0 / rate)
+        self.tick = tick
+        self.due = 0.0
+        self.awake = False
+        self.closed = False
+        self._thread = TickerThread(name, post) if thread is None else thread
+        self._thread.add(self)
 
     def wake(self) -> None:
         """Starts ticking, with the first tick as soon as possible; thread-safe."""
-        self._awake.set()
+        self._thread.wake(self)
 
     def close(self) -> None:
-        """Ends the ticker and its thread."""
-        self._closed.set()
-        self._awake.set()
-
-    def _run(self) -> None:
-        due = 0.0
-        while True:
-            self._awake.wait()
-            if self._closed.wait(max(0.0, due - time.monotonic())):
-                return
-            now = time.monotonic()
-            due = now + self._period
-            done = threading.Event()
-            self._post(lambda now=now, done=done: self._tick_once(now, done))  # type: ignore[misc]
-            while not done.wait(_CLOSE_POLL_PERIOD):
-                if self._closed.is_set():
-                    return
-
-    def _tick_once(self, now: float, done: threading.Event) -> None:
-        # Sleep before the call, not after it: `wake` may be called while the tick decides that
-        # there is nothing left to do.
-        self._awake.clear()
-        stay_awake = True
-        try:
-            stay_awake = not self._closed.is_set() and self._tick(now)
-        finally:
-            if stay_awake or self._closed.is_set():
-                self._awake.set()
-            done.set()
+        """Ends the ticker, and its thread if it is the last one; further calls have no effect."""
+        self._thread.close(self)

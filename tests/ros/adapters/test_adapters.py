@@ -220,9 +220,15 @@ def test_registration_replaces_a_built_in_adapter() -> None:
             built_in.message_type,
             built_in.to_message,
             built_in.from_message,
+            built_in.serialize,
         )
 
 
 def test_adapter_without_functions_raises() -> None:
     with pytest.raises(ValueError, match="an adapter for int needs at least one function"):
         register_adapter(int, String)
+
+
+def test_adapter_that_only_serializes_raises() -> None:
+    with pytest.raises(ValueError, match="an adapter for int needs to_message for serialize"):
+        register_adapter(int, String, from_message=len, serialize=bytes)

@@ -14,7 +14,7 @@ from geometry_msgs.msg import Point, Vector3
 from std_msgs.msg import ColorRGBA
 from visualization_msgs.msg import Marker, MarkerArray
 
-from flatland.ros.markers.packed_markers import PackedMarkers
+from flatland.ros.markers.packed_markers import JoinedMarkers, PackedMarkers
 
 POINTS = np.array([[1.5, -2.5, 3.5], [0.1, 0.2, 0.3]])
 COLOR = (0.25, 0.5, 0.75, 1.0)
@@ -27,7 +27,7 @@ def packed() -> PackedMarkers:
     markers.add_deletion()
     markers.add_deletion_of_all()
     markers.set_stamp(12_345_678_901)
-    markers.set_pose(1, (4.0, 5.0, math.pi / 2))
+    markers.set_poses([1], (4.0, 5.0, math.pi / 2))
     return markers
 
 
@@ -69,6 +69,21 @@ def test_serialization_equals_that_of_the_message() -> None:
     assert data(packed()) == data(message)
 
 
+def test_markers_added_later_get_the_same_stamp() -> None:
+    markers = packed()
+    markers.set_stamp(5)
+    number = markers.add_deletion()
+    markers.set_stamp(5)
+    assert markers.markers[number].header.stamp.nsecs == 5
+
+
+def test_joined_markers_are_those_of_all_parts() -> None:
+    joined = JoinedMarkers([packed(), PackedMarkers("empty"), packed()])
+    assert data(joined) == joined.packed
+    assert data(MarkerArray(packed().markers * 2)) == joined.packed
+    assert packed().packed == data(packed())
+
+
 def test_message_type_attributes() -> None:
     for name in ("_md5sum", "_type", "_full_text", "_has_header"):
         assert getattr(PackedMarkers, name) == getattr(MarkerArray, name)
@@ -83,15 +98,15 @@ def test_deserialized_markers() -> None:
 
 def test_points_are_replaced_in_place() -> None:
     markers = packed()
-    markers.set_points(0, POINTS * 2)
+    markers.set_points(0, (POINTS * 2).tobytes())
     first, second, *_ = markers.markers
     assert first.points == as_messages(POINTS * 2)
     assert second.points == as_messages(POINTS[:1])
 
 
 def test_different_number_of_points_raises() -> None:
-    with pytest.raises(ValueError, match="marker 0 has 2 points, got 1"):
-        packed().set_points(0, POINTS[:1])
+    with pytest.raises(ValueError, match="marker 0 has 2 points, got 24 bytes"):
+        packed().set_points(0, POINTS[:1].tobytes())
 
 
 def test_points_of_invalid_shape_raise() -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import contextlib
+import itertools
 import queue
 import threading
 import time
@@ -12,7 +14,7 @@ from typing import Any
 import pytest
 from waiting import TIMEOUT
 
-from flatland.ros.transport.ticker import Ticker
+from flatland.ros.transport.ticker import Ticker, TickerThread
 
 RATE = 50.0  # Hz
 
@@ -147,3 +149,85 @@ def test_exception_in_a_tick_does_not_end_the_ticker(loop: Loop) -> None:
         with pytest.raises(ValueError, match="expected"):
             loop.run_next()
     ticker.close()
+
+
+# -- tickers of one thread ---------------------------------------------------------------------
+
+
+def test_tickers_of_one_thread_with_the_same_rate_tick_in_one_action(loop: Loop) -> None:
+    thread = TickerThread("shared", loop.post)
+    counts = [0, 0]
+    log: list[tuple[int, ...]] = []
+
+    def count(number: int) -> Callable[[float], bool]:
+        def tick(_now: float) -> bool:
+            counts[number] += 1
+            return True
+
+        return tick
+
+    tickers = [Ticker("", RATE, loop.post, count(number), thread) for number in range(2)]
+    tickers[0].wake()
+    loop.run_next()
+    time.sleep(0.5 / RATE)
+    tickers[1].wake()  # Its first tick is due at once, half a period from those of the other.
+    for _ in range(8):
+        loop.run_next()
+        log.append(tuple(counts))
+    for ticker in tickers:
+        ticker.close()
+    # From the third action on, at the latest, both tick in each.
+    assert [b[0] - a[0] for a, b in itertools.pairwise(log[2:])] == [1] * 5
+    assert [b[1] - a[1] for a, b in itertools.pairwise(log[2:])] == [1] * 5
+
+
+def test_tickers_of_one_thread_keep_their_rates(loop: Loop) -> None:
+    thread = TickerThread("two rates", loop.post)
+    times: tuple[list[float], list[float]] = ([], [])
+
+    def record(number: int) -> Callable[[float], bool]:
+        return lambda now: times[number].append(now) is None
+
+    rates = (RATE, RATE / 3)
+    tickers = [
+        Ticker("", rate, loop.post, record(number), thread) for number, rate in enumerate(rates)
+    ]
+    for ticker in tickers:
+        ticker.wake()
+    while len(times[1]) < 4:
+        loop.run_next()
+    for ticker in tickers:
+        ticker.close()
+    for rate, ticks in zip(rates, times, strict=True):
+        assert min(b - a for a, b in itertools.pairwise(ticks)) >= 1 / rate
+    assert len(times[0]) > len(times[1])
+
+
+def test_thread_ends_with_its_last_ticker(loop: Loop) -> None:
+    shared = TickerThread("ending", loop.post)
+    first, second = (Ticker("", RATE, loop.post, loop.tick, shared) for _ in range(2))
+    (thread,) = [t for t in threading.enumerate() if t.name == "ending"]
+    first.close()
+    second.wake()
+    loop.run_next()
+    assert len(loop.ticks) == 1
+    second.close()
+    second.close()
+    thread.join(TIMEOUT)
+    assert not thread.is_alive()
+
+
+def test_exception_in_a_tick_does_not_affect_the_other_tickers(loop: Loop) -> None:
+    thread = TickerThread("failing", loop.post)
+
+    def fail(_now: float) -> bool:
+        raise ValueError("expected")
+
+    tickers = [Ticker("", RATE, loop.post, tick, thread) for tick in (fail, loop.tick)]
+    for ticker in tickers:
+        ticker.wake()
+    while len(loop.ticks) < 3:
+        with contextlib.suppress(ValueError):
+            loop.run_next()
+    for ticker in tickers:
+        ticker.close()

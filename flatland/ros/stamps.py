@@ -1,0 +1,34 @@
+"""Stamps of messages: simulated time, or wall time."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from genpy import Time
+
+from flatland.timekeeper import NANOSECONDS
+
+_stamps: Callable[[int], int] | None = None
+
+
+def set_stamps(stamps: Callable[[int], int] | None) -> None:
+    """Sets the stamps of all messages of this process.
+
+    Args:
+        stamps: Returns the stamp [ns] of a simulated time [ns]; called in any thread. None if
+            stamps are simulated times.
+    """
+    global _stamps
+    _stamps = stamps
+
+
+def stamp(nanoseconds: int) -> int:
+    """Returns the stamp [ns] of a simulated time [ns]: that time, or wall time."""
+    return nanoseconds if _stamps is None else _stamps(nanoseconds)
+
+
+def time(nanoseconds: int, time_type: type[Time] = Time) -> Time:
+    """Converts simulated nanoseconds to the ROS time of a stamp without rounding."""
+    result: Time = object.__new__(time_type)
+    result.secs, result.nsecs = divmod(stamp(nanoseconds), NANOSECONDS)
+    return result

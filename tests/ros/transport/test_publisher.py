@@ -1,0 +1,134 @@
+"""Serialized messages of a publisher, received over two connections."""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Callable, Iterator
+from io import BytesIO
+from typing import Any
+
+import pytest
+from geometry_msgs.msg import PointStamped
+from raw_subscriber import RawSubscriber
+from std_msgs.msg import Int32
+from waiting import TIMEOUT
+
+from flatland.ros.transport.publisher import Publisher
+from flatland.ros.transport.registrar import Registrar
+
+STAMPED = "/flatland_tests/stamped"
+PLAIN = "/flatland_tests/plain"
+
+
+@pytest.fixture
+def registrar(ros: Any) -> Iterator[Registrar]:
+    registrar = Registrar()
+    yield registrar
+    registrar.close(TIMEOUT)
+
+
+def serialized(message: Any) -> bytes:
+    buffer = BytesIO()
+    message.serialize(buffer)
+    return buffer.getvalue()
+
+
+def point(number: int) -> PointStamped:
+    message = PointStamped()
+    message.header.frame_id = "map"
+    message.point.x = number
+    return message
+
+
+@pytest.fixture
+def advertise(
+    registrar: Registrar, ros: Any, eventually: Callable[..., Any]
+) -> Iterator[Callable[[str, Any], tuple[Publisher, list[Any]]]]:
+    """Advertises a topic and connects two subscribers to it."""
+    publishers: list[Publisher] = []
+
+    def connected(topic: str, message_type: Any) -> tuple[Publisher, list[Any]]:
+        publisher = Publisher(registrar, topic, message_type, queue_size=100)
+        publishers.append(publisher)
+        assert registrar.flush(TIMEOUT)
+        for name in ("/first", "/second"):
+            subscribers.append(RawSubscriber(ros.master, topic, message_type, name=name))
+        eventually("two connections", lambda: len(publisher._publisher.impl.connections) == 2)
+        return publisher, subscribers
+
+    subscribers: list[RawSubscriber] = []
+    yield connected
+    for each in (*subscribers, *publishers):
+        each.close()
+    assert registrar.flush(TIMEOUT)
+
+
+def test_all_subscribers_receive_serialized_messages(advertise: Any) -> None:
+    publisher, subscribers = advertise(PLAIN, Int32)
+    for number in range(3):
+        publisher.publish_serialized(struct.pack("<i", number))
+    for subscriber in subscribers:
+        assert [subscriber.next().data for _ in range(3)] == [0, 1, 2]
+
+
+def test_sequence_numbers_continue_those_of_message_objects(advertise: Any) -> None:
+    publisher, subscribers = advertise(STAMPED, PointStamped)
+    publisher.publish(point(0))
+    publisher.publish_serialized(serialized(point(1)))
+    publisher.publish_serialized(serialized(point(2)))
+    publisher.publish(point(3))
+    for subscriber in subscribers:
+        received = [subscriber.next() for _ in range(4)]
+        assert [message.point.x for message in received] == [0, 1, 2, 3]
+        assert {message.header.frame_id for message in received} == {"map"}
+        first = received[0].header.seq
+        assert [message.header.seq - first for message in received] == [0, 1, 2, 3]
+
+
+def test_a_broken_connection_is_closed_and_the_others_receive_the_message(advertise: Any) -> None:
+    publisher, subscribers = advertise(PLAIN, Int32)
+    first, second = publisher._publisher.impl.connections
+
+    def fail(_data: bytes) -> None:
+        raise OSError("broken")
+
+    first.write_data = fail
+    publisher.publish_serialized(struct.pack("<i", 7))
+    publisher.publish_serialized(struct.pack("<i", 8))
+    assert first.done
+    assert publisher._publisher.impl.connections == [second]
+    # Connections are listed in the order in which they were made.
+    assert [subscribers[1].next().data for _ in range(2)] == [7, 8]
+    assert subscribers[0].socket.recv(1) == b""
+
+
+def test_nothing_is_serialized_without_subscribers(registrar: Registrar) -> None:
+    publisher = Publisher(registrar, "/flatland_tests/alone", Int32)
+    calls: list[int] = []
+
+    def serialize() -> bytes:
+        calls.append(1)
+        return b""
+
+    publisher.publish_current(serialize)  # not advertised yet
+    assert registrar.flush(TIMEOUT)
+    publisher.publish_current(serialize)
+    publisher.close()
+    publisher.publish_current(serialize)
+    assert registrar.flush(TIMEOUT)
+    assert calls == []
+
+
+def test_a_serialized_message_is_stored_for_a_latched_topic(
+    advertise: Any, registrar: Registrar, ros: Any
+) -> None:
+    """A plugin latches the topic of an output with a publisher of its own."""
+    publisher, subscribers = advertise(STAMPED, PointStamped)
+    latched = Publisher(registrar, STAMPED, PointStamped, latch=True)
+    assert registrar.flush(TIMEOUT)
+    publisher.publish_serialized(serialized(point(5)))
+    assert [subscriber.next().point.x for subscriber in subscribers] == [5, 5]
+    late = RawSubscriber(ros.master, STAMPED, PointStamped, name="/late")
+    assert late.next().point.x == 5
+    late.close()
+    latched.close()

@@ -1,0 +1,85 @@
+"""Markers of a model whose bodies move, compared with those of a new cache."""
+
+from __future__ import annotations
+
+from io import BytesIO
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from visualization_msgs.msg import Marker, MarkerArray
+
+import flatland
+from flatland.ros.markers.marker_geometry import joint_lines, joint_points
+from flatland.ros.markers.model_markers import ModelMarkers
+
+MODEL = """
+bodies:
+  - name: base
+    footprints:
+      - {type: circle, radius: 0.2, density: 1}
+      - {type: polygon, points: [[0, 0], [1, 0], [0, 1]], density: 1}
+  - {name: arm, pose: [0.5, 0.25, 1], footprints: [{type: circle, radius: 0.1, density: 1}]}
+  - {name: frame, footprints: []}
+joints:
+  - {name: hinge, type: revolute, color: [1, 0, 0, 1],
+     bodies: [{name: arm, anchor: [0.1, 0.2]}, {name: base, anchor: [0.5, -0.25]}]}
+"""
+STAMP = 3_000_000_007
+
+
+@pytest.fixture
+def model(tmp_path: Path) -> Any:
+    (tmp_path / "arm.model.yaml").write_text(MODEL)
+    path = tmp_path / "world.yaml"
+    path.write_text(
+        "properties: {}\nlayers: []\n"
+        "models: [{name: arm, model: arm.model.yaml, pose: [1, 2, 3]}]\n"
+    )
+    with flatland.World.from_yaml(path, seed=1) as world:
+        yield world.models[0]
+
+
+def markers_of(message: Any) -> list[Marker]:
+    received: list[Marker] = MarkerArray().deserialize(message.packed).markers
+    return received
+
+
+def by_genpy(message: Any) -> bytes:
+    buffer = BytesIO()
+    MarkerArray(message.markers).serialize(buffer)
+    return buffer.getvalue()
+
+
+def test_poses_are_replaced_in_place(model: Any) -> None:
+    cached = ModelMarkers(model)
+    cached.message(0)
+    for number in range(4):
+        for body in model.bodies:
+            body.set_velocity(number, -1.0, 2.0)
+        model.bodies[1].set_pose(number, 2 * number, 0.3 * number)
+        message = cached.message(STAMP)
+        assert message.packed == ModelMarkers(model).message(STAMP).packed
+        assert message.packed == by_genpy(message)
+
+
+def test_joints_connect_the_origins_and_the_anchors(model: Any) -> None:
+    cached = ModelMarkers(model)
+    cached.message(0)
+    model.bodies[1].set_pose(-4.0, 0.5, 2.0)
+    lines, cubes = markers_of(cached.message(STAMP))[-2:]
+    joint = model.joints[0]
+    expected = joint_points(*(body.pose for body in joint.bodies), joint.anchors)
+    np.testing.assert_array_equal([[p.x, p.y, p.z] for p in cubes.points], expected)
+    np.testing.assert_array_equal([[p.x, p.y, p.z] for p in lines.points], joint_lines(expected))
+
+
+def test_changed_footprints_and_colors_are_rebuilt(model: Any) -> None:
+    cached = ModelMarkers(model)
+    before = markers_of(cached.message(0))
+    model.bodies[2].create_circle((0.0, 0.0), 0.3, density=1.0)
+    model.bodies[0].color = (0.5, 0.5, 0.5, 0.5)
+    after = markers_of(cached.message(0))
+    assert len(after) == len(before) + 1
+    assert {marker.color.a for marker in after[:2]} == {0.5}
