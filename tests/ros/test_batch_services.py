@@ -70,7 +70,9 @@ def test_spawn_move_and_delete(ros: Any) -> None:
 
     answer = delete(ros, 4)
     assert (answer.success, answer.message, answer.index) == (True, "", -1)
-    assert not [name for name in ros.registered()["publishers"] if name.startswith("/m")]
+    assert not [
+        name for name in ros.registered()["publishers"] if name.startswith(("/m0/", "/m3/"))
+    ]
 
 
 def test_requests_without_models_succeed(ros: Any) -> None:

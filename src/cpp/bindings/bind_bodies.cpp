@@ -18,7 +18,7 @@ using PyTriple = std::tuple<double, double, double>;
 using PyPair = std::tuple<double, double>;
 
 struct SavedMotions {
-  std::vector<BodyMotion> motions;
+  std::vector<SavedMotion> motions;
 };
 
 PyTriple to_python(const Triple& t) { return {t[0], t[1], t[2]}; }

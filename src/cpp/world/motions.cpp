@@ -30,7 +30,7 @@ struct ExposeSleepTime {
 };
 template struct ExposeSleepTime<&b2Body::m_sleepTime>;
 
-bool is_moved(const b2Body& body, const BodyMotion& motion) {
+bool is_moved(const b2Body& body, const SavedMotion& motion) {
   const b2Vec2& position = body.GetPosition();
   return position.x != motion.transform.p.x || position.y != motion.transform.p.y ||
          body.GetAngle() != motion.sweep.a;
@@ -38,9 +38,9 @@ bool is_moved(const b2Body& body, const BodyMotion& motion) {
 
 }  // namespace
 
-std::vector<BodyMotion> saved_motions(const World& world) {
+std::vector<SavedMotion> saved_motions(const World& world) {
   world.check_readable();
-  std::vector<BodyMotion> motions;
+  std::vector<SavedMotion> motions;
   motions.reserve(static_cast<std::size_t>(world.engine().GetBodyCount()));
   for (const b2Body* body = world.engine().GetBodyList(); body != nullptr; body = body->GetNext()) {
     motions.push_back({id_of(body), body->*expose(kTransform), body->*expose(kSweep),
@@ -50,9 +50,9 @@ std::vector<BodyMotion> saved_motions(const World& world) {
   return motions;
 }
 
-void restore_motions(World& world, const std::vector<BodyMotion>& motions) {
+void restore_motions(World& world, const std::vector<SavedMotion>& motions) {
   world.check_changeable();
-  for (const BodyMotion& motion : motions) {
+  for (const SavedMotion& motion : motions) {
     if (!world.has_body(motion.body)) continue;
     b2Body* body = world.change_body(motion.body);
     if (is_moved(*body, motion)) body->SetTransform(motion.transform.p, motion.sweep.a);

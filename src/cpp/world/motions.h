@@ -8,7 +8,7 @@
 namespace flatland {
 
 // Pose, velocity and sleep of a body, as Box2D stores them.
-struct BodyMotion {
+struct SavedMotion {
   Id body = 0;
   b2Transform transform;
   b2Sweep sweep;
@@ -18,10 +18,10 @@ struct BodyMotion {
   bool awake = false;
 };
 
-std::vector<BodyMotion> saved_motions(const World& world);
+std::vector<SavedMotion> saved_motions(const World& world);
 
 // Restores the motions bit by bit. Bodies that were destroyed in the meantime are ignored, bodies
 // that were created keep theirs.
-void restore_motions(World& world, const std::vector<BodyMotion>& motions);
+void restore_motions(World& world, const std::vector<SavedMotion>& motions);
 
 }  // namespace flatland
