@@ -26,6 +26,10 @@ run: setup  ## run the simulator: make run [WORLD=world.yaml] [ARGS="show_viz:=f
 test: setup-dev  ## run all tests, in two processes: make test [ARGS="-k laser"]
 	@. ./setup.bash && pytest --numprocesses 2 --dist loadgroup $(ARGS)
 
+.PHONY: test-learning
+test-learning: setup-dev  ## install PyTorch and Ray in build/learning, test examples/learning and examples/sweep
+	@tools/test_learning.sh $(ARGS)
+
 # Seconds of all targets together.
 DURATION := 600
 

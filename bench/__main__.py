@@ -25,10 +25,12 @@ MODULES = (
     "jam",
     "plugin_steps",
     "node",
+    "lockstep",
     "real_time",
     "large_map",
     "markers",
     "placement",
+    "gym_steps",
 )
 
 

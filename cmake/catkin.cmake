@@ -3,7 +3,7 @@
 # There is no setup.py: setuptools of Debian does not support the metadata of pyproject.toml, and
 # catkin_python_setup() would add the root of the repository to sys.path. Instead, the package in the devel
 # space is a relay to the source package.
-find_package(catkin REQUIRED COMPONENTS geometry_msgs message_generation std_msgs)
+find_package(catkin REQUIRED COMPONENTS geometry_msgs message_generation nav_msgs std_msgs)
 
 # Build the extension for the Python interpreter of ROS, selected by catkin.
 set(Python_EXECUTABLE ${PYTHON_EXECUTABLE})
@@ -12,9 +12,9 @@ set(Python_EXECUTABLE ${PYTHON_EXECUTABLE})
 set(${PROJECT_NAME}_CATKIN_PYTHON_SETUP_HAS_PACKAGE_INIT TRUE)
 add_message_files(DIRECTORY msg FILES ${FLATLAND_MSG_FILES})
 add_service_files(DIRECTORY srv FILES ${FLATLAND_SRV_FILES})
-generate_messages(DEPENDENCIES geometry_msgs std_msgs)
+generate_messages(DEPENDENCIES geometry_msgs nav_msgs std_msgs)
 
-catkin_package(CATKIN_DEPENDS geometry_msgs message_runtime std_msgs)
+catkin_package(CATKIN_DEPENDS geometry_msgs message_runtime nav_msgs std_msgs)
 
 set(FLATLAND_DEVEL_PACKAGE_DIR ${CATKIN_DEVEL_PREFIX}/${CATKIN_PACKAGE_PYTHON_DESTINATION})
 set(FLATLAND_CORE_OUTPUT_DIR ${FLATLAND_DEVEL_PACKAGE_DIR})

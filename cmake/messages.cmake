@@ -7,18 +7,20 @@ set(FLATLAND_GENPY_PYTHON /usr/bin/python3)
 set(FLATLAND_GENPY_DIR /usr/lib/genpy)
 set(FLATLAND_GENPY_INCLUDES
     -Istd_msgs:/usr/share/std_msgs/msg
-    -Igeometry_msgs:/usr/share/geometry_msgs/msg)
+    -Igeometry_msgs:/usr/share/geometry_msgs/msg
+    -Inav_msgs:/usr/share/nav_msgs/msg)
 
 # flatland_generate_messages(PACKAGE OUTPUT_DIR): generates OUTPUT_DIR/msg and OUTPUT_DIR/srv as part of `all`.
 # Sets PACKAGE_GENERATED_MSG and PACKAGE_GENERATED_SRV in the caller to the generated files, or to empty lists
 # if genpy is not installed.
 function(flatland_generate_messages package output_dir)
   foreach(required ${FLATLAND_GENPY_PYTHON} ${FLATLAND_GENPY_DIR}/genmsg_py.py
-          ${FLATLAND_GENPY_DIR}/gensrv_py.py /usr/share/std_msgs/msg /usr/share/geometry_msgs/msg)
+          ${FLATLAND_GENPY_DIR}/gensrv_py.py /usr/share/std_msgs/msg /usr/share/geometry_msgs/msg
+          /usr/share/nav_msgs/msg)
     if(NOT EXISTS ${required})
       message(WARNING
         "${required} not found: building without ROS messages, flatland.ros will not be available. "
-        "On Debian: apt-get install python3-genpy ros-std-msgs ros-geometry-msgs")
+        "On Debian: apt-get install python3-genpy ros-std-msgs ros-geometry-msgs ros-nav-msgs")
       set(${package}_GENERATED_MSG PARENT_SCOPE)
       set(${package}_GENERATED_SRV PARENT_SCOPE)
       return()

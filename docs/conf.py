@@ -97,6 +97,9 @@ nitpick_ignore_regex = [
     (r"py:class", r"(np|npt|numpy|pybind11_builtins)\..*"),
     (r"py:class", r"(builtins|collections\.abc|concurrent\.futures|contextlib|os|threading)\..*"),
     (r"py:class", "Future"),
+    (r"py:(class|exc)", r"(gymnasium|pathlib)\..*"),
+    # Names that flatland.gym imports only for type checkers, or that are not described.
+    (r"py:class", r"(FleetEnv|Laser|Touches)"),
     # Type variables.
     (r"py:(class|obj)", r"(flatland\.[a-z_.]+\.)?[DRT]"),
 ]
@@ -105,6 +108,16 @@ _CONSTRUCTED = {
     "flatland.DynamicsLimits",
     "flatland.Timekeeper",
     "flatland.UpdateTimer",
+    "flatland.gym.FixedGoal",
+    "flatland.gym.FlatlandEnv",
+    "flatland.gym.FlatlandVectorEnv",
+    "flatland.gym.Goal",
+    "flatland.gym.Observation",
+    "flatland.gym.Proximity",
+    "flatland.gym.RandomGoal",
+    "flatland.gym.Scan",
+    "flatland.gym.Strayed",
+    "flatland.gym.VelocityAction",
     "flatland.recording.Replay",
     "flatland.simulation.Simulation",
 }

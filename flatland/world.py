@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import logging
 import os
-import threading
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 from types import TracebackType
@@ -32,12 +31,13 @@ from flatland.runtime.observer import Observers, WorldObserver
 from flatland.runtime.placement import Placement
 from flatland.runtime.plugin_host import PluginHost
 from flatland.runtime.requests import Requests
+from flatland.runtime.snapshot import WorldStates
+from flatland.runtime.stepping import Stepping
 from flatland.runtime.transforms import TransformBuffer
 from flatland.timekeeper import Timekeeper
 
 if TYPE_CHECKING:
     from flatland.recording import Recorder
-    from flatland.runtime.change_log import ChangeLog
 
 _LOG = logging.getLogger("flatland")
 
@@ -91,21 +91,23 @@ class World(Contents):
         self.plugin_errors, self.on_invalid_body = plugin_errors, on_invalid_body
         self._faults = Faults(plugin_errors)
         self.seed = checked_seed(seed)
+        self.velocity_iterations = velocity_iterations
+        self.position_iterations = position_iterations
         self.params = params
         self.path = ""
         self.inputs = Inputs()
-        self.velocity_iterations = velocity_iterations
-        self.position_iterations = position_iterations
         self.collision_filter = CollisionFilter()
-        self.layers: list[Layer] = []
+        self.layers, self._former_layers = list[Layer](), dict[str, Layer]()
         self.physics = PhysicsWorld()
         self._files = Source("", str(Path(base_dir).absolute()))
         self.requests = Requests()
         self._observers = Observers(self._faults)
-        self.ports = PortRegistry(self._observers, self._faults.add_of_subscriber)
         self.transform_buffer = TransformBuffer(self._observers)
         self.plugin_host = PluginHost(
             self, self._observers, self.requests, self._faults, plugin_timeout
+        )
+        self.ports = PortRegistry(
+            self._observers, self._faults.add_of_subscriber, self.plugin_host.schedule.change
         )
         self._contacts = ContactReporter(self.physics, self.plugin_host)
         self._placement = Placement(self, self._contacts)
@@ -115,11 +117,15 @@ class World(Contents):
         self._body_monitor = BodyMonitor(
             self.physics, self._contacts, self._models, on_invalid_body
         )
+        self.stepping = Stepping(
+            self, self._contacts, self._body_monitor, self._observers, self._faults
+        )
+        self.requests.on_post = self.physics.plan.interrupt
         self.change_count = 0
-        self._change_log: ChangeLog | None = None
         self._paused = False
         self._closed = False
         self.add_observer(self._body_monitor)
+        self._states = WorldStates(self, (*vars(self), "map_layer"))
         for observer in observers:
             self.add_observer(observer)
 
@@ -212,50 +218,14 @@ class World(Contents):
         """Simulated time [s]."""
         return self.timekeeper.sim_time
 
-    def step(self, n: int = 1) -> None:
-        """Steps `n` times; has no effect while paused.
+    def step(self, n: int = 1, *, while_paused: bool = False) -> None:
+        """Steps `n` times; has no effect on a paused world unless `while_paused` is true.
 
         Raises:
             WorldError: The world is closed, a plugin calls this, or a body is not finite.
             Exception: Raised by a plugin, subscriber or observer, with `plugin_errors="raise"`.
         """
-        requests, faults = self.requests, self._faults
-        requests.refuse_in_plugin("step")
-        actions, thread = requests.actions, threading.get_ident()
-        for _ in range(n):
-            with requests.lock:
-                self._check_open()
-                if actions:
-                    requests.process()
-                if not self._paused:
-                    requests.hook_thread = thread
-                    self._observers.step_started()
-                    try:
-                        self._step_once()
-                    finally:
-                        self._observers.step_finished()
-                        requests.hook_thread = None
-                if actions:
-                    requests.process()
-            if faults.first is not None:
-                faults.raise_first()
-
-    def _step_once(self) -> None:
-        timekeeper, host = self.timekeeper, self.plugin_host
-        self._contacts.update()
-        host.before_physics_step(timekeeper)
-        report = self.physics.step(
-            timekeeper.step_size, self.velocity_iterations, self.position_iterations
-        )
-        if report is not None:
-            self._body_monitor.examine(report, timekeeper)
-        self._contacts.dispatch()
-        timekeeper.advance()
-        self._observers.time_advanced(timekeeper.sim_time_ns)
-        host.after_physics_step(timekeeper)
-        self.transform_buffer.flush()
-        if self._change_log is not None:
-            self._change_log.step_done()
+        self.stepping.step(n, while_paused=while_paused)
 
     # -- recordings and images -------------------------------------------------------------
 
@@ -319,7 +289,8 @@ class World(Contents):
         """Whether `close` was called."""
         return self._closed
 
-    def _check_open(self) -> None:
+    def check_open(self) -> None:
+        """Raises `WorldError` if the world is closed."""
         if self._closed:
             raise WorldError("the world is closed")
 
@@ -334,8 +305,8 @@ class World(Contents):
         with self.requests.lock:
             if self._closed:
                 return
-            if self._change_log is not None:
-                self._change_log.world_closing()
+            if self.stepping.change_log is not None:
+                self.stepping.change_log.world_closing()
             self.plugin_host.shut_down(list(self.plugin_host.world_plugins))
             for model in reversed(self.models):
                 self._models.delete(model.name)

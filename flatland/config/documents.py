@@ -14,7 +14,7 @@ from typing import BinaryIO
 
 from flatland.config.composer import Composer, end_position, malformed
 from flatland.config.hints import similar_file
-from flatland.config.inputs import check_allowed, note_file
+from flatland.config.inputs import cached_file, check_allowed, note_file
 from flatland.config.node import Node, Source
 from flatland.errors import Place, UnreadableFileError
 
@@ -83,7 +83,7 @@ def read_regular(path: str) -> bytes:
 
 def _read(path: str) -> bytes:
     try:
-        return read_regular(path)
+        return cached_file(path, read_regular)
     except (FileNotFoundError, NotADirectoryError):
         raise UnreadableFileError(
             f'File does not exist, path="{path}"', place=Place(path), hint=similar_file(path)

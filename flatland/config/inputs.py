@@ -8,11 +8,29 @@ from __future__ import annotations
 import errno
 import os
 import zlib
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Hashable, Iterable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import TypeVar, cast
+
+T = TypeVar("T")
+
+
+@dataclass(slots=True)
+class InputCache:
+    """What the files and parameters of a world contained when the world was loaded.
+
+    Attributes:
+        files: Content of each file.
+        results: What was made of other files, such as images, by the arguments of the function.
+        params: Values of the parameters.
+    """
+
+    files: dict[str, bytes] = field(default_factory=dict)
+    results: dict[Hashable, object] = field(default_factory=dict)
+    params: dict[str, object] = field(default_factory=dict)
 
 
 @dataclass(slots=True)
@@ -26,6 +44,7 @@ class Inputs:
         commands_received: Number of values that commands received, from plugins, when the world
             file was loaded.
         params: Values of all parameters that `param()` looked up; None if one is not set.
+        cache: The inputs of the world file, for `World.reset`.
     """
 
     seed: int = 0
@@ -33,15 +52,24 @@ class Inputs:
     commands_received: int = 0
     files: dict[str, None] = field(default_factory=dict)
     params: dict[str, object] = field(default_factory=dict)
+    cache: InputCache = field(default_factory=InputCache)
     _expressions: int = 0
+    _is_caching: bool = False
 
     @contextmanager
-    def collecting(self) -> Iterator[None]:
-        """Adds everything that the current thread reads in the block."""
+    def collecting(self, *, caching: bool = False) -> Iterator[None]:
+        """Adds everything that the current thread reads in the block.
+
+        Args:
+            caching: Whether to read only what is not in the cache, and to add it to the cache.
+        """
         token = _current.set(self)
+        was_caching = self._is_caching
+        self._is_caching = caching or was_caching
         try:
             yield
         finally:
+            self._is_caching = was_caching
             _current.reset(token)
 
 
@@ -109,11 +137,69 @@ def note_file(path: str) -> None:
         inputs.files[str(Path(path).absolute())] = None
 
 
-def note_param(name: str, value: object) -> None:
-    """Records that a parameter is looked up."""
+def cached_file(path: str, read: Callable[[str], bytes]) -> bytes:
+    """Returns the content of a file, from the cache of the current world if it is in use.
+
+    Args:
+        path: The file.
+        read: Reads the file.
+    """
     inputs = _current.get()
-    if inputs is not None:
-        inputs.params[name] = value
+    if inputs is None or not inputs._is_caching:
+        return read(path)
+    files, name = inputs.cache.files, str(Path(path).absolute())
+    if name in files:
+        note_file(path)
+    else:
+        files[name] = read(path)
+    return files[name]
+
+
+def is_cached_file(path: str) -> bool:
+    """Returns whether `cached_file` would return the content of a file from the cache."""
+    inputs = _current.get()
+    return inputs is not None and (
+        inputs._is_caching and str(Path(path).absolute()) in inputs.cache.files
+    )
+
+
+def cached_result(path: str, arguments: Hashable, make: Callable[[], T]) -> T:
+    """Returns what is made of a file, from the cache of the current world if it is in use.
+
+    Args:
+        path: The file.
+        arguments: Everything else that the result depends on, and a name of the kind of result.
+        make: Reads the file and makes the result, which must not be changed.
+    """
+    inputs = _current.get()
+    if inputs is None or not inputs._is_caching:
+        return make()
+    results, key = inputs.cache.results, (str(Path(path).absolute()), arguments)
+    if key in results:
+        note_file(path)
+    else:
+        results[key] = make()
+    return cast("T", results[key])
+
+
+def look_up_param(name: str, look_up: Callable[[str], object]) -> object:
+    """Returns the value of a parameter, from the cache of the current world if it is in use.
+
+    Args:
+        name: The parameter.
+        look_up: Returns its value; None if it is not set.
+    """
+    inputs = _current.get()
+    if inputs is None:
+        return look_up(name)
+    if inputs._is_caching and name in inputs.cache.params:
+        value = inputs.cache.params[name]
+    else:
+        value = look_up(name)
+    if inputs._is_caching:
+        inputs.cache.params[name] = value
+    inputs.params[name] = value
+    return value
 
 
 def next_seed() -> int:

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from flatland.config.documents import load_documents, parse_documents
 from flatland.config.hints import similar_file
-from flatland.config.inputs import check_allowed, next_seed, note_param
+from flatland.config.inputs import check_allowed, is_cached_file, look_up_param, next_seed
 from flatland.config.lua import EvalError, evaluate
 from flatland.config.node import MAX_NESTING, ListNode, Node, NullNode, ScalarNode, Source
 from flatland.errors import YamlError
@@ -175,13 +175,12 @@ class _Preprocessor:
         return result.text
 
     def _param(self, name: str) -> object:
-        value: object = None
+        return look_up_param(name, self._look_up)
+
+    def _look_up(self, name: str) -> object:
         if isinstance(self._params, Mapping):
-            value = self._params.get(name)
-        elif self._params is not None:
-            value = self._params(name)
-        note_param(name, value)
-        return value
+            return self._params.get(name)
+        return None if self._params is None else self._params(name)
 
     def _include(self, node: ScalarNode, marker: str, chain: _Chain, depth: int) -> list[Node]:
         written = node.text[len(marker) :].strip()
@@ -193,7 +192,7 @@ class _Preprocessor:
                 node, f'Failed to read file, path="{path}", {error.strerror}'
             ) from error
         try:
-            exists = bool(written) and Path(path).exists()
+            exists = bool(written) and (is_cached_file(path) or Path(path).exists())
         except (OSError, ValueError):
             exists = False
         if not exists:

@@ -72,6 +72,11 @@ class Layer(Entity):
     def __repr__(self) -> str:
         return f"<Layer {self.name!r}>"
 
+    def renew(self, new: Layer) -> None:
+        """Becomes equal to a layer that has been loaded again and replaces this one."""
+        vars(self).update(vars(new))
+        self.body.entity = self
+
     @property
     def edges(self) -> FloatArray:
         """All edges (x1, y1, x2, y2) in the frame of the body [m], shape (n, 4)."""

@@ -11,6 +11,7 @@ from flatland.geometry import MAX_MAGNITUDE, Pose, Vector2, compose, finite_pose
 from flatland.graph_names import clean_name
 
 if TYPE_CHECKING:
+    from flatland.physics import Touches
     from flatland.plugin_api.plugin import ModelPlugin
     from flatland.world import World
 
@@ -106,6 +107,23 @@ class Model(Entity):
             return frame_id[1:]
         namespace = self.namespace.strip("/")
         return f"{namespace}_{frame_id}" if namespace else frame_id
+
+    def watch_contacts(self, *, sensors: bool = False) -> Touches:
+        """Watches whether the model touches anything else, at hardly any cost.
+
+        Args:
+            sensors: Whether to count contacts with sensors, which have no effect on bodies.
+
+        Returns:
+            `touched` is true if a body of the model touches a wall or another model, or did so
+            since the last call of `clear`; `remove` ends it.
+
+        Raises:
+            StaleHandleError: The model was deleted.
+            WorldLockedError: The world is stepping.
+        """
+        physics = self.bodies[0].world
+        return physics.collect_touches(self.bodies, sensors=sensors, own=False)
 
     def set_pose(self, x: float, y: float, theta: float) -> None:
         """Moves the model rigidly so that its first body is at a pose, and stops all bodies.

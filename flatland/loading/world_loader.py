@@ -64,7 +64,7 @@ def load_world(
     folders = real_folders(model_path)
     seed = checked_seed(seed)
     inputs = Inputs(seed, simplify_map)
-    with inputs.collecting():
+    with inputs.collecting(caching=True):
         world = _create_world(
             world_class,
             path,
@@ -96,11 +96,7 @@ def _create_world(
 ) -> World:
     file = Path(Source("", str(Path.cwd())).resolve(os.fspath(path)))
     reader = read(file, params)
-    properties = reader.subnode("properties", "map")
-    velocity_iterations = _read_iterations(properties, "velocity_iterations")
-    position_iterations = _read_iterations(properties, "position_iterations")
-    map_layer: str = properties.get("publish_map", "string", "")
-    properties.ensure_accessed_all()
+    velocity_iterations, position_iterations, map_layer = _read_properties(reader)
     world = world_class(
         params=params,
         velocity_iterations=velocity_iterations,
@@ -112,35 +108,74 @@ def _create_world(
     world.inputs = inputs
     world.read_yaml = read
     try:
-        for entry in reader.subnode("layers", "list").items():
-            with entry.collect_errors():
-                _load_layer(world, entry, inputs.simplify_map)
-        if map_layer and not any(map_layer in layer.names for layer in world.layers):
-            names = ", ".join(layer.name for layer in world.layers) or "none"
-            properties.report(
-                properties.invalid(
-                    "publish_map", f"must be the name of a layer ({names}), got {map_layer}"
-                )
-            )
-            map_layer = ""  # only if errors are collected
-        world.map_layer = map_layer
-        try:
-            _load_models(world, reader)
-            # Unknown keys are reported before world plugins are started.
-            world_plugins = list(reader.optional_subnode("plugins", "list").items())
-            reader.ensure_accessed_all()
-            world_plugins = world.plugin_host.require_plugins(world_plugins, None)
-        except MissingPluginsError as error:
-            # The error lists the missing plugins of one model; report those of the whole world.
-            raise _all_missing_plugins(world, reader) or error from None
-        for entry in world_plugins:
-            with entry.collect_errors():
-                _load_world_plugin(world, entry, reader)
+        _load_contents(world, reader, map_layer)
     except BaseException as error:
         # Not `close`: an exception of a plugin must not replace this one.
         world.__exit__(type(error), error, error.__traceback__)
         raise
     return world
+
+
+def reload_world(world: World, seed: int) -> None:
+    """Loads the layers, models and plugins of a world again, which is empty.
+
+    Files and parameters that were read when the world was loaded are not read again.
+
+    Args:
+        world: The world; `load_world` made it.
+        seed: Seed of all random numbers.
+
+    Raises:
+        FlatlandError: With this seed, an expression results in an invalid value, or a plugin fails;
+            the world is incomplete.
+    """
+    inputs = Inputs(seed, world.inputs.simplify_map, cache=world.inputs.cache)
+    world.seed, world.inputs = seed, inputs
+    with inputs.collecting(caching=True):
+        reader = world.read_yaml(world.path, world.params)
+        properties = _read_properties(reader)
+        world.velocity_iterations, world.position_iterations, map_layer = properties
+        _load_contents(world, reader, map_layer)
+    world.change_count = 0
+    inputs.commands_received = world.ports.commands_received()
+
+
+def _read_properties(reader: YamlReader) -> tuple[int, int, str]:
+    """Returns the iterations of velocities and positions, and the layer of the map topic."""
+    properties = reader.subnode("properties", "map")
+    velocity_iterations = _read_iterations(properties, "velocity_iterations")
+    position_iterations = _read_iterations(properties, "position_iterations")
+    map_layer: str = properties.get("publish_map", "string", "")
+    properties.ensure_accessed_all()
+    return velocity_iterations, position_iterations, map_layer
+
+
+def _load_contents(world: World, reader: YamlReader, map_layer: str) -> None:
+    for entry in reader.subnode("layers", "list").items():
+        with entry.collect_errors():
+            _load_layer(world, entry, world.inputs.simplify_map)
+    if map_layer and not any(map_layer in layer.names for layer in world.layers):
+        names = ", ".join(layer.name for layer in world.layers) or "none"
+        properties = reader.subnode("properties", "map")
+        properties.report(
+            properties.invalid(
+                "publish_map", f"must be the name of a layer ({names}), got {map_layer}"
+            )
+        )
+        map_layer = ""  # only if errors are collected
+    world.map_layer = map_layer
+    try:
+        _load_models(world, reader)
+        # Unknown keys are reported before world plugins are started.
+        world_plugins = list(reader.optional_subnode("plugins", "list").items())
+        reader.ensure_accessed_all()
+        world_plugins = world.plugin_host.require_plugins(world_plugins, None)
+    except MissingPluginsError as error:
+        # The error lists the missing plugins of one model; report those of the whole world.
+        raise _all_missing_plugins(world, reader) or error from None
+    for entry in world_plugins:
+        with entry.collect_errors():
+            _load_world_plugin(world, entry, reader)
 
 
 def _read_iterations(properties: YamlReader, key: str) -> int:

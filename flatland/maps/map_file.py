@@ -9,10 +9,11 @@ import numpy as np
 import numpy.typing as npt
 
 from flatland.config.hints import similar_file
+from flatland.config.inputs import cached_result
 from flatland.config.preprocessor import Params
 from flatland.config.reader import ReadYaml, YamlReader
 from flatland.errors import MapFileError
-from flatland.geometry import Pose
+from flatland.geometry import FloatArray, Pose
 from flatland.maps.line_segments import read_line_segments
 from flatland.maps.map_image import image_edges, read_grey_image, threshold_in_place
 
@@ -113,16 +114,20 @@ def _load_image(reader: YamlReader, layer_name: str, simplify: int) -> LayerMap:
             layer_name,
             occupied_thresh,
         )
+
+    def make_edges() -> tuple[FloatArray, int]:
+        mask = threshold_in_place(read_grey_image(image_path), occupied_thresh)
+        return image_edges(mask, resolution, simplify)
+
     try:
-        image = read_grey_image(image_path)
+        edges, exact_edge_count = cached_result(
+            image_path, ("edges", occupied_thresh, resolution, simplify), make_edges
+        )
     except OSError as error:
         node = reader.subnode("image")
         raise node.error(
             f'Failed to load "{image_path}" in layer "{layer_name}"', similar_file(image_path)
         ) from error
-    try:
-        mask = threshold_in_place(image, occupied_thresh)
-        edges, exact_edge_count = image_edges(mask, resolution, simplify)
     except ValueError as error:
         raise reader.invalid("resolution", str(error)) from error
     return LayerMap(origin, edges, exact_edge_count, reader.path, unknown_keys)
@@ -137,7 +142,7 @@ def _load_line_segments(reader: YamlReader, layer_name: str) -> LayerMap:
     if scale == 0:
         reader.report(reader.invalid("scale", "must not be 0"))
     try:
-        segments = read_line_segments(data_path)
+        segments = cached_result(data_path, "segments", lambda: read_line_segments(data_path))
     except OSError as error:
         located = reader.subnode("data").error(f'Failed to load "{data_path}"')
         raise MapFileError(

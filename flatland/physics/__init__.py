@@ -14,15 +14,20 @@ from flatland._core import BOX2D_VERSION, OldManifold, PreSolveContact
 from flatland.geometry import Pose
 from flatland.physics.body import PhysicsBody
 from flatland.physics.contact import ContactEvent, ContactInfo
+from flatland.physics.controller import Controller, VelocityController
 from flatland.physics.fixture import PhysicsFixture
 from flatland.physics.joint import PhysicsJoint
+from flatland.physics.plan import END_OF_ORDER, RunEnd, RunResult, StepPlan, StepRun, run_worlds
 from flatland.physics.queries import RayHit
-from flatland.physics.world import PhysicsWorld, StepReport
+from flatland.physics.touches import Touch, Touches
+from flatland.physics.world import PhysicsWorld, StepReport, to_report
 
 __all__ = [
     "BOX2D_VERSION",
+    "END_OF_ORDER",
     "ContactEvent",
     "ContactInfo",
+    "Controller",
     "OldManifold",
     "PhysicsBody",
     "PhysicsFixture",
@@ -31,5 +36,14 @@ __all__ = [
     "Pose",
     "PreSolveContact",
     "RayHit",
+    "RunEnd",
+    "RunResult",
+    "StepPlan",
     "StepReport",
+    "StepRun",
+    "Touch",
+    "Touches",
+    "VelocityController",
+    "run_worlds",
+    "to_report",
 ]

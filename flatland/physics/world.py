@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
 from flatland import _core
-from flatland.geometry import FloatArray
+from flatland.geometry import DoubleArray, FloatArray
 from flatland.physics.body import PhysicsBody
 from flatland.physics.contact import ContactEvent, ContactInfo, to_events, to_infos
 from flatland.physics.fixture import PhysicsFixture
 from flatland.physics.joint import PhysicsJoint
+from flatland.physics.plan import StepPlan
 from flatland.physics.queries import PhysicsQueries
+from flatland.physics.touches import Touches
 
 PreSolveHook = Callable[[_core.PreSolveContact, _core.OldManifold], object]
 
@@ -47,6 +49,11 @@ class StepReport:
     invalid: tuple[int, ...]
 
 
+def to_report(ids: tuple[list[int], list[int]] | None) -> StepReport | None:
+    """Converts the report of the core: the ids of limited and of invalid bodies."""
+    return None if ids is None else StepReport(tuple(ids[0]), tuple(ids[1]))
+
+
 class PhysicsWorld(PhysicsQueries):
     """A Box2D world without gravity; owns its bodies, fixtures, joints and contacts.
 
@@ -61,13 +68,15 @@ class PhysicsWorld(PhysicsQueries):
             that it raises.
         pre_solve_bodies: Ids of the bodies whose contacts are passed to `pre_solve`. Contacts of
             other bodies cause no overhead.
+        plan: What the steps of a `flatland.World` do besides the physics; `step` ignores it.
     """
 
-    __slots__ = ("_pre_solve_errors", "pre_solve", "pre_solve_bodies")
+    __slots__ = ("_pre_solve_errors", "plan", "pre_solve", "pre_solve_bodies")
 
     def __init__(self) -> None:
         """Creates an empty world."""
         self._core = _core.World()
+        self.plan = StepPlan(self._core)
         self.pre_solve: PreSolveHook | None = None
         self.pre_solve_bodies: set[int] = set()
         self._pre_solve_errors: list[BaseException] = []
@@ -85,6 +94,46 @@ class PhysicsWorld(PhysicsQueries):
     def closed(self) -> bool:
         """Whether the world is closed."""
         return self._core.closed
+
+    # -- copies ----------------------------------------------------------------------------
+
+    def copy(self) -> PhysicsWorld:
+        """Returns an independent copy with the same ids and without a function `pre_solve`.
+
+        The copy is exact: the same calls have the same results, bit by bit. It shares only what
+        never changes: trees of edges and sorted rays. Copies may be used in different threads.
+
+        Raises:
+            StaleHandleError: The world is closed.
+            WorldLockedError: The world is stepping.
+        """
+        copy = type(self)()
+        copy._core = self._core.copy()
+        return copy
+
+    def become_copy_of(self, source: PhysicsWorld) -> None:
+        """Replaces all objects by exact copies of those of another world, with the same ids.
+
+        Handles of objects whose ids do not exist in the other world become stale, and their ids are
+        not used again.
+
+        Args:
+            source: The other world, such as an earlier copy of this one.
+
+        Raises:
+            StaleHandleError: One of the worlds is closed.
+            WorldLockedError: One of the worlds is stepping.
+        """
+        self._core.become_copy_of(source._core)
+
+    def clear(self) -> None:
+        """Destroys all objects; the results of the same further calls are those of a new world.
+
+        Raises:
+            StaleHandleError: The world is closed.
+            WorldLockedError: The world is stepping.
+        """
+        self._core.clear()
 
     def step(
         self, dt: float, velocity_iterations: int, position_iterations: int
@@ -128,7 +177,7 @@ class PhysicsWorld(PhysicsQueries):
                 self.pre_solve_bodies,
                 self._pre_solve_errors,
             )
-        return None if ids is None else StepReport(tuple(ids[0]), tuple(ids[1]))
+        return to_report(ids)
 
     def find_new_contacts(self) -> None:
         """Searches for pairs of fixtures that may touch, which the next step would do otherwise.
@@ -293,6 +342,21 @@ class PhysicsWorld(PhysicsQueries):
         """
         return self._core.body_states()
 
+    def motions(self, bodies: Iterable[PhysicsBody]) -> DoubleArray:
+        """Returns the poses and velocities of the origins of some bodies, in one call.
+
+        Args:
+            bodies: The bodies.
+
+        Returns:
+            (x, y, theta, vx, vy, omega) of each body in the world frame [m, rad, s], shape (n, 6).
+
+        Raises:
+            StaleHandleError: A body was destroyed, or the world is closed.
+            WorldLockedError: The world is stepping.
+        """
+        return self._core.motions([body.id for body in bodies])
+
     # -- handles by id ---------------------------------------------------------------------
 
     def body(self, body_id: int) -> PhysicsBody:
@@ -327,6 +391,51 @@ class PhysicsWorld(PhysicsQueries):
         """
         columns = self._core.take_contact_rows()
         return [] if columns is None else to_events(columns)
+
+    def record_contacts_of(self, body_id: int, kinds: int) -> None:
+        """Records the contact events of one body, besides those of others.
+
+        Args:
+            body_id: The body.
+            kinds: 1 for `begin`, 2 for `end`, 4 for `post_solve`, or a sum of them; 0 for none.
+        """
+        self._core.record_body_contacts(body_id, kinds)
+
+    def record_contacts_of_all(self, kinds: int) -> None:
+        """Records the contact events of some kinds of all bodies; see `record_contacts_of`."""
+        self._core.record_all_contacts(kinds)
+
+    def own_bodies(self, bodies: Iterable[PhysicsBody], are_owned: bool) -> None:
+        """Sets whether bodies belong to a model or a layer; others are ignored by `Touches`."""
+        self._core.own_bodies([body.id for body in bodies], are_owned)
+
+    def collect_touches(
+        self,
+        bodies: Iterable[PhysicsBody],
+        *,
+        exclude: Iterable[PhysicsBody] = (),
+        sensors: bool = True,
+        own: bool = True,
+    ) -> Touches:
+        """Collects the contacts of bodies with bodies of models and layers.
+
+        Args:
+            bodies: The bodies.
+            exclude: Bodies whose contacts are ignored.
+            sensors: Whether to collect contacts with sensors, which have no effect on bodies.
+            own: Whether to collect contacts between two of the bodies.
+
+        Returns:
+            The contacts, also those that exist already.
+
+        Raises:
+            StaleHandleError: A body was destroyed.
+            WorldLockedError: The world is stepping.
+        """
+        touches = self._core.add_touches(
+            [body.id for body in bodies], [body.id for body in exclude], sensors, own
+        )
+        return Touches(self, touches)
 
     def contacts(self) -> list[ContactInfo]:
         """Returns the contacts of all fixtures that currently touch.

@@ -9,9 +9,10 @@ has published the time t already. With `after_step: true`, they publish the stat
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
-from flatland.plugin_api.update_timer import UpdateTimer
+from flatland.plugin_api.schedule import not_called
+from flatland.plugin_api.update_timer import UpdateClock, UpdateTimer
 from flatland.timekeeper import Timekeeper
 
 if TYPE_CHECKING:
@@ -19,6 +20,9 @@ if TYPE_CHECKING:
     from flatland.plugin_api.plugin import FlatlandPlugin
 
 StepHook = Callable[[Timekeeper], None]
+
+BEFORE: Final = "before_physics_step"
+AFTER: Final = "after_physics_step"
 
 
 def read_after_step(config: YamlReader) -> bool:
@@ -35,10 +39,10 @@ def call_after_step(plugin: FlatlandPlugin, hook: StepHook) -> None:
 
     Other plugins of the class remain without this hook, so that it costs nothing for them.
     """
-    vars(plugin)["after_physics_step"] = hook
+    vars(plugin)[AFTER] = hook
 
 
-def update_after_step(plugin: FlatlandPlugin, config: YamlReader, timer: UpdateTimer) -> None:
+def update_after_step(plugin: FlatlandPlugin, config: YamlReader, timer: UpdateTimer) -> str:
     """Calls `before_physics_step` of a plugin after the step instead, if `after_step` is set.
 
     To be called in `on_initialize`.
@@ -48,18 +52,28 @@ def update_after_step(plugin: FlatlandPlugin, config: YamlReader, timer: UpdateT
         config: Parameters of the plugin.
         timer: Timer of its updates.
 
+    Returns:
+        Name of the hook that publishes.
+
     Raises:
         YamlError: The value is not a boolean.
     """
     if read_after_step(config) and timer.rate:
         call_after_step(plugin, plugin.before_physics_step)
-        vars(plugin)["before_physics_step"] = lambda _timekeeper: None
+        vars(plugin)[BEFORE] = not_called
+        return AFTER
+    return BEFORE
 
 
 class NeverDue(UpdateTimer):
     """The timer of a hook that does not publish."""
 
     __slots__ = ()
+
+    def clock(self, step_size_ns: int) -> UpdateClock | None:
+        """Returns the clock that is never due."""
+        del step_size_ns
+        return ("never", 0, 0)
 
     def check_update(self, timekeeper: Timekeeper) -> bool:
         """Returns False."""

@@ -5,10 +5,17 @@ from __future__ import annotations
 import logging
 import math
 import time
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from flatland.geometry import IDENTITY, DoubleArray, Pose, Vector2, compose, invert, rotate
-from flatland.plugin_api.after_step import NeverDue, StepHook, call_after_step, read_after_step
+from flatland.plugin_api.after_step import (
+    AFTER,
+    BEFORE,
+    NeverDue,
+    StepHook,
+    call_after_step,
+    read_after_step,
+)
 from flatland.plugin_api.noise import GaussianNoise
 from flatland.plugin_api.odometry_drift import OdometryDrift
 from flatland.plugin_api.parameters import (
@@ -17,10 +24,13 @@ from flatland.plugin_api.parameters import (
     read_rate,
     read_variances,
 )
+from flatland.plugin_api.schedule import when_due
 from flatland.plugin_api.update_timer import UpdateTimer
 from flatland.values import Odometry, Twist
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable
+
     from flatland.config.reader import YamlReader
     from flatland.entities.body import Body
     from flatland.plugin_api.plugin import ModelPlugin
@@ -159,18 +169,23 @@ class Odometer:
             stream = plugin.noise_stream("odometry drift")
             self._is_exact = False
             self._drift = OdometryDrift((a1, a2, a3, a4), stream, body.pose, center)
+        self._publish: StepHook | None = None  # after the step, at the updates of `_timer`
+        self._timer = UpdateTimer()
         self._truth: Output[Odometry] | None = None
         self._odometry: Output[Odometry] | None = None
         if publish:
             self._truth = plugin.output(truth_topic, Odometry)
             self._odometry = plugin.output(odometry_topic, Odometry)
 
-    def schedule(self, config: YamlReader, publish: StepHook) -> UpdateTimer:
-        """Reads `pub_rate` and `after_step`, and arranges for what happens after each step.
+    def schedule(
+        self, config: YamlReader, publish: StepHook, outputs: Iterable[Output[Any]] = ()
+    ) -> UpdateTimer:
+        """Reads `pub_rate` and `after_step`, and arranges for what happens in each step.
 
         Args:
             config: Parameters of the drive.
             publish: Publishes the current state with the current time.
+            outputs: What it emits besides the ground truth and the odometry.
 
         Returns:
             The timer of the updates in `before_physics_step`.
@@ -179,19 +194,49 @@ class Odometer:
             YamlError: A parameter is invalid.
         """
         timer = UpdateTimer(read_rate(config, "pub_rate"))
-        drift, body = self._drift, self._body
-        publishes_after_step = read_after_step(config) and timer.rate > 0
+        plugin = self._plugin
+        own = (output for output in (self._truth, self._odometry) if output is not None)
+        emitted = (*own, *outputs)
+        if read_after_step(config) and timer.rate > 0:
+            self._publish, self._timer = publish, timer
+            timer = NeverDue(timer.rate)
+            plugin.call_when_due(BEFORE, timer)
+        if self._drift is not None:
+            # In each step, so that the drift depends neither on the rate nor on subscribers.
+            call_after_step(plugin, self._drift_and_publish)
+            plugin.call_when_due(BEFORE, timer)
+            return timer
+        hook, publishing = BEFORE, timer
+        if self._publish is not None:
+            call_after_step(plugin, self._publish_after_step)
+            hook, publishing = AFTER, self._timer
+        plugin.call_when_due(
+            hook,
+            publishing,
+            outputs=emitted,
+            transforms=self.sends_transform,
+            body=self._body,
+            skipped=self._skip,
+        )
+        return timer
 
-        def finish_step(timekeeper: Timekeeper) -> None:
-            if drift is not None:
-                # In each step, so that the drift depends neither on the rate nor on subscribers.
-                drift.advance(body.pose)
-            if publishes_after_step and timer.check_update(timekeeper):
-                publish(timekeeper)
+    @when_due
+    def _publish_after_step(self, timekeeper: Timekeeper) -> None:
+        if self._publish is not None and self._timer.check_update(timekeeper):
+            self._publish(timekeeper)
 
-        if publishes_after_step or drift is not None:
-            call_after_step(self._plugin, finish_step)
-        return NeverDue(timer.rate) if publishes_after_step else timer
+    def _drift_and_publish(self, timekeeper: Timekeeper) -> None:
+        if self._drift is not None:
+            self._drift.advance(self._body.pose)
+        self._publish_after_step(timekeeper)
+
+    def _skip(self, count: int, stamp: int, pose: Pose | None) -> None:
+        """Makes up for updates that nothing wanted; see `FlatlandPlugin.call_when_due`."""
+        for noise in self._active_noise:
+            noise.begin_update(count)
+        if self.sends_transform and pose is not None:
+            noisy_pose = self._noisy_estimate(pose)
+            self._plugin.send_past_transform(stamp, self.frame_id, self.child_frame_id, *noisy_pose)
 
     @property
     def wanted(self) -> bool:
@@ -292,6 +337,9 @@ class Odometer:
                     self.twist_covariance(pose, velocity, yaw),
                 )
             )
+
+    def _noisy_estimate(self, pose: Pose) -> Pose:
+        return self._noisy(pose if self._is_exact else self._estimate(pose), self._pose_noise)
 
     @staticmethod
     def _noisy(values: Pose, noise: GaussianNoise) -> Pose:

@@ -9,6 +9,7 @@ from flatland.plugin_api.parameters import read_not_negative
 
 if TYPE_CHECKING:
     from flatland.config.reader import YamlReader
+    from flatland.physics.controller import SpeedLimits
 
 
 class DynamicsLimits:
@@ -63,6 +64,10 @@ class DynamicsLimits:
         deceleration = read_not_negative(reader, "deceleration_limit", acceleration)
         reader.ensure_accessed_all()
         return cls(velocity, acceleration, deceleration)
+
+    def as_tuple(self) -> SpeedLimits:
+        """Returns the limits of velocity, acceleration and deceleration."""
+        return (self.velocity_limit, self.acceleration_limit, self.deceleration_limit)
 
     def limit(self, v: float, target: float, dt: float) -> float:
         """Returns the velocity after one step towards a target.

@@ -52,9 +52,13 @@ class NoiseStream:
         self._is_positioned = False
         self.updates = 0
 
-    def begin_update(self) -> None:
-        """Advances to the next update; to be called for each update due, emitted or not."""
-        self.updates += 1
+    def begin_update(self, count: int = 1) -> None:
+        """Advances to the next update; to be called for each update due, emitted or not.
+
+        Args:
+            count: Number of updates that were due.
+        """
+        self.updates += count
         self._is_positioned = False
 
     @property
@@ -90,9 +94,13 @@ class GaussianNoise:
         """Returns whether any quantity has noise."""
         return any(self._deviations)
 
-    def begin_update(self) -> None:
-        """Advances to the next update; to be called for each update due, emitted or not."""
-        self._stream.begin_update()
+    def begin_update(self, count: int = 1) -> None:
+        """Advances to the next update; to be called for each update due, emitted or not.
+
+        Args:
+            count: Number of updates that were due.
+        """
+        self._stream.begin_update(count)
 
     def sample(self, index: int) -> float:
         """Returns the noise of one quantity; to be called once per quantity and update."""

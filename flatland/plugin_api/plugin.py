@@ -16,18 +16,22 @@ from flatland.errors import PluginError
 from flatland.graph_names import resolve_topic
 from flatland.plugin_api.noise import NoiseStream
 from flatland.plugin_api.ports import Command, Output
+from flatland.plugin_api.schedule import HookSchedule, SkippedHandler
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
+    from collections.abc import Callable, Iterable, Mapping
 
     from flatland.config.reader import YamlReader
+    from flatland.entities.body import Body
     from flatland.entities.model import Model
     from flatland.geometry import Pose
-    from flatland.physics import OldManifold
+    from flatland.physics import Controller, OldManifold, Touches
+    from flatland.plugin_api.update_timer import UpdateTimer
     from flatland.timekeeper import Timekeeper
     from flatland.world import World
 
 T = TypeVar("T")
+C = TypeVar("C", bound="Controller")
 
 
 class FlatlandPlugin:
@@ -47,6 +51,7 @@ class FlatlandPlugin:
     """
 
     base_class_type: ClassVar[str] = ""
+    outside_state: ClassVar[dict[str, Callable[[], object]]] = {"ros": lambda: None}
 
     name: str
     type: str
@@ -60,6 +65,8 @@ class FlatlandPlugin:
     _commands: list[Command[Any]]
     _noise_streams: list[NoiseStream]
     _sent: set[tuple[str, str]]
+    _schedules: dict[str, HookSchedule]
+    _controllers: list[Controller]
     _detached: bool
     _label: str
 
@@ -84,6 +91,8 @@ class FlatlandPlugin:
         self._commands = []
         self._noise_streams = []
         self._sent = set()
+        self._schedules = {}
+        self._controllers = []
         self._detached = False
         self._label = describe(self)
 
@@ -153,6 +162,98 @@ class FlatlandPlugin:
         self._noise_streams.append(stream)
         return stream
 
+    def reseed(self, rng: np.random.Generator) -> None:
+        """Continues `rng` and all noise streams from states that are drawn from a generator.
+
+        Args:
+            rng: Equal states of it give equal random numbers.
+        """
+        streams = list(self._noise_streams)
+        streams += [
+            value
+            for value in vars(self).values()
+            if isinstance(value, NoiseStream) and value not in streams
+        ]
+        words = rng.bit_generator.random_raw(2 + len(streams)).tolist()
+        generator = self.rng.bit_generator
+        state: Any = generator.state
+        state["state"]["state"] = words[0] << 64 | words[1]
+        state["has_uint32"] = 0
+        generator.state = state
+        for stream, word in zip(streams, words[2:], strict=True):
+            stream.updates = word >> 2
+            stream.begin_update()
+
+    def call_when_due(
+        self,
+        hook: str,
+        timer: UpdateTimer,
+        *,
+        outputs: Iterable[Output[Any]] | None = None,
+        transforms: bool = False,
+        body: Body | None = None,
+        skipped: SkippedHandler | None = None,
+        touches: Touches | None = None,
+        calls_at_touches: bool = False,
+    ) -> None:
+        """Restricts the calls of a hook to steps in which an update is due; for `on_initialize`.
+
+        Further calls may change only `outputs`.
+
+        Other steps need no Python code and are made in the core, many at a time. The hook must be
+        marked by `flatland.when_due`, and checks the timer itself. The first update due is always
+        called, others only if something wants what the hook computes.
+
+        Args:
+            hook: `before_physics_step` or `after_physics_step`.
+            timer: Timer of the updates.
+            outputs: The outputs to which the hook emits; without any that is wanted, there is no
+                call. None to call the hook in any case.
+            transforms: Whether to call the hook also while an observer wants transforms.
+            body: Body whose pose `skipped` needs.
+            skipped: Makes up for updates that were due without a call of the hook. It is called as
+                `skipped(count, stamp, pose)` with the number of updates, the simulated time of the
+                last one [ns], and the pose of `body` at that time, None without a body. It is
+                called before the next call of the hook and before the state of the plugin or the
+                transforms are read, and must not emit anything.
+            touches: Contacts that `clear` is called for at updates without a call of the hook.
+            calls_at_touches: Whether to call the hook also after steps in which there are contacts
+                in `touches`; for `after_physics_step`.
+
+        Raises:
+            ValueError: The hook is unknown.
+        """
+        if hook not in ("before_physics_step", "after_physics_step"):
+            raise ValueError(f"hook must be before_physics_step or after_physics_step, got {hook}")
+        self._schedules[hook] = HookSchedule(
+            timer,
+            None if outputs is None else tuple(outputs),
+            transforms,
+            body,
+            skipped,
+            touches,
+            calls_at_touches,
+        )
+        self.world.plugin_host.schedule.change()
+
+    def control(self, controller: C) -> C:
+        """Takes over a controller, for `on_initialize`; returns it.
+
+        The core carries it out in each step at the place of `before_physics_step` of the plugin if
+        that hook is marked by `when_due` and restricted by `call_when_due`; otherwise the hook is
+        called in each step and calls `Controller.advance`. It is removed with the plugin.
+        """
+        controller.schedule(0, automatic=False)
+        self._controllers.append(controller)
+        return controller
+
+    def set_before_step(self, function: Callable[[], None]) -> None:
+        """Calls a function before the next step; safe from any thread.
+
+        For `Command.on_change`, to pass the value to a controller.
+        """
+        self.world.plugin_host.schedule.set_later(function)
+
     def _random_state(self) -> tuple[Any, list[int]]:
         """Returns the states of `rng` and of the noise streams, for `World.state_hash`."""
         updates = [stream.updates for stream in self._noise_streams]
@@ -194,6 +295,25 @@ class FlatlandPlugin:
             self._sent.add(frames)
             world.transform_buffer.register(self, frames)
         world.transform_buffer.send(frames, (world.timekeeper.sim_time_ns, x, y, yaw, roll))
+
+    def send_past_transform(
+        self, stamp: int, parent: str, child: str, x: float, y: float, yaw: float, roll: float = 0.0
+    ) -> None:
+        """Adds a transform of an earlier step that nothing wanted, for `World.transforms`.
+
+        For the function `skipped` of `call_when_due`. Transforms that were never sent are ignored.
+
+        Args:
+            stamp: Simulated time of the transform [ns].
+            parent: As for `send_transform`.
+            child: As for `send_transform`.
+            x: As for `send_transform`.
+            y: As for `send_transform`.
+            yaw: As for `send_transform`.
+            roll: As for `send_transform`.
+        """
+        if (parent, child) in self._sent:
+            self.world.transform_buffer.add_past((parent, child), (stamp, x, y, yaw, roll))
 
     def on_initialize(self, config: YamlReader) -> None:
         """Reads the parameters and initializes the plugin; called once.

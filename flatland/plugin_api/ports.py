@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable, Hashable
-from typing import Any, Generic, TypeVar
+from typing import Any, ClassVar, Generic, TypeVar
 
 from flatland.errors import PLUGIN_FAULTS, WorldError
 from flatland.graph_names import global_name
@@ -29,9 +29,16 @@ class Output(Generic[T]):
         closed: Whether the last of these plugins has ended.
     """
 
+    outside_state: ClassVar[dict[str, Callable[[], object]]] = {
+        "_lock": threading.Lock,
+        "_subscribers": tuple,
+        "_wanters": frozenset,
+    }
+
     __slots__ = (
         "_lock",
         "_on_fault",
+        "_on_wanted",
         "_subscribers",
         "_wanters",
         "closed",
@@ -48,6 +55,7 @@ class Output(Generic[T]):
         value_type: type[T],
         owner: str = "",
         on_fault: SubscriberFault | None = None,
+        on_wanted: Callable[[], None] | None = None,
     ) -> None:
         """Creates an output without subscribers.
 
@@ -57,6 +65,7 @@ class Output(Generic[T]):
             owner: Name of the plugin, for messages.
             on_fault: Called with the exception of a subscriber, which then does not reach the
                 plugin that emits; None to propagate it.
+            on_wanted: Called from any thread when `wanted` may have changed.
         """
         self.name = name
         self.topic = global_name(name)
@@ -65,6 +74,7 @@ class Output(Generic[T]):
         self.owners = [owner]
         self.closed = False
         self._on_fault = on_fault
+        self._on_wanted = on_wanted
         # Both are replaced and never modified, so that other threads may read them at any time; the
         # lock serializes the replacements.
         self._lock = threading.Lock()
@@ -79,12 +89,17 @@ class Output(Generic[T]):
     def want(self, who: Hashable) -> None:
         """Marks the output as wanted on behalf of `who`; safe from any thread."""
         with self._lock:
-            self._wanters = self._wanters | {who}
+            self._set_wanters(self._wanters | {who})
 
     def unwant(self, who: Hashable) -> None:
         """Reverts `want` for `who`; safe from any thread."""
         with self._lock:
-            self._wanters = self._wanters - {who}
+            self._set_wanters(self._wanters - {who})
+
+    def _set_wanters(self, wanters: frozenset[Hashable]) -> None:
+        was_wanted, self._wanters = bool(self._wanters), wanters
+        if bool(wanters) != was_wanted and self._on_wanted is not None:
+            self._on_wanted()
 
     def emit(self, value: T) -> None:
         """Stores a value as `latest` and passes it to all subscribers."""
@@ -125,12 +140,12 @@ class Output(Generic[T]):
         with self._lock:
             self._subscribers = (*self._subscribers, (token, callback))
             if wants:
-                self._wanters = self._wanters | {token}
+                self._set_wanters(self._wanters | {token})
 
         def unsubscribe() -> None:
             with self._lock:
                 self._subscribers = tuple(s for s in self._subscribers if s[0] is not token)
-                self._wanters = self._wanters - {token}
+                self._set_wanters(self._wanters - {token})
 
         return unsubscribe
 
@@ -142,23 +157,26 @@ class Command(Generic[T]):
         name: Topic under the namespace of the model, with a leading `/` only if it is global.
         topic: The topic with a leading `/`.
         value_type: Type of the values.
-        value: The last value accepted, or the default.
         received: Number of values accepted.
         owner: Name of the plugin that opened it, for messages.
         closed: Whether the plugin has ended.
         on_set: Called as `on_set(command, value)` before each `set`, also for values that are not
             accepted; None for no function.
+        on_change: Called after `value` was set, in any thread; None for no function.
     """
 
+    outside_state: ClassVar[dict[str, Callable[[], object]]] = {"on_set": lambda: None}
+
     __slots__ = (
+        "_value",
         "accept",
         "closed",
         "name",
+        "on_change",
         "on_set",
         "owner",
         "received",
         "topic",
-        "value",
         "value_type",
     )
 
@@ -183,11 +201,28 @@ class Command(Generic[T]):
         self.owner = owner
         self.topic = global_name(name)
         self.value_type = value_type
-        self.value = default
+        self._value = default
         self.received = 0
         self.closed = False
         self.accept = accept
         self.on_set: Callable[[Command[T], T], None] | None = None
+        self.on_change: Callable[[], None] | None = None
+
+    @property
+    def value(self) -> T:
+        """The last value accepted, or the default."""
+        return self._value
+
+    @value.setter
+    def value(self, value: T) -> None:
+        self._value = value
+        if self.on_change is not None:
+            self.on_change()
+
+    def renew(self, new: Command[T]) -> None:
+        """Becomes equal to a new command of the same topic; `on_set` remains."""
+        self.name, self.owner, self.accept = new.name, new.owner, new.accept
+        self.value, self.received, self.closed = new.value, 0, False
 
     def set(self, value: T) -> None:
         """Sets the value if `accept` allows it.
@@ -200,8 +235,8 @@ class Command(Generic[T]):
         if self.on_set is not None:
             self.on_set(self, value)
         if self.accept is None or self.accept(value):
-            self.value = value
             self.received += 1
+            self.value = value
 
 
 class CommandTopic(Generic[T]):

@@ -4,8 +4,12 @@ from __future__ import annotations
 
 import math
 from fractions import Fraction
+from typing import Literal
 
 from flatland.timekeeper import NANOSECONDS, Timekeeper
+
+UpdateClock = tuple[Literal["periodic", "always", "at_start", "never"], int, int]
+"""Kind, half step and cycle, see `flatland.physics.StepPlan.add_clock`."""
 
 
 class UpdateTimer:
@@ -39,6 +43,27 @@ class UpdateTimer:
             exact = Fraction(repr(self.rate))
             self._per_nanosecond = exact.numerator
             self._cycle = NANOSECONDS * exact.denominator
+
+    def clock(self, step_size_ns: int) -> UpdateClock | None:
+        """Returns the clock of the core that agrees with this timer.
+
+        Args:
+            step_size_ns: Simulated time of a step [ns]; all times are multiples of it.
+
+        Returns:
+            The clock; None if its numbers do not fit into 63 bits.
+        """
+        if self._always:
+            return ("always", 0, 0)
+        if self._per_nanosecond == 0:
+            return ("at_start", 0, 0)
+        # phase < 2 * step * weight in `check_update`, without the common divisor of all terms.
+        half_step, cycle = step_size_ns * self._per_nanosecond, 2 * self._cycle
+        divisor = math.gcd(half_step, cycle)
+        half_step, cycle = half_step // divisor, cycle // divisor
+        if 2 * half_step >= cycle:
+            return ("always", 0, 0)
+        return ("periodic", half_step, cycle) if cycle < 1 << 63 else None
 
     def check_update(self, timekeeper: Timekeeper) -> bool:
         """Returns whether an update is due at the current time.

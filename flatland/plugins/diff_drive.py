@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import math
 from typing import TYPE_CHECKING
 
 from flatland.plugin_api.drive import Odometer, open_twist_command
 from flatland.plugin_api.dynamics_limits import DynamicsLimits
 from flatland.plugin_api.parameters import read_body
 from flatland.plugin_api.plugin import ModelPlugin
+from flatland.plugin_api.schedule import when_due
 from flatland.values import TwistWithCovariance
 
 if TYPE_CHECKING:
@@ -21,7 +21,14 @@ if TYPE_CHECKING:
 
 
 class DiffDrive(ModelPlugin):
-    """Moves the origin of a body with the commanded linear and angular velocity."""
+    """Moves the origin of a body with the commanded linear and angular velocity.
+
+    The core sets the velocity in each step (`flatland.physics.VelocityController`).
+
+    Attributes:
+        linear_dynamics: Limits of the linear velocity; settable, not to be modified.
+        angular_dynamics: Limits of the angular velocity; settable, not to be modified.
+    """
 
     def on_initialize(self, config: YamlReader) -> None:
         """Reads the parameters and declares the ports.
@@ -31,12 +38,12 @@ class DiffDrive(ModelPlugin):
             PluginError: A topic is not a legal name.
         """
         self.body = read_body(config, self.model)
-        self.linear_dynamics = DynamicsLimits.from_config(
-            config.optional_subnode("linear_dynamics", "map")
+        self._limits = tuple(
+            DynamicsLimits.from_config(config.optional_subnode(key, "map"))
+            for key in ("linear_dynamics", "angular_dynamics")
         )
-        self.angular_dynamics = DynamicsLimits.from_config(
-            config.optional_subnode("angular_dynamics", "map")
-        )
+        self._controller = self.control(self.body.control_velocity(holonomic=False))
+        self._set_limits()
         self._odometer = Odometer(
             self,
             config,
@@ -46,29 +53,54 @@ class DiffDrive(ModelPlugin):
             publish=config.get("enable_odom_pub", "bool", True),
         )
         self.world_frame_id = self._odometer.world_frame_id
-        self.timer = self._odometer.schedule(
-            config, lambda timekeeper: self._publish(timekeeper.sim_time_ns, self.body.pose)
-        )
         twist_topic = config.get("twist_pub", "string", "twist")
         self._twist: Output[TwistWithCovariance] | None = None
         if config.get("enable_twist_pub", "bool", True):
             self._twist = self.output(twist_topic, TwistWithCovariance)
+        outputs = () if self._twist is None else (self._twist,)
+        self.timer = self._odometer.schedule(config, self._publish_now, outputs)
         self._command = open_twist_command(self, config.get("twist_sub", "string", "cmd_vel"))
-        self._velocity = 0.0
-        self._yaw_rate = 0.0
+        self._command.on_change = self._command_changed
 
+    @property
+    def linear_dynamics(self) -> DynamicsLimits:
+        """Limits of the linear velocity; settable, not to be modified."""
+        return self._limits[0]
+
+    @linear_dynamics.setter
+    def linear_dynamics(self, limits: DynamicsLimits) -> None:
+        self._limits = (limits, self._limits[1])
+        self._set_limits()
+
+    @property
+    def angular_dynamics(self) -> DynamicsLimits:
+        """Limits of the angular velocity; settable, not to be modified."""
+        return self._limits[1]
+
+    @angular_dynamics.setter
+    def angular_dynamics(self, limits: DynamicsLimits) -> None:
+        self._limits = (self._limits[0], limits)
+        self._set_limits()
+
+    def _set_limits(self) -> None:
+        linear, angular = self._limits
+        self._controller.set_limits(linear.as_tuple(), angular.as_tuple())
+
+    def _command_changed(self) -> None:
+        self.set_before_step(self._set_target)
+
+    def _set_target(self) -> None:
+        command = self._command.value
+        self._controller.set_target(command.linear_x, 0.0, command.angular_z)
+
+    @when_due
     def before_physics_step(self, timekeeper: Timekeeper) -> None:
         """Sets the body's velocity, then reports where it is and how it moves now."""
-        dt = timekeeper.step_size
-        command = self._command.value
-        v = self._velocity = self.linear_dynamics.limit(self._velocity, command.linear_x, dt)
-        omega = self._yaw_rate = self.angular_dynamics.limit(self._yaw_rate, command.angular_z, dt)
-        body = self.body
-        pose = body.pose
-        # Set in every step; otherwise friction and contacts would slow the robot down.
-        body.set_velocity(v * math.cos(pose[2]), v * math.sin(pose[2]), omega)
+        self._set_target()
+        # In every step; otherwise friction and contacts would slow the robot down.
+        self._controller.advance(timekeeper.step_size)
         if self.timer.check_update(timekeeper):
-            self._publish(timekeeper.sim_time_ns, pose)
+            self._publish(timekeeper.sim_time_ns, self.body.pose)
 
     def model_moved(self, previous: Mapping[str, Pose], keep_odometry: bool) -> None:
         """Keeps the odometry, or displaces it along with the model."""
@@ -76,7 +108,11 @@ class DiffDrive(ModelPlugin):
 
     def state(self) -> object:
         """Returns the commanded velocities within the limits, and the state of the odometry."""
-        return (self._velocity, self._yaw_rate, self._odometer.state())
+        velocity, _, yaw_rate = self._controller.velocity
+        return (velocity, yaw_rate, self._odometer.state())
+
+    def _publish_now(self, timekeeper: Timekeeper) -> None:
+        self._publish(timekeeper.sim_time_ns, self.body.pose)
 
     def _publish(self, stamp: int, pose: Pose) -> None:
         twist = self._twist

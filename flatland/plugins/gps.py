@@ -7,12 +7,14 @@ from typing import TYPE_CHECKING
 from flatland.geometry import compose
 from flatland.plugin_api.parameters import at_key, read_body, read_finite, read_pose, read_rate
 from flatland.plugin_api.plugin import ModelPlugin
+from flatland.plugin_api.schedule import when_due
 from flatland.plugin_api.update_timer import UpdateTimer
 from flatland.plugins._geodesy import TangentPlane
 from flatland.values import NavSatFix
 
 if TYPE_CHECKING:
     from flatland.config.reader import YamlReader
+    from flatland.geometry import Pose
     from flatland.timekeeper import Timekeeper
 
 _DEFAULT_RATE = 10.0  # Hz
@@ -35,7 +37,15 @@ class Gps(ModelPlugin):
             )
         self._plane = TangentPlane(latitude, read_finite(config, "ref_lon", 0.0))
         self._output = self.output(config.get("topic", "string", "gps/fix"), NavSatFix)
+        self.call_when_due(
+            "before_physics_step",
+            self._timer,
+            outputs=[self._output],
+            transforms=self._broadcast_tf,
+            skipped=self._skip,
+        )
 
+    @when_due
     def before_physics_step(self, timekeeper: Timekeeper) -> None:
         """Emits the position and sends the transform if an update is due."""
         if not self._timer.check_update(timekeeper):
@@ -46,6 +56,12 @@ class Gps(ModelPlugin):
         if self._broadcast_tf:
             parent = self.model.frame(self._body.name)
             self.send_transform(parent, self._frame_id, *self._origin)
+
+    def _skip(self, count: int, stamp: int, pose: Pose | None) -> None:
+        del count, pose
+        if self._broadcast_tf:
+            parent = self.model.frame(self._body.name)
+            self.send_past_transform(stamp, parent, self._frame_id, *self._origin)
 
     def compute_position(self) -> tuple[float, float]:
         """Returns the current latitude and longitude of the antenna [deg]."""

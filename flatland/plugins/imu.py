@@ -14,6 +14,7 @@ from flatland.plugin_api.parameters import (
     read_variances,
 )
 from flatland.plugin_api.plugin import ModelPlugin
+from flatland.plugin_api.schedule import when_due
 from flatland.plugin_api.update_timer import UpdateTimer
 from flatland.timekeeper import NANOSECONDS
 from flatland.values import Imu as ImuValue
@@ -59,7 +60,9 @@ class Imu(ModelPlugin):
         # Stamp and velocity at the last update due, emitted or not, so that the first message after
         # a subscription is correct too.
         self._last: tuple[int, Pose] | None = None
+        self.call_when_due("after_physics_step", self._timer)
 
+    @when_due
     def after_physics_step(self, timekeeper: Timekeeper) -> None:
         """Emits the measurements and sends the transform if an update is due."""
         if not self._timer.check_update(timekeeper):

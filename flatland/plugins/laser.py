@@ -18,11 +18,14 @@ from flatland.plugin_api.parameters import (
     read_rate,
 )
 from flatland.plugin_api.plugin import ModelPlugin
+from flatland.plugin_api.schedule import when_due
 from flatland.plugin_api.update_timer import UpdateTimer
 from flatland.plugins._range_noise import read_range_noise
 from flatland.values import LaserScan
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from flatland.config.reader import YamlReader
     from flatland.timekeeper import Timekeeper
 
@@ -115,8 +118,8 @@ class Laser(ModelPlugin):
         self.angles = BeamAngles.from_config(config.subnode("angle", "map"))
         self.origin = read_pose(config, "origin")
         self.timer = UpdateTimer(read_rate(config))
-        update_after_step(self, config, self.timer)
-        self.always_publish: bool = config.get("always_publish", "bool", False)
+        hook = update_after_step(self, config, self.timer)
+        self._always_publish: bool = config.get("always_publish", "bool", False)
         self._length = np.float32(self.range)
         self.range_min = self._read_range_min(config)
         self.scan_time, self.time_increment = self._read_times(config)
@@ -135,6 +138,36 @@ class Laser(ModelPlugin):
         self._body_frame_id = self.model.frame(self.body.name)
         self.frame_id = self.model.frame(config.get("frame", "string", self.name))
         self._scan = self.output(config.get("topic", "string", "scan"), LaserScan)
+        self._hook = hook
+        self._schedule()
+
+    @property
+    def always_publish(self) -> bool:
+        """Whether to compute scans that nothing wants; settable."""
+        return self._always_publish
+
+    @always_publish.setter
+    def always_publish(self, value: bool) -> None:
+        self._always_publish = value
+        self._schedule()
+
+    def _schedule(self) -> None:
+        self.call_when_due(
+            self._hook,
+            self.timer,
+            outputs=None if self._always_publish else [self._scan],
+            transforms=self._sends_transform,
+            skipped=self._skip,
+        )
+
+    def _skip(self, count: int, stamp: int, pose: Pose | None) -> None:
+        """Makes up for updates that nothing wanted; see `FlatlandPlugin.call_when_due`."""
+        del pose
+        self._noise.begin_update(count)
+        if self._sends_transform:
+            self.send_past_transform(
+                stamp, self._body_frame_id, self.frame_id, *self.origin, roll=self._roll
+            )
 
     @staticmethod
     def _read_range(config: YamlReader) -> float:
@@ -186,6 +219,7 @@ class Laser(ModelPlugin):
             raise at_key(config, "layers").error(f"Cannot find layer(s): {{{','.join(unknown)}}}")
         return collision_filter.category_bits(layers)
 
+    @when_due
     def before_physics_step(self, timekeeper: Timekeeper) -> None:
         """Sends the transform and emits a scan, if it is wanted, when an update is due."""
         if not self.timer.check_update(timekeeper):
@@ -253,3 +287,29 @@ class Laser(ModelPlugin):
         pose = compose(self.body.pose, self.origin)
         fractions, _ = self.world.physics.cast_rays(pose, self.beam_ends, self._mask)
         return pose, fractions * self._length
+
+
+def compute_scans(
+    lasers: Sequence[Laser], out: FloatArray | None = None, num_threads: int = 0
+) -> list[FloatArray]:
+    """Computes a scan of each of many lasers; equal to `compute_ranges` of each.
+
+    Args:
+        lasers: The lasers, of one or of several worlds.
+        out: Array for the ranges, shape (len(lasers), n), float32, if all lasers have n beams.
+        num_threads: Maximum number of threads; 0 for all processors.
+
+    Returns:
+        Range of each beam of each laser [m], shapes (n,), float32.
+
+    Raises:
+        ValueError: `out` has a wrong shape, or `num_threads` is negative.
+    """
+    if num_threads < 0:
+        raise ValueError(f"num_threads must not be negative, got {num_threads}")
+    scans = [laser.compute_ranges() for laser in lasers]
+    if out is None:
+        return scans
+    for row, ranges in zip(out, scans, strict=True):
+        row[:] = ranges
+    return list(out)

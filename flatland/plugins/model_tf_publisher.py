@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 from flatland.plugin_api.after_step import update_after_step
 from flatland.plugin_api.parameters import read_bodies, read_body_or_first, read_rate
 from flatland.plugin_api.plugin import ModelPlugin
+from flatland.plugin_api.schedule import when_due
 from flatland.plugin_api.update_timer import UpdateTimer
 
 if TYPE_CHECKING:
@@ -27,7 +28,7 @@ class ModelTfPublisher(ModelPlugin):
         self.reference = read_body_or_first(config, self.model, "reference")
         excluded = read_bodies(config, self.model, "exclude")
         self.timer = UpdateTimer(read_rate(config))
-        update_after_step(self, config, self.timer)
+        self.call_when_due(update_after_step(self, config, self.timer), self.timer)
         self._sends_world: bool = config.get("publish_tf_world", "bool", False)
         self.world_frame_id = config.get("world_frame_id", "string", "map")
         self._reference_frame_id = self.model.frame(self.reference.name)
@@ -37,6 +38,7 @@ class ModelTfPublisher(ModelPlugin):
             if body is not self.reference and body not in excluded
         ]
 
+    @when_due
     def before_physics_step(self, timekeeper: Timekeeper) -> None:
         """Sends the transforms if an update is due."""
         if not self.timer.check_update(timekeeper):

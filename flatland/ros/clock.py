@@ -38,6 +38,9 @@ class NodeClock(Protocol):
     def time_advanced(self, time_ns: int) -> None:
         """The simulated time [ns] advanced within a step."""
 
+    def flush(self) -> None:
+        """Publishes the current time if it has not been published yet; safe from any thread."""
+
     def close(self) -> None:
         """Ends all activity."""
 
@@ -85,6 +88,11 @@ class SimulatedClock:
         self._set(convert.time(time_ns, rospy.Time))
         if self._ticker is None and self._topic.connected:
             self._topic.publish(self._message)
+
+    def flush(self) -> None:
+        """Publishes the current time if its rate is limited and it has not been published yet."""
+        if self._ticker is not None and self._topic.connected:
+            self._run_now(lambda: self._tick(0.0))
 
     def _set(self, now: rospy.Time) -> None:
         self._message.clock = now
@@ -154,6 +162,9 @@ class WallClock:
         start = (0, now())
         self._anchors = start, start
         convert.set_stamps(self.stamp)
+
+    def flush(self) -> None:
+        """Has no effect."""
 
     def close(self) -> None:
         """Makes `convert` use simulated time again."""

@@ -9,17 +9,16 @@ from __future__ import annotations
 
 import math
 import time
-from collections import Counter, defaultdict, deque
+from collections import defaultdict, deque
 from collections.abc import Mapping
 from typing import Any, Final
-from weakref import WeakKeyDictionary
 
 import rospy
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 
 from flatland.plugin_api.plugin import describe
 from flatland.ros.names import sendable_text
-from flatland.ros.transport.outbox import Outbox, open_outboxes
+from flatland.ros.transport.drops import REPLACED, DropCounter
 from flatland.ros.transport.publisher import Publisher
 from flatland.ros.transport.registrar import Registrar
 from flatland.ros.transport.ticker import Ticker
@@ -36,8 +35,6 @@ MEASURED_TIME: Final = 0.2
 _TICKS_PER_MESSAGE: Final = 5
 _NEGLIGIBLE: Final = 0.01  # share of the wall time that may be lost without a warning
 _MAX_ENTRIES: Final = 20  # plugins and types that are listed
-# A time is replaced by the next one; subscribers need not receive all of them.
-_REPLACED: Final = ("/clock",)
 
 
 class Diagnostics:
@@ -123,21 +120,24 @@ class _Rate:
         steps = advanced_ns / timekeeper.step_size_ns / elapsed
         rate = simulation.rate
         level, text = DiagnosticStatus.OK, f"{steps:.1f} steps per second"
-        if simulation.world.paused:
+        if simulation.lockstep:
+            text = f"lockstep: {text}"
+        elif simulation.world.paused:
             text = "paused"
         elif lost > _NEGLIGIBLE * elapsed:
             level = DiagnosticStatus.WARN
             text = f"the update rate of {rate:g} Hz cannot be held: {text}"
         values = {
             "steps per second": f"{steps:.1f}",
-            "update rate [Hz]": f"{rate:g}",
+            "update rate [Hz]": "on request" if simulation.lockstep else f"{rate:g}",
             "real-time factor": f"{advanced_ns / NANOSECONDS / elapsed:.3f}",
-            "target real-time factor": f"{rate * timekeeper.step_size:g}",
             "lost time [s]": f"{lost:.3f}",
             "simulated time [s]": f"{timekeeper.sim_time:.3f}",
             "paused": str(simulation.world.paused),
             "models": str(len(simulation.world.models)),
         }
+        if not simulation.lockstep:
+            values["target real-time factor"] = f"{rate * timekeeper.step_size:g}"
         statistics = simulation.statistics
         if statistics is not None and math.isfinite(rate):
             values["mean use of a cycle [%]"] = f"{statistics.use_mean:.1f}"
@@ -206,21 +206,16 @@ class _Drops:
     """The subscribers for which messages were dropped."""
 
     def __init__(self) -> None:
-        self._seen: WeakKeyDictionary[Outbox, int] = WeakKeyDictionary()
+        self._counter = DropCounter()
 
     def status(self) -> DiagnosticStatus:
         """Returns the status since the previous call."""
-        dropped: Counter[tuple[str, str]] = Counter()
-        for outbox in open_outboxes():
-            count = outbox.dropped
-            if count > self._seen.get(outbox, 0):
-                dropped[outbox.topic, outbox.subscriber] += count - self._seen.get(outbox, 0)
-            self._seen[outbox] = count
+        dropped = self._counter.count()
         values = {
             f"{topic} to {subscriber}": f"{count} messages dropped"
             for (topic, subscriber), count in sorted(dropped.items())
         }
-        slow = [f"{topic} to {node}" for topic, node in sorted(dropped) if topic not in _REPLACED]
+        slow = [f"{topic} to {node}" for topic, node in sorted(dropped) if topic not in REPLACED]
         if slow:
             text = f"subscribers do not keep up: {', '.join(slow)}"
             return _status("subscribers", DiagnosticStatus.WARN, text, values)

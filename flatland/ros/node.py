@@ -242,6 +242,7 @@ class ServerNode:
             world,
             parameters.update_rate,
             max_lag=parameters.max_lag,
+            lockstep=parameters.lockstep,
             report=lambda report: _LOG.debug("%s", report),
         )
         self._simulation = simulation
@@ -260,6 +261,7 @@ class ServerNode:
             Services(
                 self._registrar,
                 simulation,
+                clock,
                 parameters.if_blocked,
                 move_keeps_odometry=parameters.move_keeps_odometry,
             )

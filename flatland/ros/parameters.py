@@ -34,6 +34,7 @@ class NodeParameters:
         update_rate: Steps per second of wall time [Hz]; 0 for as many as possible.
         max_lag: Limit of the lost wall time that is made up for [s]; 0 for one cycle.
         step_size: Simulated time of one step [s].
+        lockstep: Whether time passes only on request.
         show_viz: Whether debug markers are published.
         viz_pub_rate: Rate of the debug markers in wall time [Hz].
         simplify_map: 0 exact, 1 simplified, 2 opened and simplified map boundaries.
@@ -64,6 +65,7 @@ class NodeParameters:
     update_rate: float
     max_lag: float
     step_size: float
+    lockstep: bool
     show_viz: bool
     viz_pub_rate: float
     simplify_map: int
@@ -98,11 +100,17 @@ def read_parameters(
         ParameterError: A parameter is missing or invalid.
     """
     reader = _Reader(get)
+    if reader.boolean("lockstep", False) and get("benchmark_duration") is not None:
+        raise ParameterError(
+            'Invalid parameter "~lockstep": it must be false with "~benchmark_duration", because '
+            "time passes only on request"
+        )
     return NodeParameters(
         world_path=reader.path("world_path"),
         update_rate=reader.rate("update_rate", 200.0),
         max_lag=reader.lag("max_lag", MAX_LAG),
         step_size=reader.step_size("step_size", 0.005),
+        lockstep=reader.boolean("lockstep", False),
         show_viz=reader.boolean("show_viz", False),
         viz_pub_rate=reader.positive("viz_pub_rate", 30.0),
         simplify_map=reader.choice("simplify_map", 0, _SIMPLIFICATIONS),

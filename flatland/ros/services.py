@@ -2,27 +2,24 @@
 
 from __future__ import annotations
 
-import logging
 import math
 from collections.abc import Callable
-from typing import Any, Final
+from typing import Any
 
 import rospy
 from std_srvs.srv import Empty, EmptyResponse
 
 from flatland.entities.model import Model
-from flatland.errors import FlatlandError
 from flatland.geometry import Pose
+from flatland.ros.clock import NodeClock
 from flatland.ros.message_types import service_class
 from flatland.ros.names import sendable_text
+from flatland.ros.service_calls import REGISTRATION_TIMEOUT, CallError, ServiceCalls
+from flatland.ros.step_service import StepService
 from flatland.ros.transport.registrar import Registrar
-from flatland.ros.transport.service import Service, wait_for
+from flatland.ros.transport.service import Service
 from flatland.runtime.placement import IfBlocked
 from flatland.simulation import Simulation
-
-_LOG = logging.getLogger("flatland")
-
-_REGISTRATION_TIMEOUT: Final = 5.0  # s, for the registration of the topics of a new model
 
 
 class Services:
@@ -36,6 +33,7 @@ class Services:
         self,
         registrar: Registrar,
         simulation: Simulation,
+        clock: NodeClock,
         if_blocked: IfBlocked = "warn",
         *,
         move_keeps_odometry: bool = False,
@@ -45,6 +43,7 @@ class Services:
         Args:
             registrar: Registers the services with the ROS master.
             simulation: Simulation that the services control.
+            clock: Publishes the time.
             if_blocked: Behaviour of `spawn_model` and `move_model` at poses that are not free.
             move_keeps_odometry: Whether `move_model` keeps the odometry of the model.
 
@@ -53,9 +52,11 @@ class Services:
         """
         self._registrar = registrar
         self._simulation = simulation
+        self._calls = ServiceCalls(registrar, simulation)
         self._if_blocked = if_blocked
         self._keep_odometry = move_keeps_odometry
         world = simulation.world
+        StepService(self._calls, clock)
         for name, service_type, handler in (
             ("spawn_model", service_class("SpawnModel"), self._spawn_model),
             ("delete_model", service_class("DeleteModel"), self._delete_model),
@@ -103,7 +104,7 @@ class Services:
             # Clients read the current rate from the parameter.
             value = 0.0 if math.isinf(rate) else rate
             self._registrar.set_parameter("~update_rate", value)
-            self._registrar.flush(_REGISTRATION_TIMEOUT)
+            self._registrar.flush(REGISTRATION_TIMEOUT)
         return done, message
 
     def _switch(self, action: Callable[[], None]) -> Callable[[Any], EmptyResponse]:
@@ -123,18 +124,9 @@ class Services:
             Whether it succeeded, and the text that it returned or the error.
         """
         try:
-            requests = self._simulation.world.requests
-            message = wait_for(self._simulation.post(action), requests) or ""
-            # A client may use the topics of a model as soon as it receives the response.
-            self._registrar.flush(_REGISTRATION_TIMEOUT)
-        except (FlatlandError, rospy.ServiceException) as error:
-            self._registrar.flush(_REGISTRATION_TIMEOUT)
-            text = error.text_with_hint if isinstance(error, FlatlandError) else str(error)
-            return False, sendable_text(text)
-        except Exception as error:
-            _LOG.exception("unexpected internal error in a service call")
-            return False, sendable_text(f"{type(error).__name__}: {error}")
-        return True, sendable_text(message)
+            return True, sendable_text(self._calls.carry_out(action) or "")
+        except CallError as error:
+            return False, str(error)
 
 
 def _displacement(model: Model | None, requested: Pose) -> str:

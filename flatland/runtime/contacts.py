@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Set
 from typing import TYPE_CHECKING
 
 from flatland.entities.contact import Contact
@@ -28,6 +28,7 @@ class ContactReporter:
         self._hooks = host.hooks
         self._bodies: dict[int, Body] = {}
         self._is_recording = False
+        self._recorded: Set[int] = frozenset()  # ids of the bodies whose contacts are recorded
         self._hooks_version = -1  # of the hooks that recording is adapted to
 
     @property
@@ -38,6 +39,8 @@ class ContactReporter:
 
     def add_bodies(self, bodies: Iterable[Body]) -> None:
         """Reports the contacts of some bodies."""
+        bodies = list(bodies)
+        self._physics.own_bodies(bodies, True)
         self._bodies.update((body.id, body) for body in bodies)
         self._hooks_version = -1
 
@@ -60,7 +63,16 @@ class ContactReporter:
         if self._hooks_version == self._hooks.version:
             return
         self._hooks_version = self._hooks.version
-        self._is_recording = self._physics.record_contacts = self._host.wants_contacts
+        self._is_recording = self._host.wants_contacts
+        kinds, kinds_of_all = self._host.contact_kinds(self._bodies.values())
+        self._physics.record_contacts_of_all(kinds_of_all)
+        for body_id in self._recorded - kinds.keys():
+            if self._physics.body(body_id).alive:
+                self._physics.record_contacts_of(body_id, 0)
+        for body_id, bits in kinds.items():
+            if self._physics.body(body_id).alive:
+                self._physics.record_contacts_of(body_id, bits)
+        self._recorded = kinds.keys()
         if self._host.wants_pre_solve:
             self._physics.pre_solve = self._pre_solve
             self._physics.pre_solve_bodies = self._host.pre_solve_bodies(self._bodies)

@@ -11,6 +11,8 @@ import numpy as np
 from flatland.config.reader import ReadYaml, YamlReader
 from flatland.errors import WorldError
 from flatland.geometry import DoubleArray
+from flatland.plugin_api.noise import checked_seed
+from flatland.runtime.model_states import ModelStates, model_states
 from flatland.runtime.placement import IfBlocked, Models, check_if_blocked
 from flatland.runtime.state_hash import state_hash
 
@@ -33,6 +35,8 @@ if TYPE_CHECKING:
     from flatland.runtime.placement import Placement
     from flatland.runtime.plugin_host import PluginHost
     from flatland.runtime.requests import Requests
+    from flatland.runtime.snapshot import WorldSnapshot, WorldStates
+    from flatland.runtime.stepping import Stepping
     from flatland.runtime.transforms import FramePair, TransformBuffer
     from flatland.timekeeper import Timekeeper
     from flatland.values import Transform
@@ -52,6 +56,7 @@ class Contents:
         plugin_host: Starts plugins and calls their hooks.
         ports: All outputs and commands by resolved topic.
         requests: The queue of actions that run between two steps.
+        stepping: Makes the steps.
         transform_buffer: Collects the transforms of plugins.
         read_yaml: Loads a model file; `YamlReader.from_file`, or a method that collects errors.
         change_count: Number of models that were spawned, moved or deleted since the world file was
@@ -71,19 +76,21 @@ class Contents:
     plugin_host: PluginHost
     ports: PortRegistry
     requests: Requests
+    stepping: Stepping
     seed: int
     timekeeper: Timekeeper
     transform_buffer: TransformBuffer
     change_count: int
     inputs: Inputs
 
-    _change_log: ChangeLog | None
     _contacts: ContactReporter
     _files: Source
     _models: ModelSet
     _observers: Observers
     _paused: bool
+    _former_layers: dict[str, Layer]
     _placement: Placement
+    _states: WorldStates
 
     @property
     def models(self) -> list[Model]:
@@ -111,6 +118,10 @@ class Contents:
 
     def add_layer(self, layer: Layer) -> None:
         """Adds a layer whose names are registered; for the loader."""
+        former = self._former_layers.pop(layer.name, None)
+        if former is not None:
+            former.renew(layer)
+            layer = former
         self.layers.append(layer)
         self._contacts.add_bodies([layer.body])
         self.layer_changed(layer)
@@ -121,7 +132,7 @@ class Contents:
 
     def log_changes(self, log: ChangeLog | None) -> None:
         """Notifies a log of all further changes and steps, instead of the previous one."""
-        self._change_log = log
+        self.stepping.change_log = log
 
     def resolve_path(self, path: str) -> str:
         """Returns the absolute path of a model or map file.
@@ -232,14 +243,16 @@ class Contents:
         is_external = not self.requests.in_hook
 
         def checked() -> R:
-            self._check_open()
+            self.check_open()
             self.change_count += 1
-            if self._change_log is None or not is_external:
+            log = self.stepping.change_log
+            if log is None or not is_external:
                 return action()
-            with self._change_log.change(kind, arguments):
+            with log.change(kind, arguments):
                 return action()
 
-        return self.requests.change(checked, f'{kind} "{arguments["name"]}"')
+        name = arguments.get("name")
+        return self.requests.change(checked, kind if name is None else f'{kind} "{name}"')
 
     # -- requests --------------------------------------------------------------------------
 
@@ -262,6 +275,7 @@ class Contents:
     def pause(self) -> None:
         """Pauses the world from the next step on."""
         self._paused = True
+        self.physics.plan.interrupt()
 
     def resume(self) -> None:
         """Resumes a paused world."""
@@ -270,6 +284,7 @@ class Contents:
     def toggle_pause(self) -> None:
         """Pauses a running world, resumes a paused one."""
         self._paused = not self._paused
+        self.physics.plan.interrupt()
 
     # -- observers -------------------------------------------------------------------------
 
@@ -313,6 +328,7 @@ class Contents:
     @property
     def transforms(self) -> dict[FramePair, Transform]:
         """The latest transform of each (parent, child)."""
+        self.plugin_host.schedule.settle()
         return self.transform_buffer.latest
 
     @property
@@ -321,6 +337,86 @@ class Contents:
         return self._contacts.touching
 
     # -- state -----------------------------------------------------------------------------
+
+    def state(self) -> ModelStates:
+        """Returns the names, poses and velocities of all models.
+
+        Raises:
+            WorldError: The world is closed.
+        """
+        return self._read(lambda: model_states(self.physics, self._models.by_name))
+
+    def snapshot(self) -> WorldSnapshot:
+        """Returns the current state of the world, for `restore`.
+
+        It includes everything that affects the further steps: bodies, contacts, the attributes of
+        all plugins with all that they refer to, random numbers, commands, the time and the last
+        values of outputs. Requests, the pause, observers and subscribers are not part of it.
+
+        Raises:
+            WorldError: The world is closed, a plugin calls this, or a plugin has an attribute that
+                cannot be copied; see *Snapshots* in `docs/write_a_plugin.md`.
+        """
+        self.requests.refuse_in_plugin("snapshot")
+        return self._read(self._states.take)
+
+    def restore(self, snapshot: WorldSnapshot) -> None:
+        """Returns to an earlier state: the same steps have the same results, bit by bit.
+
+        Models, bodies, plugins, outputs and commands that exist in both states are the same
+        objects. Models that were spawned since are deleted, and deleted ones are there again. A
+        snapshot can be restored any number of times.
+
+        Args:
+            snapshot: Result of `snapshot` of this world.
+
+        Raises:
+            WorldError: The world is closed, a plugin calls this, the snapshot is one of another
+                world, or a plugin of a deleted model had a connection that has ended.
+        """
+        self.requests.refuse_in_plugin("restore")
+        self._read(lambda: self._states.restore(snapshot))
+
+    def clone(self) -> World:
+        """Returns an independent copy of the world in its current state.
+
+        The same steps have the same results in both, bit by bit. They share only what never
+        changes, such as parsed files and trees of map edges; the clone can be used in another
+        thread and outlives the original. It has no observers, no subscribers other than its own
+        plugins, no requests, is not paused, and its plugins have no access to ROS.
+
+        Raises:
+            WorldError: The world is closed, a plugin calls this, or a plugin has an attribute that
+                cannot be copied; see *Snapshots* in `docs/write_a_plugin.md`.
+        """
+        self.requests.refuse_in_plugin("clone")
+        return self._read(self._states.clone)
+
+    def reset(self, seed: int | None = None, keep_time: bool = False) -> None:
+        """Returns to the state after loading: the same steps have the same results, bit by bit.
+
+        All models and plugins end, and those of the world file start anew, with the files and
+        parameters as they were when the world was loaded; models spawned since are gone. Look up
+        models, bodies and plugins again, since they are new objects. Outputs and commands that
+        exist before and after, layers, observers and subscribers remain. Requests that wait and the
+        pause do not change. A hook of a plugin may call this: it takes effect after the step.
+
+        Args:
+            seed: Seed of all random numbers, also of those in expressions of the files: the state
+                is that after loading with this seed. None for the present seed.
+            keep_time: Whether the simulated time continues, instead of starting at 0 again. Updates
+                at a rate then continue in phase.
+
+        Raises:
+            WorldError: The world is closed or was not loaded from a file.
+            FlatlandError: With this seed, a file is invalid, or a plugin fails; the world is as
+                before, or empty if a plugin cannot be copied (see `snapshot`).
+            ValueError: The seed is negative.
+        """
+        if seed is not None:
+            checked_seed(seed)
+        arguments = {"seed": seed, "keep_time": keep_time}
+        self._change("reset", arguments, lambda: self._states.reset(seed, keep_time))
 
     def state_hash(self) -> str:
         """Returns a hash of the state: equal for two runs that have been the same so far.
@@ -335,9 +431,12 @@ class Contents:
         Raises:
             WorldError: The world is closed, or the state of a plugin cannot be hashed.
         """
-        return self._read(
-            lambda: state_hash(self.seed, self.timekeeper, self.physics, self.models, self.plugins)
-        )
+
+        def read() -> str:
+            self.plugin_host.schedule.settle()
+            return state_hash(self.seed, self.timekeeper, self.physics, self.models, self.plugins)
+
+        return self._read(read)
 
     # -- free places -----------------------------------------------------------------------
 
@@ -424,10 +523,11 @@ class Contents:
         )
 
     def _read(self, action: Callable[[], R]) -> R:
-        self._check_open()
+        self.check_open()
         return self.requests.read(action)
 
-    def _check_open(self) -> None:
+    def check_open(self) -> None:
+        """Raises `WorldError` if the world is closed."""
         raise NotImplementedError
 
 

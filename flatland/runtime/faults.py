@@ -6,7 +6,7 @@ import logging
 import time
 from collections import Counter
 from collections.abc import Callable, Hashable
-from typing import TYPE_CHECKING, Any, Final, Literal, get_args
+from typing import TYPE_CHECKING, Any, ClassVar, Final, Literal, get_args
 
 from flatland.errors import PluginError
 
@@ -34,6 +34,11 @@ class Faults:
         first: The exception that `raise_first` raises, None if there is none.
         counts: Exceptions in a row of each (plugin, hook) whose last call raised.
     """
+
+    outside_state: ClassVar[dict[str, Callable[[], object]]] = {
+        "first": lambda: None,
+        "_last_log": dict,
+    }
 
     def __init__(self, policy: FaultPolicy) -> None:
         """Creates an empty record.

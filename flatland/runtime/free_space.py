@@ -83,6 +83,68 @@ class FreeSpace:
         reached = self._regions_around(np.array(connected_to))
         return self._candidates[np.isin(self._regions[self._candidates], reached)]
 
+    def largest_region(self) -> IntArray:
+        """Returns the cells, as `cells` does, of the connected region with the most of them."""
+        regions = self._regions[self._candidates]
+        sizes = np.bincount(regions[regions > 0], minlength=1)
+        largest = sizes.argmax() if sizes.any() else -1
+        cells: IntArray = self._candidates[regions == largest]
+        return cells
+
+    @property
+    def size(self) -> int:
+        """Number of cells."""
+        return self._rows * self._columns
+
+    def cell_at(self, x: float, y: float) -> int | None:
+        """Returns the cell of a point in the world frame [m], None out of bounds."""
+        column = math.floor((x - float(self._origin[0])) / self._cell)
+        row = math.floor((y - float(self._origin[1])) / self._cell)
+        if not (0 <= column < self._columns and 0 <= row < self._rows):
+            return None
+        return row * self._columns + column
+
+    def is_connected_within(
+        self, start: tuple[float, float], goal: tuple[float, float], margin: float
+    ) -> bool:
+        """Returns whether a path of the disc connects two points without a wide detour.
+
+        Args:
+            start: A point in the world frame [m].
+            goal: Another point.
+            margin: Distance by which the path may leave the rectangle whose opposite corners are
+                the points [m].
+        """
+        corners = np.array((start, goal))
+        low = np.floor((corners.min(axis=0) - margin - self._origin) / self._cell).astype(int)
+        high = np.ceil((corners.max(axis=0) + margin - self._origin) / self._cell).astype(int)
+        first_column, first_row = np.maximum(low, 0).tolist()
+        grid = self._regions.reshape(self._rows, self._columns)
+        window = grid[first_row : int(high[1]), first_column : int(high[0])] > 0
+        cv2 = importlib.import_module("cv2")
+        regions = cv2.connectedComponents(window.view(np.uint8), connectivity=8)[1]
+        ends = []
+        for x, y in (start, goal):
+            cell = self.cell_at(x, y)
+            if cell is None:
+                return False
+            row, column = divmod(cell, self._columns)
+            ends.append(int(regions[row - first_row, column - first_column]))
+        return ends[0] > 0 and ends[0] == ends[1]
+
+    def point_in(self, cell: int, u: float, v: float) -> tuple[float, float]:
+        """Returns a point of a cell in the world frame [m].
+
+        Args:
+            cell: The cell.
+            u: Position along x within the cell, from 0 to 1.
+            v: Position along y within the cell, from 0 to 1.
+        """
+        row, column = divmod(cell, self._columns)
+        x = min((column + u) * self._cell, float(self._extent[0]))
+        y = min((row + v) * self._cell, float(self._extent[1]))
+        return (float(self._origin[0]) + x, float(self._origin[1]) + y)
+
     def places_in(self, cells: IntArray, rng: np.random.Generator) -> DoubleArray:
         """Returns a random point of each cell in the world frame [m], shape (n, 2)."""
         corners = np.stack((cells % self._columns, cells // self._columns), axis=1)

@@ -3,25 +3,47 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 from flatland.plugin_api.plugin import FlatlandPlugin, ModelPlugin
+from flatland.plugin_api.schedule import not_called
+from flatland.runtime.step_schedule import needs_work
 
 if TYPE_CHECKING:
     from flatland.entities.body import Body, Entity
     from flatland.entities.model import Model
+    from flatland.runtime.step_schedule import StepSchedule
 
 STEP_HOOKS: Final = ("before_physics_step", "after_physics_step")
 CONTACT_HOOKS: Final = ("begin_contact", "end_contact", "post_solve")
+_MOST_LISTS: Final = 64  # of calls for different sets of clocks
 
 Hook = Callable[..., None]
 HookWrapper = Callable[[FlatlandPlugin, Hook], Hook]
 HookList = list[tuple[FlatlandPlugin, Hook]]
 
 
+class StepCall(NamedTuple):
+    """A call of a hook in a step.
+
+    Attributes:
+        plugin: The plugin.
+        hook: Its method.
+        until: The place of the plugin in the order of hooks if the core does something before the
+            call, else 0.
+    """
+
+    plugin: FlatlandPlugin
+    hook: Hook
+    until: int
+
+
 def overrides(plugin: FlatlandPlugin, hook: str) -> bool:
     """Returns whether a plugin's class, or the plugin itself, overrides a hook."""
-    return hook in vars(plugin) or getattr(type(plugin), hook) is not getattr(FlatlandPlugin, hook)
+    own = vars(plugin).get(hook)
+    if own is not None:
+        return own is not not_called
+    return getattr(type(plugin), hook) is not getattr(FlatlandPlugin, hook)
 
 
 class HookTable:
@@ -35,8 +57,16 @@ class HookTable:
         version: Changes with each plugin that is added or removed.
     """
 
-    def __init__(self) -> None:
-        """Creates an empty table."""
+    def __init__(self, schedule: StepSchedule | None = None) -> None:
+        """Creates an empty table.
+
+        Args:
+            schedule: Decides which hooks are called only when an update is due; None if none are.
+        """
+        self._schedule = schedule
+        self._calls: dict[tuple[str, int], list[StepCall]] = {}
+        self._unscheduled = (-1, False)  # version, and whether a hook is called in every step
+        self._calls_version = (-1, -1)  # of this table and of the schedule
         self._order: dict[FlatlandPlugin, int] = {}
         self._count = 0
         self._wrap: HookWrapper | None = None
@@ -53,14 +83,18 @@ class HookTable:
         is_of_model = isinstance(plugin, ModelPlugin)
         # World plugins come last.
         self._order[plugin] = self._count if is_of_model else self._count + (1 << 62)
-        self._add_hooks(plugin)
+        self._add_hooks(plugin, schedules=True)
 
-    def _add_hooks(self, plugin: FlatlandPlugin) -> None:
+    def _add_hooks(self, plugin: FlatlandPlugin, *, schedules: bool) -> None:
         hooks = self._model_hooks if isinstance(plugin, ModelPlugin) else self._world_hooks
         for hook in STEP_HOOKS:
             if overrides(plugin, hook):
                 hooks[hook][plugin] = self._method(plugin, hook)
                 self._ordered.pop(hook, None)
+                if schedules and self._schedule is not None:
+                    self._schedule.add(plugin, hook, self._order[plugin])
+        if schedules and self._schedule is not None:
+            self._schedule.add_controllers(plugin, self._order[plugin])
         for hook, table in self._contact_hooks.items():
             if overrides(plugin, hook):
                 table.add(plugin, self._method(plugin, hook))
@@ -72,8 +106,9 @@ class HookTable:
     def wrap(self, wrapper: HookWrapper | None) -> None:
         """Wraps all hooks, also those of plugins added later; None unwraps them."""
         self._wrap = wrapper
+        self.version += 1
         for plugin in self._order:
-            self._add_hooks(plugin)
+            self._add_hooks(plugin, schedules=False)
 
     def remove(self, plugin: FlatlandPlugin) -> None:
         """Removes the hooks of a plugin; one without hooks is ignored."""
@@ -84,6 +119,8 @@ class HookTable:
                     self._ordered.pop(hook, None)
         for table in self._contact_hooks.values():
             table.remove(plugin)
+        if self._schedule is not None:
+            self._schedule.remove(plugin)
         self._order.pop(plugin, None)
 
     def of_step(self, hook: str) -> HookList:
@@ -93,6 +130,49 @@ class HookTable:
             ordered = [*self._model_hooks[hook].items(), *self._world_hooks[hook].items()]
             self._ordered[hook] = ordered
         return ordered
+
+    def calls(self, hook: str, due: int) -> list[StepCall]:
+        """Returns the calls of a hook in a step, in order; the list is not changed afterwards.
+
+        Args:
+            hook: Name of the hook.
+            due: The clocks of updates that are due, as bits.
+        """
+        schedule = self._schedule
+        version = (self.version, 0 if schedule is None else schedule.version)
+        if version != self._calls_version:
+            self._calls_version = version
+            self._calls.clear()
+        found = self._calls.get((hook, due))
+        if found is None:
+            if len(self._calls) >= _MOST_LISTS:
+                self._calls.clear()
+            found = self._calls[hook, due] = list(self._find_calls(hook, due))
+        return found
+
+    def _find_calls(self, hook: str, due: int) -> Iterator[StepCall]:
+        schedule = self._schedule
+        orders = [] if schedule is None else schedule.work_orders(hook)
+        done = 0
+        for plugin, method in self.of_step(hook):
+            scheduled = None if schedule is None else schedule.find(plugin, hook)
+            if scheduled is not None and not (scheduled.is_called and due >> scheduled.clock & 1):
+                continue
+            order = self._order[plugin]
+            yield StepCall(plugin, method, order if needs_work(orders, done, order) else 0)
+            done = order
+
+    @property
+    def has_unscheduled(self) -> bool:
+        """Whether any hook is to be called in every step."""
+        if self._unscheduled[0] != self.version:
+            found = any(
+                self._schedule is None or self._schedule.find(plugin, hook) is None
+                for hook in STEP_HOOKS
+                for plugin, _ in self.of_step(hook)
+            )
+            self._unscheduled = (self.version, found)
+        return self._unscheduled[1]
 
     def of_contact(self, hook: str, body_a: Body, body_b: Body) -> HookList:
         """Returns a contact hook of the plugins that a contact concerns, in order."""
@@ -105,6 +185,10 @@ class HookTable:
     def has_any(self, *hooks: str) -> bool:
         """Returns whether any plugin overrides one of some contact hooks."""
         return any(self._contact_hooks[hook] for hook in hooks)
+
+    def concern_all(self, hook: str) -> bool:
+        """Returns whether a contact hook of a plugin receives the contacts of all models."""
+        return self._contact_hooks[hook].concern_all
 
     def bodies_concerned(self, hook: str, bodies: Iterable[Body]) -> Iterator[Body]:
         """Returns those of some bodies whose contacts concern a plugin with a contact hook."""
@@ -135,6 +219,10 @@ class _ContactHooks:
             hooks = self._by_entity.get(plugin.model)
             if hooks is not None and hooks.pop(plugin, None) is not None and not hooks:
                 del self._by_entity[plugin.model]
+
+    @property
+    def concern_all(self) -> bool:
+        return bool(self._of_all)
 
     def concerns(self, entity: Entity) -> bool:
         return bool(self._of_all) or entity in self._by_entity

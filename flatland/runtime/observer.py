@@ -58,7 +58,10 @@ class WorldObserver:
         """A step starts; no hook has run yet."""
 
     def time_advanced(self, time_ns: int) -> None:
-        """The simulated time [ns] advanced; hooks after the step have not run yet."""
+        """The simulated time [ns] advanced; hooks after the step have not run yet.
+
+        Also called if `World.reset` or `World.restore` set it, to an earlier time as a rule.
+        """
 
     @property
     def wants_transforms(self) -> bool:
@@ -165,6 +168,16 @@ class Observers:
     def layer_changed(self, layer_name: str) -> None:
         """Notifies all observers."""
         self._notify("layer_changed", layer_name)
+
+    @property
+    def watch_steps(self) -> bool:
+        """Whether an observer is to be notified in every step."""
+        return bool(self._of_start or self._of_finish or self._of_time or self._of_transforms)
+
+    @property
+    def want_transforms(self) -> bool:
+        """Whether an observer wants the transforms of this step."""
+        return any(observer.wants_transforms for observer in self._of_transforms)
 
     def step_started(self) -> None:
         """Notifies the observers that override the method."""

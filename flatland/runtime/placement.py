@@ -5,8 +5,8 @@ from __future__ import annotations
 import logging
 import math
 import zlib
-from collections.abc import Iterable, Sequence
-from typing import TYPE_CHECKING, Final, Literal, TypeAlias, get_args
+from collections.abc import Callable, Iterable, Sequence
+from typing import TYPE_CHECKING, ClassVar, Final, Literal, TypeAlias, get_args
 
 import numpy as np
 
@@ -44,6 +44,8 @@ def check_if_blocked(if_blocked: str) -> None:
 class Placement:
     """Finds overlaps and free places in a world, between two steps."""
 
+    outside_state: ClassVar[dict[str, Callable[[], object]]] = {"_spaces": dict}
+
     def __init__(self, world: World, contacts: ContactReporter) -> None:
         """Creates the placement of a world.
 
@@ -56,6 +58,10 @@ class Placement:
         self._rng: np.random.Generator | None = None
         # Walls and free spaces by the arguments of the query; they do not depend on models.
         self._spaces: dict[tuple[object, ...], tuple[DoubleArray, FreeSpace]] = {}
+
+    def forget_random_state(self) -> None:
+        """Returns to the initial state of the generator for samples of free places."""
+        self._rng = None
 
     # -- models ----------------------------------------------------------------------------
 

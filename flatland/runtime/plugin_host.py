@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Iterable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from flatland.entities.contact import Contact, ContactImpulse, MutableContact
 from flatland.errors import PLUGIN_FAULTS, FlatlandError, PluginError, YamlError
@@ -12,6 +12,7 @@ from flatland.plugin_api.missing_plugins import missing_plugins_error, read_entr
 from flatland.plugin_api.plugin import FlatlandPlugin, ModelPlugin, WorldPlugin, describe
 from flatland.plugin_api.registry import PluginRegistry
 from flatland.runtime.hooks import CONTACT_HOOKS, HookList, HookTable
+from flatland.runtime.step_schedule import StepSchedule
 from flatland.runtime.time_limit import TimeLimitExceeded, time_limit
 
 if TYPE_CHECKING:
@@ -43,9 +44,12 @@ class PluginHost:
         registry: The plugin classes that files can name.
         world_plugins: The world plugins in order of loading.
         hooks: The hooks of all plugins.
+        schedule: Which hooks are called only when an update is due.
         costs: The costs that are being measured, None if none are.
         disabled: The plugins that were disabled because a hook raised repeatedly.
     """
+
+    outside_state: ClassVar[dict[str, Callable[[], object]]] = {"costs": lambda: None}
 
     def __init__(
         self,
@@ -71,7 +75,9 @@ class PluginHost:
         self._requests = requests
         self._faults = faults
         self._timeout = timeout
-        self.hooks = HookTable()
+        self._plan = world.physics.plan
+        self.schedule = StepSchedule(self._plan, world.timekeeper)
+        self.hooks = HookTable(self.schedule)
         self.costs: PluginCosts | None = None
         self.disabled: set[FlatlandPlugin] = set()
 
@@ -228,21 +234,63 @@ class PluginHost:
         """Whether any plugin overrides `pre_solve`."""
         return self.hooks.has_any("pre_solve")
 
+    def contact_kinds(self, bodies: Iterable[Body]) -> tuple[dict[int, int], int]:
+        """Returns the contact events that concern hooks.
+
+        Args:
+            bodies: The bodies of all models and layers.
+
+        Returns:
+            The kinds of events by the id of the body, and those of all bodies, as in
+            `PhysicsWorld.record_contacts_of`.
+        """
+        kinds: dict[int, int] = {}
+        kinds_of_all = 0
+        for number, hook in enumerate(CONTACT_HOOKS):
+            if self.hooks.concern_all(hook):
+                kinds_of_all |= 1 << number
+            elif self.hooks.has_any(hook):
+                for body in self.hooks.bodies_concerned(hook, bodies):
+                    kinds[body.id] = kinds.get(body.id, 0) | 1 << number
+        return kinds, kinds_of_all
+
     def pre_solve_bodies(self, bodies: Mapping[int, Body]) -> set[int]:
         """Returns the physics ids of the bodies whose contacts concern a `pre_solve` hook."""
         concerned = self.hooks.bodies_concerned("pre_solve", bodies.values())
         return {body.id for body in concerned}
 
-    def before_physics_step(self, timekeeper: Timekeeper) -> None:
-        """Calls `before_physics_step` of all plugins."""
-        self._call("before_physics_step", self.hooks.of_step("before_physics_step"), timekeeper)
+    def call_step_hooks(self, hook: str, due: int, timekeeper: Timekeeper) -> None:
+        """Calls a hook of the plugins that need it in this step.
 
-    def after_physics_step(self, timekeeper: Timekeeper) -> None:
-        """Calls `after_physics_step` of all plugins."""
-        self._call("after_physics_step", self.hooks.of_step("after_physics_step"), timekeeper)
+        Args:
+            hook: `before_physics_step` or `after_physics_step`.
+            due: The clocks of updates that are due, as bits.
+            timekeeper: The simulated time.
+        """
+        plan, targets = self._plan, self.schedule.targets
+        counts, is_after = self._faults.counts, hook == "after_physics_step"
+        for plugin, method, until in self.hooks.calls(hook, due):
+            if until:
+                plan.carry_out(is_after, until, timekeeper.step_size)
+            try:
+                method(timekeeper)
+                if counts:
+                    self._faults.succeeded(plugin, hook)
+            except PLUGIN_FAULTS as error:
+                self._add_fault(plugin, hook, error)
+            if targets:
+                self.schedule.push_targets()
+
+    def call_failed(self, timekeeper: Timekeeper) -> None:
+        """Calls the hooks of the plugins whose controllers failed, which raise the same error."""
+        failed = set(self._plan.take_failed())
+        for plugin, method in self.hooks.of_step("before_physics_step"):
+            if any(controller.id in failed for controller in plugin._controllers):
+                self._call("before_physics_step", [(plugin, method)], timekeeper)
 
     def model_moved(self, model: Model, previous: Mapping[str, Pose], keep_odometry: bool) -> None:
         """Calls `model_moved` of the plugins of a model; see `ModelPlugin.model_moved`."""
+        self.schedule.settle()
         with self._requests.hooks():
             self._call("model_moved", self.hooks.of_move(model), previous, keep_odometry)
 
@@ -293,6 +341,9 @@ class PluginHost:
                 if counts:
                     self._faults.succeeded(plugin, hook)
             except PLUGIN_FAULTS as error:
-                if self._faults.add_in_hook(plugin, hook, describe(plugin), error):
-                    self.hooks.remove(plugin)
-                    self.disabled.add(plugin)
+                self._add_fault(plugin, hook, error)
+
+    def _add_fault(self, plugin: FlatlandPlugin, hook: str, error: BaseException) -> None:
+        if self._faults.add_in_hook(plugin, hook, describe(plugin), error):
+            self.hooks.remove(plugin)
+            self.disabled.add(plugin)

@@ -31,6 +31,7 @@ class Requests:
         lock: Held during each step and each batch of actions.
         actions: The actions that wait.
         hook_thread: Identifier of the thread that runs hooks of plugins, None if none does.
+        on_post: Called from any thread after an action was queued.
         blocked_by: Code of a plugin that keeps actions from running, as found by a watchdog; empty
             if there is none.
     """
@@ -41,6 +42,7 @@ class Requests:
         self.actions: deque[Callable[[], None]] = deque()
         self._server: int | None = None
         self._wake: Callable[[], None] | None = None
+        self.on_post: Callable[[], None] | None = None
         self.hook_thread: int | None = None
         self.blocked_by = ""
         # Identifiers of the threads that run other code of plugins, and that run actions.
@@ -127,6 +129,8 @@ class Requests:
                 future.set_exception(error)
 
         self.actions.append(run)
+        if self.on_post is not None:
+            self.on_post()
         wake = self._wake
         if wake is not None:
             wake()

@@ -51,6 +51,12 @@ class TransformBuffer:
         """Adds a transform to those of this step."""
         self._pending[frames] = fields
 
+    def add_past(self, frames: FramePair, fields: TransformFields) -> None:
+        """Adds a transform of an earlier step, which was not sent because nothing wanted it."""
+        latest = self._latest.get(frames)
+        if latest is None or latest[0] <= fields[0]:
+            self._latest[frames] = fields
+
     def forget(self, plugin: FlatlandPlugin, frames: Iterable[FramePair]) -> None:
         """Drops the transforms of a plugin that ended."""
         for pair in frames:

@@ -8,10 +8,12 @@ import time
 from collections.abc import Callable
 from concurrent.futures import Future
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Final, TypeVar
 
+from flatland.errors import WorldError
 from flatland.simulation.cycle_statistics import CycleStatistics, CycleWindow
 from flatland.simulation.rate_monitor import RateMonitor
+from flatland.simulation.step_requests import StepRequests
 from flatland.timekeeper import NANOSECONDS
 from flatland.world import World
 
@@ -20,6 +22,8 @@ MAX_LAG: Final = 0.1
 
 _PAUSED_PERIOD: Final = 0.01  # s between two cycles of a paused world without a rate
 _MAX_WAIT: Final = 3600.0  # s; Python raises for a timeout of several centuries
+
+R = TypeVar("R")
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,8 +53,12 @@ class Simulation:
     pause or a change of the rate resets the lag. If the loop repeatedly loses time, a warning names
     the most expensive plugins.
 
+    In lockstep, time passes only on request: the loop waits for `request_steps` and carries out
+    other requests meanwhile. Without it, requested steps are carried out in addition.
+
     Attributes:
         world: The world.
+        lockstep: Whether time passes only on request.
         statistics: Statistics of the last report period in which the world was stepped, None
             before the end of the first one.
         lost_time: Lag that was dropped since the start [s of wall time].
@@ -62,6 +70,7 @@ class Simulation:
         update_rate: float = 200.0,
         *,
         max_lag: float = MAX_LAG,
+        lockstep: bool = False,
         report: Callable[[CycleStatistics], None] | None = None,
         report_period: float = 1.0,
         clock: Callable[[], float] = time.perf_counter,
@@ -73,7 +82,8 @@ class Simulation:
             world: The world.
             update_rate: Steps per second of wall time [Hz]; 0 or inf for as many as possible.
             max_lag: Maximum lag that the loop catches up on [s]; at least one cycle is used.
-            report: Called with statistics while the world is not paused.
+            lockstep: Whether time passes only on request; the rate then has no meaning.
+            report: Called with statistics while the world is not paused, not in lockstep.
             report_period: Wall time between two reports [s].
             clock: Returns the wall time [s].
             wait: Waits for an event for at most some wall time [s]; returns whether it is set.
@@ -84,6 +94,7 @@ class Simulation:
         if not 0 <= max_lag < math.inf:
             raise ValueError(f"max_lag must be finite and not negative [s], got {max_lag}")
         self.world = world
+        self.lockstep = lockstep
         self.statistics: CycleStatistics | None = None
         self.lost_time = 0.0
         self._period = _period_of(update_rate)
@@ -94,6 +105,7 @@ class Simulation:
         self._wait = wait
         self._wake = threading.Event()
         self._stopped = False
+        self._steps = StepRequests(world, clock)
 
     @property
     def stopped(self) -> bool:
@@ -113,7 +125,10 @@ class Simulation:
 
         Raises:
             ValueError: The rate is negative or not a number.
+            WorldError: The simulation has no rate, because time passes only on request.
         """
+        if self.lockstep:
+            raise WorldError("the rate cannot be set in lockstep: time passes only on request")
         self._period = _period_of(update_rate)
 
     def stop(self) -> None:
@@ -121,17 +136,43 @@ class Simulation:
         self._stopped = True
         self._wake.set()
 
-    def post(self, action: Callable[[], object]) -> Future[Any]:
+    def post(self, action: Callable[[], R]) -> Future[R]:
         """Queues an action that runs between two steps; safe from any thread, see `World.post`.
 
         The action runs without delay even if the loop waits or the world is paused.
         """
         return self.world.post(action)
 
+    def request_steps(self, count: int) -> Future[int]:
+        """Requests steps in addition to those of the loop; safe from any thread.
+
+        The steps are carried out without delay and as fast as possible, after the steps that were
+        requested before. Other requests are carried out in between. A paused world is stepped and
+        stays paused. Cancelling the future withdraws the steps that are not done yet.
+
+        Args:
+            count: Number of steps, at least 1.
+
+        Returns:
+            Holds the simulated time after the last step [ns]; a `WorldError` if the simulation
+            stops first.
+
+        Raises:
+            ValueError: `count` is less than 1.
+        """
+        if count < 1:
+            raise ValueError(f"the number of steps must be at least 1, got {count}")
+        done = self._steps.add(count)
+        self._wake.set()
+        if self._stopped:
+            self._steps.fail()
+        return done
+
     def run(self, duration: float = math.inf) -> RunResult:
         """Steps the world until `stop` is called or a simulated time has elapsed.
 
-        Requests of other threads run in the calling thread meanwhile.
+        Requests of other threads run in the calling thread meanwhile. A call of `request_steps` is
+        completed even if it exceeds the simulated time.
 
         Args:
             duration: Simulated time of the run [s].
@@ -148,6 +189,8 @@ class Simulation:
                 self._loop(start, end_ns, monitor)
         finally:
             monitor.reset()
+            if self._stopped:
+                self._steps.fail()
         steps = (timekeeper.sim_time_ns - start_ns) // timekeeper.step_size_ns
         return RunResult(steps, self._clock() - start)
 
@@ -157,6 +200,12 @@ class Simulation:
         due = start
         window = self._new_window(start)
         while not self._stopped and timekeeper.sim_time_ns < end_ns:
+            if self._steps:
+                due += self._serve_steps()
+            elif self.lockstep:
+                self._wait_until(math.inf, period)
+            if self.lockstep:
+                continue
             begin = clock()
             if self._period != period:
                 # Due times of the old rate are void.
@@ -178,22 +227,37 @@ class Simulation:
                     self.lost_time += end - due - max_lag
                     monitor.lose(end - due - max_lag, period, end)
                     due = end - max_lag
-                self._wait_until(due, period)
+                due += self._wait_until(due, period)
             elif world.paused:
                 self._wait_until(end + _PAUSED_PERIOD, period)
 
-    def _wait_until(self, due: float, period: float) -> None:
+    def _wait_until(self, due: float, period: float) -> float:
         """Waits until a wall time and runs requests meanwhile.
 
-        Returns early if one of them changes the period.
+        Returns early if one of them changes the period, and, in lockstep, after requested steps.
+
+        Returns:
+            Wall time of the requested steps, by which the wait was prolonged [s].
         """
+        spent = 0.0
         while not self._stopped and self._period == period:
-            left = due - self._clock()
+            left = due + spent - self._clock()
             if left <= 0:
-                return
+                break
             if self._wait(self._wake, min(left, _MAX_WAIT)):
                 self._wake.clear()
                 self.world.requests.process()
+                if self._steps:
+                    spent += self._serve_steps()
+                    if self.lockstep:
+                        break
+        return spent
+
+    def _serve_steps(self) -> float:
+        """Carries out the requested steps and returns their wall time [s]."""
+        start = self._clock()
+        self._steps.serve(lambda: self._stopped)
+        return self._clock() - start
 
     def _new_window(self, now: float) -> CycleWindow:
         timekeeper, period = self.world.timekeeper, self._period

@@ -7,7 +7,7 @@ import shutil
 import pytest
 from pages import Shell, follow, read_page
 
-PAGES = ["moving_over.md", "several_robots.md"]
+PAGES = ["lockstep.md", "moving_over.md", "several_robots.md"]
 
 
 @pytest.mark.ros

@@ -14,6 +14,7 @@ import socket
 import threading
 import weakref
 from collections import deque
+from contextlib import suppress
 from typing import Any
 
 from rospy.exceptions import TransportTerminated
@@ -43,6 +44,7 @@ class Outbox:
         self._partial: memoryview | None = None  # rest of the partially sent message
         self._queue: deque[bytes] = deque(maxlen=queue_size)
         self.dropped = 0
+        self._is_undelayed = False
         transport.socket.setblocking(False)
         transport.set_cleanup_callback(self._closed)
         transport.write_data = self.write
@@ -83,6 +85,19 @@ class Outbox:
                 return  # The flusher already watches the socket; keep the order.
             if not self._send():
                 _flusher().watch(self)
+
+    def disable_delay(self) -> None:
+        """Makes the system send each message at once, also those that it holds back.
+
+        By default (Nagle's algorithm), a small message waits for up to 40 ms until the subscriber
+        has acknowledged the previous one, which is cheaper for many messages.
+        """
+        if not self._is_undelayed:
+            self._is_undelayed = True
+            connection: socket.socket | None = self._transport.socket
+            with suppress(OSError):  # closed
+                if connection is not None:
+                    connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
 
     def fileno(self) -> int:
         """Returns the file descriptor of the socket, -1 if it is closed."""

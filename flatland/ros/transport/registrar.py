@@ -31,6 +31,7 @@ class Registrar:
     def __init__(self) -> None:
         """Starts the thread."""
         self._actions: queue.SimpleQueue[Callable[[], object]] = queue.SimpleQueue()
+        self._unfinished = 0  # actions in the queue, and the one that is carried out
         self._closed = False
         self.master_lost = False
         self._lock = threading.Lock()
@@ -44,6 +45,8 @@ class Registrar:
 
     def submit(self, action: Callable[[], object]) -> None:
         """Queues an action and returns immediately."""
+        with self._lock:
+            self._unfinished += 1
         self._actions.put(action)
 
     def flush(self, timeout: float) -> bool:
@@ -55,6 +58,8 @@ class Registrar:
         Returns:
             Whether they are done.
         """
+        if not self._unfinished:
+            return True  # A wait would cost two changes of threads.
         if self.master_lost:
             return False
         done = threading.Event()
@@ -147,11 +152,16 @@ class Registrar:
     def _run(self) -> None:
         while not self._closed:
             action = self._actions.get()
-            # A node that registers while it ends would take its name back from the node that
-            # replaces it.
-            if self._closed or rospy.core.is_shutdown_requested():
-                continue
-            try:
-                action()
-            except Exception:
-                _LOG.exception("cannot register or unregister a topic or service")
+            self._run_one(action)
+            with self._lock:
+                self._unfinished -= 1
+
+    def _run_one(self, action: Callable[[], object]) -> None:
+        # A node that registers while it ends would take its name back from the node that
+        # replaces it.
+        if self._closed or rospy.core.is_shutdown_requested():
+            return
+        try:
+            action()
+        except Exception:
+            _LOG.exception("cannot register or unregister a topic or service")

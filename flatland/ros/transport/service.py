@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from concurrent.futures import Future
-from typing import Any, Final
+from typing import Any, Final, TypeVar
 
 import rospy
 
@@ -12,6 +12,8 @@ from flatland.ros.transport.registrar import Registrar
 from flatland.runtime.requests import Requests
 
 _POLL_PERIOD: Final = 0.2  # s between two checks of a request that waits
+
+R = TypeVar("R")
 
 
 class Service:
@@ -69,7 +71,7 @@ class Service:
             self._service.shutdown()
 
 
-def wait_for(future: Future[Any], requests: Requests) -> Any:
+def wait_for(future: Future[R], requests: Requests) -> R:
     """Waits in the thread of a service until the simulation has handled a request.
 
     Args:

@@ -79,6 +79,14 @@ void bind_bodies(WorldClass& world) {
     if (!states.empty()) std::memcpy(rows.mutable_data(), states.data(), rows.nbytes());
     return rows;
   });
+  world.def(
+      "motions",
+      [](const World& self, const std::vector<Id>& bodies) {
+        py::array_t<double> rows({bodies.size(), std::size_t{6}});
+        motions_of(self, bodies.data(), bodies.size(), rows.mutable_data());
+        return rows;
+      },
+      py::arg("bodies"));
   world.def("fixtures", &fixtures_of);
   world.def("joints", &joints_of);
 }

@@ -217,7 +217,7 @@ void bind_contacts(py::module_& module, WorldClass& world) {
   world.def("step_with_hook", &step_with_hook, py::arg("dt"), py::arg("velocity_iterations"),
             py::arg("position_iterations"), py::arg("hook"), py::arg("bodies"), py::arg("errors"));
   world.def_property(
-      "record_contacts", [](World& self) { return self.contacts().recording; },
+      "record_contacts", [](World& self) { return self.contacts().is_recording(); },
       [](World& self, bool record) {
         self.check_changeable();
         self.contacts().recording = record;

@@ -5,12 +5,6 @@
 namespace py = pybind11;
 
 namespace flatland {
-namespace {
-
-// A step that is expected to be shorter is not worth a release of the GIL [s].
-constexpr double kShortStep = 1e-4;
-
-}  // namespace
 
 py::object to_python(const StepReport& report) {
   if (report.empty()) return py::none();
@@ -33,6 +27,14 @@ WorldClass bind_world(py::module_& module) {
         }));
       },
       py::arg("dt"), py::arg("velocity_iterations"), py::arg("position_iterations"));
+  world.def("copy", [](World& self) {
+    auto copy = std::make_shared<World>();
+    copy->become_copy_of(self);
+    copy->rays().fans().share(self.rays().fans());
+    return copy;
+  });
+  world.def("become_copy_of", &World::become_copy_of, py::arg("source"));
+  world.def("clear", &World::clear, "Destroys all objects; unlike a new world, ids go on.");
   world.def("find_new_contacts", &World::find_new_contacts);
   world.def("destroy_body", &World::destroy_body, py::arg("body"));
   world.def("destroy_joint", &World::destroy_joint, py::arg("joint"));

@@ -21,6 +21,7 @@ void bind_fixtures(WorldClass& world);
 void bind_joints(WorldClass& world);
 void bind_contacts(pybind11::module_& module, WorldClass& world);
 void bind_raycast(WorldClass& world);
+void bind_steps(pybind11::module_& module, WorldClass& world);
 void bind_overlap(WorldClass& world);
 void bind_map_edges(pybind11::module_& module);
 
@@ -51,6 +52,9 @@ template <typename Use, typename Work>
 auto without_gil_if(bool is_long, Use& use, Work&& work) {
   return is_long ? without_gil(use, work) : while_in_use(use, work);
 }
+
+// A step that is expected to be shorter is not worth a release of the GIL [s].
+inline constexpr double kShortStep = 1e-4;
 
 // None for an empty report, else the ids of limited and of invalid bodies.
 pybind11::object to_python(const StepReport& report);

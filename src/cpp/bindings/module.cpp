@@ -16,6 +16,7 @@ PYBIND11_MODULE(_core, module) {
   flatland::bind_joints(world);
   flatland::bind_contacts(module, world);
   flatland::bind_raycast(world);
+  flatland::bind_steps(module, world);
   flatland::bind_overlap(world);
   flatland::bind_map_edges(module);
 }

@@ -28,34 +28,33 @@ BeamFan::BeamFan(const float* ends, std::size_t count) : ends_(ends, ends + 2 * 
   const auto angle_less = [&](std::uint32_t a, std::uint32_t b) { return angles[a] < angles[b]; };
   std::stable_sort(order_.begin(), order_.end(), angle_less);
 
-  // Vectors that start at any ray can be loaded and stored completely.
-  const std::size_t padded = order_.size() + kPadding;
-  x_.assign(padded, 0.0F);
-  y_.assign(padded, 0.0F);
-  length_.assign(padded, 0.0F);
+  x_.resize(order_.size());
+  y_.resize(order_.size());
+  length_.resize(order_.size());
   for (std::size_t i = 0; i < order_.size(); ++i) {
     x_[i] = ends[2 * order_[i]];
     y_[i] = ends[2 * order_[i] + 1];
     length_[i] = std::sqrt(x_[i] * x_[i] + y_[i] * y_[i]);
   }
   if (!order_.empty()) {
-    const auto end = length_.begin() + static_cast<std::ptrdiff_t>(order_.size());
-    min_length_ = *std::min_element(length_.begin(), end);
-    max_length_ = *std::max_element(length_.begin(), end);
+    const float* begin = length_.data();
+    const float* end = begin + order_.size();
+    min_length_ = *std::min_element(begin, end);
+    max_length_ = *std::max_element(begin, end);
   }
 
   constexpr int kMaxCellBits = 16;
-  while (cell_bits_ < kMaxCellBits && static_cast<std::size_t>(cells()) < 2 * order_.size()) {
+  while (cell_bits_ < kMaxCellBits && (std::size_t{1} << cell_bits_) < 2 * order_.size()) {
     ++cell_bits_;
   }
-  first_.resize(static_cast<std::size_t>(cells()));
-  const float cells_per_unit = static_cast<float>(cells()) / 4.0F;
+  first_in_cell_.resize(std::size_t{1} << cell_bits_);
+  const float cells_per_unit = static_cast<float>(first_in_cell_.size()) / 4.0F;
   std::size_t ray = 0;
-  for (std::size_t cell = 0; cell < first_.size(); ++cell) {
+  for (std::size_t cell = 0; cell < first_in_cell_.size(); ++cell) {
     while (ray < order_.size() && angles[order_[ray]] * cells_per_unit < static_cast<float>(cell)) {
       ++ray;
     }
-    first_[cell] = static_cast<std::int32_t>(ray);
+    first_in_cell_[cell] = static_cast<std::int32_t>(ray);
   }
 }
 
@@ -75,6 +74,11 @@ std::shared_ptr<const BeamFan> FanCache::get(const float* ends, std::size_t coun
     fans_.insert(fans_.begin(), std::make_shared<const BeamFan>(ends, count));
   }
   return fans_.front();
+}
+
+void FanCache::share(FanCache& other) {
+  const std::scoped_lock lock(mutex_, other.mutex_);
+  fans_ = other.fans_;
 }
 
 }  // namespace flatland

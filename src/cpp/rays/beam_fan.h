@@ -7,23 +7,22 @@
 #include <mutex>
 #include <vector>
 
+#include "rays/aligned_floats.h"
+
 namespace flatland {
 
 // Rays from the origin of a rangefinder to points in its frame, sorted by diamond angle (see
 // simd.h), with a lookup table for the rays between two angles. Immutable.
 class BeamFan {
  public:
-  // Number of rays of zero length appended to the sorted arrays.
-  static constexpr std::size_t kPadding = 7;
-
   BeamFan(const float* ends, std::size_t count);
 
   // Whether the fan was made from these end points.
   bool matches(const float* ends, std::size_t count) const;
 
-  // Number of rays of non-zero length; the sorted arrays have `padded_count` entries.
+  // Number of rays of non-zero length. Rays of zero length fill the last block of the sorted
+  // arrays.
   std::size_t count() const { return order_.size(); }
-  std::size_t padded_count() const { return x_.size(); }
   const float* x() const { return x_.data(); }
   const float* y() const { return y_.data(); }
   const float* length() const { return length_.data(); }
@@ -33,21 +32,16 @@ class BeamFan {
   float min_length() const { return min_length_; }
   float max_length() const { return max_length_; }
 
-  // The full circle is divided into cells; their number is a power of two. first_in(cell) is the
-  // first ray at or after the start of a cell. The numbers of cells and rays continue beyond the
-  // full circle in both directions.
-  int cells() const { return 1 << cell_bits_; }
-  std::int32_t first_in(std::int32_t cell) const {
-    const std::int32_t turns = cell >> cell_bits_;
-    return first_[static_cast<std::size_t>(cell & (cells() - 1))] +
-           turns * static_cast<std::int32_t>(count());
-  }
+  // The full circle is divided into cells; their number is 2 to the power of `cell_bits`. The entry
+  // of a cell is the first ray at or after its start.
+  int cell_bits() const { return cell_bits_; }
+  const std::int32_t* first_in_cell() const { return first_in_cell_.data(); }
 
  private:
   std::vector<float> ends_;
   std::vector<std::uint32_t> order_;
-  std::vector<float> x_, y_, length_;
-  std::vector<std::int32_t> first_;
+  AlignedFloats x_, y_, length_;
+  std::vector<std::int32_t> first_in_cell_;
   int cell_bits_ = 8;
   float min_length_ = 0.0F;
   float max_length_ = 0.0F;
@@ -57,6 +51,8 @@ class BeamFan {
 class FanCache {
  public:
   std::shared_ptr<const BeamFan> get(const float* ends, std::size_t count);
+  // Shares the fans of another cache.
+  void share(FanCache& other);
 
  private:
   static constexpr std::size_t kMaxFans = 16;

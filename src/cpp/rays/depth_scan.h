@@ -15,6 +15,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "rays/aligned_floats.h"
 #include "rays/beam_fan.h"
 #include "rays/edge_tree.h"
 
@@ -30,37 +31,35 @@ struct RayMasks {
   }
 };
 
+// The memory of scans, for any number of them one after the other.
+class ScanBuffer {
+ private:
+  friend class DepthScan;
+
+  AlignedFloats d_x_, d_y_, fraction_;
+};
+
 class DepthScan {
  public:
-  // The fan must outlive the scan. Initially all rays are misses.
-  DepthScan(const BeamFan& fan, const b2Transform& pose);
-
-  // Limits the rays, in sorted order: hits at or beyond these fractions are ignored from now on.
-  void set_limits(const std::vector<float>& fractions);
+  // The fan and the buffer must outlive the scan. Initially all rays are misses.
+  DepthScan(const BeamFan& fan, const b2Transform& pose, ScanBuffer& buffer);
 
   // Draws the edges of a tree; `body` is the pose of the frame of the tree.
   void draw(const EdgeTree& tree, const b2Transform& body, RayMasks masks);
   // Draws circles and polygons.
   void draw(const std::vector<b2Fixture*>& solids, RayMasks masks);
 
-  // Fraction of the nearest hit of each ray, in sorted order; greater than 1 for a miss.
-  const std::vector<float>& fractions() const { return fractions_; }
-
-  // The smallest fraction of a miss, which is the initial fraction of each ray.
-  static float miss_fraction();
+  // Fraction of the nearest hit of each ray, in sorted order; greater than 1 for a miss. While
+  // drawing, hits at or beyond these fractions are ignored; the caller may change them in between.
+  float* fractions() { return buffer_.fraction_.data(); }
+  const float* fractions() const { return buffer_.fraction_.data(); }
 
  private:
-  friend struct DepthScanKernel;
-
   const BeamFan& fan_;
   b2Transform pose_;
-  std::vector<float> end_x_, end_y_;  // world frame
-  // Vector along each ray in the current frame, that of the tree drawn last.
-  std::vector<float> d_x_, d_y_;
-  b2Transform frame_;
+  ScanBuffer& buffer_;
+  b2Transform frame_;  // of the vectors along the rays in the buffer, that of the tree drawn last
   bool has_frame_ = false;
-  std::vector<float> fractions_;
-  std::vector<float> reach_;  // distance to the nearest hit so far, or length of the ray [m]
 };
 
 }  // namespace flatland

@@ -67,6 +67,23 @@ void RayScene::clear() {
   is_grouped_ = true;
 }
 
+void RayScene::become_copy_of(RayScene& source,
+                              const std::function<const b2Body*(const b2Body*)>& copy_of,
+                              const std::function<b2Fixture*(const b2Fixture*)>& copy_of_fixture) {
+  std::vector<b2Fixture*> solids;
+  for (const b2Fixture* fixture : source.solids_) solids.push_back(copy_of_fixture(fixture));
+  std::vector<EdgeGroup> groups = source.edge_groups();  // makes the trees, to be shared
+  for (EdgeGroup& group : groups) {
+    for (const b2Body*& body : group.bodies) body = copy_of(body);
+  }
+  std::vector<EdgeBody> bodies = source.edge_bodies_;
+  for (EdgeBody& edge_body : bodies) edge_body.body = copy_of(edge_body.body);
+  solids_ = std::move(solids);
+  edge_groups_ = std::move(groups);
+  edge_bodies_ = std::move(bodies);
+  is_grouped_ = true;
+}
+
 const std::vector<EdgeGroup>& RayScene::edge_groups() {
   const std::lock_guard<std::mutex> lock(groups_mutex_);
   if (is_grouped_) find_moved_bodies();

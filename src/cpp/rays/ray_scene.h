@@ -4,6 +4,7 @@
 #include <box2d/b2_math.h>
 
 #include <cstddef>
+#include <functional>
 #include <memory>
 #include <mutex>
 #include <vector>
@@ -35,6 +36,9 @@ class RayScene {
   // To be called after a change of the category bits or the sensor flag of a fixture.
   void changed(const b2Fixture* fixture);
   void clear();
+  // Makes this scene that of a copy of a world, which shares the trees of edges.
+  void become_copy_of(RayScene& source, const std::function<const b2Body*(const b2Body*)>& copy_of,
+                      const std::function<b2Fixture*(const b2Fixture*)>& copy_of_fixture);
 
   // The members below are thread-safe with respect to each other, but not to those above.
   const std::vector<b2Fixture*>& solids() const { return solids_; }

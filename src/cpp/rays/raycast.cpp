@@ -83,19 +83,18 @@ void draw_all(DepthScan& scan, RayScene& scene, RayMasks masks) {
 }
 
 // Casts the rays again at the reflecting fixtures only, up to the distances of the nearest hits.
-void find_reflections(const DepthScan& hits, const BeamFan& fan, RayScene& scene,
+void find_reflections(DepthScan& scan, const BeamFan& fan, RayScene& scene,
                       const ScanRequest& request, bool* reflect) {
-  std::vector<float> limits(fan.padded_count(), -1.0F);
+  float* fractions = scan.fractions();
+  std::vector<float> limits(fan.count());
   for (std::size_t i = 0; i < fan.count(); ++i) {
-    if (hits.fractions()[i] <= 1.0F) {
-      limits[i] = hits.fractions()[i] + kFractionTolerance + kDistanceTolerance / fan.length()[i];
-    }
+    const bool is_hit = fractions[i] <= 1.0F;
+    const float limit = fractions[i] + kFractionTolerance + kDistanceTolerance / fan.length()[i];
+    fractions[i] = limits[i] = is_hit ? limit : -1.0F;
   }
-  DepthScan reflections(fan, request.pose);
-  reflections.set_limits(limits);
-  draw_all(reflections, scene, {request.mask, request.reflect_mask});
+  draw_all(scan, scene, {request.mask, request.reflect_mask});
   for (std::size_t i = 0; i < fan.count(); ++i) {
-    reflect[fan.order()[i]] = reflections.fractions()[i] < limits[i];
+    reflect[fan.order()[i]] = fractions[i] < limits[i];
   }
 }
 
@@ -105,7 +104,8 @@ void cast_rays(RayScene& scene, const ScanRequest& request, const ScanResult& re
   std::fill_n(result.fractions, request.count, std::numeric_limits<float>::quiet_NaN());
   std::fill_n(result.reflect, request.count, false);
   const std::shared_ptr<const BeamFan> fan = scene.fans().get(request.ends, request.count);
-  DepthScan scan(*fan, request.pose);
+  ScanBuffer buffer;
+  DepthScan scan(*fan, request.pose, buffer);
   draw_all(scan, scene, {request.mask, kAnyCategory});
   for (std::size_t i = 0; i < fan->count(); ++i) {
     if (scan.fractions()[i] <= 1.0F) result.fractions[fan->order()[i]] = scan.fractions()[i];

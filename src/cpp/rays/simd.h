@@ -1,5 +1,4 @@
-// Operations on vectors of eight floats, with the vector extensions of the compiler: one
-// instruction with AVX, two with SSE2 or NEON. Contraction to fused operations is disabled (see
+// Operations on vectors of floats. Contraction to fused operations is disabled (see
 // CMakeLists.txt), so the results are the same on all machines.
 //
 // All functions are always inlined. They are then compiled for the instruction set of the calling
@@ -14,6 +13,8 @@
 
 namespace flatland::simd {
 
+// Vectors of eight, with the vector extensions of the compiler: one instruction with AVX, two with
+// SSE2 or NEON.
 inline constexpr std::size_t kWidth = 8;
 
 using Floats = float __attribute__((vector_size(32), aligned(4), may_alias));
@@ -22,29 +23,34 @@ using Ints = std::int32_t __attribute__((vector_size(32), aligned(4), may_alias)
 FLATLAND_INLINE Floats load(const float* p) { return *reinterpret_cast<const Floats*>(p); }
 FLATLAND_INLINE void store(float* p, Floats v) { *reinterpret_cast<Floats*>(p) = v; }
 FLATLAND_INLINE void store(std::int32_t* p, Ints v) { *reinterpret_cast<Ints*>(p) = v; }
+FLATLAND_INLINE Ints load(const std::int32_t* p) { return *reinterpret_cast<const Ints*>(p); }
 FLATLAND_INLINE Floats broadcast(float x) { return Floats{x, x, x, x, x, x, x, x}; }
-
-// True in the first `count` lanes.
-FLATLAND_INLINE Ints first_lanes(std::int32_t count) {
-  return Ints{0, 1, 2, 3, 4, 5, 6, 7} < count;
-}
 
 FLATLAND_INLINE Floats min(Floats a, Floats b) { return a < b ? a : b; }
 FLATLAND_INLINE Floats max(Floats a, Floats b) { return a > b ? a : b; }
 FLATLAND_INLINE Floats abs(Floats a) { return a < 0.0F ? -a : a; }
+
+FLATLAND_INLINE Ints min(Ints a, Ints b) { return a < b ? a : b; }
+FLATLAND_INLINE Ints max(Ints a, Ints b) { return a > b ? a : b; }
+FLATLAND_INLINE Ints min(Ints a, std::int32_t b) { return min(a, Ints{} + b); }
+
+// The lowest and the highest of eight numbers.
+FLATLAND_INLINE std::int32_t lowest(Ints a) {
+  a = min(a, __builtin_shuffle(a, Ints{4, 5, 6, 7, 0, 1, 2, 3}));
+  a = min(a, __builtin_shuffle(a, Ints{2, 3, 0, 1, 6, 7, 4, 5}));
+  return a[0] < a[1] ? a[0] : a[1];
+}
+FLATLAND_INLINE std::int32_t highest(Ints a) {
+  a = max(a, __builtin_shuffle(a, Ints{4, 5, 6, 7, 0, 1, 2, 3}));
+  a = max(a, __builtin_shuffle(a, Ints{2, 3, 0, 1, 6, 7, 4, 5}));
+  return a[0] > a[1] ? a[0] : a[1];
+}
 
 // Square roots of non-negative numbers.
 FLATLAND_INLINE Floats sqrt(Floats a) {
   Floats root;
   for (std::size_t i = 0; i < kWidth; ++i) root[i] = std::sqrt(a[i]);
   return root;
-}
-
-// Whether any lane is true.
-FLATLAND_INLINE bool any(Ints v) {
-  using Longs = std::int64_t __attribute__((vector_size(32)));
-  const auto pairs = reinterpret_cast<Longs>(v);
-  return ((pairs[0] | pairs[1]) | (pairs[2] | pairs[3])) != 0;
 }
 
 // Largest integers not greater than the numbers, which must be in the 32-bit range.
@@ -66,5 +72,46 @@ FLATLAND_INLINE Floats wrap_difference(Floats d) {
   d = d > 2.0F ? d - 4.0F : d;
   return d < -2.0F ? d + 4.0F : d;
 }
+
+// Vectors of rays, for any instruction set. Lanes8Avx2 and Lanes16 in simd_x86.h have the same
+// members. Comparisons with NaN are false, except for `not_equal`.
+struct Lanes8 {
+  static constexpr std::int32_t kWidth = 8;
+  using Floats = simd::Floats;
+  using Mask = simd::Ints;
+
+  static FLATLAND_INLINE Floats load(const float* p) { return simd::load(p); }
+  static FLATLAND_INLINE void store(float* p, Floats v) { simd::store(p, v); }
+  static FLATLAND_INLINE Floats broadcast(float x) { return simd::broadcast(x); }
+  static FLATLAND_INLINE Floats min(Floats a, Floats b) { return simd::min(a, b); }
+  static FLATLAND_INLINE Floats max(Floats a, Floats b) { return simd::max(a, b); }
+  static FLATLAND_INLINE Floats sqrt(Floats a) { return simd::sqrt(a); }
+  static FLATLAND_INLINE Mask less(Floats a, Floats b) { return a < b; }
+  static FLATLAND_INLINE Mask less_equal(Floats a, Floats b) { return a <= b; }
+  static FLATLAND_INLINE Mask equal(Floats a, Floats b) { return a == b; }
+  static FLATLAND_INLINE Mask not_equal(Floats a, Floats b) { return a != b; }
+  static FLATLAND_INLINE Mask none() { return Mask{}; }
+  static FLATLAND_INLINE Mask both(Mask a, Mask b) { return a & b; }
+  static FLATLAND_INLINE Mask either(Mask a, Mask b) { return a | b; }
+  static FLATLAND_INLINE Mask but_not(Mask a, Mask b) { return a & ~b; }
+  static FLATLAND_INLINE Floats select(Mask mask, Floats a, Floats b) { return mask ? a : b; }
+  // True in the lanes from `begin` to `end` - 1, which may lie outside of the vector.
+  static FLATLAND_INLINE Mask range(std::int32_t begin, std::int32_t end) {
+    constexpr Mask kIndex{0, 1, 2, 3, 4, 5, 6, 7};
+    return (kIndex >= begin) & (kIndex < end);
+  }
+  // Bit i is set if lane i of eight integers is true (-1).
+  static FLATLAND_INLINE std::uint32_t bits(Ints lanes) {
+    const Ints weights = lanes & Ints{1, 2, 4, 8, 16, 32, 64, 128};
+    std::int32_t sum = 0;
+    for (std::size_t i = 0; i < simd::kWidth; ++i) sum |= weights[i];
+    return static_cast<std::uint32_t>(sum);
+  }
+  static FLATLAND_INLINE bool any(Mask mask) {
+    using Longs = std::int64_t __attribute__((vector_size(32)));
+    const auto pairs = reinterpret_cast<Longs>(mask);
+    return ((pairs[0] | pairs[1]) | (pairs[2] | pairs[3])) != 0;
+  }
+};
 
 }  // namespace flatland::simd

@@ -70,15 +70,19 @@ Id create_body(World& world, b2BodyType type, const Triple& pose, double linear_
   return world.add_body(definition);
 }
 
-Triple pose_of(const World& world, Id body_id) {
-  const b2Body* body = world.read_body(body_id);
-  const b2Vec2& position = body->GetPosition();
+Triple pose_of(const World& world, Id body_id) { return pose_of(*world.read_body(body_id)); }
+
+Triple pose_of(const b2Body& body) {
+  const b2Vec2& position = body.GetPosition();
   return {static_cast<double>(position.x), static_cast<double>(position.y),
-          static_cast<double>(body->GetAngle())};
+          static_cast<double>(body.GetAngle())};
 }
 
 void set_pose(World& world, Id body_id, const Triple& pose) {
-  b2Body* body = world.change_body(body_id);
+  set_pose(world, world.change_body(body_id), pose);
+}
+
+void set_pose(World& world, b2Body* body, const Triple& pose) {
   const b2Vec2 position = checked_vector(pose[0], pose[1], "pose");
   const float angle = checked_finite(pose[2], "pose angle");
   body->SetTransform(position, angle);
@@ -93,7 +97,10 @@ Triple velocity_of(const World& world, Id body_id) {
 }
 
 void set_velocity(World& world, Id body_id, const Triple& velocity) {
-  b2Body* body = world.change_body(body_id);
+  set_velocity(world.change_body(body_id), velocity);
+}
+
+void set_velocity(b2Body* body, const Triple& velocity) {
   const b2Vec2 of_origin = checked_vector(velocity[0], velocity[1], "velocity");
   const float omega = checked_finite(velocity[2], "velocity omega");
   const b2Vec2 to_center = body->GetWorldCenter() - body->GetPosition();
@@ -115,6 +122,13 @@ std::vector<BodyState> states_of(const World& world) {
   // Box2D prepends new bodies to its list.
   std::reverse(states.begin(), states.end());
   return states;
+}
+
+void motions_of(const World& world, const Id* bodies, std::size_t count, double* motions) {
+  for (std::size_t i = 0; i < count; ++i) {
+    motions = std::copy_n(pose_of(world, bodies[i]).begin(), 3, motions);
+    motions = std::copy_n(velocity_of(world, bodies[i]).begin(), 3, motions);
+  }
 }
 
 void apply_force(World& world, Id body_id, double fx, double fy, double px, double py) {

@@ -6,12 +6,10 @@
 #include <cstddef>
 #include <vector>
 
+#include "world/triple.h"
 #include "world/world.h"
 
 namespace flatland {
-
-// A pose (x, y, theta) [m, rad] or a velocity (vx, vy, omega) [m/s, rad/s] in the world frame.
-using Triple = std::array<double, 3>;
 
 struct FixtureOptions {
   double density = 0.0;
@@ -26,18 +24,25 @@ Id create_body(World& world, b2BodyType type, const Triple& pose, double linear_
                double angular_damping);
 
 Triple pose_of(const World& world, Id body);
+Triple pose_of(const b2Body& body);
 // Wakes the body, or the adjacent dynamic bodies if it is static.
 void set_pose(World& world, Id body, const Triple& pose);
+void set_pose(World& world, b2Body* body, const Triple& pose);
 
 // Velocity of the origin of the body, not of its center of mass.
 Triple velocity_of(const World& world, Id body);
 void set_velocity(World& world, Id body, const Triple& velocity);
+void set_velocity(b2Body* body, const Triple& velocity);
 
 // The state of a body as Box2D stores it: position of the origin (x, y) and angle, center of mass
 // (x, y), velocity of the center of mass (vx, vy, omega), and 1 if the body is awake, else 0.
 using BodyState = std::array<float, 9>;
 // States of all bodies, in order of creation.
 std::vector<BodyState> states_of(const World& world);
+
+// Poses and velocities of the origins of some bodies, one after the other: x, y, theta, vx, vy,
+// omega.
+void motions_of(const World& world, const Id* bodies, std::size_t count, double* motions);
 
 void apply_force(World& world, Id body, double fx, double fy, double px, double py);
 void apply_torque(World& world, Id body, double torque);

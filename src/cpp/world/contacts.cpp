@@ -5,6 +5,7 @@
 #include <box2d/b2_fixture.h>
 #include <box2d/b2_world.h>
 
+#include <algorithm>
 #include <exception>
 #include <utility>
 
@@ -18,10 +19,52 @@ Id id_of(const b2Fixture* fixture) {
   return const_cast<b2Fixture*>(fixture)->GetUserData().pointer;
 }
 
+namespace {
+
+Id body_a_of(const b2Contact* contact) {
+  return id_of(const_cast<b2Contact*>(contact)->GetFixtureA()->GetBody());
+}
+
+Id body_b_of(const b2Contact* contact) {
+  return id_of(const_cast<b2Contact*>(contact)->GetFixtureB()->GetBody());
+}
+
+}  // namespace
+
+void ContactRecorder::record_body(Id body, std::uint8_t kinds) {
+  const auto slot = static_cast<std::uint32_t>(body);
+  if (slot >= kinds_of_body_.size()) {
+    if (kinds == 0) return;
+    kinds_of_body_.resize(slot + 1);
+  }
+  kinds_of_body_[slot] = kinds;
+}
+
+bool ContactRecorder::is_recording() const {
+  return recording || kinds_of_all_ != 0 ||
+         std::any_of(kinds_of_body_.begin(), kinds_of_body_.end(),
+                     [](std::uint8_t kinds) { return kinds != 0; });
+}
+
+bool ContactRecorder::records(const b2Contact* contact, ContactKind kind) const {
+  if (recording) return true;
+  const auto kinds = [this](Id body) -> int {
+    const auto slot = static_cast<std::uint32_t>(body);
+    return slot < kinds_of_body_.size() ? kinds_of_body_[slot] : 0;
+  };
+  const int recorded = kinds_of_all_ | kinds(body_a_of(contact)) | kinds(body_b_of(contact));
+  return (recorded >> static_cast<int>(kind) & 1) != 0;
+}
+
 void ContactRecorder::BeginContact(b2Contact* contact) {
   try {
     ids_[contact] = ++last_id_;
-    if (recording) rows_.push_back(make_row(contact, ContactKind::kBegin));
+    const bool is_collected = touches.concern(body_a_of(contact), body_b_of(contact));
+    const bool is_recorded = records(contact, ContactKind::kBegin);
+    if (!is_collected && !is_recorded) return;
+    const ContactRow row = make_row(contact, ContactKind::kBegin);
+    if (is_collected) touches.begin(row);
+    if (is_recorded) rows_.push_back(row);
   } catch (const std::exception&) {
     failed_ = true;
   }
@@ -29,11 +72,16 @@ void ContactRecorder::BeginContact(b2Contact* contact) {
 
 void ContactRecorder::EndContact(b2Contact* contact) {
   try {
-    if (recording) rows_.push_back(make_row(contact, ContactKind::kEnd));
+    if (records(contact, ContactKind::kEnd)) {
+      rows_.push_back(make_row(contact, ContactKind::kEnd));
+    }
   } catch (const std::exception&) {
     failed_ = true;
   }
-  ids_.erase(contact);
+  const auto known = ids_.find(contact);
+  if (known == ids_.end()) return;
+  touches.end(known->second, body_a_of(contact), body_b_of(contact));
+  ids_.erase(known);
 }
 
 void ContactRecorder::PreSolve(b2Contact* contact, const b2Manifold* old_manifold) {
@@ -47,14 +95,17 @@ void ContactRecorder::PreSolve(b2Contact* contact, const b2Manifold* old_manifol
 }
 
 void ContactRecorder::PostSolve(b2Contact* contact, const b2ContactImpulse* impulse) {
-  if (!recording) return;
+  const bool is_collected = touches.concern(body_a_of(contact), body_b_of(contact));
+  const bool is_recorded = records(contact, ContactKind::kPostSolve);
+  if (!is_collected && !is_recorded) return;
   try {
     ContactRow row = make_row(contact, ContactKind::kPostSolve);
     for (int32 i = 0; i < impulse->count && i < b2_maxManifoldPoints; ++i) {
       row.normal_impulses[i] = impulse->normalImpulses[i];
       row.tangent_impulses[i] = impulse->tangentImpulses[i];
     }
-    rows_.push_back(row);
+    if (is_collected) touches.post_solve(row, step_);
+    if (is_recorded) rows_.push_back(row);
   } catch (const std::exception&) {
     failed_ = true;
   }
@@ -63,6 +114,13 @@ void ContactRecorder::PostSolve(b2Contact* contact, const b2ContactImpulse* impu
 std::vector<ContactRow> ContactRecorder::take_rows() { return std::exchange(rows_, {}); }
 
 bool ContactRecorder::take_failure() { return std::exchange(failed_, false); }
+
+void ContactRecorder::replace_contacts(
+    const std::unordered_map<const b2Contact*, const b2Contact*>& copies) {
+  std::unordered_map<const b2Contact*, std::uint64_t> ids;
+  for (const auto& [contact, id] : ids_) ids[copies.at(contact)] = id;
+  ids_ = std::move(ids);
+}
 
 std::vector<ContactRow> ContactRecorder::touching(const b2World& world) const {
   std::vector<ContactRow> rows;

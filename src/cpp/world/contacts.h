@@ -9,6 +9,7 @@
 
 #include "world/slot_map.h"
 #include "world/step_guard.h"
+#include "world/touches.h"
 
 class b2World;
 
@@ -49,8 +50,10 @@ class PreSolveHook {
 // b2World::Step would leave the world locked; `take_failure` reports a lack of memory.
 class ContactRecorder final : public b2ContactListener {
  public:
-  // Whether events are recorded. Contacts have ids even if they are not recorded.
+  // Whether all events are recorded. Contacts have ids even if they are not recorded.
   bool recording = false;
+  // Collectors of contacts, whether these are recorded or not.
+  TouchCollectors touches;
   // Not owned; set only during a step.
   PreSolveHook* hook = nullptr;
   StepGuard guard;
@@ -60,18 +63,36 @@ class ContactRecorder final : public b2ContactListener {
   void PreSolve(b2Contact* contact, const b2Manifold* old_manifold) override;
   void PostSolve(b2Contact* contact, const b2ContactImpulse* impulse) override;
 
+  // Makes the events of some kinds recorded: of one body, or of all. Kinds are bits 1 << kind.
+  void record_body(Id body, std::uint8_t kinds);
+  void record_all(std::uint8_t kinds) { kinds_of_all_ = kinds; }
+  // Whether any events are recorded.
+  bool is_recording() const;
+  // To be called before each physics step.
+  void begin_step() { ++step_; }
+  // Number of the physics steps so far.
+  std::uint64_t step() const { return step_; }
+
   // Returns the events since the last call, in chronological order.
   std::vector<ContactRow> take_rows();
+  bool has_rows() const { return !rows_.empty(); }
   // Returns whether events were lost since the last call.
   bool take_failure();
+
+  // Replaces the contacts that have ids; to be called for the copy of a recorder.
+  void replace_contacts(const std::unordered_map<const b2Contact*, const b2Contact*>& copies);
 
   // Returns the contacts of all fixtures that currently touch.
   std::vector<ContactRow> touching(const b2World& world) const;
 
  private:
   ContactRow make_row(b2Contact* contact, ContactKind kind) const;
+  bool records(const b2Contact* contact, ContactKind kind) const;
 
   std::vector<ContactRow> rows_;
+  std::uint8_t kinds_of_all_ = 0;
+  std::vector<std::uint8_t> kinds_of_body_;  // by the slot of its id
+  std::uint64_t step_ = 0;
   std::unordered_map<const b2Contact*, std::uint64_t> ids_;
   std::uint64_t last_id_ = 0;
   bool failed_ = false;

@@ -2,6 +2,8 @@
 // slot.
 #pragma once
 
+#include <algorithm>
+#include <cstddef>
 #include <cstdint>
 #include <utility>
 #include <vector>
@@ -12,7 +14,14 @@ namespace flatland {
 // different kinds differ, no id is 0, and ids are positive as signed integers.
 using Id = std::uint64_t;
 
-enum class IdKind : std::uint64_t { kBody = 1, kFixture = 2, kJoint = 3 };
+enum class IdKind : std::uint64_t {
+  kBody = 1,
+  kFixture = 2,
+  kJoint = 3,
+  kController = 4,
+  kRecord = 5,
+  kTouches = 6
+};
 
 // Values by id. The id of an erased value is never valid again, even if its slot is reused.
 template <typename Value, IdKind kKind>
@@ -22,12 +31,12 @@ class SlotMap {
     std::uint32_t slot;
     if (free_.empty()) {
       slot = static_cast<std::uint32_t>(slots_.size());
-      slots_.push_back({std::move(value), 0, true});
+      slots_.push_back({std::move(value), 0, 1});
     } else {
       slot = free_.back();
       free_.pop_back();
       slots_[slot].value = std::move(value);
-      slots_[slot].used = true;
+      slots_[slot].generation = slots_[slot].uses++;
     }
     ++size_;
     return make_id(slot);
@@ -36,7 +45,7 @@ class SlotMap {
   // Returns the value, or null if the id is unknown or its value was erased.
   Value* find(Id id) {
     const auto slot = static_cast<std::uint32_t>(id);
-    if (slot >= slots_.size() || !slots_[slot].used || make_id(slot) != id) return nullptr;
+    if (slot >= slots_.size() || !slots_[slot].is_used() || make_id(slot) != id) return nullptr;
     return &slots_[slot].value;
   }
   const Value* find(Id id) const { return const_cast<SlotMap*>(this)->find(id); }
@@ -45,12 +54,16 @@ class SlotMap {
     if (find(id) == nullptr) return;
     const auto slot = static_cast<std::uint32_t>(id);
     slots_[slot].value = Value{};
-    slots_[slot].used = false;
+    slots_[slot].generation = kUnused;
     --size_;
-    // A slot without unused generations is not reused.
-    if (slots_[slot].generation < kLastGeneration) {
-      ++slots_[slot].generation;
-      free_.push_back(slot);
+    if (slots_[slot].is_reusable()) free_.push_back(slot);
+  }
+
+  // Calls visit(id, value) for each value in order of slots.
+  template <typename Visit>
+  void for_each(Visit&& visit) {
+    for (std::uint32_t slot = 0; slot < slots_.size(); ++slot) {
+      if (slots_[slot].is_used()) visit(make_id(slot), slots_[slot].value);
     }
   }
 
@@ -63,13 +76,37 @@ class SlotMap {
     size_ = 0;
   }
 
+  // Excludes the ids that `other` has returned, unless they belong to values of this map, from
+  // those that `insert` returns. The slots that `insert` uses are the same as without this call,
+  // as long as no slot is used up.
+  void exclude_ids_of(const SlotMap& other) {
+    const std::size_t count = slots_.size();
+    for (std::size_t slot = 0; slot < other.slots_.size(); ++slot) {
+      if (slot >= count) slots_.push_back({Value{}, kUnused, 0});
+      slots_[slot].uses = std::max(slots_[slot].uses, other.slots_[slot].uses);
+    }
+    // Slots are taken from the end, new ones after all others and in ascending order.
+    std::vector<std::uint32_t> free;
+    for (std::size_t slot = slots_.size(); slot-- > count;) {
+      free.push_back(static_cast<std::uint32_t>(slot));
+    }
+    free.insert(free.end(), free_.begin(), free_.end());
+    const auto is_used_up = [this](std::uint32_t slot) { return !slots_[slot].is_reusable(); };
+    free.erase(std::remove_if(free.begin(), free.end(), is_used_up), free.end());
+    free_ = std::move(free);
+  }
+
  private:
-  static constexpr std::uint32_t kLastGeneration = (1U << 28U) - 1U;
+  static constexpr std::uint32_t kMostUses = 1U << 28U;
+  static constexpr std::uint32_t kUnused = kMostUses;
 
   struct Slot {
     Value value;
-    std::uint32_t generation;
-    bool used;
+    std::uint32_t generation;  // of the value, or kUnused
+    std::uint32_t uses;        // the next generation
+
+    bool is_used() const { return generation != kUnused; }
+    bool is_reusable() const { return uses < kMostUses; }
   };
 
   Id make_id(std::uint32_t slot) const {

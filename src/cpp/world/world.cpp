@@ -40,6 +40,11 @@ void ensure_mass(b2Body* body) {
   body->SetMassData(&data);
 }
 
+using Clock = std::chrono::steady_clock;
+
+// Wall time after which a run ends, so that Python can handle signals [s].
+constexpr double kLongRun = 0.05;
+
 class WakeDynamicBodies final : public b2QueryCallback {
  public:
   bool ReportFixture(b2Fixture* fixture) override {
@@ -52,6 +57,10 @@ class WakeDynamicBodies final : public b2QueryCallback {
 
 World::World() : engine_(std::make_unique<b2World>(b2Vec2(0.0F, 0.0F))) {
   initialize_contact_table();
+  listen();
+}
+
+void World::listen() {
   engine_->SetDestructionListener(this);
   engine_->SetContactListener(&contacts_);
 }
@@ -61,17 +70,20 @@ World::~World() = default;
 void World::close() {
   if (closed()) return;
   check_changeable();
+  threads_.stop();
   rays_.clear();
   bodies_.clear();
   fixtures_.clear();
   joints_.clear();
   contacts_ = ContactRecorder();
   invalid_.clear();
+  plan_.clear();
   engine_.reset();
 }
 
-StepReport World::step(double dt, int velocity_iterations, int position_iterations,
-                       PreSolveHook* hook) {
+namespace {
+
+void check_step(double dt, int velocity_iterations, int position_iterations) {
   // Outside these bounds, 1 / dt or sums in the solver can exceed the range of a float.
   if (!(dt >= 1e-6 && dt <= 1e3)) {
     throw std::invalid_argument("dt must be from 1e-6 to 1000 s, got " + to_text(dt));
@@ -82,22 +94,84 @@ StepReport World::step(double dt, int velocity_iterations, int position_iteratio
                                   std::to_string(iterations));
     }
   }
+}
+
+}  // namespace
+
+StepReport World::step(double dt, int velocity_iterations, int position_iterations,
+                       PreSolveHook* hook) {
+  check_step(dt, velocity_iterations, position_iterations);
+  const auto start = Clock::now();
+  StepReport report = step_unchecked(dt, velocity_iterations, position_iterations, hook);
+  last_step_time_ = std::chrono::duration<double>(Clock::now() - start).count();
+  return report;
+}
+
+StepReport World::step_unchecked(double dt, int velocity_iterations, int position_iterations,
+                                 PreSolveHook* hook) {
   if (!invalid_.empty()) {
     invalid_ = still_invalid();
     if (!invalid_.empty()) return {{}, invalid_};
   }
-  const auto start = std::chrono::steady_clock::now();
   const auto seconds = static_cast<float>(dt);
   StepGuard& guard = contacts_.guard;
   guard.begin(*engine_, seconds);
   contacts_.hook = hook;
+  contacts_.begin_step();
   engine_->Step(seconds, velocity_iterations, position_iterations);
   contacts_.hook = nullptr;
   StepReport report = guard.end(*engine_);
   invalid_ = report.invalid;
-  last_step_time_ = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   if (contacts_.take_failure()) throw std::bad_alloc();
   return report;
+}
+
+RunResult World::run(std::int64_t k, std::int64_t n, double dt, int velocity_iterations,
+                     int position_iterations, bool only_physics) {
+  using End = RunResult::End;
+  check_step(dt, velocity_iterations, position_iterations);
+  const auto start = Clock::now();
+  // Reading the wall time takes about as long as a step of one body.
+  constexpr std::int64_t kMostUntimed = 16;
+  std::int64_t untimed = 0;
+  RunResult result;
+  while (result.steps < n) {
+    if (interrupted_.load(std::memory_order_relaxed)) {
+      result.end = End::kStopped;
+      break;
+    }
+    if (++untimed > kMostUntimed || last_step_time_ > kLongRun / kMostUntimed) {
+      untimed = 0;
+      if (result.steps > 0 && Clock::now() - start > std::chrono::duration<double>(kLongRun)) {
+        result.end = End::kStopped;
+        break;
+      }
+    }
+    if (plan_.calls_due(k) != 0) {
+      result.end = End::kCall;
+      break;
+    }
+    plan_.begin(k);
+    plan_.carry_out(*this, Phase::kBefore, StepPlan::kEnd, dt);
+    if (plan_.has_failed()) {
+      result.end = End::kFailed;
+      break;
+    }
+    result.report = step_unchecked(dt, velocity_iterations, position_iterations, nullptr);
+    if (only_physics || !result.report.empty() || contacts_.has_rows() ||
+        contacts_.touches.end_run()) {
+      result.end = End::kPhysics;
+      break;
+    }
+    plan_.carry_out(*this, Phase::kAfter, StepPlan::kEnd, dt);
+    ++result.steps;
+    ++k;
+  }
+  const double elapsed = std::chrono::duration<double>(Clock::now() - start).count();
+  const bool is_partial = result.end == End::kPhysics;
+  const std::int64_t made = result.steps + (is_partial ? 1 : 0);
+  if (made > 0) last_step_time_ = elapsed / static_cast<double>(made);
+  return result;
 }
 
 std::vector<Id> World::still_invalid() const {
@@ -221,6 +295,9 @@ void World::destroy_body(Id id) {
   rays_.remove_body(body);
   engine_->DestroyBody(body);  // calls SayGoodbye for its fixtures and joints
   bodies_.erase(id);
+  plan_.remove_body(id);
+  contacts_.record_body(id, 0);
+  contacts_.touches.set_owned(id, false);
 }
 
 void World::destroy_joint(Id id) {

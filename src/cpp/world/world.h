@@ -19,9 +19,11 @@
 #include <thread>
 #include <vector>
 
+#include "parallel/thread_pool.h"
 #include "rays/ray_scene.h"
 #include "world/contacts.h"
 #include "world/slot_map.h"
+#include "world/step_plan.h"
 
 namespace flatland {
 
@@ -30,6 +32,21 @@ struct JointRecord {
   b2Joint* joint = nullptr;
   float frequency = 0.0F;
   float damping_ratio = 0.0F;
+};
+
+// How many steps a call of `World::run` made, and why it ended.
+struct RunResult {
+  enum class End : std::uint8_t {
+    kDone,     // all steps were made
+    kCall,     // code is to be called in the next step, which has not begun
+    kFailed,   // the next step has begun, and a controller has failed before the physics step
+    kPhysics,  // the next step has begun, and its physics step was made, but nothing after it
+    kStopped,  // `interrupt` was called, or the run took long
+  };
+
+  std::int64_t steps = 0;  // complete steps
+  End end = End::kDone;
+  StepReport report;
 };
 
 class World final : private b2DestructionListener {
@@ -43,9 +60,27 @@ class World final : private b2DestructionListener {
   void close();
   bool closed() const { return engine_ == nullptr; }
 
+  // Makes this world an exact copy of another one, with the same ids; see copy.cpp. Ids of this
+  // world that do not exist in the other one become stale and are not used again. If there is not
+  // enough memory, this world is unchanged. The caches of ray casting are shared.
+  void become_copy_of(World& source);
+  // Destroys all objects. The results of the same further calls are those of a new world, except
+  // for the generations of ids.
+  void clear();
+
   // Advances the world by dt > 0 seconds. The hook may be null. The caller has exclusive use of the
   // world. While a body is invalid the world does not advance, and the report names the body again.
   StepReport step(double dt, int velocity_iterations, int position_iterations, PreSolveHook* hook);
+  // Makes up to n steps without calling any code, from step k (counted from time 0) on. Ends early
+  // as described in RunResult; with `only_physics`, after the first physics step. The caller has
+  // exclusive use of the world.
+  RunResult run(std::int64_t k, std::int64_t n, double dt, int velocity_iterations,
+                int position_iterations, bool only_physics);
+  // Makes `run` return after the current step; safe from any thread. It has an effect until
+  // `clear_interrupt` is called.
+  void interrupt() { interrupted_ = true; }
+  void clear_interrupt() { interrupted_ = false; }
+
   // Duration of the last step in wall time [s], an estimate of that of the next one.
   double last_step_time() const { return last_step_time_; }
 
@@ -90,6 +125,15 @@ class World final : private b2DestructionListener {
   ContactRecorder& contacts() { return contacts_; }
   const ContactRecorder& contacts() const { return contacts_; }
   RayScene& rays() { return rays_; }
+  StepPlan& plan() { return plan_; }
+  // Null if the body was destroyed; for the steps of a plan.
+  b2Body* find_body(Id id) {
+    b2Body* const* body = bodies_.find(id);
+    return body == nullptr ? nullptr : *body;
+  }
+  // Workers for calls on this world, or on several worlds of which this is the first. They may be
+  // used while the world is in shared or exclusive use by the calling thread.
+  ThreadPool& threads() { return threads_; }
 
   static constexpr const char* kStepping = "is stepping";
 
@@ -123,9 +167,13 @@ class World final : private b2DestructionListener {
   };
 
  private:
+  // Receives the events of a new engine.
+  void listen();
   void SayGoodbye(b2Joint* joint) override;
   void SayGoodbye(b2Fixture* fixture) override;
   std::vector<Id> still_invalid() const;
+  StepReport step_unchecked(double dt, int velocity_iterations, int position_iterations,
+                            PreSolveHook* hook);
   [[noreturn]] void throw_locked() const;
   void wait_for_readers() const;
 
@@ -137,9 +185,12 @@ class World final : private b2DestructionListener {
   SlotMap<JointRecord, IdKind::kJoint> joints_;
   ContactRecorder contacts_;
   RayScene rays_;
+  StepPlan plan_;
+  ThreadPool threads_;
   double last_step_time_ = 1.0;  // the first step may be long
   std::vector<Id> invalid_;      // bodies that the last step left so
 
+  std::atomic<bool> interrupted_{false};
   std::atomic<int> users_{0};  // kExclusive, or the number of shared uses
   std::atomic<std::thread::id> owner_{};
   std::atomic<const char*> activity_{nullptr};

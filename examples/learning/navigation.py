@@ -1,0 +1,44 @@
+"""What the programs of this folder have in common: the environment that is learned."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from flatland.gym import (
+    FlatlandEnv,
+    FlatlandVectorEnv,
+    Goal,
+    Observation,
+    Proximity,
+    Scan,
+    Velocity,
+    make_vec,
+    navigation_reward,
+)
+
+NAME = "flatland/Navigate-v0"
+STEP = 0.1  # s, duration of a step of the environment
+EVALUATION_SEED = 1_000_000  # of the first episode; not used in training
+
+
+def arguments(**changes: Any) -> dict[str, Any]:
+    """Returns the arguments of the environment.
+
+    The 180 beams are combined to 36 sectors, so that a small network suffices. To come close to
+    obstacles costs a little, so that the robot learns to keep away before it collides.
+    """
+    return {
+        "observation": Observation(Scan(36, half=0.5), Goal(), Velocity()),
+        "reward": navigation_reward() + -0.1 * Proximity(0.5),
+        **changes,
+    }
+
+
+def make_many(num_envs: int, **changes: Any) -> FlatlandVectorEnv:
+    """Returns environments for training, in which an episode follows the other at once."""
+    return make_vec(NAME, num_envs, autoreset_mode="SameStep", **arguments(**changes))
+
+
+def make_one(**changes: Any) -> FlatlandEnv:
+    """Returns one environment of the same kind."""
+    return FlatlandEnv(**arguments(**changes))

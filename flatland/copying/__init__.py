@@ -1,0 +1,1 @@
+"""Saving and copying the Python objects that the state of a world consists of."""

@@ -1,0 +1,78 @@
+"""Environments for Gymnasium and PettingZoo: robots that learn to navigate.
+
+Importing this package registers `flatland/Navigate-v0` and `flatland/Corridor-v0` with Gymnasium.
+`gymnasium.make("flatland.gym:flatland/Navigate-v0")` imports it. `docs/learning.md` describes the
+environments.
+"""
+
+from flatland.gym.extras import check_gymnasium
+
+check_gymnasium()  # Otherwise, a missing package results in a traceback without a remedy.
+
+from flatland.gym.actions import VelocityAction
+from flatland.gym.agents import Agent
+from flatland.gym.endings import AnyOf, Arrived, Collided, Ending, Strayed
+from flatland.gym.env import FlatlandEnv
+from flatland.gym.observations import (
+    Goal,
+    LastAction,
+    Observation,
+    ObservationPart,
+    Scan,
+    Velocity,
+)
+from flatland.gym.places import Places
+from flatland.gym.registration import make_parallel, make_vec, register_all
+from flatland.gym.rewards import (
+    Arrival,
+    Contact,
+    Jerkiness,
+    Progress,
+    Proximity,
+    Reward,
+    Step,
+    navigation_reward,
+)
+from flatland.gym.settings import Settings
+from flatland.gym.situation import Situation
+from flatland.gym.tasks import FixedGoal, Occupied, RandomGoal, Task
+from flatland.gym.vector import FlatlandVectorEnv
+from flatland.gym.worlds import find_world
+
+register_all()
+
+__all__ = [
+    "Agent",
+    "AnyOf",
+    "Arrival",
+    "Arrived",
+    "Collided",
+    "Contact",
+    "Ending",
+    "FixedGoal",
+    "FlatlandEnv",
+    "FlatlandVectorEnv",
+    "Goal",
+    "Jerkiness",
+    "LastAction",
+    "Observation",
+    "ObservationPart",
+    "Occupied",
+    "Places",
+    "Progress",
+    "Proximity",
+    "RandomGoal",
+    "Reward",
+    "Scan",
+    "Settings",
+    "Situation",
+    "Step",
+    "Strayed",
+    "Task",
+    "Velocity",
+    "VelocityAction",
+    "find_world",
+    "make_parallel",
+    "make_vec",
+    "navigation_reward",
+]

@@ -1,0 +1,155 @@
+"""A single environment with one agent."""
+
+from __future__ import annotations
+
+import os
+from typing import Any
+
+import gymnasium
+import numpy as np
+import numpy.typing as npt
+from gymnasium.error import ClosedEnvironmentError, ResetNeeded
+
+from flatland.geometry import FloatArray
+from flatland.gym.actions import checked_actions
+from flatland.gym.episodes import Episodes
+from flatland.gym.rendering import Renderer, checked_render_mode
+from flatland.gym.settings import Settings
+from flatland.gym.start import StartState
+from flatland.gym.tasks import Occupied
+
+
+class FlatlandEnv(gymnasium.Env[Any, FloatArray]):
+    """A robot with a laser that drives to a goal.
+
+    An action is a velocity command for `physics_steps` steps of the world. An episode depends on
+    the seed of the reset and the actions only, not on earlier episodes.
+
+    Attributes:
+        world: The world; a step of another program with it is not part of an episode.
+    """
+
+    metadata: dict[str, Any] = {  # noqa: RUF012 - as in the base class
+        "render_modes": ["rgb_array", "human"],
+        "render_fps": 10,
+    }
+
+    def __init__(
+        self,
+        world: str | os.PathLike[str] = "navigate",
+        render_mode: str | None = None,
+        **arguments: Any,
+    ) -> None:
+        """Loads the world.
+
+        Args:
+            world: World file, or the name of an included world: `navigate`, `corridor`, `fleet`.
+            render_mode: `rgb_array`, `human` or None.
+            **arguments: See `Settings`.
+
+        Raises:
+            FlatlandError: A file is missing or invalid, or the model cannot be an agent.
+            TypeError: An argument is unknown or has the wrong type.
+            ValueError: An argument is out of range.
+        """
+        self.render_mode = checked_render_mode(render_mode, self.metadata)
+        settings = Settings.from_arguments({"world": world, **arguments})
+        self.metadata = {**self.metadata, "render_fps": round(1 / settings.dt) or 1}
+        self.world = settings.load()
+        try:
+            agent = settings.find_agent(self.world)
+            self._episodes = Episodes([agent], settings)
+            self._start = StartState(self.world)
+        except BaseException:
+            self.world.close()
+            raise
+        self.observation_space = self._episodes.layout.space
+        action_space: Any = settings.action.space
+        self.action_space = action_space
+        self._renderer = Renderer(self.render_mode, settings.dt)
+        self._running = False
+
+    @property
+    def goal(self) -> tuple[float, float]:
+        """The goal of the episode in the world frame [m]."""
+        x, y = self._episodes.situation.goals[0].tolist()
+        return (x, y)
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Any, dict[str, Any]]:
+        """Begins an episode.
+
+        Args:
+            seed: Seed of the random numbers of this episode and the next ones.
+            options: `start`, a pose, and `goal`, a place in the world frame, instead of those of
+                the task.
+
+        Returns:
+            The first observation and its info.
+
+        Raises:
+            ClosedEnvironmentError: The environment is closed.
+            WorldError: No place is free.
+            ValueError: An option is unknown or invalid.
+        """
+        super().reset(seed=seed)
+        self._check_open()
+        self._running = False
+        self._start.restore(self.np_random)
+        self._episodes.begin(0, self.np_random, Occupied(), options or {})
+        self._episodes.look()
+        self._running = True
+        self._show()
+        return self._observation(), self._episodes.info(0)
+
+    def step(self, action: FloatArray) -> tuple[Any, float, bool, bool, dict[str, Any]]:
+        """Carries out an action.
+
+        Args:
+            action: Forward speed and yaw rate, each from -1 to 1, shape (2,).
+
+        Returns:
+            Observation, reward, whether the episode terminated, whether it was truncated, info.
+
+        Raises:
+            ClosedEnvironmentError: The environment is closed.
+            ResetNeeded: There was no reset, or the episode has ended.
+            InvalidAction: The action has the wrong shape, or is NaN.
+        """
+        self._check_open()
+        if not self._running:
+            raise ResetNeeded("call reset() before step(): no episode has begun, or it has ended")
+        actions = checked_actions(action, None)
+        self._episodes.advance(actions)
+        self._episodes.look()
+        rewards, terminated, truncated = self._episodes.judge()
+        ended = bool(terminated[0]), bool(truncated[0])
+        self._running = not any(ended)
+        self._show()
+        return self._observation(), float(rewards[0]), *ended, self._episodes.info(0)
+
+    def render(self) -> npt.NDArray[np.uint8] | None:
+        """Returns an image for `rgb_array`; updates the window for `human`.
+
+        Raises:
+            ClosedEnvironmentError: The environment is closed.
+        """
+        self._check_open()
+        return self._renderer.render(self.world, [self.goal], self._episodes.task.goal_radius)
+
+    def close(self) -> None:
+        """Closes the world and the window; further calls have no effect."""
+        self._renderer.close()
+        self.world.close()
+
+    def _show(self) -> None:
+        if self.render_mode == "human":
+            self.render()
+
+    def _observation(self) -> Any:
+        return self._episodes.layout.present(self._episodes.observations[0])
+
+    def _check_open(self) -> None:
+        if self.world.closed:
+            raise ClosedEnvironmentError("the environment is closed")

@@ -1,0 +1,166 @@
+"""The episodes of several agents: the part that all environments share."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from flatland.errors import WorldError
+from flatland.geometry import BoolArray, DoubleArray, FloatArray, Pose, Vector2, finite_pose
+from flatland.gym.situation import Rows, Situation
+from flatland.gym.tasks import Occupied
+from flatland.plugins.laser import compute_scans
+from flatland.runtime.batch import step_worlds
+from flatland.runtime.placement import TOLERANCE
+from flatland.values import Twist
+
+if TYPE_CHECKING:
+    from flatland.gym.agents import Agent
+    from flatland.gym.settings import Settings
+
+
+class Episodes:
+    """Agents of one or several worlds, whose episodes begin and advance.
+
+    All numbers of a row are the same functions of its world for any number of rows, so that a
+    vector of environments equals as many single ones, bit by bit.
+
+    Attributes:
+        agents: The agents.
+        situation: Their state after the last step.
+        layout: The observation space and its columns.
+        observations: The observations of the last `look`, shape (n, layout.size), float32.
+    """
+
+    def __init__(self, agents: Sequence[Agent], settings: Settings, num_threads: int = 1) -> None:
+        """Prepares the episodes; the state of the worlds is that of the start of each episode.
+
+        Args:
+            agents: The agents, each in a world of its own or all in the same.
+            settings: What is observed, rewarded and so on.
+            num_threads: Number of threads that step and scan, 0 for one per core.
+
+        Raises:
+            WorldError: The task is impossible.
+            ValueError: The observation does not fit the laser.
+        """
+        first = agents[0]
+        self.agents = tuple(agents)
+        self._settings = settings
+        self._num_threads = num_threads
+        self.task = copy.copy(settings.task)  # It is prepared for these worlds.
+        self.task.prepare(first)
+        beams = first.laser.angles.count
+        self.layout = settings.observation.layout(beams)
+        low, high = settings.action.bounds(first)
+        n = len(agents)
+        self.situation = Situation(n, beams, first.laser.range, low, high)
+        self.observations: FloatArray = np.zeros((n, self.layout.size), np.float32)
+        self._lasers = [agent.laser for agent in agents]
+        self._all = np.arange(n)
+
+    def begin(
+        self, row: int, rng: np.random.Generator, occupied: Occupied, options: Mapping[str, Any]
+    ) -> None:
+        """Begins an episode of an agent whose world is in its initial state.
+
+        Raises:
+            WorldError: The start or the goal is not free.
+            ValueError: An option is unknown or invalid.
+        """
+        agent, s = self.agents[row], self.situation
+        start, goal = self.task.draw(agent, rng, occupied)
+        if options:
+            unknown = sorted(set(options) - {"start", "goal"})
+            if unknown:
+                raise ValueError(f"options must be among goal and start, got {', '.join(unknown)}")
+            start = finite_pose(options.get("start", start))
+            goal = finite_pose((*options.get("goal", goal), 0.0))[:2]
+        self._refuse_taken(agent, start, goal, occupied)
+        # The agents that have not been placed yet may still be there.
+        agent.world.move_model(agent.model.name, start, "allow")
+        s.goals[row] = goal
+        s.steps[row] = 0
+        s.actions[row] = s.previous_actions[row] = 0.0
+        s.collided[row] = False
+
+    @staticmethod
+    def _refuse_taken(agent: Agent, start: Pose, goal: Vector2, occupied: Occupied) -> None:
+        physics, bodies = agent.world.physics, agent.model.bodies
+        unplaced = list(occupied.unplaced)
+        if not physics.free_poses(bodies, [start], ignored=unplaced, least_gap=-TOLERANCE)[0]:
+            x, y, theta = start
+            raise WorldError(f"the start ({x:g}, {y:g}, {theta:g}) is not free")
+        if not physics.free_discs(
+            [(*goal, 0.0)], agent.radius, agent.bits, ignored=[*bodies, *unplaced]
+        )[0]:
+            raise WorldError(f"the goal ({goal[0]:g}, {goal[1]:g}) is not free")
+
+    def advance(self, actions: DoubleArray, rows: Rows | None = None) -> None:
+        """Carries out actions for one step of the environment.
+
+        Args:
+            actions: Actions in [-1, 1] of all agents, shape (n, 2).
+            rows: Agents that act; None for all. The others stand still.
+        """
+        s = self.situation
+        chosen = self._all if rows is None else rows
+        commands = (s.low + (actions[chosen] + 1.0) * (0.5 * (s.high - s.low))).tolist()
+        s.previous_actions[chosen] = s.actions[chosen]
+        s.actions[chosen] = actions[chosen]
+        s.previous_distance[chosen] = s.distance[chosen]
+        s.steps[chosen] += 1
+        agents = [self.agents[row] for row in chosen.tolist()]
+        for agent, (v, omega) in zip(agents, commands, strict=True):
+            agent.command.set(Twist(v, 0.0, omega))
+            agent.touches.clear()
+        # Agents may share a world.
+        worlds = list({id(agent.world): agent.world for agent in agents}.values())
+        step_worlds(worlds, self._settings.physics_steps, self._num_threads)
+        s.collided[chosen] = [agent.touches.touched for agent in agents]
+
+    def look(self, rows: Rows | None = None) -> None:
+        """Scans, and computes the observations.
+
+        Args:
+            rows: Agents that look; None for all.
+        """
+        s, goal_radius = self.situation, self.task.goal_radius
+        chosen = self._all if rows is None else rows
+        bodies = [self.agents[row].body for row in chosen.tolist()]
+        s.poses[chosen] = [body.pose for body in bodies]
+        s.velocities[chosen] = [body.velocity for body in bodies]
+        if rows is None:
+            compute_scans(self._lasers, s.ranges, self._num_threads)
+            s.locate(goal_radius)
+            self.layout.write(s, self.observations)
+            return
+        lasers = [self._lasers[row] for row in rows.tolist()]
+        part = s.take(rows)
+        compute_scans(lasers, part.ranges, self._num_threads)
+        part.locate(goal_radius)
+        observations = np.empty((len(rows), self.layout.size), np.float32)
+        self.layout.write(part, observations)
+        self.observations[rows] = observations
+        s.put(rows, part)
+
+    def judge(self) -> tuple[DoubleArray, BoolArray, BoolArray]:
+        """Returns rewards, which episodes terminated and which were truncated, (n,) each."""
+        s, settings = self.situation, self._settings
+        rewards = settings.reward.compute(s)
+        terminated = settings.ending.check(s)
+        truncated: BoolArray = (s.steps >= settings.max_steps) & ~terminated
+        return rewards, terminated, truncated
+
+    def infos(self) -> dict[str, npt.NDArray[Any]]:
+        """Returns the info of all agents after their last step, arrays of shape (n,)."""
+        s = self.situation
+        return {"distance": s.distance, "is_success": s.arrived, "collision": s.collided}
+
+    def info(self, row: int) -> dict[str, Any]:
+        """Returns the info of one agent after its last step."""
+        return {name: values[row].item() for name, values in self.infos().items()}

@@ -1,0 +1,240 @@
+"""Several robots in one world, with the parallel API of PettingZoo."""
+
+from __future__ import annotations
+
+import os
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from gymnasium import spaces
+from gymnasium.error import ClosedEnvironmentError, InvalidAction, ResetNeeded
+from gymnasium.utils import seeding
+from pettingzoo import ParallelEnv
+
+from flatland.entities.body import Body
+from flatland.geometry import FloatArray
+from flatland.gym.actions import checked_actions
+from flatland.gym.agents import Agent, check_alike
+from flatland.gym.episodes import Episodes
+from flatland.gym.rendering import Renderer, checked_render_mode
+from flatland.gym.settings import Settings
+from flatland.gym.start import StartState
+from flatland.gym.tasks import Occupied
+from flatland.gym.worlds import ROBOT, included_folder
+from flatland.values import Twist
+
+Steps = tuple[
+    dict[str, Any], dict[str, float], dict[str, bool], dict[str, bool], dict[str, dict[str, Any]]
+]
+
+
+class FleetEnv(ParallelEnv[str, Any, FloatArray]):  # type: ignore[misc, unused-ignore]
+    """Robots that drive to their goals in the same world; each sees the others in its scan.
+
+    A robot whose episode has ended stops and remains in the world as an obstacle.
+
+    Attributes:
+        world: The world.
+        possible_agents: Names of all robots.
+        agents: Names of the robots whose episodes have not ended.
+    """
+
+    metadata: dict[str, Any] = {  # noqa: RUF012 - the base class has no ClassVar
+        "name": "flatland/Fleet-v0",
+        "render_modes": ["rgb_array", "human"],
+        "render_fps": 10,
+        "is_parallelizable": True,
+    }
+
+    def __init__(
+        self,
+        num_robots: int = 4,
+        world: str | os.PathLike[str] = "fleet",
+        *,
+        robot: str | os.PathLike[str] | None = None,
+        render_mode: str | None = None,
+        **arguments: Any,
+    ) -> None:
+        """Loads the world and adds the robots.
+
+        Args:
+            num_robots: Number of robots, which are added as `robot_0`, `robot_1`, …
+            world: World file, or the name of an included world.
+            robot: Model file of the robots; None for the included one.
+            render_mode: `rgb_array`, `human` or None.
+            **arguments: See `Settings`; `agent` and `command` are those of each robot.
+
+        Raises:
+            FlatlandError: A file is missing or invalid, or the model cannot be an agent.
+            TypeError: An argument is unknown or has the wrong type.
+            ValueError: An argument is out of range.
+        """
+        self.render_mode = checked_render_mode(render_mode, self.metadata)
+        if isinstance(num_robots, bool) or not isinstance(num_robots, int) or num_robots < 1:
+            raise ValueError(f"num_robots must be an integer of at least 1, got {num_robots!r}")
+        for name in ("agent", "command"):
+            if name in arguments:
+                raise TypeError(f"{name} is not an argument here: it is that of each robot")
+        settings = Settings.from_arguments({"world": world, **arguments})
+        self.possible_agents = [f"robot_{i}" for i in range(num_robots)]
+        self.agents: list[str] = []
+        self._row_of = {name: row for row, name in enumerate(self.possible_agents)}
+        self.world = settings.load()
+        try:
+            self._agents = self._spawn(robot, settings)
+            self._episodes = Episodes(self._agents, settings)
+            self._start = StartState(self.world)
+        except BaseException:
+            self.world.close()
+            raise
+        self._observation_space = self._episodes.layout.space
+        self._action_spaces = dict.fromkeys(self.possible_agents, settings.action.space)
+        self._renderer = Renderer(self.render_mode, settings.dt)
+        self._rng: np.random.Generator | None = None
+
+    def observation_space(self, agent: str) -> spaces.Space[Any]:  # noqa: ARG002
+        """Returns the observation space, the same for all robots."""
+        return self._observation_space
+
+    def action_space(self, agent: str) -> spaces.Box:
+        """Returns the action space of a robot."""
+        return self._action_spaces[agent]
+
+    @property
+    def goals(self) -> dict[str, tuple[float, float]]:
+        """The goals of all robots in the world frame [m]."""
+        goals = self._episodes.situation.goals.tolist()
+        return {name: (x, y) for name, (x, y) in zip(self.possible_agents, goals, strict=True)}
+
+    def reset(
+        self,
+        seed: int | None = None,
+        options: dict[str, Any] | None = None,  # noqa: ARG002 - there are no options
+    ) -> tuple[dict[str, Any], dict[str, dict[str, Any]]]:
+        """Begins an episode for all robots.
+
+        Args:
+            seed: Seed of the random numbers of this episode and the next ones.
+            options: Ignored, as other environments of PettingZoo do with options they do not have.
+
+        Returns:
+            The first observations and infos by the names of the robots.
+
+        Raises:
+            ClosedEnvironmentError: The environment is closed.
+            WorldError: There is no room for all robots and goals.
+        """
+        self._check_open()
+        if seed is not None or self._rng is None:
+            self._rng, _ = seeding.np_random(seed)
+        self.agents = []
+        self._start.restore(self._rng)
+        occupied = Occupied()
+        for row, agent in enumerate(self._agents):
+            occupied.unplaced = _bodies(self._agents[row + 1 :])
+            self._episodes.begin(row, self._rng, occupied, {})
+            x, y = self._episodes.situation.goals[row].tolist()
+            occupied.goals.append((x, y))
+            agent.command.set(Twist())
+        self._episodes.look()
+        self.agents = list(self.possible_agents)
+        self._show()
+        return self._observations(self.agents), self._infos(self.agents)
+
+    def step(self, actions: dict[str, FloatArray]) -> Steps:
+        """Carries out an action of each robot whose episode has not ended.
+
+        Args:
+            actions: Forward speed and yaw rate, each from -1 to 1, by the names in `agents`.
+
+        Returns:
+            Observations, rewards, whether episodes terminated, whether they were truncated, and
+            infos, by the names of the robots that acted.
+
+        Raises:
+            ClosedEnvironmentError: The environment is closed.
+            ResetNeeded: There was no reset, or all episodes have ended.
+            InvalidAction: An action is missing, has the wrong shape, is NaN, or is of a robot that
+                does not exist or whose episode has ended.
+        """
+        self._check_open()
+        if not self.agents:
+            raise ResetNeeded("call reset() before step(): no episode has begun, or all have ended")
+        live = list(self.agents)
+        if set(actions) != set(live):
+            raise InvalidAction(
+                f"actions must be those of {', '.join(live)}, got {', '.join(actions) or 'none'}"
+            )
+        rows = np.array([self._row_of[name] for name in live])
+        numbers = np.zeros((len(self._agents), 2))
+        numbers[rows] = checked_actions([actions[name] for name in live], len(live))
+        self._episodes.advance(numbers, rows)
+        self._episodes.look()
+        rewards, terminated, truncated = self._episodes.judge()
+        ended = terminated | truncated
+        for name in live:
+            if ended[self._row_of[name]]:
+                self._agents[self._row_of[name]].command.set(Twist())
+        self.agents = [name for name in live if not ended[self._row_of[name]]]
+        self._show()
+        return (
+            self._observations(live),
+            {name: float(rewards[self._row_of[name]]) for name in live},
+            {name: bool(terminated[self._row_of[name]]) for name in live},
+            {name: bool(truncated[self._row_of[name]]) for name in live},
+            self._infos(live),
+        )
+
+    def state(self) -> npt.NDArray[np.float32]:
+        """Returns the pose, velocity and goal of all robots, shape (8 * number of robots,).
+
+        Each robot has (x, y, theta, vx, vy, omega, goal_x, goal_y) in the world frame [m, rad, s].
+        """
+        s = self._episodes.situation
+        return np.concatenate([s.poses, s.velocities, s.goals], axis=1).astype(np.float32).ravel()
+
+    def render(self) -> npt.NDArray[np.uint8] | None:
+        """Returns an image for `rgb_array`; updates the window for `human`.
+
+        Raises:
+            ClosedEnvironmentError: The environment is closed.
+        """
+        self._check_open()
+        radius = self._episodes.task.goal_radius
+        return self._renderer.render(self.world, self.goals.values(), radius)
+
+    def close(self) -> None:
+        """Closes the world and the window; further calls have no effect."""
+        self._renderer.close()
+        self.world.close()
+
+    def _spawn(self, robot: str | os.PathLike[str] | None, settings: Settings) -> list[Agent]:
+        """Adds the robots at free places."""
+        path = included_folder() / ROBOT if robot is None else robot
+        agents: list[Agent] = []
+        for name in self.possible_agents:
+            # Where it is now is not simulated: each reset places all robots.
+            self.world.spawn_model(path, name, name, if_blocked="allow")
+            agents.append(settings.find_agent(self.world, name))
+        check_alike(agents)
+        return agents
+
+    def _observations(self, names: list[str]) -> dict[str, Any]:
+        present, numbers = self._episodes.layout.present, self._episodes.observations
+        return {name: present(numbers[self._row_of[name]]) for name in names}
+
+    def _infos(self, names: list[str]) -> dict[str, dict[str, Any]]:
+        return {name: self._episodes.info(self._row_of[name]) for name in names}
+
+    def _show(self) -> None:
+        if self.render_mode == "human":
+            self.render()
+
+    def _check_open(self) -> None:
+        if self.world.closed:
+            raise ClosedEnvironmentError("the environment is closed")
+
+
+def _bodies(agents: list[Agent]) -> list[Body]:
+    return [body for agent in agents for body in agent.model.bodies]

@@ -1,0 +1,256 @@
+"""Observations: what a policy is given, composed of parts."""
+
+from __future__ import annotations
+
+import math
+from abc import ABC, abstractmethod
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+from gymnasium import spaces
+
+from flatland.geometry import FloatArray
+
+if TYPE_CHECKING:
+    from flatland.gym.situation import Situation
+
+GOAL_SCALE: Final = 10.0  # m
+
+
+class ObservationPart(ABC):
+    """A part of the observation: some numbers between two bounds.
+
+    Attributes:
+        name: Key of the part in a dictionary of observations.
+        low: Lower bound of all numbers.
+        high: Upper bound of all numbers.
+    """
+
+    name: str
+    low: float = -1.0
+    high: float = 1.0
+
+    @abstractmethod
+    def size(self, beams: int) -> int:
+        """Returns how many numbers it has for a laser with a number of beams.
+
+        Raises:
+            ValueError: It cannot be computed from that many beams.
+        """
+
+    @abstractmethod
+    def write(self, situation: Situation, out: FloatArray) -> None:
+        """Writes the numbers of all agents to `out`, shape (n, size), float32."""
+
+
+class Scan(ObservationPart):
+    """The scan: ranges divided by the range of the laser, 1 without a hit, 0 if too close.
+
+    With `sectors`, neighbouring beams are combined and the nearest range of each sector is kept.
+    With `half`, a range r is observed as r / (r + half): near obstacles, on which the next action
+    depends, differ more than distant ones.
+    """
+
+    name = "scan"
+    low = 0.0
+
+    def __init__(self, sectors: int | None = None, half: float | None = None) -> None:
+        """Creates the part.
+
+        Args:
+            sectors: Number of sectors, a divisor of the number of beams; None for all beams.
+            half: Range that is observed as 0.5 [m]; None for a linear scale.
+
+        Raises:
+            ValueError: There are less than 1 sectors, or `half` is not positive.
+        """
+        if half is not None and not (math.isfinite(half) and half > 0):
+            raise ValueError(f"half must be positive [m], got {half}")
+        self.half = half
+        if sectors is not None and sectors < 1:
+            raise ValueError(f"sectors must be at least 1, got {sectors}")
+        self.sectors = sectors
+
+    def size(self, beams: int) -> int:
+        """Returns the number of sectors, or of beams."""
+        if self.sectors is None:
+            return beams
+        if beams % self.sectors:
+            raise ValueError(f"sectors must divide the {beams} beams of the laser: {self.sectors}")
+        return self.sectors
+
+    def write(self, situation: Situation, out: FloatArray) -> None:
+        """Writes the scaled ranges."""
+        ranges = situation.ranges
+        limit = np.float32(situation.max_range)
+        if self.sectors is not None:
+            # A range of NaN is a beam without a hit.
+            ranges = np.fmin.reduce(ranges.reshape(len(ranges), self.sectors, -1), axis=2)
+        if self.half is None:
+            np.fmin(ranges, limit, out=out)
+            np.maximum(out, np.float32(0.0), out=out)
+            np.divide(out, limit, out=out)
+            return
+        is_hit = ranges < limit
+        np.maximum(ranges, np.float32(0.0), out=out)
+        np.divide(out, out + np.float32(self.half), out=out, where=is_hit)
+        out[~is_hit] = 1.0
+
+
+class Goal(ObservationPart):
+    """The goal in the frame of the robot: distance, cosine and sine of the bearing.
+
+    The distance is divided by `scale` and at most 1. The bearing of a goal at the very position of
+    the robot is (0, 0).
+    """
+
+    name = "goal"
+
+    def __init__(self, scale: float = GOAL_SCALE) -> None:
+        """Creates the part.
+
+        Args:
+            scale: Distance that is observed as 1 [m].
+
+        Raises:
+            ValueError: It is not positive.
+        """
+        if not scale > 0:
+            raise ValueError(f"scale must be positive [m], got {scale}")
+        self.scale = scale
+
+    def size(self, beams: int) -> int:  # noqa: ARG002 - does not depend on the laser
+        """Returns 3."""
+        return 3
+
+    def write(self, situation: Situation, out: FloatArray) -> None:
+        """Writes the distance and the bearing."""
+        distance = situation.distance
+        unit = np.maximum(distance, 1e-9)
+        out[:, 0] = np.minimum(distance / self.scale, 1.0)
+        out[:, 1] = situation.goal_ahead / unit
+        out[:, 2] = situation.goal_left / unit
+        # A quotient may exceed 1 by a rounding error.
+        np.clip(out, -1.0, 1.0, out=out)
+
+
+class Velocity(ObservationPart):
+    """Forward speed and yaw rate, divided by the greatest that can be commanded."""
+
+    name = "velocity"
+
+    def size(self, beams: int) -> int:  # noqa: ARG002 - does not depend on the laser
+        """Returns 2."""
+        return 2
+
+    def write(self, situation: Situation, out: FloatArray) -> None:
+        """Writes both velocities; a robot that is pushed may exceed the bounds, which are kept."""
+        limit = np.maximum(np.abs(situation.low), np.abs(situation.high))
+        out[:, 0] = situation.speed / limit[0]
+        out[:, 1] = situation.yaw_rate / limit[1]
+        np.clip(out, -1.0, 1.0, out=out)
+
+
+class LastAction(ObservationPart):
+    """The action of the last step, zero at the start of an episode."""
+
+    name = "last_action"
+
+    def size(self, beams: int) -> int:  # noqa: ARG002 - does not depend on the laser
+        """Returns 2."""
+        return 2
+
+    def write(self, situation: Situation, out: FloatArray) -> None:
+        """Writes the action."""
+        out[:] = situation.actions
+
+
+class Observation:
+    """Parts in a fixed order, as one array or as a dictionary.
+
+    Attributes:
+        parts: The parts.
+        as_dict: Whether observations are dictionaries of arrays, by the names of the parts.
+    """
+
+    def __init__(self, *parts: ObservationPart, as_dict: bool = False) -> None:
+        """Creates the observation.
+
+        Args:
+            parts: The parts; none for `Scan`, `Goal` and `Velocity`.
+            as_dict: Whether observations are dictionaries.
+
+        Raises:
+            ValueError: Two parts have the same name.
+        """
+        self.parts = parts or (Scan(), Goal(), Velocity())
+        self.as_dict = as_dict
+        names = [part.name for part in self.parts]
+        if len(set(names)) < len(names):
+            raise ValueError(f"the parts of an observation must have different names, got {names}")
+
+    def layout(self, beams: int) -> ObservationLayout:
+        """Returns the space and the columns for a laser with a number of beams.
+
+        Raises:
+            ValueError: A part cannot be computed from that many beams.
+        """
+        return ObservationLayout(self, beams)
+
+
+class ObservationLayout:
+    """An observation with its columns in an array of all numbers.
+
+    Attributes:
+        space: Space of one observation.
+        size: Number of columns.
+    """
+
+    def __init__(self, observation: Observation, beams: int) -> None:
+        """Assigns the columns.
+
+        Args:
+            observation: The parts.
+            beams: Number of beams of the laser.
+        """
+        self._as_dict = observation.as_dict
+        self._columns: list[tuple[ObservationPart, slice]] = []
+        start = 0
+        for part in observation.parts:
+            end = start + part.size(beams)
+            self._columns.append((part, slice(start, end)))
+            start = end
+        self.size = start
+        low, high = np.empty(self.size, np.float32), np.empty(self.size, np.float32)
+        for part, columns in self._columns:
+            low[columns], high[columns] = part.low, part.high
+        self.space: spaces.Space[Any]
+        if self._as_dict:
+            boxes: dict[str, spaces.Space[Any]] = {
+                part.name: spaces.Box(low[columns], high[columns], dtype=np.float32)
+                for part, columns in self._columns
+            }
+            self.space = spaces.Dict(boxes)
+        else:
+            self.space = spaces.Box(low, high, dtype=np.float32)
+
+    def write(self, situation: Situation, out: FloatArray) -> None:
+        """Writes the observations of all agents to `out`, shape (n, size)."""
+        for part, columns in self._columns:
+            part.write(situation, out[:, columns])
+
+    def present(self, numbers: FloatArray, *, copy: bool = True) -> Any:
+        """Returns observations as the space describes them.
+
+        Args:
+            numbers: One observation, shape (size,), or several, shape (n, size).
+            copy: Whether the result is independent of `numbers`.
+        """
+        if not self._as_dict:
+            return numbers.copy() if copy else numbers
+        # The keys of the space are sorted.
+        parts = sorted(self._columns, key=lambda column: column[0].name)
+        return {
+            part.name: numbers[..., columns].copy() if copy else numbers[..., columns]
+            for part, columns in parts
+        }

@@ -1,0 +1,91 @@
+"""The registered environments."""
+
+from __future__ import annotations
+
+import functools
+from typing import TYPE_CHECKING, Any, Final, NoReturn
+
+import gymnasium
+from gymnasium.envs.registration import VectorizeMode
+from gymnasium.error import NameNotFound, UnsupportedMode
+
+from flatland.gym.extras import check_pettingzoo
+
+if TYPE_CHECKING:
+    from flatland.gym.fleet import FleetEnv
+    from flatland.gym.vector import FlatlandVectorEnv
+
+SINGLE: Final[dict[str, dict[str, Any]]] = {
+    "flatland/Navigate-v0": {"world": "navigate"},
+    "flatland/Corridor-v0": {"world": "corridor", "max_steps": 200},
+}
+"""Arguments of the environments with one robot."""
+PARALLEL: Final[dict[str, dict[str, Any]]] = {"flatland/Fleet-v0": {"world": "fleet"}}
+"""Arguments of the environments with several robots."""
+
+
+def register_all() -> None:
+    """Registers all environments with Gymnasium."""
+    for name, arguments in SINGLE.items():
+        gymnasium.register(
+            name,
+            entry_point="flatland.gym.env:FlatlandEnv",
+            vector_entry_point="flatland.gym.vector:FlatlandVectorEnv",
+            kwargs=arguments,
+        )
+    for name in PARALLEL:
+        # Gymnasium has no environments with several agents: the entry point says so.
+        gymnasium.register(name, entry_point=functools.partial(_refuse, name))
+
+
+def make_vec(name: str, num_envs: int = 1, **arguments: Any) -> FlatlandVectorEnv:
+    """Returns many environments that are stepped together, in the core and over all cores.
+
+    Args:
+        name: A registered name, such as `flatland/Navigate-v0`.
+        num_envs: Number of environments.
+        **arguments: See `FlatlandVectorEnv` and `Settings`.
+
+    Raises:
+        gymnasium.error.Error: The name is unknown, or that of an environment with several robots.
+        FlatlandError: A file is missing or invalid, or the model cannot be an agent.
+        TypeError: An argument is unknown or has the wrong type.
+        ValueError: An argument is out of range.
+    """
+    if name in PARALLEL:
+        _refuse(name)
+    if name not in SINGLE:
+        raise NameNotFound(f'environment "{name}" does not exist; known: {", ".join(SINGLE)}')
+    envs: Any = gymnasium.make_vec(
+        name, num_envs, vectorization_mode=VectorizeMode.VECTOR_ENTRY_POINT, **arguments
+    )
+    vector: FlatlandVectorEnv = envs
+    return vector
+
+
+def make_parallel(name: str = "flatland/Fleet-v0", **arguments: Any) -> FleetEnv:
+    """Returns an environment with several robots, with the parallel API of PettingZoo.
+
+    Args:
+        name: A registered name.
+        **arguments: See `FleetEnv` and `Settings`.
+
+    Raises:
+        ImportError: PettingZoo is not installed.
+        gymnasium.error.Error: The name is unknown.
+        FlatlandError: A file is missing or invalid, or the model cannot be an agent.
+        TypeError: An argument is unknown or has the wrong type.
+        ValueError: An argument is out of range.
+    """
+    if name not in PARALLEL:
+        raise NameNotFound(f'environment "{name}" does not exist; known: {", ".join(PARALLEL)}')
+    check_pettingzoo()
+    from flatland.gym.fleet import FleetEnv
+
+    return FleetEnv(**{**PARALLEL[name], **arguments})
+
+
+def _refuse(name: str, **_arguments: Any) -> NoReturn:
+    raise UnsupportedMode(
+        f'{name} has several robots and the API of PettingZoo: flatland.gym.make_parallel("{name}")'
+    )

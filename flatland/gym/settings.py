@@ -1,0 +1,116 @@
+"""What an environment consists of, with defaults for navigation."""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields
+from typing import TYPE_CHECKING, Any
+
+from flatland.gym.actions import VelocityAction
+from flatland.gym.agents import Agent, find_agent
+from flatland.gym.endings import Ending, navigation_ending
+from flatland.gym.observations import Observation
+from flatland.gym.rewards import Reward, navigation_reward
+from flatland.gym.tasks import RandomGoal, Task
+from flatland.gym.worlds import find_world
+from flatland.world import World
+
+if TYPE_CHECKING:
+    from flatland.config.preprocessor import Params
+
+
+@dataclass(frozen=True, kw_only=True)
+class Settings:
+    """The arguments that all environments have in common.
+
+    Attributes:
+        world: World file, or the name of an included world: `navigate`, `corridor`, `fleet`.
+        agent: Name of the model that is controlled.
+        laser: Name of its laser; None for the first one.
+        command: Topic of its velocity command; None for the first one.
+        task: Starts and goals.
+        observation: What is observed.
+        action: How actions are scaled.
+        reward: The reward.
+        ending: When an episode terminates.
+        max_steps: Number of steps after which an episode is truncated.
+        physics_steps: Number of steps of the world in a step of the environment.
+        step_size: Simulated time of a step of the world [s].
+        params: Values of `param()` in YAML files.
+    """
+
+    world: str | os.PathLike[str] = "navigate"
+    agent: str = "robot"
+    laser: str | None = None
+    command: str | None = None
+    task: Task = field(default_factory=RandomGoal)
+    observation: Observation = field(default_factory=Observation)
+    action: VelocityAction = field(default_factory=VelocityAction)
+    reward: Reward = field(default_factory=navigation_reward)
+    ending: Ending = field(default_factory=navigation_ending)
+    max_steps: int = 300
+    physics_steps: int = 20
+    step_size: float = 0.005
+    params: Params = None
+
+    def __post_init__(self) -> None:
+        for name in ("max_steps", "physics_steps"):
+            value = getattr(self, name)
+            if isinstance(value, bool) or not isinstance(value, int) or value < 1:
+                raise ValueError(f"{name} must be an integer of at least 1, got {value!r}")
+        for name, kind in _KINDS.items():
+            value = getattr(self, name)
+            if not isinstance(value, kind):
+                raise TypeError(f"{name} must be a {kind.__name__}, got {value!r}")
+        if not (math.isfinite(self.step_size) and self.step_size > 0):
+            raise ValueError(f"step_size must be positive [s], got {self.step_size}")
+
+    @classmethod
+    def from_arguments(cls, arguments: Mapping[str, Any]) -> Settings:
+        """Returns settings from keyword arguments.
+
+        Raises:
+            TypeError: An argument is unknown or has the wrong type.
+            ValueError: A value is out of range.
+        """
+        known = [each.name for each in fields(cls)]
+        unknown = sorted(set(arguments) - set(known))
+        if unknown:
+            raise TypeError(
+                f"unknown argument {unknown[0]!r} of the environment; known: {', '.join(known)}"
+            )
+        return cls(**arguments)
+
+    @property
+    def dt(self) -> float:
+        """Simulated time of a step of the environment [s]."""
+        return self.physics_steps * self.step_size
+
+    def load(self) -> World:
+        """Loads the world.
+
+        Raises:
+            FlatlandError: A file is missing or invalid.
+        """
+        return World.from_yaml(
+            find_world(self.world), seed=0, params=self.params, step_size=self.step_size
+        )
+
+    def find_agent(self, world: World, name: str | None = None) -> Agent:
+        """Returns the agent of a world, by default the model `agent`.
+
+        Raises:
+            WorldError: The model does not exist, or has no laser or no velocity command.
+        """
+        return find_agent(world, name or self.agent, self.laser, self.command)
+
+
+_KINDS: dict[str, type] = {
+    "action": VelocityAction,
+    "ending": Ending,
+    "observation": Observation,
+    "reward": Reward,
+    "task": Task,
+}

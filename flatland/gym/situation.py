@@ -1,0 +1,128 @@
+"""The state of all agents of an environment as arrays."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from flatland.geometry import BoolArray, DoubleArray, FloatArray
+
+Rows = npt.NDArray[np.intp]
+
+
+class Situation:
+    """The state of n agents after a step of the environment; row i of each array is agent i.
+
+    Observations, rewards and endings are functions of it, of all rows at once. The value of a row
+    must not depend on other rows.
+
+    Attributes:
+        poses: (x, y, theta) of each agent in the world frame [m, rad], shape (n, 3).
+        velocities: (vx, vy, omega) in the world frame [m/s, rad/s], shape (n, 3).
+        speed: Forward speed in the frame of the agent [m/s], shape (n,).
+        yaw_rate: Yaw rate [rad/s], shape (n,).
+        ranges: Range of each beam [m], as the laser measures it: a beam without a hit is NaN, inf
+            or the range of the laser; shape (n, beams), float32.
+        max_range: Range of the laser [m].
+        goals: Goal in the world frame [m], shape (n, 2).
+        goal_ahead: Goal in the frame of the agent, forward [m], shape (n,).
+        goal_left: Goal in the frame of the agent, to the left [m], shape (n,).
+        distance: Distance to the goal [m], shape (n,).
+        previous_distance: Distance to the goal before the step [m], shape (n,).
+        arrived: Whether the agent is at its goal, shape (n,).
+        collided: Whether a solid footprint of the agent touched anything during the step,
+            shape (n,).
+        actions: Actions in [-1, 1], zero before the first step, shape (n, 2).
+        previous_actions: Actions of the step before, shape (n, 2).
+        low: Velocity command (v, omega) of the action (-1, -1) [m/s, rad/s], shape (2,).
+        high: Velocity command of the action (1, 1) [m/s, rad/s], shape (2,).
+        steps: Number of steps since the start of the episode, shape (n,).
+    """
+
+    __slots__ = (
+        "actions",
+        "arrived",
+        "collided",
+        "distance",
+        "goal_ahead",
+        "goal_left",
+        "goals",
+        "high",
+        "low",
+        "max_range",
+        "poses",
+        "previous_actions",
+        "previous_distance",
+        "ranges",
+        "speed",
+        "steps",
+        "velocities",
+        "yaw_rate",
+    )
+
+    def __init__(
+        self, n: int, beams: int, max_range: float, low: DoubleArray, high: DoubleArray
+    ) -> None:
+        """Creates arrays of zeros.
+
+        Args:
+            n: Number of agents.
+            beams: Number of beams of a laser.
+            max_range: Range of the laser [m].
+            low: Velocity command of the action (-1, -1).
+            high: Velocity command of the action (1, 1).
+        """
+        self.max_range = max_range
+        self.low = low
+        self.high = high
+        self.poses: DoubleArray = np.zeros((n, 3))
+        self.velocities: DoubleArray = np.zeros((n, 3))
+        self.speed: DoubleArray = np.zeros(n)
+        self.yaw_rate: DoubleArray = np.zeros(n)
+        self.ranges: FloatArray = np.zeros((n, beams), np.float32)
+        self.goals: DoubleArray = np.zeros((n, 2))
+        self.goal_ahead: DoubleArray = np.zeros(n)
+        self.goal_left: DoubleArray = np.zeros(n)
+        self.distance: DoubleArray = np.zeros(n)
+        self.previous_distance: DoubleArray = np.zeros(n)
+        self.arrived: BoolArray = np.zeros(n, np.bool_)
+        self.collided: BoolArray = np.zeros(n, np.bool_)
+        self.actions: DoubleArray = np.zeros((n, 2))
+        self.previous_actions: DoubleArray = np.zeros((n, 2))
+        self.steps: npt.NDArray[np.int64] = np.zeros(n, np.int64)
+
+    def __len__(self) -> int:
+        """Returns the number of agents."""
+        return len(self.distance)
+
+    def take(self, rows: Rows) -> Situation:
+        """Returns a copy of some rows."""
+        part = Situation(0, 0, self.max_range, self.low, self.high)
+        for name in self.__slots__:
+            if name not in ("max_range", "low", "high"):
+                setattr(part, name, getattr(self, name)[rows])
+        return part
+
+    def put(self, rows: Rows, part: Situation) -> None:
+        """Replaces some rows by those of `part`, the inverse of `take`."""
+        for name in self.__slots__:
+            if name not in ("max_range", "low", "high"):
+                getattr(self, name)[rows] = getattr(part, name)
+
+    def locate(self, goal_radius: float) -> None:
+        """Computes what follows from the poses, velocities and goals.
+
+        Args:
+            goal_radius: Distance to the goal at which the agent has arrived [m].
+        """
+        theta = np.ascontiguousarray(self.poses[:, 2])
+        c, s = np.cos(theta), np.sin(theta)
+        offset = self.goals - self.poses[:, :2]
+        dx, dy = offset[:, 0], offset[:, 1]
+        np.add(dx * c, dy * s, out=self.goal_ahead)
+        np.subtract(dy * c, dx * s, out=self.goal_left)
+        np.sqrt(dx * dx + dy * dy, out=self.distance)
+        np.less_equal(self.distance, goal_radius, out=self.arrived)
+        vx, vy = self.velocities[:, 0], self.velocities[:, 1]
+        np.add(vx * c, vy * s, out=self.speed)
+        self.yaw_rate[:] = self.velocities[:, 2]

@@ -1,0 +1,278 @@
+"""Many environments of the same kind, stepped together."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from gymnasium.error import ClosedEnvironmentError, ResetNeeded
+from gymnasium.utils import seeding
+from gymnasium.vector import AutoresetMode, VectorEnv
+from gymnasium.vector.utils import batch_space
+
+from flatland.geometry import BoolArray, DoubleArray
+from flatland.gym.actions import checked_actions
+from flatland.gym.env import FlatlandEnv
+from flatland.gym.episodes import Episodes
+from flatland.gym.rendering import checked_render_mode, draw_goals
+from flatland.gym.settings import Settings
+from flatland.gym.situation import Rows
+from flatland.gym.start import StartState, clone_worlds
+from flatland.gym.tasks import Occupied
+
+Image = npt.NDArray[np.uint8]
+
+
+class FlatlandVectorEnv(VectorEnv[Any, Any, Any]):
+    """Equal environments whose worlds are stepped and scanned over all cores.
+
+    Each environment gives the same numbers as a `FlatlandEnv` of the same seed, for any number of
+    threads.
+    """
+
+    def __init__(
+        self,
+        num_envs: int = 1,
+        world: str | os.PathLike[str] = "navigate",
+        *,
+        autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
+        num_threads: int = 0,
+        copy: bool = True,
+        render_mode: str | None = None,
+        **arguments: Any,
+    ) -> None:
+        """Loads the world and copies it.
+
+        Args:
+            num_envs: Number of environments.
+            world: World file, or the name of an included world: `navigate`, `corridor`, `fleet`.
+            autoreset_mode: When an episode that has ended is followed by the next one; see
+                `gymnasium.vector.AutoresetMode`.
+            num_threads: Number of threads, 0 for one per core.
+            copy: Whether `reset` and `step` return copies of the observations. Otherwise, the next
+                call changes the arrays that they returned.
+            render_mode: `rgb_array` or None.
+            **arguments: See `Settings`.
+
+        Raises:
+            FlatlandError: A file is missing or invalid, or the model cannot be an agent.
+            TypeError: An argument is unknown or has the wrong type.
+            ValueError: An argument is out of range.
+        """
+        super().__init__()
+        self.autoreset_mode = AutoresetMode(autoreset_mode)
+        metadata = {**FlatlandEnv.metadata, "render_modes": ["rgb_array"]}
+        self.render_mode = checked_render_mode(render_mode, metadata)
+        if isinstance(num_envs, bool) or not isinstance(num_envs, int) or num_envs < 1:
+            raise ValueError(f"num_envs must be an integer of at least 1, got {num_envs!r}")
+        if isinstance(num_threads, bool) or not isinstance(num_threads, int) or num_threads < 0:
+            raise ValueError(f"num_threads must be an integer of at least 0, got {num_threads!r}")
+        settings = Settings.from_arguments({"world": world, **arguments})
+        self.metadata = {
+            **metadata,
+            "render_fps": round(1 / settings.dt) or 1,
+            "autoreset_mode": self.autoreset_mode,
+        }
+        self.num_envs = num_envs
+        self.copy = copy
+        self._worlds = clone_worlds(settings, num_envs)
+        try:
+            agents = [settings.find_agent(world) for world in self._worlds]
+            self._episodes = Episodes(agents, settings, num_threads)
+            self._starts = [StartState(agent.world) for agent in agents]
+        except BaseException:
+            self.close()
+            raise
+        self.single_observation_space = self._episodes.layout.space
+        self.single_action_space = settings.action.space
+        self.observation_space = batch_space(self.single_observation_space, num_envs)
+        self.action_space = batch_space(self.single_action_space, num_envs)
+        self._rngs: list[np.random.Generator | None] = [None] * num_envs
+        self._seeds: list[int | None] = [None] * num_envs
+        self._has_begun = np.zeros(num_envs, np.bool_)
+        self._has_ended = np.zeros(num_envs, np.bool_)
+
+    @property  # type: ignore[misc]
+    def np_random(self) -> tuple[np.random.Generator, ...]:  # type: ignore[override]
+        """The random number generators of the environments."""
+        return tuple(self._rng(row) for row in range(self.num_envs))
+
+    @property
+    def np_random_seed(self) -> tuple[int | None, ...]:  # type: ignore[override]
+        """The seeds of the random number generators."""
+        return tuple(self._seeds)
+
+    def reset(
+        self,
+        *,
+        seed: int | Sequence[int | None] | None = None,
+        options: dict[str, Any] | None = None,
+    ) -> tuple[Any, dict[str, Any]]:
+        """Begins an episode in all environments, or in those of `options["reset_mask"]`.
+
+        Args:
+            seed: Seed of the first environment, which is increased by one for each of the others,
+                or a list of all seeds.
+            options: `start` and `goal` for all environments, see `FlatlandEnv.reset`, and
+                `reset_mask`, shape (num_envs,).
+
+        Returns:
+            The observations of all environments, and the info of those that were reset.
+
+        Raises:
+            ClosedEnvironmentError: The environments are closed.
+            WorldError: No place is free.
+            TypeError: The mask is not an array of bools.
+            ValueError: An option or the number of seeds is invalid.
+        """
+        self._check_open()
+        given = dict(options or {})
+        mask = _checked_mask(given.pop("reset_mask", None), self.num_envs)
+        rows = np.flatnonzero(mask)
+        seeds = _checked_seeds(seed, self.num_envs)
+        for row in rows.tolist():
+            if seeds[row] is not None:
+                self._rngs[row], self._seeds[row] = seeding.np_random(seeds[row])
+        self._begin(rows, given)
+        self._episodes.look(None if len(rows) == self.num_envs else rows)
+        return self._present(), self._infos(mask)
+
+    def step(self, actions: Any) -> tuple[Any, DoubleArray, BoolArray, BoolArray, dict[str, Any]]:
+        """Carries out one action in each environment.
+
+        Args:
+            actions: Forward speed and yaw rate, each from -1 to 1, shape (num_envs, 2).
+
+        Returns:
+            Observations, rewards, which episodes terminated, which were truncated, infos. The
+            autoreset mode defines what they contain for episodes that end.
+
+        Raises:
+            ClosedEnvironmentError: The environments are closed.
+            ResetNeeded: There was no reset, or, without autoreset, an episode has ended.
+            InvalidAction: The actions have the wrong shape, or are NaN.
+        """
+        self._check_open()
+        if not self._has_begun.all():
+            raise ResetNeeded("call reset() before step(): no episode has begun")
+        if self.autoreset_mode is AutoresetMode.DISABLED and self._has_ended.any():
+            row = int(self._has_ended.argmax())
+            raise ResetNeeded(
+                f"the episode of environment {row} has ended: call reset() with "
+                'options={"reset_mask": ...} before step()'
+            )
+        numbers = checked_actions(actions, self.num_envs)
+        # Only in the mode NEXT_STEP has any episode ended here.
+        fresh = self._has_ended.copy()
+        if fresh.any():
+            self._begin(np.flatnonzero(fresh), {})
+            self._episodes.advance(numbers, np.flatnonzero(~fresh))
+        else:
+            self._episodes.advance(numbers)
+        self._episodes.look()
+        rewards, terminated, truncated = self._episodes.judge()
+        rewards[fresh] = 0.0
+        terminated[fresh] = truncated[fresh] = False
+        ended = terminated | truncated
+        infos: dict[str, Any] = {}
+        if self.autoreset_mode is AutoresetMode.SAME_STEP:
+            if ended.any():
+                infos = self._finish(ended)
+            self._has_ended = np.zeros(self.num_envs, np.bool_)
+        else:
+            self._has_ended = ended
+        infos.update(self._infos(np.ones(self.num_envs, np.bool_)))
+        return self._present(), rewards, terminated, truncated, infos
+
+    def render(self) -> tuple[Image, ...] | None:
+        """Returns an image of each environment for the render mode `rgb_array`.
+
+        Raises:
+            ClosedEnvironmentError: The environments are closed.
+        """
+        self._check_open()
+        if self.render_mode is None:
+            return None
+        goals = self._episodes.situation.goals.tolist()
+        radius = self._episodes.task.goal_radius
+        return tuple(
+            draw_goals(world, [(x, y)], radius)
+            for world, (x, y) in zip(self._worlds, goals, strict=True)
+        )
+
+    def close_extras(self, **kwargs: Any) -> None:  # noqa: ARG002 - as in the base class
+        """Closes all worlds."""
+        for world in self._worlds:
+            world.close()
+
+    def _rng(self, row: int) -> np.random.Generator:
+        rng = self._rngs[row]
+        if rng is None:
+            rng, self._seeds[row] = seeding.np_random()
+            self._rngs[row] = rng
+        return rng
+
+    def _begin(self, rows: Rows, options: Mapping[str, Any]) -> None:
+        for row in rows.tolist():
+            self._has_begun[row] = False
+            rng = self._rng(row)
+            self._starts[row].restore(rng)
+            self._episodes.begin(row, rng, Occupied(), options)
+            self._has_begun[row], self._has_ended[row] = True, False
+
+    def _finish(self, ended: BoolArray) -> dict[str, Any]:
+        """Begins the next episodes, and returns what the last step of the previous ones gave."""
+        rows = np.flatnonzero(ended)
+        observations = np.full(self.num_envs, None, dtype=object)
+        for row in rows.tolist():
+            observations[row] = self._episodes.layout.present(self._episodes.observations[row])
+        infos = {
+            "final_obs": observations,
+            "_final_obs": ended.copy(),
+            "final_info": self._infos(ended),
+            "_final_info": ended.copy(),
+        }
+        self._begin(rows, {})
+        self._episodes.look(rows)
+        return infos
+
+    def _infos(self, mask: BoolArray) -> dict[str, Any]:
+        """Returns the infos of some environments as arrays with masks."""
+        infos: dict[str, Any] = {}
+        for name, values in self._episodes.infos().items():
+            infos[name] = np.where(mask, values, np.zeros(1, values.dtype))
+            infos[f"_{name}"] = mask.copy()
+        return infos
+
+    def _present(self) -> Any:
+        return self._episodes.layout.present(self._episodes.observations, copy=self.copy)
+
+    def _check_open(self) -> None:
+        if self.closed:
+            raise ClosedEnvironmentError("the environments are closed")
+
+
+def _checked_mask(mask: object, n: int) -> BoolArray:
+    if mask is None:
+        return np.ones(n, np.bool_)
+    if not isinstance(mask, np.ndarray) or mask.dtype != np.bool_:
+        raise TypeError(f'options["reset_mask"] must be an array of bools, got {mask!r}')
+    if mask.shape != (n,):
+        raise ValueError(f'options["reset_mask"] must have the shape ({n},), got {mask.shape}')
+    if not mask.any():
+        raise ValueError('options["reset_mask"] must contain True')
+    return mask
+
+
+def _checked_seeds(seed: int | Sequence[int | None] | None, n: int) -> list[int | None]:
+    if seed is None:
+        return [None] * n
+    if isinstance(seed, int | np.integer):
+        return [int(seed) + i for i in range(n)]
+    seeds = list(seed)
+    if len(seeds) != n:
+        raise ValueError(f"there must be a seed for each of the {n} environments, got {len(seeds)}")
+    return seeds

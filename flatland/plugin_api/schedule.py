@@ -1,0 +1,68 @@
+"""Hooks that are called only in steps in which an update is due, so that other steps are cheap."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Final, TypeVar
+
+if TYPE_CHECKING:
+    from flatland.entities.body import Body
+    from flatland.geometry import Pose
+    from flatland.physics import Touches
+    from flatland.plugin_api.ports import Output
+    from flatland.plugin_api.update_timer import UpdateTimer
+    from flatland.timekeeper import Timekeeper
+
+H = TypeVar("H", bound=Callable[..., None])
+
+SkippedHandler = Callable[[int, int, "Pose | None"], None]
+"""Called as `handler(count, stamp, pose)`, see `FlatlandPlugin.call_when_due`."""
+
+_MARK: Final = "_flatland_when_due"
+
+
+@dataclass(frozen=True, slots=True)
+class HookSchedule:
+    """When a hook of a plugin is to be called; see `FlatlandPlugin.call_when_due`.
+
+    Attributes:
+        timer: Timer of the updates.
+        outputs: What the hook computes, None if it is always needed.
+        transforms: Whether the hook sends transforms.
+        body: Body whose pose `skipped` needs.
+        skipped: Makes up for updates without a call.
+        touches: Contacts that are to be cleared at updates without a call, and after whose steps
+            the hook is called if `calls_at_touches` is set.
+        calls_at_touches: Whether to call the hook also in steps with contacts.
+    """
+
+    timer: UpdateTimer
+    outputs: tuple[Output[Any], ...] | None
+    transforms: bool
+    body: Body | None
+    skipped: SkippedHandler | None
+    touches: Touches | None
+    calls_at_touches: bool
+
+
+def when_due(hook: H) -> H:
+    """Marks a hook that has nothing to do in steps in which no update is due.
+
+    A decorator for `before_physics_step` and `after_physics_step`. The hook is called in every step
+    unless `FlatlandPlugin.call_when_due` says when an update is due. If a subclass overrides the
+    hook without this mark, its hook is called in every step.
+    """
+    setattr(hook, _MARK, True)
+    return hook
+
+
+def is_called_when_due(hook: Callable[..., None]) -> bool:
+    """Returns whether a hook is marked by `when_due`."""
+    return getattr(hook, _MARK, False)
+
+
+@when_due
+def not_called(timekeeper: Timekeeper) -> None:
+    """The hook of a plugin that moved its work to another hook."""
+    del timekeeper

@@ -1,0 +1,279 @@
+"""Which hooks are called only when an update is due, and what is made up for when it is read."""
+
+from __future__ import annotations
+
+from bisect import bisect_left
+from collections import Counter, deque
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Final
+
+from flatland.plugin_api.schedule import HookSchedule, is_called_when_due
+from flatland.plugin_api.update_timer import UpdateTimer
+
+if TYPE_CHECKING:
+    from flatland.physics import StepPlan
+    from flatland.plugin_api.plugin import FlatlandPlugin
+    from flatland.plugin_api.update_timer import UpdateClock
+    from flatland.timekeeper import Timekeeper
+
+_AFTER: Final = "after_physics_step"
+_MOST_CLOCKS: Final = 60  # of the sets of due clocks, which are integers of 64 bits
+
+
+@dataclass(slots=True, eq=False)
+class ScheduledHook:
+    """A hook that is called only when an update is due.
+
+    Attributes:
+        plugin: The plugin.
+        name: Name of the hook.
+        order: Place of the plugin in the order of hooks.
+        clock: Number of the clock of the core.
+        record: Record of the updates without a call, None if nothing is made up for.
+        is_called: Whether the hook is called when an update is due.
+        was_called: Whether it was called at least once, or at least is no longer to be.
+    """
+
+    plugin: FlatlandPlugin
+    name: str
+    order: int
+    clock: int
+    record: int | None = None
+    is_called: bool = True
+    was_called: bool = False
+
+    @property
+    def schedule(self) -> HookSchedule:
+        """What the plugin asked for last."""
+        return self.plugin._schedules[self.name]
+
+
+@dataclass(slots=True)
+class _Phase:
+    """The hooks and the work of the core before or after the physics step."""
+
+    hooks: dict[FlatlandPlugin, ScheduledHook] = field(default_factory=dict)
+    orders: list[int] = field(default_factory=list)  # of what the core does, ascending
+
+
+class StepSchedule:
+    """Decides for each step which hooks are called; the core does the rest.
+
+    Attributes:
+        version: Changes when other hooks are to be called.
+        targets: Functions that pass new commands to the core; called before the next step, and
+            appended from any thread.
+    """
+
+    def __init__(self, plan: StepPlan, timekeeper: Timekeeper) -> None:
+        """Creates a schedule without hooks.
+
+        Args:
+            plan: The plan of the core.
+            timekeeper: The simulated time.
+        """
+        self._plan = plan
+        self._timekeeper = timekeeper
+        self._clocks: dict[tuple[bool, UpdateClock], int] = {}
+        self._phases = {"before_physics_step": _Phase(), _AFTER: _Phase()}
+        self._records: dict[int, ScheduledHook] = {}
+        self._is_stale = False
+        self._new: list[ScheduledHook] = []  # not called yet
+        self._transforms_wanted = False
+        self.version = 0
+        self.targets: deque[Callable[[], None]] = deque()
+
+    # -- hooks -----------------------------------------------------------------------------
+
+    def add(self, plugin: FlatlandPlugin, hook: str, order: int) -> ScheduledHook | None:
+        """Adds a hook of a plugin if it is to be called only when an update is due.
+
+        Returns:
+            The scheduled hook; None if the hook is to be called in every step.
+        """
+        asked: HookSchedule | None = getattr(plugin, "_schedules", {}).get(hook)
+        if asked is None or not is_called_when_due(getattr(plugin, hook)):
+            return None
+        clock = self._clock(asked.timer, hook == _AFTER)
+        if clock is None:
+            return None
+        found = ScheduledHook(plugin, hook, order, clock)
+        if asked.skipped is not None:
+            body_id = None if asked.body is None else asked.body.id
+            touches_id = None if asked.touches is None else asked.touches.id
+            found.record = self._plan.add_record(clock, order, body_id, touches_id)
+            self._records[found.record] = found
+        phase = self._phases[hook]
+        phase.hooks[plugin] = found
+        self._new.append(found)
+        self._changed(phase)
+        return found
+
+    def add_controllers(self, plugin: FlatlandPlugin, order: int) -> None:
+        """Has the core carry out the controllers of a plugin whose hook is not always called."""
+        automatic = plugin in self._phases["before_physics_step"].hooks
+        for controller in getattr(plugin, "_controllers", ()):
+            controller.schedule(order, automatic=automatic)
+        self._changed(self._phases["before_physics_step"])
+
+    def _clock(self, timer: UpdateTimer, is_after: bool) -> int | None:
+        kind = type(timer)
+        if kind.check_update is not UpdateTimer.check_update and kind.clock is UpdateTimer.clock:
+            return None
+        clock = timer.clock(self._timekeeper.step_size_ns)
+        if clock is None:
+            return None
+        number = self._clocks.get((is_after, clock))
+        if number is None and len(self._clocks) < _MOST_CLOCKS:
+            number = self._clocks[is_after, clock] = self._plan.add_clock(is_after, *clock)
+        return number
+
+    def remove(self, plugin: FlatlandPlugin) -> None:
+        """Removes the hooks and the controllers of a plugin."""
+        for phase in self._phases.values():
+            hook = phase.hooks.pop(plugin, None)
+            if hook is None:
+                continue
+            if hook.record is not None:
+                del self._records[hook.record]
+                self._plan.remove_record(hook.record)
+            self._new = [other for other in self._new if other is not hook]
+            self._changed(phase)
+        for controller in getattr(plugin, "_controllers", ()):
+            if controller.alive:
+                controller.remove()
+
+    def _changed(self, phase: _Phase) -> None:
+        phase.orders.clear()
+        self._is_stale = True
+
+    def find(self, plugin: FlatlandPlugin, hook: str) -> ScheduledHook | None:
+        """Returns the scheduled hook of a plugin, None if it is called in every step."""
+        return self._phases[hook].hooks.get(plugin)
+
+    def work_orders(self, hook: str) -> list[int]:
+        """Returns the places of the plugins for which the core does something, ascending."""
+        phase = self._phases[hook]
+        if not phase.orders:
+            phase.orders += sorted(self._orders(phase))
+        return phase.orders
+
+    def _orders(self, phase: _Phase) -> Iterator[int]:
+        for plugin, hook in phase.hooks.items():
+            if hook.record is not None or plugin._controllers:
+                yield hook.order
+
+    # -- which hooks are called ------------------------------------------------------------
+
+    def change(self) -> None:
+        """Takes over that something is wanted or not any more; safe from any thread."""
+        self._is_stale = True
+        self._plan.interrupt()
+
+    def refresh(self, transforms_wanted: bool) -> None:
+        """Decides which hooks are called when an update is due; to be called before each step.
+
+        Args:
+            transforms_wanted: Whether an observer wants transforms.
+        """
+        if transforms_wanted != self._transforms_wanted:
+            self._transforms_wanted = transforms_wanted
+            self._is_stale = True
+        if self._is_stale:
+            self._is_stale = False
+            self._decide()
+
+    def _decide(self) -> None:
+        calls: Counter[int] = Counter()
+        for phase in self._phases.values():
+            for hook in phase.hooks.values():
+                is_called = self._is_wanted(hook)
+                if is_called != hook.is_called:
+                    self._set_called(hook, is_called)
+                calls[hook.clock] += is_called
+        for clock in self._clocks.values():
+            self._plan.set_calls(clock, calls[clock] > 0)
+        self.version += 1
+
+    def _is_wanted(self, hook: ScheduledHook) -> bool:
+        asked = hook.schedule
+        if not hook.was_called or asked.outputs is None:
+            return True
+        if asked.transforms and self._transforms_wanted:
+            return True
+        return any(output.wanted for output in asked.outputs)
+
+    def _set_called(self, hook: ScheduledHook, is_called: bool) -> None:
+        if hook.record is not None:
+            if is_called:
+                self.settle()
+            self._plan.enable_record(hook.record, not is_called)
+        hook.is_called = is_called
+
+    def call_all(self) -> int:
+        """Has all hooks called when no clock applies, since the time was changed from outside.
+
+        Returns:
+            All clocks, as bits.
+        """
+        self._is_stale = True
+        for phase in self._phases.values():
+            for hook in phase.hooks.values():
+                hook.was_called = False
+                if not hook.is_called:
+                    self._set_called(hook, True)
+                if hook not in self._new:
+                    self._new.append(hook)
+        self.version += 1
+        return (1 << _MOST_CLOCKS) - 1
+
+    def calls_made(self, due: int) -> None:
+        """Takes over that all hooks of a step were called.
+
+        Args:
+            due: The clocks that were due, as bits.
+        """
+        if not self._new:
+            return
+        waiting = []
+        for hook in self._new:
+            if due >> hook.clock & 1:
+                hook.was_called = True
+                self._is_stale = True
+            else:
+                waiting.append(hook)
+        self._new = waiting
+
+    # -- what was not called ---------------------------------------------------------------
+
+    def settle(self) -> None:
+        """Makes up for all updates without a call, in the order of the plugins."""
+        if not self._records:
+            return
+        step_size_ns = self._timekeeper.step_size_ns
+        skipped = [
+            (self._records[record], count, step * step_size_ns, pose)
+            for record, count, step, pose in self._plan.take_skipped()
+        ]
+        for hook, count, stamp, pose in sorted(skipped, key=lambda each: each[0].order):
+            asked = hook.schedule
+            if asked.skipped is not None:
+                asked.skipped(count, stamp, None if asked.body is None else pose)
+
+    def push_targets(self) -> None:
+        """Passes new commands to the core."""
+        targets = self.targets
+        while targets:
+            targets.popleft()()
+
+    def set_later(self, target: Callable[[], None]) -> None:
+        """Has a function called before the next step; safe from any thread."""
+        self.targets.append(target)
+        self._plan.interrupt()
+
+
+def needs_work(orders: list[int], after: int, until: int) -> bool:
+    """Returns whether the core does something for a plugin from one place to before another."""
+    index = bisect_left(orders, after)
+    return index < len(orders) and orders[index] < until

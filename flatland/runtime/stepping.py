@@ -1,0 +1,260 @@
+"""The order of a step, and runs of steps in which no code of plugins is called."""
+
+from __future__ import annotations
+
+import threading
+from typing import TYPE_CHECKING
+
+from flatland.physics import END_OF_ORDER, RunEnd, StepRun, to_report
+
+if TYPE_CHECKING:
+    from contextlib import ExitStack
+
+    from flatland.physics import RunResult, StepReport
+    from flatland.runtime.body_monitor import BodyMonitor
+    from flatland.runtime.change_log import ChangeLog
+    from flatland.runtime.contacts import ContactReporter
+    from flatland.runtime.faults import Faults
+    from flatland.runtime.observer import Observers
+    from flatland.world import World
+
+
+class Stepping:
+    """Makes the steps of a world.
+
+    Attributes:
+        change_log: Notified of each step, None if there is none.
+    """
+
+    def __init__(
+        self,
+        world: World,
+        contacts: ContactReporter,
+        body_monitor: BodyMonitor,
+        observers: Observers,
+        faults: Faults,
+    ) -> None:
+        """Creates the steps of a world from its parts.
+
+        Args:
+            world: The world.
+            contacts: Reports contacts to plugins.
+            body_monitor: Handles the bodies that a physics step reports.
+            observers: Notified of each step.
+            faults: The exceptions of hooks.
+        """
+        self.change_log: ChangeLog | None = None
+        self._world = world
+        self._physics = world.physics
+        self._plan = world.physics.plan
+        self._timekeeper = world.timekeeper
+        self._host = world.plugin_host
+        self._requests = world.requests
+        self._transforms = world.transform_buffer
+        self._contacts = contacts
+        self._body_monitor = body_monitor
+        self._observers = observers
+        self._faults = faults
+
+    def step(self, n: int, *, while_paused: bool = False) -> None:
+        """Steps n times; see `World.step`."""
+        requests, faults = self._requests, self._faults
+        requests.refuse_in_plugin("step")
+        actions, thread = requests.actions, threading.get_ident()
+        left = n
+        while left > 0:
+            with requests.lock:
+                self._start()
+                if self._world.paused and not while_paused:
+                    left -= 1
+                else:
+                    requests.hook_thread = thread
+                    self._observers.step_started()
+                    try:
+                        left -= self._advance(left)
+                    finally:
+                        self._observers.step_finished()
+                        requests.hook_thread = None
+                if actions:
+                    requests.process()
+            if faults.first is not None:
+                faults.raise_first()
+
+    def begin_batch(self, n: int, locks: ExitStack) -> StepRun | None:
+        """Prepares up to n steps in the core; for `flatland.runtime.batch`.
+
+        Args:
+            n: Number of steps.
+            locks: Holds the lock of the requests until the run ends.
+
+        Returns:
+            The run; None if `step` has to make the steps.
+
+        Raises:
+            WorldError: The world is closed, or a plugin calls this.
+        """
+        self._requests.refuse_in_plugin("step")
+        locks.enter_context(self._requests.lock)
+        self._start()
+        if self._world.paused or self._is_watched:
+            return None
+        return self._begin_run(n)
+
+    def end_batch(self, run: StepRun, result: RunResult | Exception) -> int:
+        """Takes over the steps of a run, and makes the next one if code is to be called in it.
+
+        Args:
+            run: What `begin_batch` returned.
+            result: How the run ended.
+
+        Returns:
+            The number of steps.
+
+        Raises:
+            Exception: As `World.step`.
+        """
+        if isinstance(result, Exception):
+            raise result
+        requests = self._requests
+        requests.hook_thread = threading.get_ident()
+        try:
+            made = self._end_run(run, result)
+        finally:
+            requests.hook_thread = None
+        if requests.actions:
+            requests.process()
+        self._faults.raise_first()
+        return made
+
+    def _start(self) -> None:
+        """Runs the actions that wait before a step."""
+        self._world.check_open()
+        self._plan.clear_interrupt()
+        if self._requests.actions:
+            self._requests.process()
+
+    def _advance(self, n: int) -> int:
+        """Makes up to n steps, at least one unless another thread interrupts.
+
+        Returns:
+            The number of steps.
+
+        Raises:
+            WorldError: A body is not finite, with the policy `raise`.
+        """
+        run = self._begin_run(n)
+        if run is not None:
+            return self._end_run(run, self._plan.run(run))
+        timekeeper = self._timekeeper
+        step, rest = divmod(timekeeper.sim_time_ns, timekeeper.step_size_ns)
+        self._make_step(step, is_aligned=not rest)
+        return 1
+
+    @property
+    def _is_watched(self) -> bool:
+        """Whether something is to be notified in every step."""
+        return self._observers.watch_steps or self.change_log is not None
+
+    def _begin_run(self, n: int) -> StepRun | None:
+        """Prepares up to n steps in the core.
+
+        Returns:
+            The run; None if hooks are to be called in the first step.
+        """
+        self._prepare()
+        timekeeper = self._timekeeper
+        step, rest = divmod(timekeeper.sim_time_ns, timekeeper.step_size_ns)
+        if rest or self._physics.pre_solve is not None or self._host.hooks.has_unscheduled:
+            return None
+        is_watched = self._is_watched
+        return StepRun(
+            self._physics,
+            step,
+            1 if is_watched else n,
+            timekeeper.step_size,
+            self._world.velocity_iterations,
+            self._world.position_iterations,
+            is_watched,
+        )
+
+    def _end_run(self, run: StepRun, result: RunResult) -> int:
+        """Takes over the steps of a run, and makes the step in which code is to be called.
+
+        Args:
+            run: The run.
+            result: How it ended.
+
+        Returns:
+            The number of steps.
+
+        Raises:
+            WorldError: A body is not finite, with the policy `raise`.
+        """
+        timekeeper = self._timekeeper
+        made, end, report = result
+        if made:
+            timekeeper.sim_time_ns += made * timekeeper.step_size_ns
+        if end in (RunEnd.DONE, RunEnd.STOPPED):
+            return made
+        if end == RunEnd.CALL:
+            self._make_step(run.step + made, is_aligned=True)
+        elif end == RunEnd.PHYSICS:
+            self._finish_step(0, to_report(report))
+        else:
+            self._host.call_failed(timekeeper)
+            self._finish_step(0, self._physics_step())
+        return made + 1
+
+    def _prepare(self) -> None:
+        """Adapts to what has changed since the last step."""
+        self._contacts.update()
+        schedule = self._host.schedule
+        schedule.refresh(self._observers.want_transforms)
+        if schedule.targets:
+            schedule.push_targets()
+
+    def _make_step(self, step: int, *, is_aligned: bool) -> None:
+        """Makes a step in which hooks are called.
+
+        Args:
+            step: Number of the step.
+            is_aligned: Whether the time is a multiple of the step size; otherwise, timers and
+                the clocks of the core differ, and all hooks are called.
+        """
+        host, timekeeper = self._host, self._timekeeper
+        due = 0
+        if self._plan.is_used:
+            due = self._plan.begin_step(step)
+            if not is_aligned:
+                due = host.schedule.call_all()
+        host.call_step_hooks("before_physics_step", due, timekeeper)
+        if self._plan.is_used and self._plan.carry_out(False, END_OF_ORDER, timekeeper.step_size):
+            host.call_failed(timekeeper)
+        self._finish_step(due, self._physics_step())
+        host.schedule.calls_made(due)
+
+    def _physics_step(self) -> StepReport | None:
+        world = self._world
+        return self._physics.step(
+            self._timekeeper.step_size, world.velocity_iterations, world.position_iterations
+        )
+
+    def _finish_step(self, due: int, report: StepReport | None) -> None:
+        """Makes the rest of a step after the physics step.
+
+        Args:
+            due: The clocks of updates that are due, as bits.
+            report: The report of the physics step.
+        """
+        timekeeper = self._timekeeper
+        if report is not None:
+            self._body_monitor.examine(report, timekeeper)
+        self._contacts.dispatch()
+        timekeeper.advance()
+        self._observers.time_advanced(timekeeper.sim_time_ns)
+        self._host.call_step_hooks("after_physics_step", due, timekeeper)
+        if self._plan.is_used:
+            self._plan.carry_out(True, END_OF_ORDER, timekeeper.step_size)
+        self._transforms.flush()
+        if self.change_log is not None:
+            self.change_log.step_done()

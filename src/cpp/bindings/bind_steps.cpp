@@ -1,0 +1,392 @@
+#include <pybind11/stl.h>
+
+#include <memory>
+#include <optional>
+#include <stdexcept>
+#include <string>
+#include <tuple>
+#include <utility>
+#include <vector>
+
+#include "bindings/bindings.h"
+#include "world/errors.h"
+
+namespace py = pybind11;
+
+namespace flatland {
+namespace {
+
+using Limits = std::tuple<double, double, double>;
+using PyTriple = std::tuple<double, double, double>;
+
+Phase phase_of(bool is_after) { return is_after ? Phase::kAfter : Phase::kBefore; }
+
+double checked_limit(double limit) {
+  if (!(limit >= 0.0)) {
+    throw py::value_error("a limit must not be negative or NaN, got " + to_text(limit));
+  }
+  return limit;
+}
+
+SpeedLimits to_limits(const Limits& limits) {
+  const auto& [velocity, acceleration, deceleration] = limits;
+  return {checked_limit(velocity), checked_limit(acceleration), checked_limit(deceleration)};
+}
+
+Controller& changed_controller(World& world, Id id) {
+  world.check_changeable();
+  Controller* controller = world.plan().find_controller(id);
+  if (controller == nullptr) throw StaleHandleError("the controller was removed");
+  return *controller;
+}
+
+template <typename Kind>
+Kind& motion_of(World& world, Id id) {
+  Kind* motion = std::get_if<Kind>(&changed_controller(world, id).motion);
+  if (motion == nullptr) throw PhysicsError("the controller is of another kind");
+  return *motion;
+}
+
+Id add_controller(World& world, Id body, Motion motion) {
+  world.change_body(body);  // throws if it does not exist
+  Controller controller;
+  controller.body = body;
+  controller.motion = std::move(motion);
+  return world.plan().add_controller(controller);
+}
+
+PyTriple to_python(const Triple& t) { return {t[0], t[1], t[2]}; }
+
+void bind_controllers(WorldClass& world) {
+  world.def("add_twist_controller", [](World& self, Id body, bool is_holonomic) {
+    TwistMotion motion;
+    motion.is_holonomic = is_holonomic;
+    return add_controller(self, body, motion);
+  });
+  world.def("set_twist_limits",
+            [](World& self, Id id, const Limits& linear, const Limits& angular) {
+              auto& motion = motion_of<TwistMotion>(self, id);
+              const SpeedLimits checked = to_limits(linear);
+              motion.angular = to_limits(angular);
+              motion.linear = checked;
+            });
+  world.def("twist_target",
+            [](World& self, Id id) { return to_python(motion_of<TwistMotion>(self, id).target); });
+  world.def("set_twist_target",
+            [](World& self, Id id, double forward, double sideways, double omega) {
+              // A velocity that is out of range is refused when it is applied to the body.
+              motion_of<TwistMotion>(self, id).target = {forward, sideways, omega};
+            });
+  world.def("twist_velocity", [](World& self, Id id) {
+    return to_python(motion_of<TwistMotion>(self, id).velocity);
+  });
+  world.def("set_twist_velocity",
+            [](World& self, Id id, double forward, double sideways, double omega) {
+              motion_of<TwistMotion>(self, id).velocity = {forward, sideways, omega};
+            });
+  world.def("has_controller",
+            [](World& self, Id id) { return self.plan().find_controller(id) != nullptr; });
+  world.def("controller_body",
+            [](World& self, Id id) { return changed_controller(self, id).body; });
+  world.def("remove_controller", [](World& self, Id id) {
+    changed_controller(self, id);
+    self.plan().remove_controller(id);
+  });
+  world.def(
+      "schedule_controller",
+      [](World& self, Id id, std::int64_t order, bool is_automatic) {
+        Controller& controller = changed_controller(self, id);
+        controller.order = order;
+        controller.is_automatic = is_automatic;
+        self.plan().order_changed();
+      },
+      py::arg("controller"), py::arg("order"), py::arg("is_automatic"));
+  world.def("advance_controller", [](World& self, Id id, double dt) {
+    self.plan().advance_now(self, changed_controller(self, id), dt);
+  });
+  world.def("take_failed_controllers", [](World& self) {
+    self.check_changeable();
+    return self.plan().take_failed();
+  });
+}
+
+std::uint32_t add_clock(World& world, bool is_after, const std::string& kind,
+                        std::uint64_t half_step, std::uint64_t cycle) {
+  world.check_changeable();
+  RateClock::Kind checked = RateClock::Kind::kPeriodic;
+  if (kind == "always") {
+    checked = RateClock::Kind::kAlways;
+  } else if (kind == "at_start") {
+    checked = RateClock::Kind::kAtStart;
+  } else if (kind == "never") {
+    checked = RateClock::Kind::kNever;
+  } else if (kind != "periodic" || half_step == 0 || cycle >> 63U != 0 || half_step >= cycle / 2) {
+    throw py::value_error(
+        "a clock must be always, at_start, never, or periodic with a step of less "
+        "than its cycle, which must be below 2^63");
+  }
+  return world.plan().add_clock(phase_of(is_after), RateClock(checked, half_step, cycle));
+}
+
+Record& changed_record(World& world, Id id) {
+  world.check_changeable();
+  Record* record = world.plan().find_record(id);
+  if (record == nullptr) throw StaleHandleError("the record was removed");
+  return *record;
+}
+
+void bind_clocks(WorldClass& world) {
+  world.def("add_clock", &add_clock, py::arg("is_after"), py::arg("kind"), py::arg("half_step"),
+            py::arg("cycle"));
+  world.def("set_clock_calls", [](World& self, std::uint32_t clock, bool has_calls) {
+    self.check_changeable();
+    self.plan().set_calls(clock, has_calls);
+  });
+  world.def(
+      "add_record",
+      [](World& self, std::uint32_t clock, std::int64_t order, std::optional<Id> body,
+         std::optional<Id> touches) {
+        self.check_changeable();
+        Record record;
+        record.clock = clock;
+        record.order = order;
+        record.touches = touches.value_or(0);
+        if (body) {
+          self.read_body(*body);  // throws if it does not exist
+          record.body = *body;
+        }
+        return self.plan().add_record(record);
+      },
+      py::arg("clock"), py::arg("order"), py::arg("body"), py::arg("touches"));
+  world.def("enable_record", [](World& self, Id id, bool is_enabled) {
+    changed_record(self, id).is_enabled = is_enabled;
+  });
+  world.def("remove_record", [](World& self, Id id) {
+    changed_record(self, id);
+    self.plan().remove_record(id);
+  });
+  world.def("take_skipped", [](World& self) {
+    self.check_changeable();
+    std::vector<std::tuple<Id, std::int64_t, std::int64_t, PyTriple>> rows;
+    for (const SkippedUpdates& each : self.plan().take_skipped()) {
+      rows.emplace_back(each.record, each.count, each.step, to_python(each.pose));
+    }
+    return rows;
+  });
+}
+
+py::tuple run_to_python(const RunResult& result) {
+  return py::make_tuple(result.steps, static_cast<int>(result.end), to_python(result.report));
+}
+
+// The steps of one world: World.run with its arguments.
+using WorldRun =
+    std::tuple<std::shared_ptr<World>, std::int64_t, std::int64_t, double, int, int, bool>;
+
+// A run of several worlds at the same time, each by one thread.
+class Runs {
+ public:
+  explicit Runs(const std::vector<WorldRun>& runs)
+      : runs_(runs), uses_(runs.size()), results_(runs.size()), errors_(runs.size()) {
+    for (std::size_t i = 0; i < runs.size(); ++i) {
+      World& world = *std::get<0>(runs_[i]);
+      try {
+        uses_[i] = std::make_unique<World::ExclusiveUse>(world, World::kStepping);
+        seconds_ += world.last_step_time() * static_cast<double>(std::get<2>(runs_[i]));
+      } catch (const std::exception&) {
+        errors_[i] = std::current_exception();
+      }
+    }
+  }
+
+  // Expected wall time on one processor [s].
+  double seconds() const { return seconds_; }
+
+  void run(std::size_t i) {
+    if (!uses_[i]) return;
+    try {
+      const auto& [world, step, n, dt, velocity, position, only_physics] = runs_[i];
+      results_[i] = world->run(step, n, dt, velocity, position, only_physics);
+    } catch (const std::exception&) {
+      errors_[i] = std::current_exception();
+    }
+  }
+
+  // To be called before the GIL is acquired: other threads that hold it may wait for the end.
+  void end() { uses_.clear(); }
+
+  py::list to_python() const {
+    py::list list;
+    for (std::size_t i = 0; i < runs_.size(); ++i) {
+      list.append(errors_[i] ? error_of(errors_[i]) : run_to_python(results_[i]));
+    }
+    return list;
+  }
+
+ private:
+  // Converts an exception to an instance of the Python class that pybind11 would raise.
+  static py::object error_of(const std::exception_ptr& error) {
+    const auto errors = py::module_::import("flatland.errors");
+    try {
+      std::rethrow_exception(error);
+    } catch (const StaleHandleError& stale) {
+      return errors.attr("StaleHandleError")(stale.what());
+    } catch (const WorldLockedError& locked) {
+      return errors.attr("WorldLockedError")(locked.what());
+    } catch (const std::invalid_argument& invalid) {
+      return py::module_::import("builtins").attr("ValueError")(invalid.what());
+    } catch (const std::exception& other) {
+      return py::module_::import("builtins").attr("MemoryError")(other.what());
+    }
+  }
+
+  const std::vector<WorldRun>& runs_;
+  std::vector<std::unique_ptr<World::ExclusiveUse>> uses_;
+  std::vector<RunResult> results_;
+  std::vector<std::exception_ptr> errors_;
+  double seconds_ = 0.0;
+};
+
+py::list run_worlds(const std::vector<WorldRun>& given, std::size_t num_threads) {
+  Runs runs(given);
+  const auto run = [&](std::size_t i) { runs.run(i); };
+  if (given.empty() || runs.seconds() <= kShortStep) {
+    for (std::size_t i = 0; i < given.size(); ++i) run(i);
+    runs.end();
+  } else {
+    // The pool of the first world, which exists during the call.
+    ThreadPool& threads = std::get<0>(given.front())->threads();
+    const py::gil_scoped_release unlocked;
+    threads.parallel_for(given.size(), num_threads, run);
+    runs.end();
+  }
+  return runs.to_python();
+}
+
+void bind_run(WorldClass& world) {
+  world.def("calls_due", [](World& self, std::int64_t step) {
+    self.check_changeable();
+    return self.plan().calls_due(step);
+  });
+  world.def("begin_step", [](World& self, std::int64_t step) {
+    self.check_changeable();
+    const std::uint64_t due = self.plan().calls_due(step);
+    self.plan().begin(step);
+    return due;
+  });
+  world.def(
+      "carry_out",
+      [](World& self, bool is_after, std::int64_t until, double dt) {
+        self.check_changeable();
+        self.plan().carry_out(self, phase_of(is_after), until, dt);
+        return self.plan().has_failed();
+      },
+      py::arg("is_after"), py::arg("until"), py::arg("dt"));
+  world.def(
+      "run",
+      [](World& self, std::int64_t step, std::int64_t n, double dt, int velocity_iterations,
+         int position_iterations, bool only_physics) {
+        // Safe without the GIL: the world is in exclusive use by this thread, and the run accesses
+        // no Python object.
+        World::ExclusiveUse use(self, World::kStepping);
+        const bool is_long = self.last_step_time() * static_cast<double>(n) > kShortStep;
+        return run_to_python(without_gil_if(is_long, use, [&] {
+          return self.run(step, n, dt, velocity_iterations, position_iterations, only_physics);
+        }));
+      },
+      py::arg("step"), py::arg("n"), py::arg("dt"), py::arg("velocity_iterations"),
+      py::arg("position_iterations"), py::arg("only_physics"));
+  world.def("interrupt", &World::interrupt);
+  world.def("clear_interrupt", &World::clear_interrupt);
+}
+
+TouchCollector& changed_collector(World& world, Id id) {
+  world.check_changeable();
+  TouchCollector* collector = world.contacts().touches.find(id);
+  if (collector == nullptr) throw StaleHandleError("the collector of contacts was removed");
+  return *collector;
+}
+
+// Contact id, this body, other body, whether this body is body A, solver calls in the last step,
+// sums of normal and of tangent impulses, points, normal; the last three are those of the points.
+py::list to_rows(const World& world, const TouchCollector& collector) {
+  py::list rows;
+  for (const Touch& touch : collector.touches) {
+    const bool is_solved = touch.solved_in == world.contacts().step() && touch.solver_calls > 0;
+    py::list normal_impulses, tangent_impulses, points;
+    for (std::size_t i = 0; is_solved && i < touch.point_count; ++i) {
+      normal_impulses.append(touch.normal_impulses[i]);
+      tangent_impulses.append(touch.tangent_impulses[i]);
+      points.append(py::make_tuple(touch.points[i][0], touch.points[i][1]));
+    }
+    rows.append(py::make_tuple(touch.contact_id, touch.this_body, touch.other_body, touch.is_a,
+                               is_solved ? touch.solver_calls : 0, normal_impulses,
+                               tangent_impulses, points,
+                               py::make_tuple(touch.normal[0], touch.normal[1])));
+  }
+  return rows;
+}
+
+void bind_touches(WorldClass& world) {
+  world.def(
+      "add_touches",
+      [](World& self, std::vector<Id> bodies, std::vector<Id> excluded, bool counts_sensors,
+         bool counts_own) {
+        for (const Id body : bodies) self.change_body(body);  // throws if it does not exist
+        TouchCollector collector;
+        collector.bodies = std::move(bodies);
+        collector.excluded = std::move(excluded);
+        collector.counts_sensors = counts_sensors;
+        collector.counts_own = counts_own;
+        return self.contacts().touches.add(collector, self.contacts().touching(self.engine()));
+      },
+      py::arg("bodies"), py::arg("excluded"), py::arg("counts_sensors"), py::arg("counts_own"));
+  world.def("has_touches",
+            [](World& self, Id id) { return self.contacts().touches.find(id) != nullptr; });
+  world.def("remove_touches", [](World& self, Id id) {
+    changed_collector(self, id);
+    self.contacts().touches.remove(id);
+  });
+  world.def("is_touched", [](World& self, Id id) {
+    const TouchCollector& collector = changed_collector(self, id);
+    return collector.was_touched || !collector.touches.empty();
+  });
+  world.def("was_touched",
+            [](World& self, Id id) { return changed_collector(self, id).was_touched; });
+  world.def("clear_touches",
+            [](World& self, Id id) { changed_collector(self, id).was_touched = false; });
+  world.def("count_touches",
+            [](World& self, Id id) { return changed_collector(self, id).touches.size(); });
+  world.def("touch_rows",
+            [](World& self, Id id) { return to_rows(self, changed_collector(self, id)); });
+  world.def("end_runs_at_touches", [](World& self, Id id, bool ends_runs) {
+    self.contacts().touches.set_ends_runs(changed_collector(self, id), ends_runs);
+  });
+  world.def("own_bodies", [](World& self, const std::vector<Id>& bodies, bool are_owned) {
+    self.check_changeable();
+    for (const Id body : bodies) {
+      // Those of destroyed bodies are forgotten with them.
+      if (!are_owned || self.has_body(body)) self.contacts().touches.set_owned(body, are_owned);
+    }
+  });
+  world.def("record_body_contacts", [](World& self, Id body, std::uint8_t kinds) {
+    self.change_body(body);
+    self.contacts().record_body(body, kinds);
+  });
+  world.def("record_all_contacts", [](World& self, std::uint8_t kinds) {
+    self.check_changeable();
+    self.contacts().record_all(kinds);
+  });
+}
+
+}  // namespace
+
+void bind_steps(py::module_& module, WorldClass& world) {
+  module.def("run_worlds", &run_worlds, py::arg("runs"), py::arg("num_threads"));
+  bind_touches(world);
+  bind_controllers(world);
+  bind_clocks(world);
+  bind_run(world);
+}
+
+}  // namespace flatland

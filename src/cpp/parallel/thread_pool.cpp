@@ -1,0 +1,208 @@
+#include "parallel/thread_pool.h"
+
+#include <pthread.h>
+#include <sched.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cmath>
+#include <condition_variable>
+#include <csignal>
+#include <exception>
+#include <fstream>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <system_error>
+#include <thread>
+#include <vector>
+
+namespace flatland {
+namespace {
+
+// More threads than this are of no use for any call.
+constexpr std::size_t kMaxThreads = 256;
+
+std::size_t allowed_processors() {
+  // The kernel refuses a set that is smaller than its own.
+  for (std::size_t size = 1024; size <= 1024 * 1024; size *= 2) {
+    const std::unique_ptr<cpu_set_t, void (*)(cpu_set_t*)> set(
+        CPU_ALLOC(size), [](cpu_set_t* allocated) { CPU_FREE(allocated); });
+    const std::size_t bytes = CPU_ALLOC_SIZE(size);
+    if (set != nullptr && sched_getaffinity(0, bytes, set.get()) == 0) {
+      return static_cast<std::size_t>(CPU_COUNT_S(bytes, set.get()));
+    }
+  }
+  return std::max(1U, std::thread::hardware_concurrency());
+}
+
+// Processors that the control group (version 2) of the process may use on average, rounded up.
+std::size_t processor_quota() {
+  std::ifstream file("/sys/fs/cgroup/cpu.max");  // "QUOTA PERIOD" or "max PERIOD", in microseconds
+  double quota = 0.0;
+  double period = 0.0;
+  if (!(file >> quota >> period) || !(quota > 0.0 && period > 0.0)) return kMaxThreads;
+  return static_cast<std::size_t>(std::ceil(std::min<double>(kMaxThreads, quota / period)));
+}
+
+// The jobs of one call.
+class Batch {
+ public:
+  Batch(std::size_t count, const ThreadPool::Job& job) : count_(count), job_(job) {}
+
+  // Carries out jobs until none is left.
+  void work() {
+    for (std::size_t i; (i = next_.fetch_add(1, std::memory_order_relaxed)) < count_;) {
+      try {
+        job_(i);
+      } catch (...) {
+        const std::lock_guard<std::mutex> lock(mutex_);
+        if (failure_ == nullptr || i < failed_job_) {
+          failure_ = std::current_exception();
+          failed_job_ = i;
+        }
+      }
+    }
+  }
+
+  // To be called after all threads have left `work`.
+  void rethrow() const {
+    if (failure_ != nullptr) std::rethrow_exception(failure_);
+  }
+
+ private:
+  const std::size_t count_;
+  const ThreadPool::Job& job_;
+  std::atomic<std::size_t> next_{0};
+  std::mutex mutex_;
+  std::exception_ptr failure_;
+  std::size_t failed_job_ = 0;
+};
+
+}  // namespace
+
+std::size_t available_threads() {
+  return std::max<std::size_t>(1, std::min(allowed_processors(), processor_quota()));
+}
+
+// The workers of one process.
+class ThreadPool::Crew {
+ public:
+  Crew() = default;
+  ~Crew() {
+    {
+      const std::lock_guard<std::mutex> lock(mutex_);
+      is_stopped_ = true;
+    }
+    work_.notify_all();
+    for (std::thread& worker : workers_) worker.join();
+  }
+  Crew(const Crew&) = delete;
+  Crew& operator=(const Crew&) = delete;
+
+  bool is_of_this_process() const { return process_ == getpid(); }
+  std::size_t available() const { return available_; }
+
+  // Works on a batch together with up to `helpers` workers. Returns false if the crew is busy.
+  bool try_work(Batch& batch, std::size_t helpers) {
+    if (is_busy_.exchange(true, std::memory_order_acquire)) return false;
+    hire(helpers);
+    helpers = std::min(helpers, workers_.size());
+    {
+      const std::lock_guard<std::mutex> lock(mutex_);
+      batch_ = &batch;
+      vacancies_ = helpers;
+    }
+    for (std::size_t i = 0; i < helpers; ++i) work_.notify_one();
+    batch.work();
+    {
+      // Workers that have not woken up yet are no longer needed.
+      std::unique_lock<std::mutex> lock(mutex_);
+      batch_ = nullptr;
+      vacancies_ = 0;
+      done_.wait(lock, [this] { return working_ == 0; });
+    }
+    is_busy_.store(false, std::memory_order_release);
+    return true;
+  }
+
+ private:
+  // Starts workers until there are `count`, or until the system refuses one.
+  void hire(std::size_t count) {
+    if (workers_.size() >= count) return;
+    // A signal of the process interrupts one of its other threads.
+    sigset_t all, before;
+    sigfillset(&all);
+    pthread_sigmask(SIG_SETMASK, &all, &before);
+    try {
+      while (workers_.size() < count) {
+        workers_.emplace_back([this] { run(); });
+        pthread_setname_np(workers_.back().native_handle(), "flatland-pool");
+      }
+    } catch (const std::system_error&) {
+      // Fewer threads carry out the same jobs.
+    } catch (const std::bad_alloc&) {
+    }
+    pthread_sigmask(SIG_SETMASK, &before, nullptr);
+  }
+
+  void run() {
+    std::unique_lock<std::mutex> lock(mutex_);
+    while (true) {
+      work_.wait(lock, [this] { return is_stopped_ || vacancies_ > 0; });
+      if (is_stopped_) return;
+      --vacancies_;
+      ++working_;
+      Batch* batch = batch_;
+      lock.unlock();
+      batch->work();
+      lock.lock();
+      if (--working_ == 0) done_.notify_one();
+    }
+  }
+
+  const pid_t process_ = getpid();
+  const std::size_t available_ = available_threads();
+  std::atomic<bool> is_busy_{false};
+  std::vector<std::thread> workers_;  // changed only by the thread that has set `is_busy_`
+  std::mutex mutex_;                  // guards the members below
+  std::condition_variable work_, done_;
+  Batch* batch_ = nullptr;
+  std::size_t vacancies_ = 0;  // workers that may still join the batch
+  std::size_t working_ = 0;
+  bool is_stopped_ = false;
+};
+
+ThreadPool::~ThreadPool() { stop(); }
+
+void ThreadPool::stop() {
+  Crew* crew = crew_.exchange(nullptr);
+  // The threads of another process do not exist in this one, and its locks may be held for ever.
+  // Such a crew is not destroyed.
+  if (crew != nullptr && crew->is_of_this_process()) delete crew;
+}
+
+ThreadPool::Crew& ThreadPool::crew() {
+  Crew* known = crew_.load();
+  while (known == nullptr || !known->is_of_this_process()) {
+    auto made = std::make_unique<Crew>();
+    if (crew_.compare_exchange_strong(known, made.get())) return *made.release();
+  }
+  return *known;
+}
+
+void ThreadPool::parallel_for(std::size_t jobs, std::size_t num_threads, const Job& job) {
+  if (jobs == 0) return;
+  Batch batch(jobs, job);
+  bool is_done = false;
+  if (jobs > 1 && num_threads != 1) {
+    Crew& workers = crew();
+    if (num_threads == 0) num_threads = workers.available();
+    const std::size_t threads = std::min({num_threads, jobs, kMaxThreads});
+    is_done = threads > 1 && workers.try_work(batch, threads - 1);
+  }
+  if (!is_done) batch.work();
+  batch.rethrow();
+}
+
+}  // namespace flatland

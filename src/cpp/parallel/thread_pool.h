@@ -1,0 +1,51 @@
+// Independent jobs on several threads.
+#pragma once
+
+#include <atomic>
+#include <cstddef>
+#include <functional>
+
+namespace flatland {
+
+// Number of threads that can run at the same time: the processors that the process may use, reduced
+// to the quota of its control group. At least 1.
+std::size_t available_threads();
+
+// A set of worker threads, which are started when they are first needed and then wait for the next
+// call. A pool without calls costs nothing. Several threads may call `parallel_for` concurrently.
+//
+// Jobs must not acquire the GIL: a thread that stops the pool may hold it.
+class ThreadPool {
+ public:
+  using Job = std::function<void(std::size_t)>;
+
+  ThreadPool() = default;
+  ~ThreadPool();
+  ThreadPool(const ThreadPool&) = delete;
+  ThreadPool& operator=(const ThreadPool&) = delete;
+
+  // Calls job(i) once for each i from 0 to jobs - 1, on up to `num_threads` threads (0: as many as
+  // are available), of which the calling thread is one. Threads take jobs in order of i as they
+  // become free. Returns when all jobs have ended. If jobs throw, all others are carried out all
+  // the same; afterwards the exception of the first job, in order of i, is rethrown.
+  //
+  // While the pool is in use by another thread, or in a job of the same pool, the calling thread
+  // carries out all jobs. The same happens if no thread can be created.
+  //
+  // After a fork, the child process starts workers of its own.
+  void parallel_for(std::size_t jobs, std::size_t num_threads, const Job& job);
+
+  // Ends the workers; the next call starts new ones. Like the destructor, it must not be called
+  // while jobs are carried out.
+  void stop();
+
+ private:
+  class Crew;
+
+  // The workers of this process, created if there are none.
+  Crew& crew();
+
+  std::atomic<Crew*> crew_{nullptr};
+};
+
+}  // namespace flatland

@@ -1,0 +1,160 @@
+"""Observations, actions, rewards and endings."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from gymnasium import spaces
+
+from flatland.gym import (
+    Arrival,
+    Arrived,
+    Collided,
+    Contact,
+    Goal,
+    Jerkiness,
+    LastAction,
+    Observation,
+    Progress,
+    Proximity,
+    Scan,
+    Situation,
+    Step,
+    Strayed,
+    Velocity,
+    VelocityAction,
+    navigation_reward,
+)
+
+
+@pytest.fixture
+def situation() -> Situation:
+    """Two agents with six beams of 4 m; the second has arrived."""
+    s = Situation(2, 6, 4.0, np.array([0.0, -2.0]), np.array([1.0, 2.0]))
+    s.ranges[0] = [1.0, 2.0, math.nan, math.inf, -math.inf, 4.0]
+    s.ranges[1] = math.nan
+    s.poses[:] = [(1.0, 1.0, math.pi / 2), (5.0, 5.0, 0.0)]
+    s.velocities[:] = [(0.1, 0.5, -1.0), (9.0, 0.0, 9.0)]
+    s.goals[:] = [(1.0, 3.0), (5.0, 5.0)]
+    s.locate(0.3)
+    return s
+
+
+def written(observation: Observation, situation: Situation) -> np.ndarray:
+    layout = observation.layout(6)
+    out = np.full((2, layout.size), np.nan, np.float32)
+    layout.write(situation, out)
+    assert all(layout.space.contains(layout.present(row)) for row in out)
+    return out
+
+
+def test_the_situation_is_that_of_the_robot(situation: Situation) -> None:
+    np.testing.assert_allclose(situation.distance, [2.0, 0.0])
+    np.testing.assert_allclose(situation.goal_ahead, [2.0, 0.0], atol=1e-12)
+    np.testing.assert_allclose(situation.goal_left, [0.0, 0.0], atol=1e-12)
+    np.testing.assert_allclose(situation.speed, [0.5, 9.0])
+    np.testing.assert_array_equal(situation.yaw_rate, [-1.0, 9.0])
+    np.testing.assert_array_equal(situation.arrived, [False, True])
+
+
+def test_a_scan_is_scaled_by_the_range(situation: Situation) -> None:
+    out = written(Observation(Scan()), situation)
+    np.testing.assert_array_equal(out, [[0.25, 0.5, 1, 1, 0, 1], [1] * 6])
+
+
+def test_near_ranges_are_spread(situation: Situation) -> None:
+    out = written(Observation(Scan(half=1.0)), situation)
+    np.testing.assert_allclose(out, [[0.5, 2 / 3, 1, 1, 0, 1], [1] * 6], rtol=1e-6)
+
+
+def test_a_sector_has_its_nearest_range(situation: Situation) -> None:
+    out = written(Observation(Scan(3)), situation)
+    np.testing.assert_array_equal(out, [[0.25, 1, 0], [1, 1, 1]])
+
+
+def test_the_goal_is_observed_in_the_frame_of_the_robot(situation: Situation) -> None:
+    situation.goals[0] = (-2.0, 1.0)  # 3 m to the left
+    situation.locate(0.3)
+    out = written(Observation(Goal(scale=6.0)), situation)
+    np.testing.assert_allclose(out, [[0.5, 0, 1], [0, 0, 0]], atol=1e-7)
+
+
+def test_velocities_are_scaled_and_limited(situation: Situation) -> None:
+    out = written(Observation(Velocity()), situation)
+    np.testing.assert_allclose(out, [[0.5, -0.5], [1, 1]])
+
+
+def test_parts_are_columns_or_entries(situation: Situation) -> None:
+    situation.actions[:] = [(0.5, -0.5), (1.0, 0.0)]
+    parts = (Goal(), LastAction(), Velocity())
+    flat = written(Observation(*parts), situation)
+    layout = Observation(*parts, as_dict=True).layout(6)
+    assert isinstance(layout.space, spaces.Dict)
+    entries = layout.present(flat)
+    assert list(entries) == list(layout.space) == ["goal", "last_action", "velocity"]
+    np.testing.assert_array_equal(np.concatenate(list(entries.values()), axis=1), flat)
+    np.testing.assert_array_equal(entries["last_action"], situation.actions)
+
+
+def test_two_parts_of_one_name_are_an_error() -> None:
+    with pytest.raises(ValueError, match="different names"):
+        Observation(Scan(2), Scan(3))
+
+
+@pytest.mark.parametrize(
+    "make",
+    [
+        lambda: Scan(0),
+        lambda: Scan(half=0.0),
+        lambda: Goal(scale=0.0),
+        lambda: Proximity(-1.0),
+        lambda: Strayed(math.nan),
+        lambda: VelocityAction(speed=(1.0, 0.0)),
+        lambda: VelocityAction(yaw_rate=math.inf),
+    ],
+)
+def test_a_number_out_of_range_is_an_error(make: object) -> None:
+    assert callable(make)
+    with pytest.raises(ValueError, match="must be"):
+        make()
+
+
+def test_rewards_are_scaled_and_added_up(situation: Situation) -> None:
+    situation.previous_distance[:] = [2.5, 0.4]
+    situation.collided[:] = [True, False]
+    reward = 2.0 * Progress() + Contact() * -3.0 + Step()
+    np.testing.assert_allclose(reward.compute(situation), [2 * 0.5 - 3 + 1, 2 * 0.4 + 1])
+    np.testing.assert_array_equal(Arrival().compute(situation), [0, 1])
+    np.testing.assert_allclose(
+        navigation_reward().compute(situation), [0.5 - 5 - 0.02, 0.4 + 5 - 0.02]
+    )
+
+
+def test_a_change_of_the_action_is_jerky(situation: Situation) -> None:
+    situation.actions[:] = [(1.0, 1.0), (0.0, 0.0)]
+    situation.previous_actions[:] = [(0.5, 0.0), (0.0, 0.0)]
+    np.testing.assert_allclose(Jerkiness().compute(situation), [1.25, 0.0])
+
+
+def test_proximity_counts_the_nearest_obstacle(situation: Situation) -> None:
+    situation.ranges[0, 4] = 2.0
+    np.testing.assert_allclose(Proximity(4.0).compute(situation), [0.75, 0.0])
+
+
+def test_endings_are_combined(situation: Situation) -> None:
+    situation.collided[:] = [True, False]
+    assert Arrived().check(situation).tolist() == [False, True]
+    assert Collided().check(situation).tolist() == [True, False]
+    assert (Arrived() | Collided()).check(situation).tolist() == [True, True]
+    assert Strayed(1.0).check(situation).tolist() == [True, False]
+
+
+def test_rows_are_taken_and_put_back(situation: Situation) -> None:
+    rows = np.array([1])
+    part = situation.take(rows)
+    part.goals[:] = 7.0
+    assert situation.goals[1].tolist() == [5.0, 5.0]
+    situation.put(rows, part)
+    assert situation.goals.tolist() == [[1.0, 3.0], [7.0, 7.0]]

@@ -1,0 +1,206 @@
+"""Many environments: equal to as many single ones, in all autoreset modes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from gymnasium.error import ClosedEnvironmentError, InvalidAction, ResetNeeded
+from gymnasium.vector import AutoresetMode, SyncVectorEnv
+
+from flatland.gym import FlatlandEnv, FlatlandVectorEnv, Goal, Observation, Scan, Velocity
+
+Make = Callable[..., Any]
+MODES = [AutoresetMode.NEXT_STEP, AutoresetMode.SAME_STEP, AutoresetMode.DISABLED]
+
+
+def actions(n: int, steps: int, seed: int = 0) -> np.ndarray:
+    """Mostly forward, so that episodes end soon."""
+    numbers = np.random.default_rng(seed).uniform(-1, 1, (steps, n, 2))
+    numbers[..., 0] = np.abs(numbers[..., 0])
+    return numbers.astype(np.float32)
+
+
+def assert_same(left: Any, right: Any) -> None:
+    """Compares nested results bit by bit."""
+    if isinstance(left, dict):
+        assert sorted(left) == sorted(right)
+        for key in left:
+            assert_same(left[key], right[key])
+    elif isinstance(left, tuple) or (isinstance(left, np.ndarray) and left.dtype == object):
+        for one, other in zip(left, right, strict=True):
+            assert_same(one, other)
+    elif isinstance(left, np.ndarray):
+        assert left.dtype == right.dtype
+        assert left.shape == right.shape
+        assert left.tobytes() == right.tobytes()
+    else:
+        assert left == right
+
+
+@pytest.mark.parametrize("mode", MODES)
+@pytest.mark.parametrize("num_threads", [1, 3])
+@pytest.mark.parametrize("world", ["navigate", "corridor", "room"])
+def test_it_equals_single_environments(
+    make: Make, room: Path, world: str, mode: AutoresetMode, num_threads: int
+) -> None:
+    n, steps = 5, 250
+    kwargs: dict[str, Any] = {"world": room if world == "room" else world, "max_steps": 40}
+    vector = make(FlatlandVectorEnv, n, autoreset_mode=mode, num_threads=num_threads, **kwargs)
+    single = make(
+        SyncVectorEnv, [partial(FlatlandEnv, **kwargs) for _ in range(n)], autoreset_mode=mode
+    )
+    assert_same(vector.reset(seed=11), single.reset(seed=11))
+    ended = 0
+    for action in actions(n, steps):
+        result, expected = vector.step(action), single.step(action)
+        assert_same(result, expected)
+        done = result[2] | result[3]
+        ended += done.sum()
+        if mode is AutoresetMode.DISABLED and done.any():
+            assert_same(
+                vector.reset(options={"reset_mask": done}),
+                single.reset(options={"reset_mask": done}),
+            )
+    assert ended > 3 * n
+
+
+def test_dictionaries_of_observations_equal_those_of_single_environments(make: Make) -> None:
+    kwargs: dict[str, Any] = {
+        "world": "corridor",
+        "observation": Observation(Scan(12), Velocity(), Goal(), as_dict=True),
+    }
+    vector = make(FlatlandVectorEnv, 3, autoreset_mode="SameStep", **kwargs)
+    single = make(
+        SyncVectorEnv, [partial(FlatlandEnv, **kwargs)] * 3, autoreset_mode=AutoresetMode.SAME_STEP
+    )
+    assert vector.observation_space == single.observation_space
+    assert_same(vector.reset(seed=1), single.reset(seed=1))
+    for action in actions(3, 100):
+        assert_same(vector.step(action), single.step(action))
+
+
+def test_the_number_of_threads_changes_nothing(make: Make) -> None:
+    runs = []
+    for num_threads in (0, 1, 2, 7):
+        envs = make(FlatlandVectorEnv, 16, "navigate", num_threads=num_threads, max_steps=50)
+        envs.reset(seed=3)
+        runs.append([envs.step(action) for action in actions(16, 120)])
+    for other in runs[1:]:
+        for left, right in zip(runs[0], other, strict=True):
+            assert_same(left, right)
+
+
+def test_seeds_are_those_of_single_environments(make: Make) -> None:
+    envs = make(FlatlandVectorEnv, 3, "corridor")
+    by_number, _ = envs.reset(seed=5)
+    by_list, _ = envs.reset(seed=[5, 6, 7])
+    np.testing.assert_array_equal(by_number, by_list)
+    assert envs.np_random_seed == (5, 6, 7)
+    partly, _ = envs.reset(seed=[5, None, 7])
+    np.testing.assert_array_equal(partly[[0, 2]], by_list[[0, 2]])
+    assert (partly[1] != by_list[1]).any()
+    with pytest.raises(ValueError, match="3 environments, got 2"):
+        envs.reset(seed=[1, 2])
+
+
+def test_observations_are_copies_unless_told_otherwise(make: Make) -> None:
+    for copy in (True, False):
+        envs = make(FlatlandVectorEnv, 2, "corridor", copy=copy)
+        first, _ = envs.reset(seed=0)
+        kept = first.copy()
+        second = envs.step(np.ones((2, 2)))[0]
+        assert (first is second) is not copy
+        assert np.array_equal(first, kept) is copy
+
+
+def test_the_metadata_name_the_autoreset_mode(make: Make) -> None:
+    for mode in MODES:
+        envs = make(FlatlandVectorEnv, 1, "corridor", autoreset_mode=mode)
+        assert envs.metadata["autoreset_mode"] is mode
+    by_name = make(FlatlandVectorEnv, 1, "corridor", autoreset_mode="SameStep")
+    assert by_name.metadata["autoreset_mode"] is AutoresetMode.SAME_STEP
+
+
+def test_rendering_returns_an_image_of_each(make: Make) -> None:
+    envs = make(FlatlandVectorEnv, 2, "corridor", render_mode="rgb_array")
+    envs.reset(seed=0)
+    images = envs.render()
+    assert [image.shape for image in images] == [(600, 800, 3)] * 2
+    assert (images[0] != images[1]).any()
+    assert make(FlatlandVectorEnv, 1, "corridor").render() is None
+
+
+# -- errors ------------------------------------------------------------------------------------
+
+
+def test_stepping_needs_a_reset(make: Make) -> None:
+    envs = make(FlatlandVectorEnv, 2, "corridor", autoreset_mode="Disabled", max_steps=1)
+    with pytest.raises(ResetNeeded, match="no episode has begun"):
+        envs.step(np.zeros((2, 2)))
+    envs.reset(seed=0, options={"reset_mask": np.array([True, False])})
+    with pytest.raises(ResetNeeded, match="no episode has begun"):
+        envs.step(np.zeros((2, 2)))
+    envs.reset(seed=0)
+    envs.step(np.zeros((2, 2)))
+    with pytest.raises(ResetNeeded, match="environment 0 has ended"):
+        envs.step(np.zeros((2, 2)))
+
+
+@pytest.mark.parametrize(
+    ("action", "message"),
+    [
+        (np.zeros((3, 2)), r"shape \(2, 2\), got \(3, 2\)"),
+        (np.zeros(2), r"shape \(2, 2\), got \(2,\)"),
+        (np.array([[0, 0], [0, np.nan]]), r"nan\] for agent 1"),
+    ],
+)
+def test_invalid_actions_are_errors(make: Make, action: np.ndarray, message: str) -> None:
+    envs = make(FlatlandVectorEnv, 2, "corridor")
+    envs.reset(seed=0)
+    with pytest.raises(InvalidAction, match=message):
+        envs.step(action)
+    envs.step(np.zeros((2, 2)))
+
+
+@pytest.mark.parametrize(
+    ("mask", "error"),
+    [
+        ([True, False], TypeError),
+        (np.array([1, 0]), TypeError),
+        (np.array([True]), ValueError),
+        (np.array([False, False]), ValueError),
+    ],
+)
+def test_an_invalid_mask_is_an_error(make: Make, mask: object, error: type[Exception]) -> None:
+    envs = make(FlatlandVectorEnv, 2, "corridor")
+    with pytest.raises(error, match="reset_mask"):
+        envs.reset(options={"reset_mask": mask})
+
+
+def test_closed_environments_are_of_no_use(make: Make) -> None:
+    envs = make(FlatlandVectorEnv, 2, "corridor")
+    envs.reset(seed=0)
+    envs.close()
+    envs.close()
+    for use in (lambda: envs.step(np.zeros((2, 2))), envs.reset, envs.render):
+        with pytest.raises(ClosedEnvironmentError, match="closed"):
+            use()
+
+
+@pytest.mark.parametrize(
+    ("kwargs", "message"),
+    [
+        ({"num_envs": 0}, "num_envs"),
+        ({"num_threads": -1}, "num_threads"),
+        ({"autoreset_mode": "Never"}, "Never"),
+        ({"render_mode": "human"}, "rgb_array"),
+    ],
+)
+def test_an_invalid_argument_is_an_error(kwargs: dict[str, Any], message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        FlatlandVectorEnv(**{"num_envs": 1, "world": "corridor", **kwargs})

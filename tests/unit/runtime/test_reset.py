@@ -1,0 +1,331 @@
+"""Resets: the state is exactly that after loading, and what is connected stays connected."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import flatland
+from flatland import PluginError, StaleHandleError, Twist, World, WorldError, YamlError
+
+WORLD = """
+properties: {velocity_iterations: 8}
+layers:
+  - {name: walls, map: room.yaml}
+  - {name: other, map: $eval math.random() < 0.5 and "room.yaml" or "hall.yaml"}
+models:
+  - name: robot
+    model: robot.model.yaml
+    pose: [$eval 2 + math.random(), 4, 0.3]
+  - {name: second, model: robot.model.yaml, pose: [6, $eval 3 + param("offset"), 1], namespace: b}
+  - {name: box, model: minimal.model.yaml, pose: [5, 5.5, 0]}
+plugins:
+  - {type: RandomWall, name: walls, layer: walls, robot_name: robot, num_of_walls: 3}
+"""
+ROBOT = """
+bodies:
+  - name: base
+    footprints: [{type: circle, radius: $eval 0.2 + 0.1 * math.random(), density: 1}]
+plugins:
+  - $include drive.yaml
+  - {type: Laser, name: laser, body: base, range: 5, update_rate: 10, noise_std_dev: 0.1,
+     angle: {min: -1, max: 1, increment: 0.1}}
+  - {type: Bumper, name: bumper}
+"""
+DRIVE = "{type: DiffDrive, name: drive, body: base, odom_drift: [0.1, 0.1, 0.1, 0.1]}"
+
+
+@pytest.fixture
+def params() -> dict[str, object]:
+    return {"offset": 0.25}
+
+
+@pytest.fixture
+def world(files: Any, params: dict[str, object]) -> Iterator[World]:
+    files.write_map("room", ["##########", *["#........#"] * 8, "##########"])
+    files.write_map("hall", ["##########", *["#........#"] * 7, "#....#...#", "##########"])
+    files.write("robot.model.yaml", ROBOT)
+    files.write("drive.yaml", DRIVE)
+    return files.load(WORLD, params=params)
+
+
+def fresh(world: World, seed: int) -> World:
+    return World.from_yaml(world.path, seed=seed, params={"offset": 0.25})
+
+
+def use(world: World) -> None:
+    """Does all kinds of things with a world."""
+    world.command("/cmd_vel").set(Twist(linear_x=1.0, angular_z=0.5))
+    world.step(100)
+    world.delete_model("second")
+    world.spawn_model("minimal.model.yaml", "newer", pose=(3.0, 3.0, 0.0))
+    world.move_model("box", (7.0, 7.0, 0.0))
+    world.sample_free(2, 0.1)
+    world.step(100)
+
+
+def run(world: World, steps: int = 1000) -> list[object]:
+    found: list[object] = []
+    world.command("/cmd_vel").set(Twist(linear_x=1.0, angular_z=0.3))
+    world.command("/b/cmd_vel").set(Twist(linear_x=-1.0, angular_z=0.3))
+    scan = world.output("/b/scan")
+    for _ in range(steps):
+        world.step()
+        found.append((world.state_hash(), repr(scan.latest), world.transforms))
+    found.append(world.sample_free(2, 0.1).tolist())
+    return found
+
+
+@pytest.mark.parametrize("seed", [None, 1, 7])
+def test_the_state_is_that_after_loading(world: World, seed: int | None) -> None:
+    with fresh(world, 1 if seed is None else seed) as other:
+        first = world.state_hash()
+        expected_hash = other.state_hash()
+        assert (first == expected_hash) == (seed in (None, 1))
+        expected = run(other)
+        for _ in range(2):
+            use(world)
+            world.reset(seed)
+            assert (world.time, world.seed) == (0.0, other.seed)
+            assert world.state_hash() == expected_hash
+            assert run(world) == expected
+
+
+def test_five_thousand_steps_after_a_reset_are_those_after_loading(world: World) -> None:
+    use(world)
+    world.reset()
+    with fresh(world, 1) as other:
+        for each in (world, other):
+            each.command("/cmd_vel").set(Twist(linear_x=0.5, angular_z=0.2))
+        for _ in range(5000):
+            world.step()
+            other.step()
+            assert world.physics.body_states().tobytes() == other.physics.body_states().tobytes()
+        assert world.state_hash() == other.state_hash()
+
+
+def test_the_time_can_continue(world: World) -> None:
+    stamps: list[int] = []
+    world.output("/scan").subscribe(lambda scan: stamps.append(scan.stamp))
+    world.step(130)
+    world.reset(keep_time=True)
+    assert world.time == pytest.approx(0.65)
+    world.step(71)
+    assert stamps == [number * 100_000_000 for number in range(11)]
+
+
+def test_files_and_parameters_are_not_read_again(
+    world: World, params: dict[str, object], files: Any
+) -> None:
+    before, files_before = world.state_hash(), list(world.inputs.files)
+    params.clear()
+    for path in Path(files.folder).iterdir():
+        path.unlink()
+    world.reset()
+    assert world.state_hash() == before
+    assert list(world.inputs.files) == files_before
+    with pytest.raises(YamlError, match="File does not exist"):
+        world.spawn_model("minimal.model.yaml", "newer")
+
+
+def test_what_is_connected_stays_connected(world: World) -> None:
+    events: list[str] = []
+
+    class Recorder(flatland.WorldObserver):
+        def output_opened(self, output: Any) -> None:
+            events.append(f"opened {output.topic}")
+
+        def output_closed(self, output: Any) -> None:
+            events.append(f"closed {output.topic}")
+
+        def command_opened(self, command: Any) -> None:
+            events.append(f"opened {command.topic}")
+
+        def command_closed(self, command: Any) -> None:
+            events.append(f"closed {command.topic}")
+
+    world.add_observer(Recorder())
+    world.spawn_model("robot.model.yaml", "newer", "newer", (7.0, 2.0, 0.0))
+    received: list[Any] = []
+    output, topic = world.output("/scan"), world.command("/cmd_vel")
+    output.subscribe(received.append)
+    commands = [command for same in world.ports.commands.values() for command in same]
+    layers = world.layers[:]
+    topic.set(Twist(linear_x=1.0))
+    world.step(30)
+    events.clear()
+    world.reset()
+    assert {event.split()[0] for event in events} == {"closed"}
+    assert all(event.split()[1].startswith("/newer/") for event in events)
+    assert len(events) == 6
+    assert world.output("/scan") is output
+    assert not output.closed
+    assert output.latest is None
+    assert (topic.value, commands[0].received, commands[0].closed) == (Twist(), 0, False)
+    assert world.ports.commands["/cmd_vel"] == commands[:1]
+    assert world.layers == layers
+    assert layers[0].body.entity is layers[0]
+    received.clear()
+    topic.set(Twist(linear_x=1.0))
+    world.step(1)
+    assert len(received) == 1
+    assert world.model("robot").bodies[0].velocity[0] != 0.0
+
+
+def test_models_bodies_and_plugins_are_new(world: World) -> None:
+    robot = world.model("robot")
+    body, plugin = robot.bodies[0], robot.plugin("drive")
+    world.reset()
+    assert world.model("robot").plugin("drive") is not plugin
+    for old in (body, robot):
+        with pytest.raises(StaleHandleError):
+            _ = old.pose
+
+
+def test_a_command_of_another_type_is_not_kept(world: World, files: Any) -> None:
+    world.delete_model("robot")
+    files.write(
+        "switch.model.yaml",
+        """
+        bodies: [{name: base, footprints: [{type: circle, radius: 0.2, density: 1}]}]
+        plugins: [{type: Tween, name: t, body: base, mode: trigger, trigger_topic: cmd_vel}]
+        """,
+    )
+    world.spawn_model("switch.model.yaml", "switch", pose=(2.0, 2.0, 0.0))
+    command = world.ports.commands["/cmd_vel"][0]
+    world.reset()
+    assert command.closed
+    world.command("/cmd_vel").set(Twist(linear_x=1.0))
+
+
+def test_a_reset_that_a_hook_requests_takes_effect_after_the_step(world: World) -> None:
+    expected = world.state_hash()
+    unsubscribe = world.output("/scan").subscribe(lambda _: world.reset())
+    world.step()
+    assert world.state_hash() == expected
+    unsubscribe()
+
+
+def test_requests_and_the_pause_remain(world: World) -> None:
+    world.step(10)
+    world.pause()
+    world.reset()
+    assert world.paused
+    world.resume()
+    calls: list[int] = []
+    world.post(lambda: calls.append(1))
+    world.reset()
+    world.step()
+    assert calls == [1]
+
+
+FAILING = """
+from flatland import ModelPlugin
+
+calls = []
+
+
+class Failing(ModelPlugin):
+    def on_initialize(self, config):
+        config.get("number", "float")
+        if self.world.seed == 13:
+            raise ValueError("unlucky")
+        if config.get("uncopyable", "bool", False):
+            self.numbers = (number for number in range(3))
+"""
+
+
+@pytest.fixture
+def failing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, files: Any) -> None:
+    (tmp_path / "failing_plugins.py").write_text(FAILING)
+    manifest = tmp_path / "failing_plugins.xml"
+    manifest.write_text(
+        '<library path="failing_plugins"><class name="Failing" type="failing_plugins.Failing" '
+        'base_class_type="flatland::ModelPlugin"/></library>'
+    )
+    monkeypatch.setenv("FLATLAND_PLUGIN_PATH", str(manifest))
+    monkeypatch.syspath_prepend(str(tmp_path))
+
+
+def failing_world(files: Any, options: str = "") -> World:
+    files.write_map("room", ["##########", *["#........#"] * 8, "##########"])
+    files.write("drive.yaml", DRIVE)
+    files.write(
+        "failing.model.yaml",
+        f"""
+        bodies: [{{name: base, footprints: [{{type: circle, radius: 0.2, density: 1}}]}}]
+        plugins: [{{type: Failing, name: failing, number: 1{options}}}, $include drive.yaml]
+        """,
+    )
+    world: World = files.load(
+        """
+        properties: {}
+        layers: [{name: walls, map: room.yaml}]
+        models:
+          - {name: box, model: minimal.model.yaml, pose: [5, 5.5, 0]}
+          - {name: robot, model: failing.model.yaml, pose: [2, 2, 0]}
+        """
+    )
+    return world
+
+
+def test_a_reset_that_fails_changes_nothing(files: Any, failing: None) -> None:
+    world = failing_world(files)
+    output, robot, layer = world.output("/odometry/filtered"), world.model("robot"), world.layers[0]
+    received: list[Any] = []
+    output.subscribe(received.append)
+    world.command("/cmd_vel").set(Twist(linear_x=0.3))
+    world.step(20)
+    with world.clone() as clone:
+        before, count = world.state_hash(), len(received)
+        with pytest.raises(PluginError, match="unlucky"):
+            world.reset(seed=13)
+        assert world.state_hash() == before
+        assert (world.seed, world.model("robot"), world.layers) == (1, robot, [layer])
+        assert world.output("/odometry/filtered") is output
+        world.step(50)
+        clone.step(50)
+        assert world.state_hash() == clone.state_hash()
+        assert len(received) == count + 50
+    world.reset(seed=3)
+
+
+def test_a_reset_that_fails_with_an_uncopyable_plugin_leaves_an_empty_world(
+    files: Any, failing: None, caplog: pytest.LogCaptureFixture
+) -> None:
+    world = failing_world(files, ", uncopyable: true")
+    with caplog.at_level(logging.ERROR), pytest.raises(PluginError, match="unlucky"):
+        world.reset(seed=13)
+    assert world.models == []
+    assert "the world is empty" in caplog.text
+    world.step()
+    world.reset(seed=2)
+    assert [model.name for model in world.models] == ["box", "robot"]
+
+
+def test_errors(world: World) -> None:
+    with pytest.raises(WorldError, match="only a world that was loaded from a file can be reset"):
+        World().reset()
+    with pytest.raises(ValueError, match="seed must not be negative, got -2"):
+        world.reset(seed=-2)
+    with world.clone() as clone:
+        use(clone)
+        clone.reset()
+        assert clone.state_hash() == world.state_hash()
+    world.close()
+    with pytest.raises(WorldError, match="the world is closed"):
+        world.reset()
+
+
+def test_a_snapshot_can_be_restored_after_a_reset(world: World) -> None:
+    world.step(10)
+    snapshot = world.snapshot()
+    expected = run(world, 50)
+    world.reset(seed=5)
+    world.step(3)
+    world.restore(snapshot)
+    assert run(world, 50) == expected

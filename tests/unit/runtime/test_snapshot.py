@@ -1,0 +1,529 @@
+"""Snapshots and clones: the same steps have the same results, bit by bit."""
+
+from __future__ import annotations
+
+import gc
+import threading
+import types
+import weakref
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import flatland
+from flatland import StaleHandleError, Twist, World, WorldError
+
+MODELS = Path(__file__).resolve().parents[3] / "bench" / "all_plugins.model.yaml"
+WORLD = f"""
+properties: {{}}
+layers: [{{name: walls, map: room.yaml}}]
+models:
+  - {{name: robot, model: {MODELS}, pose: [4, 4, 0.3], namespace: robot}}
+  - {{name: other, model: {MODELS}, pose: [6.2, 4.1, 2], namespace: other}}
+  - {{name: box, model: minimal.model.yaml, pose: [5, 5.5, 0]}}
+  - {{name: drift, model: drift.model.yaml, pose: [2, 6, 0], namespace: drift}}
+plugins:
+  - {{type: RandomWall, name: walls, layer: walls, robot_name: robot, num_of_walls: 2}}
+"""
+DRIFT = """
+bodies:
+  - name: base
+    footprints: [{type: circle, radius: 0.2, density: 1}]
+plugins:
+  - type: DiffDrive
+    name: diff
+    body: base
+    pub_rate: 50
+    odom_drift: [0.1, 0.1, 0.1, 0.1]
+    odom_pose_noise: [1, 1, 1]
+    after_step: true
+    linear_dynamics: {acceleration_limit: 1}
+  - type: Laser
+    name: laser
+    body: base
+    range: 5
+    update_rate: 20
+    always_publish: true
+    after_step: true
+    noise_model: beam
+    z_short: 0.1
+    lambda_short: 1
+    angle: {min: -1, max: 1, increment: 0.1}
+  - {type: Tween, name: door, body: base, delta: [0, 0, 0], mode: trigger, trigger_topic: go}
+"""
+PLUGINS = '''
+import collections
+import functools
+import random
+import threading
+
+import numpy as np
+
+from flatland import ModelPlugin, UpdateTimer
+
+
+class Inner:
+    def __init__(self, owner):
+        self.owner = owner
+        self.count = 0
+
+
+class Slots:
+    __slots__ = ("value", "unset")
+
+    def __init__(self):
+        self.value = 0
+
+
+class Names(list):
+    pass
+
+
+class Everything(ModelPlugin):
+    """Keeps its state in everything that Python has for it."""
+
+    def on_initialize(self, config):
+        self.timer = UpdateTimer(50.0)
+        self.inner = Inner(self)
+        self.slots = Slots()
+        self.names = Names(["a"])
+        self.body = self.model.bodies[0]
+        self.by_body = {self.body: 0, "other": 0}
+        self.all = {self.body, self}
+        self.of_key_values = collections.defaultdict(int)
+        self.values = self.of_key_values.values()
+        self.last = collections.deque(maxlen=3)
+        self.counts = collections.Counter()
+        self.of_key = collections.defaultdict(list)
+        self.array = np.zeros(3)
+        self.view = self.array[1:]
+        self.bytes = bytearray(2)
+        self.random = random.Random(1)
+        self.generator = np.random.Generator(np.random.Philox(5))
+        self.lock = threading.RLock()
+        total = 0
+
+        def add(number=1, *, owner=self):
+            nonlocal total
+            total += number
+            owner.inner.count += 1
+            return total
+
+        self.add = add
+        self.partial = functools.partial(self.note, "partial")
+        self.append = self.names.append
+        self.lambdas = (lambda: self.inner.count, sum)
+        self.seen = self.output("seen", int)
+        self.heard = []
+        self.unsubscribe = self.seen.subscribe(self.heard.append)
+        self.command("value", int)
+
+    def note(self, *names):
+        for name in names:
+            self.counts[name] += 1
+
+    def before_physics_step(self, timekeeper):
+        with self.lock:
+            self.slots.value += 1
+            if self.timer.check_update(timekeeper):
+                self.slots.unset = self.add(2)
+            self.by_body[self.body] += self.random.random()
+            self.last.append(float(self.generator.normal()))
+            self.of_key[len(self.last)].append(self.slots.value)
+            self.array += self.rng.normal(size=3)
+            self.view += 1.0
+            self.bytes[0] = (self.bytes[0] + 1) % 256
+            self.partial("more")
+            self.of_key_values[self.slots.value % 7] += 1
+            if self.slots.value % 10 == 0:
+                self.append(str(self.slots.value))
+            self.seen.emit(self.slots.value)
+            self.body.apply_force((self.last[-1], self.view[0] % 1.0), self.body.world_center)
+
+    def state(self):
+        return [
+            self.inner.count, self.slots.value, getattr(self.slots, "unset", None), self.names,
+            self.by_body[self.body], list(self.last), self.counts, dict(self.of_key), self.array,
+            self.view, self.bytes, self.random.getstate(), self.lambdas[0](), self.heard[-3:],
+            list(self.values), self in self.all, self.body in self.all, self.inner.owner is self,
+            self.add.__name__,
+        ]
+
+
+class Generating(ModelPlugin):
+    """Holds what cannot be copied."""
+
+    def on_initialize(self, config):
+        self.numbers = (i for i in range(3))
+
+
+class Device:
+    pass
+
+
+class Connected(ModelPlugin):
+    """Is connected to the outside, and says how it is copied."""
+
+    def on_initialize(self, config):
+        self.device = threading.Event()
+        self.count = 0
+
+    def __getstate__(self):
+        return {name: value for name, value in vars(self).items() if name != "device"}
+
+    def __setstate__(self, state):
+        vars(self).update(state)
+        if "device" not in vars(self):
+            self.device = threading.Event()
+
+    def before_physics_step(self, timekeeper):
+        self.count += 1
+
+
+class Threaded(ModelPlugin):
+    def on_initialize(self, config):
+        self.device = threading.Event()
+'''
+NAMES = ("Everything", "Generating", "Connected", "Threaded")
+
+
+@pytest.fixture
+def plugins(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "snapshot_plugins.py").write_text(PLUGINS)
+    classes = "".join(
+        f'<class name="{name}" type="snapshot_plugins.{name}" '
+        'base_class_type="flatland::ModelPlugin"/>'
+        for name in NAMES
+    )
+    manifest = tmp_path / "snapshot_plugins.xml"
+    manifest.write_text(f'<library path="snapshot_plugins">{classes}</library>')
+    monkeypatch.setenv("FLATLAND_PLUGIN_PATH", str(manifest))
+    monkeypatch.syspath_prepend(str(tmp_path))
+
+
+@pytest.fixture
+def world(files: Any, plugins: None) -> Iterator[World]:
+    rows = ["##########", *["#........#"] * 8, "##########"]
+    files.write_map("room", rows)
+    files.write("drift.model.yaml", DRIFT)
+    world = files.load(WORLD)
+    for name in ("robot", "other"):
+        world.command(f"/{name}/diff_vel").set(Twist(linear_x=0.7, angular_z=0.3))
+    world.command("/drift/cmd_vel").set(Twist(linear_x=0.5, angular_z=-0.4))
+    world.output("/robot/scan")
+    return world
+
+
+def plugin_model(kind: str) -> str:
+    return f"""
+    bodies:
+      - name: base
+        footprints: [{{type: circle, radius: 0.2, density: 1}}]
+    plugins: [{{type: {kind}, name: plugin}}]
+    """
+
+
+def hashes(world: World, steps: int = 300) -> list[object]:
+    """Returns what can be observed after each of some steps."""
+    found: list[object] = []
+    for _ in range(steps):
+        world.step()
+        latest = {
+            topic: repr(output.latest)
+            for topic, output in world.ports.outputs.items()
+            if output.latest is not None
+        }
+        found.append(
+            (world.state_hash(), latest, world.transforms, repr(world.contacts).count("C"))
+        )
+    return found
+
+
+def test_the_state_of_all_models(world: World) -> None:
+    world.step(30)
+    state = world.state()
+    assert state.names == ("robot", "other", "box", "drift")
+    assert state.poses.shape == state.velocities.shape == (4, 3)
+    for number, model in enumerate(world.models):
+        assert tuple(state.poses[number]) == model.pose
+        assert tuple(state.velocities[number]) == model.bodies[0].velocity
+    assert World().state().poses.shape == (0, 3)
+
+
+def test_a_restored_world_repeats_its_steps(world: World) -> None:
+    hashes(world, 50)
+    snapshot = world.snapshot()
+    before = world.state_hash()
+    expected = hashes(world, 1000)
+    for _ in range(2):
+        world.restore(snapshot)
+        assert (world.state_hash(), world.time) == (before, snapshot.time)
+        assert hashes(world, 1000) == expected
+
+
+def test_a_clone_repeats_the_steps_of_its_original(world: World) -> None:
+    hashes(world, 50)
+    clone = world.clone()
+    with clone:
+        clone.output("/robot/scan")
+        assert clone.state_hash() == world.state_hash()
+        expected = hashes(world)
+        world.close()
+        assert hashes(clone) == expected
+
+
+def test_a_clone_of_a_clone_of_a_restored_world(world: World) -> None:
+    snapshot = world.snapshot()
+    expected = hashes(world, 100)
+    world.restore(snapshot)
+    with world.clone() as clone, clone.clone() as second:
+        inner = second.snapshot()
+        assert hashes(second, 100) == expected
+        second.restore(inner)
+        assert hashes(second, 100) == expected
+        assert hashes(clone, 100) == expected
+
+
+def test_a_clone_is_independent(world: World) -> None:
+    world.step(20)
+    before = world.state_hash()
+    with world.clone() as clone:
+        clone.command("/robot/cmd_vel").set(Twist(linear_x=-1.0))
+        clone.step(100)
+        clone.delete_model("box")
+        clone.spawn_model("minimal.model.yaml", "newer", pose=(2.0, 2.0, 0.0))
+        assert world.state_hash() == before
+        assert [model.name for model in world.models] == ["robot", "other", "box", "drift"]
+        found = reachable_worlds(clone)
+        assert found == {id(clone)}
+
+
+def reachable_worlds(root: World) -> set[int]:
+    """Returns the worlds and physics worlds that are reachable from the parts of a world."""
+    seen: set[int] = set()
+    pending: list[object] = [root]
+    skipped = (type, types.ModuleType, types.FrameType)
+    worlds = set()
+    while pending:
+        found = pending.pop()
+        if id(found) in seen or isinstance(found, skipped):
+            continue
+        seen.add(id(found))
+        if isinstance(found, World):
+            worlds.add(id(found))
+        if isinstance(found, types.FunctionType):
+            pending += [found.__closure__, found.__defaults__, found.__kwdefaults__]
+        else:
+            pending += gc.get_referents(found)
+    return worlds
+
+
+def test_clones_can_be_stepped_in_threads(world: World) -> None:
+    world.step(20)
+    clones = [world.clone() for _ in range(4)]
+    expected = hashes(world, 50)
+    results: list[Any] = [None] * len(clones)
+
+    def run(number: int) -> None:
+        results[number] = hashes(clones[number], 50)
+
+    threads = [threading.Thread(target=run, args=(n,)) for n in range(len(clones))]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert results == [expected] * len(clones)
+    for clone in clones:
+        clone.close()
+
+
+def test_restoring_after_models_were_spawned_and_deleted(world: World) -> None:
+    world.step(40)
+    snapshot = world.snapshot()
+    robot, box = world.model("robot"), world.model("box")
+    plugin, output = robot.plugin("laser"), world.output("/robot/scan")
+    expected = hashes(world, 200)
+    for _ in range(2):
+        world.delete_model("robot")
+        world.move_model("box", (7.0, 7.0, 0.0), if_blocked="allow")
+        newer = world.spawn_model("minimal.model.yaml", "newer", pose=(2.0, 2.0, 0.0))
+        assert newer is not None
+        world.spawn_model(MODELS, "robot", "robot", (3.0, 3.0, 0.0))
+        world.step(30)
+        world.restore(snapshot)
+        assert [model.name for model in world.models] == ["robot", "other", "box", "drift"]
+        assert world.model("robot") is robot
+        assert robot.plugin("laser") is plugin
+        assert world.model("box") is box
+        assert world.ports.find_output("/robot/scan") is output
+        with pytest.raises(StaleHandleError):
+            _ = newer.pose
+        world.output("/robot/scan")
+        assert hashes(world, 200) == expected
+
+
+def test_observers_are_notified_of_what_is_there_again(world: World) -> None:
+    events: list[tuple[str, str]] = []
+
+    class Recorder(flatland.WorldObserver):
+        def model_added(self, model: flatland.Model) -> None:
+            events.append(("added", model.name))
+
+        def model_removed(self, model: flatland.Model) -> None:
+            events.append(("removed", model.name))
+
+        def output_opened(self, output: Any) -> None:
+            events.append(("opened", output.topic))
+
+        def output_closed(self, output: Any) -> None:
+            events.append(("closed", output.topic))
+
+        def command_opened(self, command: Any) -> None:
+            events.append(("opened", command.topic))
+
+        def command_closed(self, command: Any) -> None:
+            events.append(("closed", command.topic))
+
+    snapshot = world.snapshot()
+    world.add_observer(Recorder())
+    world.step(10)
+    world.restore(snapshot)
+    assert events == []
+    world.delete_model("drift")
+    deleted, events[:] = list(events), []
+    world.spawn_model("minimal.model.yaml", "newer", pose=(2.0, 2.0, 0.0))
+    events.clear()
+    world.restore(snapshot)
+    opposite = {"closed": "opened", "removed": "added"}
+    assert ("removed", "newer") in events
+    events.remove(("removed", "newer"))
+    assert sorted(events) == sorted((opposite[kind], name) for kind, name in deleted)
+
+
+def test_subscribers_remain_after_a_restore_and_are_not_cloned(world: World) -> None:
+    received: list[float] = []
+    unsubscribe = world.output("/drift/scan").subscribe(lambda scan: received.append(scan.stamp))
+    snapshot = world.snapshot()
+    world.step(20)
+    first, received[:] = list(received), []
+    world.restore(snapshot)
+    world.step(20)
+    assert first
+    assert received == first
+    with world.clone() as clone:
+        received.clear()
+        clone.step(20)
+        assert received == []
+    unsubscribe()
+
+
+def test_plugins_of_third_parties_need_to_know_nothing(world: World, files: Any) -> None:
+    files.write("everything.model.yaml", plugin_model("Everything"))
+    world.spawn_model("everything.model.yaml", "one", pose=(2.0, 2.0, 0.0))
+    world.spawn_model("everything.model.yaml", "two", "two", pose=(3.0, 2.0, 0.0))
+    world.step(7)
+    snapshot = world.snapshot()
+    with world.clone() as clone:
+        plugin, copied = world.model("one").plugin("plugin"), clone.model("one").plugin("plugin")
+        expected = hashes(world, 100)
+        before = plugin.state()
+        assert hashes(clone, 100) == expected
+        for _ in range(2):
+            world.restore(snapshot)
+            assert hashes(world, 100) == expected
+        assert copied is not plugin
+        assert copied.inner.owner is copied
+        assert copied.view.base is copied.array
+        assert str(copied.state()) == str(before)
+
+
+def test_a_plugin_that_cannot_be_copied_is_named(world: World, files: Any) -> None:
+    files.write("generating.model.yaml", plugin_model("Generating"))
+    files.write("threaded.model.yaml", plugin_model("Threaded"))
+    world.spawn_model("threaded.model.yaml", "thread", pose=(2.0, 2.0, 0.0))
+    snapshot = world.snapshot()
+    text = 'type "Threaded" model "thread": attribute "device" holds .*threading.Event'
+    with pytest.raises(WorldError, match=text):
+        world.clone()
+    world.restore(snapshot)
+    world.delete_model("thread")
+    with pytest.raises(WorldError, match='"device" holds a connection that ended'):
+        world.restore(snapshot)
+    world.spawn_model("generating.model.yaml", "generator", pose=(2.0, 2.0, 0.0))
+    text = 'type "Generating" model "generator": attribute "numbers" holds .* generator'
+    for method in (world.snapshot, world.clone):
+        with pytest.raises(WorldError, match=text):
+            method()
+    world.step()
+
+
+def test_a_plugin_can_define_how_it_is_copied(world: World, files: Any) -> None:
+    files.write("connected.model.yaml", plugin_model("Connected"))
+    model = world.spawn_model("connected.model.yaml", "robot2", pose=(2.0, 2.0, 0.0))
+    assert model is not None
+    plugin: Any = model.plugin("plugin")
+    device = plugin.device
+    world.step(5)
+    snapshot = world.snapshot()
+    with world.clone() as clone:
+        copied: Any = clone.model("robot2").plugin("plugin")
+        clone.step(2)
+        assert (copied.count, plugin.count) == (7, 5)
+        assert copied.device is not device
+    world.step(3)
+    world.restore(snapshot)
+    assert plugin.count == 5
+    assert plugin.device is device
+    world.delete_model("robot2")
+    world.restore(snapshot)
+    world.step()
+    assert plugin.count == 6
+
+
+def test_errors(world: World) -> None:
+    snapshot = world.snapshot()
+    with world.clone() as clone, pytest.raises(WorldError, match="one of another world"):
+        clone.restore(snapshot)
+    errors: list[BaseException] = []
+
+    def call(_: object) -> None:
+        for method in (world.snapshot, world.clone, lambda: world.restore(snapshot)):
+            try:
+                method()
+            except WorldError as error:
+                errors.append(error)
+
+    unsubscribe = world.output("/drift/scan").subscribe(call)
+    world.step(20)
+    unsubscribe()
+    assert {str(error).split(": ")[-1] for error in errors} == {
+        f"{name} must not be called from a plugin's hook"
+        for name in ("snapshot", "clone", "restore")
+    }
+    world.close()
+    for method in (world.snapshot, world.clone, world.state, lambda: world.restore(snapshot)):
+        with pytest.raises(WorldError, match="the world is closed"):
+            method()
+
+
+def test_a_clone_is_released(world: World) -> None:
+    clone = world.clone()
+    clone.step()
+    reference = weakref.ref(clone)
+    clone.close()
+    del clone
+    gc.collect()
+    assert reference() is None
+
+
+def test_noise_of_a_clone_is_that_of_the_original(world: World) -> None:
+    world.step(10)
+    laser: Any = world.model("drift").plugin("laser")
+    with world.clone() as clone:
+        copied: Any = clone.model("drift").plugin("laser")
+        assert copied.beam_ends is laser.beam_ends
+        for _ in range(3):
+            assert np.array_equal(copied.compute_ranges(), laser.compute_ranges(), equal_nan=True)
