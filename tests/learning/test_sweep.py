@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import contextlib
 import os
 import re
@@ -762,8 +763,9 @@ PAGE = SCRIPT.with_name("README.md")
 
 
 def test_the_commands_of_the_page_are_valid(monkeypatch):
-    commands = re.findall(r"^python examples/sweep/sweep\.py (.*)$", PAGE.read_text(), re.MULTILINE)
-    assert len(commands) >= 3
+    text = PAGE.read_text() + (SCRIPT.parents[2] / "docs" / "learning.md").read_text()
+    commands = re.findall(r"^python examples/sweep/sweep\.py (.*)$", text, re.MULTILINE)
+    assert len(commands) >= 4
     for command in commands:
         options = command_line.make_parser().parse_args(shlex.split(command))
         folder = SCRIPT.parents[2] / (options.working_dir or "")
@@ -783,3 +785,17 @@ def test_the_controller_of_the_page_reaches_goals(tmp_path):
 def test_the_page_describes_all_columns():
     text = PAGE.read_text()
     assert [name for name in COLUMNS if f"`{name}`" not in text] == []
+
+
+def test_the_environment_of_the_program_for_rllib_can_be_created():
+    page = SCRIPT.parents[2] / "docs" / "learning.md"
+    (program,) = re.findall(r"```python\n(import ray\n.*?)```", page.read_text(), re.DOTALL)
+    (function,) = [node for node in ast.parse(program).body if isinstance(node, ast.FunctionDef)]
+    names: dict[str, Any] = {}
+    exec(compile(ast.Module([function], []), page.name, "exec"), names)
+    environment = names[function.name]({"world": "corridor"})
+    environment.reset(seed=1)
+    observation, _, terminated, _, _ = environment.step(np.zeros(2, np.float32))
+    assert environment.observation_space.contains(observation)
+    assert not terminated
+    environment.close()

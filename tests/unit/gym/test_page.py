@@ -1,0 +1,40 @@
+"""The programs of docs/learning.md."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+
+PAGE = Path(__file__).resolve().parents[3] / "docs" / "learning.md"
+# The program for RLlib requires a cluster; tests/learning/test_sweep.py tests its environment.
+PROGRAMS = [
+    program
+    for program in re.findall(r"```python\n(.*?)```", PAGE.read_text(), re.DOTALL)
+    if "import ray" not in program
+]
+
+
+@pytest.mark.parametrize("number", range(len(PROGRAMS)))
+def test_a_program_of_the_page_runs(
+    checkout: Path, monkeypatch: pytest.MonkeyPatch, number: int
+) -> None:
+    monkeypatch.chdir(checkout)
+    exec(compile(PROGRAMS[number], f"learning.md, program {number}", "exec"), {})  # its last use
+
+
+def test_the_page_names_all_parts() -> None:
+    import flatland.gym
+
+    text = PAGE.read_text()
+    parts = (
+        flatland.gym.ObservationPart,
+        flatland.gym.Reward,
+        flatland.gym.Ending,
+        flatland.gym.Task,
+    )
+    for name in flatland.gym.__all__:
+        each = getattr(flatland.gym, name)
+        if isinstance(each, type) and issubclass(each, parts) and each not in parts:
+            assert name == "AnyOf" or f"`{name}(" in text or f"{name}`" in text, name
