@@ -113,13 +113,13 @@ class RosRobot:
 
         def are_here() -> bool:
             return all(
-                topic in self._messages and self._messages[topic].header.stamp >= answer.time
+                topic in self._messages and self._messages[topic].header.stamp >= answer.stamp
                 for topic in (SCAN, ODOMETRY)
             )
 
         with self._changed:
             if not self._changed.wait_for(are_here, TIMEOUT):
-                raise RuntimeError(f"no messages of the time {answer.time.to_sec():.3f}")
+                raise RuntimeError(f"no messages of the time {answer.stamp.to_sec():.3f}")
 
     def _observe(self) -> Any:
         s = self._situation
