@@ -275,7 +275,7 @@ class FlatlandPlugin:
 
         For `Command.on_change`, to pass the value to a controller.
         """
-        self.world.plugin_host.schedule.set_later(function)
+        self.world.plugin_host.schedule.set_later(self, function)
 
     def _uncounted_stream(self, output: str) -> NoiseStream:
         """Returns a noise stream whose number of updates is left to `state`."""

@@ -79,7 +79,7 @@ class PluginHost:
         self._faults = faults
         self._timeout = timeout
         self._plan = world.physics.plan
-        self.schedule = StepSchedule(self._plan, world.timekeeper)
+        self.schedule = StepSchedule(self._plan, world.timekeeper, self._add_fault)
         self.hooks = HookTable(self.schedule)
         self.costs: PluginCosts | None = None
         self.disabled: set[FlatlandPlugin] = set()

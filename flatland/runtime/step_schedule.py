@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Final
 
+from flatland.errors import PLUGIN_FAULTS
 from flatland.physics import TweenController
 from flatland.plugin_api.schedule import HookSchedule, is_called_when_due
 from flatland.plugin_api.update_timer import UpdateTimer
@@ -17,6 +18,8 @@ if TYPE_CHECKING:
     from flatland.plugin_api.plugin import FlatlandPlugin
     from flatland.plugin_api.update_timer import UpdateClock
     from flatland.timekeeper import Timekeeper
+
+FaultHandler = Callable[["FlatlandPlugin", str, BaseException], None]
 
 _AFTER: Final = "after_physics_step"
 _MOST_CLOCKS: Final = 60  # of the sets of due clocks, which are integers of 64 bits
@@ -66,17 +69,19 @@ class StepSchedule:
 
     Attributes:
         version: Changes when other hooks are to be called.
-        targets: Functions that pass new commands to the core; called before the next step, and
-            appended from any thread.
+        targets: Functions of plugins that pass new commands to the core; called before the next
+            step, and appended from any thread.
     """
 
-    def __init__(self, plan: StepPlan, timekeeper: Timekeeper) -> None:
+    def __init__(self, plan: StepPlan, timekeeper: Timekeeper, on_fault: FaultHandler) -> None:
         """Creates a schedule without hooks.
 
         Args:
             plan: The plan of the core.
             timekeeper: The simulated time.
+            on_fault: Called as `on_fault(plugin, what, error)` with what code of plugins raises.
         """
+        self._on_fault = on_fault
         self._plan = plan
         self._timekeeper = timekeeper
         self._clocks: dict[tuple[bool, UpdateClock], int] = {}
@@ -87,7 +92,7 @@ class StepSchedule:
         self._transforms_wanted = False
         self._touching = 0  # hooks that are called in steps with contacts
         self.version = 0
-        self.targets: deque[Callable[[], None]] = deque()
+        self.targets: deque[tuple[FlatlandPlugin, Callable[[], None]]] = deque()
 
     # -- hooks -----------------------------------------------------------------------------
 
@@ -142,6 +147,7 @@ class StepSchedule:
 
     def remove(self, plugin: FlatlandPlugin) -> None:
         """Removes the hooks and the controllers of a plugin."""
+        self.settle()
         for phase in self._phases.values():
             hook = phase.hooks.pop(plugin, None)
             if hook is None:
@@ -287,18 +293,26 @@ class StepSchedule:
         ]
         for hook, count, stamp, pose in sorted(skipped, key=lambda each: each[0].order):
             asked = hook.schedule
-            if asked.skipped is not None:
+            if asked.skipped is None:
+                continue
+            try:
                 asked.skipped(count, stamp, None if asked.body is None else pose)
+            except PLUGIN_FAULTS as error:
+                self._on_fault(hook.plugin, hook.name, error)
 
     def push_targets(self) -> None:
         """Passes new commands to the core."""
         targets = self.targets
         while targets:
-            targets.popleft()()
+            plugin, target = targets.popleft()
+            try:
+                target()
+            except PLUGIN_FAULTS as error:
+                self._on_fault(plugin, "before_physics_step", error)
 
-    def set_later(self, target: Callable[[], None]) -> None:
-        """Has a function called before the next step; safe from any thread."""
-        self.targets.append(target)
+    def set_later(self, plugin: FlatlandPlugin, target: Callable[[], None]) -> None:
+        """Has a function of a plugin called before the next step; safe from any thread."""
+        self.targets.append((plugin, target))
         self._plan.interrupt()
 
 

@@ -173,8 +173,6 @@ void bind_controllers(WorldClass& world) {
   bind_tween(world);
   world.def("has_controller",
             [](World& self, Id id) { return self.plan().find_controller(id) != nullptr; });
-  world.def("controller_body",
-            [](World& self, Id id) { return changed_controller(self, id).body; });
   world.def("remove_controller", [](World& self, Id id) {
     changed_controller(self, id);
     self.plan().remove_controller(id);
@@ -365,10 +363,6 @@ py::list run_worlds(const std::vector<WorldRun>& given, std::size_t num_threads)
 }
 
 void bind_run(WorldClass& world) {
-  world.def("calls_due", [](World& self, std::int64_t step) {
-    self.check_changeable();
-    return self.plan().calls_due(checked_step(step));
-  });
   world.def("begin_step", [](World& self, std::int64_t step) {
     self.check_changeable();
     const std::uint64_t due = self.plan().calls_due(checked_step(step));

@@ -373,3 +373,13 @@ def test_the_clock_of_the_core_agrees_with_the_timer(rate: float, step_size: flo
     for step in [*range(3000), 10**9, 10**9 + 1, 10**12 + 7]:
         timekeeper.sim_time_ns = step * timekeeper.step_size_ns
         assert bool(plan.begin_step(step)) == UpdateTimer(rate).check_update(timekeeper)
+
+
+def test_what_a_function_before_a_step_raises_is_a_fault_of_its_plugin(files: Any) -> None:
+    world = room(files, MIXED)
+    world.step(20)
+    world.model("a").plugin("drive").set_before_step(lambda: 1 // 0)
+    with pytest.raises(ZeroDivisionError) as caught:
+        world.step(20)
+    assert 'Model Plugin "drive"' in caught.value.__notes__[0]
+    assert world.timekeeper.sim_time_ns > 20 * 5_000_000
