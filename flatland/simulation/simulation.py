@@ -15,7 +15,7 @@ from flatland.errors import WorldError
 from flatland.simulation.cycle_statistics import CycleStatistics, CycleWindow
 from flatland.simulation.rate_monitor import RateMonitor
 from flatland.simulation.step_requests import StepRequests
-from flatland.timekeeper import NANOSECONDS
+from flatland.timekeeper import NANOSECONDS, Timekeeper
 from flatland.world import World
 
 _PAUSED_PERIOD: Final = 0.01  # s between two cycles of a paused world without a rate
@@ -40,6 +40,22 @@ class RunResult:
     def steps_per_second(self) -> float:
         """Steps per second of wall time."""
         return self.steps / self.wall_time if self.wall_time > 0 else 0.0
+
+
+class _ElapsedTime:
+    """The simulated time of a run [ns], which continues when a reset sets the clock back."""
+
+    def __init__(self, timekeeper: Timekeeper) -> None:
+        self._timekeeper = timekeeper
+        self._last = timekeeper.sim_time_ns
+        self._total = 0
+
+    def update(self) -> int:
+        """Returns the simulated time since the start [ns], without jumps back."""
+        now = self._timekeeper.sim_time_ns
+        self._total += max(now - self._last, 0)
+        self._last = now
+        return self._total
 
 
 class Simulation:
@@ -179,25 +195,26 @@ class Simulation:
             WorldError: The world is closed, or another simulation runs it.
         """
         timekeeper = self.world.timekeeper
-        start, start_ns = self._clock(), timekeeper.sim_time_ns
-        end_ns = math.inf if math.isinf(duration) else start_ns + round(duration * NANOSECONDS)
+        start, elapsed = self._clock(), _ElapsedTime(timekeeper)
+        duration_ns = math.inf if math.isinf(duration) else round(duration * NANOSECONDS)
         monitor = RateMonitor(self.world, self._clock)
         try:
             with self.world.requests.serving(self._wake.set):
-                self._loop(start, end_ns, monitor)
+                self._loop(start, elapsed, duration_ns, monitor)
         finally:
             monitor.reset()
             if self._stopped:
                 self._steps.fail()
-        steps = (timekeeper.sim_time_ns - start_ns) // timekeeper.step_size_ns
-        return RunResult(steps, self._clock() - start)
+        return RunResult(elapsed.update() // timekeeper.step_size_ns, self._clock() - start)
 
-    def _loop(self, start: float, end_ns: float, monitor: RateMonitor) -> None:
+    def _loop(
+        self, start: float, elapsed: _ElapsedTime, duration_ns: float, monitor: RateMonitor
+    ) -> None:
         world, clock, period, max_lag = self.world, self._clock, self._period, self._max_lag
         timekeeper = world.timekeeper
         due = start
         window = self._new_window(start)
-        while not self._stopped and timekeeper.sim_time_ns < end_ns:
+        while not self._stopped and elapsed.update() < duration_ns:
             if self._steps:
                 due += self._serve_steps()
             elif self.lockstep:

@@ -79,6 +79,20 @@ def test_run_ends_after_an_exact_simulated_time(world: flatland.World) -> None:
     assert world.time == 2.6
 
 
+def test_a_run_whose_world_returns_to_an_earlier_time_lasts_as_long(world: flatland.World) -> None:
+    start = world.snapshot()
+    simulation = Simulation(world, 0)
+
+    class Return(flatland.WorldObserver):
+        def time_advanced(self, time_ns: int) -> None:
+            if time_ns == 500_000_000:
+                simulation.post(lambda: world.restore(start))
+
+    world.add_observer(Return())
+    assert simulation.run(2.5).steps == 250
+    assert simulation.run(0.1).steps == 10
+
+
 def test_the_loop_is_never_faster_than_its_rate(world: flatland.World) -> None:
     result = Simulation(world, 500).run(0.5)
     assert result.steps == 50
