@@ -164,7 +164,10 @@ def __getattr__(name: str) -> Any:
     elif name == "load_world":
         value = import_module("flatland.world").World.from_yaml
     elif not name.startswith("_") and find_spec(f"{__name__}.{name}") is not None:
-        return import_module(f"{__name__}.{name}")
+        try:
+            return import_module(f"{__name__}.{name}")
+        except ImportError as error:  # The module needs an extra that is not installed.
+            raise AttributeError(f"module {__name__!r} has no attribute {name!r}: {error}") from error
     else:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     globals()[name] = value

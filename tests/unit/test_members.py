@@ -45,6 +45,17 @@ def test_unknown_members_raise() -> None:
     assert not hasattr(flatland, "_unknown")
 
 
+def test_a_module_whose_packages_are_missing_is_no_member() -> None:
+    code = (
+        "import sys; sys.modules['gymnasium'] = None\n"
+        "import flatland; print(hasattr(flatland, 'gym'))\n"
+        "flatland.gym"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert done.stdout == "False\n", done.stderr
+    assert "AttributeError: module 'flatland' has no attribute 'gym': " in done.stderr
+
+
 def test_the_node_publishes_its_time_before_the_simulation_is_imported() -> None:
     code = (
         "import sys\n"
