@@ -56,6 +56,7 @@ def test_node_in_a_group(
         "/clock",
         "/tf",
         "/rosout",
+        "/robots/model_states",
         "/robots/laser",  # remapped
         "/robots/odometry/filtered",
         "/robots/odometry/ground_truth",

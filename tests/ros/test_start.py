@@ -218,6 +218,8 @@ def test_server_launch_passes_all_parameters(launcher: Any, ros: Any, world: Pat
         "model_path": f"{world.parent}:/usr",
         "record": "",
         "record_mcap": "",
+        "lockstep": False,
+        "model_states_rate": 50,
     }
     assert ros.master.getParam("/use_sim_time") is True
     ros.log_everything()

@@ -72,6 +72,7 @@ TOPICS = {
     "/r1/imu/ground_truth": "sensor_msgs/Imu",
     "/odometry/filtered": "nav_msgs/Odometry",
     "/odometry/ground_truth": "nav_msgs/Odometry",
+    "/model_states": "flatland/ModelStates",
     "/rosout": "rosgraph_msgs/Log",
 }
 COMMANDS = {"/r1/cmd_vel": "geometry_msgs/Twist", "/cmd_vel": "geometry_msgs/Twist"}
@@ -79,6 +80,13 @@ SERVICES = {
     "/spawn_model",
     "/delete_model",
     "/move_model",
+    "/spawn_models",
+    "/delete_models",
+    "/move_models",
+    "/get_model_states",
+    "/set_layer_map",
+    "/step_world",
+    "/reset_world",
     "/set_rate",
     "/pause",
     "/resume",

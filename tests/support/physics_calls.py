@@ -639,7 +639,10 @@ _WEIGHTS: Final = {
     "do_create_polygon": 6,
     "do_create_edges": 3,
     "do_destroy_body": 3,
-    "do_step": 20,
+    "do_step": 30,
+    "do_set_hook": 5,  # a copy has no hook
+    "do_continue_with_a_copy": 1,
+    "do_restore": 1,
     "do_boundaries": 1,
     "do_clear": 1,
     "do_close": 1,

@@ -54,7 +54,8 @@ def test_world(folder: Path, capsys: Any) -> None:
 def test_the_test_of_a_plugin_passes() -> None:
     assert main("new", "plugin", "speed_meter") == 0
     done = subprocess.run(
-        [sys.executable, "-W", "error", "-m", "unittest", "discover", "-s", "speed_meter/test"],
+        # Without bytecode, which Python reuses if a file changes within a second.
+        [sys.executable, "-BW", "error", "-m", "unittest", "discover", "-s", "speed_meter/test"],
         capture_output=True,
         text=True,
         timeout=TIMEOUT,
