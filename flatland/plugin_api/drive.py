@@ -215,7 +215,7 @@ class Odometer:
             publishing,
             outputs=emitted,
             transforms=self.sends_transform,
-            body=self._body,
+            bodies=[self._body],
             skipped=self._skip,
         )
         return timer
@@ -230,12 +230,12 @@ class Odometer:
             self._drift.advance(self._body.pose)
         self._publish_after_step(timekeeper)
 
-    def _skip(self, count: int, stamp: int, pose: Pose | None) -> None:
-        """Makes up for updates that nothing wanted; see `FlatlandPlugin.call_when_due`."""
+    def _skip(self, count: int, stamp: int, poses: tuple[Pose, ...]) -> None:
+        """Takes over skipped updates; see `FlatlandPlugin.call_when_due`."""
         for noise in self._active_noise:
             noise.begin_update(count)
-        if self.sends_transform and pose is not None:
-            noisy_pose = self._noisy_estimate(pose)
+        if self.sends_transform:
+            noisy_pose = self._noisy_estimate(poses[0])
             self._plugin.send_past_transform(stamp, self.frame_id, self.child_frame_id, *noisy_pose)
 
     @property

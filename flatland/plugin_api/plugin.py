@@ -196,7 +196,7 @@ class FlatlandPlugin:
         *,
         outputs: Iterable[Output[Any]] | None = None,
         transforms: bool = False,
-        body: Body | None = None,
+        bodies: Iterable[Body] = (),
         skipped: SkippedHandler | None = None,
         touches: Touches | None = None,
         calls_at_touches: bool = False,
@@ -215,10 +215,10 @@ class FlatlandPlugin:
             outputs: The outputs to which the hook emits; without any that is wanted, there is no
                 call. None to call the hook in any case.
             transforms: Whether to call the hook also while an observer wants transforms.
-            body: Body whose pose `skipped` needs.
+            bodies: Bodies whose poses `skipped` needs.
             skipped: Makes up for updates that were due without a call of the hook. It is called as
-                `skipped(count, stamp, pose)` with the number of updates, the simulated time of the
-                last one [ns], and the pose of `body` at that time, None without a body. It is
+                `skipped(count, stamp, poses)` with the number of updates, the simulated time of the
+                last one [ns], and the poses of `bodies` at that time, world frame [m, rad]. It is
                 called before the next call of the hook and before the state of the plugin or the
                 transforms are read, and must not emit anything.
             touches: Contacts that `clear` is called for at updates without a call of the hook.
@@ -234,7 +234,7 @@ class FlatlandPlugin:
             timer,
             None if outputs is None else tuple(outputs),
             transforms,
-            body,
+            tuple(bodies),
             skipped,
             touches,
             calls_at_touches,

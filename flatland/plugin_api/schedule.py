@@ -16,8 +16,8 @@ if TYPE_CHECKING:
 
 H = TypeVar("H", bound=Callable[..., None])
 
-SkippedHandler = Callable[[int, int, "Pose | None"], None]
-"""Called as `handler(count, stamp, pose)`, see `FlatlandPlugin.call_when_due`."""
+SkippedHandler = Callable[[int, int, "tuple[Pose, ...]"], None]
+"""Called as `handler(count, stamp, poses)`, see `FlatlandPlugin.call_when_due`."""
 
 _MARK: Final = "_flatland_when_due"
 _BATCH: Final = "_flatland_batch"
@@ -31,7 +31,7 @@ class HookSchedule:
         timer: Timer of the updates.
         outputs: What the hook computes, None if it is always needed.
         transforms: Whether the hook sends transforms.
-        body: Body whose pose `skipped` needs.
+        bodies: Bodies whose poses `skipped` needs.
         skipped: Makes up for updates without a call.
         touches: Contacts that are to be cleared at updates without a call, and after whose steps
             the hook is called if `calls_at_touches` is set.
@@ -41,7 +41,7 @@ class HookSchedule:
     timer: UpdateTimer
     outputs: tuple[Output[Any], ...] | None
     transforms: bool
-    body: Body | None
+    bodies: tuple[Body, ...]
     skipped: SkippedHandler | None
     touches: Touches | None
     calls_at_touches: bool

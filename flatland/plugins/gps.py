@@ -57,8 +57,8 @@ class Gps(ModelPlugin):
             parent = self.model.frame(self._body.name)
             self.send_transform(parent, self._frame_id, *self._origin)
 
-    def _skip(self, count: int, stamp: int, pose: Pose | None) -> None:
-        del count, pose
+    def _skip(self, count: int, stamp: int, poses: tuple[Pose, ...]) -> None:
+        del count, poses
         if self._broadcast_tf:
             parent = self.model.frame(self._body.name)
             self.send_past_transform(stamp, parent, self._frame_id, *self._origin)

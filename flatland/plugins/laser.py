@@ -183,9 +183,9 @@ class Laser(ModelPlugin):
             skipped=self._skip,
         )
 
-    def _skip(self, count: int, stamp: int, pose: Pose | None) -> None:
-        """Makes up for updates that nothing wanted; see `FlatlandPlugin.call_when_due`."""
-        del pose
+    def _skip(self, count: int, stamp: int, poses: tuple[Pose, ...]) -> None:
+        """Takes over skipped updates; see `FlatlandPlugin.call_when_due`."""
+        del poses
         self._noise.begin_update(count)
         if self._sends_transform:
             self.send_past_transform(

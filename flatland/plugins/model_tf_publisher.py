@@ -12,8 +12,13 @@ from flatland.plugin_api.schedule import when_due
 from flatland.plugin_api.update_timer import UpdateTimer
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+
     from flatland.config.reader import YamlReader
+    from flatland.geometry import Pose
     from flatland.timekeeper import Timekeeper
+
+    FrameTransform = tuple[str, str, float, float, float]
 
 
 class ModelTfPublisher(ModelPlugin):
@@ -28,7 +33,7 @@ class ModelTfPublisher(ModelPlugin):
         self.reference = read_body_or_first(config, self.model, "reference")
         excluded = read_bodies(config, self.model, "exclude")
         self.timer = UpdateTimer(read_rate(config))
-        self.call_when_due(update_after_step(self, config, self.timer), self.timer)
+        hook = update_after_step(self, config, self.timer)
         self._sends_world: bool = config.get("publish_tf_world", "bool", False)
         self.world_frame_id = config.get("world_frame_id", "string", "map")
         self._reference_frame_id = self.model.frame(self.reference.name)
@@ -37,20 +42,37 @@ class ModelTfPublisher(ModelPlugin):
             for body in self.model.bodies
             if body is not self.reference and body not in excluded
         ]
+        self.call_when_due(
+            hook,
+            self.timer,
+            outputs=(),
+            transforms=True,
+            bodies=[self.reference, *(body for body, _ in self._others)],
+            skipped=self._skip,
+        )
 
     @when_due
     def before_physics_step(self, timekeeper: Timekeeper) -> None:
         """Sends the transforms if an update is due."""
         if not self.timer.check_update(timekeeper):
             return
-        x, y, yaw = self.reference.pose
+        poses = [body.pose for body, _ in self._others]
+        for transform in self._transforms(self.reference.pose, poses):
+            self.send_transform(*transform)
+
+    def _skip(self, count: int, stamp: int, poses: tuple[Pose, ...]) -> None:
+        """Takes over skipped updates; see `FlatlandPlugin.call_when_due`."""
+        del count
+        for transform in self._transforms(poses[0], poses[1:]):
+            self.send_past_transform(stamp, *transform)
+
+    def _transforms(self, reference: Pose, others: Sequence[Pose]) -> Iterator[FrameTransform]:
+        """Returns all transforms: parent, child, and the pose of the child in the parent."""
+        x, y, yaw = reference
         c, s = math.cos(yaw), math.sin(yaw)
-        reference_frame_id = self._reference_frame_id
-        for body, frame_id in self._others:
-            body_x, body_y, body_yaw = body.pose
+        parent = self._reference_frame_id
+        for (_, frame_id), (body_x, body_y, body_yaw) in zip(self._others, others, strict=True):
             dx, dy = body_x - x, body_y - y
-            self.send_transform(
-                reference_frame_id, frame_id, c * dx + s * dy, c * dy - s * dx, body_yaw - yaw
-            )
+            yield parent, frame_id, c * dx + s * dy, c * dy - s * dx, body_yaw - yaw
         if self._sends_world:
-            self.send_transform(self.world_frame_id, reference_frame_id, x, y, yaw)
+            yield self.world_frame_id, parent, x, y, yaw

@@ -74,6 +74,11 @@ class Bridge(WorldObserver):
         self._clock.time_advanced(time_ns)
 
     @property
+    def watches_steps(self) -> bool:
+        """Whether the clock needs each step."""
+        return self._clock.watches_steps
+
+    @property
     def wants_transforms(self) -> bool:
         """Whether `/tf` has subscribers."""
         return self._tf.connected

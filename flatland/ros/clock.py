@@ -32,6 +32,10 @@ _MAX_STAMP_AGE_NS: Final = round(MAX_STAMP_AGE * NANOSECONDS)
 class NodeClock(Protocol):
     """Relates the simulated time to the ROS time; notified by the bridge."""
 
+    @property
+    def watches_steps(self) -> bool:
+        """Whether the clock is to be notified of each step, not only of the last one of several."""
+
     def step_started(self, time_ns: int) -> None:
         """A step starts at a simulated time [ns]."""
 
@@ -79,6 +83,11 @@ class SimulatedClock:
         if self._ticker is not None:
             self._ticker.close()
         self._topic.close()
+
+    @property
+    def watches_steps(self) -> bool:
+        """Whether each step is published."""
+        return self._ticker is None and self._topic.connected
 
     def step_started(self, time_ns: int) -> None:
         """Has no effect."""
@@ -173,6 +182,11 @@ class WallClock:
     def close(self) -> None:
         """Makes `stamps` use simulated time again."""
         stamps.set_stamps(None)
+
+    @property
+    def watches_steps(self) -> bool:
+        """Returns True: a stamp is the wall time of a step."""
+        return True
 
     def step_started(self, time_ns: int) -> None:
         """Renews the stamp of the current simulated time if it is too old."""

@@ -64,6 +64,15 @@ class WorldObserver:
         """
 
     @property
+    def watches_steps(self) -> bool:
+        """Whether the observer is to be notified of each step.
+
+        Otherwise, `step_started`, `time_advanced` and `step_finished` may be called once for
+        several steps in which no code of plugins is called, which are then much faster.
+        """
+        return True
+
+    @property
     def wants_transforms(self) -> bool:
         """Whether `transforms_sent` is to be called in this step."""
         return True
@@ -95,6 +104,7 @@ class Observers:
         self._of_transforms: tuple[WorldObserver, ...] = ()
         self._of_start: tuple[WorldObserver, ...] = ()
         self._of_finish: tuple[WorldObserver, ...] = ()
+        self._of_steps: tuple[WorldObserver, ...] = ()  # all of the four
 
     def add(self, observer: WorldObserver, world: World) -> None:
         """Adds an observer and attaches it to a world."""
@@ -123,6 +133,8 @@ class Observers:
         self._of_transforms = tuple(o for o in observers if _overrides(o, "transforms_sent"))
         self._of_start = tuple(o for o in observers if _overrides(o, "step_started"))
         self._of_finish = tuple(o for o in observers if _overrides(o, "step_finished"))
+        of_any = (*self._of_time, *self._of_transforms, *self._of_start, *self._of_finish)
+        self._of_steps = tuple(dict.fromkeys(of_any))
 
     # -- ports: raising refuses the port ---------------------------------------------------
 
@@ -171,8 +183,8 @@ class Observers:
 
     @property
     def watch_steps(self) -> bool:
-        """Whether an observer is to be notified in every step."""
-        return bool(self._of_start or self._of_finish or self._of_time or self._of_transforms)
+        """Whether an observer is to be notified of each step."""
+        return any(observer.watches_steps for observer in self._of_steps)
 
     @property
     def want_transforms(self) -> bool:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from bisect import bisect_left
 from collections import Counter, deque
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Final
 
@@ -36,7 +36,8 @@ class ScheduledHook:
         order: Place of the plugin in the order of hooks.
         clock: Number of the clock of the core.
         bits: The clocks in whose steps the hook is called, as bits.
-        record: Record of the updates without a call, None if nothing is made up for.
+        records: Records of the updates without a call, one for each body whose pose is recorded;
+            empty if nothing is made up for.
         is_called: Whether the hook is called when an update is due.
         was_called: Whether it was called at least once, or at least is no longer to be.
     """
@@ -46,7 +47,7 @@ class ScheduledHook:
     order: int
     clock: int
     bits: int
-    record: int | None = None
+    records: tuple[int, ...] = ()
     is_called: bool = True
     was_called: bool = False
 
@@ -112,10 +113,12 @@ class StepSchedule:
         if asked.calls_at_touches:
             found.bits |= _TOUCHING
         if asked.skipped is not None or asked.touches is not None:
-            body_id = None if asked.body is None else asked.body.id
             touches_id = None if asked.touches is None else asked.touches.id
-            found.record = self._plan.add_record(clock, order, body_id, touches_id)
-            self._records[found.record] = found
+            body_ids: Sequence[int | None] = [body.id for body in asked.bodies] or [None]
+            found.records = tuple(
+                self._plan.add_record(clock, order, body_id, touches_id) for body_id in body_ids
+            )
+            self._records.update(dict.fromkeys(found.records, found))
         self._set_called(found, True)
         phase = self._phases[hook]
         phase.hooks[plugin] = found
@@ -154,9 +157,9 @@ class StepSchedule:
                 continue
             if hook.is_called:
                 self._set_called(hook, False)
-            if hook.record is not None:
-                del self._records[hook.record]
-                self._plan.remove_record(hook.record)
+            for record in hook.records:
+                del self._records[record]
+                self._plan.remove_record(record)
             self._new = [other for other in self._new if other is not hook]
             self._changed(phase)
         for controller in getattr(plugin, "_controllers", ()):
@@ -189,7 +192,7 @@ class StepSchedule:
 
     def _orders(self, phase: _Phase) -> Iterator[int]:
         for plugin, hook in phase.hooks.items():
-            if hook.record is not None or plugin._controllers:
+            if hook.records or plugin._controllers:
                 yield hook.order
 
     # -- which hooks are called ------------------------------------------------------------
@@ -233,10 +236,10 @@ class StepSchedule:
         return any(output.wanted for output in asked.outputs)
 
     def _set_called(self, hook: ScheduledHook, is_called: bool) -> None:
-        if hook.record is not None:
-            if is_called and not hook.is_called:
-                self.settle()
-            self._plan.enable_record(hook.record, not is_called)
+        if hook.records and is_called and not hook.is_called:
+            self.settle()
+        for record in hook.records:
+            self._plan.enable_record(record, not is_called)
         if hook.bits & _TOUCHING and hook.schedule.touches is not None:
             hook.schedule.touches.end_runs(is_called)
             self._touching += 1 if is_called else -1
@@ -287,16 +290,19 @@ class StepSchedule:
         if not self._records:
             return
         step_size_ns = self._timekeeper.step_size_ns
-        skipped = [
-            (self._records[record], count, step * step_size_ns, pose)
-            for record, count, step, pose in self._plan.take_skipped()
-        ]
-        for hook, count, stamp, pose in sorted(skipped, key=lambda each: each[0].order):
+        taken = {
+            record: (count, step, pose) for record, count, step, pose in self._plan.take_skipped()
+        }
+        hooks = dict.fromkeys(self._records[record] for record in taken)
+        for hook in sorted(hooks, key=lambda each: each.order):
             asked = hook.schedule
             if asked.skipped is None:
                 continue
+            updates = [taken[record] for record in hook.records]
+            count, step, _ = updates[0]
+            poses = tuple(pose for *_, pose in updates) if asked.bodies else ()
             try:
-                asked.skipped(count, stamp, None if asked.body is None else pose)
+                asked.skipped(count, step * step_size_ns, poses)
             except PLUGIN_FAULTS as error:
                 self._on_fault(hook.plugin, hook.name, error)
 

@@ -61,27 +61,43 @@ class Stepping:
 
     def step(self, n: int, *, while_paused: bool = False) -> None:
         """Steps n times; see `World.step`."""
+        self._requests.refuse_in_plugin("step")
+        while n > 0:
+            n -= self._step_up_to(n, while_paused)
+
+    def step_up_to(self, n: int) -> int:
+        """Steps at most n times: until code has been called or a request has been processed.
+
+        Args:
+            n: Maximum number of steps, at least 1.
+
+        Returns:
+            The number of steps; 1 for a paused world, 0 if a request came before the first step.
+
+        Raises:
+            Exception: As `World.step`.
+        """
+        self._requests.refuse_in_plugin("step")
+        return self._step_up_to(n, while_paused=False)
+
+    def _step_up_to(self, n: int, while_paused: bool) -> int:
         requests, faults = self._requests, self._faults
-        requests.refuse_in_plugin("step")
-        actions, thread = requests.actions, threading.get_ident()
-        left = n
-        while left > 0:
-            with requests.lock:
-                self._start()
-                if self._world.paused and not while_paused:
-                    left -= 1
-                else:
-                    requests.hook_thread = thread
-                    self._observers.step_started()
-                    try:
-                        left -= self._advance(left)
-                    finally:
-                        self._observers.step_finished()
-                        requests.hook_thread = None
-                if actions:
-                    requests.process()
-            if faults.first is not None:
-                faults.raise_first()
+        made = 1
+        with requests.lock:
+            self._start()
+            if while_paused or not self._world.paused:
+                requests.hook_thread = threading.get_ident()
+                self._observers.step_started()
+                try:
+                    made = self._advance(n)
+                finally:
+                    self._observers.step_finished()
+                    requests.hook_thread = None
+            if requests.actions:
+                requests.process()
+        if faults.first is not None:
+            faults.raise_first()
+        return made
 
     def begin_batch(self, n: int, locks: ExitStack) -> StepRun | None:
         """Prepares up to n steps in the core; for `flatland.runtime.batch`.
@@ -197,6 +213,7 @@ class Stepping:
         made, end, report = result
         if made:
             timekeeper.sim_time_ns += made * timekeeper.step_size_ns
+            self._observers.time_advanced(timekeeper.sim_time_ns)
         if end in (RunEnd.DONE, RunEnd.STOPPED):
             return made
         if end == RunEnd.CALL:

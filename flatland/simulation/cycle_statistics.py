@@ -61,14 +61,18 @@ class CycleWindow:
         self._min = math.inf
         self._max = 0.0
 
-    def add(self, worked: float) -> None:
-        """Adds a cycle.
+    def add(self, worked: float, count: int = 1) -> None:
+        """Adds a cycle, or several of the same length.
 
         Args:
-            worked: Wall time spent working in the cycle [s].
+            worked: Wall time spent working in all of them [s].
+            count: Number of cycles.
         """
-        self._count += 1
+        if not count:
+            return
+        self._count += count
         self._sum += worked
+        worked /= count
         if worked < self._min:
             self._min = worked
         if worked > self._max:

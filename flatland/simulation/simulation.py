@@ -19,6 +19,9 @@ from flatland.timekeeper import NANOSECONDS, Timekeeper
 from flatland.world import World
 
 _PAUSED_PERIOD: Final = 0.01  # s between two cycles of a paused world without a rate
+# Without a rate, a cycle has up to this many steps, as long as they take less than this time [s].
+_MAX_STEPS: Final = 256
+_SHORT_CYCLE: Final = 1e-3
 _MAX_WAIT: Final = 3600.0  # s; Python raises for a timeout of several centuries
 
 R = TypeVar("R")
@@ -214,6 +217,7 @@ class Simulation:
         timekeeper = world.timekeeper
         due = start
         window = self._new_window(start)
+        steps = 1
         while not self._stopped and elapsed.update() < duration_ns:
             if self._steps:
                 due += self._serve_steps()
@@ -227,9 +231,9 @@ class Simulation:
                 period, due = self._period, begin
                 window = self._new_window(begin)
                 monitor.reset()
-            world.step()
+            count = world.stepping.step_up_to(steps)
             end = clock()
-            window.add(end - begin)
+            window.add(end - begin, count)
             if end - window.start >= self._report_period:
                 self._finish(window, end)
                 window = self._new_window(end)
@@ -243,8 +247,12 @@ class Simulation:
                     monitor.lose(end - due - max_lag, period, end)
                     due = end - max_lag
                 due += self._wait_until(due, period)
+                steps = 1
             elif world.paused:
                 self._wait_until(end + _PAUSED_PERIOD, period)
+            else:
+                left = duration_ns - elapsed.update()
+                steps = _next_steps(steps, end - begin, left / timekeeper.step_size_ns)
 
     def _wait_until(self, due: float, period: float) -> float:
         """Waits until a wall time and runs requests meanwhile.
@@ -286,6 +294,18 @@ class Simulation:
             self.statistics = window.statistics(now, now_ns)
             if self._report is not None:
                 self._report(self.statistics)
+
+
+def _next_steps(steps: int, worked: float, left: float) -> int:
+    """Returns how many steps without calls of plugins may follow each other in one cycle.
+
+    Args:
+        steps: The number for the last cycle.
+        worked: Wall time of the last cycle [s].
+        left: Number of steps to the end of the run, may be infinite.
+    """
+    steps = min(2 * steps, _MAX_STEPS) if worked < _SHORT_CYCLE else max(1, steps // 4)
+    return max(1, min(steps, math.ceil(min(left, _MAX_STEPS))))
 
 
 def _period_of(update_rate: float) -> float:

@@ -107,6 +107,10 @@ class RecordedClock:
     def __init__(self, log: list[str]) -> None:
         self._log = log
 
+    @property
+    def watches_steps(self) -> bool:
+        return True
+
     def step_started(self, time_ns: int) -> None:
         self._log.append(f"start {time_ns // 1_000_000}")
 

@@ -117,3 +117,24 @@ def test_invalid_parameters_are_errors(plugin_world: Any, extra: str, message: s
     text = plugin_world.error(f"- {{type: ModelTfPublisher, name: tf, {extra}}}", bodies=BODIES)
     assert 'Model Plugin "tf" type "ModelTfPublisher" model "robot": ' in text
     assert message in text
+
+
+@pytest.mark.parametrize("extra", ["", "publish_tf_world: true", "update_rate: 30"])
+def test_transforms_that_nobody_wanted_are_those_of_the_last_update(tf: Any, extra: str) -> None:
+    def transforms(observers: list[flatland.WorldObserver]) -> list[dict[Any, flatland.Transform]]:
+        world = tf(extra)
+        for observer in observers:
+            world.add_observer(observer)
+        found = []
+        for index, body in enumerate(world.model("robot").bodies):
+            body.set_velocity(0.3, -0.2 * index, 0.5 + index)
+        for steps in (1, 7, 40):
+            world.step(steps)
+            found.append(world.transforms)
+        return found
+
+    class Listener(flatland.WorldObserver):
+        def transforms_sent(self, transforms: Any) -> None:
+            del transforms
+
+    assert transforms([]) == transforms([Listener()])

@@ -8,6 +8,7 @@ import threading
 import time
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 from waiting import TIMEOUT
@@ -251,3 +252,53 @@ def test_a_closed_world_ends_the_loop_with_an_error(world: flatland.World) -> No
     world.close()
     with pytest.raises(flatland.WorldError, match="closed"):
         simulation.run()
+
+
+class LastStep(flatland.WorldObserver):
+    """Needs no notification of each step."""
+
+    def __init__(self) -> None:
+        self.times: list[int] = []
+
+    @property
+    def watches_steps(self) -> bool:
+        return False
+
+    def time_advanced(self, time_ns: int) -> None:
+        self.times.append(time_ns)
+
+
+@pytest.fixture
+def unwatched(world: flatland.World, counter: Counter) -> tuple[flatland.World, LastStep]:
+    world.remove_observer(counter)
+    observer = LastStep()
+    world.add_observer(observer)
+    return world, observer
+
+
+def test_without_a_rate_a_cycle_has_many_steps_if_nothing_watches_them(unwatched: Any) -> None:
+    world, observer = unwatched
+    result = Simulation(world, 0).run(123.45)
+    assert result.steps == 12345
+    assert world.time == 123.45
+    assert observer.times == sorted(set(observer.times))
+    assert observer.times[-1] == 123_450_000_000
+    assert len(observer.times) < 5000
+
+
+def test_with_a_rate_each_cycle_has_one_step(unwatched: Any) -> None:
+    world, observer = unwatched
+    Simulation(world, 1000.0).run(0.2)
+    assert observer.times == [10_000_000 * (i + 1) for i in range(20)]
+
+
+def test_a_request_interrupts_the_steps_of_a_cycle(unwatched: Any) -> None:
+    world, observer = unwatched
+    with Running(Simulation(world, 0)) as simulation:
+        simulation.post(lambda: simulation.set_rate(100.0)).result(TIMEOUT)
+        simulation.post(lambda: None).result(TIMEOUT)
+        before = len(observer.times)
+        last = simulation.post(lambda: world.timekeeper.sim_time_ns).result(TIMEOUT)
+        steps = [b - a for a, b in itertools.pairwise(observer.times[before:])]
+    assert set(steps) <= {10_000_000}
+    assert last >= observer.times[before - 1]
