@@ -20,6 +20,8 @@ from sb3_vector import StableVector
 from stable_baselines3 import PPO
 from stable_baselines3.common.env_checker import check_env
 
+from flatland.gym import FlatlandVectorEnv
+
 FOLDER = Path(evaluate.__file__).resolve().parent
 WORLD = FOLDER.parents[1] / "worlds" / "learning" / "navigate.yaml"
 EPISODES = 20
@@ -49,7 +51,7 @@ def simulator(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]
     monkeypatch.setenv("ROS_IP", "127.0.0.1")
     monkeypatch.setenv("ROS_HOME", str(tmp_path))
     command = ["roslaunch", "-p", str(port), "flatland", "server.launch", f"world_path:={WORLD}"]
-    log = (tmp_path / "log").open("wb")
+    log = (tmp_path / "roslaunch.log").open("wb")
     process = subprocess.Popen(
         [*command, "show_viz:=false", "lockstep:=true"],
         stdout=log,
@@ -92,7 +94,7 @@ def test_the_vector_ends_episodes_as_stable_baselines_expects() -> None:
         assert abs(following[row] - observations[row]).max() > 0.1
     envs.close()
     with pytest.raises(ValueError, match="SAME_STEP"):
-        StableVector(make_many(1, autoreset_mode="NextStep"))
+        StableVector(FlatlandVectorEnv(1, autoreset_mode="NextStep"))
 
 
 def test_training_improves_the_policy(policy: Path) -> None:

@@ -619,21 +619,22 @@ def test_a_cell_that_always_kills_its_worker_is_a_row_with_an_error(
     ids=["kill-ray", "interrupt-ray", "terminate-local"],
 )
 def test_an_interrupted_sweep_continues_where_it_stopped(number, options, arguments, tmp_path):
-    arguments["--seeds"] = "0:150"
+    count = 500  # about 20 s
+    arguments["--seeds"] = f"0:{count}"
     parts = tmp_path / "out" / "parts"
     process = start_sweep(arguments, "--workers", "1", *options, folder=tmp_path)
     wait_until("the first rows", lambda: any(parts.glob("*.parquet")), TIMEOUT, poll_period=0.01)
     process.send_signal(number)
     output, _ = process.communicate(timeout=SWEEP_TIMEOUT)
     before = read_results(tmp_path / "out")
-    assert 0 < len(before) < 150
+    assert 0 < len(before) < count
     if number == signal.SIGKILL:
         assert process.returncode == -signal.SIGKILL
     else:
         assert process.returncode == 130, output
-        assert f"interrupted with {150 - len(before)} of 150 cells missing" in output
+        assert f"interrupted with {count - len(before)} of {count} cells missing" in output
     after = sweep(arguments, "--workers", "2", *options, folder=tmp_path)
-    assert len(after) == 150
+    assert len(after) == count
     # Rows from before the interruption were not computed again.
     kept = after.merge(before, on=list(KEY), suffixes=("", "_before"))
     assert len(kept) == len(before)
