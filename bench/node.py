@@ -53,10 +53,10 @@ def rows(unit: float) -> list[Row]:
         subscribed = _fastest(session, world, CLOCK, SCAN, ODOMETRY)
         four = _fastest(session, world, SCAN, TF, ODOMETRY, TWIST)
         markers = _markers(world)
-        displayed = _fastest(session, world, *markers, show_viz=True)
+        displayed = _fastest(session, quiet_world, *markers, show_viz=True)
         use = min(_processor_use(session, quiet_world, SCAN) for _ in range(RUNS))
         displayed_use = min(
-            _processor_use(session, world, *markers, show_viz=True) for _ in range(RUNS)
+            _processor_use(session, quiet_world, *markers, show_viz=True) for _ in range(RUNS)
         )
         starts, peaks = zip(*(_start(session, world) for _ in range(RUNS)), strict=True)
         spawn = _spawn(session, quiet_world)
