@@ -231,7 +231,11 @@ class Simulation:
                 period, due = self._period, begin
                 window = self._new_window(begin)
                 monitor.reset()
-            count = world.stepping.step_up_to(steps)
+            if period:
+                count = 1
+                world.step()
+            else:
+                count = world.stepping.step_up_to(steps)
             end = clock()
             window.add(end - begin, count)
             if end - window.start >= self._report_period:
