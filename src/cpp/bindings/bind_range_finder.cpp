@@ -65,15 +65,19 @@ b2Transform to_transform(const Triple& pose) {
   return transform;
 }
 
-// Several shared uses that end together.
+// Shared uses of several worlds that end together.
 class SharedUses {
  public:
-  void add(World& world) { uses_.push_back(std::make_unique<World::SharedUse>(world)); }
+  // Adds a use of a world that is not in use yet.
+  void add(World& world) {
+    if (worlds_.insert(&world).second) uses_.push_back(std::make_unique<World::SharedUse>(world));
+  }
   void end() {
     for (const auto& use : uses_) use->end();
   }
 
  private:
+  std::unordered_set<const World*> worlds_;
   std::vector<std::unique_ptr<World::SharedUse>> uses_;
 };
 
@@ -86,41 +90,60 @@ class PyScans {
   }
 
   void add(World& world, const RangeFinder& finder, Id body, const NoiseKey& key, Ranges ranges) {
-    const Triple pose = finder.pose_of(pose_of(world, body));
-    Readings out{ranges.mutable_data(), nullptr};
-    py::object intensities = py::none();
-    if (finder.has_intensities()) {
-      Ranges values(static_cast<py::ssize_t>(finder.beams()));
-      out.intensities = values.mutable_data();
-      intensities = std::move(values);
-    }
-    jobs_.push_back({&world.rays(), &finder, to_transform(pose), key, out});
-    results_.push_back(py::make_tuple(py::make_tuple(pose[0], pose[1], pose[2]), std::move(ranges),
-                                      std::move(intensities)));
+    std::optional<Ranges> intensities;
+    if (finder.has_intensities()) intensities.emplace(static_cast<py::ssize_t>(finder.beams()));
+    scans_.push_back({&world, &finder, body, key, std::move(ranges), std::move(intensities), {}});
     beams_ += finder.beams();
   }
 
-  // Returns (pose, ranges, intensities) of each scan. Safe without the GIL: `uses` prevents changes
-  // of the worlds, and the caller keeps them and the range finders alive. If another thread
-  // accesses the arrays, their contents are unspecified.
-  template <typename Use>
-  std::vector<py::tuple> run(Use& uses, ThreadPool& pool, std::size_t num_threads) {
-    without_gil_if(beams_ > kShortScans, uses, [&] { scan_all(jobs_, pool, num_threads); });
-    return std::move(results_);
+  // Returns (pose, ranges, intensities) of each scan. Safe without the GIL: the worlds are in use,
+  // and the caller keeps them and the range finders alive. If another thread accesses the arrays,
+  // their contents are unspecified.
+  std::vector<py::tuple> run(ThreadPool& pool, std::size_t num_threads) {
+    // No Python object is created while the worlds are in use. That may start the garbage
+    // collector, which runs Python code; another thread may then acquire the GIL and wait for the
+    // end of the use.
+    SharedUses uses;
+    std::vector<ScanJob> jobs;
+    for (PyScan& scan : scans_) {
+      uses.add(*scan.world);
+      scan.pose = scan.finder->pose_of(pose_of(*scan.world, scan.body));
+      const Readings out{scan.ranges.mutable_data(),
+                         scan.intensities ? scan.intensities->mutable_data() : nullptr};
+      jobs.push_back({&scan.world->rays(), scan.finder, to_transform(scan.pose), scan.key, out});
+    }
+    without_gil_if(beams_ > kShortScans, uses, [&] { scan_all(jobs, pool, num_threads); });
+    std::vector<py::tuple> results;
+    for (PyScan& scan : scans_) {
+      const auto& [x, y, theta] = scan.pose;
+      py::object intensities = py::none();
+      if (scan.intensities) intensities = std::move(*scan.intensities);
+      results.push_back(py::make_tuple(py::make_tuple(x, y, theta), std::move(scan.ranges),
+                                       std::move(intensities)));
+    }
+    return results;
   }
 
  private:
-  std::vector<ScanJob> jobs_;
-  std::vector<py::tuple> results_;
+  struct PyScan {
+    World* world;
+    const RangeFinder* finder;
+    Id body;
+    NoiseKey key;
+    Ranges ranges;
+    std::optional<Ranges> intensities;
+    Triple pose;  // of the sensor
+  };
+
+  std::vector<PyScan> scans_;
   std::size_t beams_ = 0;
 };
 
 py::tuple py_scan(const RangeFinder& finder, World& world, Id body, std::uint64_t stream,
                   std::uint64_t update) {
-  World::SharedUse use(world);
   PyScans scans;
   scans.add(world, finder, body, {stream, update});
-  return scans.run(use, world.threads(), 1).front();
+  return scans.run(world.threads(), 1).front();
 }
 
 // A view of row `i` of the output array.
@@ -160,15 +183,12 @@ std::vector<py::tuple> py_scan_all(const std::vector<PyJob>& jobs, const py::obj
   std::optional<Ranges> array;
   if (!out.is_none()) array = checked_output(out, jobs);
   if (jobs.empty()) return {};
-  SharedUses uses;
-  std::unordered_set<const World*> worlds;
   PyScans scans;
   for (std::size_t i = 0; i < jobs.size(); ++i) {
     const auto& [world, finder, body, stream, update] = jobs[i];
     if (world == nullptr || finder == nullptr) {
       throw py::type_error("a scan requires a world and a range finder, got None");
     }
-    if (worlds.insert(world.get()).second) uses.add(*world);
     if (array) {
       scans.add(*world, *finder, body, {stream, update},
                 row_of(*array, static_cast<py::ssize_t>(i)));
@@ -176,8 +196,7 @@ std::vector<py::tuple> py_scan_all(const std::vector<PyJob>& jobs, const py::obj
       scans.add(*world, *finder, body, {stream, update});
     }
   }
-  return scans.run(uses, std::get<0>(jobs.front())->threads(),
-                   static_cast<std::size_t>(num_threads));
+  return scans.run(std::get<0>(jobs.front())->threads(), static_cast<std::size_t>(num_threads));
 }
 
 }  // namespace

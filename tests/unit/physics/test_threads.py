@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import subprocess
 import sys
 import threading
 import time
@@ -245,6 +246,49 @@ def test_long_calls_release_the_gil() -> None:
     assert releases_gil(lambda: world.cast_rays_reference((50, 50, 0), ends[:20_000], 0xFFFF))
     assert not releases_gil(lambda: sum(range(1000))), "the check must be able to fail"
     world.close()
+
+
+# Scans in a process in which the garbage collector runs often and lets another thread step.
+COLLECTS_GARBAGE_DURING_SCANS = """
+import gc
+import threading
+import time
+
+from flatland.physics import PhysicsWorld, RangeFinder, ScanRequest, scan_all
+
+world = PhysicsWorld()
+body = world.create_body("dynamic", (0, 0, 0))
+finder = RangeFinder([[1, 0]], 1.0, origin=(0, 0, 0), mask=1)
+requests = [ScanRequest(finder, body, 0, 0)] * 300
+is_done = False
+steps = []
+
+def step():
+    while not is_done:
+        world.step(0.01, 1, 1)
+        steps.append(1)
+        time.sleep(1e-4)
+
+thread = threading.Thread(target=step, daemon=True)
+thread.start()
+gc.callbacks.append(lambda phase, info: time.sleep(1e-3))
+gc.set_threshold(1)
+before = len(steps)
+scans = scan_all(requests)
+assert len(steps) > before
+assert len(scans) == 300
+gc.callbacks.clear()
+is_done = True
+thread.join()
+print("done")
+"""
+
+
+def test_a_world_can_be_changed_while_a_scan_waits_for_the_garbage_collector() -> None:
+    """In a process of its own: a change that waits for the end of the scan holds the GIL."""
+    command = [sys.executable, "-c", COLLECTS_GARBAGE_DURING_SCANS]
+    result = subprocess.run(command, capture_output=True, text=True, timeout=TIMEOUT, check=False)
+    assert (result.stdout, result.returncode) == ("done\n", 0), result.stderr
 
 
 def test_several_threads_cast_rays_in_one_world() -> None:
