@@ -167,7 +167,9 @@ def __getattr__(name: str) -> Any:
         try:
             return import_module(f"{__name__}.{name}")
         except ImportError as error:  # The module needs an extra that is not installed.
-            raise AttributeError(f"module {__name__!r} has no attribute {name!r}: {error}") from error
+            raise AttributeError(
+                f"module {__name__!r} has no attribute {name!r}: {error}"
+            ) from error
     else:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     globals()[name] = value

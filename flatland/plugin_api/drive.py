@@ -231,7 +231,7 @@ class Odometer:
         self._publish_after_step(timekeeper)
 
     def _skip(self, count: int, stamp: int, pose: Pose | None) -> None:
-        """Makes up for updates that nothing wanted; see `FlatlandPlugin.call_when_due`."""
+        """Accounts for skipped updates; see `FlatlandPlugin.call_when_due`."""
         for noise in self._active_noise:
             noise.begin_update(count)
         if self.sends_transform and pose is not None:

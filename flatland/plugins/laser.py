@@ -184,7 +184,7 @@ class Laser(ModelPlugin):
         )
 
     def _skip(self, count: int, stamp: int, pose: Pose | None) -> None:
-        """Makes up for updates that nothing wanted; see `FlatlandPlugin.call_when_due`."""
+        """Accounts for skipped updates; see `FlatlandPlugin.call_when_due`."""
         del pose
         self._noise.begin_update(count)
         if self._sends_transform:
