@@ -1,9 +1,9 @@
 """The base class of the kinds of objects.
 
 Each class of objects has a kind, which saves the contents of an object, writes them back, and
-copies the object. Plugins need no code for this. A class declares attributes that are not part of the
-simulated state, such as locks and subscribers, in a dictionary `outside_state`: it maps their names
-to functions that return their values in a copied world.
+copies the object. Plugins need no code for this. A class declares attributes that are not part of
+the simulated state, such as locks and subscribers, in a dictionary `outside_state`: it maps their
+names to functions that return their values in a copied world.
 """
 
 from __future__ import annotations

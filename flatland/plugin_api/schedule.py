@@ -59,7 +59,7 @@ def when_due(hook: H) -> H:
 
 
 class HookBatch(NamedTuple):
-    """The parts of a hook, which handle consecutive plugins of a step together.
+    """The parts of a hook that handles consecutive plugins of a step together.
 
     A step calls `begin` of all plugins, then `perform` once with those for which it returned true,
     then `finish` of each of these. The parts must not move bodies.
