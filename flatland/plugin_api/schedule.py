@@ -51,15 +51,15 @@ def when_due(hook: H) -> H:
     """Marks a hook that has nothing to do in steps in which no update is due.
 
     A decorator for `before_physics_step` and `after_physics_step`. The hook is called in every step
-    unless `FlatlandPlugin.call_when_due` declares when an update is due. If a subclass overrides the
-    hook without this mark, its hook is called in every step.
+    unless `FlatlandPlugin.call_when_due` restricts its calls. If a subclass overrides the hook
+    without this mark, its hook is called in every step.
     """
     setattr(hook, _MARK, True)
     return hook
 
 
 class HookBatch(NamedTuple):
-    """The parts of a hook that handles consecutive plugins of a step together.
+    """The parts of a hook that serves consecutive plugins of a step together.
 
     A step calls `begin` of all plugins, then `perform` once with those for which it returned true,
     then `finish` of each of these. The parts must not move bodies.
