@@ -171,12 +171,12 @@ def is_cached_file(path: str) -> bool:
 
 
 def cached_result(path: str, arguments: Hashable, make: Callable[[], T]) -> T:
-    """Returns what is made of a file, from the cache of the current world if it is in use.
+    """Returns the parsed content of a file, from the cache of the current world if it is in use.
 
     Args:
         path: The file.
         arguments: Everything else that the result depends on, and a name of the kind of result.
-        make: Reads the file and makes the result, which must not be changed.
+        make: Reads the file and returns the result, which must not be changed.
     """
     inputs = _current.get()
     if inputs is None or not inputs._is_caching:

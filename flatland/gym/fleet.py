@@ -30,7 +30,7 @@ Steps = tuple[
 
 
 class FleetEnv(ParallelEnv[str, Any, FloatArray]):  # type: ignore[misc, unused-ignore]
-    """Robots that drive to their goals in the same world; each sees the others in its scan.
+    """Robots that drive to their goals in the same world, as obstacles in the scans of the others.
 
     A robot whose episode has ended stops and remains in the world as an obstacle.
 

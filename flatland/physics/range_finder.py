@@ -18,7 +18,7 @@ BeamFan = _core.BeamFan
 """End points of beams, shape (n, 2), prepared for scans; may be shared by range finders."""
 
 RangeNoise = _core.RangeNoise
-"""A noise model of a range finder, made by `additive`, `proportional` or `beam`."""
+"""A noise model of a range finder, created by `additive`, `proportional` or `beam`."""
 
 
 class Scan(NamedTuple):

@@ -166,7 +166,7 @@ class Laser(ModelPlugin):
 
     @property
     def always_publish(self) -> bool:
-        """Whether to compute scans that nothing wants; settable."""
+        """Whether to compute scans that are not wanted; settable."""
         return self._always_publish
 
     @always_publish.setter

@@ -44,7 +44,7 @@ OUTSIDE: Final = frozenset(
 
 
 class WorldSnapshot:
-    """The state of a world at one time, made by `World.snapshot`.
+    """The state of a world at one time, returned by `World.snapshot`.
 
     Attributes:
         time_ns: Simulated time [ns].
