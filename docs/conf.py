@@ -79,6 +79,8 @@ autodoc_type_aliases = {
         "NodeKind",
         "Params",
         "Pose",
+        "SkippedHandler",
+        "SpeedLimits",
         "Triple",
         "Vector2",
     )
@@ -97,11 +99,13 @@ nitpick_ignore_regex = [
     (r"py:class", r"(np|npt|numpy|pybind11_builtins)\..*"),
     (r"py:class", r"(builtins|collections\.abc|concurrent\.futures|contextlib|os|threading)\..*"),
     (r"py:class", "Future"),
-    (r"py:(class|exc)", r"(gymnasium|pathlib)\..*"),
+    (r"py:(class|exc)", r"(gymnasium|pathlib|pettingzoo)\..*"),
+    (r"py:exc", r"(ClosedEnvironmentError|InvalidAction|ResetNeeded)"),  # of Gymnasium
     # Names that flatland.gym imports only for type checkers, or that are not described.
     (r"py:class", r"(FleetEnv|Laser|Touches)"),
+    (r"py:class", r"flatland\._core\..*"),
     # Type variables.
-    (r"py:(class|obj)", r"(flatland\.[a-z_.]+\.)?[DRT]"),
+    (r"py:(class|obj)", r"(flatland\.[a-z_.]+\.)?[CDHRT]"),
 ]
 # Classes that programs create; the others are created by flatland.
 _CONSTRUCTED = {

@@ -24,8 +24,8 @@ EVALUATION_SEED = 1_000_000  # of the first episode; not used in training
 def arguments(**changes: Any) -> dict[str, Any]:
     """Returns the arguments of the environment.
 
-    The 180 beams are combined to 36 sectors, so that a small network suffices. To come close to
-    obstacles costs a little, so that the robot learns to keep away before it collides.
+    The 180 beams are combined into 36 sectors, so that a small network suffices. A small penalty
+    for short distances to obstacles teaches the robot to keep away before it collides.
     """
     return {
         "observation": Observation(Scan(36, half=0.5), Goal(), Velocity()),
@@ -35,7 +35,7 @@ def arguments(**changes: Any) -> dict[str, Any]:
 
 
 def make_many(num_envs: int, **changes: Any) -> FlatlandVectorEnv:
-    """Returns environments for training, in which an episode follows the other at once."""
+    """Returns environments for training; the next episode begins in the step that ends one."""
     return make_vec(NAME, num_envs, autoreset_mode="SameStep", **arguments(**changes))
 
 

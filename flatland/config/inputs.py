@@ -20,11 +20,11 @@ T = TypeVar("T")
 
 @dataclass(slots=True)
 class InputCache:
-    """What the files and parameters of a world contained when the world was loaded.
+    """The contents of the files and parameters of a world when the world was loaded.
 
     Attributes:
         files: Content of each file.
-        results: What was made of other files, such as images, by the arguments of the function.
+        results: Parsed contents of other files, such as images, by the arguments of the function.
         params: Values of the parameters.
         grids: The last grid of each layer whose map is received from a topic, by its first name.
     """
@@ -37,7 +37,7 @@ class InputCache:
 
 @dataclass(slots=True)
 class Inputs:
-    """What was read while a world and its models were loaded.
+    """The files and parameters that were read while a world and its models were loaded.
 
     Attributes:
         seed: Seed of the random numbers of expressions.
@@ -171,12 +171,12 @@ def is_cached_file(path: str) -> bool:
 
 
 def cached_result(path: str, arguments: Hashable, make: Callable[[], T]) -> T:
-    """Returns what is made of a file, from the cache of the current world if it is in use.
+    """Returns the parsed content of a file, from the cache of the current world if it is in use.
 
     Args:
         path: The file.
         arguments: Everything else that the result depends on, and a name of the kind of result.
-        make: Reads the file and makes the result, which must not be changed.
+        make: Reads the file and returns the result, which must not be changed.
     """
     inputs = _current.get()
     if inputs is None or not inputs._is_caching:

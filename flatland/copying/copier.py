@@ -15,7 +15,7 @@ T = TypeVar("T")
 
 
 class Copier:
-    """Copies objects with all that they refer to; each object is copied once."""
+    """Copies objects with everything that they refer to; each object is copied once."""
 
     def __init__(self, kinds: dict[type[Any], Kind]) -> None:
         """Creates a copier.
@@ -30,7 +30,7 @@ class Copier:
         self._last: list[Callable[[], object]] = []
 
     def add(self, original: object, copy: T) -> T:
-        """Determines the copy of an object; returns it."""
+        """Registers the copy of an object and returns it."""
         self._copies[id(original)] = (original, copy)
         return copy
 
@@ -52,11 +52,11 @@ class Copier:
         return kind.copy(obj, self) if found is None else found[1]
 
     def later(self, action: Callable[[], object]) -> None:
-        """Calls a function that completes a copy, not recursively: chains of objects are long."""
+        """Schedules a function that completes a copy; recursion would overflow for long chains."""
         self._pending.append(action)
 
     def at_end(self, action: Callable[[], object]) -> None:
-        """Calls a function when all copies have their attributes."""
+        """Schedules a function for when all copies have their attributes."""
         self._last.append(action)
 
     def finish(self) -> None:

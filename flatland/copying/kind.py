@@ -1,9 +1,9 @@
 """The base class of the kinds of objects.
 
-Each class of objects has a kind, which knows how to save what an object contains, to write it back,
-and to copy the object. Plugins need to know nothing of this. A class says which of its attributes
-are not part of the simulated state, such as locks and subscribers, by a dictionary `outside_state`
-of their names and of functions that return their values in a copied world.
+Each class of objects has a kind, which saves the contents of an object, writes them back, and
+copies the object. Plugins need no code for this. A class declares attributes that are not part of
+the simulated state, such as locks and subscribers, in a dictionary `outside_state`: it maps their
+names to functions that return their values in a copied world.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ class Kind:
     is_immutable = True
 
     def record(self, obj: Any, recorder: Recorder) -> None:
-        """Saves what an object contains, and follows the references to other objects.
+        """Saves the contents of an object, and follows its references to other objects.
 
         Raises:
             UncopyableError: The object has a state that cannot be read.
@@ -52,10 +52,10 @@ class MutableKind(Kind):
 
 
 class Connection(MutableKind):
-    """Connections to the outside of a world: they stay as they are, and cannot be copied."""
+    """Connections to the outside of a world: not changed by a restore, and not copied."""
 
     def record(self, obj: Any, recorder: Recorder) -> None:
-        """Notes the connection."""
+        """Records the connection."""
         recorder.outside.append(obj)
 
     def copy(self, obj: Any, copier: Copier) -> Any:

@@ -21,7 +21,7 @@ class _Plain(MutableKind):
     """An object of a class that is written in Python: attributes and slots."""
 
     def __init__(self, cls: type[Any]) -> None:
-        """Finds the slots of a class, and what is not part of its state."""
+        """Determines the slots of a class, and the attributes that are not part of its state."""
         self.cls = cls
         self.outside: dict[str, Callable[[], object]] = {}
         for base in reversed(cls.__mro__):
@@ -73,7 +73,7 @@ class _Plain(MutableKind):
         return made
 
     def fill(self, obj: Any, made: Any, copier: Copier) -> None:
-        """Gives a copy its attributes."""
+        """Sets the attributes of a copy."""
         if self.has_dict:
             attributes = vars(made)
             for name, value in vars(obj).items():
@@ -95,7 +95,7 @@ def _slot(member: types.MemberDescriptorType, obj: object) -> Any:
 
 
 class _PhysicsHandle(_Plain):
-    """A handle of a physics object, whose hash must be right from the start."""
+    """A handle of a physics object, whose hash must be valid from the start."""
 
     def copy(self, obj: Any, copier: Copier) -> Any:
         made = copier.add(obj, object.__new__(self.cls))
@@ -136,7 +136,7 @@ class _Container(_Plain):
 
 
 class _Stateful(MutableKind):
-    """An object that defines `__getstate__`: what this returns is saved and copied instead."""
+    """An object that defines `__getstate__`, whose result is saved and copied instead."""
 
     def __init__(self, cls: type[Any]) -> None:
         self._cls = cls
@@ -161,7 +161,7 @@ class _Stateful(MutableKind):
 
 
 def set_state(obj: Any, state: Any) -> None:
-    """Gives an object what its `__getstate__` returned, as the modules copy and pickle do."""
+    """Applies the result of `__getstate__` to an object, as the modules copy and pickle do."""
     if hasattr(obj, "__setstate__"):
         obj.__setstate__(state)
         return

@@ -1,4 +1,4 @@
-"""Records of what all objects of a world contain, to be written back into the same objects."""
+"""Records of the contents of all objects of a world, to be written back into the same objects."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ Entry = tuple[Write, Any, Any]
 class Recorder:
     """Saves the contents of objects and of all objects that they refer to.
 
-    The identity of the objects is kept: whoever refers to one of them, also by a closure, refers to
-    it after the contents were written back.
+    The identity of the objects is kept: references to them, including those of closures, remain
+    valid after the contents were written back.
 
     Attributes:
         outside: The objects found that connect a plugin to the outside of the world.
@@ -27,7 +27,7 @@ class Recorder:
 
         Args:
             kinds: The kinds of classes found so far; it is extended.
-            excluded: Objects that are left alone.
+            excluded: Objects that are not saved.
         """
         self.outside: list[object] = []
         self._kinds = kinds
@@ -38,7 +38,7 @@ class Recorder:
         self._last: list[Entry] = []
 
     def follow(self, objects: Iterable[object]) -> None:
-        """Saves some more objects, which must be kept alive by ones that were saved."""
+        """Saves further objects, which saved objects must keep alive."""
         self._pending.extend(objects)
 
     def add(self, write: Write, obj: Any, content: Any) -> None:
@@ -46,11 +46,11 @@ class Recorder:
         self._written.append((write, obj, content))
 
     def add_last(self, write: Write, obj: Any, content: Any) -> None:
-        """Does the same for content that is written back after all other content."""
+        """Adds content that is written back after all other content."""
         self._last.append((write, obj, content))
 
     def record(self, objects: Iterable[object]) -> StateRecord:
-        """Saves some objects and all that they refer to.
+        """Saves objects and everything that they refer to.
 
         Raises:
             UncopyableError: An object has a state that cannot be read.
@@ -80,7 +80,7 @@ class StateRecord:
 
         Args:
             entries: Functions that write a content back, with the object and the content.
-            last: Calls of `__setstate__`, which are made when all content was written back.
+            last: Calls of `__setstate__`, performed after all contents were written back.
         """
         self._entries = entries
         self._last = last

@@ -26,7 +26,7 @@ class FlatlandEnv(gymnasium.Env[Any, FloatArray]):
     the seed of the reset and the actions only, not on earlier episodes.
 
     Attributes:
-        world: The world; a step of another program with it is not part of an episode.
+        world: The world; it must be stepped only by the environment.
     """
 
     metadata: dict[str, Any] = {  # noqa: RUF012 - as in the base class

@@ -26,8 +26,8 @@ if TYPE_CHECKING:
 class Episodes:
     """Agents of one or several worlds, whose episodes begin and advance.
 
-    All numbers of a row are the same functions of its world for any number of rows, so that a
-    vector of environments equals as many single ones, bit by bit.
+    The numbers of a row are a function of its world, for any number of rows. The results of a
+    vector of environments therefore equal those of single environments, bit by bit.
 
     Attributes:
         agents: The agents.
@@ -81,7 +81,7 @@ class Episodes:
             start = finite_pose(options.get("start", start))
             goal = finite_pose((*options.get("goal", goal), 0.0))[:2]
         self._refuse_taken(agent, start, goal, occupied)
-        # The agents that have not been placed yet may still be there.
+        # Agents that have not been placed yet may overlap the start.
         agent.world.move_model(agent.model.name, start, "allow")
         s.goals[row] = goal
         s.steps[row] = 0
@@ -124,10 +124,10 @@ class Episodes:
         s.collided[chosen] = [agent.touches.touched for agent in agents]
 
     def look(self, rows: Rows | None = None) -> None:
-        """Scans, and computes the observations.
+        """Performs scans and computes the observations.
 
         Args:
-            rows: Agents that look; None for all.
+            rows: Agents whose observations are computed; None for all.
         """
         s, goal_radius = self.situation, self.task.goal_radius
         chosen = self._all if rows is None else rows

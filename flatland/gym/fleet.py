@@ -30,7 +30,7 @@ Steps = tuple[
 
 
 class FleetEnv(ParallelEnv[str, Any, FloatArray]):  # type: ignore[misc, unused-ignore]
-    """Robots that drive to their goals in the same world; each sees the others in its scan.
+    """Robots that drive to their goals in the same world, as obstacles in the scans of the others.
 
     A robot whose episode has ended stops and remains in the world as an obstacle.
 
@@ -116,7 +116,7 @@ class FleetEnv(ParallelEnv[str, Any, FloatArray]):  # type: ignore[misc, unused-
 
         Args:
             seed: Seed of the random numbers of this episode and the next ones.
-            options: Ignored, as other environments of PettingZoo do with options they do not have.
+            options: Ignored, as in other environments of PettingZoo.
 
         Returns:
             The first observations and infos by the names of the robots.
@@ -214,7 +214,7 @@ class FleetEnv(ParallelEnv[str, Any, FloatArray]):  # type: ignore[misc, unused-
         path = included_folder() / ROBOT if robot is None else robot
         agents: list[Agent] = []
         for name in self.possible_agents:
-            # Where it is now is not simulated: each reset places all robots.
+            # This pose is never simulated: each reset places all robots.
             self.world.spawn_model(path, name, name, if_blocked="allow")
             agents.append(settings.find_agent(self.world, name))
         check_alike(agents)

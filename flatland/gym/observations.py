@@ -1,4 +1,4 @@
-"""Observations: what a policy is given, composed of parts."""
+"""Observations: the input of a policy, composed of parts."""
 
 from __future__ import annotations
 
@@ -32,10 +32,10 @@ class ObservationPart(ABC):
 
     @abstractmethod
     def size(self, beams: int) -> int:
-        """Returns how many numbers it has for a laser with a number of beams.
+        """Returns the number of values for a laser with a given number of beams.
 
         Raises:
-            ValueError: It cannot be computed from that many beams.
+            ValueError: The part does not support this number of beams.
         """
 
     @abstractmethod
@@ -62,7 +62,7 @@ class Scan(ObservationPart):
             half: Range that is observed as 0.5 [m]; None for a linear scale.
 
         Raises:
-            ValueError: There are less than 1 sectors, or `half` is not positive.
+            ValueError: There is less than 1 sector, or `half` is not positive.
         """
         if half is not None and not (math.isfinite(half) and half > 0):
             raise ValueError(f"half must be positive [m], got {half}")

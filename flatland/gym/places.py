@@ -20,10 +20,10 @@ _TRIES: Final = 2000
 
 
 class Places:
-    """The free places of a map that an agent can reach from where its world file puts it.
+    """The free places of a map that an agent can reach from its pose in the world file.
 
-    They depend on the walls alone, so that copies of a world share them. That a drawn place is
-    free of walls and models is confirmed by an exact test in the world of the episode.
+    They depend only on the walls, so that copies of a world share them. An exact test in the world
+    of the episode verifies that a drawn place is free of walls and models.
 
     Attributes:
         radius: Radius of the disc that must fit [m].
@@ -35,7 +35,7 @@ class Places:
         """Prepares the grid of free places.
 
         Args:
-            agent: The agent; models do not block the way.
+            agent: The agent; models are not regarded as obstacles.
             clearance: Distance to keep from walls and models [m].
             origin: A place in the world frame [m] from which all others can be reached; None for
                 the place of the agent, or, if it does not fit there, for the largest region.

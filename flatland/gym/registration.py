@@ -34,7 +34,7 @@ def register_all() -> None:
             kwargs=arguments,
         )
     for name in PARALLEL:
-        # Gymnasium has no environments with several agents: the entry point says so.
+        # Gymnasium has no environments with several agents: the entry point raises an error.
         gymnasium.register(name, entry_point=functools.partial(_refuse, name))
 
 

@@ -86,7 +86,7 @@ class Contact(Reward):
 
 
 class Step(Reward):
-    """1 for each step; scaled by a negative number, it makes shorter paths better."""
+    """1 for each step; scaled by a negative number, it favours short paths."""
 
     def compute(self, situation: Situation) -> DoubleArray:
         """Returns 1 for all agents."""

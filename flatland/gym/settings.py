@@ -1,4 +1,4 @@
-"""What an environment consists of, with defaults for navigation."""
+"""The parts of an environment, with defaults for navigation."""
 
 from __future__ import annotations
 

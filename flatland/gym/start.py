@@ -23,7 +23,7 @@ class StartState:
         """Returns to the state, with new random numbers of all plugins.
 
         Args:
-            rng: Source of the seeds: equal states give equal noise.
+            rng: Source of the seeds; the noise is a function of its state.
         """
         world = self._world
         world.restore(self._snapshot)

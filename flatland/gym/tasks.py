@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 @dataclass(slots=True)
 class Occupied:
-    """What the agents that start at the same time have taken.
+    """The places that other agents of the same start occupy.
 
     Attributes:
         goals: Their goals in the world frame [m].
@@ -57,7 +57,7 @@ class Task(ABC):
         Args:
             agent: The agent, whose world is in its initial state.
             rng: The only source of random numbers: equal states give equal episodes.
-            occupied: What the other agents of the world have taken.
+            occupied: The places that other agents of the world occupy.
 
         Raises:
             WorldError: There is no room.
@@ -70,8 +70,8 @@ class RandomGoal(Task):
     The start is uniform over the free space that the agent can reach from its place in the world
     file; the goal is uniform over the part of it that has the right distance from the start.
 
-    A path leads to the goal that does not leave the rectangle around start and goal by more than a
-    margin. Goals behind a wall, whose door is far away, are the task of a planner with a map.
+    There is a path to the goal that leaves the rectangle around start and goal by at most a margin.
+    This excludes goals behind a wall whose door is far away, which require a planner with a map.
 
     Attributes:
         distance: Least and greatest distance of the goal from the start, along a straight line [m].

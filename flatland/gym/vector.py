@@ -224,7 +224,7 @@ class FlatlandVectorEnv(VectorEnv[Any, Any, Any]):
             self._has_begun[row], self._has_ended[row] = True, False
 
     def _finish(self, ended: BoolArray) -> dict[str, Any]:
-        """Begins the next episodes, and returns what the last step of the previous ones gave."""
+        """Begins the next episodes, and returns the results of the previous ones."""
         rows = np.flatnonzero(ended)
         observations = np.full(self.num_envs, None, dtype=object)
         for row in rows.tolist():

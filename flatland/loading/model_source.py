@@ -1,4 +1,4 @@
-"""What models are created from: files, or YAML text given instead of a path."""
+"""The sources of models: files, or YAML text given instead of a path."""
 
 from __future__ import annotations
 

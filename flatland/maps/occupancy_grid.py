@@ -137,7 +137,7 @@ class EdgeGrid:
 
 
 class GivenGrid:
-    """The grid that a layer was made from."""
+    """The grid from which a layer was created."""
 
     def __init__(self, grid: OccupancyGrid) -> None:
         """Stores the grid."""

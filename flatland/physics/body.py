@@ -96,10 +96,10 @@ class PhysicsBody(Handle):
         *,
         holonomic: bool = True,
     ) -> VelocityController:
-        """Makes each step of a `World` set the velocity of the body in its own frame.
+        """Creates a controller that sets the velocity of the body in its own frame in each step.
 
-        The core carries it out before the hooks of plugins; it costs a tenth of a call of
-        `set_velocity` in a hook. The commanded velocity is 0 at first.
+        The core carries it out before the hooks of plugins, in a tenth of the time of a hook that
+        calls `set_velocity`. The commanded velocity is initially 0.
 
         Args:
             linear: Limits of the forward and sideways velocity [m/s], acceleration and deceleration

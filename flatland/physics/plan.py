@@ -1,4 +1,4 @@
-"""What the core does in each step besides the physics, and when code of plugins is to be called."""
+"""Work of the core in each step besides the physics, and the steps that call plugins."""
 
 from __future__ import annotations
 
@@ -23,11 +23,11 @@ class RunEnd(IntEnum):
     """Why a run of steps ended.
 
     Attributes:
-        DONE: All steps were made.
+        DONE: All steps were performed.
         CALL: Code is to be called in the next step, which has not begun.
         FAILED: The next step has begun, and a controller has failed before the physics step.
-        PHYSICS: The next step has begun, and its physics step was made, but nothing after it.
-        STOPPED: `interrupt` was called, or the run took long.
+        PHYSICS: The next step has begun, and its physics step was performed, but nothing after it.
+        STOPPED: `interrupt` was called, or the run reached its time limit.
     """
 
     DONE = 0
@@ -42,7 +42,7 @@ RunResult = tuple[int, int, tuple[list[int], list[int]] | None]
 
 
 class StepRun(NamedTuple):
-    """Steps to be made without calling code.
+    """Steps to be performed without calling Python code.
 
     Attributes:
         world: The physics world.
@@ -64,11 +64,11 @@ class StepRun(NamedTuple):
 
 
 def run_worlds(runs: Sequence[StepRun], num_threads: int) -> list[RunResult | Exception]:
-    """Makes steps of several worlds in parallel, without the GIL if that takes long.
+    """Performs steps of several worlds in parallel, without the GIL if that takes long.
 
     Args:
-        runs: The steps, each of another world.
-        num_threads: Maximum number of threads; 0 for all processors.
+        runs: The steps, each of a different world.
+        num_threads: Maximum number of threads; 0 for one per core.
 
     Returns:
         What `StepPlan.run` returns or raises, for each world.
@@ -150,7 +150,7 @@ class StepPlan:
         return self._core.take_skipped()
 
     def run(self, run: StepRun) -> RunResult:
-        """Makes steps without calling code; releases the GIL if that takes long.
+        """Performs steps without calling Python code; releases the GIL if that takes long.
 
         Args:
             run: The steps of this world.
@@ -175,10 +175,10 @@ class StepPlan:
         return self._core.begin_step(step)
 
     def carry_out(self, is_after: bool, until: int, dt: float) -> bool:
-        """Carries out what precedes a plugin and was not carried out in this step yet.
+        """Carries out the pending work of this step that precedes a plugin.
 
         Args:
-            is_after: Whether the physics step was made.
+            is_after: Whether the physics step was performed.
             until: Place of the plugin in the order of hooks.
             dt: Duration of the step [s].
 

@@ -18,7 +18,7 @@ BeamFan = _core.BeamFan
 """End points of beams, shape (n, 2), prepared for scans; may be shared by range finders."""
 
 RangeNoise = _core.RangeNoise
-"""A noise model of a range finder, made by `additive`, `proportional` or `beam`."""
+"""A noise model of a range finder, created by `additive`, `proportional` or `beam`."""
 
 
 class Scan(NamedTuple):
@@ -37,7 +37,7 @@ class Scan(NamedTuple):
 
 
 class RangeFinder:
-    """A fan of beams, what stops them, and how they are read; immutable and without a world.
+    """A fan of beams with their filter and their noise model; immutable, independent of a world.
 
     Readings are a function of the poses of all fixtures, of the stream of random numbers and of the
     number of the update. They depend neither on other scans nor on the number of threads.

@@ -1,4 +1,4 @@
-"""Collectors of contacts, which need no call at each contact."""
+"""Collectors of contacts, which call no Python code at each contact."""
 
 from __future__ import annotations
 
@@ -73,7 +73,7 @@ class Touches(Handle):
         return self._core.was_touched(self.id)
 
     def clear(self) -> None:
-        """Forgets the contacts that have ended; those that exist remain."""
+        """Discards the contacts that have ended; those that exist remain."""
         self._core.clear_touches(self.id)
 
     def __len__(self) -> int:

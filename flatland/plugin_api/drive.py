@@ -231,7 +231,7 @@ class Odometer:
         self._publish_after_step(timekeeper)
 
     def _skip(self, count: int, stamp: int, poses: tuple[Pose, ...]) -> None:
-        """Takes over skipped updates; see `FlatlandPlugin.call_when_due`."""
+        """Accounts for skipped updates; see `FlatlandPlugin.call_when_due`."""
         for noise in self._active_noise:
             noise.begin_update(count)
         if self.sends_transform:

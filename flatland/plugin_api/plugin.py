@@ -205,23 +205,23 @@ class FlatlandPlugin:
 
         Further calls may change only `outputs`.
 
-        Other steps need no Python code and are made in the core, many at a time. The hook must be
-        marked by `flatland.when_due`, and checks the timer itself. The first update due is always
-        called, others only if something wants what the hook computes.
+        The core performs the other steps, many at a time, without Python code. The hook must be
+        marked by `flatland.when_due`, and checks the timer itself. It is always called for the
+        first due update, and for others only if one of its outputs is wanted.
 
         Args:
             hook: `before_physics_step` or `after_physics_step`.
             timer: Timer of the updates.
-            outputs: The outputs to which the hook emits; without any that is wanted, there is no
-                call. None to call the hook in any case.
+            outputs: The outputs to which the hook emits; the hook is not called while none of them
+                is wanted. None to call the hook in any case.
             transforms: Whether to call the hook also while an observer wants transforms.
             bodies: Bodies whose poses `skipped` needs.
-            skipped: Makes up for updates that were due without a call of the hook. It is called as
+            skipped: Accounts for updates that were due without a call of the hook. It is called as
                 `skipped(count, stamp, poses)` with the number of updates, the simulated time of the
                 last one [ns], and the poses of `bodies` at that time, world frame [m, rad]. It is
                 called before the next call of the hook and before the state of the plugin or the
                 transforms are read, and must not emit anything.
-            touches: Contacts that `clear` is called for at updates without a call of the hook.
+            touches: Contacts whose `clear` is called at updates without a call of the hook.
             calls_at_touches: Whether to call the hook also after steps in which there are contacts
                 in `touches`; for `after_physics_step`.
 
@@ -242,7 +242,7 @@ class FlatlandPlugin:
         self.world.plugin_host.schedule.change()
 
     def control(self, controller: C) -> C:
-        """Takes over a controller, for `on_initialize`; returns it.
+        """Assigns a controller to the plugin and returns it; for `on_initialize`.
 
         The core carries it out in each step at the place of `before_physics_step` of the plugin if
         that hook is marked by `when_due` and restricted by `call_when_due`; otherwise the hook is
@@ -326,7 +326,7 @@ class FlatlandPlugin:
     def send_past_transform(
         self, stamp: int, parent: str, child: str, x: float, y: float, yaw: float, roll: float = 0.0
     ) -> None:
-        """Adds a transform of an earlier step that nothing wanted, for `World.transforms`.
+        """Adds a transform of an earlier step that was not wanted, for `World.transforms`.
 
         For the function `skipped` of `call_when_due`. Transforms that were never sent are ignored.
 

@@ -29,10 +29,10 @@ class HookSchedule:
 
     Attributes:
         timer: Timer of the updates.
-        outputs: What the hook computes, None if it is always needed.
+        outputs: Outputs that the hook computes, None if it is always called.
         transforms: Whether the hook sends transforms.
         bodies: Bodies whose poses `skipped` needs.
-        skipped: Makes up for updates without a call.
+        skipped: Accounts for updates without a call.
         touches: Contacts that are to be cleared at updates without a call, and after whose steps
             the hook is called if `calls_at_touches` is set.
         calls_at_touches: Whether to call the hook also in steps with contacts.
@@ -51,15 +51,15 @@ def when_due(hook: H) -> H:
     """Marks a hook that has nothing to do in steps in which no update is due.
 
     A decorator for `before_physics_step` and `after_physics_step`. The hook is called in every step
-    unless `FlatlandPlugin.call_when_due` says when an update is due. If a subclass overrides the
-    hook without this mark, its hook is called in every step.
+    unless `FlatlandPlugin.call_when_due` restricts its calls. If a subclass overrides the hook
+    without this mark, its hook is called in every step.
     """
     setattr(hook, _MARK, True)
     return hook
 
 
 class HookBatch(NamedTuple):
-    """The parts of a hook that serves the plugins that follow each other in one step together.
+    """The parts of a hook that serves consecutive plugins of a step together.
 
     A step calls `begin` of all plugins, then `perform` once with those for which it returned true,
     then `finish` of each of these. The parts must not move bodies.
@@ -94,5 +94,5 @@ def is_called_when_due(hook: Callable[..., None]) -> bool:
 
 @when_due
 def not_called(timekeeper: Timekeeper) -> None:
-    """The hook of a plugin that moved its work to another hook."""
+    """Hook of a plugin whose work was moved to another hook."""
     del timekeeper

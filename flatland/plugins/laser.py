@@ -166,7 +166,7 @@ class Laser(ModelPlugin):
 
     @property
     def always_publish(self) -> bool:
-        """Whether to compute scans that nothing wants; settable."""
+        """Whether to compute scans that are not wanted; settable."""
         return self._always_publish
 
     @always_publish.setter
@@ -184,7 +184,7 @@ class Laser(ModelPlugin):
         )
 
     def _skip(self, count: int, stamp: int, poses: tuple[Pose, ...]) -> None:
-        """Takes over skipped updates; see `FlatlandPlugin.call_when_due`."""
+        """Accounts for skipped updates; see `FlatlandPlugin.call_when_due`."""
         del poses
         self._noise.begin_update(count)
         if self._sends_transform:

@@ -119,7 +119,7 @@ class Recorder(WorldObserver):
 
     @contextmanager
     def repeated(self) -> Iterator[None]:
-        """Records nothing that happens in a change of a hook."""
+        """Suspends the recording during a change that a hook has requested."""
         self._depth += 1
         try:
             yield

@@ -89,7 +89,7 @@ class ModelStatesTopic(WorldObserver):
         self._schedule()
 
     def _schedule(self) -> None:
-        """Publishes once after the current request, however many models it changes."""
+        """Schedules one message after the current request, for any number of changed models."""
         if not self._changed:
             self._changed = True
             self._post(self._send_change)

@@ -13,7 +13,7 @@ KEEP_SEED: Final = -1
 
 
 class ResetService:
-    """Resets the world; the topics of models that are there again stay registered."""
+    """Resets the world; topics that exist before and after stay registered."""
 
     def __init__(self, calls: ServiceCalls) -> None:
         """Advertises the service asynchronously.

@@ -1,4 +1,4 @@
-"""What the services of the node have in common: requests, their results and their errors."""
+"""The common part of the services of the node: requests, their results and their errors."""
 
 from __future__ import annotations
 
@@ -88,7 +88,7 @@ class ServiceCalls:
 
 
 def describe_displacement(model: Model | None, requested: Pose) -> str:
-    """Describes where a model was put instead of the requested pose; empty if it is there."""
+    """Describes a pose that differs from the requested one; empty if it does not."""
     if model is None or model.displacement == (0.0, 0.0):
         return ""
     dx, dy = model.displacement

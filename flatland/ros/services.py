@@ -1,4 +1,4 @@
-"""The services of the node: spawn, delete and move models, pause, resume and set the rate."""
+"""The services of the node for single models, pause and rate; creates all other services."""
 
 from __future__ import annotations
 

@@ -13,9 +13,9 @@ if TYPE_CHECKING:
 
 
 def step_worlds(worlds: Sequence[World], n: int = 1, num_threads: int = 0) -> None:
-    """Steps each of some worlds n times; the same as `for world in worlds: world.step(n)`.
+    """Steps each of several worlds n times; the same as `for world in worlds: world.step(n)`.
 
-    Steps in which no code of plugins is due are made in the core, with the worlds in parallel and
+    Steps in which no hook is due are performed in the core, with the worlds in parallel and
     without the GIL; the results do not depend on the number of threads. Worlds that are observed,
     recorded or paused, and those with hooks that are called in every step, are stepped one after
     the other.
@@ -23,13 +23,13 @@ def step_worlds(worlds: Sequence[World], n: int = 1, num_threads: int = 0) -> No
     Args:
         worlds: The worlds, each at most once.
         n: Number of steps.
-        num_threads: Maximum number of threads; 0 for all processors.
+        num_threads: Maximum number of threads; 0 for one per core.
 
     Raises:
         ValueError: A world is given twice, or the number of threads is negative.
         WorldError: As `World.step`.
-        Exception: As `World.step`. If worlds raise, the first exception in their order is raised
-            when all other worlds have made their steps.
+        Exception: As `World.step`. If several worlds raise, the exception of the first one is
+            raised after all other worlds have been stepped.
     """
     if num_threads < 0:
         raise ValueError(f"num_threads must not be negative, got {num_threads}")
@@ -43,7 +43,7 @@ def step_worlds(worlds: Sequence[World], n: int = 1, num_threads: int = 0) -> No
 
 
 class _Batch:
-    """Steps that are still to be made.
+    """Steps that remain to be performed.
 
     Attributes:
         left: Steps by the index of the world, in the order in which worlds are locked.
@@ -58,7 +58,7 @@ class _Batch:
         self.errors: dict[int, BaseException] = {}
 
     def run(self, num_threads: int) -> None:
-        """Makes steps in the core, in all worlds as far as possible, and then those with calls."""
+        """Performs steps in the core as far as possible, and then those that call hooks."""
         with ExitStack() as locks:
             runs = {}
             for index in list(self.left):

@@ -57,7 +57,7 @@ def clone_world(world: World, state: Collection[str], kinds: dict[type[Any], Kin
 
 
 def _copy_subscriptions(world: World, copier: Copier) -> None:
-    """Copies the subscriptions that plugins have made, and what they want."""
+    """Copies the subscriptions of plugins, and which outputs they want."""
     for output in world.ports.outputs.values():
         copy = copier.find(output)
         subscribers = []

@@ -58,7 +58,7 @@ class Contents(ManyModels, LayerMaps, SavedStates):
         plugin_host: Starts plugins and calls their hooks.
         ports: All outputs and commands by resolved topic.
         requests: The queue of actions that run between two steps.
-        stepping: Makes the steps.
+        stepping: Performs the steps.
         transform_buffer: Collects the transforms of plugins.
         read_yaml: Loads a model file; `YamlReader.from_file`, or a method that collects errors.
         change_count: Number of models that were spawned, moved or deleted since the world file was

@@ -1,4 +1,4 @@
-"""Which plugins have which hooks, and which contacts concern them."""
+"""The hooks of all plugins, and the contacts that concern them."""
 
 from __future__ import annotations
 
@@ -29,10 +29,11 @@ class StepCall(NamedTuple):
     Attributes:
         plugin: The plugin.
         hook: Its method.
-        until: The place of the plugin in the order of hooks if the core does something before the
-            call, else 0.
+        until: The place of the plugin in the order of hooks if the core has work before the call,
+            else 0.
         batch: The parts of the hook if it is called together with others.
-        members: The calls that are made together, including this one; empty for a single call.
+        members: The calls that are performed together, including this one; empty for a single
+            call.
     """
 
     plugin: FlatlandPlugin

@@ -30,7 +30,7 @@ class LayerMaps:
     _placement: Placement
 
     def set_layer_map(self, layer: str, source: str | os.PathLike[str] | OccupancyGrid) -> None:
-        """Replaces the map of a layer; its walls, also those that plugins added, are gone.
+        """Replaces the map of a layer and all of its walls, including those that plugins added.
 
         A model that overlaps the new walls is logged with a warning. Plugins keep no handle of the
         old walls, and bodies wake. `reset` returns to the map of the world file, or, for a layer

@@ -120,7 +120,7 @@ class ModelBatches:
                 self._models.delete(name)
 
     def _place(self, models: list[Model], targets: list[Pose], if_blocked: IfBlocked) -> None:
-        """Moves all models to their poses, and then away from what they overlap there."""
+        """Moves all models to their poses, and then away from overlaps."""
         for index, (model, target) in enumerate(zip(models, targets, strict=True)):
             with _item(f"models[{index}]", index):
                 self._models.put(model, target)

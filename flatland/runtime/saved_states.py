@@ -47,9 +47,10 @@ class SavedStates:
     def snapshot(self) -> WorldSnapshot:
         """Returns the current state of the world, for `restore`.
 
-        It includes everything that affects the further steps: bodies, contacts, the attributes of
+        It includes everything that affects later steps: bodies, contacts, the attributes of
         all plugins with all that they refer to, random numbers, commands, the time and the last
-        values of outputs. Requests, the pause, observers and subscribers are not part of it.
+        values of outputs. It does not include pending requests, the pause, observers and
+        subscribers.
 
         Raises:
             WorldError: The world is closed, a plugin calls this, or a plugin has an attribute that
@@ -63,7 +64,7 @@ class SavedStates:
         """Returns to an earlier state: the same steps have the same results, bit by bit.
 
         Models, bodies, plugins, outputs and commands that exist in both states are the same
-        objects. Models that were spawned since are deleted, and deleted ones are there again. A
+        objects. Models that were spawned since are deleted, and deleted ones are restored. A
         snapshot can be restored any number of times.
 
         Args:
@@ -80,8 +81,8 @@ class SavedStates:
     def clone(self) -> World:
         """Returns an independent copy of the world in its current state.
 
-        The same steps have the same results in both, bit by bit. They share only what never
-        changes, such as parsed files and trees of map edges; the clone can be used in another
+        The same steps have the same results in both, bit by bit. They share only immutable
+        data, such as parsed files and trees of map edges; the clone can be used in another
         thread and outlives the original. It has no observers, no subscribers other than its own
         plugins, no requests, is not paused, and its plugins have no access to ROS.
 
@@ -95,15 +96,16 @@ class SavedStates:
     def reset(self, seed: int | None = None, keep_time: bool = False) -> None:
         """Returns to the state after loading: the same steps have the same results, bit by bit.
 
-        All models and plugins end, and those of the world file start anew, with the files and
-        parameters as they were when the world was loaded; models spawned since are gone. Look up
-        models, bodies and plugins again, since they are new objects. Outputs and commands that
-        exist before and after, layers, observers and subscribers remain. Requests that wait and the
-        pause do not change. A hook of a plugin may call this: it takes effect after the step.
+        All models and plugins end, and those of the world file are created again, with the files
+        and parameters as they were when the world was loaded; models spawned since are removed.
+        Models, bodies and plugins are new objects and have to be looked up again. Outputs and
+        commands that exist before and after, layers, observers and subscribers remain. Pending
+        requests and the pause do not change. If a hook of a plugin calls this, it takes effect
+        after the step.
 
         Args:
             seed: Seed of all random numbers, also of those in expressions of the files: the state
-                is that after loading with this seed. None for the present seed.
+                is that after loading with this seed. None for the current seed.
             keep_time: Whether the simulated time continues, instead of starting at 0 again. Updates
                 at a rate then continue in phase.
 

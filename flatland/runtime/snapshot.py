@@ -44,7 +44,7 @@ OUTSIDE: Final = frozenset(
 
 
 class WorldSnapshot:
-    """The state of a world at one time, made by `World.snapshot`.
+    """The state of a world at one time, returned by `World.snapshot`.
 
     Attributes:
         time_ns: Simulated time [ns].
@@ -58,9 +58,9 @@ class WorldSnapshot:
         """Creates a snapshot.
 
         Args:
-            owner: Of the world.
+            owner: Takes the snapshots of the world.
             physics: A copy of the physics world, which nothing else uses.
-            record: What all objects of the world contain.
+            record: The contents of all objects of the world.
         """
         world = owner.world
         self.time_ns = world.timekeeper.sim_time_ns
@@ -102,8 +102,7 @@ class WorldStates:
 
         Args:
             world: The world.
-            attributes: Names of the attributes that it has had from the start; others were added by
-                users.
+            attributes: Names of the attributes that flatland defines; others were added by users.
         """
         self.world = world
         self._attributes = tuple(name for name in attributes if name not in OUTSIDE)
@@ -151,7 +150,7 @@ class WorldStates:
             raise error
 
     def _notify(self, before: _Ports, snapshot: WorldSnapshot, revived: list[Model]) -> None:
-        """Notifies the observers of what is there again, and of what is gone."""
+        """Notifies the observers of ports and models that were restored or removed."""
         observers, now = self.world._observers, snapshot._ports
         for output in _without(before.outputs, now.outputs):
             output.closed = True

@@ -1,4 +1,4 @@
-"""Which hooks are called only when an update is due, and what is made up for when it is read."""
+"""Hooks that are called only when an update is due, and the handling of skipped updates."""
 
 from __future__ import annotations
 
@@ -35,9 +35,9 @@ class ScheduledHook:
         name: Name of the hook.
         order: Place of the plugin in the order of hooks.
         clock: Number of the clock of the core.
-        bits: The clocks in whose steps the hook is called, as bits.
+        bits: Clocks in whose steps the hook is called, as bits.
         records: Records of the updates without a call, one for each body whose pose is recorded;
-            empty if nothing is made up for.
+            empty if the skipped updates need no handling.
         is_called: Whether the hook is called when an update is due.
         was_called: Whether it was called at least once, or at least is no longer to be.
     """
@@ -53,7 +53,7 @@ class ScheduledHook:
 
     @property
     def schedule(self) -> HookSchedule:
-        """What the plugin asked for last."""
+        """The latest schedule that the plugin has declared."""
         return self.plugin._schedules[self.name]
 
 
@@ -62,7 +62,7 @@ class _Phase:
     """The hooks and the work of the core before or after the physics step."""
 
     hooks: dict[FlatlandPlugin, ScheduledHook] = field(default_factory=dict)
-    orders: list[int] = field(default_factory=list)  # of what the core does, ascending
+    orders: list[int] = field(default_factory=list)  # of the work of the core, ascending
 
 
 class StepSchedule:
@@ -80,7 +80,7 @@ class StepSchedule:
         Args:
             plan: The plan of the core.
             timekeeper: The simulated time.
-            on_fault: Called as `on_fault(plugin, what, error)` with what code of plugins raises.
+            on_fault: Called as `on_fault(plugin, what, error)` with exceptions of plugins.
         """
         self._on_fault = on_fault
         self._plan = plan
@@ -127,7 +127,7 @@ class StepSchedule:
         return found
 
     def add_controllers(self, plugin: FlatlandPlugin, order: int) -> None:
-        """Has the core carry out the controllers of a plugin whose hook is not always called."""
+        """Schedules the controllers of a plugin in the core."""
         before, after = self._phases["before_physics_step"], self._phases[_AFTER]
         for controller in getattr(plugin, "_controllers", ()):
             controller.schedule(
@@ -184,7 +184,7 @@ class StepSchedule:
         )
 
     def work_orders(self, hook: str) -> list[int]:
-        """Returns the places of the plugins for which the core does something, ascending."""
+        """Returns the places of the plugins for which the core has work, ascending."""
         phase = self._phases[hook]
         if not phase.orders:
             phase.orders += sorted(self._orders(phase))
@@ -198,12 +198,12 @@ class StepSchedule:
     # -- which hooks are called ------------------------------------------------------------
 
     def change(self) -> None:
-        """Takes over that something is wanted or not any more; safe from any thread."""
+        """Schedules a new decision about the hooks; safe from any thread."""
         self._is_stale = True
         self._plan.interrupt()
 
     def refresh(self, transforms_wanted: bool) -> None:
-        """Decides which hooks are called when an update is due; to be called before each step.
+        """Decides which hooks are called when an update is due; called before each step.
 
         Args:
             transforms_wanted: Whether an observer wants transforms.
@@ -246,7 +246,7 @@ class StepSchedule:
         hook.is_called = is_called
 
     def call_all(self) -> int:
-        """Has all hooks called when no clock applies, since the time was changed from outside.
+        """Calls all hooks in this step, for a time that is not a multiple of the step size.
 
         Returns:
             All clocks, as bits.
@@ -267,7 +267,7 @@ class StepSchedule:
         return due | _TOUCHING if self._touching and self._plan.has_touches() else due
 
     def calls_made(self, due: int) -> None:
-        """Takes over that all hooks of a step were called.
+        """Records that all hooks of a step were called.
 
         Args:
             due: The clocks that were due, as bits.
@@ -283,10 +283,10 @@ class StepSchedule:
                 waiting.append(hook)
         self._new = waiting
 
-    # -- what was not called ---------------------------------------------------------------
+    # -- skipped updates --------------------------------------------------------------------
 
     def settle(self) -> None:
-        """Makes up for all updates without a call, in the order of the plugins."""
+        """Reports skipped updates to the plugins, in the order of the hooks."""
         if not self._records:
             return
         step_size_ns = self._timekeeper.step_size_ns
@@ -317,12 +317,12 @@ class StepSchedule:
                 self._on_fault(plugin, "before_physics_step", error)
 
     def set_later(self, plugin: FlatlandPlugin, target: Callable[[], None]) -> None:
-        """Has a function of a plugin called before the next step; safe from any thread."""
+        """Calls a function of a plugin before the next step; safe from any thread."""
         self.targets.append((plugin, target))
         self._plan.interrupt()
 
 
 def needs_work(orders: list[int], after: int, until: int) -> bool:
-    """Returns whether the core does something for a plugin from one place to before another."""
+    """Returns whether the core has work for a place of at least `after` and less than `until`."""
     index = bisect_left(orders, after)
     return index < len(orders) and orders[index] < until

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 
 class Stepping:
-    """Makes the steps of a world.
+    """Performs the steps of a world.
 
     Attributes:
         change_log: Notified of each step, None if there is none.
@@ -37,7 +37,7 @@ class Stepping:
         observers: Observers,
         faults: Faults,
     ) -> None:
-        """Creates the steps of a world from its parts.
+        """Creates the steps of a world.
 
         Args:
             world: The world.
@@ -107,7 +107,7 @@ class Stepping:
             locks: Holds the lock of the requests until the run ends.
 
         Returns:
-            The run; None if `step` has to make the steps.
+            The run; None if `step` has to perform the steps.
 
         Raises:
             WorldError: The world is closed, or a plugin calls this.
@@ -120,7 +120,7 @@ class Stepping:
         return self._begin_run(n)
 
     def end_batch(self, run: StepRun, result: RunResult | Exception) -> int:
-        """Takes over the steps of a run, and makes the next one if code is to be called in it.
+        """Accounts for the steps of a run, and performs the next one if it calls hooks.
 
         Args:
             run: What `begin_batch` returned.
@@ -146,14 +146,14 @@ class Stepping:
         return made
 
     def _start(self) -> None:
-        """Runs the actions that wait before a step."""
+        """Runs the pending actions before a step."""
         self._world.check_open()
         self._plan.clear_interrupt()
         if self._requests.actions:
             self._requests.process()
 
     def _advance(self, n: int) -> int:
-        """Makes up to n steps, at least one unless another thread interrupts.
+        """Performs up to n steps, at least one unless another thread interrupts.
 
         Returns:
             The number of steps.
@@ -171,7 +171,7 @@ class Stepping:
 
     @property
     def _is_watched(self) -> bool:
-        """Whether something is to be notified in every step."""
+        """Whether every step has to be reported to observers or to the change log."""
         return self._observers.watch_steps or self.change_log is not None
 
     def _begin_run(self, n: int) -> StepRun | None:
@@ -197,7 +197,7 @@ class Stepping:
         )
 
     def _end_run(self, run: StepRun, result: RunResult) -> int:
-        """Takes over the steps of a run, and makes the step in which code is to be called.
+        """Accounts for the steps of a run, and performs the next one if it calls hooks.
 
         Args:
             run: The run.
@@ -226,7 +226,7 @@ class Stepping:
         return made + 1
 
     def _prepare(self) -> None:
-        """Adapts to what has changed since the last step."""
+        """Updates contacts and schedule to the changes since the last step."""
         self._contacts.update()
         schedule = self._host.schedule
         schedule.refresh(self._observers.want_transforms)
@@ -234,7 +234,7 @@ class Stepping:
             schedule.push_targets()
 
     def _make_step(self, step: int, *, is_aligned: bool) -> None:
-        """Makes a step in which hooks are called.
+        """Performs a step in which hooks are called.
 
         Args:
             step: Number of the step.
@@ -260,7 +260,7 @@ class Stepping:
         )
 
     def _finish_step(self, due: int, report: StepReport | None) -> None:
-        """Makes the rest of a step after the physics step.
+        """Performs the part of a step that follows the physics step.
 
         Args:
             due: The clocks of updates that are due, as bits.

@@ -52,7 +52,7 @@ class TransformBuffer:
         self._pending[frames] = fields
 
     def add_past(self, frames: FramePair, fields: TransformFields) -> None:
-        """Adds a transform of an earlier step, which was not sent because nothing wanted it."""
+        """Adds a transform of an earlier step that was not sent, because it was not wanted."""
         latest = self._latest.get(frames)
         if latest is None or latest[0] <= fields[0]:
             self._latest[frames] = fields

@@ -49,7 +49,7 @@ class StepRequests:
         self._batch = 1
 
     def __bool__(self) -> bool:
-        """Whether a request waits."""
+        """Whether a request is pending."""
         return bool(self._waiting)
 
     def add(self, count: int) -> Future[int]:
@@ -77,7 +77,7 @@ class StepRequests:
             self._advance(self._waiting.popleft(), stopped)
 
     def fail(self) -> None:
-        """Fails all requests that wait, because the simulation has stopped; thread-safe."""
+        """Fails all pending requests, because the simulation has stopped; thread-safe."""
         while True:
             try:
                 request = self._waiting.popleft()

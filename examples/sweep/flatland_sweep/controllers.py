@@ -172,7 +172,7 @@ class RandomWalk:
 class PurePursuit:
     """Follows the shortest path on a grid map of all obstacles, as they are at the start.
 
-    It knows the map and its pose exactly and does not use the scan: an upper bound for others.
+    It uses the exact map and pose instead of the scan: an upper bound for other controllers.
     """
 
     _LOOKAHEAD: Final = 0.35  # [m]

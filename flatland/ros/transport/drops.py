@@ -1,4 +1,4 @@
-"""The messages that were dropped because subscribers do not keep up."""
+"""The messages that were dropped for slow subscribers."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ class DropCounter:
     """Counts the messages dropped since the previous count."""
 
     def __init__(self) -> None:
-        """Creates a counter that has seen no connections."""
+        """Creates a counter without connections."""
         self._seen: WeakKeyDictionary[Outbox, int] = WeakKeyDictionary()
 
     def count(self) -> Counter[tuple[str, str]]:

@@ -1,7 +1,7 @@
 // What the core does in each step besides the physics, and when code of plugins is to be called.
 //
 // A plan contains controllers, which move bodies, and records of updates that were due but for
-// which no code was called, because nothing wanted the result. They are carried out in the order of
+// which no code was called, because the result was not wanted. They are carried out in the order of
 // the plugins to which they belong, so that code that is called in between finds the world as if
 // each plugin had been called in each step. All of it are values that refer to objects by id.
 #pragma once
@@ -21,7 +21,7 @@ class World;
 // Before the physics step, at the time of step k, or after it, at that of step k + 1.
 enum class Phase : std::uint8_t { kBefore = 0, kAfter = 1 };
 
-// Updates that were due and are to be made up for.
+// Updates that were due without a call, to be reported to the plugin.
 struct Record {
   std::uint32_t clock = 0;
   Id body = 0;             // whose pose is recorded, 0 for none

@@ -34,14 +34,14 @@ struct JointRecord {
   float damping_ratio = 0.0F;
 };
 
-// How many steps a call of `World::run` made, and why it ended.
+// How many steps a call of `World::run` performed, and why it ended.
 struct RunResult {
   enum class End : std::uint8_t {
-    kDone,     // all steps were made
+    kDone,     // all steps were performed
     kCall,     // code is to be called in the next step, which has not begun
     kFailed,   // the next step has begun, and a controller has failed before the physics step
-    kPhysics,  // the next step has begun, and its physics step was made, but nothing after it
-    kStopped,  // `interrupt` was called, or the run took long
+    kPhysics,  // the next step has begun, and its physics step was performed, but nothing after it
+    kStopped,  // `interrupt` was called, or the run reached its time limit
   };
 
   std::int64_t steps = 0;  // complete steps
@@ -71,7 +71,7 @@ class World final : private b2DestructionListener {
   // Advances the world by dt > 0 seconds. The hook may be null. The caller has exclusive use of the
   // world. While a body is invalid the world does not advance, and the report names the body again.
   StepReport step(double dt, int velocity_iterations, int position_iterations, PreSolveHook* hook);
-  // Makes up to n steps without calling any code, from step k (counted from time 0) on. Ends early
+  // Performs up to n steps without calling code, from step k (counted from time 0) on. Ends early
   // as described in RunResult; with `only_physics`, after the first physics step. The caller has
   // exclusive use of the world.
   RunResult run(std::int64_t k, std::int64_t n, double dt, int velocity_iterations,
