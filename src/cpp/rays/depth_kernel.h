@@ -179,7 +179,9 @@ struct Kernel {
     float numerator[simd::kWidth];
   };
 
-  // Draws the edges of a set, given by its bits, into a vector of rays.
+  // Draws the edges of a set, given by its bits, into a vector of rays. For edges seen edge-on, see
+  // `find_edge_on`.
+  template <bool kIsEdgeOn>
   FLATLAND_INLINE void draw_edges(const EdgeTree::Leaf& leaf, const Edges& edges, std::uint32_t set,
                                   std::int32_t first) const {
     const Floats zero = Lanes::broadcast(0.0F);
@@ -192,7 +194,13 @@ struct Kernel {
       const Floats side_a = d_x * edges.a_y[i] - d_y * edges.a_x[i];
       const Floats side_b = d_x * edges.b_y[i] - d_y * edges.b_x[i];
       const Floats denominator = leaf.normal_x[i] * d_x + leaf.normal_y[i] * d_y;
-      const Floats fraction = edges.numerator[i] / denominator;
+      Floats fraction = edges.numerator[i] / denominator;
+      if constexpr (kIsEdgeOn) {
+        const Floats dd = d_x * d_x + d_y * d_y;
+        const Floats at_a = (d_x * edges.a_x[i] + d_y * edges.a_y[i]) / dd;
+        const Floats at_b = (d_x * edges.b_x[i] + d_y * edges.b_y[i]) / dd;
+        fraction = Lanes::min(Lanes::max(fraction, Lanes::min(at_a, at_b)), Lanes::max(at_a, at_b));
+      }
       const Mask is_crossed = Lanes::both(Lanes::less_equal(Lanes::min(side_a, side_b), zero),
                                           Lanes::less_equal(zero, Lanes::max(side_a, side_b)));
       // A fraction of NaN is a miss.
@@ -202,6 +210,16 @@ struct Kernel {
       nearest = Lanes::min(hit, nearest);
     }
     Lanes::store(scan.fraction + first, nearest);
+  }
+
+  // Finds the edges whose lines pass through the origin of the rays, within the rounding errors.
+  // The fraction of a ray along such a line is a quotient of two rounding errors, and rounding
+  // decides whether the ray crosses the edge. The fraction is therefore limited to those of the
+  // ends of the edge, so that no ray has a hit beside the edge.
+  FLATLAND_INLINE std::uint32_t find_edge_on(simd::Floats a_x, simd::Floats a_y, simd::Floats b_x,
+                                             simd::Floats b_y, simd::Floats numerator) const {
+    const simd::Floats size = (simd::abs(a_x) + simd::abs(a_y)) + (simd::abs(b_x) + simd::abs(b_y));
+    return Lanes::bits(simd::abs(numerator) <= kEdgeOn * size);
   }
 
   // Draws the edges of a leaf; `rays` covers all of them.
@@ -215,16 +233,26 @@ struct Kernel {
     simd::store(edges.a_y, a_y);
     simd::store(edges.b_x, b_x);
     simd::store(edges.b_y, b_y);
-    simd::store(edges.numerator, simd::load(leaf.normal_x) * a_x + simd::load(leaf.normal_y) * a_y);
+    const simd::Floats numerator =
+        simd::load(leaf.normal_x) * a_x + simd::load(leaf.normal_y) * a_y;
+    simd::store(edges.numerator, numerator);
     std::uint32_t wanted = 0;
     for (std::uint32_t i = 0; i < leaf.count; ++i) {
       const bool passes =
           frame.masks.pass(leaf.category_bits[i]) || frame.masks.pass(leaf.coincident_bits[i]);
       wanted |= static_cast<std::uint32_t>(passes) << i;
     }
+    const std::uint32_t edge_on = wanted & find_edge_on(a_x, a_y, b_x, b_y, numerator);
+    if (edge_on != 0) {
+      any_of(leaf_rays, [&](std::int32_t first, std::int32_t, std::int32_t) {
+        draw_edges<true>(leaf, edges, edge_on, first);
+        return false;
+      });
+      wanted &= ~edge_on;
+    }
     if (leaf_rays.end - (leaf_rays.begin & -Lanes::kWidth) <= kFewVectors * Lanes::kWidth) {
       any_of(leaf_rays, [&](std::int32_t first, std::int32_t, std::int32_t) {
-        draw_edges(leaf, edges, wanted, first);
+        draw_edges<false>(leaf, edges, wanted, first);
         return false;
       });
       return;
@@ -250,7 +278,7 @@ struct Kernel {
     for (std::int32_t first = begin & -Lanes::kWidth; first < end; first += Lanes::kWidth) {
       const std::uint32_t set =
           wanted & Lanes::bits((rays.begin < first + Lanes::kWidth) & (rays.end > first));
-      if (set != 0) draw_edges(leaf, edges, set, first);
+      if (set != 0) draw_edges<false>(leaf, edges, set, first);
     }
   }
 

@@ -6,7 +6,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 #include "rays/instruction_set.h"
 #include "rays/simd.h"
@@ -70,8 +69,9 @@ constexpr float kCircleRounding = 1.0F - 1e-3F;
 // Up to this number of vectors of rays, drawing all edges of a leaf costs less than finding the
 // rays that each edge covers.
 constexpr std::int32_t kFewVectors = 3;
-// The smallest fraction of a miss.
-constexpr float kMissFraction = 1.0F + std::numeric_limits<float>::epsilon();
+// The distance of the line of an edge seen edge-on from the origin of the rays, as a part of the
+// distances of its ends.
+constexpr float kEdgeOn = 1e-4F;
 // Part of the squared radius by which the origin of the rays must be inside a circle.
 constexpr float kInside = 1e-3F;
 

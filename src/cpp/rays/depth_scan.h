@@ -13,6 +13,7 @@
 #include <box2d/b2_math.h>
 
 #include <cstdint>
+#include <limits>
 #include <vector>
 
 #include "rays/aligned_floats.h"
@@ -21,6 +22,9 @@
 #include "rays/solid_tree.h"
 
 namespace flatland {
+
+// The smallest fraction of a miss.
+inline constexpr float kMissFraction = 1.0F + std::numeric_limits<float>::epsilon();
 
 // A fixture stops a ray if it has a category in each of the two masks.
 struct RayMasks {

@@ -2,6 +2,8 @@
 
 #include <box2d/b2_body.h>
 
+#include <algorithm>
+
 #include "rays/raycast.h"
 
 namespace flatland {
@@ -35,7 +37,8 @@ void find_reflections(DepthScan& scan, const SceneView& scene, const BeamFan& fa
   for (std::size_t i = 0; i < fan.count(); ++i) {
     const bool is_hit = fractions[i] <= 1.0F;
     const float limit = fractions[i] + kFractionTolerance + kDistanceTolerance / fan.length()[i];
-    fractions[i] = limits[i] = is_hit ? limit : -1.0F;
+    // Near the end of a ray, the limit must not exceed the fraction of a miss.
+    fractions[i] = limits[i] = is_hit ? std::min(limit, kMissFraction) : -1.0F;
   }
   scene.draw(scan, masks);
   for (std::size_t i = 0; i < fan.count(); ++i) {

@@ -277,6 +277,39 @@ def test_any_of_several_fixtures_at_the_same_distance_reflects(world: PhysicsWor
     np.testing.assert_array_equal(reflect, world.cast_rays_reference((0, 0, 0), ends, 3, 2)[1])
 
 
+def test_a_hit_near_the_end_of_a_ray_does_not_reflect(world: PhysicsWorld) -> None:
+    """Rays that end less than 0.1 mm behind a surface, beside edges that reflect."""
+    wall = world.create_body("static", (0, 0, 0))
+    wall.create_edges([[5, -1, 5, 1], [0, -1e-5, 0.5, -1e-5]], category_bits=1)
+    wall.create_edges([[2, 3, 3, 3], [5.00005, -1, 5.00005, 1]], category_bits=2)
+    ends = [[5.00002, 0], [5.00001, 0.5], [0, -3e-5], [5.0002, 0]]
+    fractions, reflect = world.cast_rays((0, 0, 0), ends, 3, 2)
+    np.testing.assert_allclose(fractions, [1, 1, 1 / 3, 1], rtol=1e-4)
+    assert reflect.tolist() == [False, False, False, True]
+    reference = world.cast_rays_reference((0, 0, 0), ends, 3, 2)
+    np.testing.assert_array_equal(fractions, reference[0])
+    np.testing.assert_array_equal(reflect, reference[1])
+
+
+@pytest.mark.parametrize("angle", [0.1 * k for k in range(1, 63)])
+def test_a_ray_along_the_line_of_a_wall_has_no_hit_beside_the_wall(
+    world: PhysicsWorld, angle: float
+) -> None:
+    """The origin of the ray is on the line within the rounding errors, as are the ends."""
+    rng = np.random.default_rng(int(angle * 1000))
+    along = np.array([math.cos(angle), math.sin(angle)])
+    edges = [np.hstack([a * along, b * along]) for a, b in rng.uniform(1, 100, (8, 2))]
+    near = min(min(np.hypot(*edge[:2]), np.hypot(*edge[2:])) for edge in edges)
+    world.create_body("static", (0, 0, 0)).create_edges(edges)
+    turns = angle + np.concatenate([rng.normal(0, 1e-7, 200), math.pi + rng.normal(0, 1e-7, 200)])
+    ends = 200 * np.stack([np.cos(turns), np.sin(turns)], 1)
+    fractions, _ = world.cast_rays((0, 0, 0), ends, ALL)
+    ahead, behind = fractions[:200], fractions[200:]
+    assert np.isnan(behind).all()
+    # A ray along a wall may miss it.
+    assert np.all(np.isnan(ahead) | (ahead * 200 >= near * (1 - 1e-5)))
+
+
 @pytest.mark.parametrize("mask", range(1, 8))
 @pytest.mark.parametrize("reflect_mask", [0, 1, 2, 3, 4])
 def test_each_of_several_layers_with_common_walls_stops_rays(
