@@ -109,6 +109,8 @@ class PhysicsWorld(PhysicsQueries):
         """
         copy = type(self)()
         copy._core = self._core.copy()
+        copy.plan = StepPlan(copy._core)
+        copy.plan.is_used = self.plan.is_used
         return copy
 
     def become_copy_of(self, source: PhysicsWorld) -> None:
@@ -125,6 +127,7 @@ class PhysicsWorld(PhysicsQueries):
             WorldLockedError: One of the worlds is stepping.
         """
         self._core.become_copy_of(source._core)
+        self.plan.is_used = self.plan.is_used or source.plan.is_used
 
     def clear(self) -> None:
         """Destroys all objects; the results of the same further calls are those of a new world.

@@ -12,7 +12,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from flatland.errors import StaleHandleError
-from flatland.physics import PhysicsBody, PhysicsWorld
+from flatland.physics import PhysicsBody, PhysicsWorld, StepRun
 
 STEP = (0.005, 10, 10)
 STEPS = 300
@@ -247,6 +247,25 @@ def test_a_copy_is_independent() -> None:
     world.close()
     copy.step(*STEP)
     assert not copy.closed
+
+
+def test_the_plan_of_a_copy_steps_the_copy() -> None:
+    world, restored = PhysicsWorld(), PhysicsWorld()
+    body = world.create_body("dynamic", (0, 0, 0))
+    body.create_circle((0, 0), 0.2, density=1.0)
+    controller = body.control_velocity()
+    controller.schedule(1, automatic=True, holds=True)
+    controller.set_target(1.0, 0.0, 0.5)
+    copy = world.copy()
+    restored.become_copy_of(world)
+    start = body.pose
+    for other in (copy, restored):
+        assert other.plan.is_used
+        assert other.plan.run(StepRun(other, 0, 20, 0.005, 8, 3, False))[0] == 20
+        assert body.pose == start
+        assert other.body(body.id).pose[0] == pytest.approx(0.1, abs=1e-3)
+    assert world.plan.run(StepRun(world, 0, 20, 0.005, 8, 3, False))[0] == 20
+    assert body.pose == copy.body(body.id).pose == restored.body(body.id).pose
 
 
 def test_ids_stay_valid_only_for_objects_that_exist_again() -> None:
