@@ -238,6 +238,7 @@ class ServerNode:
         from flatland.ros.deferred_topics import DeferredTopics
         from flatland.ros.frame_monitor import FrameMonitor
         from flatland.ros.hook_watchdog import HookWatchdog
+        from flatland.ros.operations import Operations
         from flatland.ros.services import Services
         from flatland.ros.transport.master_watch import MasterWatch
         from flatland.simulation import Simulation
@@ -268,10 +269,18 @@ class ServerNode:
         frame_monitor = FrameMonitor(self._registrar, simulation, bridge.subscribed)
         try:
             _publish_map(self._registrar, world, parameters)
+            operations = Operations(
+                self._registrar,
+                simulation,
+                clock,
+                parameters.if_blocked,
+                move_keeps_odometry=parameters.move_keeps_odometry,
+            )
             Services(
                 self._registrar,
                 simulation,
                 clock,
+                operations,
                 parameters.if_blocked,
                 move_keeps_odometry=parameters.move_keeps_odometry,
                 model_states_rate=parameters.model_states_rate,
