@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Hashable
 from concurrent.futures import Future
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from flatland.ros.service_calls import describe_displacement
 
@@ -89,7 +89,7 @@ class Operations:
         """Ends the hold of a holder, if any."""
         self._simulation.holds.release(holder)
 
-    def step(self, count: int) -> Future[int]:
+    def step(self, count: int) -> Future[Any]:
         """Requests steps, also of a paused world and in lockstep; safe from any thread.
 
         Returns:
@@ -102,7 +102,7 @@ class Operations:
 
     # -- models ----------------------------------------------------------------------------
 
-    def spawn(self, path: str, name: str, namespace: str, pose: Pose) -> str:
+    def spawn(self, file: str, name: str, namespace: str, pose: Pose) -> str:
         """Spawns a model.
 
         Returns:
@@ -111,7 +111,7 @@ class Operations:
         Raises:
             FlatlandError: The model is invalid, or the pose is blocked; the world is unchanged.
         """
-        model = self._world.spawn_model(path, name, namespace, pose, self._if_blocked)
+        model = self._world.spawn_model(file, name, namespace, pose, self._if_blocked)
         return describe_displacement(model, pose)
 
     def move(self, name: str, pose: Pose) -> str:
