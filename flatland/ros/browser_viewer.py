@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 _LOG = logging.getLogger("flatland")
 
-_PORT_TIMEOUT: Final = 5.0  # s; a node that this one replaces ends within this time
+_PORT_TIMEOUT: Final = 3.0  # s; a node that this one replaces ends within this time
 _PORT_POLL_PERIOD: Final = 0.2  # s
 
 
