@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Hashable
 from concurrent.futures import Future
 from typing import TYPE_CHECKING, Any
 
@@ -14,7 +13,7 @@ if TYPE_CHECKING:
     from flatland.ros.clock import NodeClock
     from flatland.ros.transport.registrar import Registrar
     from flatland.runtime.placement import IfBlocked
-    from flatland.simulation import Simulation
+    from flatland.simulation import PauseHolds, Simulation
 
 
 class Operations:
@@ -45,10 +44,15 @@ class Operations:
         self._simulation = simulation
         self._clock = clock
         self._world = simulation.world
-        self._if_blocked = if_blocked
+        self._if_blocked: IfBlocked = if_blocked
         self._keep_odometry = move_keeps_odometry
 
     # -- time ------------------------------------------------------------------------------
+
+    @property
+    def holds(self) -> PauseHolds:
+        """Pause the world while clients drag models."""
+        return self._simulation.holds
 
     @property
     def rate(self) -> float:
@@ -74,20 +78,13 @@ class Operations:
         self._registrar.set_parameter("~update_rate", 0.0 if math.isinf(rate) else rate)
 
     def pause(self) -> None:
-        """Pauses the world."""
+        """Pauses the world, also beyond the end of a drag."""
         self._world.pause()
+        self.holds.keep_paused()
 
     def resume(self) -> None:
         """Resumes the world."""
         self._world.resume()
-
-    def hold(self, holder: Hashable) -> None:
-        """Pauses the world until the holder, and all clients that drag a model, release it."""
-        self._simulation.holds.hold(holder)
-
-    def release(self, holder: Hashable) -> None:
-        """Ends the hold of a holder, if any."""
-        self._simulation.holds.release(holder)
 
     def step(self, count: int) -> Future[Any]:
         """Requests steps, also of a paused world and in lockstep; safe from any thread.
@@ -117,15 +114,19 @@ class Operations:
     def move(self, name: str, pose: Pose) -> str:
         """Moves a model.
 
+        While a client drags a model, no warning is logged for a pose that is not free, because a
+        drag consists of many moves.
+
         Returns:
             Where the model was put if its pose is not free; otherwise empty.
 
         Raises:
             WorldError: The model does not exist, or the pose is not finite or blocked.
         """
-        model = self._world.move_model(
-            name, pose, self._if_blocked, keep_odometry=self._keep_odometry
-        )
+        if_blocked = self._if_blocked
+        if if_blocked == "warn" and self.holds:
+            if_blocked = "allow"
+        model = self._world.move_model(name, pose, if_blocked, keep_odometry=self._keep_odometry)
         return describe_displacement(model, pose)
 
     def delete(self, name: str) -> None:

@@ -72,8 +72,8 @@ class Services:
             ("delete_model", service_class("DeleteModel"), self._delete_model),
             ("move_model", service_class("MoveModel"), self._move_model),
             ("set_rate", service_class("SetRate"), self._set_rate),
-            ("pause", Empty, self._switch(world.pause)),
-            ("resume", Empty, self._switch(world.resume)),
+            ("pause", Empty, self._switch(operations.pause)),
+            ("resume", Empty, self._switch(operations.resume)),
             ("toggle_pause", Empty, self._switch(world.toggle_pause)),
         ):
             Service(registrar, name, service_type, handler)

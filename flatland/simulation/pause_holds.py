@@ -11,8 +11,8 @@ class PauseHolds:
     """Holds on a world, which is paused while there are any.
 
     All clients that drag models share the holds of a simulation. When the last hold ends, the world
-    is resumed, unless it was already paused before the first one, or was resumed and paused again
-    in the meantime. Must be used between two steps.
+    is resumed, unless it was already paused before the first one, or has been paused by other means
+    since. Must be used between two steps.
     """
 
     def __init__(self, world: World) -> None:
@@ -46,6 +46,10 @@ class PauseHolds:
         if not self._holders and self._paused_here:
             self._paused_here = False
             self._world.resume()
+
+    def keep_paused(self) -> None:
+        """Leaves the world paused when the last hold ends, because a client has paused it."""
+        self._paused_here = False
 
     def check(self) -> None:
         """Makes a later pause independent of the holds if the world was resumed meanwhile.

@@ -115,7 +115,7 @@ def test_models_are_spawned_moved_and_deleted_as_by_the_services(
     assert "ball" in model_poses(ros)
     # The parameters of the node apply to both.
     number = client.model("ball")["id"]
-    assert "blocked" in client.refused("move", model=number, pose=[1, 2, 0])
+    assert "overlaps" in client.refused("move", model=number, pose=[1, 2, 0])
     assert "already exists" in client.refused("spawn", file=ball, name="robot", pose=[3, 3, 0])
     assert "model_path" in client.refused("spawn", file="/etc/passwd", name="x", pose=[3, 3, 0])
     client.do("move", model=number, pose=[0, -3, math.pi / 2])
@@ -180,7 +180,9 @@ def test_a_port_in_use_is_an_error_and_the_simulator_continues(
         port = taken.getsockname()[1]
         process = launcher.server(world, web=True, web_port=port)
         line = process.wait_for_line(r"\[ERROR\]").string
-    assert f"the viewer in the browser cannot start: the viewer cannot listen on port {port}" in line
+    assert (
+        f"the viewer in the browser cannot start: the viewer cannot listen on port {port}" in line
+    )
     assert line.endswith("The simulator continues without it")
     clock = ros.topic("/clock", Clock)
     now = clock.next().clock

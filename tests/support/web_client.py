@@ -15,7 +15,7 @@ import pytest
 from waiting import TIMEOUT
 
 _HEADER = struct.Struct("<BBHId")
-POSES = 2  # kind of a binary message
+EDGES, POSES = 1, 2  # kinds of binary messages
 
 
 class WebClient:
@@ -23,8 +23,8 @@ class WebClient:
 
     Attributes:
         hello: The last message `hello`.
-        worlds: For each world the last messages `world` and `status`, all models by name, and the
-            poses of all bodies by id.
+        worlds: For each world the last messages `world` and `status`, all models by name, the
+            poses of all bodies by id, and the edges of all layers by number.
         texts: All other messages.
     """
 
@@ -173,7 +173,11 @@ class WebClient:
 
     def _take_binary(self, data: bytes) -> None:
         kind, _version, world, _revision, _time = _HEADER.unpack_from(data)
-        if kind == POSES:
+        if kind == EDGES:
+            layer, count = struct.unpack_from("<II", data, _HEADER.size)
+            numbers = struct.unpack_from(f"<{4 * count}f", data, _HEADER.size + 8)
+            self._world(world)["edges"][layer] = list(zip(*[iter(numbers)] * 4, strict=True))
+        elif kind == POSES:
             (count,) = struct.unpack_from("<I", data, _HEADER.size)
             ids = struct.unpack_from(f"<{count}I", data, _HEADER.size + 4)
             numbers = struct.unpack_from(f"<{3 * count}f", data, _HEADER.size + 4 + 4 * count)
@@ -181,4 +185,4 @@ class WebClient:
             self._world(world)["poses"].update(zip(ids, poses, strict=True))
 
     def _world(self, number: int) -> dict[str, Any]:
-        return self.worlds.setdefault(number, {"models": {}, "poses": {}})
+        return self.worlds.setdefault(number, {"models": {}, "poses": {}, "edges": {}})

@@ -47,3 +47,12 @@ def test_a_pause_after_a_resume_during_a_hold_remains(world: flatland.World) -> 
     world.pause()
     holds.release("page")
     assert world.paused
+
+
+def test_a_pause_by_other_means_during_a_hold_remains(world: flatland.World) -> None:
+    holds = PauseHolds(world)
+    holds.hold("page")
+    world.pause()
+    holds.keep_paused()
+    holds.release("page")
+    assert world.paused
