@@ -42,9 +42,13 @@ class WebClient:
         self._replies: dict[int, dict[str, Any]] = {}
         self._loop = asyncio.new_event_loop()
         page, _, query = url.partition("?")
-        self._session, self._socket = self._loop.run_until_complete(
-            self._connect(f"{page.replace('http', 'ws', 1)}ws?{query}")
-        )
+        try:
+            self._session, self._socket = self._loop.run_until_complete(
+                self._connect(f"{page.replace('http', 'ws', 1)}ws?{query}")
+            )
+        except BaseException:
+            self._loop.close()
+            raise
         try:
             self.until("hello", lambda: self.hello)
             self.look(worlds=[world["world"] for world in self.hello["worlds"]], **look)

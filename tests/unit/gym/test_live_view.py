@@ -216,7 +216,7 @@ def test_an_invalid_port_is_an_error(kind: Any, monkeypatch: pytest.MonkeyPatch)
         with pytest.raises(ValueError, match="web_port must be an integer from 0 to 65535, got"):
             kind(render_mode="human", web_port=port)
     monkeypatch.setenv("FLATLAND_WEB_PORT", "http")
-    with pytest.raises(ValueError, match="FLATLAND_WEB_PORT must be .* got 'http'"):
+    with pytest.raises(ValueError, match=r"FLATLAND_WEB_PORT must be .* got 'http'"):
         kind(render_mode="human")
 
 
