@@ -23,19 +23,6 @@ export function significant(value, digits = 4) {
 }
 
 /**
- * Returns a simulated time.
- *
- * @param {number} seconds
- */
-export function clock(seconds) {
-  const hours = Math.floor(seconds / 3600);
-  const minutes = Math.floor(seconds / 60) % 60;
-  const rest = (Math.floor(seconds * 100) / 100) % 60;
-  const tail = `${String(minutes).padStart(2, "0")}:${rest.toFixed(2).padStart(5, "0")}`;
-  return hours > 0 ? `${hours}:${tail}` : tail;
-}
-
-/**
  * Returns any value of a message as short text.
  *
  * @param {any} value

@@ -7,7 +7,7 @@
  *
  * @typedef {{kind: "circle", center: Point, radius: number, layers?: string[]}} CircleShape
  * @typedef {{kind: "polygon", points: Point[], layers?: string[]}} PolygonShape
- * @typedef {{kind: "edges", edges?: number[][], points?: Point[], layers?: string[]}} EdgesShape
+ * @typedef {{kind: "edges", points: Point[], layers?: string[]}} EdgesShape
  * @typedef {(CircleShape | PolygonShape | EdgesShape) & {sensor?: boolean}} Shape
  *
  * @typedef {{id: number, name: string, color: number[], type?: string, shapes: Shape[]}} BodyInfo
@@ -21,7 +21,7 @@
  * @typedef {{label: string, path: string}} ModelFile
  * @typedef {{world: number, name: string}} WorldName
  * @typedef {{parent: string, child: string, pose: Pose}} FrameInfo
- * @typedef {{topic: string, type: string, time: number|null, value: any}} TopicValue
+ * @typedef {{topic: string, type: string, time: number|null, value: any, kind?: string}} TopicValue
  * @typedef {{name: string, type: string, parameters: Record<string, any>}} PluginInfo
  *
  * @typedef {{version: string|number, title: string, read_only: boolean, worlds: WorldName[],
@@ -34,6 +34,7 @@
  *   real_time_factor: number|null, lockstep?: boolean, stale?: number}} StatusMessage
  * @typedef {{world: number, model: number, pose: Pose, velocity: number[]|null, mass: number,
  *   inertia: number, contacts: string[], plugins: PluginInfo[], topics: TopicValue[]}} DetailsMessage
+ * @typedef {{color: number[], pose: Pose, shapes: Shape[]}} PreviewBody
  * @typedef {{world: number, time: number, series: Record<string, number>}} ValuesMessage
  * @typedef {{world: number, frames: FrameInfo[]}} FramesMessage
  *

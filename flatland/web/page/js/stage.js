@@ -41,8 +41,8 @@ export class Stage extends Emitter {
     this.followed = null;
     /** @type {import("./renderer/renderer.js").Overlay | null} */
     this.overlay = null;
-    /** @type {Map<WorldState, Camera>} */
-    this.tileCameras = new Map();
+    /** @type {WeakMap<WorldState, Camera>} */
+    this.tileCameras = new WeakMap();
     this.dark = dark;
     this.isDirty = true;
     /** @type {Renderer | null} */

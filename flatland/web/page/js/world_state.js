@@ -54,6 +54,8 @@ export class WorldState {
     this.shapesVersion = 0;
     this.posesVersion = 0;
     this.scansVersion = 0;
+    this.slots = 0;
+    this.arrivals = 0;
     /** Pose of each slot: x, y, heading, 1 if it is known. */
     this.poses = new Float32Array(4 * INITIAL_SLOTS);
     this.trails = new Trails();
@@ -307,7 +309,6 @@ const CIRCLE_EDGES = 40;
  * @returns {number[][]} x1, y1, x2, y2 of each edge [m]
  */
 export function shapeEdges(shape) {
-  if (shape.kind === "edges" && shape.edges) return shape.edges;
   const points = shapePoints(shape);
   const closed = shape.kind !== "edges";
   const edges = [];
@@ -325,7 +326,7 @@ export function shapeEdges(shape) {
  * @returns {import("./protocol.js").Point[]}
  */
 export function shapePoints(shape) {
-  if (shape.kind !== "circle") return shape.points ?? [];
+  if (shape.kind !== "circle") return shape.points;
   const { center, radius } = shape;
   return Array.from({ length: CIRCLE_EDGES }, (_, i) => {
     const angle = (2 * Math.PI * i) / CIRCLE_EDGES;
