@@ -13,7 +13,7 @@ from gymnasium.error import ClosedEnvironmentError, ResetNeeded
 from flatland.geometry import FloatArray
 from flatland.gym.actions import checked_actions
 from flatland.gym.episodes import Episodes
-from flatland.gym.live_view import LiveView, check_live_view
+from flatland.gym.live_view import EpisodeView, check_live_view
 from flatland.gym.rendering import checked_render_mode, draw_goals
 from flatland.gym.settings import Settings
 from flatland.gym.start import StartState
@@ -75,7 +75,7 @@ class FlatlandEnv(gymnasium.Env[Any, FloatArray]):
         self.observation_space = self._episodes.layout.space
         action_space: Any = settings.action.space
         self.action_space = action_space
-        self._live_view = LiveView([self.world], [settings.world_name], settings.dt, web_port)
+        self._live_view = EpisodeView([self.world], [settings.world_name], settings.dt, web_port)
         self._running = False
 
     @property

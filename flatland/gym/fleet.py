@@ -17,7 +17,7 @@ from flatland.geometry import FloatArray
 from flatland.gym.actions import checked_actions
 from flatland.gym.agents import Agent, check_alike
 from flatland.gym.episodes import Episodes
-from flatland.gym.live_view import LiveView, check_live_view
+from flatland.gym.live_view import EpisodeView, check_live_view
 from flatland.gym.rendering import checked_render_mode, draw_goals
 from flatland.gym.settings import Settings
 from flatland.gym.start import StartState
@@ -96,7 +96,7 @@ class FleetEnv(ParallelEnv[str, Any, FloatArray]):  # type: ignore[misc, unused-
             raise
         self._observation_space = self._episodes.layout.space
         self._action_spaces = dict.fromkeys(self.possible_agents, settings.action.space)
-        self._live_view = LiveView([self.world], [settings.world_name], settings.dt, web_port)
+        self._live_view = EpisodeView([self.world], [settings.world_name], settings.dt, web_port)
         self._rng: np.random.Generator | None = None
 
     def observation_space(self, agent: str) -> spaces.Space[Any]:  # noqa: ARG002

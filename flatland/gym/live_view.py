@@ -127,7 +127,7 @@ SHARED: Final = SharedViewer()
 """The viewer of all environments of this process."""
 
 
-class LiveView:
+class EpisodeView:
     """Shows the worlds of an environment with their goals, in real time."""
 
     def __init__(

@@ -17,7 +17,7 @@ from flatland.geometry import BoolArray, DoubleArray, Vector2
 from flatland.gym.actions import checked_actions
 from flatland.gym.env import FlatlandEnv
 from flatland.gym.episodes import Episodes
-from flatland.gym.live_view import LiveView, check_live_view
+from flatland.gym.live_view import EpisodeView, check_live_view
 from flatland.gym.rendering import checked_render_mode, draw_goals
 from flatland.gym.settings import Settings
 from flatland.gym.situation import Rows
@@ -85,7 +85,7 @@ class FlatlandVectorEnv(VectorEnv[Any, Any, Any]):
         self.copy = copy
         self._worlds = clone_worlds(settings, num_envs)
         names = [f"{settings.world_name} {number}" for number in range(num_envs)]
-        self._live_view = LiveView(self._worlds, names, settings.dt, web_port)
+        self._live_view = EpisodeView(self._worlds, names, settings.dt, web_port)
         try:
             agents = [settings.find_agent(world) for world in self._worlds]
             self._episodes = Episodes(agents, settings, num_threads)
