@@ -19,6 +19,7 @@ FLOORS = (
     ("runtime",),
     ("world",),
     ("simulation", "drawing", "recording"),
+    ("web",),
     ("gym", "ros", "tools"),
     ("viewer",),
     ("cli",),
