@@ -8,7 +8,10 @@ from typing import Any
 
 from flatland.geometry import DoubleArray, FloatArray, Pose
 from flatland.plugin_api.ports import Output
+from flatland.values import Transform
 from flatland.web.controller import WorldController
+from flatland.web.inspection import Details, copy_details, outputs_of
+from flatland.web.numbers import find_number
 from flatland.web.scene import LayerContents, Scene, SceneChange, copy_layers
 from flatland.world import World
 
@@ -20,10 +23,18 @@ class Demand:
     Attributes:
         scans: Whether laser scans are wanted.
         layers: Whether the layers have to be copied, because they are new or have changed.
+        frames: Whether the transforms have to be copied.
+        inspected: Ids of the models that are inspected.
+        details: Whether their details have to be copied.
+        series: Names of the numbers that are plotted.
     """
 
     scans: bool = False
     layers: bool = False
+    frames: bool = False
+    inspected: frozenset[int] = frozenset()
+    details: bool = False
+    series: frozenset[str] = frozenset()
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -57,6 +68,9 @@ class Captured:
         layers: Copies of the layers, None if they were not demanded.
         motions: (x, y, theta, vx, vy, omega) of all bodies in the world frame, shape (n, 6).
         scans: Scans that are new.
+        frames: The latest transforms, None if they were not demanded.
+        details: Details of the inspected models.
+        series: Latest value of the output of each series, and the path of the number in it.
     """
 
     time: float
@@ -68,6 +82,9 @@ class Captured:
     layers: list[LayerContents] | None
     motions: DoubleArray
     scans: list[NewScan]
+    frames: list[Transform] | None
+    details: list[Details]
+    series: dict[str, tuple[object, list[str]]]
 
 
 class Capture:
@@ -88,7 +105,9 @@ class Capture:
         self.scene = Scene(world, ids)
         self._world = world
         self._controller = controller
-        self._wanted: dict[int, Output[Any]] = {}
+        self._wanted: dict[Output[Any], None] = {}
+        self._series: dict[str, tuple[Output[Any], list[str]]] = {}
+        self._wanted_for: object = None
         self._last: dict[int, object] = {}
 
     def take(self, demand: Demand) -> Captured:
@@ -99,7 +118,8 @@ class Capture:
         """
         world, scene = self._world, self.scene
         change = scene.update()
-        self._want_scans(demand.scans)
+        self._want(demand, change.layout)
+        inspected = [scene.models[n] for n in demand.inspected if n in scene.models]
         return Captured(
             time=world.time,
             paused=world.paused,
@@ -110,24 +130,44 @@ class Capture:
             layers=copy_layers(world) if demand.layers else None,
             motions=world.physics.motions(scene.bodies),
             scans=self._new_scans() if demand.scans else [],
+            frames=list(world.transforms.values()) if demand.frames else None,
+            details=[copy_details(world, known) for known in inspected] if demand.details else [],
+            series={name: (o.latest, path) for name, (o, path) in self._series.items()},
         )
 
     def end(self) -> None:
-        """Ends the demand for scans; safe from any thread once `take` is not called any more."""
-        self._want_scans(False)
+        """Ends the demand for outputs, until the next call of `take`."""
+        self._replace_wanted({})
+        self._series, self._wanted_for = {}, None
+        self._last.clear()
 
-    def _want_scans(self, wanted: bool) -> None:
-        lasers = self.scene.lasers if wanted else {}
-        if lasers.keys() == self._wanted.keys():
+    def _want(self, demand: Demand, layout: bool) -> None:
+        """Has the outputs computed that are looked at."""
+        wanted_for = (demand.scans, demand.inspected, demand.series)
+        if wanted_for == self._wanted_for and not layout:
             return
-        for number, output in self._wanted.items():
-            if number not in lasers:
-                output.unwant(self)
-                self._last.pop(number, None)
-        for number, (_laser, output) in lasers.items():
-            if number not in self._wanted:
+        world, scene = self._world, self.scene
+        self._wanted_for = wanted_for
+        if not demand.scans:
+            self._last.clear()
+        wanted = {output: None for _, output in scene.lasers.values() if demand.scans}
+        for number in demand.inspected:
+            if number in scene.models:
+                wanted.update(dict.fromkeys(outputs_of(world, scene.models[number])))
+        outputs = world.ports.outputs if demand.series else {}
+        found = {name: find_number(outputs, name) for name in demand.series}
+        self._series = {name: series for name, series in found.items() if series is not None}
+        wanted.update(dict.fromkeys(output for output, _ in self._series.values()))
+        self._replace_wanted(wanted)
+
+    def _replace_wanted(self, wanted: dict[Output[Any], None]) -> None:
+        former, self._wanted = self._wanted, wanted
+        for output in wanted:
+            if output not in former:
                 output.want(self)
-        self._wanted = {number: output for number, (_laser, output) in lasers.items()}
+        for output in former:
+            if output not in wanted:
+                output.unwant(self)
 
     def _new_scans(self) -> list[NewScan]:
         last, found = self._last, []

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import dataclasses
 import json
 from collections import deque
 from typing import TYPE_CHECKING, Any, Final
@@ -25,6 +26,8 @@ class Client:
 
     Attributes:
         view: What it looks at.
+        waiting: Number of its requests that are not answered.
+        connected: Whether the connection has not ended.
     """
 
     def __init__(self, socket: web.WebSocketResponse, hub: Hub) -> None:
@@ -35,6 +38,8 @@ class Client:
             hub: The worlds.
         """
         self.view = View()
+        self.waiting = 0
+        self.connected = True
         self._socket = socket
         self._hub = hub
         self._wish: tuple[int, ...] = ()
@@ -61,6 +66,7 @@ class Client:
                     await self.end(WSCloseCode.POLICY_VIOLATION, str(error))
                     break
         finally:
+            self.connected = False
             writer.cancel()
             self._hub.forget(self)
 
@@ -84,7 +90,10 @@ class Client:
         fields = message.fields
         self._wish = fields.get("worlds", self._wish)
         self._hidden = fields.get("hidden", self._hidden)
-        self.view = View(scans=fields.get("scans", self.view.scans))
+        names = ("scans", "frames", "inspect", "series")
+        self.view = dataclasses.replace(
+            self.view, **{name: fields[name] for name in names if name in fields}
+        )
         self.update_feeds()
 
     def update_feeds(self) -> None:

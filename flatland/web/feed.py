@@ -7,17 +7,24 @@ import json
 import logging
 import math
 from collections import deque
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Coroutine, Iterator
+from concurrent.futures import Future
 from dataclasses import dataclass, field
 from typing import Any, Final, TypeVar
 
 import numpy as np
 
-from flatland.errors import PLUGIN_FAULTS
+from flatland.entities.model import Model
+from flatland.errors import PLUGIN_FAULTS, WorldError
 from flatland.geometry import FloatArray, bounds_of, transform_points
+from flatland.values import Transform
 from flatland.web import encoding
 from flatland.web.capture import Capture, Captured, Demand, NewScan
 from flatland.web.controller import WorldController
+from flatland.web.holds import Holds
+from flatland.web.inspection import Details, details_message
+from flatland.web.model_files import plugin_parameters
+from flatland.web.numbers import number_at
 from flatland.web.scene import Description, LayerContents
 from flatland.world import World
 
@@ -26,6 +33,8 @@ _LOG = logging.getLogger("flatland")
 PERIOD: Final = 1 / 30  # s of wall time between two captures
 STATUS_PERIOD: Final = 0.2  # s of wall time between two messages `status`
 RATE_WINDOW: Final = 1.0  # s of wall time over which the real-time factor is measured
+DETAILS_PERIOD: Final = 0.2  # s of wall time between two messages `details`
+FRAMES_PERIOD: Final = 0.1  # s of wall time between two messages `frames`
 STALE_AFTER: Final = 0.5  # s without an answer of the simulator that clients are told of
 _POLL_PERIOD: Final = 0.01  # s between two looks at a world that no simulation runs
 _SERVED_POLL_PERIOD: Final = 0.25  # s, in case the simulation that runs the world ends
@@ -40,9 +49,15 @@ class View:
 
     Attributes:
         scans: Whether to send laser scans.
+        frames: Whether to send the transforms of frames.
+        inspect: Id of the model that is inspected, None for none.
+        series: Names of the numbers that are plotted.
     """
 
     scans: bool = False
+    frames: bool = False
+    inspect: int | None = None
+    series: tuple[str, ...] = ()
 
 
 @dataclass(slots=True)
@@ -56,6 +71,9 @@ class Seen:
         poses: Number of the capture.
         scans: Number of the capture.
         status: Version of the status.
+        details: Number of the capture.
+        frames: Number of the capture.
+        values: Number of the capture.
     """
 
     world: int = -1
@@ -64,6 +82,9 @@ class Seen:
     poses: int = -1
     scans: int = -1
     status: int = -1
+    details: int = -1
+    frames: int = -1
+    values: int = -1
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -81,13 +102,16 @@ async def between_steps(world: World, action: Callable[[], R]) -> R:
     Raises:
         Exception: Raised by the action.
     """
-    waiter = asyncio.wrap_future(world.post(action))
+    return await _wait_for(world, world.post(action))
+
+
+async def _wait_for(world: World, future: Future[R]) -> R:
+    waiter = asyncio.wrap_future(future)
     requests = world.requests
     try:
         while not waiter.done():
-            served = requests.served
-            if not served and requests.process_if_idle():
-                served = True
+            # Without a simulation that runs, whoever waits carries out the requests.
+            served = requests.served or await asyncio.to_thread(requests.process_if_idle)
             await asyncio.wait({waiter}, timeout=_SERVED_POLL_PERIOD if served else _POLL_PERIOD)
     except asyncio.CancelledError:
         waiter.cancel()
@@ -103,6 +127,8 @@ class WorldFeed:
         name: Name of the world for users.
         world: The world.
         controller: Carries out what clients request.
+        holds: Models that clients hold; used between two steps only.
+        model_files: Label and path of the model files that can be spawned.
     """
 
     def __init__(
@@ -112,7 +138,6 @@ class WorldFeed:
         world: World,
         controller: WorldController,
         ids: Iterator[int],
-        model_files: Callable[[], list[dict[str, str]]],
     ) -> None:
         """Creates a feed that nobody looks at.
 
@@ -122,10 +147,10 @@ class WorldFeed:
             world: The world.
             controller: Carries out what clients request.
             ids: Returns ids that have not been used.
-            model_files: Returns the model files that can be spawned.
         """
         self.index, self.name, self.world, self.controller = index, name, world, controller
-        self._model_files = model_files
+        self.holds = Holds(world, controller)
+        self.model_files: list[dict[str, str]] = []
         self._capture = Capture(world, controller, ids)
         self._lookers: dict[Callable[[], None], View] = {}
         self._looked_at = asyncio.Event()
@@ -147,7 +172,15 @@ class WorldFeed:
         self._status = ""
         self._status_version = 0
         self._status_due = -math.inf
+        self._jobs: set[asyncio.Task[None]] = set()
         self._shared: dict[str, tuple[int, bytes]] = {}
+        self._details_due = self._frames_due = -math.inf
+        self._details: dict[int, tuple[int, str]] = {}
+        self._frames: tuple[int, str] = (-1, "")
+        self._values: dict[str, float] = {}
+        self._values_tick = -1
+        self._values_time = -math.inf
+        self._parameters: dict[int, tuple[str, Description]] = {}
 
     # -- who looks -------------------------------------------------------------------------
 
@@ -167,9 +200,41 @@ class WorldFeed:
         if not self._lookers:
             self._looked_at.clear()
 
+    def find_model(self, number: int) -> Model:
+        """Returns the model of an id; to be called between two steps.
+
+        Raises:
+            WorldError: It was deleted.
+        """
+        known = self._capture.scene.models.get(number)
+        if known is None or known.model not in self.world.models:
+            raise WorldError("the model does not exist any more")
+        return known.model
+
     def layers_changed(self) -> None:
         """Copies the layers again at the next capture."""
         self._layers_changed = True
+
+    # -- requests --------------------------------------------------------------------------
+
+    async def wait_for(self, future: Future[Any]) -> None:
+        """Waits for a future that is completed between two steps, without blocking the loop.
+
+        Raises:
+            Exception: The exception of the future.
+        """
+        await _wait_for(self.world, future)
+
+    def spawn(self, work: Coroutine[Any, Any, None]) -> None:
+        """Starts something that ends by itself, or with the world."""
+        task = asyncio.create_task(work)
+        self._jobs.add(task)
+        task.add_done_callback(self._job_done)
+
+    def _job_done(self, task: asyncio.Task[None]) -> None:
+        self._jobs.discard(task)
+        if not task.cancelled() and task.exception() is not None and not self.world.closed:
+            _LOG.warning("web viewer: %s", task.exception())
 
     # -- captures --------------------------------------------------------------------------
 
@@ -186,18 +251,39 @@ class WorldFeed:
                 self._wake_all()
                 await asyncio.sleep(max(began + PERIOD - loop.time(), 0.001))
         finally:
-            self._capture.end()
+            if not self.world.closed:
+                self.world.post(self._capture.end)
 
     def _rest(self) -> None:
         """Ends everything that costs something; nobody looks."""
-        self._capture.end()
+        if not self.world.closed:
+            self.world.post(self._capture.end)
         self._times.clear()
         self._scans.clear()
+        self._details.clear()
+        self._parameters.clear()
+        self._values.clear()
+
+    def _demand(self, now: float) -> Demand:
+        """Returns what the clients look at, and what of it is due."""
+        views = self._lookers.values()
+        inspected = frozenset(view.inspect for view in views if view.inspect is not None)
+        demand = Demand(
+            scans=any(view.scans for view in views),
+            layers=self._layers_changed,
+            frames=now >= self._frames_due and any(view.frames for view in views),
+            inspected=inspected,
+            details=now >= self._details_due and bool(inspected),
+            series=frozenset(name for view in views for name in view.series),
+        )
+        if demand.frames:
+            self._frames_due = now + FRAMES_PERIOD
+        if demand.details:
+            self._details_due = now + DETAILS_PERIOD
+        return demand
 
     async def _update(self, now: float) -> None:
-        demand = Demand(
-            scans=any(view.scans for view in self._lookers.values()), layers=self._layers_changed
-        )
+        demand = self._demand(now)
         self._layers_changed = False
         task = asyncio.ensure_future(between_steps(self.world, lambda: self._capture.take(demand)))
         try:
@@ -206,7 +292,9 @@ class WorldFeed:
                 if not task.done():
                     self._set_status(asyncio.get_running_loop().time())
                     self._wake_all()
-            self._apply(task.result(), now)
+            captured = task.result()
+            await self._read_parameters(captured.details)
+            self._apply(captured, now)
         except PLUGIN_FAULTS as error:
             self._layers_changed = self._layers_changed or demand.layers
             if not self.world.closed:
@@ -229,6 +317,7 @@ class WorldFeed:
         self._apply_models(captured)
         self._apply_poses(captured)
         self._apply_scans(captured.scans)
+        self._apply_extras(captured)
         self._times.append((now, captured.time))
         if captured.time < self._times[0][1]:  # The world was reset.
             self._times.clear()
@@ -295,6 +384,30 @@ class WorldFeed:
             for scan, part in zip(same, parts, strict=True):
                 self._scans[scan.laser] = (self._tick, part)
 
+    async def _read_parameters(self, details: list[Details]) -> None:
+        """Reads the parameters of the plugins of models that were not inspected before."""
+        for each in details:
+            known = self._parameters.get(each.model)
+            if known is None or known[0] != each.path:
+                parameters = await asyncio.to_thread(plugin_parameters, self.world, each.path)
+                self._parameters[each.model] = (each.path, parameters)
+
+    def _apply_extras(self, captured: Captured) -> None:
+        for details in captured.details:
+            parameters = self._parameters[details.model][1]
+            text = _json(details_message(self.index, details, parameters))
+            self._details[details.model] = (self._tick, text)
+        if captured.frames is not None:
+            self._frames = (self._tick, _json(self._frames_message(captured.frames)))
+        values = {}
+        for name, (value, path) in captured.series.items():
+            number = number_at(value, path)
+            if number is not None:
+                values[name] = number
+        if values != self._values or captured.time != self._values_time:
+            self._values_tick = self._tick
+        self._values, self._values_time = values, captured.time
+
     # -- messages --------------------------------------------------------------------------
 
     def next_message(self, seen: Seen, view: View) -> str | bytes | None:
@@ -329,8 +442,37 @@ class WorldFeed:
                 return message
         if view.scans and seen.scans < self._tick:
             before, seen.scans = seen.scans, self._tick
-            return self._scans_message(before, last.time)
+            message = self._scans_message(before, last.time)
+            if message is not None:
+                return message
+        return self._next_extra(seen, view, last.time)
+
+    def _next_extra(self, seen: Seen, view: View, time: float) -> str | None:
+        """Returns the next message that only some clients want."""
+        if view.inspect is not None and view.inspect in self._details:
+            tick, text = self._details[view.inspect]
+            if seen.details != tick:
+                seen.details = tick
+                return text
+        if view.frames and seen.frames < self._frames[0]:
+            seen.frames, text = self._frames
+            return text
+        if view.series and seen.values < self._values_tick:
+            seen.values = self._values_tick
+            series = {name: self._values[name] for name in view.series if name in self._values}
+            if series:
+                message = {"type": "values", "world": self.index, "time": time, "series": series}
+                return _json(message)
         return None
+
+    def _frames_message(self, frames: list[Transform]) -> dict[str, Any]:
+        return {
+            "type": "frames",
+            "world": self.index,
+            "frames": [
+                {"parent": f.parent, "child": f.child, "pose": [f.x, f.y, f.yaw]} for f in frames
+            ],
+        }
 
     def _world_message(self, last: Captured) -> str:
         points = [layer.edges.reshape(-1, 2) for layer in self._layers]
@@ -353,7 +495,7 @@ class WorldFeed:
                     }
                     for layer in self._layers
                 ],
-                "model_files": self._model_files(),
+                "model_files": self.model_files,
             }
         )
 

@@ -5,18 +5,22 @@ from __future__ import annotations
 import asyncio
 import itertools
 import logging
-from typing import Any
+from collections.abc import Coroutine
+from typing import Any, Final
 
 from flatland.errors import PLUGIN_FAULTS, FlatlandError
 from flatland.web.client import MAX_MESSAGES_PER_SECOND, Client
+from flatland.web.commands import Commands
 from flatland.web.controller import WorldController
-from flatland.web.feed import WorldFeed, between_steps
+from flatland.web.feed import WorldFeed
 from flatland.web.messages import MAX_SIZE, READ_ONLY_TYPES, Message
+from flatland.web.model_files import model_files
 from flatland.world import World
 
 _LOG = logging.getLogger("flatland")
 
-PROTOCOL_VERSION = 1
+PROTOCOL_VERSION: Final = 1
+MAX_WAITING: Final = 64  # requests of a client that wait for the simulator
 
 
 class Hub:
@@ -41,12 +45,13 @@ class Hub:
         self._ids = itertools.count(1)
         self._tasks: dict[WorldFeed, asyncio.Task[None]] = {}
         self._jobs: set[asyncio.Task[None]] = set()
+        self._commands = Commands()
 
     # -- worlds ----------------------------------------------------------------------------
 
     def add(self, index: int, name: str, world: World, controller: WorldController) -> WorldFeed:
         """Adds a world."""
-        feed = WorldFeed(index, name, world, controller, self._ids, list)
+        feed = WorldFeed(index, name, world, controller, self._ids)
         self.feeds[index] = feed
         self._tasks[feed] = asyncio.create_task(self._run(feed))
         for client in self.clients:
@@ -56,6 +61,7 @@ class Hub:
 
     async def _run(self, feed: WorldFeed) -> None:
         try:
+            feed.model_files = await asyncio.to_thread(model_files, feed.world)
             await feed.run()
         except asyncio.CancelledError:
             raise
@@ -102,17 +108,28 @@ class Hub:
     def forget(self, client: Client) -> None:
         """Ends everything that a client has begun."""
         self.clients.discard(client)
+        self._commands.forget(client)
         for feed in self.feeds.values():
             feed.look_away(client.wake)
 
     def receive(self, client: Client, message: Message) -> None:
         """Carries out a message of a client and replies to it."""
-        task = asyncio.create_task(self._carry_out(client, message))
+        self._start(self._carry_out(client, message))
+
+    def _start(self, work: Coroutine[Any, Any, None]) -> None:
+        task = asyncio.create_task(work)
         self._jobs.add(task)
         task.add_done_callback(self._jobs.discard)
 
+    async def watch(self) -> None:
+        """Ends what clients have begun and do not continue; runs until it is cancelled."""
+        await self._commands.watch()
+
     async def _carry_out(self, client: Client, message: Message) -> None:
+        client.waiting += 1
         try:
+            if client.waiting > MAX_WAITING:
+                raise FlatlandError("too many requests wait for the simulator")
             if self.read_only and message.type not in READ_ONLY_TYPES:
                 raise FlatlandError("this viewer is read-only")
             result = await self._result(client, message)
@@ -122,6 +139,8 @@ class Hub:
         except PLUGIN_FAULTS as error:
             _LOG.exception("web viewer: %s failed", message.type)
             client.send({"type": "reply", "id": message.id, "ok": False, "error": repr(error)})
+        finally:
+            client.waiting -= 1
 
     async def _result(self, client: Client, message: Message) -> object:
         if message.type == "look":
@@ -130,14 +149,7 @@ class Hub:
         feed = self.feeds.get(message.world)
         if feed is None:
             raise FlatlandError(f"there is no world {message.world}")
-        match message.type:
-            case "pause":
-                await between_steps(feed.world, feed.controller.pause)
-            case "resume":
-                await between_steps(feed.world, feed.controller.resume)
-            case _:
-                raise FlatlandError(f"{message.type} is not available")
-        return None
+        return await self._commands.carry_out(client, feed, message)
 
     async def disconnect(self, code: int, reason: str) -> None:
         """Closes all connections."""

@@ -176,12 +176,15 @@ class WebViewer:
         runner = web.AppRunner(application, access_log=None, handle_signals=False)
         await runner.setup()
         await web.SockSite(runner, listener, shutdown_timeout=1.0).start()
+        watch = asyncio.create_task(self._hub.watch())
         try:
             await self._stop.wait()
             await self._hub.disconnect(WSCloseCode.GOING_AWAY, "the viewer ends")
         finally:
+            watch.cancel()
             await self._hub.close()
             await runner.cleanup()
+            await asyncio.get_running_loop().shutdown_default_executor()
 
     # -- worlds ----------------------------------------------------------------------------
 
