@@ -34,6 +34,7 @@ MODULES = (
     "placement",
     "copies",
     "gym_steps",
+    "web_page",
 )
 
 
