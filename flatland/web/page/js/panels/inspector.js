@@ -1,5 +1,5 @@
 import { byId, element, icon, setText } from "../dom.js";
-import { brief, fixed, significant } from "../format.js";
+import { brief, describeValue, fixed, significant } from "../format.js";
 
 /** Time between two updates of the pose from the view [ms]. */
 const POSE_PERIOD = 200;
@@ -158,7 +158,7 @@ export class Inspector {
       const [name, text] = /** @type {any} */ (row.children);
       setText(name, topic);
       name.title = kind ? `${type}, ${kind}` : type;
-      setText(text, brief(value));
+      setText(text, describeValue(value));
     });
     while (section.children.length > topics.length + 1) section.lastElementChild?.remove();
   }
