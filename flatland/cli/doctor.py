@@ -39,6 +39,7 @@ _OPTIONAL = (
     ("PIL", "Pillow", _APT + "python3-pil", "8-bit grey map images"),
     ("cv2", "OpenCV", _APT + "python3-opencv", "other map images, flatland run --video"),
     ("matplotlib", "matplotlib", _APT + "python3-matplotlib", "flatland show"),
+    ("aiohttp", "aiohttp", _APT + "python3-aiohttp", "flatland view"),
     ("tqdm", "tqdm", _APT + "python3-tqdm", "progress bar of flatland run"),
     ("argcomplete", "argcomplete", _APT + "python3-argcomplete", "completion in the shell"),
 )

@@ -43,10 +43,10 @@ class WorldController(Protocol):
             Done after the last step.
         """
 
-    def spawn(self, file: str, name: str, namespace: str, pose: Pose) -> None:
+    def spawn(self, file: str, name: str, namespace: str, pose: Pose) -> object:
         """Adds a model to the world."""
 
-    def move(self, name: str, pose: Pose) -> None:
+    def move(self, name: str, pose: Pose) -> object:
         """Moves a model to a pose in the world frame [m, rad]."""
 
     def delete(self, name: str) -> None:

@@ -6,6 +6,8 @@ import asyncio
 import logging
 import socket
 import threading
+from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass
 from types import TracebackType
 from typing import Final
@@ -75,7 +77,8 @@ class WebViewer:
             raise ValueError("token must not be empty")
         self._access = Access.for_host(host, token)
         self._port = port
-        self._loop = asyncio.new_event_loop()
+        self._loop: asyncio.AbstractEventLoop | None = None
+        self._before_start: list[Callable[[], object]] = []
         self._hub = Hub(title, read_only)
         self._handles: dict[WorldHandle, tuple[World, _LayerObserver]] = {}
         self._thread: threading.Thread | None = None
@@ -127,8 +130,11 @@ class WebViewer:
                 return
             listener = self._listen()
             self._port = listener.getsockname()[1]
+            self._loop = asyncio.new_event_loop()
+            for action in self._before_start:
+                self._loop.call_soon(action)
             self._thread = threading.Thread(
-                target=self._run, args=[listener], name="flatland-web", daemon=True
+                target=self._run, args=[self._loop, listener], name="flatland-web", daemon=True
             )
             self._thread.start()
 
@@ -140,6 +146,7 @@ class WebViewer:
             )
         except (OSError, OverflowError, UnicodeError) as error:
             reason = error.strerror if isinstance(error, OSError) else str(error)
+            reason = str(reason).partition(" (while")[0]
             raise FlatlandError(
                 f"the viewer cannot listen on port {port} of {host!r}: {reason}",
                 hint="choose another port; 0 for any free one",
@@ -155,25 +162,26 @@ class WebViewer:
         for handle in list(self._handles):
             self.remove_world(handle)
         if thread is None:
-            self._loop.close()
             return
-        self._loop.call_soon_threadsafe(self._stop.set)
+        self._call(self._stop.set)
         thread.join(_CLOSE_TIMEOUT)
         if thread.is_alive():
             _LOG.warning("the thread of the web viewer did not end")
 
-    def _run(self, listener: socket.socket) -> None:
-        asyncio.set_event_loop(self._loop)
+    def _run(self, loop: asyncio.AbstractEventLoop, listener: socket.socket) -> None:
+        asyncio.set_event_loop(loop)
         try:
-            self._loop.run_until_complete(self._serve(listener))
+            loop.run_until_complete(self._serve(listener))
         except Exception:
             _LOG.exception("unexpected internal error in the web viewer")
         finally:
-            self._loop.close()
+            loop.close()
 
     async def _serve(self, listener: socket.socket) -> None:
         application = Server(self._hub, self._access).application()
-        runner = web.AppRunner(application, access_log=None, handle_signals=False)
+        # Requests that are not HTTP are answered by status 400, and are not worth a log entry.
+        silent = logging.Logger("flatland.web", logging.CRITICAL)
+        runner = web.AppRunner(application, access_log=None, logger=silent, handle_signals=False)
         await runner.setup()
         await web.SockSite(runner, listener, shutdown_timeout=1.0).start()
         watch = asyncio.create_task(self._hub.watch())
@@ -241,12 +249,14 @@ class WebViewer:
     def _layers_changed(self, handle: WorldHandle) -> None:
         self._call(lambda: self._hub.layers_changed(handle.index))
 
-    def _call(self, action: object) -> None:
-        """Calls a function in the thread of the loop, if it has not ended."""
-        try:
-            self._loop.call_soon_threadsafe(action)  # type: ignore[arg-type]
-        except RuntimeError:
-            return  # The loop is closed.
+    def _call(self, action: Callable[[], object]) -> None:
+        """Calls a function in the thread of the loop, when it has started and has not ended."""
+        with self._lock:
+            if self._loop is None:
+                self._before_start.append(action)
+                return
+        with suppress(RuntimeError):  # The loop is closed.
+            self._loop.call_soon_threadsafe(action)
 
 
 class _LayerObserver(WorldObserver):
