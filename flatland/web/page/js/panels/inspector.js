@@ -27,6 +27,7 @@ export class Inspector {
       if (this.shownId !== (session.selected?.id ?? null)) this.rebuild();
     });
     session.on("hello", () => this.rebuild());
+    session.on("current", () => this.rebuild());
     session.on("details", (details) => this.update(details));
     stage.on("frame", () => this.updatePose());
   }
@@ -36,6 +37,8 @@ export class Inspector {
     this.shownId = selected?.id ?? null;
     this.isEdited = false;
     if (!selected) {
+      const place = this.session.world ? "Select a model in the view or in the list." : "Enlarge a world to select a model.";
+      setText(this.empty, place);
       this.root.replaceChildren(this.empty);
       return;
     }
