@@ -1,7 +1,7 @@
 import { addAttributes, createProgram } from "./gl.js";
 import { readable } from "./palette.js";
 import { edgesFragment, edgesVertex, flatFragment, thinVertex } from "./shaders.js";
-import { useProgram } from "./view.js";
+import { lineWeight, useProgram } from "./view.js";
 
 /** Width of the edges of a layer [CSS pixels]. */
 const WIDTH = 1.6;
@@ -106,7 +106,7 @@ export class EdgeLayers {
         gl.bindVertexArray(entry.thin);
         gl.drawArrays(gl.LINES, 0, 2 * entry.count);
       } else {
-        gl.uniform1f(program.uniform("u_width"), WIDTH * viewport.ratio);
+        gl.uniform1f(program.uniform("u_width"), WIDTH * lineWeight(viewport) * viewport.ratio);
         gl.bindVertexArray(entry.wide);
         gl.drawArraysInstanced(gl.TRIANGLE_STRIP, 0, 4, entry.count);
       }
