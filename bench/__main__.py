@@ -34,6 +34,8 @@ MODULES = (
     "placement",
     "copies",
     "gym_steps",
+    "web_page",
+    "web_stream",
 )
 
 

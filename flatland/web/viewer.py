@@ -6,20 +6,23 @@ import asyncio
 import logging
 import socket
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from types import TracebackType
 from typing import Final
 
+import numpy as np
 from aiohttp import WSCloseCode, web
 
 from flatland.errors import FlatlandError
+from flatland.geometry import FloatArray
 from flatland.runtime.observer import WorldObserver
 from flatland.simulation import Simulation
 from flatland.web.access import Access
 from flatland.web.controller import DefaultController, WorldController
 from flatland.web.hub import Hub
+from flatland.web.scene import LayerContents
 from flatland.web.server import Server
 from flatland.world import World
 
@@ -245,6 +248,26 @@ class WebViewer:
         observer.active = False
         if not world.closed:
             world.post(lambda: world.remove_observer(observer))
+
+    def draw_lines(
+        self, handle: WorldHandle, name: str, color: Sequence[float], edges: FloatArray
+    ) -> None:
+        """Shows lines that are not part of a world, such as goals; safe from any thread.
+
+        Args:
+            handle: The world. If it was removed, the call has no effect.
+            name: Name for users; lines of the same name are replaced.
+            color: (r, g, b, a), each in [0, 1].
+            edges: (x1, y1, x2, y2) in the world frame [m], shape (n, 4).
+
+        Raises:
+            ValueError: The edges have the wrong shape.
+        """
+        lines = np.array(edges, np.float32)
+        if lines.ndim != 2 or lines.shape[1] != 4:
+            raise ValueError(f"edges must have the shape (n, 4), got {lines.shape}")
+        contents = LayerContents(name, tuple(map(float, color)), (0.0, 0.0, 0.0), lines)
+        self._call(lambda: self._hub.draw(handle.index, contents))
 
     def _layers_changed(self, handle: WorldHandle) -> None:
         self._call(lambda: self._hub.layers_changed(handle.index))

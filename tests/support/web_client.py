@@ -1,79 +1,69 @@
-"""A client of the viewer in the browser, over a real socket."""
+"""A client of the viewer in the browser: what the page receives and sends, without a browser."""
 
 from __future__ import annotations
 
 import asyncio
+import itertools
 import json
 import struct
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Any
 
 import aiohttp
-import numpy as np
+import pytest
 from waiting import TIMEOUT
 
-HEADER = struct.Struct("<BBHId")
-
-
-@dataclass(frozen=True)
-class Binary:
-    """A decoded binary message."""
-
-    kind: int
-    version: int
-    world: int
-    revision: int
-    time: float
-    payload: bytes
-
-    def edges(self) -> tuple[int, np.ndarray]:
-        layer, count = struct.unpack_from("<II", self.payload)
-        assert len(self.payload) == 8 + 16 * count
-        return layer, np.frombuffer(self.payload, "<f4", offset=8).reshape(count, 4)
-
-    def poses(self) -> dict[int, np.ndarray]:
-        (count,) = struct.unpack_from("<I", self.payload)
-        assert len(self.payload) == 4 + 16 * count
-        ids = np.frombuffer(self.payload, "<u4", count, 4).tolist()
-        poses = np.frombuffer(self.payload, "<f4", offset=4 + 4 * count).reshape(count, 3)
-        return dict(zip(ids, poses, strict=True))
-
-    def scans(self) -> dict[int, tuple[np.ndarray, np.ndarray]]:
-        (count,) = struct.unpack_from("<I", self.payload)
-        found, offset = {}, 4
-        for _ in range(count):
-            number, beams = struct.unpack_from("<II", self.payload, offset)
-            pose = np.frombuffer(self.payload, "<f4", 3, offset + 8)
-            found[number] = pose, np.frombuffer(self.payload, "<u2", beams, offset + 20)
-            offset += 20 + 2 * (beams + beams % 2)
-        assert offset == len(self.payload)
-        return found
+_HEADER = struct.Struct("<BBHId")
+EDGES, POSES = 1, 2  # kinds of binary messages
 
 
 class WebClient:
-    """Connects to a viewer; keeps all messages in the order in which they arrive."""
+    """A connection to a viewer; messages are read while a method waits.
 
-    def __init__(self, url: str, *, look: bool = True, **options: Any) -> None:
-        self._runner = asyncio.Runner()
-        self._id = 0
-        self.received: list[Any] = []
-        self.closed: aiohttp.WSMessage | None = None
+    Attributes:
+        hello: The last message `hello`.
+        worlds: For each world the last messages `world` and `status`, all models by name, the
+            poses of all bodies by id, and the edges of all layers by number.
+        texts: All other messages.
+    """
+
+    def __init__(self, url: str, **look: Any) -> None:
+        """Connects to the viewer with an address, and looks at all of its worlds.
+
+        Args:
+            url: Address of the page.
+            look: More fields of the message `look`.
+        """
+        self.hello: dict[str, Any] = {}
+        self.worlds: dict[int, dict[str, Any]] = {}
+        self.texts: list[dict[str, Any]] = []
+        self._ids = itertools.count(1)
+        self._replies: dict[int, dict[str, Any]] = {}
+        self._loop = asyncio.new_event_loop()
+        page, _, query = url.partition("?")
         try:
-            self._runner.run(self._connect(url, options))
-            if look:
-                self.ask("look", worlds=[0])
+            self._session, self._socket = self._loop.run_until_complete(
+                self._connect(f"{page.replace('http', 'ws', 1)}ws?{query}")
+            )
+        except BaseException:
+            self._loop.close()
+            raise
+        try:
+            self.until("hello", lambda: self.hello)
+            self.look(worlds=[world["world"] for world in self.hello["worlds"]], **look)
         except BaseException:
             self.close()
             raise
 
-    async def _connect(self, url: str, options: Any) -> None:
-        base, _, query = url.partition("?")
-        self._session = aiohttp.ClientSession()
-        self._socket = await self._session.ws_connect(
-            f"{base}ws?{query}", protocols=["flatland.1"], max_msg_size=0, **options
-        )
+    @staticmethod
+    async def _connect(url: str) -> tuple[Any, Any]:
+        session = aiohttp.ClientSession()
+        try:
+            return session, await session.ws_connect(url, protocols=["flatland.1"])
+        except BaseException:
+            await session.close()
+            raise
 
     def __enter__(self) -> WebClient:
         return self
@@ -82,114 +72,121 @@ class WebClient:
         self.close()
 
     def close(self) -> None:
-        """Disconnects; further calls have no effect."""
-        if self._runner is None:
-            return
+        """Ends the connection."""
 
-        async def close() -> None:
-            if hasattr(self, "_socket"):
-                await self._socket.close()
+        async def end() -> None:
+            await self._socket.close()
             await self._session.close()
 
-        self._runner.run(close())
-        self._runner.close()
-        self._runner = None  # type: ignore[assignment]
+        if not self._loop.is_closed():
+            self._loop.run_until_complete(end())
+            self._loop.close()
 
-    def vanish(self) -> None:
-        """Ends the connection without a word, like a machine that loses its power."""
+    def look(self, **fields: Any) -> None:
+        """Changes what is received."""
+        assert self.send("look", **fields)["ok"]
 
-        async def abort() -> None:
-            self._socket._response.connection.transport.abort()  # type: ignore[union-attr]
-            await asyncio.sleep(0)
-
-        self._runner.run(abort())
-
-    # -- to the server ---------------------------------------------------------------------
-
-    def send_text(self, text: str) -> None:
-        self._runner.run(self._socket.send_str(text))
-
-    def send_bytes(self, data: bytes) -> None:
-        self._runner.run(self._socket.send_bytes(data))
-
-    def send(self, kind: str, **fields: Any) -> int:
-        self._id += 1
-        self.send_text(json.dumps({"id": self._id, "type": kind, **fields}))
-        return self._id
-
-    def reply(self, kind: str, **fields: Any) -> dict[str, Any]:
+    def send(self, kind: str, **fields: Any) -> dict[str, Any]:
         """Sends a message and returns its reply."""
-        number = self.send(kind, **fields)
-        return self.wait("reply", lambda message: message["id"] == number)
+        number = next(self._ids)
+        message = {"id": number, "type": kind, **fields}
+        self._loop.run_until_complete(self._socket.send_json(message))
+        self.until(f"reply to {kind}", lambda: number in self._replies)
+        return self._replies.pop(number)
 
-    def ask(self, kind: str, **fields: Any) -> Any:
-        """Sends a message that must succeed and returns the result."""
-        reply = self.reply(kind, **fields)
+    def do(self, kind: str, **fields: Any) -> Any:
+        """Sends a message that succeeds, and returns its result."""
+        reply = self.send(kind, **fields)
         assert reply["ok"], reply
         return reply["result"]
 
-    # -- from the server -------------------------------------------------------------------
+    def refused(self, kind: str, **fields: Any) -> str:
+        """Sends a message that fails, and returns the error."""
+        reply = self.send(kind, **fields)
+        assert not reply["ok"], reply
+        return str(reply["error"])
 
-    def receive(self, timeout: float = TIMEOUT) -> Any:
-        """Returns the next message: a dictionary, a `Binary`, or None at the end."""
-        try:
-            message = self._runner.run(self._socket.receive(timeout))
-        except TimeoutError:
-            raise TimeoutError("no message") from None
-        if message.type is aiohttp.WSMsgType.TEXT:
-            decoded: Any = json.loads(message.data)
-        elif message.type is aiohttp.WSMsgType.BINARY:
-            decoded = Binary(*HEADER.unpack_from(message.data), message.data[HEADER.size :])
-        else:
-            self.closed = message
-            return None
-        self.received.append(decoded)
-        return decoded
-
-    def wait(self, kind: str | int, accept: Callable[[Any], bool] = lambda _: True) -> Any:
-        """Returns the next message of a type or binary kind that is accepted."""
+    def until(self, what: str, condition: Callable[[], Any]) -> Any:
+        """Reads messages until a condition holds, and returns its value."""
         end = time.monotonic() + TIMEOUT
-        while time.monotonic() < end:
-            message = self.receive()
-            assert message is not None, f"the connection was closed: {self.closed}"
-            found = message["type"] if isinstance(message, dict) else message.kind
-            if found == kind and accept(message):
-                return message
-        raise TimeoutError(f"no message {kind}")
+        while not (result := condition()):
+            left = end - time.monotonic()
+            if left <= 0:
+                pytest.fail(f"{what}: not within {TIMEOUT} s; {self.worlds}")
+            self._receive(left)
+        return result
 
-    def receive_for(self, seconds: float) -> list[Any]:
-        """Returns all messages that arrive in some time."""
-        end, found = time.monotonic() + seconds, []
-        while (left := end - time.monotonic()) > 0:
-            try:
-                found.append(self.receive(left))
-            except TimeoutError:
-                break
-        return found
+    # -- the state of a world --------------------------------------------------------------
 
-    def wait_closed(self) -> tuple[int, str]:
-        """Waits until the server closes the connection; returns the code and the reason."""
-        while self.receive() is not None:
-            pass
-        assert self.closed is not None
-        return self.closed.data, self.closed.extra
+    def status(self, world: int = 0) -> dict[str, Any]:
+        """Returns the last status of a world, and waits for the first one."""
+        return dict(self.until("status", lambda: self.worlds.get(world, {}).get("status")))
 
-    def model(self, name: str) -> dict[str, Any]:
-        """Returns the latest description of a model, which must have been received."""
-        described = [
-            model
-            for message in self.received
-            if isinstance(message, dict) and message["type"] == "models"
-            for model in message["models"]
-            if model["name"] == name
-        ]
-        return described[-1]
+    def until_status(self, world: int = 0, **expected: Any) -> dict[str, Any]:
+        """Waits until fields of the status of a world have these values."""
+        self.until(
+            f"status {expected}",
+            lambda: {k: self.status(world).get(k) for k in expected} == expected,
+        )
+        return self.status(world)
 
-    def wait_model(self, name: str) -> dict[str, Any]:
-        """Returns the description of a model, as soon as it is there."""
-        try:
-            return self.model(name)
-        except IndexError:
-            names = lambda message: [model["name"] for model in message["models"]]  # noqa: E731
-            self.wait("models", lambda message: name in names(message))
-            return self.model(name)
+    def model(self, name: str, world: int = 0) -> dict[str, Any]:
+        """Waits for a model, and returns its description."""
+        found = self.until(
+            f"model {name}", lambda: self.worlds.get(world, {}).get("models", {}).get(name)
+        )
+        return dict(found)
+
+    def pose(self, name: str, world: int = 0) -> tuple[float, float, float]:
+        """Returns the last pose of the first body of a model, and waits for the first one."""
+        body = self.model(name, world)["bodies"][0]["id"]
+        x, y, theta = self.until("pose", lambda: self.worlds[world]["poses"].get(body))
+        return x, y, theta
+
+    # -- messages --------------------------------------------------------------------------
+
+    def _receive(self, timeout: float) -> None:
+        message = self._loop.run_until_complete(self._socket.receive(timeout))
+        if message.type is aiohttp.WSMsgType.TEXT:
+            self._take_text(json.loads(message.data))
+        elif message.type is aiohttp.WSMsgType.BINARY:
+            self._take_binary(message.data)
+        else:
+            raise ConnectionError(f"{message.type!r}: {message.data}, {message.extra}")
+
+    def _take_text(self, message: dict[str, Any]) -> None:
+        kind = message["type"]
+        if kind == "hello":
+            self.hello = message
+        elif kind == "reply":
+            self._replies[message["id"]] = message
+        elif kind in ("world", "status"):
+            self._world(message["world"])[kind] = message
+        elif kind == "models":
+            models = self._world(message["world"])["models"]
+            changed = {model["id"] for model in message["models"]} | set(message["removed"])
+            for name in [name for name, model in models.items() if model["id"] in changed]:
+                del models[name]
+            if message["complete"]:
+                models.clear()
+            models.update({model["name"]: model for model in message["models"]})
+        elif kind == "gone":
+            self.worlds.pop(message["world"], None)
+        else:
+            self.texts.append(message)
+
+    def _take_binary(self, data: bytes) -> None:
+        kind, _version, world, _revision, _time = _HEADER.unpack_from(data)
+        if kind == EDGES:
+            layer, count = struct.unpack_from("<II", data, _HEADER.size)
+            numbers = struct.unpack_from(f"<{4 * count}f", data, _HEADER.size + 8)
+            self._world(world)["edges"][layer] = list(zip(*[iter(numbers)] * 4, strict=True))
+        elif kind == POSES:
+            (count,) = struct.unpack_from("<I", data, _HEADER.size)
+            ids = struct.unpack_from(f"<{count}I", data, _HEADER.size + 4)
+            numbers = struct.unpack_from(f"<{3 * count}f", data, _HEADER.size + 4 + 4 * count)
+            poses = zip(*[iter(numbers)] * 3, strict=True)
+            self._world(world)["poses"].update(zip(ids, poses, strict=True))
+
+    def _world(self, number: int) -> dict[str, Any]:
+        return self.worlds.setdefault(number, {"models": {}, "poses": {}, "edges": {}})

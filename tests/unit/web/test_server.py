@@ -10,8 +10,8 @@ from typing import Any
 
 import aiohttp
 import pytest
+from raw_web_client import RawWebClient
 from waiting import wait_until
-from web_client import WebClient
 
 from flatland.errors import FlatlandError
 from flatland.web import WebViewer
@@ -65,11 +65,11 @@ class TestFiles:
 class TestAccess:
     def test_pages_of_other_sites_may_not_connect(self, viewer):
         with pytest.raises(aiohttp.WSServerHandshakeError) as error:
-            WebClient(viewer.url, headers={"Origin": "http://example.org"})
+            RawWebClient(viewer.url, headers={"Origin": "http://example.org"})
         assert error.value.status == 403
 
     def test_the_own_page_may_connect(self, viewer):
-        with WebClient(
+        with RawWebClient(
             viewer.url, look=False, headers={"Origin": viewer.url.rstrip("/")}
         ) as client:
             assert client.wait("hello")["title"] == "flatland"
@@ -77,7 +77,7 @@ class TestAccess:
     def test_names_of_other_machines_are_refused(self, viewer):
         assert get(viewer.url, headers={"Host": "example.org"})[0] == 403
         with pytest.raises(aiohttp.WSServerHandshakeError) as error:
-            WebClient(viewer.url, headers={"Host": "example.org:80"})
+            RawWebClient(viewer.url, headers={"Host": "example.org:80"})
         assert error.value.status == 403
         for name in ("localhost:9000", "127.0.0.1", "[::1]:8000"):
             assert get(viewer.url, headers={"Host": name})[0] == 200
@@ -85,7 +85,7 @@ class TestAccess:
     def test_a_token_is_required_if_the_viewer_has_one(self):
         with WebViewer(port=0, token="sesame & co") as viewer:
             assert viewer.url.endswith("/?token=sesame%20%26%20co")
-            with WebClient(viewer.url, look=False) as client:
+            with RawWebClient(viewer.url, look=False) as client:
                 client.wait("hello")
             plain = viewer.url.partition("?")[0]
             for wrong in (
@@ -94,7 +94,7 @@ class TestAccess:
                 f"{plain}?token=Sesame",
                 f"{plain}?token=%c3%a4",
             ):
-                with WebClient(wrong, look=False) as client:
+                with RawWebClient(wrong, look=False) as client:
                     assert client.wait_closed() == (4401, "the token is missing or wrong")
                     assert client.received == []
 
@@ -108,13 +108,13 @@ class TestAccess:
     def test_the_viewer_of_all_addresses_is_reached_with_its_token(self):
         with WebViewer("0.0.0.0", 0) as viewer:
             url = f"http://127.0.0.1:{viewer.port}/?{viewer.url.partition('?')[2]}"
-            with WebClient(url, look=False) as client:
+            with RawWebClient(url, look=False) as client:
                 client.wait("hello")
 
     def test_a_read_only_viewer_refuses_changes(self, world, simulation):
         with WebViewer(port=0, read_only=True) as viewer:
             viewer.add_world(world, simulation=simulation)
-            with WebClient(viewer.url) as client:
+            with RawWebClient(viewer.url) as client:
                 assert client.wait_model("robot")
                 robot = client.model("robot")["id"]
                 for kind, fields in (
@@ -159,7 +159,7 @@ class TestAccess:
     ],
 )
 def test_a_malformed_message_closes_that_connection_and_nothing_else(url, text, reason):
-    with WebClient(url) as other, WebClient(url) as client:
+    with RawWebClient(url) as other, RawWebClient(url) as client:
         client.send_text(text)
         code, found = client.wait_closed()
         assert code == 1008
@@ -170,17 +170,17 @@ def test_a_malformed_message_closes_that_connection_and_nothing_else(url, text, 
 
 class TestLimits:
     def test_binary_messages_are_refused(self, url):
-        with WebClient(url) as client:
+        with RawWebClient(url) as client:
             client.send_bytes(b"\x00\x01")
             assert client.wait_closed() == (1003, "only text is accepted")
 
     def test_large_messages_are_refused(self, url):
-        with WebClient(url) as client:
+        with RawWebClient(url) as client:
             client.send_text(json.dumps({"type": "preview", "file": "x" * 17000}))
             assert client.wait_closed()[0] == 1009
 
     def test_too_many_messages_are_refused(self, url):
-        with WebClient(url) as client, WebClient(url) as other:
+        with RawWebClient(url) as client, RawWebClient(url) as other:
             for _ in range(400):
                 try:
                     client.send("pause", world=7)
@@ -191,7 +191,7 @@ class TestLimits:
 
     def test_requests_that_wait_are_limited(self, url, world):
         release = threading.Event()
-        with WebClient(url) as client:
+        with RawWebClient(url) as client:
             client.wait("models")
             blocked = world.post(lambda: release.wait(30))
             numbers = [client.send("pause") for _ in range(70)]
@@ -204,9 +204,9 @@ class TestLimits:
 
     def test_too_many_clients_are_refused(self, viewer, monkeypatch):
         monkeypatch.setattr("flatland.web.server.MAX_CLIENTS", 2)
-        with WebClient(viewer.url, look=False) as first, WebClient(viewer.url, look=False):
+        with RawWebClient(viewer.url, look=False) as first, RawWebClient(viewer.url, look=False):
             first.wait("hello")
-            with WebClient(viewer.url, look=False) as third:
+            with RawWebClient(viewer.url, look=False) as third:
                 assert third.wait_closed() == (1013, "too many clients")
 
 
@@ -225,7 +225,7 @@ class TestLifecycle:
             WebViewer(port=port)
 
     def test_close_disconnects_clients_and_ends_the_thread(self, url, viewer):
-        with WebClient(url) as client:
+        with RawWebClient(url) as client:
             client.wait("models")
             viewer.close()
             viewer.close()
@@ -244,7 +244,7 @@ class TestLifecycle:
             viewer.add_world(world)
 
     def test_twenty_clients_see_the_world_and_may_vanish(self, url, viewer):
-        clients = [WebClient(url) for _ in range(20)]
+        clients = [RawWebClient(url) for _ in range(20)]
         try:
             for client in clients:
                 client.wait(2)

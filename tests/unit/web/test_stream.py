@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 import pytest
+from raw_web_client import RawWebClient
 from waiting import wait_until
-from web_client import WebClient
 
 from flatland.simulation import Simulation
 from flatland.values import Twist
@@ -23,14 +23,14 @@ def wanted(world: Any) -> set[str]:
 
 class TestStart:
     def test_hello_lists_the_worlds_and_nothing_follows_without_look(self, url):
-        with WebClient(url, look=False) as client:
+        with RawWebClient(url, look=False) as client:
             hello = client.wait("hello")
             assert hello["version"] == 1
             assert hello["worlds"] == [{"world": 0, "name": "room"}]
             assert client.receive_for(0.3) == []
 
     def test_the_world_its_edges_and_its_models(self, url, world):
-        with WebClient(url) as client:
+        with RawWebClient(url) as client:
             message = client.wait("world")
             edges = client.wait(1)
             models = client.wait("models")
@@ -71,7 +71,7 @@ class TestStart:
         for number in range(5):
             world.spawn_model("box.model.yaml", f"box{number}", pose=(2 + number, 2, 0))
         viewer.add_world(world)
-        with WebClient(viewer.url) as client:
+        with RawWebClient(viewer.url) as client:
             client.wait_model("box4")
             messages = [m for m in client.received if isinstance(m, dict) and m["type"] == "models"]
             names = [[model["name"] for model in message["models"]] for message in messages]
@@ -81,7 +81,7 @@ class TestStart:
 
 class TestPoses:
     def test_poses_follow_the_bodies(self, url, world):
-        with WebClient(url) as client:
+        with RawWebClient(url) as client:
             robot = client.wait_model("robot")
             base, arm = (body["id"] for body in robot["bodies"])
             first = client.wait(2).poses()
@@ -95,7 +95,7 @@ class TestPoses:
             )
 
     def test_only_bodies_that_moved_are_sent(self, url, world):
-        with WebClient(url) as client:
+        with RawWebClient(url) as client:
             world.pause()
             world.spawn_model("box.model.yaml", "box", pose=(6, 6, 0))
             box = client.wait_model("box")["bodies"][0]["id"]
@@ -109,14 +109,14 @@ class TestPoses:
 
     def test_a_second_client_gets_all_poses(self, url, world):
         world.pause()
-        with WebClient(url) as client:
+        with RawWebClient(url) as client:
             first = client.wait(2).poses()
-            with WebClient(url) as other:
+            with RawWebClient(url) as other:
                 assert set(other.wait(2).poses()) == set(first)
 
     def test_at_most_thirty_messages_per_second(self, url, world):
         world.command("/cmd_vel").set(Twist(0.0, 0.0, 2.0))
-        with WebClient(url) as client:
+        with RawWebClient(url) as client:
             client.wait(2)
             times = [m.time for m in client.receive_for(1.0) if not isinstance(m, dict)]
             assert 2 < len(times) <= 31
@@ -124,7 +124,7 @@ class TestPoses:
 
 class TestScans:
     def test_scans_arrive_if_they_are_wanted(self, url, world):
-        with WebClient(url) as client:
+        with RawWebClient(url) as client:
             client.wait("models")
             assert wanted(world) == set()
             client.ask("look", scans=True)
@@ -137,7 +137,7 @@ class TestScans:
             wait_until("the scans are not computed", lambda: wanted(world) == set())
 
     def test_a_scan_is_sent_once(self, url, world):
-        with WebClient(url) as client:
+        with RawWebClient(url) as client:
             client.ask("look", scans=True)
             client.wait(3)
             world.pause()
@@ -146,7 +146,7 @@ class TestScans:
             assert not [m for m in client.receive_for(0.3) if getattr(m, "kind", 0) == 3]
 
     def test_a_second_client_gets_the_last_scan_of_a_paused_world(self, url, world):
-        with WebClient(url) as client, WebClient(url) as other:
+        with RawWebClient(url) as client, RawWebClient(url) as other:
             client.ask("look", scans=True)
             client.wait(3)
             world.pause()
@@ -156,7 +156,7 @@ class TestScans:
 
 class TestChanges:
     def test_models_are_added_and_removed(self, url, world):
-        with WebClient(url) as client:
+        with RawWebClient(url) as client:
             robot = client.wait_model("robot")
             world.spawn_model("box.model.yaml", "box", namespace="b", pose=(6, 6, 0))
             box = client.wait_model("box")
@@ -169,7 +169,7 @@ class TestChanges:
             assert (message["models"], message["removed"]) == ([], [robot["id"]])
 
     def test_a_model_that_replaces_another_one_has_a_new_id(self, url, world):
-        with WebClient(url) as client:
+        with RawWebClient(url) as client:
             robot = client.wait_model("robot")
 
             def replace() -> None:
@@ -184,7 +184,7 @@ class TestChanges:
             assert len(ids) == 1
 
     def test_a_changed_colour_is_sent(self, url, world):
-        with WebClient(url) as client:
+        with RawWebClient(url) as client:
             robot = client.wait_model("robot")
             world.models[0].bodies[0].color = (1.0, 1.0, 0.0, 1.0)
             message = client.wait("models")
@@ -192,7 +192,7 @@ class TestChanges:
             assert message["models"][0]["id"] == robot["id"]
 
     def test_new_edges_of_a_layer_are_sent(self, url, world):
-        with WebClient(url) as client:
+        with RawWebClient(url) as client:
             client.wait("models")
             edges = np.array([[1, 1, 2, 2]], np.float32)
 
@@ -205,7 +205,7 @@ class TestChanges:
             np.testing.assert_array_equal(client.wait(1).edges()[1][-1], [1, 1, 2, 2])
 
     def test_a_reset_is_followed(self, url, world):
-        with WebClient(url) as client:
+        with RawWebClient(url) as client:
             robot = client.wait_model("robot")
             base = robot["bodies"][0]["id"]
             world.move_model("robot", (7, 7, 0))
@@ -216,7 +216,7 @@ class TestChanges:
 
 class TestStatus:
     def test_the_real_time_factor_and_the_rate(self, url, simulation):
-        with WebClient(url) as client:
+        with RawWebClient(url) as client:
             status = client.wait("status", lambda m: m["real_time_factor"] > 0.5)
             assert status["rate"] == 200
             assert not status["paused"]
@@ -225,7 +225,7 @@ class TestStatus:
 
     def test_a_simulator_that_does_not_answer_is_reported(self, url, world):
         release = threading.Event()
-        with WebClient(url) as client:
+        with RawWebClient(url) as client:
             client.wait("models")
             blocked = world.post(lambda: release.wait(60))
             client.wait("status", lambda message: message["stale"] > 0.5)
@@ -242,7 +242,7 @@ class TestNobodyLooks:
             feed.Capture, "take", lambda self, demand: (taken.append(1), take(self, demand))[1]
         )
         assert not world._observers.watch_steps
-        with WebClient(url) as client:
+        with RawWebClient(url) as client:
             client.ask("look", scans=True)
             client.wait(3)
             assert taken
@@ -264,7 +264,7 @@ class TestNobodyLooks:
 class TestWorlds:
     def test_an_idle_world_without_a_simulation_is_shown(self, world, viewer):
         viewer.add_world(world)
-        with WebClient(viewer.url) as client:
+        with RawWebClient(viewer.url) as client:
             client.wait_model("robot")
             assert client.wait("status")["rate"] is None
             world.step(100)
@@ -272,7 +272,7 @@ class TestWorlds:
 
     def test_a_program_steps_the_world_in_a_loop(self, world, viewer):
         viewer.add_world(world)
-        with WebClient(viewer.url) as client:
+        with RawWebClient(viewer.url) as client:
             client.wait_model("robot")
             stop = threading.Event()
 
@@ -290,7 +290,7 @@ class TestWorlds:
 
     def test_a_closed_world_is_gone_and_replaced_by_the_next_one(self, files, world, viewer):
         viewer.add_world(world, "first")
-        with WebClient(viewer.url) as client:
+        with RawWebClient(viewer.url) as client:
             robot = client.wait_model("robot")
             world.close()
             assert client.wait("gone")["world"] == 0
@@ -307,7 +307,7 @@ class TestWorlds:
         text = (files.folder / "world.yaml").read_text()
         worlds = [world, files.load(text), files.load(text)]
         handles = [viewer.add_world(each, f"w{n}") for n, each in enumerate(worlds)]
-        with WebClient(viewer.url, look=False) as client:
+        with RawWebClient(viewer.url, look=False) as client:
             assert [each["name"] for each in client.wait("hello")["worlds"]] == ["w0", "w1", "w2"]
             client.ask("look", worlds=[0, 2])
             seen = {client.wait("models")["world"] for _ in range(2)}
@@ -328,7 +328,7 @@ class TestWorlds:
 class TestSlowClient:
     def test_a_client_that_does_not_read_delays_nobody(self, url, world, viewer):
         world.command("/cmd_vel").set(Twist(0.0, 0.0, 2.0))
-        with WebClient(url) as slow, WebClient(url) as client:
+        with RawWebClient(url) as slow, RawWebClient(url) as client:
             slow.ask("look", scans=True)
             steps = world.time
             messages = client.receive_for(1.5)
@@ -342,7 +342,7 @@ def test_captures_do_not_change_the_simulation(files, world, viewer):
     text = (files.folder / "world.yaml").read_text()
     other = files.load(text)
     viewer.add_world(world)
-    with WebClient(viewer.url) as client:
+    with RawWebClient(viewer.url) as client:
         robot = client.wait_model("robot")
         client.ask("look", scans=True, frames=True, inspect=robot["id"], series=["/scan/ranges/0"])
         for _ in range(20):
@@ -354,7 +354,7 @@ def test_captures_do_not_change_the_simulation(files, world, viewer):
 
 def test_a_step_is_not_held_up_by_the_viewer(url, simulation: Simulation, world, viewer: WebViewer):
     """While the thread of the server is blocked, the simulation goes on."""
-    with WebClient(url) as client:
+    with RawWebClient(url) as client:
         client.wait("models")
         release = threading.Event()
         viewer._call(lambda: release.wait(60))
