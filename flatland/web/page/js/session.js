@@ -132,11 +132,6 @@ export class Session extends Emitter {
    */
   setDisplay(display, shown) {
     this.displays[display] = shown;
-    for (const world of this.worlds.values()) {
-      if (display === "scans" && !shown) world.clearScans();
-      if (display === "frames" && !shown) world.frames = [];
-      if (display === "trails") world.trails.clear();
-    }
     this.emit("displays", undefined);
     this.emit("redraw", undefined);
     this.look();
@@ -250,7 +245,7 @@ export class Session extends Emitter {
         this.emit("status", world);
         return;
       case "frames":
-        world.frames = this.displays.frames ? message.frames : [];
+        world.frames = message.frames;
         break;
       case "details":
         if (world === this.world) this.emit("details", /** @type {any} */ (message));
@@ -273,7 +268,7 @@ export class Session extends Emitter {
     if (!world?.present) return;
     if (data.kind === "edges") world.applyEdges(data);
     else if (data.kind === "poses") world.applyPoses(data);
-    else if (this.displays.scans) world.applyScans(data);
+    else world.applyScans(data);
     this.emit("redraw", undefined);
   }
 }
