@@ -35,6 +35,7 @@ MODULES = (
     "copies",
     "gym_steps",
     "web_page",
+    "web_stream",
 )
 
 

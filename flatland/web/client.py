@@ -42,6 +42,7 @@ class Client:
         self.connected = True
         self._socket = socket
         self._hub = hub
+        self._end = (int(WSCloseCode.OK), b"")
         self._wish: tuple[int, ...] = ()
         self._hidden = False
         self._seen: dict[WorldFeed, Seen] = {}
@@ -69,11 +70,18 @@ class Client:
             self.connected = False
             writer.cancel()
             self._hub.forget(self)
+        # If another task closes the connection, the loop above ends before it has sent the code.
+        await self._close()
 
     async def end(self, code: int, reason: str) -> None:
         """Closes the connection."""
         # A reason has at most 123 bytes.
-        await self._socket.close(code=code, message=reason.encode()[:120])
+        self._end = code, reason.encode()[:120]
+        await self._close()
+
+    async def _close(self) -> None:
+        code, reason = self._end
+        await self._socket.close(code=code, message=reason)
 
     def _count_message(self) -> None:
         now = asyncio.get_running_loop().time()

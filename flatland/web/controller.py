@@ -8,7 +8,7 @@ from typing import Protocol
 
 from flatland.errors import WorldError
 from flatland.geometry import Pose
-from flatland.simulation import Simulation
+from flatland.simulation import PauseHolds, Simulation
 from flatland.world import World
 
 
@@ -18,6 +18,10 @@ class WorldController(Protocol):
     All methods but `step` are called between two steps. Those that cannot carry out a request raise
     a `FlatlandError` or a `ValueError`, whose text is sent to the client.
     """
+
+    @property
+    def holds(self) -> PauseHolds:
+        """Pause the world while clients drag models."""
 
     @property
     def rate(self) -> float | None:
@@ -43,10 +47,10 @@ class WorldController(Protocol):
             Done after the last step.
         """
 
-    def spawn(self, file: str, name: str, namespace: str, pose: Pose) -> None:
+    def spawn(self, file: str, name: str, namespace: str, pose: Pose) -> object:
         """Adds a model to the world."""
 
-    def move(self, name: str, pose: Pose) -> None:
+    def move(self, name: str, pose: Pose) -> object:
         """Moves a model to a pose in the world frame [m, rad]."""
 
     def delete(self, name: str) -> None:
@@ -65,6 +69,12 @@ class DefaultController:
         """
         self._world = world
         self._simulation = simulation
+        self._holds = PauseHolds(world) if simulation is None else simulation.holds
+
+    @property
+    def holds(self) -> PauseHolds:
+        """Pause the world while clients drag models."""
+        return self._holds
 
     @property
     def rate(self) -> float | None:

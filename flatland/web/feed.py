@@ -21,7 +21,6 @@ from flatland.values import Transform
 from flatland.web import encoding
 from flatland.web.capture import Capture, Captured, Demand, NewScan
 from flatland.web.controller import WorldController
-from flatland.web.holds import Holds
 from flatland.web.inspection import Details, details_message
 from flatland.web.model_files import plugin_parameters
 from flatland.web.numbers import number_at
@@ -149,12 +148,13 @@ class WorldFeed:
             ids: Returns ids that have not been used.
         """
         self.index, self.name, self.world, self.controller = index, name, world, controller
-        self.holds = Holds(world, controller)
+        self.holds = controller.holds
         self.model_files: list[dict[str, str]] = []
         self._capture = Capture(world, controller, ids)
         self._lookers: dict[Callable[[], None], View] = {}
         self._looked_at = asyncio.Event()
         self._layers: list[_Layer] = []
+        self._lines: dict[str, LayerContents] = {}
         self._layers_changed = True
         self._world_version = 0
         self._revision = 0
@@ -236,6 +236,11 @@ class WorldFeed:
         if not task.cancelled() and task.exception() is not None and not self.world.closed:
             _LOG.warning("web viewer: %s", task.exception())
 
+    def draw(self, lines: LayerContents) -> None:
+        """Shows lines in addition to the layers, instead of earlier lines of the same name."""
+        self._lines[lines.name] = lines
+        self._layers_changed = True
+
     # -- captures --------------------------------------------------------------------------
 
     async def run(self) -> None:
@@ -313,7 +318,7 @@ class WorldFeed:
         previous, self._last = self._last, captured
         self._answered = asyncio.get_running_loop().time()
         if captured.layers is not None:
-            self._apply_layers(captured.layers)
+            self._apply_layers([*captured.layers, *self._lines.values()])
         self._apply_models(captured)
         self._apply_poses(captured)
         self._apply_scans(captured.scans)

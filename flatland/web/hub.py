@@ -15,6 +15,7 @@ from flatland.web.controller import WorldController
 from flatland.web.feed import WorldFeed
 from flatland.web.messages import MAX_SIZE, READ_ONLY_TYPES, Message
 from flatland.web.model_files import model_files
+from flatland.web.scene import LayerContents
 from flatland.world import World
 
 _LOG = logging.getLogger("flatland")
@@ -85,6 +86,11 @@ class Hub:
         """Has the layers of a world copied again."""
         if index in self.feeds:
             self.feeds[index].layers_changed()
+
+    def draw(self, index: int, lines: LayerContents) -> None:
+        """Shows lines in addition to the layers of a world."""
+        if index in self.feeds:
+            self.feeds[index].draw(lines)
 
     # -- clients ---------------------------------------------------------------------------
 

@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import asyncio
+import logging
+import re
+from collections.abc import Awaitable, Callable
 from pathlib import Path
 from typing import Final
 
@@ -12,6 +15,10 @@ from flatland.web.access import Access
 from flatland.web.client import Client
 from flatland.web.hub import Hub
 from flatland.web.messages import MAX_SIZE
+
+_LOG = logging.getLogger("flatland")
+
+Handler = Callable[[web.Request], Awaitable[web.StreamResponse]]
 
 PAGE: Final = Path(__file__).parent / "page"
 SUBPROTOCOL: Final = "flatland.1"
@@ -29,6 +36,8 @@ _TYPES: Final = {
     ".png": "image/png",
     ".ico": "image/x-icon",
 }
+# No part begins with a dot, so that no file outside the folder can be named.
+_FILE_NAME: Final = re.compile(r"[\w-][\w.-]*(/[\w-][\w.-]*)*", re.ASCII)
 _POLICY: Final = (
     "default-src 'self'; img-src 'self' data: blob:; media-src 'self' blob:; object-src 'none'; "
     "base-uri 'none'; form-action 'none'; frame-ancestors {ancestors}"
@@ -69,17 +78,23 @@ class Server:
         return application
 
     @web.middleware
-    async def _check(self, request: web.Request, handler: object) -> web.StreamResponse:
+    async def _check(self, request: web.Request, handler: Handler) -> web.StreamResponse:
         if not self._access.allows_host(request.host):
             return web.Response(status=403, text="unknown name of the server in the header Host\n")
-        response: web.StreamResponse = await handler(request)  # type: ignore[operator]
+        try:
+            response: web.StreamResponse = await handler(request)
+        except (web.HTTPException, ConnectionError):
+            raise
+        except Exception:
+            _LOG.exception("unexpected internal error in the web viewer")
+            return web.Response(status=500, text="internal error\n")
         return response
 
     async def _file(self, request: web.Request) -> web.StreamResponse:
         name = request.match_info["path"] or "index.html"
-        path = (self._page / name).resolve()
+        path = self._page / name
         kind = _TYPES.get(path.suffix)
-        if kind is None or not path.is_relative_to(self._page.resolve()) or not path.is_file():
+        if kind is None or not _FILE_NAME.fullmatch(name) or not path.is_file():
             return web.Response(status=404, text="not found\n", headers=self._headers)
         return web.FileResponse(path, headers={**self._headers, "Content-Type": kind})
 

@@ -6,18 +6,23 @@ import asyncio
 import logging
 import socket
 import threading
+from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from types import TracebackType
 from typing import Final
 
+import numpy as np
 from aiohttp import WSCloseCode, web
 
 from flatland.errors import FlatlandError
+from flatland.geometry import FloatArray
 from flatland.runtime.observer import WorldObserver
 from flatland.simulation import Simulation
 from flatland.web.access import Access
 from flatland.web.controller import DefaultController, WorldController
 from flatland.web.hub import Hub
+from flatland.web.scene import LayerContents
 from flatland.web.server import Server
 from flatland.world import World
 
@@ -75,7 +80,8 @@ class WebViewer:
             raise ValueError("token must not be empty")
         self._access = Access.for_host(host, token)
         self._port = port
-        self._loop = asyncio.new_event_loop()
+        self._loop: asyncio.AbstractEventLoop | None = None
+        self._before_start: list[Callable[[], object]] = []
         self._hub = Hub(title, read_only)
         self._handles: dict[WorldHandle, tuple[World, _LayerObserver]] = {}
         self._thread: threading.Thread | None = None
@@ -127,8 +133,11 @@ class WebViewer:
                 return
             listener = self._listen()
             self._port = listener.getsockname()[1]
+            self._loop = asyncio.new_event_loop()
+            for action in self._before_start:
+                self._loop.call_soon(action)
             self._thread = threading.Thread(
-                target=self._run, args=[listener], name="flatland-web", daemon=True
+                target=self._run, args=[self._loop, listener], name="flatland-web", daemon=True
             )
             self._thread.start()
 
@@ -140,6 +149,7 @@ class WebViewer:
             )
         except (OSError, OverflowError, UnicodeError) as error:
             reason = error.strerror if isinstance(error, OSError) else str(error)
+            reason = str(reason).partition(" (while")[0]
             raise FlatlandError(
                 f"the viewer cannot listen on port {port} of {host!r}: {reason}",
                 hint="choose another port; 0 for any free one",
@@ -155,25 +165,26 @@ class WebViewer:
         for handle in list(self._handles):
             self.remove_world(handle)
         if thread is None:
-            self._loop.close()
             return
-        self._loop.call_soon_threadsafe(self._stop.set)
+        self._call(self._stop.set)
         thread.join(_CLOSE_TIMEOUT)
         if thread.is_alive():
             _LOG.warning("the thread of the web viewer did not end")
 
-    def _run(self, listener: socket.socket) -> None:
-        asyncio.set_event_loop(self._loop)
+    def _run(self, loop: asyncio.AbstractEventLoop, listener: socket.socket) -> None:
+        asyncio.set_event_loop(loop)
         try:
-            self._loop.run_until_complete(self._serve(listener))
+            loop.run_until_complete(self._serve(listener))
         except Exception:
             _LOG.exception("unexpected internal error in the web viewer")
         finally:
-            self._loop.close()
+            loop.close()
 
     async def _serve(self, listener: socket.socket) -> None:
         application = Server(self._hub, self._access).application()
-        runner = web.AppRunner(application, access_log=None, handle_signals=False)
+        # Requests that are not HTTP are answered by status 400, and are not worth a log entry.
+        silent = logging.Logger("flatland.web", logging.CRITICAL)
+        runner = web.AppRunner(application, access_log=None, logger=silent, handle_signals=False)
         await runner.setup()
         await web.SockSite(runner, listener, shutdown_timeout=1.0).start()
         watch = asyncio.create_task(self._hub.watch())
@@ -238,15 +249,37 @@ class WebViewer:
         if not world.closed:
             world.post(lambda: world.remove_observer(observer))
 
+    def draw_lines(
+        self, handle: WorldHandle, name: str, color: Sequence[float], edges: FloatArray
+    ) -> None:
+        """Shows lines that are not part of a world, such as goals; safe from any thread.
+
+        Args:
+            handle: The world. If it was removed, the call has no effect.
+            name: Name for users; lines of the same name are replaced.
+            color: (r, g, b, a), each in [0, 1].
+            edges: (x1, y1, x2, y2) in the world frame [m], shape (n, 4).
+
+        Raises:
+            ValueError: The edges have the wrong shape.
+        """
+        lines = np.array(edges, np.float32)
+        if lines.ndim != 2 or lines.shape[1] != 4:
+            raise ValueError(f"edges must have the shape (n, 4), got {lines.shape}")
+        contents = LayerContents(name, tuple(map(float, color)), (0.0, 0.0, 0.0), lines)
+        self._call(lambda: self._hub.draw(handle.index, contents))
+
     def _layers_changed(self, handle: WorldHandle) -> None:
         self._call(lambda: self._hub.layers_changed(handle.index))
 
-    def _call(self, action: object) -> None:
-        """Calls a function in the thread of the loop, if it has not ended."""
-        try:
-            self._loop.call_soon_threadsafe(action)  # type: ignore[arg-type]
-        except RuntimeError:
-            return  # The loop is closed.
+    def _call(self, action: Callable[[], object]) -> None:
+        """Calls a function in the thread of the loop, when it has started and has not ended."""
+        with self._lock:
+            if self._loop is None:
+                self._before_start.append(action)
+                return
+        with suppress(RuntimeError):  # The loop is closed.
+            self._loop.call_soon_threadsafe(action)
 
 
 class _LayerObserver(WorldObserver):

@@ -16,7 +16,7 @@ import { WorldState } from "./world_state.js";
  * @property {void} redraw  something that is drawn has changed
  * @property {import("./protocol.js").DetailsMessage} details
  * @property {import("./protocol.js").ValuesMessage} values
- * @property {{level: string, text: string}} notice
+ * @property {{level: string, text: string, topic?: string}} notice  replaces those of the same topic
  */
 
 /** @type {Display[]} */
@@ -96,9 +96,10 @@ export class Session extends Emitter {
   /**
    * @param {"info" | "warning" | "error"} level
    * @param {string} text
+   * @param {string} [topic]  earlier notices of the same topic are removed
    */
-  notify(level, text) {
-    this.emit("notice", { level, text });
+  notify(level, text, topic) {
+    this.emit("notice", { level, text, topic });
   }
 
   /**

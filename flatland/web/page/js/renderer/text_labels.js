@@ -84,6 +84,17 @@ export class TextLabels {
   }
 
   /**
+   * Returns the width of a line of text [CSS pixels].
+   *
+   * @param {string} text
+   */
+  width(text) {
+    let sum = 0;
+    for (const character of text) sum += this.glyph(character)?.advance ?? 0;
+    return sum / this.ratio;
+  }
+
+  /**
    * Adds a line of text whose centre is above or below a point.
    *
    * @param {string} text
