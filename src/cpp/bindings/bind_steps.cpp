@@ -1,5 +1,9 @@
 #include <pybind11/stl.h>
 
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <limits>
 #include <memory>
 #include <optional>
 #include <stdexcept>
@@ -274,6 +278,77 @@ std::int64_t checked_step(std::int64_t step) {
   return step;
 }
 
+// Wall times of paced steps, and of the waits between them [s].
+struct WorkTimes {
+  double waited = 0.0;
+  double total = 0.0;
+  double least = std::numeric_limits<double>::infinity();
+  double most = 0.0;
+
+  void add(double seconds) {
+    total += seconds;
+    least = std::min(least, seconds);
+    most = std::max(most, seconds);
+  }
+};
+
+// Performs up to n steps, one each period, the first one at once, as World::run. Between two steps
+// it waits without the GIL and without a use of the world. Ends before a wait if a step was late,
+// or after the time limit, and with an interrupt.
+py::tuple run_paced(World& world, std::int64_t step, std::int64_t n, double dt,
+                    int velocity_iterations, int position_iterations, double due, double period) {
+  using Clock = std::chrono::steady_clock;
+  using Seconds = std::chrono::duration<double>;
+  using End = RunResult::End;
+  // Signals are handled, and the time is read by other threads, after a run.
+  constexpr double kLongest = 0.025;
+  const auto now = [] { return Seconds(Clock::now().time_since_epoch()).count(); };
+  checked_step(step);
+  checked_step(n);
+  if (!std::isfinite(due) || !(period > 0.0)) {
+    throw py::value_error("due must be finite and the period positive");
+  }
+  const double start = now();
+  RunResult total;
+  WorkTimes times;
+  while (total.steps < n) {
+    const double begin = now();
+    RunResult one;
+    try {
+      World::ExclusiveUse use(world, World::kStepping);
+      one = without_gil_if(world.last_step_time() > kShortStep, use, [&] {
+        return world.run(step + total.steps, 1, dt, velocity_iterations, position_iterations,
+                         false);
+      });
+    } catch (const std::exception&) {
+      // The steps so far must be accounted for. The next run throws again, if the reason remains.
+      if (total.steps == 0) throw;
+      total.end = End::kStopped;
+      break;
+    }
+    total.steps += one.steps;
+    total.end = one.end;
+    total.report = one.report;
+    if (one.end != End::kDone) break;
+    const double end = now();
+    times.add(end - begin);
+    due += period;
+    if (total.steps == n) break;
+    bool is_due = false;
+    if (end <= due && due <= start + kLongest) {
+      const py::gil_scoped_release unlocked;
+      is_due = world.wait_until(
+          Clock::time_point(std::chrono::duration_cast<Clock::duration>(Seconds(due))));
+    }
+    times.waited += now() - end;
+    if (!is_due) {
+      total.end = End::kStopped;
+      break;
+    }
+  }
+  return py::make_tuple(run_to_python(total), times.waited, times.total, times.least, times.most);
+}
+
 // The steps of one world: World.run with its arguments.
 using WorldRun =
     std::tuple<std::shared_ptr<World>, std::int64_t, std::int64_t, double, int, int, bool>;
@@ -393,6 +468,9 @@ void bind_run(WorldClass& world) {
       },
       py::arg("step"), py::arg("n"), py::arg("dt"), py::arg("velocity_iterations"),
       py::arg("position_iterations"), py::arg("only_physics"));
+  world.def("run_paced", &run_paced, py::arg("step"), py::arg("n"), py::arg("dt"),
+            py::arg("velocity_iterations"), py::arg("position_iterations"), py::arg("due"),
+            py::arg("period"));
   world.def("interrupt", &World::interrupt);
   world.def("clear_interrupt", &World::clear_interrupt);
 }
