@@ -185,8 +185,10 @@ class StepPlan:
     def run_paced(self, run: StepRun, due: float, period: float) -> tuple[RunResult, WorkTimes]:
         """Performs steps as `run`, the first one at once and then one each period.
 
-        Between two steps it waits without the GIL, and other threads may use the world. The run
-        ends before such a wait after 25 ms, if a step was late, and with an interrupt.
+        Between two steps it waits without the GIL, and other threads may use the world. Short steps
+        in which no code is due, and for which no contacts are wanted, are performed together when
+        the last one of them is due. The run ends before a wait after 25 ms, if a step was late, and
+        with an interrupt, after the steps that were due before it.
 
         Args:
             run: The steps of this world, not those that end after the physics step.
