@@ -21,7 +21,6 @@ from typing import Any
 
 import numpy as np
 from chromium import PHONE, Chromium, line, missing_programs
-from draw_pictures import FURNITURE
 from PIL import Image, ImageDraw
 from viewer_page import ViewerPage
 
@@ -37,13 +36,13 @@ Point = tuple[float, float]
 _CHECKOUT = Path(__file__).resolve().parent.parent
 _OFFICE = _CHECKOUT / "worlds" / "office"
 _SIZE = (1200, 760)  # of the page [px]
-_RECORDING_SIZE = (960, 600)
+_RECORDING_SIZE = (1080, 640)
 _FRAME_STEPS = 20  # of the world
 _FRAME_PERIOD = 0.1  # s of simulated time, and of the recording
 _DRAWN_TIMEOUT = 20.0  # s
 _QUALITY = 60  # of the frames, 0 to 100
-# Furniture of the recording.
-_CLUTTER = (("box", (3.4, -4.9, 0.4)), ("chair", (1.5, -6.2, 2.0)), ("chair", (5.5, -5.2, 0.0)))
+# Name of the model file, pose (x, y [m], yaw [rad]).
+_FURNITURE = (("box", (3.4, -4.9, 0.4)), ("chair", (1.5, -6.2, 2.0)), ("chair", (5.5, -5.2, 0.0)))
 _CURSOR = ((0, 0), (0, 17), (4, 13), (7, 20), (10, 19), (7, 12), (12, 12))
 _ROBOT_VIEW = "#x=1.5&y=-4.2&zoom=62&select=robot"
 
@@ -57,9 +56,9 @@ def main(arguments: list[str]) -> int:
     folder = Path(arguments[0]) if arguments else _CHECKOUT / "docs" / "images"
     folder.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory() as downloads, Chromium(Path(downloads)) as browser:
-        with _office(_CLUTTER, lockstep=True) as (url, simulation):
+        with _office(_FURNITURE, lockstep=True) as (url, simulation):
             _record(browser, url, simulation, folder / "browser.webp")
-        with _office(FURNITURE) as (url, _):
+        with _office(_FURNITURE) as (url, _):
             _capture_desktop(browser, url, folder / "browser.png")
             _capture_phone(browser, url, folder / "browser_phone.png")
         _capture_grid(browser, folder / "browser_grid.png")
@@ -94,7 +93,7 @@ def _capture_desktop(browser: Chromium, url: str, path: Path) -> None:
     _choose_series(browser, ("/odometry/filtered/twist/0", "/odometry/filtered/twist/2"))
     browser.evaluate("document.activeElement.blur()")
     _drive(browser, "w", 2.5)
-    _drive(browser, "wa", 1.5)
+    _drive(browser, "wa", 0.5)
     browser.key_down("w")
     browser.key_down("d")
     time.sleep(1.2)
@@ -238,13 +237,13 @@ def _record(browser: Chromium, url: str, simulation: Simulation, path: Path) -> 
     """Records a short session: drive a robot, drag a model, spawn another one."""
     browser.resize(*_RECORDING_SIZE)
     page = ViewerPage(browser)
-    page.open(f"{url}#x=0.6&y=-4.6&zoom=66")
+    page.open(f"{url}#x=0.6&y=-4.6&zoom=64")
     recording = Recording(browser, simulation)
     recording.wait(0.5)
     recording.click(page.screen(*page.pose("robot")[:2]))
     _drive_recorded(browser, recording, "w", 2.2)
     _drive_recorded(browser, recording, "wa", 0.6)
-    recording.drag(page.screen(*page.pose("box_1")[:2]), page.screen(0.9, -4.4))
+    recording.drag(page.screen(*page.pose("box_1")[:2]), page.screen(0.9, -5.0))
     recording.wait(0.5)
     recording.click("#spawn")
     recording.wait(0.3)
@@ -256,7 +255,7 @@ def _record(browser: Chromium, url: str, simulation: Simulation, path: Path) -> 
         browser.click(place)
     recording.wait(0.5)
     recording.click(page.screen(*page.pose("robot")[:2]))
-    _drive_recorded(browser, recording, "wd", 1.4)
+    _drive_recorded(browser, recording, "wd", 0.9)
     _drive_recorded(browser, recording, "w", 1.2)
     recording.wait(0.4)
     recording.save(path)
