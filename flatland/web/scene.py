@@ -20,7 +20,7 @@ from flatland.values import LaserScan, Twist
 from flatland.world import World
 
 _TIME_LIMIT: Final = 1e-3  # s between two steps for descriptions; the rest follows later
-_CHECK_PERIOD: Final = 0.25  # s between two searches for changed shapes and colours
+_CHECK_PERIOD: Final = 0.5  # s between two searches for changed shapes and colours
 
 Description = dict[str, Any]
 
