@@ -258,7 +258,7 @@ export class WorldState {
   /**
    * Returns the bounds of all layers, or of the models of a world without layers.
    *
-   * @returns {Bounds}
+   * @returns {Bounds | null} null for an empty world
    */
   fitBounds() {
     if (this.bounds && this.layers.some((layer) => layer.edges?.length)) return this.bounds;
@@ -271,7 +271,7 @@ export class WorldState {
       x1 = Math.max(x1, pose[0] + body.radius);
       y1 = Math.max(y1, pose[1] + body.radius);
     }
-    return x0 <= x1 && y0 <= y1 ? [x0, y0, x1, y1] : [-5, -5, 5, 5];
+    return x0 <= x1 && y0 <= y1 ? [x0, y0, x1, y1] : null;
   }
 }
 
