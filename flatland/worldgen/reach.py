@@ -43,20 +43,19 @@ class Reach:
         Args:
             cells: The plan; everything outside it is occupied.
         """
-        occupied = np.pad((cells != FREE).astype(np.uint8), 1, constant_values=1)
+        occupied = _with_border(cells)
         main = _largest_region(self._cv2, self._places(occupied, self._sure))
-        reached = self._cv2.dilate(main, self._near)
-        possible = self._places(occupied, self._possible)
-        return np.asarray(((possible > 0) & (reached == 0))[1:-1, 1:-1])
+        return self._beyond(occupied, main)[1:-1, 1:-1]
 
     def is_connected(self, cells: Cells) -> bool:
         """Returns whether the disc reaches each place of a plan where it fits, and there is one."""
-        return bool(self.places(cells).any()) and not self.unreachable(cells).any()
+        occupied = _with_border(cells)
+        main = _largest_region(self._cv2, self._places(occupied, self._sure))
+        return bool(main.any()) and not self._beyond(occupied, main).any()
 
     def places(self, cells: Cells) -> BoolArray:
         """Returns the cells anywhere in which the disc's centre may be, in the largest region."""
-        occupied = np.pad((cells != FREE).astype(np.uint8), 1, constant_values=1)
-        main = _largest_region(self._cv2, self._places(occupied, self._sure))
+        main = _largest_region(self._cv2, self._places(_with_border(cells), self._sure))
         return np.asarray(main[1:-1, 1:-1] > 0)
 
     def seal(self, cells: Cells) -> None:
@@ -84,10 +83,21 @@ class Reach:
         main = _largest_region(self._cv2, (cells == FREE).astype(np.uint8))
         cells[(main == 0) & (cells == FREE)] = FURNITURE
 
+    def _beyond(self, occupied: Cells, main: Cells) -> BoolArray:
+        """Returns the places where the disc may fit, but that are not close to a region."""
+        reached = self._cv2.dilate(main, self._near)
+        possible = self._places(occupied, self._possible)
+        return np.asarray((possible > 0) & (reached == 0))
+
     def _places(self, occupied: Cells, disc: Cells) -> Cells:
         """Returns 1 for the cells around which a disc covers nothing that is occupied, else 0."""
         grown = self._cv2.dilate(occupied, disc, borderType=self._cv2.BORDER_REPLICATE)
         return np.asarray(1 - grown, np.uint8)
+
+
+def _with_border(cells: Cells) -> Cells:
+    """Returns 1 for occupied cells and for a border around them, else 0."""
+    return np.pad((cells != FREE).astype(np.uint8), 1, constant_values=1)
 
 
 def _disc(radius: float) -> Cells:
@@ -99,9 +109,22 @@ def _disc(radius: float) -> Cells:
 
 
 def _largest_region(cv2: Any, mask: Cells) -> Cells:
-    """Returns the largest region of a mask that is connected along the sides of cells."""
-    _, labels, statistics, _ = cv2.connectedComponentsWithStats(mask, connectivity=4)
-    sizes = statistics[1:, cv2.CC_STAT_AREA]
-    if not len(sizes):
-        return np.zeros_like(mask)
-    return np.asarray(labels == 1 + int(sizes.argmax()), np.uint8)
+    """Returns the largest region of a mask that is connected along the sides of cells.
+
+    Regions are filled one after the other: `connectedComponents` uses threads, which take longer
+    than the work for a room.
+    """
+    columns = mask.shape[1]
+    rest = mask.copy()
+    left = int(np.count_nonzero(mask))
+    largest, seed = 0, (0, 0)
+    while left > largest:
+        row, column = divmod(int(rest.argmax()), columns)
+        size = int(cv2.floodFill(rest, None, (column, row), 0, flags=4)[0])
+        left -= size
+        if size > largest:
+            largest, seed = size, (column, row)
+    region = mask.copy()
+    if largest:
+        cv2.floodFill(region, None, seed, 2, flags=4)
+    return np.asarray(region == 2, np.uint8)
