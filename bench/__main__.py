@@ -35,6 +35,8 @@ MODULES = (
     "placement",
     "copies",
     "gym_steps",
+    "web_page",
+    "web_stream",
 )
 
 

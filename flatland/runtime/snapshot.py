@@ -39,6 +39,7 @@ OUTSIDE: Final = frozenset(
         "_paused",
         "_closed",
         "_states",
+        "_view",
     ]
 )
 """Attributes of a world that are not part of its state."""

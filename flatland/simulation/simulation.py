@@ -15,6 +15,7 @@ from flatland.errors import WorldError
 from flatland.physics import WorkTimes
 from flatland.runtime.stepping import Pace
 from flatland.simulation.cycle_statistics import CycleStatistics, CycleWindow
+from flatland.simulation.pause_holds import PauseHolds
 from flatland.simulation.rate_monitor import RateMonitor
 from flatland.simulation.step_requests import StepRequests
 from flatland.timekeeper import NANOSECONDS, Timekeeper
@@ -113,6 +114,7 @@ class Simulation:
         statistics: Statistics of the last report period in which the world was stepped, None
             before the end of the first one.
         lost_time: Lag that was dropped since the start [s of wall time].
+        holds: Pause the world while clients drag models.
     """
 
     def __init__(
@@ -148,6 +150,7 @@ class Simulation:
         self.lockstep = lockstep
         self.statistics: CycleStatistics | None = None
         self.lost_time = 0.0
+        self.holds = PauseHolds(world)
         self._period = _period_of(update_rate)
         self._max_lag = max_lag
         self._report = report

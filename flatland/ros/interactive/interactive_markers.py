@@ -58,7 +58,7 @@ class InteractiveMarkers(WorldObserver):
         self._names = UniqueNames()
         self._models: dict[str, Model] = {}  # by marker name
         self._published: dict[str, Pose] = {}  # last published pose of each marker
-        self._drags = Drags(self._world)
+        self._drags = Drags(simulation.holds)
         self._keep_alive_due = 0.0
         self._ticker = Ticker("flatland-handles", UPDATE_RATE, simulation.post, self._tick, thread)
         self._server = MarkerServer(
