@@ -116,6 +116,19 @@ def draw_odometry(path: Path) -> None:
     plt.close(figure)
 
 
+def draw_appearance(path: Path) -> None:
+    """Draws a part of the office before and after changes of the appearance of its models."""
+    view = (-5.5, -7.8, 6.0, -3.0)
+    with office() as world:
+        before = world.draw(view=view, dpi=72)
+        world.set_appearance("robot", color=(0.1, 0.65, 0.25))
+        for name in ("box_3", "box_4"):
+            world.set_appearance(name, color=(0.85, 0.2, 0.2, 1.0))
+        world.set_appearance("chair_1", visible=False)
+        after = world.draw(view=view, dpi=72)
+    plt.imsave(path, np.concatenate((before, after)), metadata={"Software": None})
+
+
 # Seeds of the random worlds of docs/random_worlds.md.
 RANDOM_WORLDS = {"office": (1, 4, 11), "maze": (1, 2, 3), "warehouse": (1, 2, 4)}
 _FLOOR, _WALL, _FURNITURE, _MARGIN = 255, (70, 74, 82), (214, 178, 128), (255, 255, 255)
@@ -144,6 +157,7 @@ def main(arguments: list[str]) -> int:
         save(world, folder / "office.png")
         save(world, folder / "corridor.png", view=(-5.5, -7.8, 6.0, -3.0), names=True)
     draw_odometry(folder / "odometry.png")
+    draw_appearance(folder / "appearance.png")
     for kind in RANDOM_WORLDS:
         draw_random_worlds(kind, folder / f"random_{kind}.png")
     return 0
