@@ -150,6 +150,22 @@ def test_page_and_topic_drive_the_same_command(client: WebClient, ros: Any) -> N
     truth.until(lambda message: message.twist.twist.linear.x == 0)
 
 
+def test_the_inspector_shows_the_latest_values_of_topics(client: WebClient, ros: Any) -> None:
+    robot = client.model("robot")
+    truth = ros.topic("/odometry/ground_truth", Odometry).next()
+    client.look(inspect=robot["id"])
+
+    def values() -> dict[str, Any]:
+        details = [text for text in client.texts if text["type"] == "details"]
+        return {topic["topic"]: topic for topic in details[-1]["topics"]} if details else {}
+
+    client.until("a value", lambda: values().get("/odometry/ground_truth", {}).get("value"))
+    topics = values()
+    assert str(round(truth.pose.pose.position.x, 3)) in str(topics["/odometry/ground_truth"])
+    assert topics["/cmd_vel"]["kind"] == "command"
+    assert "/scan" in topics
+
+
 def test_a_drag_in_rviz_and_one_on_the_page_share_the_pause(client: WebClient, ros: Any) -> None:
     from visualization_msgs.msg import InteractiveMarkerFeedback as Feedback
 
@@ -224,8 +240,9 @@ def test_the_page_steps_a_world_in_lockstep(launcher: Any, ros: Any, world: Path
     process = launcher.server(world, web=True, web_port=0, lockstep=True, clock_rate=1)
     clock = ros.topic("/clock", Clock)
     with WebClient(process.wait_for_line(PORT_LINE)[1]) as client:
-        assert client.status()["lockstep"]
-        assert client.status()["time"] == 0
+        status = client.status()
+        assert (status["lockstep"], status["time"]) == (True, 0)
+        assert (status["rate"], status["real_time_factor"]) == (None, None)
         client.do("step", n=40)
         client.until("step", lambda: client.status()["time"] == pytest.approx(0.2))
         clock.until(lambda message: message.clock.to_sec() == pytest.approx(0.2))

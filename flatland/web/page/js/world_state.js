@@ -227,12 +227,6 @@ export class WorldState {
     this.scansVersion++;
   }
 
-  /** Removes the latest scans, for example when their display is turned off. */
-  clearScans() {
-    for (const laser of this.lasers.values()) laser.ranges = null;
-    this.scansVersion++;
-  }
-
   /**
    * Returns the pose of a body, null before the first one has arrived.
    *
@@ -264,7 +258,7 @@ export class WorldState {
   /**
    * Returns the bounds of all layers, or of the models of a world without layers.
    *
-   * @returns {Bounds}
+   * @returns {Bounds | null} null for an empty world
    */
   fitBounds() {
     if (this.bounds && this.layers.some((layer) => layer.edges?.length)) return this.bounds;
@@ -277,7 +271,7 @@ export class WorldState {
       x1 = Math.max(x1, pose[0] + body.radius);
       y1 = Math.max(y1, pose[1] + body.radius);
     }
-    return x0 <= x1 && y0 <= y1 ? [x0, y0, x1, y1] : [-5, -5, 5, 5];
+    return x0 <= x1 && y0 <= y1 ? [x0, y0, x1, y1] : null;
   }
 }
 
