@@ -30,6 +30,7 @@ MODULES = (
     "lockstep",
     "real_time",
     "large_map",
+    "random_worlds",
     "markers",
     "placement",
     "copies",

@@ -19,7 +19,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 import numpy.typing as npt
 
-from flatland import Twist, World
+from flatland import Twist, World, worldgen
 from flatland.drawing import save
 
 _CHECKOUT = Path(__file__).resolve().parent.parent
@@ -116,6 +116,39 @@ def draw_odometry(path: Path) -> None:
     plt.close(figure)
 
 
+def draw_appearance(path: Path) -> None:
+    """Draws a part of the office before and after changes of the appearance of its models."""
+    view = (-5.5, -7.8, 6.0, -3.0)
+    with office() as world:
+        before = world.draw(view=view, dpi=72)
+        world.set_appearance("robot", color=(0.1, 0.65, 0.25))
+        for name in ("box_3", "box_4"):
+            world.set_appearance(name, color=(0.85, 0.2, 0.2, 1.0))
+        world.set_appearance("chair_1", visible=False)
+        after = world.draw(view=view, dpi=72)
+    plt.imsave(path, np.concatenate((before, after)), metadata={"Software": None})
+
+
+# Seeds of the random worlds of docs/random_worlds.md.
+RANDOM_WORLDS = {"office": (1, 4, 11), "maze": (1, 2, 3), "warehouse": (1, 2, 4)}
+_FLOOR, _WALL, _FURNITURE, _MARGIN = 255, (70, 74, 82), (214, 178, 128), (255, 255, 255)
+_GAP = 24  # pixels between two plans
+
+
+def draw_random_worlds(kind: str, path: Path) -> None:
+    """Draws the floor plans of three random worlds, one pixel for each cell."""
+    plans: list[npt.NDArray[np.uint8]] = []
+    for seed in RANDOM_WORLDS[kind]:
+        world = worldgen.generate(kind, seed)
+        plan = np.full((*world.furniture.shape, 3), _FLOOR, np.uint8)
+        plan[world.grid.cells > 0] = _WALL
+        plan[world.furniture] = _FURNITURE
+        if plans:
+            plans.append(np.full((_GAP, plan.shape[1], 3), _MARGIN, np.uint8))
+        plans.append(plan[::-1])
+    plt.imsave(path, np.concatenate(plans), metadata={"Software": None})
+
+
 def main(arguments: list[str]) -> int:
     """Draws all images into a folder."""
     folder = Path(arguments[0]) if arguments else _CHECKOUT / "docs" / "images"
@@ -124,6 +157,9 @@ def main(arguments: list[str]) -> int:
         save(world, folder / "office.png")
         save(world, folder / "corridor.png", view=(-5.5, -7.8, 6.0, -3.0), names=True)
     draw_odometry(folder / "odometry.png")
+    draw_appearance(folder / "appearance.png")
+    for kind in RANDOM_WORLDS:
+        draw_random_worlds(kind, folder / f"random_{kind}.png")
     return 0
 
 

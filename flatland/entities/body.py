@@ -24,9 +24,10 @@ class Body(PhysicsBody):
         name: Name of the body, unique within its entity.
         entity: Model or layer that owns the body.
         color: Color for drawings as (r, g, b, a), each in [0, 1].
+        visible: Whether markers and drawings show the body; no effect on collisions and rays.
     """
 
-    __slots__ = ("color", "entity", "name")
+    __slots__ = ("color", "entity", "name", "visible")
 
     def __init__(self, physics: PhysicsBody, entity: Entity, name: str, color: Color) -> None:
         """Creates a named handle of a body.
@@ -41,6 +42,7 @@ class Body(PhysicsBody):
         self.entity = entity
         self.name = name
         self.color = color
+        self.visible = True
 
     def __repr__(self) -> str:
         return f"<Body {self.name!r} of {self.entity.name!r}>"
