@@ -43,6 +43,7 @@ PARAMETERS: dict[str, dict[str, Any]] = {
         "rear_right_wheel_joint": "right",
     },
     "ModelTfPublisher": {"publish_tf_world": True},
+    "PosePublisher": {"message": "odometry"},
     "Bumper": {},
     "BoolSensor": {},
     "Gps": {"body": "base", "update_rate": float("inf")},

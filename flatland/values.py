@@ -96,6 +96,21 @@ class Odometry:
     twist_covariance: DoubleArray = field(default_factory=lambda: ZERO_COVARIANCE)
 
 
+@dataclass(frozen=True, slots=True)
+class PoseStamped:
+    """Pose of a frame at one time, as in `geometry_msgs/PoseStamped`.
+
+    Attributes:
+        stamp: Simulated time [ns].
+        frame_id: Frame of the pose.
+        pose: Pose (x, y, yaw) [m, m, rad].
+    """
+
+    stamp: int
+    frame_id: str
+    pose: Pose
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class TwistWithCovariance:
     """A measured velocity, as in `geometry_msgs/TwistWithCovarianceStamped`.

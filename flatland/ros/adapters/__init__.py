@@ -23,6 +23,7 @@ _BUILT_IN: dict[type[Any], str] = {
     values.LaserScan: "laser_scan",
     values.NavSatFix: "nav_sat_fix",
     values.Odometry: "odometry",
+    values.PoseStamped: "pose_stamped",
     values.Transform: "transform",
     values.Twist: "twist",
     values.TwistWithCovariance: "twist_with_covariance",

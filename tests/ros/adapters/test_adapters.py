@@ -94,6 +94,14 @@ def test_odometry() -> None:
     assert list(message.twist.covariance) == [0.0] * 36
 
 
+def test_pose_stamped() -> None:
+    message = sent(flatland.PoseStamped(STAMP, "map", (1.0, -2.0, 2.0)))
+    assert header(message) == (1_234_567_890, 987_654_321, "map")
+    position = message.pose.position
+    assert (position.x, position.y, position.z) == (1.0, -2.0, 0.0)
+    assert quaternion(message.pose.orientation) == (0, 0, math.sin(1.0), math.cos(1.0))
+
+
 def test_twist_with_covariance() -> None:
     covariance = np.arange(36.0).reshape(6, 6)
     message = sent(flatland.TwistWithCovariance(STAMP, "base", (1.0, 2.0, 3.0), covariance))

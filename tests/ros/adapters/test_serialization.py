@@ -51,6 +51,7 @@ VALUES = st.one_of(
         BEAMS,
     ),
     st.builds(flatland.Odometry, STAMPS, TEXTS, TEXTS, POSES, TRIPLES, matrices(6), matrices(6)),
+    st.builds(flatland.PoseStamped, STAMPS, TEXTS, POSES),
     st.builds(flatland.TwistWithCovariance, STAMPS, TEXTS, TRIPLES, matrices(6)),
     st.builds(
         flatland.Imu,

@@ -370,6 +370,16 @@ PLUGIN_SECTIONS = [
         RATE,
     ),
     plugin(
+        "PosePublisher",
+        Key("body", "base"),
+        ORIGIN,
+        RATE,
+        Key("message", "odometry"),
+        Key("topic", "pose"),
+        Key("frame_id", "map"),
+        Key("after_step", "false", "bool"),
+    ),
+    plugin(
         "Bumper",
         Key("topic", "collisions"),
         Key("world_frame_id", "map"),
