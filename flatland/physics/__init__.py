@@ -24,10 +24,12 @@ from flatland.physics.controller import (
 )
 from flatland.physics.fixture import PhysicsFixture
 from flatland.physics.joint import PhysicsJoint
+from flatland.physics.material import Material
 from flatland.physics.plan import END_OF_ORDER, RunEnd, RunResult, StepPlan, StepRun, run_worlds
 from flatland.physics.queries import RayHit
 from flatland.physics.range_finder import (
     BeamFan,
+    LabelledScan,
     RangeFinder,
     RangeNoise,
     Scan,
@@ -44,6 +46,8 @@ __all__ = [
     "ContactEvent",
     "ContactInfo",
     "Controller",
+    "LabelledScan",
+    "Material",
     "OldManifold",
     "PhysicsBody",
     "PhysicsFixture",

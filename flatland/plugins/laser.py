@@ -105,9 +105,9 @@ class Laser(ModelPlugin):
         scan_time: Reported time between scans [s].
         time_increment: Reported time between beams [s].
         origin: (x, y, theta) of the sensor in the body frame.
-        intensities: Intensities of the last scan computed: 255 for a beam whose nearest hit is in
-            the layer `reflectance`, else 0; shape (n,), or (0,) in a world without that layer;
-            float32.
+        intensities: Intensities of the last scan computed, shape (n,), float32: 255 for a beam
+            whose nearest hit is in the layer `reflectance`; in a world with materials, those of
+            `flatland.physics.Scan` for other hits; else 0. Shape (0,) in a world with neither.
         beam_ends: End point of each beam in the sensor frame [m], shape (n, 2), read-only.
         last_scan: Pose of the sensor in the world frame and ranges [m], shape (n,), of the last
             scan computed; None before the first one. The ranges are those of the emitted scan.
@@ -137,7 +137,6 @@ class Laser(ModelPlugin):
         # Calls of `compute_ranges` have random numbers of their own, so that they do not change the
         # scans that are emitted.
         self._computed = self._uncounted_stream("compute_ranges")
-        self._has_noise = noise is not None
         no_hit = self._read_no_hit(config)
         self._mask = self._read_mask(config)
         self._sends_transform: bool = config.get("broadcast_tf", "bool", True)
@@ -304,8 +303,13 @@ class Laser(ModelPlugin):
         return compute_scans((self,))[0]
 
     def state(self) -> int | None:
-        """Returns the number of scans that were computed with noise on request, None for 0."""
+        """Returns the number of random scans that were computed on request, None for 0."""
         return self._computed.updates or None
+
+    @property
+    def _is_random(self) -> bool:
+        """Whether scans depend on the number of the update: noise, or materials of the world."""
+        return self._finder.is_random(self.world.physics)
 
     def _request(self, stream: NoiseStream) -> ScanRequest:
         return ScanRequest(self._finder, self.body, stream.key, stream.updates)
@@ -313,8 +317,7 @@ class Laser(ModelPlugin):
     def _keep(self, scan: Scan) -> None:
         """Sets the attributes that describe the last scan."""
         self.last_scan = (scan.pose, scan.ranges)
-        if scan.intensities is not None:
-            self.intensities = scan.intensities
+        self.intensities = _no_intensities() if scan.intensities is None else scan.intensities
 
     def cast_without_noise(self) -> tuple[Pose, FloatArray]:
         """Casts the beams from the current pose without changing the state of the laser.
@@ -354,10 +357,10 @@ def compute_scans(
         StaleHandleError: The body of a laser was destroyed, or its world is closed.
         WorldLockedError: A world is stepping.
     """
-    noisy = [laser for laser in lasers if laser._has_noise]
+    noisy = [laser for laser in lasers if laser._is_random]
     requests = []
     for laser in lasers:
-        if laser._has_noise:
+        if laser._is_random:
             laser._computed.begin_update()
         requests.append(laser._request(laser._computed))
     try:

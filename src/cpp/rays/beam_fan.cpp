@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <utility>
 
 namespace flatland {
 namespace {
@@ -75,6 +76,24 @@ void BeamFan::find_runs(std::size_t count) {
   }
   std::sort(runs_.begin(), runs_.end(),
             [](const Run& a, const Run& b) { return a.original < b.original; });
+}
+
+BeamFan::~BeamFan() = default;
+
+const BeamFan::Mirrored& BeamFan::mirrored() const {
+  std::call_once(has_mirrored_, [this] {
+    std::vector<float> ends = ends_;
+    for (std::size_t i = 1; i < ends.size(); i += 2) ends[i] = -ends[i];
+    auto made = std::unique_ptr<Mirrored>(new Mirrored{{ends.data(), size()}, {}});
+    std::vector<std::uint32_t> ray_of_end(size());
+    const std::vector<std::uint32_t>& order = made->fan.order();
+    for (std::size_t i = 0; i < order.size(); ++i) {
+      ray_of_end[order[i]] = static_cast<std::uint32_t>(i);
+    }
+    for (const std::uint32_t end : order_) made->ray.push_back(ray_of_end[end]);
+    mirrored_ = std::move(made);
+  });
+  return *mirrored_;
 }
 
 bool BeamFan::matches(const float* ends, std::size_t count) const {

@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 
 #include "rays/instruction_set.h"
 #include "rays/simd.h"
@@ -22,6 +23,22 @@ static_assert(AlignedFloats::kBlock % simd::kWidth == 0, "a block consists of wh
 struct Interval {
   std::int32_t begin, end;
 };
+
+// The hits of a scan that finds fixtures; see HitRules.
+struct HitView {
+  const float* nearest;
+  float* fixture;
+  const std::uint16_t* number;  // of the material of a fixture, by its slot
+  std::size_t count;            // of these numbers; fixtures with other slots have no material
+  const std::uint32_t* pass_limit;
+  NoiseKey key;
+  std::uint32_t leg, excluded;
+  std::uint16_t preferred;
+};
+
+std::uint32_t slot_of(const b2Fixture& fixture) {
+  return static_cast<std::uint32_t>(const_cast<b2Fixture&>(fixture).GetUserData().pointer);
+}
 
 // A node or leaf that remains to be drawn.
 struct StackEntry {
@@ -78,6 +95,8 @@ constexpr float kInside = 1e-3F;
 // The same code is compiled for several instruction sets, one of which is selected at run time.
 namespace baseline {
 using Lanes = simd::Lanes8;
+#include "rays/random_kernel.h"
+// Uses the file above.
 #include "rays/depth_kernel.h"
 }  // namespace baseline
 
@@ -86,6 +105,8 @@ using Lanes = simd::Lanes8;
 #pragma GCC target("avx2")
 namespace avx2 {
 using Lanes = simd::Lanes8Avx2;
+#include "rays/random_kernel.h"
+// Uses the file above.
 #include "rays/depth_kernel.h"
 }  // namespace avx2
 #pragma GCC pop_options
@@ -94,6 +115,8 @@ using Lanes = simd::Lanes8Avx2;
 #pragma GCC target("avx512f,avx512vl,avx512dq,avx512bw")
 namespace avx512 {
 using Lanes = simd::Lanes16;
+#include "rays/random_kernel.h"
+// Uses the file above.
 #include "rays/depth_kernel.h"
 }  // namespace avx512
 #pragma GCC pop_options
@@ -104,6 +127,9 @@ struct Functions {
   decltype(&baseline::draw_tree) draw_tree;
   decltype(&baseline::draw_solids) draw_solids;
   decltype(&baseline::draw_solid_tree) draw_solid_tree;
+  decltype(&baseline::find_in_tree) find_in_tree;
+  decltype(&baseline::find_in_solids) find_in_solids;
+  decltype(&baseline::find_in_solid_tree) find_in_solid_tree;
 };
 
 const Functions& functions() {
@@ -111,17 +137,20 @@ const Functions& functions() {
 #if defined(__x86_64__)
     switch (instruction_set()) {
       case InstructionSet::kAvx512:
-        return Functions{avx512::set_frame, avx512::draw_tree, avx512::draw_solids,
-                         avx512::draw_solid_tree};
+        return Functions{avx512::set_frame,         avx512::draw_tree,    avx512::draw_solids,
+                         avx512::draw_solid_tree,   avx512::find_in_tree, avx512::find_in_solids,
+                         avx512::find_in_solid_tree};
       case InstructionSet::kAvx2:
-        return Functions{avx2::set_frame, avx2::draw_tree, avx2::draw_solids,
-                         avx2::draw_solid_tree};
+        return Functions{avx2::set_frame,         avx2::draw_tree,    avx2::draw_solids,
+                         avx2::draw_solid_tree,   avx2::find_in_tree, avx2::find_in_solids,
+                         avx2::find_in_solid_tree};
       case InstructionSet::kBaseline:
         break;
     }
 #endif
-    return Functions{baseline::set_frame, baseline::draw_tree, baseline::draw_solids,
-                     baseline::draw_solid_tree};
+    return Functions{baseline::set_frame,         baseline::draw_tree,    baseline::draw_solids,
+                     baseline::draw_solid_tree,   baseline::find_in_tree, baseline::find_in_solids,
+                     baseline::find_in_solid_tree};
   }();
   return kSelected;
 }
@@ -141,6 +170,19 @@ ScanView view_of(const BeamFan& fan, const b2Transform& pose, ScanBuffer& buffer
           pose};
 }
 
+HitView hits_of(const HitRules& rules, ScanBuffer& buffer) {
+  const Materials& materials = *rules.materials;
+  return {buffer.nearest.data(),
+          buffer.fixture.data(),
+          materials.numbers().data(),
+          materials.numbers().size(),
+          materials.pass_limits().data(),
+          rules.key,
+          rules.leg,
+          rules.excluded,
+          rules.preferred};
+}
+
 // Bound of the difference between the diamond angle of a ray in the frame of a body and in the fan.
 // It is caused by the rounding of coordinates and is largest for short rays far from the origin of
 // the world.
@@ -158,13 +200,19 @@ ScanFrame world_frame(const BeamFan& fan, const b2Transform& pose, RayMasks mask
 
 }  // namespace
 
-DepthScan::DepthScan(const BeamFan& fan, const b2Transform& pose, ScanBuffer& buffer)
-    : fan_(fan), pose_(pose), buffer_(buffer) {
+DepthScan::DepthScan(const BeamFan& fan, const b2Transform& pose, ScanBuffer& buffer,
+                     const HitRules* rules)
+    : fan_(fan), pose_(pose), buffer_(buffer), rules_(rules) {
   buffer.d_x.resize(fan.count());
   buffer.d_y.resize(fan.count());
   // Whole vectors are read from the start of any run of rays on.
   buffer.fraction.resize(fan.count() + AlignedFloats::kBlock);
   std::fill_n(buffer.fraction.data(), buffer.fraction.size(), kMissFraction);
+  if (rules == nullptr) return;
+  buffer.nearest.resize(fan.count());
+  buffer.fixture.resize(fan.count());
+  std::fill_n(buffer.nearest.data(), buffer.nearest.size(), 0.0F);
+  std::memset(buffer.fixture.data(), 0xFF, buffer.fixture.size() * sizeof(float));
 }
 
 void DepthScan::draw(const EdgeTree& tree, const b2Transform& body, RayMasks masks) {
@@ -178,20 +226,38 @@ void DepthScan::draw(const EdgeTree& tree, const b2Transform& body, RayMasks mas
   if (!is_same) functions().set_frame(view, frame, body);
   frame_ = body;
   has_frame_ = true;
-  functions().draw_tree(view, frame, tree.nodes().data(), tree.leaves().data());
+  if (rules_ == nullptr) {
+    functions().draw_tree(view, frame, tree.nodes().data(), tree.leaves().data());
+  } else {
+    functions().find_in_tree(view, frame, hits_of(*rules_, buffer_), tree.nodes().data(),
+                             tree.leaves().data(), tree.leaf_fixtures().data());
+  }
 }
 
 void DepthScan::draw(const std::vector<b2Fixture*>& solids, RayMasks masks) {
   if (solids.empty() || fan_.count() == 0) return;
-  functions().draw_solids(view_of(fan_, pose_, buffer_), world_frame(fan_, pose_, masks),
-                          solids.data(), solids.size());
+  const ScanView view = view_of(fan_, pose_, buffer_);
+  const ScanFrame frame = world_frame(fan_, pose_, masks);
+  if (rules_ == nullptr) {
+    functions().draw_solids(view, frame, solids.data(), solids.size());
+  } else {
+    functions().find_in_solids(view, frame, hits_of(*rules_, buffer_), solids.data(),
+                               solids.size());
+  }
 }
 
 void DepthScan::draw(const SolidTree& tree, RayMasks masks) {
   draw(tree.loose(), masks);
   if (tree.is_empty() || fan_.count() == 0) return;
-  functions().draw_solid_tree(view_of(fan_, pose_, buffer_), world_frame(fan_, pose_, masks),
-                              tree.nodes().data(), tree.solids().data(), tree.solids().size());
+  const ScanView view = view_of(fan_, pose_, buffer_);
+  const ScanFrame frame = world_frame(fan_, pose_, masks);
+  const std::vector<b2Fixture*>& solids = tree.solids();
+  if (rules_ == nullptr) {
+    functions().draw_solid_tree(view, frame, tree.nodes().data(), solids.data(), solids.size());
+  } else {
+    functions().find_in_solid_tree(view, frame, hits_of(*rules_, buffer_), tree.nodes().data(),
+                                   solids.data(), solids.size());
+  }
 }
 
 }  // namespace flatland
