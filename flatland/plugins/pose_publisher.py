@@ -84,7 +84,7 @@ class PosePublisher(ModelPlugin):
     def _velocity(self, body: Pose, pose: Pose) -> Pose:
         """Returns the velocity of the observed frame at `pose`, in its own axes [m/s, rad/s]."""
         vx, vy, omega = self.body.velocity
-        # The velocity of a point of a rigid body: v + omega x r, with r from the origin of the body.
+        # The velocity of a point of a rigid body: v + omega x r, with r from its origin.
         vx -= omega * (pose[1] - body[1])
         vy += omega * (pose[0] - body[0])
         c, s = math.cos(pose[2]), math.sin(pose[2])

@@ -24,6 +24,8 @@ _BUILT_IN: dict[type[Any], str] = {
     values.NavSatFix: "nav_sat_fix",
     values.Odometry: "odometry",
     values.PoseStamped: "pose_stamped",
+    values.Range: "range",
+    values.SemanticScan: "semantic_scan",
     values.Transform: "transform",
     values.Twist: "twist",
     values.TwistWithCovariance: "twist_with_covariance",

@@ -117,10 +117,9 @@ void RangeFinder::write_intensities(const RayScene& scene, const RayEnds& ends,
     if (!(ends.fraction[i] <= 1.0F)) continue;
     const std::uint32_t slot = ends.fixture[i];
     float& intensity = intensities[fan_->order()[i]];
-    if (parameters_.reflect_mask != 0) {
-      const std::uint16_t bits = scene.fixture_at(slot)->GetFilterData().categoryBits;
-      intensity = (bits & parameters_.reflect_mask) != 0 ? kReflective : 0.0F;
-      if (intensity > 0.0F) continue;
+    if (parameters_.reflect_mask != 0 && ends.is_preferred[i] != 0) {
+      intensity = kReflective;
+      continue;
     }
     const float reflectance = materials.at(materials.number_of(slot)).reflectance;
     const float range = std::max(ends.fraction[i] * parameters_.length, kReferenceRange);

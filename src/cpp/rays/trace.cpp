@@ -11,6 +11,7 @@
 #include <cmath>
 #include <tuple>
 
+#include "rays/raycast.h"
 #include "rays/simd.h"
 #include "world/contacts.h"
 
@@ -131,6 +132,7 @@ class Tracer {
         if (is_hit(i)) ends_.cosine[i] = cosine_of(i, ends_.fixture[i], ends_.fraction[i]);
       }
     }
+    if (rules_.preferred != 0) find_preferred(buffer);
     if (materials_->has_mirrors()) reflect();
   }
 
@@ -173,6 +175,37 @@ class Tracer {
 
   b2Vec2 along(std::size_t ray) const {
     return b2Mul(pose_.q, b2Vec2(fan_.x()[ray], fan_.y()[ray]));
+  }
+
+  // Casts the rays again at the fixtures with preferred categories only, near the distances of the
+  // hits; see `find_reflections` in scene_view.h.
+  void find_preferred(ScanBuffer& buffer) {
+    static const Materials kNoMaterials;
+    const HitRules hit_rules{&kNoMaterials, rules_.key, HitRules::kDirect, HitRules::kNoFixture, 0};
+    DepthScan hits(fan_, pose_, buffer, hit_rules);
+    const auto tolerance = [this](std::size_t ray) {
+      return kFractionTolerance + kDistanceTolerance / fan_.length()[ray];
+    };
+    const std::size_t count = fan_.count();
+    std::vector<float> limits(count);
+    for (std::size_t i = 0; i < count; ++i) {
+      const float limit = std::min(ends_.fraction[i] + tolerance(i), kMissFraction);
+      hits.fractions()[i] = limits[i] = is_hit(i) ? limit : -1.0F;
+      hits.nearest()[i] = std::max(ends_.fraction[i] - tolerance(i), 0.0F);
+    }
+    scene_.draw(hits, {rules_.mask, rules_.preferred});
+    ends_.is_preferred.assign(count, 0);
+    for (std::size_t i = 0; i < count; ++i) {
+      ends_.is_preferred[i] = static_cast<char>(hits.fractions()[i] < limits[i]);
+    }
+  }
+
+  // Marks a reflected ray if the fixture at its end has a preferred category.
+  void mark_reflected(std::size_t ray) {
+    if (rules_.preferred == 0) return;
+    const b2Fixture* fixture = scene_.scene().fixture_at(ends_.fixture[ray]);
+    const bool is_preferred = (fixture->GetFilterData().categoryBits & rules_.preferred) != 0;
+    ends_.is_preferred[ray] = static_cast<char>(is_preferred);
   }
 
   // Replaces the ends of the rays that mirrors reflect.
@@ -235,6 +268,7 @@ class Tracer {
     }
     ends_.fraction[ray] = fraction + (1.0F - fraction) * callback.nearest;
     ends_.fixture[ray] = callback.hit_slot;
+    mark_reflected(ray);
     if (!rules_.needs_cosines) return;
     const b2Vec2 end = point + callback.nearest * (to - point);
     const float height = b2Dot(surface_at(*callback.hit, end).normal, reflected);
@@ -271,6 +305,7 @@ class Tracer {
       }
       ends_.fraction[it->ray] = std::max(fraction, ends_.fraction[it->ray]);
       ends_.fixture[it->ray] = hits.fixture(ray);
+      mark_reflected(it->ray);
       if (rules_.needs_cosines) {
         ends_.cosine[it->ray] = cosine_of(ray, ends_.fixture[it->ray], fraction);
       }

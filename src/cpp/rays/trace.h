@@ -14,7 +14,7 @@ namespace flatland {
 // What is computed for the rays of a scan, besides the fractions.
 struct TraceRules {
   std::uint16_t mask;       // categories that stop a ray
-  std::uint16_t preferred;  // of two coincident edges, the one with these categories is hit
+  std::uint16_t preferred;  // categories of fixtures that are marked; 0 for none
   NoiseKey key;
   bool uses_materials;  // otherwise all fixtures are opaque
   bool needs_cosines;
@@ -25,6 +25,8 @@ struct RayEnds {
   std::vector<float> fraction;         // of the length of the ray; greater than 1 for a miss
   std::vector<std::uint32_t> fixture;  // slot of the fixture; unspecified for a miss
   std::vector<float> cosine;           // of the angle of incidence; 0 for a miss
+  // Whether a fixture with a preferred category is at the end of the ray; empty if there are none.
+  std::vector<char> is_preferred;
 };
 
 // The memory of traces, for any number of them one after the other.
