@@ -146,8 +146,7 @@ class RangeFinder:
     def scan_labels(self, body: PhysicsBody, stream: int, update: int) -> LabelledScan:
         """Performs the same scan as `scan`, and finds out which bodies the beams hit.
 
-        Of several fixtures at the same distance, the one that was created first is hit. Arguments
-        and errors are those of `scan`.
+        Arguments and errors are those of `scan`.
         """
         return LabelledScan(*self._core.scan_labels(body._core, body.id, stream, update))
 

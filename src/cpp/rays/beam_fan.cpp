@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
-#include <utility>
 
 namespace flatland {
 namespace {
@@ -27,7 +26,9 @@ BeamFan::BeamFan(const float* ends, std::size_t count) : ends_(ends, ends + 2 * 
     order_.push_back(static_cast<std::uint32_t>(i));
   }
   const auto angle_less = [&](std::uint32_t a, std::uint32_t b) { return angles[a] < angles[b]; };
-  std::stable_sort(order_.begin(), order_.end(), angle_less);
+  if (!std::is_sorted(order_.begin(), order_.end(), angle_less)) {
+    std::stable_sort(order_.begin(), order_.end(), angle_less);
+  }
 
   x_.resize(order_.size());
   y_.resize(order_.size());
@@ -76,24 +77,6 @@ void BeamFan::find_runs(std::size_t count) {
   }
   std::sort(runs_.begin(), runs_.end(),
             [](const Run& a, const Run& b) { return a.original < b.original; });
-}
-
-BeamFan::~BeamFan() = default;
-
-const BeamFan::Mirrored& BeamFan::mirrored() const {
-  std::call_once(has_mirrored_, [this] {
-    std::vector<float> ends = ends_;
-    for (std::size_t i = 1; i < ends.size(); i += 2) ends[i] = -ends[i];
-    auto made = std::unique_ptr<Mirrored>(new Mirrored{{ends.data(), size()}, {}});
-    std::vector<std::uint32_t> ray_of_end(size());
-    const std::vector<std::uint32_t>& order = made->fan.order();
-    for (std::size_t i = 0; i < order.size(); ++i) {
-      ray_of_end[order[i]] = static_cast<std::uint32_t>(i);
-    }
-    for (const std::uint32_t end : order_) made->ray.push_back(ray_of_end[end]);
-    mirrored_ = std::move(made);
-  });
-  return *mirrored_;
 }
 
 bool BeamFan::matches(const float* ends, std::size_t count) const {

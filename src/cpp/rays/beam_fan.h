@@ -16,7 +16,6 @@ namespace flatland {
 class BeamFan {
  public:
   BeamFan(const float* ends, std::size_t count);
-  ~BeamFan();
 
   // Whether the fan was made from these end points.
   bool matches(const float* ends, std::size_t count) const;
@@ -42,11 +41,6 @@ class BeamFan {
   // into the next one; empty if there are too many runs or rays of zero length.
   const std::vector<Run>& runs() const { return runs_; }
 
-  // The fan of a sensor that is seen in a mirror: the end points (x, -y), and for each ray its
-  // number there, both in sorted order. Created at the first call; thread-safe.
-  struct Mirrored;
-  const Mirrored& mirrored() const;
-
   float min_length() const { return min_length_; }
   float max_length() const { return max_length_; }
 
@@ -66,13 +60,6 @@ class BeamFan {
   int cell_bits_ = 8;
   float min_length_ = 0.0F;
   float max_length_ = 0.0F;
-  mutable std::once_flag has_mirrored_;
-  mutable std::unique_ptr<const Mirrored> mirrored_;
-};
-
-struct BeamFan::Mirrored {
-  BeamFan fan;
-  std::vector<std::uint32_t> ray;
 };
 
 // The most recently used fans, so that the rays of a laser are sorted only once. Thread-safe.

@@ -5,8 +5,9 @@
 
 //
 // With kFindsFixtures, the kernel also records which fixture each ray hits, and fixtures may let
-// rays pass (see HitRules). Of several fixtures at the same distance, the one with the lowest slot
-// is recorded, whatever the order in which they are drawn.
+// rays pass (see HitRules). Of several fixtures at the same distance, one is recorded that depends
+// neither on the instruction set nor on other scans: edges are always drawn in the same order, and
+// circles and polygons replace fixtures with higher slots.
 
 template <bool kFindsFixtures>
 struct Kernel {
@@ -56,7 +57,12 @@ struct Kernel {
     const Floats before = Lanes::load(scan.fraction + first);
     if constexpr (kFindsFixtures) {
       Floats fixture = Lanes::load(hits->fixture + first);
-      const Mask is_new = select_hits(first, fraction, before, fixture, is_hit, object);
+      const Mask is_ahead = Lanes::less_equal(least_fraction(first), fraction);
+      const Mask is_first = Lanes::less(Lanes::words(object.fixture), Lanes::as_words(fixture));
+      const Mask is_nearer = Lanes::either(Lanes::less(fraction, before),
+                                           Lanes::both(Lanes::equal(fraction, before), is_first));
+      const Mask is_new =
+          stopped(first, Lanes::both(Lanes::both(is_hit, is_ahead), is_nearer), object);
       if (!Lanes::any(is_new)) return;
       Lanes::store(scan.fraction + first, Lanes::select(is_new, fraction, before));
       fixture = Lanes::select(is_new, Lanes::as_floats(Lanes::words(object.fixture)), fixture);
@@ -69,19 +75,19 @@ struct Kernel {
     }
   }
 
-  // Finds the hits of an object that replace the previous ones of a vector of rays.
-  FLATLAND_INLINE Mask select_hits(std::int32_t first, Floats fraction, Floats before,
-                                   Floats fixture, Mask is_hit, const Object& object) const {
-    const Mask is_tie =
-        Lanes::both(Lanes::equal(fraction, before),
-                    Lanes::less(Lanes::words(object.fixture), Lanes::as_words(fixture)));
-    const Mask is_nearer = Lanes::either(Lanes::less(fraction, before), is_tie);
-    const Mask is_beyond = Lanes::less_equal(Lanes::load(hits->nearest + first), fraction);
-    const Mask is_new = Lanes::both(is_hit, Lanes::both(is_nearer, is_beyond));
-    if (object.pass_limit == Materials::kOpaque || !Lanes::any(is_new)) return is_new;
-    const RandomWords random(hits->key, static_cast<std::uint32_t>(first),
-                             hits->leg | object.fixture);
-    return Lanes::but_not(is_new, Lanes::less(random.word[0], Lanes::words(object.pass_limit)));
+  // The least fraction of a hit of a vector of rays.
+  FLATLAND_INLINE Floats least_fraction(std::int32_t first) const {
+    if (hits->nearest == nullptr) return Lanes::broadcast(0.0F);
+    return Lanes::load(hits->nearest + first);
+  }
+
+  // Returns which rays of a vector an object stops.
+  FLATLAND_INLINE Mask stopped(std::int32_t first, Mask is_hit, const Object& object) const {
+    if (object.pass_limit == Materials::kOpaque || !Lanes::any(is_hit)) return is_hit;
+    const auto* words = reinterpret_cast<const float*>(hits->words);
+    const Words fate =
+        fate_word(Lanes::as_words(Lanes::load(words + first)), hits->leg ^ object.fixture);
+    return Lanes::but_not(is_hit, Lanes::less(fate, Lanes::words(object.pass_limit)));
   }
 
   // Returns a fixture as an object, which is invisible if rays do not end at it.
@@ -206,6 +212,9 @@ struct Kernel {
         const Interval rays{found.begin[i], found.end[i]};
         const float distance = found.distance[i] * rounding;
         if (!frame.masks.pass(node.category_bits[i]) || !is_visible(rays, distance)) continue;
+        if constexpr (kFindsFixtures) {
+          if (is_before(node, i)) continue;
+        }
         // Insertion sort, with the nearest entry on top of the stack.
         std::size_t top = size++;
         for (; top > first && stack[top - 1].distance < distance; --top) {
@@ -214,6 +223,15 @@ struct Kernel {
         stack[top] = {distance, rays, node.child[i]};
       }
     }
+  }
+
+  // Whether a box is nearer than the least distance of all hits.
+  FLATLAND_INLINE bool is_before(const EdgeTree::Node& node, std::uint32_t i) const {
+    const float x0 = node.min_x[i] - frame.origin.x, x1 = node.max_x[i] - frame.origin.x;
+    const float y0 = node.min_y[i] - frame.origin.y, y1 = node.max_y[i] - frame.origin.y;
+    const float xx = x0 * x0 > x1 * x1 ? x0 * x0 : x1 * x1;
+    const float yy = y0 * y0 > y1 * y1 ? y0 * y0 : y1 * y1;
+    return xx + yy < hits->least_distance * hits->least_distance;
   }
 
   // -- edges -------------------------------------------------------------------------------------
@@ -235,7 +253,11 @@ struct Kernel {
     const Floats d_y = Lanes::load(scan.d_y + first);
     Floats nearest = Lanes::load(scan.fraction + first);
     Floats fixture = nearest;
-    if constexpr (kFindsFixtures) fixture = Lanes::load(hits->fixture + first);
+    Floats least = zero;
+    if constexpr (kFindsFixtures) {
+      fixture = Lanes::load(hits->fixture + first);
+      least = least_fraction(first);
+    }
     for (; set != 0; set &= set - 1) {
       const int i = __builtin_ctz(set);
       const Floats side_a = d_x * edges.a_y[i] - d_y * edges.a_x[i];
@@ -252,11 +274,12 @@ struct Kernel {
                                           Lanes::less_equal(zero, Lanes::max(side_a, side_b)));
       // A fraction of NaN is a miss.
       const Mask is_ahead =
-          Lanes::both(Lanes::not_equal(denominator, zero), Lanes::less_equal(zero, fraction));
+          Lanes::both(Lanes::not_equal(denominator, zero), Lanes::less_equal(least, fraction));
       if constexpr (kFindsFixtures) {
         const Object& object = objects[i];
-        const Mask is_new = select_hits(first, fraction, nearest, fixture,
-                                        Lanes::both(is_crossed, is_ahead), object);
+        const Mask is_hit = Lanes::both(is_crossed, is_ahead);
+        const Mask is_new =
+            stopped(first, Lanes::both(is_hit, Lanes::less(fraction, nearest)), object);
         nearest = Lanes::select(is_new, fraction, nearest);
         fixture = Lanes::select(is_new, Lanes::as_floats(Lanes::words(object.fixture)), fixture);
       } else {

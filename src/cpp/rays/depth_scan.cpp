@@ -26,14 +26,15 @@ struct Interval {
 
 // The hits of a scan that finds fixtures; see HitRules.
 struct HitView {
-  const float* nearest;
+  const float* nearest;  // null if there are no limits
   float* fixture;
   const std::uint16_t* number;  // of the material of a fixture, by its slot
   std::size_t count;            // of these numbers; fixtures with other slots have no material
   const std::uint32_t* pass_limit;
-  NoiseKey key;
+  const std::uint32_t* words;
   std::uint32_t leg, excluded;
   std::uint16_t preferred;
+  float least_distance;  // [m]; hits are not nearer
 };
 
 std::uint32_t slot_of(const b2Fixture& fixture) {
@@ -95,8 +96,6 @@ constexpr float kInside = 1e-3F;
 // The same code is compiled for several instruction sets, one of which is selected at run time.
 namespace baseline {
 using Lanes = simd::Lanes8;
-#include "rays/random_kernel.h"
-// Uses the file above.
 #include "rays/depth_kernel.h"
 }  // namespace baseline
 
@@ -105,8 +104,6 @@ using Lanes = simd::Lanes8;
 #pragma GCC target("avx2")
 namespace avx2 {
 using Lanes = simd::Lanes8Avx2;
-#include "rays/random_kernel.h"
-// Uses the file above.
 #include "rays/depth_kernel.h"
 }  // namespace avx2
 #pragma GCC pop_options
@@ -115,8 +112,6 @@ using Lanes = simd::Lanes8Avx2;
 #pragma GCC target("avx512f,avx512vl,avx512dq,avx512bw")
 namespace avx512 {
 using Lanes = simd::Lanes16;
-#include "rays/random_kernel.h"
-// Uses the file above.
 #include "rays/depth_kernel.h"
 }  // namespace avx512
 #pragma GCC pop_options
@@ -170,17 +165,18 @@ ScanView view_of(const BeamFan& fan, const b2Transform& pose, ScanBuffer& buffer
           pose};
 }
 
-HitView hits_of(const HitRules& rules, ScanBuffer& buffer) {
+HitView hits_of(const HitRules& rules, ScanBuffer& buffer, bool has_nearest, float least_distance) {
   const Materials& materials = *rules.materials;
-  return {buffer.nearest.data(),
+  return {has_nearest ? buffer.nearest.data() : nullptr,
           buffer.fixture.data(),
           materials.numbers().data(),
           materials.numbers().size(),
           materials.pass_limits().data(),
-          rules.key,
+          rules.words,
           rules.leg,
           rules.excluded,
-          rules.preferred};
+          rules.preferred,
+          least_distance};
 }
 
 // Bound of the difference between the diamond angle of a ray in the frame of a body and in the fan.
@@ -209,10 +205,15 @@ DepthScan::DepthScan(const BeamFan& fan, const b2Transform& pose, ScanBuffer& bu
   buffer.fraction.resize(fan.count() + AlignedFloats::kBlock);
   std::fill_n(buffer.fraction.data(), buffer.fraction.size(), kMissFraction);
   if (rules == nullptr) return;
-  buffer.nearest.resize(fan.count());
   buffer.fixture.resize(fan.count());
-  std::fill_n(buffer.nearest.data(), buffer.nearest.size(), 0.0F);
   std::memset(buffer.fixture.data(), 0xFF, buffer.fixture.size() * sizeof(float));
+}
+
+float* DepthScan::limit_nearest() {
+  has_nearest_ = true;
+  buffer_.nearest.resize(fan_.count());
+  std::fill_n(buffer_.nearest.data(), buffer_.nearest.size(), 0.0F);
+  return buffer_.nearest.data();
 }
 
 void DepthScan::draw(const EdgeTree& tree, const b2Transform& body, RayMasks masks) {
@@ -229,8 +230,9 @@ void DepthScan::draw(const EdgeTree& tree, const b2Transform& body, RayMasks mas
   if (rules_ == nullptr) {
     functions().draw_tree(view, frame, tree.nodes().data(), tree.leaves().data());
   } else {
-    functions().find_in_tree(view, frame, hits_of(*rules_, buffer_), tree.nodes().data(),
-                             tree.leaves().data(), tree.leaf_fixtures().data());
+    functions().find_in_tree(view, frame, hits_of(*rules_, buffer_, has_nearest_, least_distance_),
+                             tree.nodes().data(), tree.leaves().data(),
+                             tree.leaf_fixtures().data());
   }
 }
 
@@ -241,8 +243,9 @@ void DepthScan::draw(const std::vector<b2Fixture*>& solids, RayMasks masks) {
   if (rules_ == nullptr) {
     functions().draw_solids(view, frame, solids.data(), solids.size());
   } else {
-    functions().find_in_solids(view, frame, hits_of(*rules_, buffer_), solids.data(),
-                               solids.size());
+    functions().find_in_solids(view, frame,
+                               hits_of(*rules_, buffer_, has_nearest_, least_distance_),
+                               solids.data(), solids.size());
   }
 }
 
@@ -255,8 +258,9 @@ void DepthScan::draw(const SolidTree& tree, RayMasks masks) {
   if (rules_ == nullptr) {
     functions().draw_solid_tree(view, frame, tree.nodes().data(), solids.data(), solids.size());
   } else {
-    functions().find_in_solid_tree(view, frame, hits_of(*rules_, buffer_), tree.nodes().data(),
-                                   solids.data(), solids.size());
+    functions().find_in_solid_tree(view, frame,
+                                   hits_of(*rules_, buffer_, has_nearest_, least_distance_),
+                                   tree.nodes().data(), solids.data(), solids.size());
   }
 }
 

@@ -22,7 +22,6 @@
 #include "rays/beam_fan.h"
 #include "rays/edge_tree.h"
 #include "rays/materials.h"
-#include "rays/range_noise.h"
 #include "rays/solid_tree.h"
 
 namespace flatland {
@@ -48,17 +47,16 @@ struct ScanBuffer {
 };
 
 // How fixtures are hit, for scans that find out which ones are. A ray passes a fixture that
-// transmits if a random word is below its limit: a function of the noise key, the leg, the slot of
-// the fixture and the number of the ray in sorted order.
+// transmits if a random word is below its limit: `fate_word` of the word of the ray and of the slot
+// of the fixture with the bits of the leg.
 struct HitRules {
   static constexpr std::uint32_t kNoFixture = 0xFFFFFFFFU;
-  // The legs of a path: before and after a reflection. Slots are below the lowest of these bits;
-  // noise uses the numbers from 0 on.
-  static constexpr std::uint32_t kDirect = 0x80000000U;
-  static constexpr std::uint32_t kReflected = 0xC0000000U;
+  // The legs of a path: before and after a reflection.
+  static constexpr std::uint32_t kDirect = 0;
+  static constexpr std::uint32_t kReflected = 0x80000000U;
 
   const Materials* materials;
-  NoiseKey key;
+  const std::uint32_t* words;  // for each ray in sorted order, whole blocks; see `draw_words`
   std::uint32_t leg;
   std::uint32_t excluded;   // a fixture that is not hit, or kNoFixture
   std::uint16_t preferred;  // of two coincident edges, the one with these categories is hit
@@ -83,13 +81,14 @@ class DepthScan {
   // drawing, hits at or beyond these fractions are ignored; the caller may change them in between.
   float* fractions() { return buffer_.fraction.data(); }
   const float* fractions() const { return buffer_.fraction.data(); }
-  // Least fraction of a hit of each ray, initially 0; only of scans that find fixtures.
-  float* nearest() { return buffer_.nearest.data(); }
-  // Slot of the fixture that a ray hits; unspecified for a miss.
-  std::uint32_t fixture(std::size_t ray) const {
-    std::uint32_t slot;
-    std::memcpy(&slot, buffer_.fixture.data() + ray, sizeof(slot));
-    return slot;
+  // Ignores hits of each ray at lower fractions than these, which are initially 0; only for scans
+  // that find fixtures.
+  float* limit_nearest();
+  // Allows to skip what is nearer than the least distance [m] of all these limits.
+  void set_least_distance(float distance) { least_distance_ = distance; }
+  // Copies the slots of the fixtures that the rays hit; unspecified for a miss.
+  void copy_fixtures(std::uint32_t* slots) const {
+    std::memcpy(slots, buffer_.fixture.data(), fan_.count() * sizeof(*slots));
   }
 
  private:
@@ -99,6 +98,8 @@ class DepthScan {
   b2Transform pose_;
   ScanBuffer& buffer_;
   const HitRules* rules_;
+  bool has_nearest_ = false;
+  float least_distance_ = 0.0F;
   b2Transform frame_;  // of the vectors along the rays in the buffer, that of the tree drawn last
   bool has_frame_ = false;
 };

@@ -54,6 +54,8 @@ std::uint16_t Materials::number(const Material& material) {
     mirror_limit = static_cast<std::uint64_t>(share >= kAll ? kWords : share * kWords);
     has_mirrors_ = true;
   }
+  const bool is_partial = mirror_limit > 0 && mirror_limit < static_cast<std::uint64_t>(kWords);
+  if (is_partial || (pass_limit != kOpaque && pass_limit != kInvisible)) needs_words_ = true;
   entries_.push_back(material);
   pass_limits_.push_back(pass_limit);
   mirror_limits_.push_back(mirror_limit);

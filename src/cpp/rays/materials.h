@@ -7,6 +7,22 @@
 
 namespace flatland {
 
+// The random word of a ray at a fixture, from the word of the ray and the number of the fixture:
+// one for each pair, by the finalizer of MurmurHash3 (A. Appleby), which is a permutation whose
+// every input bit changes each output bit with a probability of about 1/2. For vectors of words,
+// too.
+template <typename Words>
+inline __attribute__((always_inline)) Words fate_word(Words word, std::uint32_t fixture) {
+  // Multiples of this odd number differ in many bits for successive fixtures.
+  word ^= fixture * 0x9E3779B9U + 0x7F4A7C15U;
+  word ^= word >> 16U;
+  word *= 0x85EBCA6BU;
+  word ^= word >> 13U;
+  word *= 0xC2B2AE35U;
+  word ^= word >> 16U;
+  return word;
+}
+
 // Shares from 0 to 1. The sum of `transmission` and `specular` is at most 1.
 struct Material {
   float reflectance = 0.5F;   // of the light that is scattered, the albedo
@@ -24,6 +40,8 @@ class Materials {
   bool is_empty() const { return count_ == 0; }
   // Whether a material is in use, or was since there were no materials, that reflects beams.
   bool has_mirrors() const { return has_mirrors_; }
+  // Whether random words of rays are needed, as above.
+  bool needs_words() const { return needs_words_; }
 
   void set(std::uint32_t slot, const Material& material);
   void erase(std::uint32_t slot);
@@ -53,6 +71,7 @@ class Materials {
   std::vector<std::uint16_t> numbers_;
   std::size_t count_ = 0;
   bool has_mirrors_ = false;
+  bool needs_words_ = false;
 };
 
 }  // namespace flatland

@@ -105,26 +105,27 @@ void RangeFinder::scan_traced(const SceneView& scene, const b2Transform& pose, c
   ends.fraction.resize(AlignedFloats::rounded(fan_->count()) + AlignedFloats::kBlock,
                        kMissFraction);
   write_ranges(ends.fraction.data(), memory.ranges.data());
-  if (out.intensities != nullptr) write_intensities(scene.scene(), ends, out.intensities);
+  if (out.intensities != nullptr) write_intensities(ends, out.intensities);
   if (out.hits != nullptr) write_labels(scene.scene(), ends, *out.hits);
 }
 
-void RangeFinder::write_intensities(const RayScene& scene, const RayEnds& ends,
-                                    float* intensities) const {
-  std::fill_n(intensities, beams(), 0.0F);
-  const Materials& materials = scene.materials();
-  for (std::size_t i = 0; i < fan_->count(); ++i) {
-    if (!(ends.fraction[i] <= 1.0F)) continue;
-    const std::uint32_t slot = ends.fixture[i];
-    float& intensity = intensities[fan_->order()[i]];
-    if (parameters_.reflect_mask != 0 && ends.is_preferred[i] != 0) {
-      intensity = kReflective;
-      continue;
-    }
-    const float reflectance = materials.at(materials.number_of(slot)).reflectance;
-    const float range = std::max(ends.fraction[i] * parameters_.length, kReferenceRange);
-    intensity = kReflective * reflectance * ends.cosine[i] / (range * range);
+void RangeFinder::write_intensities(RayEnds& ends, float* intensities) const {
+  float* brightness = ends.brightness.data();
+  const float* fraction = ends.fraction.data();
+  const std::size_t count = fan_->count();
+  for (std::size_t i = 0; i < count; ++i) {
+    const float range = std::max(fraction[i] * parameters_.length, kReferenceRange);
+    brightness[i] = kReflective * brightness[i] / (range * range);
   }
+  for (std::size_t i = 0; parameters_.reflect_mask != 0 && i < count; ++i) {
+    if (ends.is_preferred[i] != 0) brightness[i] = kReflective;
+  }
+  for (const BeamFan::Run& run : fan_->runs()) {
+    std::copy_n(brightness + run.sorted, run.count, intensities + run.original);
+  }
+  if (!fan_->runs().empty()) return;
+  std::fill_n(intensities, beams(), 0.0F);
+  for (std::size_t i = 0; i < count; ++i) intensities[fan_->order()[i]] = brightness[i];
 }
 
 void RangeFinder::write_labels(const RayScene& scene, const RayEnds& ends, HitTable& hits) const {

@@ -98,7 +98,8 @@ class RangeFinder {
                   ScanMemory& memory) const;
   void scan_traced(const SceneView& scene, const b2Transform& pose, const NoiseKey& key,
                    const Readings& out, ScanMemory& memory) const;
-  void write_intensities(const RayScene& scene, const RayEnds& ends, float* intensities) const;
+  // Replaces the brightnesses by intensities.
+  void write_intensities(RayEnds& ends, float* intensities) const;
   void write_labels(const RayScene& scene, const RayEnds& ends, HitTable& hits) const;
 
   std::shared_ptr<const BeamFan> fan_;

@@ -9,31 +9,21 @@
 
 #include <algorithm>
 #include <cmath>
-#include <tuple>
+#include <unordered_map>
 
+#include "rays/range_noise.h"
 #include "rays/raycast.h"
-#include "rays/simd.h"
 #include "world/contacts.h"
 
 namespace flatland {
 namespace {
 
-namespace single {
-using Lanes = simd::Lanes1;
-#include "rays/random_kernel.h"
-}  // namespace single
-
 // A mirror that reflects fewer rays has them cast one by one, at about 1 us each. The scan of an
 // image costs as much as some of them.
-constexpr std::size_t kFewRays = 4;
+constexpr std::uint32_t kFewRays = 2;
 // By how much a hit may seem to be behind the mirror because of rounding, as a part of the length
 // of a ray, and in metres.
 constexpr float kMirrorTolerance = 1e-5F;
-
-std::uint32_t word_of(const NoiseKey& key, std::uint32_t ray, std::uint32_t leg,
-                      std::uint32_t fixture) {
-  return single::RandomWords(key, ray, leg | fixture).word[0];
-}
 
 // A point of the surface of a fixture.
 struct Surface {
@@ -74,8 +64,8 @@ Surface surface_at(const b2Fixture& fixture, const b2Vec2& point) {
 // The nearest hit of a ray after its reflection, with b2World::RayCast.
 class ReflectedHit final : public b2RayCastCallback {
  public:
-  ReflectedHit(const HitRules& rules, std::uint16_t mask, std::uint32_t ray)
-      : rules_(rules), mask_(mask), ray_(ray) {}
+  ReflectedHit(const HitRules& rules, std::uint16_t mask, std::uint32_t word)
+      : rules_(rules), mask_(mask), word_(word) {}
 
   float ReportFixture(b2Fixture* fixture, const b2Vec2&, const b2Vec2&, float fraction) override {
     constexpr float kIgnore = -1.0F;
@@ -86,9 +76,7 @@ class ReflectedHit final : public b2RayCastCallback {
     }
     const std::uint32_t limit = rules_.materials->pass_limit(slot);
     if (limit == Materials::kInvisible) return kIgnore;
-    if (limit != Materials::kOpaque && word_of(rules_.key, ray_, rules_.leg, slot) < limit) {
-      return kIgnore;
-    }
+    if (fate_word(word_, rules_.leg ^ slot) < limit) return kIgnore;
     // Of several fixtures at the same distance, the one with the lowest slot.
     if (hit == nullptr || fraction < nearest || slot < hit_slot) {
       hit = fixture;
@@ -105,7 +93,7 @@ class ReflectedHit final : public b2RayCastCallback {
  private:
   const HitRules& rules_;
   std::uint16_t mask_;
-  std::uint32_t ray_;
+  std::uint32_t word_;
 };
 
 // One trace; see the function.
@@ -118,80 +106,95 @@ class Tracer {
   void run(ScanBuffer& buffer) {
     static const Materials kNoMaterials;
     materials_ = rules_.uses_materials ? &scene_.scene().materials() : &kNoMaterials;
-    const HitRules hit_rules = rules_for(HitRules::kDirect, HitRules::kNoFixture);
+    const std::size_t count = fan_.count();
+    memory_.words.resize((count + kWordsPerGroup - 1) / kWordsPerGroup * kWordsPerGroup);
+    if (materials_->needs_words()) draw_words(rules_.key, count, memory_.words.data());
+    const HitRules hit_rules{materials_, memory_.words.data(), HitRules::kDirect,
+                             HitRules::kNoFixture, rules_.preferred};
     DepthScan hits(fan_, pose_, buffer, hit_rules);
     scene_.draw(hits, {rules_.mask, kAnyCategory});
-    const std::size_t count = fan_.count();
-    ends_.fraction.assign(hits.fractions(), hits.fractions() + count);
-    ends_.fixture.resize(count);
-    for (std::size_t i = 0; i < count; ++i) ends_.fixture[i] = hits.fixture(i);
-    if (rules_.needs_cosines) {
-      ends_.cosine.assign(count, 0.0F);
-      CosineOf cosine_of(*this, fan_, pose_);
-      for (std::size_t i = 0; i < count; ++i) {
-        if (is_hit(i)) ends_.cosine[i] = cosine_of(i, ends_.fixture[i], ends_.fraction[i]);
-      }
-    }
+    take_ends(hits, fan_, pose_, ends_);
     if (rules_.preferred != 0) find_preferred(buffer);
     if (materials_->has_mirrors()) reflect();
   }
 
  private:
-  using Reflection = TraceMemory::Reflection;
-  using Reflections = std::vector<Reflection>::const_iterator;
-
-  // Cosines of the angles of incidence of rays of a fan. Consecutive rays often hit the same edge.
-  class CosineOf {
-   public:
-    CosineOf(const Tracer& tracer, const BeamFan& fan, const b2Transform& pose)
-        : tracer_(tracer), fan_(fan), pose_(pose) {}
-
-    float operator()(std::size_t ray, std::uint32_t slot, float fraction) {
-      const b2Vec2 end(fan_.x()[ray], fan_.y()[ray]);
-      const b2Vec2 along = b2Mul(pose_.q, end);
-      if (slot != slot_ || !is_flat_) {
-        slot_ = slot;
-        const b2Fixture* fixture = tracer_.scene_.scene().fixture_at(slot);
-        is_flat_ = fixture->GetType() == b2Shape::e_edge;
-        normal_ = surface_at(*fixture, pose_.p + fraction * along).normal;
-      }
-      return std::min(std::abs(b2Dot(normal_, along)) / fan_.length()[ray], 1.0F);
-    }
-
-   private:
-    const Tracer& tracer_;
-    const BeamFan& fan_;
-    const b2Transform& pose_;
-    std::uint32_t slot_ = HitRules::kNoFixture;
-    bool is_flat_ = false;
-    b2Vec2 normal_ = b2Vec2_zero;
-  };
-
-  HitRules rules_for(std::uint32_t leg, std::uint32_t excluded) const {
-    return {materials_, rules_.key, leg, excluded, rules_.preferred};
-  }
-
   bool is_hit(std::size_t ray) const { return ends_.fraction[ray] <= 1.0F; }
 
   b2Vec2 along(std::size_t ray) const {
     return b2Mul(pose_.q, b2Vec2(fan_.x()[ray], fan_.y()[ray]));
   }
 
+  const b2Fixture& fixture_at(std::uint32_t slot) const { return *scene_.scene().fixture_at(slot); }
+
+  // Sets the ends of all rays of a scan.
+  void take_ends(const DepthScan& hits, const BeamFan& fan, const b2Transform& pose,
+                 RayEnds& ends) const {
+    const std::size_t count = fan.count();
+    ends.fraction.assign(hits.fractions(), hits.fractions() + count);
+    ends.fixture.resize(count);
+    hits.copy_fixtures(ends.fixture.data());
+    if (!rules_.needs_brightness) return;
+    ends.brightness.assign(count, 0.0F);
+    // Consecutive rays often hit the same fixture.
+    for (std::size_t first = 0; first < count;) {
+      const std::uint32_t slot = ends.fixture[first];
+      std::size_t last = first + 1;
+      while (last < count && ends.fixture[last] == slot) ++last;
+      if (slot != HitRules::kNoFixture) write_brightness(fan, pose, slot, first, last, ends);
+      first = last;
+    }
+  }
+
+  // Writes the brightness of the rays from `first` to `last` - 1, which hit one fixture.
+  void write_brightness(const BeamFan& fan, const b2Transform& pose, std::uint32_t slot,
+                        std::size_t first, std::size_t last, RayEnds& ends) const {
+    const b2Fixture& fixture = fixture_at(slot);
+    const float reflectance = reflectance_of(slot);
+    const float* x = fan.x();
+    const float* y = fan.y();
+    const float* length = fan.length();
+    const float* fraction = ends.fraction.data();
+    float* brightness = ends.brightness.data();
+    if (fixture.GetType() != b2Shape::e_edge) {
+      for (std::size_t i = first; i < last; ++i) {
+        if (!(fraction[i] <= 1.0F)) continue;
+        const b2Vec2 along = b2Mul(pose.q, b2Vec2(x[i], y[i]));
+        const b2Vec2 normal = surface_at(fixture, pose.p + fraction[i] * along).normal;
+        brightness[i] = reflectance * std::min(std::abs(b2Dot(normal, along)) / length[i], 1.0F);
+      }
+      return;
+    }
+    // All rays have the same normal, here in the frame of the sensor.
+    const b2Vec2 normal = b2MulT(pose.q, surface_at(fixture, pose.p).normal);
+    for (std::size_t i = first; i < last; ++i) {
+      const float height = std::abs(normal.x * x[i] + normal.y * y[i]);
+      const float cosine = std::min(height / length[i], 1.0F);
+      brightness[i] = fraction[i] <= 1.0F ? reflectance * cosine : 0.0F;
+    }
+  }
+
+  float reflectance_of(std::uint32_t slot) const {
+    return materials_->at(materials_->number_of(slot)).reflectance;
+  }
+
   // Casts the rays again at the fixtures with preferred categories only, near the distances of the
   // hits; see `find_reflections` in scene_view.h.
   void find_preferred(ScanBuffer& buffer) {
     static const Materials kNoMaterials;
-    const HitRules hit_rules{&kNoMaterials, rules_.key, HitRules::kDirect, HitRules::kNoFixture, 0};
+    const HitRules hit_rules{&kNoMaterials, memory_.words.data(), HitRules::kDirect,
+                             HitRules::kNoFixture, 0};
     DepthScan hits(fan_, pose_, buffer, hit_rules);
     const auto tolerance = [this](std::size_t ray) {
       return kFractionTolerance + kDistanceTolerance / fan_.length()[ray];
     };
     const std::size_t count = fan_.count();
+    float* nearest = hits.limit_nearest();
     std::vector<float> limits(count);
     for (std::size_t i = 0; i < count; ++i) {
       const float limit = std::min(ends_.fraction[i] + tolerance(i), kMissFraction);
       hits.fractions()[i] = limits[i] = is_hit(i) ? limit : -1.0F;
-      hits.nearest()[i] = std::max(ends_.fraction[i] - tolerance(i), 0.0F);
+      nearest[i] = std::max(ends_.fraction[i] - tolerance(i), 0.0F);
     }
     scene_.draw(hits, {rules_.mask, rules_.preferred});
     ends_.is_preferred.assign(count, 0);
@@ -200,53 +203,64 @@ class Tracer {
     }
   }
 
-  // Marks a reflected ray if the fixture at its end has a preferred category.
-  void mark_reflected(std::size_t ray) {
-    if (rules_.preferred == 0) return;
-    const b2Fixture* fixture = scene_.scene().fixture_at(ends_.fixture[ray]);
-    const bool is_preferred = (fixture->GetFilterData().categoryBits & rules_.preferred) != 0;
-    ends_.is_preferred[ray] = static_cast<char>(is_preferred);
-  }
-
   // Replaces the ends of the rays that mirrors reflect.
   void reflect() {
-    find_reflections();
-    const std::vector<Reflection>& all = memory_.reflections;
-    for (auto first = all.begin(); first != all.end();) {
-      const auto last = std::find_if(first, all.end(), [&](const Reflection& other) {
-        return other.fixture != first->fixture || other.face != first->face;
-      });
-      const b2Fixture& mirror = *scene_.scene().fixture_at(first->fixture);
-      const bool is_round = mirror.GetType() == b2Shape::e_circle;
-      if (is_round || static_cast<std::size_t>(last - first) < kFewRays) {
-        for (auto it = first; it != last; ++it) cast_reflected(mirror, it->ray);
+    find_mirrors();
+    for (const TraceMemory::Mirror& mirror : memory_.mirrors) {
+      const b2Fixture& fixture = fixture_at(mirror.fixture);
+      const std::uint32_t* rays = memory_.sorted_rays.data() + (mirror.end - mirror.count);
+      if (fixture.GetType() == b2Shape::e_circle || mirror.count < kFewRays) {
+        for (std::uint32_t i = 0; i < mirror.count; ++i) cast_reflected(fixture, rays[i]);
       } else {
-        scan_image(mirror, first, last);
+        scan_image(mirror, rays);
       }
-      first = last;
     }
   }
 
-  // Finds the rays that mirrors reflect, sorted by the plane of the mirror.
-  void find_reflections() {
-    std::vector<Reflection>& all = memory_.reflections;
-    all.clear();
-    for (std::size_t i = 0; i < fan_.count(); ++i) {
+  // Finds the rays that mirrors reflect, grouped by the plane of the mirror. Those of a mirror are
+  // in reverse order, which is the order of their images.
+  void find_mirrors() {
+    std::vector<TraceMemory::Mirror>& mirrors = memory_.mirrors;
+    mirrors.clear();
+    memory_.rays.clear();
+    memory_.mirror_of_ray.clear();
+    std::unordered_map<std::uint64_t, std::uint32_t> known;
+    std::uint64_t last_plane = ~std::uint64_t{0};
+    std::uint32_t last = 0;
+    for (std::size_t i = fan_.count(); i-- > 0;) {
       if (!is_hit(i)) continue;
       const std::uint32_t slot = ends_.fixture[i];
       const std::uint64_t limit = materials_->mirror_limit(slot);
-      if (limit == 0) continue;
-      const auto ray = static_cast<std::uint32_t>(i);
-      constexpr std::uint64_t kAllWords = std::uint64_t{1} << 32U;
-      if (limit < kAllWords && word_of(rules_.key, ray, HitRules::kDirect, slot) >= limit) continue;
-      const b2Fixture& mirror = *scene_.scene().fixture_at(slot);
-      const bool has_faces = mirror.GetType() == b2Shape::e_polygon;
-      const b2Vec2 point = pose_.p + ends_.fraction[i] * along(i);
-      all.push_back({slot, has_faces ? surface_at(mirror, point).face : 0, ray});
+      if (limit == 0 || fate_word(memory_.words[i], HitRules::kDirect ^ slot) >= limit) continue;
+      const std::int32_t face = face_at(slot, i);
+      const std::uint64_t plane = std::uint64_t{slot} << 32U | static_cast<std::uint32_t>(face);
+      if (plane != last_plane) {
+        last_plane = plane;
+        const auto next = static_cast<std::uint32_t>(mirrors.size());
+        const auto [place, is_new] = known.try_emplace(plane, next);
+        if (is_new) mirrors.push_back({slot, face, 0, 0});
+        last = place->second;
+      }
+      ++mirrors[last].count;
+      memory_.rays.push_back(static_cast<std::uint32_t>(i));
+      memory_.mirror_of_ray.push_back(last);
     }
-    std::sort(all.begin(), all.end(), [](const Reflection& a, const Reflection& b) {
-      return std::tie(a.fixture, a.face, a.ray) < std::tie(b.fixture, b.face, b.ray);
-    });
+    std::uint32_t end = 0;
+    for (TraceMemory::Mirror& mirror : mirrors) {
+      mirror.end = end;
+      end += mirror.count;
+    }
+    memory_.sorted_rays.resize(memory_.rays.size());
+    for (std::size_t i = 0; i < memory_.rays.size(); ++i) {
+      memory_.sorted_rays[mirrors[memory_.mirror_of_ray[i]].end++] = memory_.rays[i];
+    }
+  }
+
+  // Returns the face of a polygon that a ray hits; 0 for other shapes.
+  std::int32_t face_at(std::uint32_t slot, std::size_t ray) const {
+    const b2Fixture& fixture = fixture_at(slot);
+    if (fixture.GetType() != b2Shape::e_polygon) return 0;
+    return surface_at(fixture, pose_.p + ends_.fraction[ray] * along(ray)).face;
   }
 
   // Casts one ray from the point where it is reflected.
@@ -256,59 +270,62 @@ class Tracer {
     const b2Vec2 point = pose_.p + fraction * direct;
     const b2Vec2 normal = surface_at(mirror, point).normal;
     const b2Vec2 reflected = direct - 2.0F * b2Dot(direct, normal) * normal;
-    const HitRules hit_rules = rules_for(HitRules::kReflected, ends_.fixture[ray]);
-    ReflectedHit callback(hit_rules, rules_.mask, ray);
+    const HitRules hit_rules{materials_, nullptr, HitRules::kReflected, ends_.fixture[ray],
+                             rules_.preferred};
+    ReflectedHit callback(hit_rules, rules_.mask, memory_.words[ray]);
     const b2Vec2 to = point + (1.0F - fraction) * reflected;
     if ((to - point).LengthSquared() > 0.0F) {
       mirror.GetBody()->GetWorld()->RayCast(&callback, point, to);
     }
     if (callback.hit == nullptr) {
-      end_without_hit(ray);
+      set_end(ray, kMissFraction, ends_.fixture[ray], 0.0F);
       return;
     }
-    ends_.fraction[ray] = fraction + (1.0F - fraction) * callback.nearest;
-    ends_.fixture[ray] = callback.hit_slot;
-    mark_reflected(ray);
-    if (!rules_.needs_cosines) return;
     const b2Vec2 end = point + callback.nearest * (to - point);
-    const float height = b2Dot(surface_at(*callback.hit, end).normal, reflected);
-    ends_.cosine[ray] = std::min(std::abs(height) / fan_.length()[ray], 1.0F);
+    const float height = std::abs(b2Dot(surface_at(*callback.hit, end).normal, reflected));
+    const float cosine = std::min(height / fan_.length()[ray], 1.0F);
+    set_end(ray, fraction + (1.0F - fraction) * callback.nearest, callback.hit_slot,
+            reflectance_of(callback.hit_slot) * cosine);
   }
 
   // Scans from the image of the sensor in a flat mirror: what is in front of the mirror is where
   // the rays would hit it without the mirror.
-  void scan_image(const b2Fixture& mirror, Reflections first, Reflections last) {
-    const b2Vec2 point = pose_.p + ends_.fraction[first->ray] * along(first->ray);
-    const b2Vec2 normal = surface_at(mirror, point).normal;
-    const b2Vec2 on_mirror = point_of(mirror, first->face);
-    const b2Transform image = image_of(normal, on_mirror);
-    const BeamFan::Mirrored& mirrored = fan_.mirrored();
-    const HitRules hit_rules = rules_for(HitRules::kReflected, first->fixture);
-    DepthScan hits(mirrored.fan, image, memory_.image, hit_rules);
-    // Only the rays that the mirror reflects are cast, from the mirror on.
-    constexpr float kInactive = -1.0F;
-    std::fill_n(hits.fractions(), fan_.count(), kInactive);
-    for (auto it = first; it != last; ++it) {
-      const std::uint32_t ray = mirrored.ray[it->ray];
-      const float tolerance = kMirrorTolerance * (1.0F + 1.0F / fan_.length()[it->ray]);
-      hits.nearest()[ray] = std::max(ends_.fraction[it->ray] - tolerance, 0.0F);
-      hits.fractions()[ray] = kMissFraction;
+  void scan_image(const TraceMemory::Mirror& mirror, const std::uint32_t* rays) {
+    std::vector<float>& points = memory_.image_ends;
+    points.clear();
+    for (std::uint32_t i = 0; i < mirror.count; ++i) {
+      points.push_back(fan_.x()[rays[i]]);
+      points.push_back(-fan_.y()[rays[i]]);
     }
+    const BeamFan fan(points.data(), points.size() / 2);
+    std::vector<std::uint32_t>& words = memory_.image_words;
+    words.resize(AlignedFloats::rounded(fan.count()));
+    const auto ray_of = [&](std::size_t i) { return rays[fan.order()[i]]; };
+    for (std::size_t i = 0; i < fan.count(); ++i) words[i] = memory_.words[ray_of(i)];
+
+    const b2Fixture& fixture = fixture_at(mirror.fixture);
+    const b2Vec2 point = pose_.p + ends_.fraction[rays[0]] * along(rays[0]);
+    const b2Transform image =
+        image_of(surface_at(fixture, point).normal, point_of(fixture, mirror.face));
+    const HitRules hit_rules{materials_, words.data(), HitRules::kReflected, mirror.fixture,
+                             rules_.preferred};
+    DepthScan hits(fan, image, memory_.image, hit_rules);
+    float* nearest = hits.limit_nearest();
+    float least_distance = b2_maxFloat;
+    for (std::size_t i = 0; i < fan.count(); ++i) {
+      const float tolerance = kMirrorTolerance * (1.0F + 1.0F / fan.length()[i]);
+      nearest[i] = std::max(ends_.fraction[ray_of(i)] - tolerance, 0.0F);
+      least_distance = std::min(least_distance, nearest[i] * fan.length()[i]);
+    }
+    // Less than the distance by more than the rounding of coordinates.
+    hits.set_least_distance(std::max(0.999F * least_distance - 1e-3F, 0.0F));
     scene_.draw(hits, {rules_.mask, kAnyCategory});
-    CosineOf cosine_of(*this, mirrored.fan, image);
-    for (auto it = first; it != last; ++it) {
-      const std::uint32_t ray = mirrored.ray[it->ray];
-      const float fraction = hits.fractions()[ray];
-      if (!(fraction <= 1.0F)) {
-        end_without_hit(it->ray);
-        continue;
-      }
-      ends_.fraction[it->ray] = std::max(fraction, ends_.fraction[it->ray]);
-      ends_.fixture[it->ray] = hits.fixture(ray);
-      mark_reflected(it->ray);
-      if (rules_.needs_cosines) {
-        ends_.cosine[it->ray] = cosine_of(ray, ends_.fixture[it->ray], fraction);
-      }
+    RayEnds& ends = memory_.image_rays;
+    take_ends(hits, fan, image, ends);
+    for (std::size_t i = 0; i < fan.count(); ++i) {
+      const float fraction = std::max(ends.fraction[i], ends_.fraction[ray_of(i)]);
+      set_end(ray_of(i), fraction, ends.fixture[i],
+              rules_.needs_brightness ? ends.brightness[i] : 0.0F);
     }
   }
 
@@ -334,9 +351,15 @@ class Tracer {
     return image;
   }
 
-  void end_without_hit(std::size_t ray) {
-    ends_.fraction[ray] = kMissFraction;
-    if (rules_.needs_cosines) ends_.cosine[ray] = 0.0F;
+  // Replaces the end of a ray by that of its reflection.
+  void set_end(std::size_t ray, float fraction, std::uint32_t slot, float brightness) {
+    ends_.fraction[ray] = fraction;
+    ends_.fixture[ray] = slot;
+    if (rules_.needs_brightness) ends_.brightness[ray] = brightness;
+    if (rules_.preferred == 0) return;
+    const bool is_preferred =
+        fraction <= 1.0F && (fixture_at(slot).GetFilterData().categoryBits & rules_.preferred) != 0;
+    ends_.is_preferred[ray] = static_cast<char>(is_preferred);
   }
 
   const SceneView& scene_;

@@ -7,6 +7,7 @@ import math
 import os
 import subprocess
 import sys
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -391,7 +392,7 @@ def test_all_instruction_sets_have_the_same_results() -> None:
     )
     found = set()
     for simd in ("baseline", "avx2", "avx512"):
-        path = os.pathsep.join([os.path.dirname(__file__), *sys.path])
+        path = os.pathsep.join([str(Path(__file__).parent), *sys.path])
         environment = {**os.environ, "FLATLAND_SIMD": simd, "PYTHONPATH": path}
         done = subprocess.run(
             [sys.executable, "-c", code], env=environment, capture_output=True, text=True
