@@ -35,6 +35,12 @@ PARAMETERS: dict[str, dict[str, Any]] = {
         "range": RANGE,
         "angle": {"min": -2.356194490192345, "max": 2.3562, "increment": 4.71238898038469 / 1080},
     },
+    "Sonar": {"body": "base", "range": 5.0, "field_of_view": 0.5},
+    "SemanticScan": {
+        "body": "base",
+        "range": RANGE,
+        "angle": {"min": -2.356194490192345, "max": 2.3562, "increment": 4.71238898038469 / 1080},
+    },
     "DiffDrive": {"body": "base"},
     "TricycleDrive": {
         "body": "base",
@@ -43,6 +49,7 @@ PARAMETERS: dict[str, dict[str, Any]] = {
         "rear_right_wheel_joint": "right",
     },
     "ModelTfPublisher": {"publish_tf_world": True},
+    "PosePublisher": {"message": "odometry"},
     "Bumper": {},
     "BoolSensor": {},
     "Gps": {"body": "base", "update_rate": float("inf")},
@@ -58,6 +65,8 @@ PARAMETERS: dict[str, dict[str, Any]] = {
 }
 NOTES = {
     "Laser": f"{BEAMS} beams",
+    "Sonar": "127 rays",
+    "SemanticScan": f"{BEAMS} beams",
     "TricycleDrive": "4 bodies, 3 joints",
     "ModelTfPublisher": "4 bodies, 3 joints",
     "Bumper": "in contact with a post",

@@ -35,6 +35,7 @@ if TYPE_CHECKING:
     )
     from flatland.loading.model_source import ModelSpec
     from flatland.maps.occupancy_grid import OccupancyGrid
+    from flatland.physics.material import Material
     from flatland.plugin_api.dynamics_limits import DynamicsLimits
     from flatland.plugin_api.plugin import ModelPlugin, WorldPlugin
     from flatland.plugin_api.ports import Command, Output
@@ -51,6 +52,10 @@ if TYPE_CHECKING:
         LaserScan,
         NavSatFix,
         Odometry,
+        PoseStamped,
+        Range,
+        SemanticLabel,
+        SemanticScan,
         Transform,
         Twist,
         TwistWithCovariance,
@@ -76,6 +81,7 @@ __all__ = [
     "LaserScan",
     "Layer",
     "MapFileError",
+    "Material",
     "Model",
     "ModelContact",
     "ModelPlugin",
@@ -89,6 +95,10 @@ __all__ = [
     "PhysicsError",
     "Place",
     "PluginError",
+    "PoseStamped",
+    "Range",
+    "SemanticLabel",
+    "SemanticScan",
     "StaleHandleError",
     "Timekeeper",
     "Transform",
@@ -124,6 +134,7 @@ _MODULES = {
     "LaserScan": "flatland.values",
     "Layer": "flatland.entities.layer",
     "MapFileError": "flatland.errors",
+    "Material": "flatland.physics.material",
     "Model": "flatland.entities.model",
     "ModelContact": "flatland.entities.contact",
     "ModelPlugin": "flatland.plugin_api.plugin",
@@ -137,6 +148,10 @@ _MODULES = {
     "PhysicsError": "flatland.errors",
     "Place": "flatland.errors",
     "PluginError": "flatland.errors",
+    "PoseStamped": "flatland.values",
+    "Range": "flatland.values",
+    "SemanticLabel": "flatland.values",
+    "SemanticScan": "flatland.values",
     "StaleHandleError": "flatland.errors",
     "Timekeeper": "flatland.timekeeper",
     "Transform": "flatland.values",

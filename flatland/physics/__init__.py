@@ -24,6 +24,7 @@ from flatland.physics.controller import (
 )
 from flatland.physics.fixture import PhysicsFixture
 from flatland.physics.joint import PhysicsJoint
+from flatland.physics.material import Material
 from flatland.physics.plan import (
     END_OF_ORDER,
     RunEnd,
@@ -36,6 +37,7 @@ from flatland.physics.plan import (
 from flatland.physics.queries import RayHit
 from flatland.physics.range_finder import (
     BeamFan,
+    LabelledScan,
     RangeFinder,
     RangeNoise,
     Scan,
@@ -52,6 +54,8 @@ __all__ = [
     "ContactEvent",
     "ContactInfo",
     "Controller",
+    "LabelledScan",
+    "Material",
     "OldManifold",
     "PhysicsBody",
     "PhysicsFixture",

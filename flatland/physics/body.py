@@ -21,6 +21,7 @@ from flatland.physics.handle import Handle
 if TYPE_CHECKING:
     from flatland.physics.fixture import PhysicsFixture
     from flatland.physics.joint import PhysicsJoint
+    from flatland.physics.material import Material
 
 
 class PhysicsBody(Handle):
@@ -393,6 +394,16 @@ class PhysicsBody(Handle):
             category_bits,
             mask_bits,
         )
+
+    def set_material(self, material: Material) -> None:
+        """Gives all present fixtures of the body a material.
+
+        Raises:
+            ValueError: A number is not from 0 to 1, or `transmission` + `specular` is above 1.
+            StaleHandleError: The body was destroyed.
+            WorldLockedError: The world is stepping.
+        """
+        self._core.set_body_material(self.id, *material)
 
     def edges(self) -> FloatArray:
         """Returns the edges (x1, y1, x2, y2) of the body in the body frame [m], shape (n, 4)."""

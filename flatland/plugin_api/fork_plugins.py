@@ -27,8 +27,7 @@ _RADIATION: Final = "flatland has no model of radiation; write a Python plugin"
 _ALTERNATIVES: Final = {
     "PedsimMovement": _PEDESTRIANS,
     "VehicleMovement": _PEDESTRIANS,
-    "PosePub": "use ModelTfPublisher with publish_tf_world: true, which sends the pose to /tf; "
-    "a drive publishes it on its topic ground_truth_pub",
+    "PosePub": "use PosePublisher, which publishes the true pose of a body",
     "RandomMove": _RANDOM_MOTION,
     "RandomWandering": _RANDOM_MOTION,
     "Tween2": "use Tween, which moves to a single pose; for several waypoints, write a Python "

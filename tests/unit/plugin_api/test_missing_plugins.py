@@ -245,7 +245,7 @@ def test_a_cpp_class_with_a_base_class_of_flatland_is_reported(files, monkeypatc
     [
         ("PedsimMovement", "a Python plugin can receive its agents with self.ros.subscribe"),
         ("VehicleMovement", "a Python plugin can receive its agents with self.ros.subscribe"),
-        ("PosePub", "use ModelTfPublisher with publish_tf_world: true"),
+        ("PosePub", "use PosePublisher, which publishes the true pose of a body"),
         ("DiffDrive2", "use DiffDrive"),
         ("ackermannDrive", "use TricycleDrive, "),
         ("flatland_plugins::AckermannDrive", "use TricycleDrive, "),
