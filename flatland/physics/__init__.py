@@ -15,10 +15,16 @@ from flatland.geometry import Pose
 from flatland.physics.body import PhysicsBody
 from flatland.physics.contact import ContactEvent, ContactInfo
 from flatland.physics.controller import (
+    AckermannController,
     Controller,
+    DriveController,
+    OmniController,
+    PathController,
+    RollingWheel,
     TricycleController,
     TweenController,
     VelocityController,
+    WheelsController,
     ease,
     easings,
 )
@@ -40,11 +46,15 @@ from flatland.physics.world import PhysicsWorld, StepReport, to_report
 __all__ = [
     "BOX2D_VERSION",
     "END_OF_ORDER",
+    "AckermannController",
     "BeamFan",
     "ContactEvent",
     "ContactInfo",
     "Controller",
+    "DriveController",
     "OldManifold",
+    "OmniController",
+    "PathController",
     "PhysicsBody",
     "PhysicsFixture",
     "PhysicsJoint",
@@ -54,6 +64,7 @@ __all__ = [
     "RangeFinder",
     "RangeNoise",
     "RayHit",
+    "RollingWheel",
     "RunEnd",
     "RunResult",
     "Scan",
@@ -66,6 +77,7 @@ __all__ = [
     "TricycleController",
     "TweenController",
     "VelocityController",
+    "WheelsController",
     "ease",
     "easings",
     "run_worlds",

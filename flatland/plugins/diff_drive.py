@@ -9,6 +9,7 @@ from flatland.plugin_api.dynamics_limits import DynamicsLimits
 from flatland.plugin_api.parameters import read_body
 from flatland.plugin_api.plugin import ModelPlugin
 from flatland.plugin_api.schedule import when_due
+from flatland.plugin_api.traction import read_traction
 from flatland.values import TwistWithCovariance
 
 if TYPE_CHECKING:
@@ -28,6 +29,7 @@ class DiffDrive(ModelPlugin):
     Attributes:
         linear_dynamics: Limits of the linear velocity; settable, not to be modified.
         angular_dynamics: Limits of the angular velocity; settable, not to be modified.
+        traction: Limits of the forces in mode `force`; None in mode `velocity`.
     """
 
     def on_initialize(self, config: YamlReader) -> None:
@@ -44,6 +46,7 @@ class DiffDrive(ModelPlugin):
         )
         self._controller = self.control(self.body.control_velocity(holonomic=False))
         self._set_limits()
+        self.traction = read_traction(config, self.body, self._controller, needs_torque=True)
         self._odometer = Odometer(
             self,
             config,
@@ -109,7 +112,8 @@ class DiffDrive(ModelPlugin):
     def state(self) -> object:
         """Returns the commanded velocities within the limits, and the state of the odometry."""
         velocity, _, yaw_rate = self._controller.velocity
-        return (velocity, yaw_rate, self._odometer.state())
+        state = (velocity, yaw_rate, self._odometer.state())
+        return state if self.traction is None else (*state, self._controller.traction_state)
 
     def _publish_now(self, timekeeper: Timekeeper) -> None:
         self._publish(timekeeper.sim_time_ns, self.body.pose)
