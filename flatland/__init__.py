@@ -45,9 +45,11 @@ if TYPE_CHECKING:
     from flatland.runtime.snapshot import WorldSnapshot
     from flatland.timekeeper import Timekeeper
     from flatland.values import (
+        AckermannCommand,
         Collision,
         Collisions,
         Imu,
+        JointState,
         LaserScan,
         NavSatFix,
         Odometry,
@@ -62,6 +64,7 @@ if TYPE_CHECKING:
 __version__ = VERSION
 
 __all__ = [
+    "AckermannCommand",
     "BatchError",
     "Body",
     "Collision",
@@ -73,6 +76,7 @@ __all__ = [
     "FlatlandError",
     "Imu",
     "Joint",
+    "JointState",
     "LaserScan",
     "Layer",
     "MapFileError",
@@ -110,6 +114,7 @@ __all__ = [
 
 # Imported when they are first used: the ROS node publishes its time before it needs any of them.
 _MODULES = {
+    "AckermannCommand": "flatland.values",
     "BatchError": "flatland.errors",
     "Body": "flatland.entities.body",
     "Collision": "flatland.values",
@@ -120,6 +125,7 @@ _MODULES = {
     "DynamicsLimits": "flatland.plugin_api.dynamics_limits",
     "FlatlandError": "flatland.errors",
     "Imu": "flatland.values",
+    "JointState": "flatland.values",
     "Joint": "flatland.entities.joint",
     "LaserScan": "flatland.values",
     "Layer": "flatland.entities.layer",

@@ -27,6 +27,8 @@ class Model(Entity):
         bodies: Bodies in the order of the file; the first one defines the pose of the model.
         joints: Joints in the order of the file.
         plugins: Plugins in the order of the file.
+        followers: Plugins of other models whose `model_moved` is also called for this model, such
+            as those that are connected to it.
         displacement: Offset (dx, dy) of the actual pose from the requested pose after the last
             spawn or move [m]; (0, 0) unless `if_blocked` was `nearest`.
     """
@@ -40,6 +42,7 @@ class Model(Entity):
         self.bodies: list[Body] = []
         self.joints: list[Joint] = []
         self.plugins: list[ModelPlugin] = []
+        self.followers: list[ModelPlugin] = []
         self.displacement: Vector2 = (0.0, 0.0)
 
     def __repr__(self) -> str:

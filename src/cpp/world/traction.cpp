@@ -139,98 +139,143 @@ double limit_to_grip(const Traction& traction, const Composite& whole, double dt
   return used;
 }
 
+// Reduces the force of an impulse to that of the motors. Returns the part of it that was required.
+double limit_to_motors(const Traction& traction, double max_force, Impulse& impulse) {
+  const double driven =
+      traction.is_holonomic ? std::hypot(impulse[0], impulse[1]) : std::abs(impulse[0]);
+  if (driven == 0.0) return 0.0;
+  if (driven > max_force) {
+    const double share = max_force / driven;
+    impulse[0] *= share;
+    if (traction.is_holonomic) impulse[1] *= share;
+  }
+  return share_of(driven, max_force);
+}
+
 // Returns the impulse that changes the velocity by `change`, in the frame of the driven body, as
-// far as the limits allow. `shift` is the change of the velocity at the point for each unit by
-// which the change of the yaw rate is less.
+// far as the limits allow. `shift` is the velocity at the point for a yaw rate of 1 if the origin
+// of the body is at rest.
 Impulse limited_impulse(Traction& traction, const Composite& whole, const Response& response,
                         const Triple& change, const double* shift, double dt) {
   const double max_force = traction.max_force * dt;
   const double max_torque = traction.max_torque * dt;
-  Impulse impulse{};
-  // Without limits, both the velocity and the yaw rate change as required.
-  impulse[0] = whole.mass * (change[0] + change[2] * response.ry);
-  impulse[1] = whole.mass * (change[1] - change[2] * response.rx);
+  // First, with a torque that changes the yaw rate as required.
+  Impulse impulse{whole.mass * (change[0] + change[2] * response.ry),
+                  whole.mass * (change[1] - change[2] * response.rx), 0.0};
+  double load = limit_to_motors(traction, max_force, impulse);
   impulse[2] = whole.inertia * change[2] - response.rx * impulse[1] + response.ry * impulse[0];
-  double load = 0.0;
-  double wanted_x = change[0];
-  double wanted_y = change[1];
   const double torque = std::abs(impulse[2]);
-  if (torque > 0.0) load = share_of(torque, max_torque);
+  if (torque > 0.0) load = std::max(load, share_of(torque, max_torque));
   if (torque > max_torque) {
+    // The yaw rate changes less, but the point still moves as required.
     impulse[2] = std::copysign(max_torque, impulse[2]);
     const double turn = impulse[2] * response.inverse_inertia;
-    wanted_x += turn * response.ry - (change[2] - turn) * shift[0];
-    wanted_y -= turn * response.rx + (change[2] - turn) * shift[1];
-    response.solve(wanted_x, wanted_y, impulse);
-  }
-  const double driven =
-      traction.is_holonomic ? std::hypot(impulse[0], impulse[1]) : std::abs(impulse[0]);
-  if (driven > 0.0) load = std::max(load, share_of(driven, max_force));
-  if (driven > max_force) {
-    const double share = max_force / driven;
-    impulse[0] *= share;
-    if (traction.is_holonomic) {
-      impulse[1] *= share;
-    } else if (torque > max_torque) {
-      response.solve_sideways(wanted_y, impulse);
-    }
+    const double missing = change[2] - turn;
+    const double wanted_y = change[1] - turn * response.rx - missing * shift[1];
+    response.solve(change[0] + turn * response.ry - missing * shift[0], wanted_y, impulse);
+    const double force = limit_to_motors(traction, max_force, impulse);
+    load = std::max(load, force);
+    if (force > 1.0 && !traction.is_holonomic) response.solve_sideways(wanted_y, impulse);
   }
   traction.load = std::max(load, limit_to_grip(traction, whole, dt, impulse));
   return impulse;
 }
 
-// Replaces a velocity of zero by one that leads back to the pose at which the robot was braked.
-//
-// An impulse acts before the contacts of the step: a brake without memory would let the body creep
-// under forces that it can withstand.
-void hold_brakes(Traction& traction, const Triple& pose, double dt, Triple& velocity) {
-  if (velocity[0] != 0.0 || velocity[1] != 0.0 || velocity[2] != 0.0) {
-    traction.is_braked = false;
-    return;
+// The state of the bodies at the beginning of a step, in the frame of the driven body.
+class Push {
+ public:
+  Push(World& world, const b2Body& body, Traction& traction, double dt)
+      : world_(world),
+        traction_(traction),
+        dt_(dt),
+        whole_(composite_of(world, *traction.bodies)),
+        pose_(pose_of(body)),
+        c_(std::cos(pose_[2])),
+        s_(std::sin(pose_[2])),
+        origin_(to_body(pose_[0] - whole_.center[0], pose_[1] - whole_.center[1])),
+        response_(whole_, traction.acts_at_center ? 0.0 : origin_[0],
+                  traction.acts_at_center ? 0.0 : origin_[1]) {}
+
+  const Triple& pose() const { return pose_; }
+
+  // Returns the impulse that leads to a velocity of the origin, world frame, within the limits.
+  Impulse impulse_to(const Triple& velocity) const {
+    const auto target = to_body(velocity[0], velocity[1]);
+    const auto current = to_body(whole_.velocity[0], whole_.velocity[1]);
+    // The origin moves as required, and the point at which the forces act turns about it.
+    const bool at_center = traction_.acts_at_center;
+    const double shift[2] = {at_center ? origin_[1] : 0.0, at_center ? -origin_[0] : 0.0};
+    const Triple change{
+        target[0] + velocity[2] * shift[0] - (current[0] - whole_.omega * response_.ry),
+        target[1] + velocity[2] * shift[1] - (current[1] + whole_.omega * response_.rx),
+        velocity[2] - whole_.omega};
+    return limited_impulse(traction_, whole_, response_, change, shift, dt_);
   }
-  const Triple& held = traction.brake_pose;
+
+  void apply(const Impulse& impulse) const {
+    if (impulse[0] == 0.0 && impulse[1] == 0.0 && impulse[2] == 0.0) return;
+    accelerate(world_, *traction_.bodies, whole_,
+               {(c_ * impulse[0] - s_ * impulse[1]) / whole_.mass,
+                (s_ * impulse[0] + c_ * impulse[1]) / whole_.mass, response_.turn(impulse)});
+  }
+
+ private:
+  std::array<double, 2> to_body(double x, double y) const {
+    return {c_ * x + s_ * y, c_ * y - s_ * x};
+  }
+
+  World& world_;
+  Traction& traction_;
+  double dt_;
+  Composite whole_;
+  Triple pose_;
+  double c_, s_;
+  std::array<double, 2> origin_;  // relative to the centre of mass
+  Response response_;
+};
+
+// Returns the impulse of the brakes.
+//
+// An impulse acts before the contacts of the step: brakes without memory would let the body creep
+// under forces that they can withstand. Therefore they lead the body back to where it stopped.
+Impulse brake(const Push& push, Traction& traction, double dt) {
+  const Triple& pose = push.pose();
+  Triple& held = traction.brake_pose;
   const bool is_near = std::hypot(held[0] - pose[0], held[1] - pose[1]) < kMaxBrakeError &&
                        std::abs(held[2] - pose[2]) < kMaxBrakeError;
-  if (!traction.is_braked || !is_near) traction.brake_pose = pose;
-  traction.is_braked = true;
-  for (std::size_t i = 0; i < 3; ++i) velocity[i] = (held[i] - pose[i]) * kBrakeShare / dt;
+  const Impulse stop = push.impulse_to({0.0, 0.0, 0.0});
+  if (!traction.is_braked || !is_near || traction.load > 1.0) {
+    // A body that slips has no pose to hold until it stops.
+    traction.is_braked = traction.load <= 1.0;
+    held = pose;
+    return stop;
+  }
+  const double share = kBrakeShare / dt;
+  const Impulse impulse = push.impulse_to(
+      {(held[0] - pose[0]) * share, (held[1] - pose[1]) * share, (held[2] - pose[2]) * share});
+  if (traction.load > 1.0) {
+    // The brakes slip, and continue to pull with all of their force.
+    for (std::size_t i = 0; i < 3; ++i) held[i] = pose[i] + (held[i] - pose[i]) / traction.load;
+  }
+  return impulse;
 }
 
-void push(World& world, b2Body* body, Traction& traction, Triple velocity, double dt) {
-  const Composite whole = composite_of(world, *traction.bodies);
-  const Triple pose = pose_of(*body);
-  hold_brakes(traction, pose, dt, velocity);
-  const double c = std::cos(pose[2]);
-  const double s = std::sin(pose[2]);
-  const auto to_body = [&](double x, double y) {
-    return std::array<double, 2>{c * x + s * y, c * y - s * x};
-  };
-  // From the centre of mass to the origin, and the velocities of both in the frame of the body.
-  const auto origin = to_body(pose[0] - whole.center[0], pose[1] - whole.center[1]);
-  const auto target = to_body(velocity[0], velocity[1]);
-  const auto current = to_body(whole.velocity[0], whole.velocity[1]);
-  const bool is_at_center = traction.acts_at_center;
-  const double rx = is_at_center ? 0.0 : origin[0];
-  const double ry = is_at_center ? 0.0 : origin[1];
-  // Of the point at which the forces act: the origin moves as required, the rest turns about it.
-  const double shift[2] = {is_at_center ? origin[1] : 0.0, is_at_center ? -origin[0] : 0.0};
-  const Triple change{target[0] + velocity[2] * shift[0] - (current[0] - whole.omega * ry),
-                      target[1] + velocity[2] * shift[1] - (current[1] + whole.omega * rx),
-                      velocity[2] - whole.omega};
-  const Response response(whole, rx, ry);
-  const Impulse impulse = limited_impulse(traction, whole, response, change, shift, dt);
-  if (traction.load > 1.0) traction.is_braked = false;
-  if (impulse[0] == 0.0 && impulse[1] == 0.0 && impulse[2] == 0.0) return;
-  accelerate(world, *traction.bodies, whole,
-             {(c * impulse[0] - s * impulse[1]) / whole.mass,
-              (s * impulse[0] + c * impulse[1]) / whole.mass, response.turn(impulse)});
+void push_body(World& world, const b2Body& body, Traction& traction, const Triple& velocity,
+               double dt) {
+  const Push push(world, body, traction, dt);
+  if (velocity[0] == 0.0 && velocity[1] == 0.0 && velocity[2] == 0.0) {
+    push.apply(brake(push, traction, dt));
+  } else {
+    traction.is_braked = false;
+    push.apply(push.impulse_to(velocity));
+  }
 }
 
 }  // namespace
 
 void drive(World& world, b2Body* body, Traction& traction, const Triple& velocity, double dt) {
   if (traction.is_enabled) {
-    push(world, body, traction, velocity, dt);
+    push_body(world, *body, traction, velocity, dt);
   } else {
     set_velocity(body, velocity);
   }
