@@ -81,8 +81,9 @@ class Hitch(ModelPlugin):
 
     def _obey(self) -> None:
         """Carries out the last command once; logs a warning if that is not possible."""
+        is_start = self._handled < 0
         problem = self._carry_out()
-        if problem:
+        if problem and not is_start:
             _LOG.warning("%s", problem)
 
     def _carry_out(self) -> str:

@@ -142,7 +142,7 @@ class TestChoice:
     def test_angle_beyond_the_limit(self, tow: Any) -> None:
         world = tow("max_angle: 0.2, reach: 0.5")
         world.move_model("trailer", (-0.8, -0.8, 1.2))
-        with pytest.raises(flatland.WorldError, match="beyond the limit of 0.200"):
+        with pytest.raises(flatland.WorldError, match=r"beyond the limit of 0\.200"):
             hitch(world).attach()
         assert world.physics.object_counts().joints == 0
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from typing import Any
 
@@ -135,7 +136,7 @@ class TestMotion:
 
 class TestModes:
     def test_loop(self, follow: Any) -> None:
-        world = follow("waypoints: [[1, 0], [1, 1]], step_size: 1".replace(", step_size: 1", ""))
+        world = follow("waypoints: [[1, 0], [1, 1]]")
         seen = []
         for _ in range(4):
             world.step(100)
@@ -166,8 +167,8 @@ class TestModes:
         first = visits(1)
         assert first == visits(1)
         assert first != visits(2)
-        places = [w for w, before in zip(first[1:], first, strict=False) if w != before]
-        pairs = {(a, b) for a, b in zip(places, places[1:], strict=False)}
+        places = [w for before, w in itertools.pairwise(first) if w != before]
+        pairs = set(itertools.pairwise(places))
         assert len(pairs) == 12  # from each of four places to the three others
 
     def test_once_returns_with_the_next_start(self, follow: Any) -> None:
