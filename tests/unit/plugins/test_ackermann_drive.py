@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import sys
+from pathlib import Path
 from types import ModuleType, SimpleNamespace
 from typing import Any
 
@@ -11,6 +12,7 @@ import numpy as np
 import pytest
 
 import flatland
+from flatland.recording import Replay
 from flatland.values import AckermannCommand
 
 WHEEL = "footprints: [{type: circle, radius: 0.05, density: 1, collision: false}]"
@@ -171,6 +173,17 @@ class TestAckermannCommand:
         world.step(40)
         assert plugin(world).steering_angle == pytest.approx(0.5)
         assert plugin(world).speed == pytest.approx(0.5 + 2 * 0.2)
+
+    def test_commands_are_recorded(self, car: Any, tmp_path: Path) -> None:
+        world = car("command: ackermann")
+        world.record(tmp_path / "run.flog")
+        world.command("/ackermann_cmd").set(AckermannCommand(0.5, 0.25, 1.0, 0.5))
+        world.step(200)
+        world.close()
+        replay = Replay(tmp_path / "run.flog")
+        replay.run()
+        replay.close()
+        assert (replay.difference, replay.last_step) == (None, 200)
 
     def test_invalid_commands_are_rejected(self, car: Any) -> None:
         world = car("command: ackermann")
