@@ -209,6 +209,43 @@ def test_car_slides_out_of_a_curve_that_is_too_narrow(robot: Any) -> None:
     assert curvature < 0.65 / radius
 
 
+def test_car_accelerates_with_its_force(robot: Any) -> None:
+    world = robot(
+        "[{type: AckermannDrive, name: drive, body: base, wheelbase: 1, max_steer_angle: 1, "
+        "mode: force, max_force: 60}]"
+    )
+    drive(world, 2.0)
+    world.step(100)
+    assert base(world).velocity == pytest.approx((60.0 / MASS * 0.5, 0.0, 0.0), abs=1e-5)
+
+
+def test_tricycle_accelerates_with_its_force(plugin_world: Any) -> None:
+    wheel = "footprints: [{type: circle, radius: 0.05, density: 100, collision: false}]"
+    places = {"front": (0.0, 0.0), "left": (-0.6, 0.3), "right": (-0.6, -0.3)}
+    bodies, joints = DISC, ""
+    for name, (x, y) in places.items():
+        kind = "revolute" if name == "front" else "weld"
+        bodies += f"- {{name: {name}, pose: [{x}, {y}, 0], {wheel}}}\n"
+        joints += (
+            f"- {{type: {kind}, name: {name}, bodies: [{{name: base, anchor: [{x}, {y}]}}, "
+            f"{{name: {name}, anchor: [0, 0]}}]}}\n"
+        )
+    world = plugin_world(
+        "[{type: TricycleDrive, name: drive, body: base, front_wheel_joint: front, "
+        "rear_left_wheel_joint: left, rear_right_wheel_joint: right, mode: force, max_force: 60}]",
+        bodies=bodies,
+        joints=joints,
+    )
+    mass = sum(body.mass for body in world.model("robot").bodies)
+    assert mass > MASS + 2.0
+    drive(world, 2.0)
+    world.step(100)
+    # The joints of the wheels are solved iteratively.
+    assert base(world).velocity[0] == pytest.approx(60.0 / mass * 0.5, rel=1e-3)
+    world.step(400)
+    assert base(world).velocity[0] == pytest.approx(2.0, abs=1e-3)
+
+
 def test_omni_drive_pushes_in_all_directions(robot: Any) -> None:
     world = robot(
         "[{type: OmniDrive, name: drive, body: base, mode: force, max_force: 50, max_torque: 5}]"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -154,3 +155,12 @@ def test_the_stronger_robot_wins(checkout: Path) -> None:
             world.command(f"/{name}/cmd_vel").set(flatland.Twist(0.5))
         world.step(1000)
         assert world.model("weak").pose[0] > 4.5
+
+
+@pytest.mark.parametrize("page", ["drives.md", "moving_models.md"])
+def test_examples_of_the_documentation_are_parts_of_files(checkout: Path, page: str) -> None:
+    text = (checkout / "docs" / page).read_text()
+    examples = re.findall(r"^```yaml\n# (worlds/\S+)\n(.*?)^```", text, re.MULTILINE | re.DOTALL)
+    assert examples
+    for name, example in examples:
+        assert example in (checkout / name).read_text(), name
