@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 class BodyDrive(ModelPlugin):
     """Drives a body by a controller of the core, and emits where it is and how it moves.
 
-    A subclass creates the controller, calls `open_reports` and `open_command`, and passes commands
+    A subclass creates the controller, calls `open_reports` and `open_twist`, and passes commands
     to the controller in `set_target`.
 
     Attributes:
