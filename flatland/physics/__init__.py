@@ -22,6 +22,7 @@ from flatland.physics.controller import (
     ease,
     easings,
 )
+from flatland.physics.crowd import Crowd, PersonState, RouteOrder
 from flatland.physics.fixture import PhysicsFixture
 from flatland.physics.joint import PhysicsJoint
 from flatland.physics.plan import END_OF_ORDER, RunEnd, RunResult, StepPlan, StepRun, run_worlds
@@ -44,7 +45,9 @@ __all__ = [
     "ContactEvent",
     "ContactInfo",
     "Controller",
+    "Crowd",
     "OldManifold",
+    "PersonState",
     "PhysicsBody",
     "PhysicsFixture",
     "PhysicsJoint",
@@ -54,6 +57,7 @@ __all__ = [
     "RangeFinder",
     "RangeNoise",
     "RayHit",
+    "RouteOrder",
     "RunEnd",
     "RunResult",
     "Scan",

@@ -23,6 +23,8 @@ _BUILT_IN: dict[type[Any], str] = {
     values.LaserScan: "laser_scan",
     values.NavSatFix: "nav_sat_fix",
     values.Odometry: "odometry",
+    values.People: "people",
+    values.PeopleStates: "people_states",
     values.Transform: "transform",
     values.Twist: "twist",
     values.TwistWithCovariance: "twist_with_covariance",
