@@ -27,10 +27,11 @@ WANDER: Final = "wander"
 # Parameters of the models and their least values; None if the value must be positive.
 SOCIAL_FORCE: Final[Mapping[str, tuple[float, float | None]]] = {
     "relaxation_time": (0.5, None),
-    "strength": (2.1, 0.0),
+    "strength": (1.5, 0.0),
     "range": (0.3, None),
-    "look_ahead": (2.0, 0.0),
-    "behind": (0.5, 0.0),
+    "look_ahead": (1.0, 0.0),
+    "relative": (1.0, 0.0),
+    "behind": (0.1, 0.0),
     "wall_strength": (5.0, 0.0),
     "wall_range": (0.1, None),
     "gaze": (4.0, 0.0),

@@ -97,7 +97,7 @@ class Pedestrians(WorldPlugin):
         numbers = people_config.read_numbers(
             config, "social_force", people_config.SOCIAL_FORCE
         ) | people_config.read_numbers(config, "orca", people_config.ORCA)
-        numbers["sight"] = people_config.read_positive(config, "sight", 3.0)
+        numbers["sight"] = people_config.read_positive(config, "sight", 4.0)
         numbers["fluctuation"] = config.get("fluctuation", "float", 0.1, finite=True, minimum=0)
         numbers["cell"] = people_config.read_positive(config, "cell", 0.1)
         numbers["clearance"] = max(group.radius for group in self._groups) + _CLEARANCE

@@ -61,6 +61,7 @@ void set_numbers(Settings& settings, const std::map<std::string, double>& number
       {"strength", &forces.strength},
       {"range", &forces.range},
       {"look_ahead", &forces.look_ahead},
+      {"relative", &forces.relative},
       {"behind", &forces.behind},
       {"half_view", &forces.half_view},
       {"wall_strength", &forces.wall_strength},

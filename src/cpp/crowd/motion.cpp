@@ -83,7 +83,7 @@ Vec Crowd::by_social_force(std::size_t i, const Choice& choice, Vec preferred, d
       sum += group_repulsion(forces, offset);
       continue;
     }
-    const Vec push = repulsion(forces, offset, other.velocity);
+    const Vec push = repulsion(forces, offset, other.velocity - forces.relative * person.velocity);
     if (square(push) < kNegligible * kNegligible) continue;
     if (!walls.is_clear(person.position, other.position)) continue;
     sum += view_weight(forces, choice.direction, push) * push;
@@ -95,7 +95,8 @@ Vec Crowd::by_social_force(std::size_t i, const Choice& choice, Vec preferred, d
     const double gap = obstacle.gap(person.position, away);
     const Vec velocity = obstacle.velocity_at(person.position - gap * away);
     // The surface repels like a person who touches it from inside.
-    const Vec push = repulsion(forces, (std::max(gap, 0.0) + person.radius) * away, velocity);
+    const Vec push = repulsion(forces, (std::max(gap, 0.0) + person.radius) * away,
+                               velocity - forces.relative * person.velocity);
     sum += view_weight(forces, choice.direction, push) * push;
   }
   near_.clear();

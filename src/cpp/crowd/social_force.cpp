@@ -29,10 +29,10 @@ Vec repulsion(const SocialForces& forces, Vec offset, Vec other_velocity) {
   constexpr double kLeast = 1e-3;  // m; on the line between the foci, b is 0
   const double b = std::max(0.5 * std::sqrt(std::max(sum * sum - square(step), 0.0)), kLeast);
   const double size = forces.strength / forces.range * std::exp(-b / forces.range);
-  const Vec direction = 0.5 * (unit(offset, {1.0, 0.0}) + unit(later, unit(offset, {1.0, 0.0})));
-  // The gradient of b is sum / (2 b) times this vector; it is bounded near the line of the foci.
+  const Vec slope = sum / (4.0 * b) * (unit(offset, {1.0, 0.0}) + unit(later));
+  // The gradient of b, which grows beyond all limits next to the foci.
   constexpr double kMostSlope = 3.0;
-  return std::min(sum / (2.0 * b), kMostSlope) * size * direction;
+  return size * limited(slope, kMostSlope);
 }
 
 double view_weight(const SocialForces& forces, Vec heading, Vec push) {

@@ -14,6 +14,7 @@ struct SocialForces {
   double strength = 2.1;         // V0 [m²/s²]
   double range = 0.3;            // sigma [m]
   double look_ahead = 2.0;       // delta t of the ellipses [s]
+  double relative = 1.0;         // share of the own velocity that is subtracted for the ellipses
   double behind = 0.5;           // weight of what is outside the field of view
   double half_view = 1.7453;     // of the field of view: 100 degrees [rad]
   double wall_strength = 5.0;    // of the acceleration at a wall [m/s²]
