@@ -32,6 +32,7 @@ MODULES = (
     "large_map",
     "markers",
     "placement",
+    "people",
     "copies",
     "gym_steps",
 )

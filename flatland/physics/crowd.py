@@ -123,7 +123,8 @@ class Crowd(Controller):
             radius: The distance [m].
             wait: Shortest and longest duration for which people wait there [s].
             is_queue: Whether people queue in front of the place and wait there one by one.
-            spacing: Distance of people in the queue [m].
+            spacing: Distance of people in the queue [m]; 0 for a temporary waypoint on no route,
+                whose number is used again once nobody is sent there.
 
         Returns:
             The number of the waypoint.

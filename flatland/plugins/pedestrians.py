@@ -165,7 +165,7 @@ class Pedestrians(WorldPlugin):
         # Those in the largest part of the free space, as seen from one of the candidates.
         best: list[Vector2] = []
         for x, y in candidates[: group.places].tolist():
-            start = self._crowd.add_waypoint((x, y), (x, y), _WANDER_RADIUS)
+            start = self._crowd.add_waypoint((x, y), (x, y), _WANDER_RADIUS, spacing=0.0)
             found = [place for place in map(_pair, candidates) if self._has_way(start, place)]
             if len(found) > len(best):
                 best = found
@@ -319,9 +319,14 @@ class Pedestrians(WorldPlugin):
                 self._crowd.stop(_body(model), action == "stop")
             return
         place = (goal[0], goal[1])
-        waypoint = self._crowd.add_waypoint(place, place, 0.3)
-        if not self._crowd.reach(waypoint):
-            raise WorldError(f"nobody fits at the goal ({goal[0]:g}, {goal[1]:g})")
+        if not (math.isfinite(place[0]) and math.isfinite(place[1])):
+            raise ValueError(f"the goal must be finite [m], got {place}")
+        waypoint = self._crowd.add_waypoint(place, place, 0.3, spacing=0.0)
+        for model in models:
+            if not self._has_way(waypoint, model.pose[:2]):
+                raise WorldError(
+                    f'there is no way for "{model.name}" to the goal ({goal[0]:g}, {goal[1]:g})'
+                )
         for model in models:
             self._crowd.send(_body(model), waypoint)
 

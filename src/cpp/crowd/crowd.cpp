@@ -10,16 +10,32 @@
 namespace flatland::crowd {
 
 std::uint32_t Crowd::add_waypoint(const Waypoint& waypoint) {
-  waypoints_.push_back(waypoint);
-  queues_.emplace_back();
-  fields_.emplace_back();
-  const Place& place = waypoint.place;
-  const bool is_inside =
-      grid_ != nullptr && place.low.x > grid_->low().x && place.low.y > grid_->low().y &&
-      place.high.x < grid_->low().x + grid_->cell() * static_cast<double>(grid_->columns()) &&
-      place.high.y < grid_->low().y + grid_->cell() * static_cast<double>(grid_->rows());
-  if (!is_inside) has_grid_ = false;
-  return static_cast<std::uint32_t>(waypoints_.size() - 1);
+  auto index = static_cast<std::uint32_t>(waypoints_.size());
+  // A waypoint without a spacing is temporary: it is on no route, and its number is used again once
+  // nobody is sent there.
+  for (std::uint32_t i = 0; waypoint.spacing == 0.0 && i < waypoints_.size(); ++i) {
+    const bool is_free = waypoints_[i].spacing == 0.0 &&
+                         std::none_of(people_.begin(), people_.end(),
+                                      [i](const Person& person) { return person.sent_to == i; });
+    if (is_free) index = std::min(index, i);
+  }
+  if (index == waypoints_.size()) {
+    waypoints_.emplace_back();
+    queues_.emplace_back();
+    fields_.emplace_back();
+  }
+  waypoints_[index] = waypoint;
+  fields_[index].reset();
+  if (grid_ != nullptr) {
+    const Vec size{grid_->cell() * static_cast<double>(grid_->columns()),
+                   grid_->cell() * static_cast<double>(grid_->rows())};
+    const Vec high = grid_->low() + size;
+    const Place& place = waypoint.place;
+    const bool is_inside = place.low.x > grid_->low().x && place.low.y > grid_->low().y &&
+                           place.high.x < high.x && place.high.y < high.y;
+    if (!is_inside) has_grid_ = false;
+  }
+  return index;
 }
 
 std::uint32_t Crowd::add_route(const Route& route) {
