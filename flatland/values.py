@@ -242,3 +242,8 @@ class PeopleStates:
     groups: tuple[str, ...]
     velocities: DoubleArray
     standing: BoolArray
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class TrackedPeople(PeopleStates):
+    """The states of people, as in `people_msgs/People`."""

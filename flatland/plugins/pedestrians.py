@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+import importlib.util
 import math
 from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Any, Final
@@ -18,11 +20,12 @@ from flatland.plugin_api.schedule import when_due
 from flatland.plugin_api.update_timer import UpdateTimer
 from flatland.plugins import _people_config as people_config
 from flatland.plugins._people_models import BODY, LEGS, model_text, parties_of, preferred_speeds
-from flatland.values import People, PeopleStates
+from flatland.values import People, PeopleStates, TrackedPeople
 
 if TYPE_CHECKING:
     from flatland.config.reader import YamlReader
     from flatland.entities.model import Model
+    from flatland.plugin_api.ports import Output
     from flatland.plugins._people_config import Group
     from flatland.timekeeper import Timekeeper
 
@@ -122,7 +125,11 @@ class Pedestrians(WorldPlugin):
         self._timer = UpdateTimer(read_rate(config, "pub_rate", 10.0))
         self._people = self.output(topic, People)
         self._states = self.output(f"{topic}/states", PeopleStates)
-        outputs = [self._people, self._states]
+        outputs: list[Output[Any]] = [self._people, self._states]
+        self._tracked: Output[TrackedPeople] | None = None
+        if self.ros is not None and importlib.util.find_spec("people_msgs") is not None:
+            self._tracked = self.output(f"{topic}/tracked", TrackedPeople)
+            outputs.append(self._tracked)
         self.call_when_due(BEFORE, NeverDue())
         self.call_when_due(AFTER, self._timer, outputs=outputs)
         if self.ros is not None:
@@ -422,12 +429,16 @@ class Pedestrians(WorldPlugin):
         """Emits the people at the rate of publication."""
         if not self._timer.check_update(timekeeper):
             return
-        if self._people.wanted or self._states.wanted:
-            states = self._read_people(timekeeper.sim_time_ns)
-            if self._people.wanted:
-                self._people.emit(People(states.stamp, states.frame_id, states.names, states.poses))
-            if self._states.wanted:
-                self._states.emit(states)
+        states = self._read_people(timekeeper.sim_time_ns)
+        if self._people.wanted:
+            self._people.emit(People(states.stamp, states.frame_id, states.names, states.poses))
+        if self._states.wanted:
+            self._states.emit(states)
+        if self._tracked is not None and self._tracked.wanted:
+            fields = {
+                field.name: getattr(states, field.name) for field in dataclasses.fields(states)
+            }
+            self._tracked.emit(TrackedPeople(**fields))
 
     def _read_people(self, stamp: int) -> PeopleStates:
         people = [person for person in self._crowd.people if person.body_id in self._names]

@@ -25,6 +25,7 @@ _BUILT_IN: dict[type[Any], str] = {
     values.Odometry: "odometry",
     values.People: "people",
     values.PeopleStates: "people_states",
+    values.TrackedPeople: "tracked_people",
     values.Transform: "transform",
     values.Twist: "twist",
     values.TwistWithCovariance: "twist_with_covariance",

@@ -102,7 +102,8 @@ def test_discs_that_stand_apart_need_no_change() -> None:
         ((0.0, 0.0), (0.0, 0.0), 0.2), ((2.0, 0.0), (0.0, 0.0), 0.2), horizon=2.0, share=0.5, dt=0.1
     )
     # At rest, half of the gap may be closed within the horizon.
-    assert plane == HalfPlane((-1.0, 0.0), pytest.approx(-(1.6 / 2.0) / 2))
+    assert plane.normal == (-1.0, 0.0)
+    assert plane.offset == pytest.approx(-(1.6 / 2.0) / 2)
 
 
 def test_the_nearest_point_of_half_planes_is_that_of_an_exhaustive_search() -> None:
@@ -348,7 +349,7 @@ def test_lasers_see_the_legs_in_their_layer(files: WorldFiles) -> None:
         layer: world.physics.cast_rays((2.0, 3.0, 0.0), ends, mask)[0] * 4.0
         for layer, mask in bits.items()
     }
-    # The first ray passes the axis of the left leg at 0.05 m; nothing is hit by the second one between the legs.
+    # The first ray passes the center of the left leg at 0.05 m, the second one between the legs.
     assert seen["2d"][0] == pytest.approx(2.0 - math.sqrt(0.07**2 - 0.05**2), abs=0.005)
     assert np.isnan(seen["2d"][1])
     assert seen["body"] == pytest.approx([1.8, 1.8], abs=0.03)
@@ -478,6 +479,8 @@ def test_the_outputs_carry_the_people(files: WorldFiles) -> None:
     output.subscribe(lambda value: times.append(value.stamp))
     world.step(200)
     assert times == [200_000_000 * k for k in range(1, 6)]
+    assert output.latest is not None
+    assert states.latest is not None
     assert output.latest.poses.shape == (12, 3)
     assert states.latest.groups == ("a",) * 6 + ("b",) * 4 + ("c",) * 2
     assert states.latest.velocities.shape == (12, 3)
