@@ -34,6 +34,7 @@ MODULES = (
     "random_worlds",
     "markers",
     "placement",
+    "people",
     "copies",
     "gym_steps",
     "web_page",

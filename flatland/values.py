@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 import numpy as np
 import numpy.typing as npt
 
-from flatland.geometry import DoubleArray, FloatArray, Pose, Vector2
+from flatland.geometry import BoolArray, DoubleArray, FloatArray, Pose, Vector2
 from flatland.timekeeper import NANOSECONDS
 
 
@@ -331,3 +331,48 @@ class Transform:
     y: float
     yaw: float
     roll: float = 0.0
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class People:
+    """Positions of people, as in `geometry_msgs/PoseArray`.
+
+    Attributes:
+        stamp: Simulated time [ns].
+        frame_id: Frame of the world.
+        names: Names of the models, which are not part of the message.
+        poses: Poses (x, y, yaw) [m, rad], shape (n, 3).
+    """
+
+    stamp: int
+    frame_id: str
+    names: tuple[str, ...]
+    poses: DoubleArray
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PeopleStates:
+    """The states of people, as in the message `PeopleStates`.
+
+    Attributes:
+        stamp: Simulated time [ns].
+        frame_id: Frame of the world.
+        names: Names of the models.
+        poses: Poses (x, y, yaw) [m, rad], shape (n, 3).
+        groups: Names of the groups.
+        velocities: Velocities (vx, vy, omega) in the world frame [m/s, rad/s], shape (n, 3).
+        standing: Whether each person stands on purpose, shape (n,).
+    """
+
+    stamp: int
+    frame_id: str
+    names: tuple[str, ...]
+    poses: DoubleArray
+    groups: tuple[str, ...]
+    velocities: DoubleArray
+    standing: BoolArray
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class TrackedPeople(PeopleStates):
+    """The states of people, as in `people_msgs/People`."""

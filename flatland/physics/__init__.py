@@ -28,6 +28,7 @@ from flatland.physics.controller import (
     ease,
     easings,
 )
+from flatland.physics.crowd import Crowd, PersonState, RouteOrder
 from flatland.physics.fixture import PhysicsFixture
 from flatland.physics.joint import PhysicsJoint
 from flatland.physics.material import Material
@@ -61,12 +62,14 @@ __all__ = [
     "ContactEvent",
     "ContactInfo",
     "Controller",
+    "Crowd",
+    "DriveController",
     "LabelledScan",
     "Material",
-    "DriveController",
     "OldManifold",
     "OmniController",
     "PathController",
+    "PersonState",
     "PhysicsBody",
     "PhysicsFixture",
     "PhysicsJoint",
@@ -77,6 +80,7 @@ __all__ = [
     "RangeNoise",
     "RayHit",
     "RollingWheel",
+    "RouteOrder",
     "RunEnd",
     "RunResult",
     "Scan",

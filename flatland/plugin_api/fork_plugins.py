@@ -9,7 +9,8 @@ import re
 from typing import Final
 
 _PEDESTRIANS: Final = (
-    "flatland has no connection to pedsim_ros; a Python plugin can receive its agents with "
+    "use the world plugin Pedestrians, which does not need pedsim_ros; with pedsim_ros, a Python "
+    "plugin can receive its agents with "
     "self.ros.subscribe and move the body with body.set_velocity"
 )
 _RANDOM_MOTION: Final = (

@@ -247,6 +247,7 @@ _CHANGES: Final[dict[str, Callable[..., object]]] = {
     "spawn_models": World.spawn_models,
     "move_models": World.move_models,
     "delete_models": World.delete_models,
+    "call_plugin": World.call_plugin,
 }
 
 

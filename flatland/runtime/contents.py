@@ -234,6 +234,35 @@ class Contents(ManyModels, LayerMaps, Appearance, SavedStates):
         """
         self._change("delete_model", {"name": name}, lambda: self._models.delete(name))
 
+    def call_plugin(
+        self, plugin: WorldPlugin | str, method: str, arguments: Mapping[str, object]
+    ) -> Any:
+        """Calls a method of a world plugin between two steps, as a change of the world.
+
+        Recordings contain the call with its arguments, so that a replay repeats it.
+
+        Args:
+            plugin: The plugin or its name.
+            method: One of `WorldPlugin.recorded_methods` of its class.
+            arguments: Arguments of the method by name: values that a recording can contain.
+
+        Returns:
+            What the method returns; None if a hook calls this: it is then called after the step.
+
+        Raises:
+            WorldError: The plugin or the method does not exist.
+        """
+        name = plugin if isinstance(plugin, str) else plugin.name
+        found = next((one for one in self.plugins if plugin in (one, one.name)), None)
+        if found is None or method not in type(found).recorded_methods:
+            raise WorldError(f'world plugin "{name}" with the method {method} does not exist')
+        call = getattr(found, method)
+        return self._change(
+            "call_plugin",
+            {"plugin": name, "method": method, "arguments": dict(arguments)},
+            lambda: call(**arguments),
+        )
+
     def _change(
         self, kind: str, arguments: Mapping[str, object], action: Callable[[], R]
     ) -> R | None:

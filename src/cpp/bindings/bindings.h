@@ -17,6 +17,7 @@ using WorldClass = pybind11::class_<World, std::shared_ptr<World>>;
 void bind_errors();
 WorldClass bind_world(pybind11::module_& module);
 void bind_bodies(WorldClass& world);
+void bind_crowd(pybind11::module_& module, WorldClass& world);
 void bind_fixtures(WorldClass& world);
 void bind_joints(WorldClass& world);
 void bind_motions(WorldClass& world);

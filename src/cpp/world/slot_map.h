@@ -20,7 +20,8 @@ enum class IdKind : std::uint64_t {
   kJoint = 3,
   kController = 4,
   kRecord = 5,
-  kTouches = 6
+  kTouches = 6,
+  kCrowd = 7
 };
 
 // Values by id. The id of an erased value is never valid again, even if its slot is reused.
