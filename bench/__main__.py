@@ -31,10 +31,13 @@ MODULES = (
     "lockstep",
     "real_time",
     "large_map",
+    "random_worlds",
     "markers",
     "placement",
     "copies",
     "gym_steps",
+    "web_page",
+    "web_stream",
 )
 
 

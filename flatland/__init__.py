@@ -46,9 +46,11 @@ if TYPE_CHECKING:
     from flatland.runtime.snapshot import WorldSnapshot
     from flatland.timekeeper import Timekeeper
     from flatland.values import (
+        AckermannCommand,
         Collision,
         Collisions,
         Imu,
+        JointState,
         LaserScan,
         NavSatFix,
         Odometry,
@@ -67,6 +69,7 @@ if TYPE_CHECKING:
 __version__ = VERSION
 
 __all__ = [
+    "AckermannCommand",
     "BatchError",
     "Body",
     "Collision",
@@ -78,6 +81,7 @@ __all__ = [
     "FlatlandError",
     "Imu",
     "Joint",
+    "JointState",
     "LaserScan",
     "Layer",
     "MapFileError",
@@ -120,6 +124,7 @@ __all__ = [
 
 # Imported when they are first used: the ROS node publishes its time before it needs any of them.
 _MODULES = {
+    "AckermannCommand": "flatland.values",
     "BatchError": "flatland.errors",
     "Body": "flatland.entities.body",
     "Collision": "flatland.values",
@@ -130,6 +135,7 @@ _MODULES = {
     "DynamicsLimits": "flatland.plugin_api.dynamics_limits",
     "FlatlandError": "flatland.errors",
     "Imu": "flatland.values",
+    "JointState": "flatland.values",
     "Joint": "flatland.entities.joint",
     "LaserScan": "flatland.values",
     "Layer": "flatland.entities.layer",

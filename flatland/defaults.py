@@ -10,6 +10,11 @@ MAX_LAG: Final = 0.1
 DEFAULT_RESOLUTION: Final = 0.05
 """Default of the size of a cell of a map [m]."""
 
+WEB_HOST: Final = "127.0.0.1"
+"""Default of the address that the viewer for the browser listens on."""
+WEB_PORT: Final = 8000
+"""Default of its port."""
+
 IfBlocked = Literal["allow", "warn", "refuse", "nearest"]
 """What happens to a model that is placed at a pose that is not free."""
 IF_BLOCKED: Final[tuple[IfBlocked, ...]] = get_args(IfBlocked)

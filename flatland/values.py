@@ -34,6 +34,40 @@ class Twist:
     angular_z: float = 0.0
 
 
+@dataclass(frozen=True, slots=True)
+class AckermannCommand:
+    """A command to a car, as in `ackermann_msgs/AckermannDriveStamped`.
+
+    Attributes:
+        steering_angle: Angle of a wheel in the middle of the front axle, to the left [rad].
+        steering_angle_velocity: Limit of the rate of change of the angle [rad/s], 0 for none.
+        speed: Speed of the centre of the rear axle [m/s].
+        acceleration: Limit of the rate of change of the speed [m/s²], 0 for none.
+    """
+
+    steering_angle: float = 0.0
+    steering_angle_velocity: float = 0.0
+    speed: float = 0.0
+    acceleration: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class JointState:
+    """Angles and speeds of wheels, as in `sensor_msgs/JointState`.
+
+    Attributes:
+        stamp: Simulated time [ns].
+        names: Names of the wheels.
+        positions: Angles [rad].
+        velocities: Speeds [rad/s].
+    """
+
+    stamp: int
+    names: tuple[str, ...]
+    positions: tuple[float, ...]
+    velocities: tuple[float, ...]
+
+
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class LaserScan:
     """One scan of a planar laser; angles and ranges as in `sensor_msgs/LaserScan`.

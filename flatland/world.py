@@ -15,6 +15,7 @@ import numpy.typing as npt
 from flatland.config.inputs import Inputs
 from flatland.config.node import Source
 from flatland.config.preprocessor import Params
+from flatland.defaults import WEB_HOST
 from flatland.entities.collision_filter import CollisionFilter
 from flatland.entities.layer import Layer
 from flatland.errors import WorldError
@@ -38,6 +39,7 @@ from flatland.timekeeper import Timekeeper
 
 if TYPE_CHECKING:
     from flatland.recording import Recorder
+    from flatland.web.view import LiveView
 
 _LOG = logging.getLogger("flatland")
 
@@ -124,6 +126,7 @@ class World(Contents):
         self.change_count = 0
         self._paused = False
         self._closed = False
+        self._view: LiveView | None = None
         self.add_observer(self._body_monitor)
         self._states = WorldStates(self, (*vars(self), "map_layer"))
         for observer in observers:
@@ -275,6 +278,34 @@ class World(Contents):
         return draw(
             self, size=size, dpi=dpi, view=view, layers=layers, scans=scans, names=names, axes=axes
         )
+
+    def view(
+        self,
+        *,
+        host: str = WEB_HOST,
+        port: int = 0,
+        token: str | None = None,
+        read_only: bool = False,
+        height: int = 480,
+    ) -> LiveView:
+        """Shows the world live: as the result of a cell of a notebook, else at a printed address.
+
+        The view ends with the world. A further call replaces it.
+
+        Args:
+            host: Address to listen on; `0.0.0.0` for access from other machines.
+            port: TCP port, 0 for any free one.
+            token: Part of the address, None for a random one.
+            read_only: Whether the page only displays the world.
+            height: Height in a notebook [pixels].
+
+        Raises:
+            FlatlandError: The world is closed, or the port is in use.
+            ValueError: An argument is out of range.
+        """
+        from flatland.web.view import open_view  # Late, as in `draw`.
+
+        return open_view(self, host, port, token, read_only, height)
 
     def _repr_png_(self) -> bytes | None:
         """Returns a PNG image for Jupyter; None for a closed world and without matplotlib."""

@@ -22,7 +22,7 @@ settings.load_profile("flatland")
 _TESTS = Path(__file__).resolve().parent
 _CHECKOUT = _TESTS.parent
 # Tests that need a ROS master, a screen or a compiler, and take a while.
-_MARKED_FOLDERS = {"ros": "ros", "ros/viewer": "viewer", "build": "build"}
+_MARKED_FOLDERS = {"ros": "ros", "ros/viewer": "viewer", "build": "build", "web": "web"}
 # Folders whose tests run in one process, since they share a workspace or a screen. The tests of
 # each other file run in one process.
 _GROUPED_FOLDERS = ("build", "ros/viewer")

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import sys
 import tempfile
+from collections.abc import Sequence
 from pathlib import Path
 
 import matplotlib
@@ -19,10 +20,12 @@ import matplotlib.pyplot as plt
 import numpy as np
 import numpy.typing as npt
 from matplotlib.axes import Axes
+from matplotlib.collections import LineCollection
 from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
+from matplotlib.patches import Circle, Polygon
 
-from flatland import LaserScan, Odometry, SemanticScan, Twist, World
+from flatland import Body, LaserScan, Odometry, SemanticScan, Twist, World, worldgen
 from flatland.drawing import save
 from flatland.geometry import circle_points, compose, transform_points
 
@@ -114,10 +117,157 @@ def draw_odometry(path: Path) -> None:
         errors.set(ylim=(0, 2))
         for axis in (paths, errors):
             axis.grid(alpha=0.3)
+    _save(figure, path)
+
+
+def load_world(name: str) -> World:
+    """Loads an included world."""
+    return World.from_yaml(_CHECKOUT / "worlds" / name / "world.yaml", seed=1)
+
+
+def draw_moving(
+    world: World, axis: Axes, times: Sequence[float], names: Sequence[str] | None = None
+) -> None:
+    """Steps a world, and draws its bodies at some times with the paths of its models.
+
+    Args:
+        world: The world.
+        axis: Where to draw.
+        times: Times at which the models are drawn [s]; they are paler at earlier times.
+        names: Models whose paths are drawn; None for all.
+    """
+    shown = [model.name for model in world.models] if names is None else list(names)
+    paths: dict[str, list[tuple[float, float]]] = {name: [] for name in shown}
+    for layer in world.layers:
+        edges = layer.world_edges.reshape(-1, 2, 2)
+        axis.add_collection(LineCollection(list(edges), colors="0.2", lw=1.5))
+        axis.update_datalim(edges.reshape(-1, 2))
+    for number, end in enumerate(times):
+        while world.time < end - 1e-9:
+            world.step(10)
+            for name in shown:
+                paths[name].append(world.model(name).pose[:2])
+        alpha = 0.25 + 0.65 * number / max(1, len(times) - 1)
+        for model in world.models:
+            for body in model.bodies:
+                _draw_body(axis, body, alpha)
+    for name in shown:
+        axis.plot(*np.array(paths[name]).T, color="0.45", lw=0.8, ls=(0, (4, 2)), zorder=1)
+    axis.set(aspect="equal", xlabel="x [m]", ylabel="y [m]")
+    axis.autoscale_view()
+
+
+def _draw_body(axis: Axes, body: Body, alpha: float) -> None:
+    x, y, theta = body.pose
+    rotation = np.array([[np.cos(theta), -np.sin(theta)], [np.sin(theta), np.cos(theta)]])
+    style = {"facecolor": body.color[:3], "edgecolor": "black", "lw": 0.6, "alpha": alpha}
+    for fixture in body.fixtures:
+        if fixture.shape == "circle":
+            axis.add_patch(Circle(rotation @ fixture.center + (x, y), fixture.radius, **style))
+        else:
+            axis.add_patch(Polygon(fixture.vertices @ rotation.T + (x, y), **style))
+
+
+def draw_paths(path: Path) -> None:
+    """Draws vehicles and a door that follow waypoints, and the speed of one of them."""
+    figure, (plan, speed) = plt.subplots(1, 2, figsize=(12, 4.2), dpi=100, width_ratios=(2, 1))
+    with load_world("traffic") as world:
+        world.command("/door").set(True)
+        draw_moving(world, plan, (0.0, 9.0, 23.0))
+    with load_world("traffic") as world:
+        body, speeds = world.model("shuttle").bodies[0], []
+        for _ in range(500):
+            world.step(10)
+            speeds.append(np.hypot(*body.velocity[:2]))
+    speed.plot(np.arange(1, 501) * 0.05, speeds, color="tab:blue")
+    speed.set(xlabel="simulated time [s]", ylabel="speed of the shuttle [m/s]")
+    speed.grid(alpha=0.3)
+    _save(figure, path)
+
+
+def draw_drives(path: Path) -> None:
+    """Draws a car and holonomic robots with their paths."""
+    figure, plan = plt.subplots(figsize=(9, 5.6), dpi=100)
+    with load_world("drives") as world:
+        world.command("/car/cmd_vel").set(Twist(1.5, 0.0, 0.5))
+        world.command("/mecanum/cmd_vel").set(Twist(0.1, 0.45, 0.0))
+        world.command("/trio/cmd_vel").set(Twist(-0.3, 0.0, 0.5))
+        draw_moving(world, plan, (0.0, 2.5, 5.0))
+    _save(figure, path)
+
+
+def draw_forces(path: Path) -> None:
+    """Draws two robots that push each other, and the speeds of all models."""
+    figure, (plan, speed) = plt.subplots(1, 2, figsize=(12, 4.2), dpi=100, width_ratios=(5, 4))
+    speeds: dict[str, list[float]] = {}
+    with load_world("pushing") as world:
+        for name in ("strong", "weak", "pusher"):
+            world.command(f"/{name}/cmd_vel").set(Twist(0.8))
+        draw_moving(world, plan, (0.0, 3.0, 8.0))
+    with load_world("pushing") as world:
+        for name in ("strong", "weak", "pusher"):
+            world.command(f"/{name}/cmd_vel").set(Twist(0.8))
+        for _ in range(300):
+            world.step(5)
+            for model in world.models:
+                speeds.setdefault(model.name, []).append(model.bodies[0].velocity[0])
+    for name, values in speeds.items():
+        speed.plot(np.arange(1, len(values) + 1) * 0.025, values, lw=1.2, label=name)
+    speed.set(xlabel="simulated time [s]", ylabel="velocity along x [m/s]")
+    speed.legend()
+    speed.grid(alpha=0.3)
+    _save(figure, path)
+
+
+def draw_trailers(path: Path) -> None:
+    """Draws a tractor with three trailers."""
+    figure, plan = plt.subplots(figsize=(9, 5.6), dpi=100)
+    with load_world("trailers") as world:
+        world.command("/cmd_vel").set(Twist(1.5))
+        world.step(600)
+        world.command("/cmd_vel").set(Twist(1.5, 0.0, 0.35))
+        draw_moving(world, plan, (3.0, 6.0, 12.0))
+    _save(figure, path)
+
+
+def _save(figure: Figure, path: Path) -> None:
     figure.tight_layout()
     # Without the version of matplotlib, so that the file is the same in every run.
     figure.savefig(path, metadata={"Software": None})
     plt.close(figure)
+
+
+def draw_appearance(path: Path) -> None:
+    """Draws a part of the office before and after changes of the appearance of its models."""
+    view = (-5.5, -7.8, 6.0, -3.0)
+    with office() as world:
+        before = world.draw(view=view, dpi=72)
+        world.set_appearance("robot", color=(0.1, 0.65, 0.25))
+        for name in ("box_3", "box_4"):
+            world.set_appearance(name, color=(0.85, 0.2, 0.2, 1.0))
+        world.set_appearance("chair_1", visible=False)
+        after = world.draw(view=view, dpi=72)
+    plt.imsave(path, np.concatenate((before, after)), metadata={"Software": None})
+
+
+# Seeds of the random worlds of docs/random_worlds.md.
+RANDOM_WORLDS = {"office": (1, 4, 11), "maze": (1, 2, 3), "warehouse": (1, 2, 4)}
+_FLOOR, _WALL, _FURNITURE, _MARGIN = 255, (70, 74, 82), (214, 178, 128), (255, 255, 255)
+_GAP = 24  # pixels between two plans
+
+
+def draw_random_worlds(kind: str, path: Path) -> None:
+    """Draws the floor plans of three random worlds, one pixel for each cell."""
+    plans: list[npt.NDArray[np.uint8]] = []
+    for seed in RANDOM_WORLDS[kind]:
+        world = worldgen.generate(kind, seed)
+        plan = np.full((*world.furniture.shape, 3), _FLOOR, np.uint8)
+        plan[world.grid.cells > 0] = _WALL
+        plan[world.furniture] = _FURNITURE
+        if plans:
+            plans.append(np.full((_GAP, plan.shape[1], 3), _MARGIN, np.uint8))
+        plans.append(plan[::-1])
+    plt.imsave(path, np.concatenate(plans), metadata={"Software": None})
 
 
 def sensors() -> World:
@@ -266,6 +416,9 @@ def main(arguments: list[str]) -> int:
         save(world, folder / "office.png")
         save(world, folder / "corridor.png", view=(-5.5, -7.8, 6.0, -3.0), names=True)
     draw_odometry(folder / "odometry.png")
+    draw_appearance(folder / "appearance.png")
+    for kind in RANDOM_WORLDS:
+        draw_random_worlds(kind, folder / f"random_{kind}.png")
     for draw, name in (
         (draw_materials, "materials"),
         (draw_semantic_scan, "semantic_scan"),
@@ -274,6 +427,10 @@ def main(arguments: list[str]) -> int:
     ):
         with sensors() as world:
             draw(world, folder / f"{name}.png")
+    draw_paths(folder / "paths.png")
+    draw_drives(folder / "drives.png")
+    draw_forces(folder / "forces.png")
+    draw_trailers(folder / "trailers.png")
     return 0
 
 

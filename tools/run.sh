@@ -16,8 +16,13 @@ if [[ -n $world ]]; then
   arguments+=("world_path:=$(realpath "$world")")
 fi
 if [[ -z ${DISPLAY:-} && " $* " != *" show_viz:="* ]]; then
-  echo "flatland: DISPLAY is not set, running without the viewer (show_viz:=false)"
   arguments+=("show_viz:=false")
+  if [[ " $* " == *" web:="* ]]; then
+    echo "flatland: DISPLAY is not set, running without the Qt viewer (show_viz:=false)"
+  else
+    echo "flatland: DISPLAY is not set, running with the viewer for the browser (show_viz:=false web:=true)"
+    arguments+=("web:=true")
+  fi
 fi
 # Output to a pipe or a file is not buffered either.
 export PYTHONUNBUFFERED=1

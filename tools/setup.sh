@@ -60,6 +60,10 @@ requires=$(requirements "$venv/bin/python" build-system requires)
 echo "flatland: building and installing into $venv"
 pip_install "pip install of the build requirements" "$venv/bin/python" -r <(echo "$requires")
 pip_install "pip install" "$venv/bin/python" --no-build-isolation --config-settings=build-dir=build/pip ".$extra"
+if [[ $level == dev ]]; then
+  bare=$(requirements "$venv/bin/python" tool flatland dev-without-requirements)
+  pip_install "pip install" "$venv/bin/python" --no-deps -r <(echo "$bare")
+fi
 
 # Python started in this folder imports the source package, which therefore requires the build results as
 # well. Each file is replaced atomically, since other processes may be reading it.

@@ -41,6 +41,7 @@ _OPTIONAL = (
     ("matplotlib", "matplotlib", _APT + "python3-matplotlib", "flatland show"),
     ("tqdm", "tqdm", _APT + "python3-tqdm", "progress bar of flatland run"),
     ("argcomplete", "argcomplete", _APT + "python3-argcomplete", "completion in the shell"),
+    ("aiohttp", "aiohttp", _APT + "python3-aiohttp", "viewer in the browser"),
 )
 _ROS = (
     ("rospy", "rospy", _APT + "python3-rospy", "ROS node"),
@@ -57,8 +58,8 @@ _ROS = (
     ("flatland.msg", "messages of flatland", _SETUP, "ROS node"),
     ("rosbag", "rosbag", _APT + "python3-rosbag", "flatland run --bag"),
     ("mcap_ros1", "mcap-ros1-support", "pip install mcap mcap-ros1-support", "MCAP files"),
-    ("PyQt5", "PyQt5", _APT + "python3-pyqt5", "viewer"),
-    ("rviz", "RViz for Python", _APT + "python3-rviz", "viewer"),
+    ("PyQt5", "PyQt5", _APT + "python3-pyqt5", "Qt viewer"),
+    ("rviz", "RViz for Python", _APT + "python3-rviz", "Qt viewer"),
 )
 _PROGRAMS = (
     ("roslaunch", _APT + "python3-roslaunch"),
@@ -324,9 +325,9 @@ def _check_master() -> Finding:
 
 def _check_display() -> Iterator[Finding]:
     variables = [name for name in ("DISPLAY", "WAYLAND_DISPLAY") if os.environ.get(name)]
-    remedy = "start it in a desktop session, or use show_viz:=false, or Xvfb (apt-get install xvfb)"
+    remedy = "use the viewer in the browser: web:=true show_viz:=false, or flatland view"
     if not variables:
-        detail = "DISPLAY is not set (for: viewer and RViz)"
+        detail = "DISPLAY is not set (for: Qt viewer and RViz)"
         yield Finding("display", "display", "absent", detail, remedy)
         return
     where = ", ".join(f"{name}={os.environ[name]}" for name in variables)
@@ -345,7 +346,7 @@ def _check_display() -> Iterator[Finding]:
         "display",
         "OpenGL",
         "ok" if has_opengl else "absent",
-        lines[1] if has_opengl else "no context can be created (for: viewer and RViz)",
+        lines[1] if has_opengl else "no context can be created (for: Qt viewer and RViz)",
         "" if has_opengl else _APT + "libgl1-mesa-dri",
     )
 

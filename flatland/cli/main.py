@@ -9,7 +9,7 @@ import sys
 from collections.abc import Sequence
 
 import flatland
-from flatland.cli import check, doctor, info, new, replay, run, show
+from flatland.cli import check, doctor, info, new, replay, run, show, view
 from flatland.errors import FlatlandError
 
 _BROKEN_PIPE = 128 + signal.SIGPIPE  # exit code in a shell of a program ended by SIGPIPE
@@ -20,6 +20,7 @@ flatland COMMAND --help describes a command.
 examples:
   flatland check worlds/office/world.yaml
   flatland run worlds/office/world.yaml --duration 60
+  flatland view worlds/office/world.yaml
   flatland new world arena
 """
 
@@ -77,13 +78,13 @@ def make_parser() -> argparse.ArgumentParser:
     """Returns the parser of all commands."""
     parser = argparse.ArgumentParser(
         prog="flatland",
-        description="Checks, draws, describes and runs worlds without ROS; creates new ones.",
+        description="Checks, draws, describes, runs and shows worlds without ROS; creates them.",
         epilog=_EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("--version", action="version", version=f"flatland {flatland.__version__}")
     commands = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
-    for module in (check, info, show, run, replay, new, doctor):
+    for module in (check, info, show, run, view, replay, new, doctor):
         module.add(commands)
     return parser
 

@@ -24,10 +24,11 @@ class Body(PhysicsBody):
         name: Name of the body, unique within its entity.
         entity: Model or layer that owns the body.
         color: Color for drawings as (r, g, b, a), each in [0, 1].
+        visible: Whether markers and drawings show the body; no effect on collisions and rays.
         class_name: Class of objects that the body belongs to, for labels of sensors.
     """
 
-    __slots__ = ("class_name", "color", "entity", "name")
+    __slots__ = ("class_name", "color", "entity", "name", "visible")
 
     def __init__(
         self,
@@ -50,6 +51,7 @@ class Body(PhysicsBody):
         self.entity = entity
         self.name = name
         self.color = color
+        self.visible = True
         self.class_name = class_name
 
     def __repr__(self) -> str:

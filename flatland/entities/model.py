@@ -31,6 +31,8 @@ class Model(Entity):
         class_name: Class of objects that the model belongs to, for labels of sensors: the entry
             `class` of the model file, by default the name of the file without extensions, or the
             name of the model if it was spawned from a text.
+        followers: Plugins of other models whose `model_moved` is also called for this model, such
+            as those that are connected to it.
         displacement: Offset (dx, dy) of the actual pose from the requested pose after the last
             spawn or move [m]; (0, 0) unless `if_blocked` was `nearest`.
     """
@@ -45,6 +47,7 @@ class Model(Entity):
         self.bodies: list[Body] = []
         self.joints: list[Joint] = []
         self.plugins: list[ModelPlugin] = []
+        self.followers: list[ModelPlugin] = []
         self.displacement: Vector2 = (0.0, 0.0)
 
     def __repr__(self) -> str:

@@ -13,7 +13,8 @@ from gymnasium.error import ClosedEnvironmentError, ResetNeeded
 from flatland.geometry import FloatArray
 from flatland.gym.actions import checked_actions
 from flatland.gym.episodes import Episodes
-from flatland.gym.rendering import Renderer, checked_render_mode
+from flatland.gym.live_view import EpisodeView, check_live_view
+from flatland.gym.rendering import checked_render_mode, draw_goals
 from flatland.gym.settings import Settings
 from flatland.gym.start import StartState
 from flatland.gym.tasks import Occupied
@@ -38,6 +39,8 @@ class FlatlandEnv(gymnasium.Env[Any, FloatArray]):
         self,
         world: str | os.PathLike[str] = "navigate",
         render_mode: str | None = None,
+        *,
+        web_port: int | None = None,
         **arguments: Any,
     ) -> None:
         """Loads the world.
@@ -45,14 +48,20 @@ class FlatlandEnv(gymnasium.Env[Any, FloatArray]):
         Args:
             world: World file, or the name of an included world: `navigate`, `corridor`, `fleet`.
             render_mode: `rgb_array`, `human` or None.
+            web_port: Port of the viewer of the render mode `human`, 0 for any free one; the first
+                environment of a process determines it. None for the environment variable
+                `FLATLAND_WEB_PORT`, or 8000.
             **arguments: See `Settings`.
 
         Raises:
+            DependencyNotInstalled: `human` requires aiohttp.
             FlatlandError: A file is missing or invalid, or the model cannot be an agent.
             TypeError: An argument is unknown or has the wrong type.
             ValueError: An argument is out of range.
         """
         self.render_mode = checked_render_mode(render_mode, self.metadata)
+        if render_mode == "human":
+            check_live_view(web_port)
         settings = Settings.from_arguments({"world": world, **arguments})
         self.metadata = {**self.metadata, "render_fps": round(1 / settings.dt) or 1}
         self.world = settings.load()
@@ -66,7 +75,7 @@ class FlatlandEnv(gymnasium.Env[Any, FloatArray]):
         self.observation_space = self._episodes.layout.space
         action_space: Any = settings.action.space
         self.action_space = action_space
-        self._renderer = Renderer(self.render_mode, settings.dt)
+        self._live_view = EpisodeView([self.world], [settings.world_name], settings.dt, web_port)
         self._running = False
 
     @property
@@ -130,17 +139,23 @@ class FlatlandEnv(gymnasium.Env[Any, FloatArray]):
         return self._observation(), float(rewards[0]), *ended, self._episodes.info(0)
 
     def render(self) -> npt.NDArray[np.uint8] | None:
-        """Returns an image for `rgb_array`; updates the window for `human`.
+        """Returns an image for `rgb_array`; shows the world in the browser for `human`.
 
         Raises:
             ClosedEnvironmentError: The environment is closed.
+            FlatlandError: The viewer cannot listen on its port, or matplotlib is missing.
         """
         self._check_open()
-        return self._renderer.render(self.world, [self.goal], self._episodes.task.goal_radius)
+        radius = self._episodes.task.goal_radius
+        if self.render_mode == "rgb_array":
+            return draw_goals(self.world, [self.goal], radius)
+        if self.render_mode == "human":
+            self._live_view.show([[self.goal]], radius)
+        return None
 
     def close(self) -> None:
-        """Closes the world and the window; further calls have no effect."""
-        self._renderer.close()
+        """Closes the world and its view; further calls have no effect."""
+        self._live_view.close()
         self.world.close()
 
     def _show(self) -> None:

@@ -17,7 +17,8 @@ from flatland.geometry import FloatArray
 from flatland.gym.actions import checked_actions
 from flatland.gym.agents import Agent, check_alike
 from flatland.gym.episodes import Episodes
-from flatland.gym.rendering import Renderer, checked_render_mode
+from flatland.gym.live_view import EpisodeView, check_live_view
+from flatland.gym.rendering import checked_render_mode, draw_goals
 from flatland.gym.settings import Settings
 from flatland.gym.start import StartState
 from flatland.gym.tasks import Occupied
@@ -54,6 +55,7 @@ class FleetEnv(ParallelEnv[str, Any, FloatArray]):  # type: ignore[misc, unused-
         *,
         robot: str | os.PathLike[str] | None = None,
         render_mode: str | None = None,
+        web_port: int | None = None,
         **arguments: Any,
     ) -> None:
         """Loads the world and adds the robots.
@@ -63,14 +65,18 @@ class FleetEnv(ParallelEnv[str, Any, FloatArray]):  # type: ignore[misc, unused-
             world: World file, or the name of an included world.
             robot: Model file of the robots; None for the included one.
             render_mode: `rgb_array`, `human` or None.
+            web_port: Port of the viewer of the render mode `human`, see `FlatlandEnv`.
             **arguments: See `Settings`; `agent` and `command` are those of each robot.
 
         Raises:
+            DependencyNotInstalled: `human` requires aiohttp.
             FlatlandError: A file is missing or invalid, or the model cannot be an agent.
             TypeError: An argument is unknown or has the wrong type.
             ValueError: An argument is out of range.
         """
         self.render_mode = checked_render_mode(render_mode, self.metadata)
+        if render_mode == "human":
+            check_live_view(web_port)
         if isinstance(num_robots, bool) or not isinstance(num_robots, int) or num_robots < 1:
             raise ValueError(f"num_robots must be an integer of at least 1, got {num_robots!r}")
         for name in ("agent", "command"):
@@ -90,7 +96,7 @@ class FleetEnv(ParallelEnv[str, Any, FloatArray]):  # type: ignore[misc, unused-
             raise
         self._observation_space = self._episodes.layout.space
         self._action_spaces = dict.fromkeys(self.possible_agents, settings.action.space)
-        self._renderer = Renderer(self.render_mode, settings.dt)
+        self._live_view = EpisodeView([self.world], [settings.world_name], settings.dt, web_port)
         self._rng: np.random.Generator | None = None
 
     def observation_space(self, agent: str) -> spaces.Space[Any]:  # noqa: ARG002
@@ -195,18 +201,24 @@ class FleetEnv(ParallelEnv[str, Any, FloatArray]):  # type: ignore[misc, unused-
         return np.concatenate([s.poses, s.velocities, s.goals], axis=1).astype(np.float32).ravel()
 
     def render(self) -> npt.NDArray[np.uint8] | None:
-        """Returns an image for `rgb_array`; updates the window for `human`.
+        """Returns an image for `rgb_array`; shows the world in the browser for `human`.
 
         Raises:
             ClosedEnvironmentError: The environment is closed.
+            FlatlandError: The viewer cannot listen on its port, or matplotlib is missing.
         """
         self._check_open()
         radius = self._episodes.task.goal_radius
-        return self._renderer.render(self.world, self.goals.values(), radius)
+        goals = list(self.goals.values())
+        if self.render_mode == "rgb_array":
+            return draw_goals(self.world, goals, radius)
+        if self.render_mode == "human":
+            self._live_view.show([goals], radius)
+        return None
 
     def close(self) -> None:
-        """Closes the world and the window; further calls have no effect."""
-        self._renderer.close()
+        """Closes the world and its view; further calls have no effect."""
+        self._live_view.close()
         self.world.close()
 
     def _spawn(self, robot: str | os.PathLike[str] | None, settings: Settings) -> list[Agent]:

@@ -6,6 +6,7 @@ import math
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from flatland.gym.actions import VelocityAction
@@ -82,6 +83,12 @@ class Settings:
                 f"unknown argument {unknown[0]!r} of the environment; known: {', '.join(known)}"
             )
         return cls(**arguments)
+
+    @property
+    def world_name(self) -> str:
+        """The name of the file for users, or that of the folder of a file `world.yaml`."""
+        path = Path(self.world)
+        return path.parent.name if path.name == "world.yaml" and path.parent.name else path.stem
 
     @property
     def dt(self) -> float:

@@ -13,10 +13,11 @@ from gymnasium.utils import seeding
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
-from flatland.geometry import BoolArray, DoubleArray
+from flatland.geometry import BoolArray, DoubleArray, Vector2
 from flatland.gym.actions import checked_actions
 from flatland.gym.env import FlatlandEnv
 from flatland.gym.episodes import Episodes
+from flatland.gym.live_view import EpisodeView, check_live_view
 from flatland.gym.rendering import checked_render_mode, draw_goals
 from flatland.gym.settings import Settings
 from flatland.gym.situation import Rows
@@ -42,6 +43,7 @@ class FlatlandVectorEnv(VectorEnv[Any, Any, Any]):
         num_threads: int = 0,
         copy: bool = True,
         render_mode: str | None = None,
+        web_port: int | None = None,
         **arguments: Any,
     ) -> None:
         """Loads the world and copies it.
@@ -54,31 +56,36 @@ class FlatlandVectorEnv(VectorEnv[Any, Any, Any]):
             num_threads: Number of threads, 0 for one per core.
             copy: Whether `reset` and `step` return copies of the observations. Otherwise, the next
                 call changes the arrays that they returned.
-            render_mode: `rgb_array` or None.
+            render_mode: `rgb_array`, `human` or None.
+            web_port: Port of the viewer of the render mode `human`, see `FlatlandEnv`.
             **arguments: See `Settings`.
 
         Raises:
+            DependencyNotInstalled: `human` requires aiohttp.
             FlatlandError: A file is missing or invalid, or the model cannot be an agent.
             TypeError: An argument is unknown or has the wrong type.
             ValueError: An argument is out of range.
         """
         super().__init__()
         self.autoreset_mode = AutoresetMode(autoreset_mode)
-        metadata = {**FlatlandEnv.metadata, "render_modes": ["rgb_array"]}
-        self.render_mode = checked_render_mode(render_mode, metadata)
+        self.render_mode = checked_render_mode(render_mode, FlatlandEnv.metadata)
+        if render_mode == "human":
+            check_live_view(web_port)
         if isinstance(num_envs, bool) or not isinstance(num_envs, int) or num_envs < 1:
             raise ValueError(f"num_envs must be an integer of at least 1, got {num_envs!r}")
         if isinstance(num_threads, bool) or not isinstance(num_threads, int) or num_threads < 0:
             raise ValueError(f"num_threads must be an integer of at least 0, got {num_threads!r}")
         settings = Settings.from_arguments({"world": world, **arguments})
         self.metadata = {
-            **metadata,
+            **FlatlandEnv.metadata,
             "render_fps": round(1 / settings.dt) or 1,
             "autoreset_mode": self.autoreset_mode,
         }
         self.num_envs = num_envs
         self.copy = copy
         self._worlds = clone_worlds(settings, num_envs)
+        names = [f"{settings.world_name} {number}" for number in range(num_envs)]
+        self._live_view = EpisodeView(self._worlds, names, settings.dt, web_port)
         try:
             agents = [settings.find_agent(world) for world in self._worlds]
             self._episodes = Episodes(agents, settings, num_threads)
@@ -138,6 +145,7 @@ class FlatlandVectorEnv(VectorEnv[Any, Any, Any]):
                 self._rngs[row], self._seeds[row] = seeding.np_random(seeds[row])
         self._begin(rows, given)
         self._episodes.look(None if len(rows) == self.num_envs else rows)
+        self._show()
         return self._present(), self._infos(mask)
 
     def step(self, actions: Any) -> tuple[Any, DoubleArray, BoolArray, BoolArray, dict[str, Any]]:
@@ -185,28 +193,38 @@ class FlatlandVectorEnv(VectorEnv[Any, Any, Any]):
         else:
             self._has_ended = ended
         infos.update(self._infos(np.ones(self.num_envs, np.bool_)))
+        self._show()
         return self._present(), rewards, terminated, truncated, infos
 
     def render(self) -> tuple[Image, ...] | None:
-        """Returns an image of each environment for the render mode `rgb_array`.
+        """Returns an image of each environment for `rgb_array`; for `human`, shows all worlds.
 
         Raises:
             ClosedEnvironmentError: The environments are closed.
+            FlatlandError: The viewer cannot listen on its port, or matplotlib is missing.
         """
         self._check_open()
         if self.render_mode is None:
             return None
-        goals = self._episodes.situation.goals.tolist()
+        goals: list[list[Vector2]] = [[(x, y)] for x, y in self._episodes.situation.goals.tolist()]
         radius = self._episodes.task.goal_radius
+        if self.render_mode == "human":
+            self._live_view.show(goals, radius)
+            return None
         return tuple(
-            draw_goals(world, [(x, y)], radius)
-            for world, (x, y) in zip(self._worlds, goals, strict=True)
+            draw_goals(world, places, radius)
+            for world, places in zip(self._worlds, goals, strict=True)
         )
 
     def close_extras(self, **kwargs: Any) -> None:  # noqa: ARG002 - as in the base class
-        """Closes all worlds."""
+        """Closes all worlds and their views."""
+        self._live_view.close()
         for world in self._worlds:
             world.close()
+
+    def _show(self) -> None:
+        if self.render_mode == "human":
+            self.render()
 
     def _rng(self, row: int) -> np.random.Generator:
         rng = self._rngs[row]

@@ -19,6 +19,7 @@ from flatland.ros.parameters import NodeParameters, ParameterError, read_paramet
 from flatland.ros.shutdown import ShutdownWatchdog
 
 if TYPE_CHECKING:
+    from flatland.ros.browser_viewer import BrowserViewer
     from flatland.ros.message_recorder import MessageRecorder
     from flatland.ros.parameter_server import ParameterServer
     from flatland.ros.transport.registrar import Registrar
@@ -238,6 +239,7 @@ class ServerNode:
         from flatland.ros.deferred_topics import DeferredTopics
         from flatland.ros.frame_monitor import FrameMonitor
         from flatland.ros.hook_watchdog import HookWatchdog
+        from flatland.ros.operations import Operations
         from flatland.ros.services import Services
         from flatland.ros.transport.master_watch import MasterWatch
         from flatland.simulation import Simulation
@@ -265,17 +267,32 @@ class ServerNode:
             debug_rate=debug_rate,
             move_keeps_odometry=parameters.move_keeps_odometry,
         )
+        browser_viewer: BrowserViewer | None = None
         frame_monitor = FrameMonitor(self._registrar, simulation, bridge.subscribed)
         try:
             _publish_map(self._registrar, world, parameters)
-            Services(
+            operations = Operations(
                 self._registrar,
                 simulation,
                 clock,
                 parameters.if_blocked,
                 move_keeps_odometry=parameters.move_keeps_odometry,
+            )
+            Services(
+                self._registrar,
+                simulation,
+                clock,
+                operations,
+                parameters.if_blocked,
+                move_keeps_odometry=parameters.move_keeps_odometry,
                 model_states_rate=parameters.model_states_rate,
             )
+            if parameters.web is not None:
+                from flatland.ros.browser_viewer import BrowserViewer
+
+                browser_viewer = BrowserViewer(
+                    self._registrar, simulation, operations, parameters.web
+                )
             if parameters.initialpose_model:
                 from flatland.ros.initial_pose import InitialPose
 
@@ -291,6 +308,8 @@ class ServerNode:
         finally:
             master_watch.close()
             hook_watchdog.close()
+            if browser_viewer is not None:
+                browser_viewer.close()
             deferred_topics.close()
             frame_monitor.close()
             # Plugins are closed before their topics, so that `on_shutdown` can publish; rospy then

@@ -8,7 +8,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TypeVar
 
-from flatland.defaults import DEFAULT_RESOLUTION, IF_BLOCKED, MAX_LAG, IfBlocked
+from flatland.defaults import (
+    DEFAULT_RESOLUTION,
+    IF_BLOCKED,
+    MAX_LAG,
+    WEB_HOST,
+    WEB_PORT,
+    IfBlocked,
+)
 from flatland.ros.message_types import MESSAGE_PACKAGES, OWN_PACKAGE
 from flatland.ros.shutdown import DEFAULT_SHUTDOWN_TIMEOUT
 from flatland.timekeeper import MAX_STEP_SIZE, MIN_STEP_SIZE
@@ -23,6 +30,24 @@ _SIMPLIFICATIONS = (0, 1, 2)
 
 class ParameterError(Exception):
     """A parameter of the node is missing or invalid; the text names it and its value."""
+
+
+@dataclass(frozen=True, slots=True)
+class WebParameters:
+    """The parameters of the viewer in the browser.
+
+    Attributes:
+        host: Address that the viewer listens on.
+        port: Its port, 0 for any free one.
+        token: Text that its address must contain; None for none, or for a random one if `host` can
+            be reached from other machines.
+        read_only: Whether the page only displays the world.
+    """
+
+    host: str
+    port: int
+    token: str | None
+    read_only: bool
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,6 +86,7 @@ class NodeParameters:
         map_resolution: Size of a cell of the map of a layer without an image [m].
         msgs_package: Package of the message and service types, `flatland` or `flatland_msgs`.
         model_path: Folders outside which `spawn_model` reads no file; None for no restriction.
+        web: The viewer in the browser; None for no such viewer.
     """
 
     world_path: str
@@ -88,6 +114,7 @@ class NodeParameters:
     map_resolution: float
     msgs_package: str
     model_path: tuple[str, ...] | None
+    web: WebParameters | None
 
 
 def read_parameters(
@@ -136,7 +163,19 @@ def read_parameters(
             "msgs_package", default_msgs_package, MESSAGE_PACKAGES, " or ".join(MESSAGE_PACKAGES)
         ),
         model_path=reader.folders("model_path"),
+        web=_read_web(reader),
     )
+
+
+def _read_web(reader: _Reader) -> WebParameters | None:
+    """Reads the parameters of the viewer in the browser, which are checked in any case."""
+    parameters = WebParameters(
+        host=reader.name("web_host", "the address of an interface, or its name") or WEB_HOST,
+        port=reader.port("web_port", WEB_PORT),
+        token=reader.name("web_token", "a text") or None,
+        read_only=reader.boolean("web_read_only", False),
+    )
+    return parameters if reader.boolean("web", False) else None
 
 
 @dataclass(frozen=True, slots=True)
@@ -237,6 +276,15 @@ class _Reader:
         if value is None:
             return default
         if value not in choices:
+            raise _invalid(name, wanted, value)
+        return value
+
+    def port(self, name: str, default: int) -> int:
+        wanted = "a port number from 0 (any free port) to 65535"
+        value = self._integer(name, wanted)
+        if value is None:
+            return default
+        if not 0 <= value <= 65535:
             raise _invalid(name, wanted, value)
         return value
 

@@ -9,20 +9,16 @@ from typing import Any
 import rospy
 from std_srvs.srv import Empty, EmptyResponse
 
+from flatland.ros.appearance_service import AppearanceService
 from flatland.ros.batch_services import BatchServices
 from flatland.ros.clock import NodeClock
 from flatland.ros.layer_maps import LayerMaps
 from flatland.ros.message_types import service_class
 from flatland.ros.model_states import ModelStatesService, ModelStatesTopic
 from flatland.ros.names import sendable_text
+from flatland.ros.operations import Operations
 from flatland.ros.reset_service import ResetService
-from flatland.ros.service_calls import (
-    REGISTRATION_TIMEOUT,
-    CallError,
-    ServiceCalls,
-    describe_displacement,
-    pose_of,
-)
+from flatland.ros.service_calls import CallError, ServiceCalls, pose_of
 from flatland.ros.step_service import StepService
 from flatland.ros.transport.registrar import Registrar
 from flatland.ros.transport.service import Service
@@ -42,6 +38,7 @@ class Services:
         registrar: Registrar,
         simulation: Simulation,
         clock: NodeClock,
+        operations: Operations,
         if_blocked: IfBlocked = "warn",
         *,
         move_keeps_odometry: bool = False,
@@ -53,23 +50,22 @@ class Services:
             registrar: Registers the services with the ROS master.
             simulation: Simulation that the services control.
             clock: Publishes the time.
-            if_blocked: Behaviour of `spawn_model` and `move_model` at poses that are not free.
-            move_keeps_odometry: Whether `move_model` keeps the odometry of the model.
+            operations: Changes single models and the rate.
+            if_blocked: Behaviour of `spawn_models` and `move_models` at poses that are not free.
+            move_keeps_odometry: Whether `move_models` keeps the odometry of the models.
             model_states_rate: Rate of the topic `model_states` in simulated time [Hz]; 0 for one
                 message per step.
 
         Raises:
             FlatlandError: A plugin has a service of the same name.
         """
-        self._registrar = registrar
-        self._simulation = simulation
+        self._operations = operations
         self._calls = ServiceCalls(registrar, simulation)
-        self._if_blocked = if_blocked
-        self._keep_odometry = move_keeps_odometry
         world = simulation.world
         StepService(self._calls, clock)
         ResetService(self._calls)
         LayerMaps(self._calls)
+        AppearanceService(self._calls)
         ModelStatesService(self._calls)
         ModelStatesTopic(self._calls, model_states_rate)
         BatchServices(self._calls, if_blocked, move_keeps_odometry=move_keeps_odometry)
@@ -78,8 +74,8 @@ class Services:
             ("delete_model", service_class("DeleteModel"), self._delete_model),
             ("move_model", service_class("MoveModel"), self._move_model),
             ("set_rate", service_class("SetRate"), self._set_rate),
-            ("pause", Empty, self._switch(world.pause)),
-            ("resume", Empty, self._switch(world.resume)),
+            ("pause", Empty, self._switch(operations.pause)),
+            ("resume", Empty, self._switch(operations.resume)),
             ("toggle_pause", Empty, self._switch(world.toggle_pause)),
         ):
             Service(registrar, name, service_type, handler)
@@ -87,41 +83,22 @@ class Services:
     # rospy converts the returned fields to the response class of the service.
 
     def _spawn_model(self, request: Any) -> tuple[bool, str]:
+        path, name, namespace = request.yaml_path, request.name, request.ns
         pose = pose_of(request.pose)
-        return self._carry_out(
-            lambda: describe_displacement(
-                self._simulation.world.spawn_model(
-                    request.yaml_path, request.name, request.ns, pose, self._if_blocked
-                ),
-                pose,
-            )
-        )
+        return self._carry_out(lambda: self._operations.spawn(path, name, namespace, pose))
 
     def _delete_model(self, request: Any) -> tuple[bool, str]:
-        return self._carry_out(lambda: self._simulation.world.delete_model(request.name))
+        return self._carry_out(lambda: self._operations.delete(request.name))
 
     def _move_model(self, request: Any) -> tuple[bool, str]:
         pose = pose_of(request.pose)
-        return self._carry_out(
-            lambda: describe_displacement(
-                self._simulation.world.move_model(
-                    request.name, pose, self._if_blocked, keep_odometry=self._keep_odometry
-                ),
-                pose,
-            )
-        )
+        return self._carry_out(lambda: self._operations.move(request.name, pose))
 
     def _set_rate(self, request: Any) -> tuple[bool, str]:
         rate = request.update_rate
         if math.isnan(rate) or rate < 0:
             return False, f"update_rate must not be negative, got {rate}"
-        done, message = self._carry_out(lambda: self._simulation.set_rate(rate))
-        if done:
-            # Clients read the current rate from the parameter.
-            value = 0.0 if math.isinf(rate) else rate
-            self._registrar.set_parameter("~update_rate", value)
-            self._registrar.flush(REGISTRATION_TIMEOUT)
-        return done, message
+        return self._carry_out(lambda: self._operations.set_rate(rate))
 
     def _switch(self, action: Callable[[], None]) -> Callable[[Any], EmptyResponse]:
         def serve(_request: Any) -> EmptyResponse:

@@ -37,6 +37,7 @@ def clone_world(world: World, state: Collection[str], kinds: dict[type[Any], Kin
             "_observers": copier.add(world._observers, Observers(faults)),
             "_former_layers": {},
             "_paused": False,
+            "_view": None,
         }
         costs = world.plugin_host.costs
         if costs is not None:

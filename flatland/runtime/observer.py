@@ -48,6 +48,9 @@ class WorldObserver:
     def model_moved(self, model: Model) -> None:
         """A model was moved by a request."""
 
+    def model_changed(self, model: Model) -> None:
+        """The colour, layers or visibility of bodies of a model may have changed."""
+
     def model_removed(self, model: Model) -> None:
         """A model was removed from the world."""
 
@@ -71,6 +74,14 @@ class WorldObserver:
         several steps in which no code of plugins is called, which are then much faster.
         """
         return True
+
+    @property
+    def watches_time(self) -> bool:
+        """Whether another thread passes on the time while a `Simulation` waits between two steps.
+
+        Otherwise, `time_advanced` may be called up to 25 ms of wall time late.
+        """
+        return False
 
     @property
     def wants_transforms(self) -> bool:
@@ -173,6 +184,15 @@ class Observers:
         """Notifies all observers."""
         self._notify("model_moved", model)
 
+    def model_changed(self, model: Model) -> None:
+        """Notifies all observers."""
+        self._notify("model_changed", model)
+
+    @property
+    def watch_appearance(self) -> bool:
+        """Whether an observer overrides `model_changed`."""
+        return any(_overrides(observer, "model_changed") for observer in self._all)
+
     def model_removed(self, model: Model) -> None:
         """Notifies all observers."""
         self._notify("model_removed", model)
@@ -185,6 +205,11 @@ class Observers:
     def watch_steps(self) -> bool:
         """Whether an observer is to be notified of each step."""
         return any(observer.watches_steps for observer in self._of_steps)
+
+    @property
+    def watch_time(self) -> bool:
+        """Whether an observer is to be notified of the time without delay."""
+        return any(observer.watches_time for observer in self._of_time)
 
     @property
     def want_transforms(self) -> bool:

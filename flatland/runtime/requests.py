@@ -136,6 +136,27 @@ class Requests:
             wake()
         return future
 
+    @property
+    def served(self) -> bool:
+        """Whether a thread serves the queue at the moment."""
+        return self._server is not None
+
+    def process_if_idle(self) -> bool:
+        """Runs the actions that are waiting, unless another thread serves the queue or steps.
+
+        Returns:
+            Whether they were run.
+        """
+        if self._server not in (None, threading.get_ident()):
+            return False
+        if not self.lock.acquire(blocking=False):
+            return False
+        try:
+            self.process()
+        finally:
+            self.lock.release()
+        return True
+
     def process(self) -> None:
         """Runs the actions that are waiting; not those that they queue in turn."""
         with self.lock:

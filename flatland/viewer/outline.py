@@ -8,14 +8,10 @@ from typing import Final
 
 import numpy as np
 
-from flatland.config.reader import YamlReader
+from flatland.drawing.model_preview import bodies_of_file
 from flatland.entities.body import Body, Color
-from flatland.entities.collision_filter import ALL_LAYERS, CollisionFilter
-from flatland.entities.model import Model
-from flatland.geometry import IDENTITY, DoubleArray, circle_points, transform_points
-from flatland.loading.model_loader import ModelLoader
-from flatland.physics import PhysicsFixture, PhysicsWorld
-from flatland.world import World
+from flatland.geometry import DoubleArray, circle_points, transform_points
+from flatland.physics import PhysicsFixture
 
 _CIRCLE_POINTS: Final = 32
 
@@ -31,16 +27,6 @@ class Outline:
 
     color: Color
     segments: DoubleArray
-
-
-class _AnyLayer(CollisionFilter):
-    """Accepts every layer name: the layers of the simulator's world are not available here."""
-
-    def unknown(self, _names: Iterable[str]) -> list[str]:
-        return []
-
-    def category_bits(self, _names: Iterable[str]) -> int:
-        return ALL_LAYERS
 
 
 def read_outline(
@@ -59,15 +45,8 @@ def read_outline(
     Raises:
         YamlError: The file cannot be read, or a body or joint in it is invalid.
     """
-    with World(seed=0) as world:
-        physics = PhysicsWorld()
-        try:
-            model = Model(world, name, "", path)
-            reader = YamlReader.from_file(path, params)
-            ModelLoader(physics, _AnyLayer(), model, reader).load_bodies_and_joints(IDENTITY)
-            return [Outline(body.color, _segments(body)) for body in model.bodies if body.fixtures]
-        finally:
-            physics.close()
+    with bodies_of_file(path, params, name=name) as bodies:
+        return [Outline(body.color, _segments(body)) for body in bodies if body.fixtures]
 
 
 def max_radius(outlines: Iterable[Outline]) -> float:

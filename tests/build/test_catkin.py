@@ -26,6 +26,19 @@ for module in (flatland, flatland._core, flatland.msg, flatland.world):
 """
 
 
+SERVE_THE_PAGE = """
+import urllib.request
+from flatland.web import WebViewer
+from flatland.web.server import PAGE
+with WebViewer(port=0) as viewer:
+    for path in sorted(PAGE.rglob("*.*")):
+        name = path.relative_to(PAGE)
+        with urllib.request.urlopen(f"{viewer.url}{name}") as answer:
+            assert answer.read() == path.read_bytes()
+        print(name)
+"""
+
+
 def test_ros_tools_find_the_package(space, checkout):
     in_checkout = checkout / "catkin" / "flatland"
     expected = in_checkout if space.name == "devel" else space.folder / "share" / "flatland"
@@ -42,6 +55,13 @@ def test_world_steps_in_the_python_of_the_system(space, world_file, checkout):
     assert (package.parent, core.parent, messages.parent) == (built, built, built / "msg")
     # The devel space uses the sources, so that edits take effect without a build.
     assert world.parent.resolve() == (checkout / "flatland" if space.name == "devel" else built)
+
+
+def test_the_page_of_the_viewer_is_served(space, checkout):
+    printed = space.run("/usr/bin/python3", "-W", "error", "-c", SERVE_THE_PAGE).split()
+    page = checkout / "flatland" / "web" / "page"
+    assert "index.html" in printed
+    assert printed == [str(path.relative_to(page)) for path in sorted(page.rglob("*.*"))]
 
 
 def test_devel_space_does_not_put_the_checkout_on_the_path(make_space, checkout):

@@ -101,6 +101,32 @@ def test_run_reports_a_missing_world(shell, installed):
     assert "world file not found: nowhere.yaml" in done.stderr
 
 
+@pytest.mark.parametrize(
+    ("display", "given", "passed"),
+    [
+        ("", "", "show_viz:=false web:=true"),
+        ("", "web:=false seed:=1", "web:=false seed:=1 show_viz:=false"),
+        ("", "web:=true web_port:=0", "web:=true web_port:=0 show_viz:=false"),
+        ("", "show_viz:=true", "show_viz:=true"),
+        ("", "show_viz:=false", "show_viz:=false"),
+        (":0", "", ""),
+        (":0", "web:=true", "web:=true"),
+    ],
+)
+def test_without_a_display_run_starts_the_viewer_for_the_browser(
+    shell, installed, tmp_path, display, given, passed
+):
+    # Instead of roslaunch, which the environment of the installation finds on PATH.
+    roslaunch = tmp_path / "roslaunch"
+    roslaunch.write_text('#!/bin/sh\necho "roslaunch $*"\n')
+    roslaunch.chmod(0o755)
+    path = f"{tmp_path}:{installed}/.venv/bin:/usr/bin:/bin"
+    done = shell(f"'{installed}/tools/run.sh' '' {given}", DISPLAY=display, PATH=path)
+    *notices, command = done.stdout.splitlines()
+    assert command == f"roslaunch flatland server.launch {passed}".rstrip(), done.stderr
+    assert bool(notices) == ("show_viz" in passed and "show_viz" not in given)
+
+
 def test_server_runs_with_a_broken_python_first_on_path(shell, world_file, tmp_path):
     broken = tmp_path / "broken"
     broken.mkdir()

@@ -11,7 +11,12 @@ from typing import Any
 import pytest
 from rosgraph_msgs.msg import Clock
 
-from flatland.ros.parameters import NodeParameters, ParameterError, read_parameters
+from flatland.ros.parameters import (
+    NodeParameters,
+    ParameterError,
+    WebParameters,
+    read_parameters,
+)
 
 
 def read(**given: Any) -> NodeParameters:
@@ -45,7 +50,16 @@ def test_defaults() -> None:
         map_resolution=0.05,
         msgs_package="flatland",
         model_path=None,
+        web=None,
     )
+
+
+def test_the_parameters_of_the_browser_viewer() -> None:
+    assert read(web="true").web == WebParameters("127.0.0.1", 8000, None, False)
+    given = {"web_host": "0.0.0.0", "web_port": "0", "web_token": 7, "web_read_only": True}
+    assert read(web=True, **given).web == WebParameters("0.0.0.0", 0, "7", True)
+    assert read(web=True, web_host=" ", web_token=" ").web == read(web=True).web
+    assert read(web=False, **given).web is None
 
 
 @pytest.mark.parametrize(
@@ -199,6 +213,14 @@ def test_invalid_numbers(name: str, value: object) -> None:
         ("model_path", ["/usr", 1]),
         ("model_path", True),
         ("model_path", {"a": "/usr"}),
+        ("web", "yes"),
+        ("web_host", True),
+        ("web_port", -1),
+        ("web_port", 65536),
+        ("web_port", "http"),
+        ("web_port", 80.5),
+        ("web_token", ["a"]),
+        ("web_read_only", 1),
     ],
 )
 def test_invalid_values(name: str, value: object) -> None:

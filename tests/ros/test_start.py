@@ -220,6 +220,11 @@ def test_server_launch_passes_all_parameters(launcher: Any, ros: Any, world: Pat
         "record_mcap": "",
         "lockstep": False,
         "model_states_rate": 50,
+        "web": False,
+        "web_host": "127.0.0.1",
+        "web_port": 8000,
+        "web_token": "",
+        "web_read_only": False,
     }
     assert ros.master.getParam("/use_sim_time") is True
     ros.log_everything()

@@ -15,10 +15,11 @@ FLOORS = (
     ("physics", "values"),
     ("config", "entities"),
     ("copying", "maps", "plugin_api"),
-    ("loading", "plugins"),
+    ("loading", "plugins", "worldgen"),
     ("runtime",),
     ("world",),
     ("simulation", "drawing", "recording"),
+    ("web",),
     ("gym", "ros", "tools"),
     ("viewer",),
     ("cli",),
@@ -28,7 +29,7 @@ FLOORS = (
 # flatland/ros/message_types.py.
 SPECIAL: dict[str, set[str]] = {"_core": {"physics"}, "msg": set(), "srv": set()}
 # What a facade imports late on purpose, within a function.
-LATE = {("world", "drawing"), ("world", "recording")}
+LATE = {("world", "drawing"), ("world", "recording"), ("world", "web")}
 PACKAGE = Path(__file__).resolve().parents[2] / "flatland"
 
 

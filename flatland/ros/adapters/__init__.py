@@ -18,8 +18,10 @@ from flatland import values
 
 _BUILT_IN: dict[type[Any], str] = {
     bool: "boolean",
+    values.AckermannCommand: "ackermann",
     values.Collisions: "collisions",
     values.Imu: "imu",
+    values.JointState: "joint_state",
     values.LaserScan: "laser_scan",
     values.NavSatFix: "nav_sat_fix",
     values.Odometry: "odometry",

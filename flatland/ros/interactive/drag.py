@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from flatland.geometry import Pose
-from flatland.world import World
+from flatland.simulation import PauseHolds
 
 DRAG_TIMEOUT: Final = 0.1  # s of wall time without feedback after which a drag ends
 
@@ -27,21 +27,16 @@ class Drag:
 
 
 class Drags:
-    """Active drags of a world, which is paused while there are any.
+    """Active drags of a world, which is paused while there are any."""
 
-    When the last drag ends, the world is resumed, unless it was already paused before the first
-    drag, or was resumed and paused again in the meantime.
-    """
-
-    def __init__(self, world: World) -> None:
+    def __init__(self, holds: PauseHolds) -> None:
         """Creates an empty set of drags.
 
         Args:
-            world: World to pause.
+            holds: Pauses and resumes the world.
         """
-        self._world = world
+        self._holds = holds
         self._drags: dict[str, Drag] = {}
-        self._paused_here = False
 
     def __bool__(self) -> bool:
         """Returns whether there are active drags."""
@@ -60,30 +55,20 @@ class Drags:
             now: Time of the feedback (`time.monotonic`) [s].
             pose: Pose of the marker.
         """
-        self._check_pause()
-        if not self._drags and not self._world.paused:
-            self._world.pause()
-            self._paused_here = True
+        self._holds.hold((self, name))
         self._drags[name] = Drag(client, now, pose)
 
     def end(self, name: str) -> None:
         """Ends the drag of a marker, if any."""
-        self._check_pause()
-        if self._drags.pop(name, None) and not self._drags and self._paused_here:
-            self._paused_here = False
-            self._world.resume()
+        if self._drags.pop(name, None):
+            self._holds.release((self, name))
 
     def end_stale(self, now: float) -> list[str]:
         """Ends the drags that have timed out; returns the names of their markers."""
-        self._check_pause()
+        self._holds.check()
         stale = [
             name for name, drag in self._drags.items() if now - drag.last_feedback > DRAG_TIMEOUT
         ]
         for name in stale:
             self.end(name)
         return stale
-
-    def _check_pause(self) -> None:
-        # The world was resumed during a drag, so that a later pause is independent of drags.
-        if not self._world.paused:
-            self._paused_here = False

@@ -51,12 +51,12 @@ def test_the_commands_of_the_page_print_what_it_says(checkout, tmp_path, monkeyp
             pattern = ".*".join(re.escape(part) for part in text.split("..."))
             assert re.search(pattern, output, re.DOTALL), f"{text}\nis not in\n{output}"
             compared += 1
-    assert compared == 4
+    assert compared == 5
 
 
 def test_all_commands_and_options_are_described(checkout):
     page = (checkout / "docs" / "command_line.md").read_text()
-    for command in ("check", "info", "show", "run", "new", "doctor"):
+    for command in ("check", "info", "show", "run", "view", "new", "doctor"):
         assert f"flatland {command}" in page
     from flatland.cli.main import make_parser
 

@@ -112,7 +112,7 @@ def test_interruption_ends_without_a_traceback(monkeypatch, capsys):
     assert capsys.readouterr().err == "flatland: interrupted\n"
 
 
-COMMANDS = ("check", "info", "show", "run", "replay", "new", "doctor")
+COMMANDS = ("check", "info", "show", "run", "view", "replay", "new", "doctor")
 
 
 def subparser(name: str) -> argparse.ArgumentParser:
@@ -146,6 +146,8 @@ def test_the_examples_of_the_help_run(checkout, tmp_path, monkeypatch, capsys, e
     if words[0] == "replay":
         world = tmp_path / "worlds" / "office" / "world.yaml"
         assert main("run", world, "--duration", "0.1", "--record", words[1]) == 0
+    if words[0] == "view":  # neither endless nor on a port that is in use
+        words += ["--duration", "0.1", "--port", "0", "--no-browser"]
     assert main(*words) == 0, capsys.readouterr()
 
 

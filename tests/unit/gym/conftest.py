@@ -39,6 +39,14 @@ models:
 """
 
 
+@pytest.fixture(autouse=True)
+def no_browser(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Lets the render mode `human` use any free port, and open no browser."""
+    monkeypatch.setenv("FLATLAND_WEB_PORT", "0")
+    monkeypatch.delenv("DISPLAY", raising=False)
+    monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
+
+
 @pytest.fixture
 def room(tmp_path: Path) -> Path:
     """A room of 6 m by 4 m with a robot whose laser has 13 beams and noise."""

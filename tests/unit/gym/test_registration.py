@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import logging
 import subprocess
 import sys
 from collections.abc import Callable
@@ -98,40 +97,6 @@ def test_an_image_shows_the_goal(make: Make) -> None:
     assert images[0].dtype == np.uint8
     assert (images[0] != images[1]).any()
     assert make(world="corridor").render() is None
-
-
-def test_without_a_display_a_window_is_a_message(
-    make: Make, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
-) -> None:
-    monkeypatch.delenv("DISPLAY", raising=False)
-    monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
-    env = make(world="corridor", render_mode="human")
-    with caplog.at_level(logging.WARNING, "flatland"):
-        env.reset(seed=0)
-        env.step(np.zeros(2))
-    warnings = [record for record in caplog.records if record.levelno >= logging.WARNING]
-    assert [record.getMessage() for record in warnings] == [
-        'render_mode "human": no display, nothing is shown; see also "rgb_array"'
-    ]
-
-
-def test_a_window_shows_each_step(make: Make, monkeypatch: pytest.MonkeyPatch) -> None:
-    # The window itself needs a display: this one counts the images that it is given.
-    shown: list[Any] = []
-
-    class Window:
-        def show(self, image: Any, dt: float) -> None:
-            shown.append((image.shape, dt))
-
-        def close(self) -> None:
-            shown.append("closed")
-
-    monkeypatch.setattr("flatland.gym.rendering.open_window", Window)
-    env = make(world="corridor", render_mode="human")
-    env.reset(seed=0)
-    env.step(np.zeros(2))
-    env.close()
-    assert shown == [((600, 800, 3), 0.1)] * 2 + ["closed"]
 
 
 def test_the_included_worlds_are_found_by_name(checkout: Path) -> None:

@@ -198,7 +198,7 @@ def test_closed_environments_are_of_no_use(make: Make) -> None:
         ({"num_envs": 0}, "num_envs"),
         ({"num_threads": -1}, "num_threads"),
         ({"autoreset_mode": "Never"}, "Never"),
-        ({"render_mode": "human"}, "rgb_array"),
+        ({"render_mode": "ansi"}, "rgb_array, human"),
     ],
 )
 def test_an_invalid_argument_is_an_error(kwargs: dict[str, Any], message: str) -> None:

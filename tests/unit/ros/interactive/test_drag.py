@@ -8,6 +8,7 @@ import pytest
 
 import flatland
 from flatland.ros.interactive.drag import DRAG_TIMEOUT, Drags
+from flatland.simulation import PauseHolds
 
 POSE = (1.0, 2.0, 3.0)
 
@@ -19,7 +20,7 @@ def world() -> Iterator[flatland.World]:
 
 
 def test_world_is_paused_during_drags(world: flatland.World) -> None:
-    drags = Drags(world)
+    drags = Drags(PauseHolds(world))
     drags.hold("a", "rviz", 0.0, POSE)
     drags.hold("b", "other", 0.0, POSE)
     assert (world.paused, bool(drags)) == (True, True)
@@ -31,7 +32,7 @@ def test_world_is_paused_during_drags(world: flatland.World) -> None:
 
 def test_world_paused_before_a_drag_remains_paused(world: flatland.World) -> None:
     world.pause()
-    drags = Drags(world)
+    drags = Drags(PauseHolds(world))
     drags.hold("a", "rviz", 0.0, POSE)
     drags.hold("a", "rviz", 0.1, POSE)
     drags.end("a")
@@ -39,7 +40,7 @@ def test_world_paused_before_a_drag_remains_paused(world: flatland.World) -> Non
 
 
 def test_world_resumed_and_paused_during_a_drag_remains_paused(world: flatland.World) -> None:
-    drags = Drags(world)
+    drags = Drags(PauseHolds(world))
     drags.hold("a", "rviz", 0.0, POSE)
     world.resume()
     drags.hold("a", "rviz", 0.1, POSE)
@@ -50,7 +51,7 @@ def test_world_resumed_and_paused_during_a_drag_remains_paused(world: flatland.W
 
 
 def test_stale_drags_end(world: flatland.World) -> None:
-    drags = Drags(world)
+    drags = Drags(PauseHolds(world))
     drags.hold("a", "rviz", 0.0, POSE)
     drags.hold("b", "rviz", 0.05, POSE)
     assert drags.end_stale(DRAG_TIMEOUT) == []
@@ -63,7 +64,7 @@ def test_stale_drags_end(world: flatland.World) -> None:
 
 
 def test_end_without_a_drag_has_no_effect(world: flatland.World) -> None:
-    drags = Drags(world)
+    drags = Drags(PauseHolds(world))
     drags.end("a")
     world.pause()
     drags.end("a")

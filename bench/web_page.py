@@ -1,0 +1,142 @@
+"""The page of the browser viewer in a headless Chromium: time to load, frames per second.
+
+Chromium draws without a graphics card here (SwiftShader), on the processor that also runs the
+simulation; with a graphics card, both figures are better.
+"""
+
+from __future__ import annotations
+
+import sys
+import tempfile
+import threading
+import time
+from pathlib import Path
+
+import numpy as np
+from table import Row
+
+from flatland import Twist, World
+from flatland.simulation import Simulation
+from flatland.web import WebViewer
+
+ROBOTS = 100
+BOXES = 12_500  # of four edges each
+SIDE = 100.0  # m
+LOADS = 5
+WINDOWS = 5
+WINDOW = 2.0  # s
+
+ROBOT = """
+bodies:
+  - {name: base, color: [0, 0.4, 1, 1], footprints: [{type: circle, radius: 0.4, density: 1}]}
+plugins:
+  - {type: DiffDrive, name: drive, body: base, pub_rate: 20}
+  - {type: Laser, name: laser, body: base, range: 10, update_rate: 10,
+     angle: {min: -3.14159, max: 3.14159, increment: 0.0174533}}
+"""
+# Sets `loadTime` [ms since the start of the navigation] when all walls and robots were drawn.
+WATCH_LOADING = """
+(() => {
+  const look = () => {
+    const world = window.flatland?.state?.worlds?.[0];
+    const complete = world && Object.keys(world.models ?? {}).length === ROBOTS && world.edges === EDGES;
+    if (complete && flatland.frames > 0) window.loadTime = performance.now();
+    else requestAnimationFrame(look);
+  };
+  look();
+})();
+"""
+# Pans the view by one pixel in each frame, so that each of them is drawn, and counts them.
+PAN = """
+const [seconds, done] = arguments;
+const canvas = document.querySelector("#canvas");
+const box = canvas.getBoundingClientRect();
+const [x, y] = [box.x + box.width / 2, box.y + box.height / 2];
+const send = (type, dx, buttons) => canvas.dispatchEvent(new PointerEvent(type, {
+  bubbles: true, pointerId: 1, isPrimary: true, button: 0, buttons,
+  clientX: x + dx, clientY: y, shiftKey: false,
+}));
+const start = performance.now(), first = flatland.frames;
+let i = 0;
+send("pointerdown", 0, 1);
+const move = () => {
+  const elapsed = (performance.now() - start) / 1000;
+  if (elapsed >= seconds) {
+    send("pointerup", 0, 0);
+    done((flatland.frames - first) / elapsed);
+    return;
+  }
+  send("pointermove", 5 + (i++ % 20), 1);
+  requestAnimationFrame(move);
+};
+requestAnimationFrame(move);
+"""
+
+
+def write_world(folder: Path) -> Path:
+    """Writes a world with many small boxes as walls, and robots between them."""
+    rng = np.random.default_rng(1)
+    corners = rng.uniform(0, SIDE, (BOXES, 1, 2)) + 0.1 * np.array([[0, 0], [1, 0], [1, 1], [0, 1]])
+    edges = np.concatenate([corners, np.roll(corners, -1, axis=1)], axis=2).reshape(-1, 4)
+    np.savetxt(folder / "walls.dat", edges, fmt="%.3f")
+    (folder / "map.yaml").write_text(
+        "type: line_segments\ndata: walls.dat\nscale: 1.0\norigin: [0, 0, 0]\n"
+    )
+    (folder / "robot.model.yaml").write_text(ROBOT)
+    side = int(np.sqrt(ROBOTS))
+    models = [
+        f"  - {{name: robot_{i}, namespace: robot_{i}, model: robot.model.yaml, "
+        f"pose: [{(i % side + 0.5) * SIDE / side}, {(i // side + 0.5) * SIDE / side}, 0]}}"
+        for i in range(ROBOTS)
+    ]
+    path = folder / "world.yaml"
+    path.write_text(
+        "properties: {}\nlayers: [{name: walls, map: map.yaml}]\nmodels:\n" + "\n".join(models)
+    )
+    return path
+
+
+def measure(folder: Path) -> tuple[float, float, int]:
+    """Returns the least time to load [s], the most frames per second, and the number of edges."""
+    # The harness of the tests, which also requires the extra `test`.
+    sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "support"))
+    from chromium import Chromium
+
+    with (
+        World.from_yaml(write_world(folder), seed=1) as world,
+        WebViewer(port=0) as viewer,
+        Chromium(folder, size=(1280, 800)) as browser,
+    ):
+        for i in range(ROBOTS):
+            world.command(f"/robot_{i}/cmd_vel").set(Twist(linear_x=0.3, angular_z=0.3))
+        edges = len(world.layers[0].edges)
+        simulation = Simulation(world, 200)
+        viewer.add_world(world, simulation=simulation)
+        thread = threading.Thread(target=simulation.run)
+        thread.start()
+        try:
+            script = WATCH_LOADING.replace("ROBOTS", str(ROBOTS)).replace("EDGES", str(edges))
+            browser.command("Page.addScriptToEvaluateOnNewDocument", source=script)
+            browser.command("Network.enable")
+            browser.command("Network.setCacheDisabled", cacheDisabled=True)
+            times = []
+            for _ in range(LOADS):
+                browser.open(viewer.url)
+                times.append(browser.until("window.loadTime") / 1e3)
+                time.sleep(0.5)  # between two loads, which otherwise overlap
+            frames = [browser.driver.execute_async_script(PAN, WINDOW) for _ in range(WINDOWS)]
+        finally:
+            simulation.stop()
+            thread.join()
+    return min(times), max(frames), edges
+
+
+def rows(_unit: float) -> list[Row]:
+    """Measures how fast the page loads and draws."""
+    with tempfile.TemporaryDirectory() as folder:
+        loading, frames, edges = measure(Path(folder))
+    note = f"{edges} edges, {ROBOTS} robots; OpenGL without a graphics card"
+    return [
+        Row("loading of the page of the browser viewer", loading, "s", 1.0, note=note),
+        Row("frames while the view pans", frames, "1/s", 30.0, at_least=True, note=note),
+    ]

@@ -1,0 +1,129 @@
+import { Connection } from "./connection.js";
+import { byId, setText } from "./dom.js";
+import { Hotkeys } from "./hotkeys.js";
+import { Capture } from "./panels/capture.js";
+import { createConnectionBadge } from "./panels/connection_badge.js";
+import { createDisplays } from "./panels/displays.js";
+import { Inspector } from "./panels/inspector.js";
+import { createModelList } from "./panels/model_list.js";
+import { ModelMenu } from "./panels/model_menu.js";
+import { createNotices } from "./panels/notices.js";
+import { Plots } from "./panels/plots.js";
+import { createScaleBar } from "./panels/scale_bar.js";
+import { createShare } from "./panels/share.js";
+import { SpawnDialog } from "./panels/spawn_dialog.js";
+import { createTiles } from "./panels/tiles.js";
+import { TimeBar } from "./panels/time_bar.js";
+import { createToolbar } from "./panels/toolbar.js";
+import { exposeScripting } from "./scripting.js";
+import { Session } from "./session.js";
+import { Stage } from "./stage.js";
+import { connectTheme, isDark } from "./theme.js";
+import { Drive } from "./tools/drive.js";
+import { MeasureTool } from "./tools/measure_tool.js";
+import { PanTool } from "./tools/pan_tool.js";
+import { PointerInput } from "./tools/pointer.js";
+import { SelectTool } from "./tools/select_tool.js";
+import { SpawnTool } from "./tools/spawn_tool.js";
+import { createStick } from "./tools/stick.js";
+import { ToolBox } from "./tools/tool_box.js";
+import { ViewLink } from "./view_link.js";
+
+/** Returns the address of the WebSocket of the server that sent the page. */
+function socketAddress() {
+  const address = new URL("ws", window.location.href);
+  address.protocol = address.protocol === "https:" ? "wss:" : "ws:";
+  address.search = window.location.search;
+  address.hash = "";
+  return address.href;
+}
+
+const connection = new Connection(socketAddress());
+const session = new Session(connection);
+const stage = new Stage(/** @type {HTMLCanvasElement} */ (byId("canvas")), session, isDark());
+
+const spawnTool = new SpawnTool(session, stage);
+const tools = new ToolBox({
+  select: new SelectTool(session, stage),
+  pan: new PanTool(),
+  measure: new MeasureTool(stage),
+  spawn: spawnTool,
+});
+const drive = new Drive(session);
+
+async function deleteSelected() {
+  const { selected } = session;
+  if (!selected || session.readOnly) return;
+  if (await session.attempt("delete", { model: selected.id })) {
+    session.notify("info", `Deleted ${selected.name}`);
+    if (session.selectedName === selected.name) session.select(null);
+    stage.canvas.focus();
+  }
+}
+
+function toggleFollow() {
+  stage.follow(stage.followed === null ? session.selectedName : null);
+}
+
+const timeBar = new TimeBar(session);
+const plots = new Plots(session, isDark);
+const spawnDialog = new SpawnDialog(session, tools, spawnTool);
+const menu = new ModelMenu();
+const help = /** @type {HTMLDialogElement} */ (byId("help-dialog"));
+
+const hotkeys = new Hotkeys(stage, session, tools, drive, {
+  togglePause: () => timeBar.togglePause(),
+  step: () => timeBar.step(),
+  openSpawn: () => spawnDialog.open(),
+  deleteSelected,
+  toggleFollow,
+  togglePlots: () => plots.setOpen(byId("plots").hasAttribute("hidden")),
+  showAll: () => session.worlds.size > 1 && session.show(null),
+  openHelp: () => help.showModal(),
+});
+hotkeys.createHelp();
+byId("help").addEventListener("click", () => help.showModal());
+
+new PointerInput(stage, session, tools, (spot, event) => {
+  const select = /** @type {SelectTool} */ (tools.tools.select);
+  const model = select.modelUnder(spot);
+  if (!model) return;
+  session.select(model.name);
+  const pose = session.world?.modelPose(model);
+  /** @type {import("./panels/model_menu.js").Item[]} */
+  const items = [
+    { text: "Centre", icon: "center", run: () => void (pose && stage.centerOn(pose[0], pose[1])) },
+    { text: "Follow", icon: "follow", run: () => stage.follow(model.name) },
+  ];
+  if (!session.readOnly) items.push({ text: "Delete", icon: "delete", run: () => void deleteSelected() });
+  menu.open(event.clientX, event.clientY, items, stage.canvas);
+});
+
+stage.overlay = (batch, labels, viewport, palette) => {
+  tools.tools.select.draw(batch, labels, viewport, palette);
+  if (tools.name !== "select") tools.active.draw(batch, labels, viewport, palette);
+  hotkeys.drawAim(batch, viewport, palette);
+};
+
+createNotices(session);
+createConnectionBadge(session, stage);
+createModelList(session, stage);
+createDisplays(session);
+new Inspector(session, stage, { deleteSelected });
+new Capture(stage, session);
+createTiles(session, stage);
+createScaleBar(session, stage);
+createStick(session, drive);
+createToolbar(session, stage, tools, { toggleFollow, zoomIn: hotkeys.zoomIn, zoomOut: hotkeys.zoomOut });
+connectTheme((dark) => {
+  stage.setTheme(dark);
+  plots.draw();
+});
+createShare(session, new ViewLink(session, stage));
+exposeScripting(session, stage);
+
+document.addEventListener("visibilitychange", () => session.setHidden(document.hidden));
+window.addEventListener("online", () => connection.open());
+session.on("current", () => tools.use("select"));
+setText(byId("title"), session.title);
+connection.open();

@@ -1,0 +1,82 @@
+import { byId, saveFile, setPressed } from "../dom.js";
+
+const FRAME_RATE = 30;
+const BIT_RATE = 8_000_000;
+const FORMATS = ["video/webm;codecs=vp9", "video/webm;codecs=vp8", "video/webm"];
+
+/** Saves pictures and videos of the canvas. */
+export class Capture {
+  /**
+   * @param {import("../stage.js").Stage} stage
+   * @param {import("../session.js").Session} session
+   */
+  constructor(stage, session) {
+    this.stage = stage;
+    this.session = session;
+    this.button = byId("record");
+    /** @type {MediaRecorder | null} */
+    this.recorder = null;
+    byId("screenshot").addEventListener("click", () => this.saveScreenshot());
+    this.button.addEventListener("click", () => this.toggleRecording());
+  }
+
+  /** @param {string} extension */
+  fileName(extension) {
+    const name = (this.session.world?.name || "worlds").replace(/[^\w.-]+/g, "_");
+    const time = new Date().toISOString().slice(0, 19).replaceAll(":", "-");
+    return `flatland-${name}-${time}.${extension}`;
+  }
+
+  saveScreenshot() {
+    // Drawn in the same task: the browser clears the canvas afterwards.
+    this.stage.draw();
+    this.stage.canvas.toBlob((blob) => {
+      if (!blob) {
+        this.session.notify("error", "The browser cannot create a picture of the view");
+        return;
+      }
+      saveFile(blob, this.fileName("png"));
+      this.session.notify("info", "Screenshot saved");
+    }, "image/png");
+  }
+
+  toggleRecording() {
+    if (this.recorder) this.recorder.stop();
+    else this.startRecording();
+  }
+
+  startRecording() {
+    const format = FORMATS.find((each) => window.MediaRecorder?.isTypeSupported(each));
+    if (!format) {
+      this.session.notify("error", "This browser cannot record WebM videos");
+      return;
+    }
+    const stream = this.stage.canvas.captureStream(FRAME_RATE);
+    const recorder = new MediaRecorder(stream, { mimeType: format, videoBitsPerSecond: BIT_RATE });
+    const name = this.fileName("webm");
+    /** @type {Blob[]} */
+    const parts = [];
+    recorder.ondataavailable = (event) => parts.push(event.data);
+    recorder.onerror = () => this.session.notify("error", "The recording failed");
+    recorder.onstop = () => {
+      this.recorder = null;
+      for (const track of stream.getTracks()) track.stop();
+      this.showState(false);
+      saveFile(new Blob(parts, { type: "video/webm" }), name);
+      this.session.notify("info", `Recording saved as ${name}`);
+    };
+    recorder.start(1000);
+    this.recorder = recorder;
+    this.showState(true);
+    // A canvas that does not change has no frames; the first one is drawn for a paused world.
+    this.stage.invalidate();
+    this.session.notify("info", "Recording; press the button again to stop");
+  }
+
+  /** @param {boolean} isRecording */
+  showState(isRecording) {
+    setPressed(this.button, isRecording);
+    const label = isRecording ? "Stop recording" : "Record a video";
+    this.button.title = label;
+  }
+}

@@ -1,0 +1,75 @@
+import { byId, element, setText } from "../dom.js";
+import { css } from "../renderer/palette.js";
+
+/** Largest number of models in the list; the filter finds the others. */
+const MAX_SHOWN = 200;
+
+/**
+ * Shows the names of the models, by which they are selected.
+ *
+ * @param {import("../session.js").Session} session
+ * @param {import("../stage.js").Stage} stage
+ */
+export function createModelList(session, stage) {
+  const list = byId("model-list");
+  const filter = /** @type {HTMLInputElement} */ (byId("model-filter"));
+  let scheduled = false;
+
+  /** @param {import("../world_state.js").Model} model */
+  const createRow = (model) => {
+    const swatch = element("span", { class: "swatch", "aria-hidden": "true" });
+    const color = model.bodies[0]?.color;
+    if (color) swatch.style.background = css(color);
+    const isSelected = model.name === session.selectedName;
+    const button = element(
+      "button",
+      { type: "button", "aria-pressed": String(isSelected), "data-model": model.name },
+      swatch,
+      element("span", {}, model.name),
+    );
+    button.addEventListener("click", () => {
+      session.select(model.name);
+      const pose = session.world?.modelPose(model);
+      if (!pose || stage.followed !== null) return;
+      const [px, py] = stage.camera.toScreen(pose[0], pose[1]);
+      const isVisible = px > 0 && py > 0 && px < stage.camera.width && py < stage.camera.height;
+      if (!isVisible) stage.centerOn(pose[0], pose[1]);
+    });
+    return element("li", {}, button);
+  };
+
+  const rebuild = () => {
+    scheduled = false;
+    const models = [...(session.world?.models.values() ?? [])];
+    const wanted = filter.value.trim().toLowerCase();
+    const found = models.filter((model) => model.name.toLowerCase().includes(wanted));
+    const focused = document.activeElement?.getAttribute("data-model");
+    list.replaceChildren(...found.slice(0, MAX_SHOWN).map(createRow));
+    if (found.length > MAX_SHOWN) {
+      list.append(element("li", { class: "muted" }, `and ${found.length - MAX_SHOWN} more`));
+    }
+    if (focused) {
+      const again = [...list.querySelectorAll("button")].find((row) => row.dataset.model === focused);
+      again?.focus({ preventScroll: true });
+    }
+    filter.hidden = models.length < 8 && wanted === "";
+    setText(byId("model-count"), String(models.length));
+  };
+  const schedule = () => {
+    if (scheduled) return;
+    scheduled = true;
+    window.requestAnimationFrame(rebuild);
+  };
+
+  filter.addEventListener("input", schedule);
+  session.on("models", schedule);
+  session.on("current", schedule);
+  session.on("hello", schedule);
+  session.on("selection", () => {
+    for (const row of list.querySelectorAll("button")) {
+      const isSelected = row.dataset.model === session.selectedName;
+      row.setAttribute("aria-pressed", String(isSelected));
+      if (isSelected) row.scrollIntoView({ block: "nearest" });
+    }
+  });
+}

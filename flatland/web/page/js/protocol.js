@@ -1,0 +1,119 @@
+/**
+ * Messages of the subprotocol `flatland.1`, see docs/web_protocol.md.
+ *
+ * @typedef {import("./geometry.js").Point} Point
+ * @typedef {import("./geometry.js").Pose} Pose
+ * @typedef {import("./geometry.js").Bounds} Bounds
+ *
+ * @typedef {{kind: "circle", center: Point, radius: number, layers?: string[]}} CircleShape
+ * @typedef {{kind: "polygon", points: Point[], layers?: string[]}} PolygonShape
+ * @typedef {{kind: "edges", points: Point[], layers?: string[]}} EdgesShape
+ * @typedef {(CircleShape | PolygonShape | EdgesShape) & {sensor?: boolean}} Shape
+ *
+ * @typedef {{id: number, name: string, color: number[], type?: string, shapes: Shape[]}} BodyInfo
+ * @typedef {{id: number, topic: string, body: number, origin: Pose, angle_min: number,
+ *   angle_increment: number, count: number, range_max: number}} LaserInfo
+ * @typedef {{name: string, color: number[], bodies: number[], anchors: Point[]}} JointInfo  anchors
+ *   in the frames of the two bodies
+ * @typedef {{id: number, name: string, namespace?: string, file?: string|null, bodies: BodyInfo[],
+ *   lasers: LaserInfo[], joints: JointInfo[], commands: string[], outputs: string[]}} ModelInfo
+ * @typedef {{name: string, color: number[], edges: number}} LayerInfo
+ * @typedef {{label: string, path: string}} ModelFile
+ * @typedef {{world: number, name: string}} WorldName
+ * @typedef {{parent: string, child: string, pose: Pose}} FrameInfo
+ * @typedef {{topic: string, type: string, time: number|null, value: any, kind?: string}} TopicValue
+ * @typedef {{name: string, type: string, parameters: Record<string, any>}} PluginInfo
+ *
+ * @typedef {{version: string|number, title: string, read_only: boolean, worlds: WorldName[],
+ *   limits?: Record<string, number>}} HelloMessage
+ * @typedef {{world: number, name: string, revision: number, bounds: Bounds|null, step_size: number,
+ *   lockstep: boolean, layers: LayerInfo[], model_files: ModelFile[]}} WorldMessage
+ * @typedef {{world: number, revision: number, complete: boolean,
+ *   models: ModelInfo[], removed: number[]}} ModelsMessage
+ * @typedef {{world: number, time: number, paused: boolean, rate: number|null,
+ *   real_time_factor: number|null, lockstep?: boolean, stale?: number}} StatusMessage
+ * @typedef {{world: number, model: number, pose: Pose, velocity: number[]|null, mass: number,
+ *   inertia: number, contacts: string[], plugins: PluginInfo[], topics: TopicValue[]}} DetailsMessage
+ * @typedef {{color: number[], pose: Pose, shapes: Shape[]}} PreviewBody
+ * @typedef {{world: number, time: number, series: Record<string, number>}} ValuesMessage
+ * @typedef {{world: number, frames: FrameInfo[]}} FramesMessage
+ *
+ * @typedef {{kind: "edges", world: number, revision: number, time: number, layer: number,
+ *   edges: Float32Array}} EdgesData  four numbers for each edge
+ * @typedef {{kind: "poses", world: number, revision: number, time: number, ids: Uint32Array,
+ *   poses: Float32Array}} PosesData  three numbers for each body
+ * @typedef {{id: number, pose: Pose, ranges: Uint16Array}} Scan  fractions of the maximum range,
+ *   MAX_FRACTION for the whole, NO_HIT for none
+ * @typedef {{kind: "scans", world: number, revision: number, time: number, scans: Scan[]}} ScansData
+ */
+
+/** Name of the WebSocket subprotocol. */
+export const SUBPROTOCOL = "flatland.1";
+/** Code that closes a connection without a valid token. */
+export const WRONG_TOKEN = 4401;
+/** Range of a beam that stands for the maximum range of its laser. */
+export const MAX_FRACTION = 0xfffe;
+/** Range of a beam that hits nothing. */
+export const NO_HIT = 0xffff;
+
+const BINARY_VERSION = 1;
+const HEADER_SIZE = 16;
+
+/**
+ * Returns the content of a binary message. The arrays are views of the buffer.
+ *
+ * @param {ArrayBuffer} buffer
+ * @returns {EdgesData | PosesData | ScansData | null} null for a kind that is not known
+ * @throws {RangeError} if the message is shorter than its counts state
+ * @throws {Error} if its version is not supported
+ */
+export function decodeBinary(buffer) {
+  const view = new DataView(buffer);
+  const kind = view.getUint8(0);
+  const version = view.getUint8(1);
+  if (version !== BINARY_VERSION) throw new Error(`unsupported version ${version} of a binary message`);
+  const header = {
+    world: view.getUint16(2, true),
+    revision: view.getUint32(4, true),
+    time: view.getFloat64(8, true),
+  };
+  const first = view.getUint32(HEADER_SIZE, true);
+  const start = HEADER_SIZE + 4;
+  if (kind === 1) {
+    const count = view.getUint32(start, true);
+    return { kind: "edges", ...header, layer: first, edges: new Float32Array(buffer, start + 4, 4 * count) };
+  }
+  if (kind === 2) {
+    return {
+      kind: "poses",
+      ...header,
+      ids: new Uint32Array(buffer, start, first),
+      poses: new Float32Array(buffer, start + 4 * first, 3 * first),
+    };
+  }
+  if (kind === 3) return { kind: "scans", ...header, scans: decodeScans(view, start, first) };
+  return null;
+}
+
+/**
+ * @param {DataView} view
+ * @param {number} offset
+ * @param {number} count
+ */
+function decodeScans(view, offset, count) {
+  /** @type {Scan[]} */
+  const scans = [];
+  for (let i = 0; i < count; i++) {
+    const id = view.getUint32(offset, true);
+    const beams = view.getUint32(offset + 4, true);
+    /** @type {Pose} */
+    const pose = [
+      view.getFloat32(offset + 8, true),
+      view.getFloat32(offset + 12, true),
+      view.getFloat32(offset + 16, true),
+    ];
+    scans.push({ id, pose, ranges: new Uint16Array(view.buffer, offset + 20, beams) });
+    offset += 20 + 4 * Math.ceil(beams / 2);
+  }
+  return scans;
+}

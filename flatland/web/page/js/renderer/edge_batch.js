@@ -1,0 +1,130 @@
+import { addAttributes, createProgram } from "./gl.js";
+import { coloredEdgesFragment, coloredEdgesVertex } from "./shaders.js";
+import { useProgram } from "./view.js";
+
+/** Words of an edge: four coordinates, colour, width, time. */
+export const EDGE_WORDS = 7;
+const STRIDE = 4 * EDGE_WORDS;
+
+/**
+ * Returns the program that draws edges with colours of their own.
+ *
+ * @param {WebGL2RenderingContext} gl
+ */
+export function createColoredEdgeProgram(gl) {
+  const names = ["a_segment", "a_color", "a_width", "a_time"];
+  return createProgram(gl, coloredEdgesVertex, coloredEdgesFragment, names);
+}
+
+/**
+ * Returns a vertex array of a buffer of coloured edges.
+ *
+ * @param {WebGL2RenderingContext} gl
+ * @param {WebGLBuffer} buffer
+ */
+export function createColoredEdgeArray(gl, buffer) {
+  const array = gl.createVertexArray();
+  addAttributes(gl, array, buffer, STRIDE, 1, [
+    { location: 0, size: 4 },
+    { location: 1, size: 4, type: gl.UNSIGNED_BYTE, normalized: true, offset: 16 },
+    { location: 2, size: 1, offset: 20 },
+    { location: 3, size: 1, offset: 24 },
+  ]);
+  return array;
+}
+
+/**
+ * Returns a colour as four bytes.
+ *
+ * @param {ArrayLike<number>} color
+ * @param {number} [opacity]  factor
+ */
+export function packColor(color, opacity = 1) {
+  const [r, g, b] = [color[0], color[1], color[2]].map((part) => Math.round(255 * part));
+  const a = Math.round(255 * (color[3] ?? 1) * opacity);
+  return ((a << 24) | (b << 16) | (g << 8) | r) >>> 0;
+}
+
+/** Coloured edges that change with each frame: grid, joints, frames, handles. */
+export class EdgeBatch {
+  /**
+   * @param {WebGL2RenderingContext} gl
+   * @param {import("./gl.js").Program} program
+   */
+  constructor(gl, program) {
+    this.gl = gl;
+    this.program = program;
+    this.floats = new Float32Array(EDGE_WORDS * 256);
+    this.words = new Uint32Array(this.floats.buffer);
+    this.count = 0;
+    this.buffer = gl.createBuffer();
+    this.array = createColoredEdgeArray(gl, this.buffer);
+  }
+
+  /**
+   * Adds an edge.
+   *
+   * @param {number} x1  [m]
+   * @param {number} y1
+   * @param {number} x2
+   * @param {number} y2
+   * @param {number} color  see `packColor`
+   * @param {number} width  [CSS pixels]
+   */
+  add(x1, y1, x2, y2, color, width) {
+    const at = EDGE_WORDS * this.count++;
+    if (at + EDGE_WORDS > this.floats.length) {
+      const floats = new Float32Array(2 * this.floats.length);
+      floats.set(this.floats);
+      this.floats = floats;
+      this.words = new Uint32Array(floats.buffer);
+    }
+    this.floats[at] = x1;
+    this.floats[at + 1] = y1;
+    this.floats[at + 2] = x2;
+    this.floats[at + 3] = y2;
+    this.words[at + 4] = color;
+    this.floats[at + 5] = width;
+    this.floats[at + 6] = 0;
+  }
+
+  /**
+   * Adds a circle.
+   *
+   * @param {number} x  [m]
+   * @param {number} y
+   * @param {number} radius  [m]
+   * @param {number} color
+   * @param {number} width  [CSS pixels]
+   */
+  addCircle(x, y, radius, color, width) {
+    const count = 48;
+    let [px, py] = [x + radius, y];
+    for (let i = 1; i <= count; i++) {
+      const angle = (2 * Math.PI * i) / count;
+      const qx = x + radius * Math.cos(angle);
+      const qy = y + radius * Math.sin(angle);
+      this.add(px, py, qx, qy, color, width);
+      px = qx;
+      py = qy;
+    }
+  }
+
+  /**
+   * Draws all edges and removes them.
+   *
+   * @param {import("./view.js").Viewport} viewport
+   */
+  flush(viewport) {
+    if (this.count === 0) return;
+    const { gl, program } = this;
+    gl.bindBuffer(gl.ARRAY_BUFFER, this.buffer);
+    gl.bufferData(gl.ARRAY_BUFFER, this.floats.subarray(0, EDGE_WORDS * this.count), gl.STREAM_DRAW);
+    useProgram(gl, program, viewport);
+    gl.uniform1f(program.uniform("u_lifetime"), 0);
+    gl.uniform1f(program.uniform("u_ratio"), viewport.ratio);
+    gl.bindVertexArray(this.array);
+    gl.drawArraysInstanced(gl.TRIANGLE_STRIP, 0, 4, this.count);
+    this.count = 0;
+  }
+}

@@ -1,0 +1,121 @@
+import { sortIntoCells, visibleRanges } from "./edge_cells.js";
+import { addAttributes, createProgram } from "./gl.js";
+import { readable } from "./palette.js";
+import { edgesFragment, edgesVertex, flatFragment, thinVertex } from "./shaders.js";
+import { lineWeight, useProgram } from "./view.js";
+
+/** Width of the edges of a layer [CSS pixels]. */
+const WIDTH = 1.6;
+/** Number of edges from which a view from far away draws lines of one pixel. */
+const MANY_EDGES = 20_000;
+
+/**
+ * @typedef {object} LayerBuffer
+ * @property {WebGLBuffer} buffer
+ * @property {WebGLVertexArrayObject} wide  one instance for each edge
+ * @property {WebGLVertexArrayObject} thin  two vertices for each edge
+ * @property {import("./edge_cells.js").Cell[]} cells
+ * @property {number} meanLength  [m]
+ */
+
+/** Programs that draw the static edges of layers; shared by all worlds. */
+export class EdgeProgram {
+  /** @param {WebGL2RenderingContext} gl */
+  constructor(gl) {
+    this.wide = createProgram(gl, edgesVertex, edgesFragment, ["a_segment"]);
+    this.thin = createProgram(gl, thinVertex, flatFragment, ["a_point"]);
+  }
+}
+
+/** The static edges of the layers of a world, each in a buffer that is filled once. */
+export class EdgeLayers {
+  /**
+   * @param {WebGL2RenderingContext} gl
+   * @param {EdgeProgram} program
+   */
+  constructor(gl, program) {
+    this.gl = gl;
+    this.program = program;
+    /** @type {Map<Float32Array, LayerBuffer>} */
+    this.buffers = new Map();
+    this.version = -1;
+  }
+
+  /** @param {import("../world_state.js").WorldState} world */
+  update(world) {
+    if (this.version === world.layersVersion) return;
+    this.version = world.layersVersion;
+    this.keepOnly(new Set(world.layers.map((layer) => layer.edges)));
+    for (const { edges } of world.layers) {
+      if (edges && edges.length > 0 && !this.buffers.has(edges)) this.buffers.set(edges, this.upload(edges));
+    }
+  }
+
+  /** @param {Set<Float32Array | null>} used */
+  keepOnly(used) {
+    for (const [edges, { buffer, wide, thin }] of this.buffers) {
+      if (used.has(edges)) continue;
+      this.gl.deleteBuffer(buffer);
+      this.gl.deleteVertexArray(wide);
+      this.gl.deleteVertexArray(thin);
+      this.buffers.delete(edges);
+    }
+  }
+
+  dispose() {
+    this.keepOnly(new Set());
+  }
+
+  /**
+   * @param {Float32Array} edges
+   * @returns {LayerBuffer}
+   */
+  upload(edges) {
+    const { gl } = this;
+    const sorted = sortIntoCells(edges);
+    const buffer = gl.createBuffer();
+    const wide = gl.createVertexArray();
+    const thin = gl.createVertexArray();
+    addAttributes(gl, wide, buffer, 16, 1, [{ location: 0, size: 4 }]);
+    addAttributes(gl, thin, buffer, 8, 0, [{ location: 0, size: 2 }]);
+    gl.bindBuffer(gl.ARRAY_BUFFER, buffer);
+    gl.bufferData(gl.ARRAY_BUFFER, sorted.edges, gl.STATIC_DRAW);
+    let length = 0;
+    for (let i = 0; i < edges.length; i += 4) {
+      length += Math.hypot(edges[i + 2] - edges[i], edges[i + 3] - edges[i + 1]);
+    }
+    return { buffer, wide, thin, cells: sorted.cells, meanLength: (4 * length) / edges.length };
+  }
+
+  /**
+   * @param {import("./view.js").Viewport} viewport
+   * @param {import("../world_state.js").WorldState} world
+   * @param {import("./palette.js").Palette} palette
+   */
+  draw(viewport, world, palette) {
+    const { gl } = this;
+    for (const layer of world.layers) {
+      const entry = layer.visible && layer.edges ? this.buffers.get(layer.edges) : undefined;
+      if (!entry) continue;
+      const ranges = visibleRanges(entry.cells, viewport.camera);
+      const count = ranges.reduce((sum, range) => sum + range.count, 0);
+      // From far away, thousands of edges are shorter than their width: plain lines look the same.
+      const isThin = count > MANY_EDGES && entry.meanLength * viewport.camera.zoom < 4;
+      const program = isThin ? this.program.thin : this.program.wide;
+      useProgram(gl, program, viewport);
+      const [r, g, b, a] = readable(layer.color, palette);
+      gl.uniform4f(program.uniform("u_color"), r * a, g * a, b * a, a);
+      gl.bindVertexArray(isThin ? entry.thin : entry.wide);
+      if (isThin) {
+        for (const range of ranges) gl.drawArrays(gl.LINES, 2 * range.start, 2 * range.count);
+        continue;
+      }
+      gl.uniform1f(program.uniform("u_width"), WIDTH * lineWeight(viewport) * viewport.ratio);
+      gl.bindBuffer(gl.ARRAY_BUFFER, entry.buffer);
+      for (const range of ranges) {
+        gl.vertexAttribPointer(0, 4, gl.FLOAT, false, 16, 16 * range.start);
+        gl.drawArraysInstanced(gl.TRIANGLE_STRIP, 0, 4, range.count);
+      }
+    }
+  }
+}

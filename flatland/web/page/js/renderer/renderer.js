@@ -1,0 +1,121 @@
+import { BodyPrograms } from "./body_shapes.js";
+import { EdgeBatch, createColoredEdgeProgram } from "./edge_batch.js";
+import { EdgeProgram } from "./edge_layers.js";
+import { LabelPlaces } from "./label_places.js";
+import { addFrames, addGrid, addJoints, addNames, addShapelessModels } from "./marks.js";
+import { createPalette } from "./palette.js";
+import { ScanPrograms } from "./scan_clouds.js";
+import { TextLabels } from "./text_labels.js";
+import { WorldGraphics } from "./world_graphics.js";
+
+/**
+ * @typedef {import("../world_state.js").WorldState} WorldState
+ * @typedef {import("./view.js").Viewport} Viewport
+ *
+ * Draws what tools display in the enlarged world: selection, handles, outlines, measurements.
+ * @typedef {(batch: EdgeBatch, labels: TextLabels, viewport: Viewport,
+ *   palette: import("./palette.js").Palette) => void} Overlay
+ *
+ * @typedef {object} Scene
+ * @property {{world: WorldState, viewport: Viewport}[]} views
+ * @property {Record<import("../session.js").Display, boolean>} displays
+ * @property {import("../world_state.js").Model | null} selected
+ * @property {Overlay | null} overlay
+ * @property {boolean} isGrid  whether the views are tiles on the background of a grid
+ */
+
+/** Draws worlds into viewports of a canvas. */
+export class Renderer {
+  /**
+   * @param {WebGL2RenderingContext} gl
+   * @param {boolean} dark  whether the theme is dark
+   */
+  constructor(gl, dark) {
+    this.gl = gl;
+    this.palette = createPalette(dark);
+    /** @type {import("./world_graphics.js").Programs} */
+    this.programs = {
+      layers: new EdgeProgram(gl),
+      bodies: new BodyPrograms(gl),
+      scans: new ScanPrograms(gl),
+      coloredEdges: createColoredEdgeProgram(gl),
+    };
+    this.batch = new EdgeBatch(gl, this.programs.coloredEdges);
+    this.labels = new TextLabels(gl);
+    /** @type {Map<WorldState, WorldGraphics>} */
+    this.graphics = new Map();
+    gl.enable(gl.BLEND);
+    gl.blendFunc(gl.ONE, gl.ONE_MINUS_SRC_ALPHA);
+    gl.pixelStorei(gl.UNPACK_ALIGNMENT, 1);
+  }
+
+  /** @param {boolean} dark */
+  setTheme(dark) {
+    this.palette = createPalette(dark);
+  }
+
+  /**
+   * Releases the graphics of worlds that no longer exist.
+   *
+   * @param {Iterable<WorldState>} worlds
+   */
+  keepOnly(worlds) {
+    const kept = new Set(worlds);
+    for (const [world, graphics] of this.graphics) {
+      if (kept.has(world)) continue;
+      graphics.dispose();
+      this.graphics.delete(world);
+    }
+  }
+
+  /** @param {Scene} scene */
+  draw(scene) {
+    const { gl, palette } = this;
+    const { canvas } = gl;
+    gl.disable(gl.SCISSOR_TEST);
+    gl.clearColor(...(scene.isGrid ? palette.gaps : palette.background), 1);
+    gl.clear(gl.COLOR_BUFFER_BIT);
+    gl.viewport(0, 0, canvas.width, canvas.height);
+    if (scene.isGrid) gl.enable(gl.SCISSOR_TEST);
+    gl.clearColor(...palette.background, 1);
+    for (const { world, viewport } of scene.views) {
+      const { left, bottom, width, height } = viewport;
+      gl.viewport(left, bottom, width, height);
+      gl.scissor(left, bottom, width, height);
+      if (scene.isGrid) gl.clear(gl.COLOR_BUFFER_BIT);
+      this.drawWorld(world, viewport, scene);
+    }
+    gl.bindVertexArray(null);
+  }
+
+  /**
+   * @param {WorldState} world
+   * @param {Viewport} viewport
+   * @param {Scene} scene
+   */
+  drawWorld(world, viewport, { displays, selected, overlay, isGrid }) {
+    const { batch, labels, palette } = this;
+    let graphics = this.graphics.get(world);
+    if (!graphics) this.graphics.set(world, (graphics = new WorldGraphics(this.gl, this.programs)));
+    graphics.update(world, palette);
+    labels.begin(viewport.ratio);
+    addGrid(batch, viewport, palette);
+    batch.flush(viewport);
+    if (displays.scans) graphics.scans.drawAreas(viewport, palette, selected);
+    if (displays.layers) graphics.layers.draw(viewport, world, palette);
+    if (displays.trails) graphics.trails.draw(viewport, world.trails);
+    if (displays.models) {
+      graphics.bodies.draw(viewport);
+      addJoints(batch, world, palette);
+      addShapelessModels(batch, viewport, world, palette);
+    }
+    batch.flush(viewport);
+    if (displays.scans) graphics.scans.drawPoints(viewport, palette);
+    const places = new LabelPlaces();
+    if (displays.names && !isGrid) addNames(labels, places, viewport, world);
+    if (displays.frames) addFrames(batch, labels, places, viewport, world, palette);
+    overlay?.(batch, labels, viewport, palette);
+    batch.flush(viewport);
+    labels.draw(viewport, palette);
+  }
+}

@@ -1,0 +1,89 @@
+import { TRAIL_CAPACITY, TRAIL_LIFETIME } from "../trails.js";
+import { EDGE_WORDS, createColoredEdgeArray, packColor } from "./edge_batch.js";
+import { useProgram } from "./view.js";
+
+const WIDTH = 2;
+const OPACITY = 0.75;
+
+/** Draws the trails of a world. A frame uploads only the segments added since the last one. */
+export class TrailLines {
+  /**
+   * @param {WebGL2RenderingContext} gl
+   * @param {import("./gl.js").Program} program  of coloured edges
+   */
+  constructor(gl, program) {
+    this.gl = gl;
+    this.program = program;
+    this.buffer = gl.createBuffer();
+    this.array = createColoredEdgeArray(gl, this.buffer);
+    this.isAllocated = false;
+    this.uploaded = 0;
+    this.generation = -1;
+    /** @type {import("./palette.js").Palette | null} */
+    this.palette = null;
+  }
+
+  /**
+   * @param {import("../trails.js").Trails} trails
+   * @param {import("./palette.js").Palette} palette
+   */
+  update(trails, palette) {
+    const { gl } = this;
+    gl.bindBuffer(gl.ARRAY_BUFFER, this.buffer);
+    if (!this.isAllocated) {
+      gl.bufferData(gl.ARRAY_BUFFER, 4 * EDGE_WORDS * TRAIL_CAPACITY, gl.DYNAMIC_DRAW);
+      this.isAllocated = true;
+    }
+    if (this.generation !== trails.generation || this.palette !== palette) this.uploaded = 0;
+    this.generation = trails.generation;
+    this.palette = palette;
+    let from = Math.max(this.uploaded, trails.added - TRAIL_CAPACITY);
+    while (from < trails.added) {
+      const start = from % TRAIL_CAPACITY;
+      const count = Math.min(trails.added - from, TRAIL_CAPACITY - start);
+      gl.bufferSubData(gl.ARRAY_BUFFER, 4 * EDGE_WORDS * start, packSegments(trails, start, count, palette));
+      from += count;
+    }
+    this.uploaded = trails.added;
+  }
+
+  /**
+   * @param {import("./view.js").Viewport} viewport
+   * @param {import("../trails.js").Trails} trails
+   */
+  draw(viewport, trails) {
+    const count = Math.min(trails.added, TRAIL_CAPACITY);
+    if (count === 0) return;
+    const { gl, program } = this;
+    useProgram(gl, program, viewport);
+    gl.uniform1f(program.uniform("u_time"), trails.time - trails.epoch);
+    gl.uniform1f(program.uniform("u_lifetime"), TRAIL_LIFETIME);
+    gl.uniform1f(program.uniform("u_ratio"), viewport.ratio);
+    gl.bindVertexArray(this.array);
+    gl.drawArraysInstanced(gl.TRIANGLE_STRIP, 0, 4, count);
+  }
+
+  dispose() {
+    this.gl.deleteBuffer(this.buffer);
+    this.gl.deleteVertexArray(this.array);
+  }
+}
+
+/**
+ * @param {import("../trails.js").Trails} trails
+ * @param {number} start
+ * @param {number} count
+ * @param {import("./palette.js").Palette} palette
+ */
+function packSegments(trails, start, count, palette) {
+  const floats = new Float32Array(EDGE_WORDS * count);
+  const words = new Uint32Array(floats.buffer);
+  for (let i = 0; i < count; i++) {
+    const at = EDGE_WORDS * i;
+    floats.set(trails.segments.subarray(4 * (start + i), 4 * (start + i) + 4), at);
+    words[at + 4] = packColor(palette.series[trails.colors[start + i] % palette.series.length], OPACITY);
+    floats[at + 5] = WIDTH;
+    floats[at + 6] = trails.times[start + i];
+  }
+  return floats;
+}

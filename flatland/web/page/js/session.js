@@ -1,0 +1,274 @@
+import { Emitter } from "./events.js";
+import { WorldState } from "./world_state.js";
+
+/**
+ * @typedef {"layers" | "models" | "scans" | "frames" | "names" | "trails"} Display
+ * @typedef {import("./world_state.js").Model} Model
+ *
+ * @typedef {object} SessionEvents
+ * @property {void} hello  the server has sent the list of worlds
+ * @property {WorldState} world  a world has been replaced
+ * @property {WorldState} models  models have been added, removed or changed
+ * @property {WorldState} status
+ * @property {void} current  another world, or all worlds, are displayed
+ * @property {void} selection
+ * @property {void} displays
+ * @property {void} redraw  something that is drawn has changed
+ * @property {import("./protocol.js").DetailsMessage} details
+ * @property {import("./protocol.js").ValuesMessage} values
+ * @property {{level: string, text: string, topic?: string}} notice  replaces those of the same topic
+ */
+
+/** @type {Display[]} */
+export const DISPLAYS = ["layers", "models", "scans", "frames", "names", "trails"];
+
+/**
+ * The worlds of the server and what the user looks at.
+ *
+ * @extends {Emitter<SessionEvents>}
+ */
+export class Session extends Emitter {
+  /** @param {import("./connection.js").Connection} connection */
+  constructor(connection) {
+    super();
+    this.connection = connection;
+    this.title = "flatland";
+    this.readOnly = false;
+    /** @type {Map<number, WorldState>} */
+    this.worlds = new Map();
+    /** Index of the displayed world, null for the grid of all worlds.
+     * @type {number | null} */
+    this.currentIndex = null;
+    /** Name of the selected model of the displayed world.
+     * @type {string | null} */
+    this.selectedName = null;
+    /** @type {Record<Display, boolean>} */
+    this.displays = { layers: true, models: true, scans: true, frames: false, names: true, trails: false };
+    /** @type {Set<string>} */
+    this.series = new Set();
+    this.hidden = document.hidden;
+    this.ready = false;
+    this.lookScheduled = false;
+    connection.on("message", (message) => this.receive(message));
+    connection.on("data", (data) => this.receiveData(data));
+    connection.on("state", (state) => {
+      if (state !== "connected") this.ready = false;
+      this.emit("redraw", undefined);
+    });
+  }
+
+  /** The displayed world, null for the grid. */
+  get world() {
+    return this.currentIndex === null ? null : (this.worlds.get(this.currentIndex) ?? null);
+  }
+
+  /** The selected model, null if there is none. */
+  get selected() {
+    return this.selectedName === null ? null : (this.world?.modelByName(this.selectedName) ?? null);
+  }
+
+  /**
+   * Sends a request about the displayed world.
+   *
+   * @param {string} type
+   * @param {Record<string, any>} [fields]
+   */
+  request(type, fields = {}) {
+    return this.connection.request(type, { world: this.currentIndex ?? 0, ...fields });
+  }
+
+  /**
+   * Sends a request about the displayed world and shows its error as a notice.
+   *
+   * @param {string} type
+   * @param {Record<string, any>} [fields]
+   * @returns {Promise<{result: any} | null>} null after an error
+   */
+  async attempt(type, fields = {}) {
+    try {
+      return { result: await this.request(type, fields) };
+    } catch (error) {
+      this.notify("error", error instanceof Error ? error.message : String(error));
+      return null;
+    }
+  }
+
+  /**
+   * @param {"info" | "warning" | "error"} level
+   * @param {string} text
+   * @param {string} [topic]  earlier notices of the same topic are removed
+   */
+  notify(level, text, topic) {
+    this.emit("notice", { level, text, topic });
+  }
+
+  /**
+   * Displays a world, or the grid of all worlds.
+   *
+   * @param {number | null} index
+   */
+  show(index) {
+    if (index === this.currentIndex) return;
+    // The address may name a model before the server has listed the worlds.
+    if (this.currentIndex !== null) this.selectedName = null;
+    this.currentIndex = index;
+    this.emit("current", undefined);
+    this.emit("selection", undefined);
+    this.look();
+  }
+
+  /** @param {string | null} name  name of a model */
+  select(name) {
+    if (name === this.selectedName) return;
+    this.selectedName = name;
+    this.emit("selection", undefined);
+    this.emit("redraw", undefined);
+    this.look();
+  }
+
+  /**
+   * @param {Display} display
+   * @param {boolean} shown
+   */
+  setDisplay(display, shown) {
+    this.displays[display] = shown;
+    this.emit("displays", undefined);
+    this.emit("redraw", undefined);
+    this.look();
+  }
+
+  /** @param {string[]} names  numbers to plot */
+  setSeries(names) {
+    this.series = new Set(names);
+    this.look();
+  }
+
+  /** @param {boolean} hidden  whether the page is in the background */
+  setHidden(hidden) {
+    this.hidden = hidden;
+    if (!hidden) this.connection.probe("look", this.demands());
+    else if (this.ready) this.connection.request("look", this.demands()).catch(() => {});
+  }
+
+  /** Sends what is displayed to the server, once for all changes of a task. */
+  look() {
+    if (this.lookScheduled) return;
+    this.lookScheduled = true;
+    queueMicrotask(() => {
+      this.lookScheduled = false;
+      if (!this.ready) return;
+      this.connection.request("look", this.demands()).catch((error) => {
+        if (this.ready) this.notify("error", error.message);
+      });
+    });
+  }
+
+  demands() {
+    const shown = this.world ? [this.world] : [...this.worlds.values()];
+    return {
+      worlds: shown.map((world) => world.index),
+      scans: this.displays.scans,
+      frames: this.displays.frames && this.world !== null,
+      inspect: this.selected?.id ?? null,
+      series: this.world ? [...this.series] : [],
+      hidden: this.hidden,
+    };
+  }
+
+  /** @param {{type: string} & Record<string, any>} message */
+  receive(message) {
+    if (message.type === "hello") {
+      this.applyHello(/** @type {any} */ (message));
+      return;
+    }
+    if (message.type === "notice") {
+      this.emit("notice", { level: message.level, text: message.text });
+      return;
+    }
+    const world = this.worlds.get(message.world);
+    if (world) this.receiveWorld(world, message);
+  }
+
+  /** @param {import("./protocol.js").HelloMessage} message */
+  applyHello(message) {
+    this.title = message.title;
+    this.readOnly = message.read_only;
+    // The first one of a connection: ids of an earlier connection have no meaning any more.
+    const before = this.ready ? this.worlds : new Map();
+    this.ready = true;
+    this.worlds = new Map();
+    for (const { world, name } of message.worlds) {
+      this.worlds.set(world, before.get(world) ?? new WorldState(world, name));
+    }
+    this.showExisting();
+    this.emit("hello", undefined);
+    this.look();
+  }
+
+  /** Displays the only world, or all worlds if the displayed one does not exist any more. */
+  showExisting() {
+    const present = [...this.worlds.keys()];
+    if (present.length === 1) this.show(present[0]);
+    else if (this.currentIndex !== null && !this.worlds.has(this.currentIndex)) this.show(null);
+  }
+
+  /** @param {WorldState} world */
+  removeWorld(world) {
+    this.worlds.delete(world.index);
+    this.showExisting();
+    this.emit("hello", undefined);
+  }
+
+  /**
+   * @param {WorldState} world
+   * @param {{type: string} & Record<string, any>} message
+   */
+  receiveWorld(world, message) {
+    switch (message.type) {
+      case "world":
+        world.applyWorld(/** @type {any} */ (message));
+        this.emit("world", world);
+        break;
+      case "models": {
+        const inspected = this.selected?.id;
+        world.applyModels(/** @type {any} */ (message));
+        if (world === this.world && this.selected?.id !== inspected) {
+          this.emit("selection", undefined);
+          this.look();
+        }
+        this.emit("models", world);
+        break;
+      }
+      case "status":
+        world.status = /** @type {any} */ (message);
+        world.lockstep = message.lockstep ?? world.lockstep;
+        this.emit("status", world);
+        return;
+      case "frames":
+        world.frames = message.frames;
+        break;
+      case "details":
+        if (world === this.world) this.emit("details", /** @type {any} */ (message));
+        return;
+      case "values":
+        if (world === this.world) this.emit("values", /** @type {any} */ (message));
+        return;
+      case "gone":
+        this.removeWorld(world);
+        break;
+      default:
+        return;
+    }
+    this.emit("redraw", undefined);
+  }
+
+  /** @param {import("./connection.js").ConnectionEvents["data"]} data */
+  receiveData(data) {
+    const world = this.worlds.get(data.world);
+    if (!world?.present) return;
+    if (data.kind === "edges") world.applyEdges(data);
+    else if (data.kind === "poses") world.applyPoses(data);
+    else world.applyScans(data);
+    this.emit("redraw", undefined);
+  }
+}

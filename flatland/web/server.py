@@ -1,0 +1,117 @@
+"""The HTTP server: the files of the page, and the connections of clients."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import re
+from collections.abc import Awaitable, Callable
+from pathlib import Path
+from typing import Final
+
+from aiohttp import WSCloseCode, web
+
+from flatland.web.access import Access
+from flatland.web.client import Client
+from flatland.web.hub import Hub
+from flatland.web.messages import MAX_SIZE
+
+_LOG = logging.getLogger("flatland")
+
+Handler = Callable[[web.Request], Awaitable[web.StreamResponse]]
+
+PAGE: Final = Path(__file__).parent / "page"
+SUBPROTOCOL: Final = "flatland.1"
+WRONG_TOKEN: Final = 4401  # code that closes a connection
+HEARTBEAT: Final = 10.0  # s between two pings; a client that does not answer is disconnected
+MAX_CLIENTS: Final = 64
+
+_TYPES: Final = {
+    ".html": "text/html; charset=utf-8",
+    ".css": "text/css; charset=utf-8",
+    ".js": "text/javascript; charset=utf-8",
+    ".json": "application/json",
+    ".webmanifest": "application/manifest+json",
+    ".svg": "image/svg+xml",
+    ".png": "image/png",
+    ".ico": "image/x-icon",
+}
+# No part begins with a dot, so that no file outside the folder can be named.
+_FILE_NAME: Final = re.compile(r"[\w-][\w.-]*(/[\w-][\w.-]*)*", re.ASCII)
+_POLICY: Final = (
+    "default-src 'self'; img-src 'self' data: blob:; media-src 'self' blob:; object-src 'none'; "
+    "base-uri 'none'; form-action 'none'; frame-ancestors {ancestors}"
+)
+# Notebooks on this machine show the page in a frame. A foreign page does not know the token.
+_LOCAL_ANCESTORS: Final = (
+    "'self' http://localhost:* http://127.0.0.1:* https://localhost:* https://127.0.0.1:*"
+)
+
+
+class Server:
+    """Answers the requests of browsers."""
+
+    def __init__(self, hub: Hub, access: Access, page: Path = PAGE) -> None:
+        """Creates a server.
+
+        Args:
+            hub: The worlds.
+            access: Decides who may connect.
+            page: Folder of the files of the page.
+        """
+        self._hub = hub
+        self._access = access
+        self._page = page
+        ancestors = _LOCAL_ANCESTORS if access.token is None else "*"
+        self._headers = {
+            "Content-Security-Policy": _POLICY.format(ancestors=ancestors),
+            "X-Content-Type-Options": "nosniff",
+            "Referrer-Policy": "no-referrer",  # The address contains the token.
+            "Cache-Control": "no-cache",  # Files are used again only if their ETag is the same.
+        }
+
+    def application(self) -> web.Application:
+        """Returns the application of aiohttp."""
+        application = web.Application(middlewares=[self._check], client_max_size=1024)
+        application.router.add_get("/ws", self._connect)
+        application.router.add_get("/{path:.*}", self._file)
+        return application
+
+    @web.middleware
+    async def _check(self, request: web.Request, handler: Handler) -> web.StreamResponse:
+        if not self._access.allows_host(request.host):
+            return web.Response(status=403, text="unknown name of the server in the header Host\n")
+        try:
+            response: web.StreamResponse = await handler(request)
+        except (web.HTTPException, ConnectionError):
+            raise
+        except Exception:
+            _LOG.exception("unexpected internal error in the web viewer")
+            return web.Response(status=500, text="internal error\n")
+        return response
+
+    async def _file(self, request: web.Request) -> web.StreamResponse:
+        name = request.match_info["path"] or "index.html"
+        path = self._page / name
+        kind = _TYPES.get(path.suffix)
+        if kind is None or not _FILE_NAME.fullmatch(name) or not path.is_file():
+            return web.Response(status=404, text="not found\n", headers=self._headers)
+        return web.FileResponse(path, headers={**self._headers, "Content-Type": kind})
+
+    async def _connect(self, request: web.Request) -> web.StreamResponse:
+        if not self._access.allows_origin(request.headers.get("Origin"), request.host):
+            return web.Response(status=403, text="pages of other sites may not connect\n")
+        socket = web.WebSocketResponse(
+            protocols=(SUBPROTOCOL,), heartbeat=HEARTBEAT, max_msg_size=MAX_SIZE, compress=False
+        )
+        if not socket.can_prepare(request):
+            return web.Response(status=400, text="a WebSocket is expected\n")
+        await socket.prepare(request)
+        if not self._access.allows_token(request.query.get("token", "")):
+            await asyncio.sleep(0.5)  # slows down guesses
+            await socket.close(code=WRONG_TOKEN, message=b"the token is missing or wrong")
+        elif len(self._hub.clients) >= MAX_CLIENTS:
+            await socket.close(code=WSCloseCode.TRY_AGAIN_LATER, message=b"too many clients")
+        else:
+            await self._hub.serve(Client(socket, self._hub))
+        return socket

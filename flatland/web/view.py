@@ -1,0 +1,135 @@
+"""A live view of a world that a program steps: in a cell of a notebook, or at an address."""
+
+from __future__ import annotations
+
+import html
+import secrets
+import sys
+from types import TracebackType
+from typing import TYPE_CHECKING
+
+from flatland.runtime.observer import WorldObserver
+from flatland.web.viewer import WebViewer
+
+if TYPE_CHECKING:
+    from flatland.world import World
+
+
+class LiveView(WorldObserver):
+    """Shows a world in the browser until it is closed, or the world is; see `World.view`.
+
+    A notebook shows it as the result of a cell. The program continues meanwhile; what it does to
+    the world is visible at once, also between two steps.
+
+    Attributes:
+        world: The world.
+    """
+
+    def __init__(
+        self,
+        world: World,
+        host: str,
+        port: int,
+        token: str | None,
+        read_only: bool,
+        height: int,
+    ) -> None:
+        """Starts a server that shows the world; `World.view` describes the arguments.
+
+        Raises:
+            FlatlandError: The world is closed, or the server cannot listen on the port.
+            ValueError: An argument is out of range.
+        """
+        if not height > 0:
+            raise ValueError(f"height must be positive [pixels], got {height}")
+        world.check_open()
+        self.world = world
+        self._height = height
+        # A notebook has an origin of its own: only a token distinguishes its frame from those of
+        # other sites.
+        self._viewer = WebViewer(
+            host, port, token=token or secrets.token_urlsafe(16), read_only=read_only
+        )
+        try:
+            self._viewer.start()
+            self._viewer.add_world(world)
+        except BaseException:
+            self._viewer.close()
+            raise
+        self._closed = False
+        world.between_steps(lambda: world.add_observer(self))
+
+    @property
+    def url(self) -> str:
+        """Address of the page, with the token."""
+        return self._viewer.url
+
+    @property
+    def closed(self) -> bool:
+        """Whether the view has ended."""
+        return self._closed
+
+    def close(self) -> None:
+        """Ends the server; the world continues. Further calls have no effect."""
+        if self._closed:
+            return
+        self._closed = True
+        self._viewer.close()
+        if not self.world.closed:
+            self.world.between_steps(lambda: self.world.remove_observer(self))
+
+    def detached(self) -> None:
+        """Ends the server with the world."""
+        self._closed = True
+        self._viewer.close()
+
+    def __enter__(self) -> LiveView:
+        """Returns the view, which is closed at the end of the block."""
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        """Closes the view."""
+        self.close()
+
+    def __repr__(self) -> str:
+        """Returns the address."""
+        return f"<LiveView {'closed' if self._closed else self.url}>"
+
+    def _repr_html_(self) -> str:
+        """Returns the page as a frame, for Jupyter."""
+        if self._closed:
+            return "<p>The view is closed.</p>"
+        return (
+            f'<iframe src="{html.escape(self.url)}" title="flatland" width="100%" '
+            f'height="{self._height}" style="border: 0" allow="fullscreen; clipboard-write">'
+            "</iframe>"
+        )
+
+
+def open_view(
+    world: World, host: str, port: int, token: str | None, read_only: bool, height: int
+) -> LiveView:
+    """Opens the view of a world instead of its previous one; see `World.view`.
+
+    Raises:
+        FlatlandError: The world is closed, or the server cannot listen on the port.
+        ValueError: An argument is out of range.
+    """
+    if world._view is not None:
+        world._view.close()
+    view = world._view = LiveView(world, host, port, token, read_only, height)
+    if not _in_notebook():
+        print(f"flatland: {view.url}", file=sys.stderr, flush=True)
+    return view
+
+
+def _in_notebook() -> bool:
+    """Returns whether the results of the program are displayed by Jupyter."""
+    ipython = sys.modules.get("IPython")
+    shell = None if ipython is None else ipython.get_ipython()
+    return shell is not None and hasattr(shell, "kernel")

@@ -1,0 +1,259 @@
+"""The viewer in the browser beside ROS: both control the same node."""
+
+from __future__ import annotations
+
+import math
+import re
+import socket
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from geometry_msgs.msg import Twist
+from nav_msgs.msg import Odometry
+from rosgraph_msgs.msg import Clock
+from std_msgs.msg import Bool
+from std_srvs.srv import Empty
+from web_client import WebClient
+
+from flatland.msg import ModelStates
+from flatland.srv import SetRate
+
+PORT_LINE = r"viewer in the browser: (http://\S+)"
+
+
+@pytest.fixture(scope="module")
+def world(write_world: Callable[..., Path]) -> Path:
+    return write_world("[{name: robot, model: robot.model.yaml, pose: [1, 2, 0]}]")
+
+
+@pytest.fixture(scope="module")
+def url(module_launcher: Any, world: Path) -> str:
+    """A node started by roslaunch, with the viewer on any free port."""
+    launch = module_launcher.launch(
+        "flatland",
+        "server.launch",
+        f"world_path:={world}",
+        "show_viz:=false",
+        "web:=true",
+        "web_port:=0",
+        "if_blocked:=refuse",
+        f"model_path:={world.parent}",
+    )
+    return str(launch.wait_for_line(PORT_LINE)[1])
+
+
+@pytest.fixture
+def client(url: str, ros: Any) -> Iterator[WebClient]:
+    with WebClient(url) as client:
+        yield client
+        client.do("resume")
+
+
+def model_poses(ros: Any) -> dict[str, tuple[float, float, float]]:
+    """Returns the poses of all models as published."""
+    message = ros.topic("/model_states", ModelStates).next()
+    poses = [(pose.x, pose.y, pose.theta) for pose in message.pose]
+    return dict(zip(message.name, poses, strict=True))
+
+
+def test_the_page_shows_the_world_of_the_node(client: WebClient, url: str, ros: Any) -> None:
+    assert re.fullmatch(r"http://127\.0\.0\.1:\d+/", url)
+    assert client.pose("robot") == pytest.approx((1, 2, 0))
+    before = client.status()["time"]
+    client.until("time", lambda: client.status()["time"] > before)
+    status = client.status()
+    assert (status["paused"], status["rate"], status["lockstep"]) == (False, 200, False)
+    assert ros.move("robot", (-1, 0.5, 1)).success
+    client.until("move", lambda: client.pose("robot") == pytest.approx((-1, 0.5, 1), abs=1e-5))
+    assert ros.move("robot", (1, 2, 0)).success
+
+
+def test_pause_and_resume_agree_with_the_services(client: WebClient, ros: Any) -> None:
+    paused = ros.topic("/flatland_server/paused", Bool)
+    assert not paused.until(lambda message: not message.data).data
+    client.do("pause")
+    paused.until(lambda message: message.data)
+    ros.call("/resume", Empty)
+    client.until_status(paused=False)
+    ros.call("/pause", Empty)
+    client.until_status(paused=True)
+    client.do("resume")
+    paused.until(lambda message: not message.data)
+
+
+def test_set_rate_agrees_with_the_service(client: WebClient, ros: Any, eventually: Any) -> None:
+    client.do("set_rate", rate=50)
+    client.until_status(rate=50)
+    # Clients of ROS read the rate here.
+    eventually("rate", lambda: ros.master.getParam("/flatland_server/update_rate") == 50)
+    assert ros.call("/set_rate", SetRate, 200).success
+    client.until_status(rate=200)
+
+
+def test_single_steps_of_a_paused_world(client: WebClient, ros: Any) -> None:
+    client.do("pause")
+    start = client.until_status(paused=True)["time"]
+    clock = ros.topic("/clock", Clock)
+    client.do("step", n=3)
+    client.until("three steps", lambda: client.status()["time"] > start)
+    assert client.status()["time"] == pytest.approx(start + 0.015, abs=1e-9)
+    clock.until(lambda message: message.clock.to_sec() == pytest.approx(start + 0.015, abs=1e-9))
+    assert client.status()["paused"]
+
+
+def test_models_are_spawned_moved_and_deleted_as_by_the_services(
+    client: WebClient, ros: Any, world: Path
+) -> None:
+    files = {each["label"]: each["path"] for each in client.do("files")}
+    ball = next(path for label, path in files.items() if "ball" in label)
+    client.do("spawn", file=ball, name="ball", pose=[0, -2, 0])
+    assert client.pose("ball") == pytest.approx((0, -2, 0))
+    assert "ball" in model_poses(ros)
+    # The parameters of the node apply to both.
+    number = client.model("ball")["id"]
+    assert "overlaps" in client.refused("move", model=number, pose=[1, 2, 0])
+    assert "already exists" in client.refused("spawn", file=ball, name="robot", pose=[3, 3, 0])
+    assert "model_path" in client.refused("spawn", file="/etc/passwd", name="x", pose=[3, 3, 0])
+    client.do("move", model=number, pose=[0, -3, math.pi / 2])
+    assert model_poses(ros)["ball"] == pytest.approx((0, -3, math.pi / 2))
+    client.do("delete", model=number)
+    client.until("deletion", lambda: "ball" not in client.worlds[0]["models"])
+    assert "ball" not in model_poses(ros)
+
+
+def test_a_spawned_robot_has_topics(client: WebClient, ros: Any, world: Path) -> None:
+    robot = str(world.parent / "robot.model.yaml")
+    client.do("spawn", file=robot, name="second", namespace="second", pose=[-3, -3, 0])
+    truth = ros.topic("/second/odometry/ground_truth", Odometry)
+    assert truth.next().pose.pose.position.x == pytest.approx(-3)
+    client.do("delete", model=client.model("second")["id"])
+
+
+def test_page_and_topic_drive_the_same_command(client: WebClient, ros: Any) -> None:
+    truth = ros.topic("/odometry/ground_truth", Odometry)
+    robot = client.model("robot")
+    (command,) = robot["commands"]
+    client.do("drive", model=robot["id"], command=command, linear=[0.5, 0], angular=0)
+    truth.until(lambda message: message.twist.twist.linear.x == pytest.approx(0.5))
+    # Without further messages, the robot stops: here, as if the key had got stuck.
+    truth.until(lambda message: message.twist.twist.linear.x == 0)
+    twist = Twist()
+    twist.linear.x = -0.25
+    ros.publisher("/cmd_vel", Twist).publish(twist)
+    truth.until(lambda message: message.twist.twist.linear.x == pytest.approx(-0.25))
+    # A stop by the page ends the command of the topic too.
+    client.do("drive", model=robot["id"], command=command, linear=[0, 0], angular=0)
+    truth.until(lambda message: message.twist.twist.linear.x == 0)
+
+
+def test_the_inspector_shows_the_latest_values_of_topics(client: WebClient, ros: Any) -> None:
+    robot = client.model("robot")
+    truth = ros.topic("/odometry/ground_truth", Odometry).next()
+    client.look(inspect=robot["id"])
+
+    def values() -> dict[str, Any]:
+        details = [text for text in client.texts if text["type"] == "details"]
+        return {topic["topic"]: topic for topic in details[-1]["topics"]} if details else {}
+
+    client.until("a value", lambda: values().get("/odometry/ground_truth", {}).get("value"))
+    topics = values()
+    assert str(round(truth.pose.pose.position.x, 3)) in str(topics["/odometry/ground_truth"])
+    assert topics["/cmd_vel"]["kind"] == "command"
+    assert "/scan" in topics
+
+
+def test_a_drag_in_rviz_and_one_on_the_page_share_the_pause(client: WebClient, ros: Any) -> None:
+    from visualization_msgs.msg import InteractiveMarkerFeedback as Feedback
+
+    handles = ros.publisher("/interactive_model_markers/feedback", Feedback)
+    drag = Feedback(client_id="rviz", marker_name="robot", event_type=Feedback.MOUSE_DOWN)
+    drag.header.frame_id = "map"
+    drag.pose.position.x, drag.pose.position.y, drag.pose.orientation.w = 1, 2, 1
+    handles.publish(drag)
+    client.until_status(paused=True)
+    client.do("hold", model=client.model("robot")["id"])
+    # RViz stops sending feedback, which ends its drag; the page still holds the model.
+    drag.event_type = Feedback.MOUSE_UP
+    drag.pose.position.x = -2
+    handles.publish(drag)
+    client.until("release", lambda: client.pose("robot")[0] == pytest.approx(-2))
+    assert client.until_status(paused=True)["paused"]
+    client.do("release", model=client.model("robot")["id"])
+    client.until_status(paused=False)
+
+
+# -- the start of the viewer -----------------------------------------------------------------
+
+
+def test_a_port_in_use_is_an_error_and_the_simulator_continues(
+    launcher: Any, ros: Any, world: Path
+) -> None:
+    with socket.create_server(("127.0.0.1", 0)) as taken:
+        port = taken.getsockname()[1]
+        process = launcher.server(world, web=True, web_port=port)
+        line = process.wait_for_line(r"\[ERROR\]").string
+    assert (
+        f"the viewer in the browser cannot start: the viewer cannot listen on port {port}" in line
+    )
+    assert line.endswith("The simulator continues without it")
+    clock = ros.topic("/clock", Clock)
+    now = clock.next().clock
+    clock.until(lambda message: message.clock > now)
+    assert process.stop() == 0
+    assert "Traceback" not in process.output
+
+
+def test_a_restarted_simulator_is_shown_at_the_same_address(launcher: Any, world: Path) -> None:
+    first = launcher.server(world, web=True, web_port=0)
+    url = first.wait_for_line(PORT_LINE)[1]
+    port = int(url.rsplit(":", 1)[1].strip("/"))
+    with WebClient(url) as client:
+        assert client.pose("robot")
+        # The new node has the name of the first one, which ends, and takes its port.
+        second = launcher.start(world_path=world, web=True, web_port=port)
+        with pytest.raises(ConnectionError):
+            client.until("the end of the connection", lambda: False)
+    assert first.wait() == 1
+    assert second.wait_for_line(PORT_LINE)[1] == url
+    with WebClient(url) as client:
+        assert client.pose("robot") == pytest.approx((1, 2, 0))
+    assert second.stop() == 0
+    assert "Traceback" not in first.output + second.output
+
+
+def test_access_from_other_machines_requires_a_token(launcher: Any, world: Path) -> None:
+    process = launcher.server(world, web=True, web_host="0.0.0.0", web_port=0, web_read_only=True)
+    url = process.wait_for_line(PORT_LINE)[1]
+    address, token = re.fullmatch(r"http://[^/]+:(\d+)/\?token=(\S{16,})", url).groups()
+    with WebClient(f"http://127.0.0.1:{address}/?token={token}") as client:
+        assert client.hello["read_only"]
+        assert "read-only" in client.refused("pause")
+    with pytest.raises(ConnectionError, match="4401"):
+        WebClient(f"http://127.0.0.1:{address}/?token=guess")
+
+
+def test_the_page_steps_a_world_in_lockstep(launcher: Any, ros: Any, world: Path) -> None:
+    process = launcher.server(world, web=True, web_port=0, lockstep=True, clock_rate=1)
+    clock = ros.topic("/clock", Clock)
+    with WebClient(process.wait_for_line(PORT_LINE)[1]) as client:
+        status = client.status()
+        assert (status["lockstep"], status["time"]) == (True, 0)
+        assert (status["rate"], status["real_time_factor"]) == (None, None)
+        client.do("step", n=40)
+        client.until("step", lambda: client.status()["time"] == pytest.approx(0.2))
+        clock.until(lambda message: message.clock.to_sec() == pytest.approx(0.2))
+        assert "lockstep" in client.refused("set_rate", rate=10)
+
+
+def test_without_the_viewer_its_modules_are_not_imported() -> None:
+    """They take longer to import than a small world to load."""
+    code = (
+        "import sys, flatland.ros.node, flatland.ros.services, flatland.ros.browser_viewer\n"
+        "print(sorted(m for m in sys.modules if m in ('aiohttp', 'flatland.web')))"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "[]"

@@ -1,0 +1,405 @@
+"""A headless Chromium with its driver, for tests and pictures of the browser viewer.
+
+Input is sent through the DevTools protocol, and passes through the same code of the browser as that
+of a mouse, a keyboard or a touch screen. All coordinates are CSS pixels of the page.
+"""
+
+from __future__ import annotations
+
+import base64
+import contextlib
+import json
+import shutil
+from collections.abc import Callable, Iterable, Sequence
+from pathlib import Path
+from typing import Any, Final
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+from selenium import webdriver
+from selenium.webdriver.chrome.service import Service
+from waiting import TIMEOUT, wait_until
+
+Image = npt.NDArray[np.uint8]
+Point = tuple[float, float]
+
+PHONE: Final = (390, 844)  # CSS pixels
+_PROGRAMS: Final = ("chromium", "chromedriver")
+_FLAGS: Final = (
+    "--headless=new",
+    "--no-sandbox",  # the sandbox does not start for root
+    "--disable-dev-shm-usage",  # /dev/shm of containers is small
+    "--use-angle=swiftshader",  # OpenGL without a graphics card
+    "--enable-unsafe-swiftshader",
+    "--hide-scrollbars",
+    "--force-color-profile=srgb",
+    # Requests of the browser itself, which are no part of the page.
+    "--no-first-run",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+)
+# Key: code and virtual key code, for keys that are not a single letter or digit.
+_KEYS: Final = {
+    "ArrowUp": ("ArrowUp", 38),
+    "ArrowDown": ("ArrowDown", 40),
+    "ArrowLeft": ("ArrowLeft", 37),
+    "ArrowRight": ("ArrowRight", 39),
+    "Enter": ("Enter", 13),
+    "Escape": ("Escape", 27),
+    "Tab": ("Tab", 9),
+    "Delete": ("Delete", 46),
+    "Backspace": ("Backspace", 8),
+    "Home": ("Home", 36),
+    "End": ("End", 35),
+    "Shift": ("ShiftLeft", 16),
+    " ": ("Space", 32),
+    ".": ("Period", 190),
+    "+": ("NumpadAdd", 107),
+    "-": ("Minus", 189),
+    "?": ("Slash", 191),
+}
+_TEXTS: Final = {"Enter": "\r", "Tab": ""}
+SHIFT: Final = 8  # modifier of key and mouse events
+# Passes the centre of an element that can be clicked to the callback after the next frame.
+_CENTER: Final = """
+const [selector, done] = arguments;
+const find = () => {
+  const element = document.querySelector(selector);
+  if (!element || !element.checkVisibility({visibilityProperty: true})) return null;
+  element.scrollIntoView({block: "nearest", inline: "nearest"});
+  const box = element.getBoundingClientRect();
+  const x = box.x + box.width / 2, y = box.y + box.height / 2;
+  const top = document.elementFromPoint(x, y);
+  const isHit = top && (element.contains(top) || top.closest("label")?.control === element);
+  return isHit ? [x, y] : null;
+};
+requestAnimationFrame(() => done(find()));
+"""
+
+
+def missing_programs() -> list[str]:
+    """Returns the required programs that are not installed."""
+    return [name for name in _PROGRAMS if shutil.which(name) is None]
+
+
+class Chromium:
+    """A headless browser; methods concern its current tab.
+
+    Attributes:
+        driver: The driver of Selenium.
+        downloads: Folder of downloaded files.
+    """
+
+    def __init__(
+        self, downloads: Path, *, size: tuple[int, int] = (1200, 800), flags: Iterable[str] = ()
+    ) -> None:
+        """Starts the browser.
+
+        Args:
+            downloads: Folder of downloaded files.
+            size: Width and height of the page [CSS pixels].
+            flags: More flags of Chromium.
+        """
+        options = webdriver.ChromeOptions()
+        options.binary_location = shutil.which("chromium") or ""
+        for flag in (*_FLAGS, *flags):
+            options.add_argument(flag)
+        options.set_capability("goog:loggingPrefs", {"browser": "ALL", "performance": "ALL"})
+        self.downloads = downloads
+        self.driver = webdriver.Chrome(
+            options=options, service=Service(shutil.which("chromedriver") or "")
+        )
+        self.driver.set_script_timeout(TIMEOUT)
+        self.command(
+            "Browser.setDownloadBehavior",
+            behavior="allow",
+            downloadPath=str(downloads),
+            eventsEnabled=False,
+        )
+        self.resize(*size)
+
+    def __enter__(self) -> Chromium:
+        """Returns the browser, which is closed at the end of the block."""
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """Closes the browser."""
+        self.close()
+
+    def close(self) -> None:
+        """Ends the browser and its driver."""
+        self.driver.quit()
+
+    def command(self, method: str, **parameters: Any) -> Any:
+        """Calls a method of the DevTools protocol and returns its result."""
+        return self.driver.execute_cdp_cmd(method, parameters)
+
+    # -- the page --------------------------------------------------------------------------
+
+    def open(self, url: str) -> None:
+        """Loads a page, also if the address differs from the current one only in its fragment."""
+        self.driver.get("about:blank")
+        self.driver.get(url)
+
+    def new_tab(self) -> str:
+        """Opens a tab, in front of the current one, and returns its handle."""
+        self.driver.switch_to.new_window("tab")
+        return self.driver.current_window_handle
+
+    def evaluate(self, expression: str, *arguments: Any) -> Any:
+        """Returns the value of an expression of JavaScript; the arguments are `arguments[0]`, …."""
+        return self.driver.execute_script(f"return ({expression})", *arguments)
+
+    def until(self, expression: str, *arguments: Any) -> Any:
+        """Waits until an expression of JavaScript is true, and returns its value."""
+        return wait_until(
+            expression, lambda: self.evaluate(expression, *arguments), poll_period=0.02
+        )
+
+    def resize(self, width: int, height: int, *, touch: bool = False) -> None:
+        """Sets the size of the page [CSS pixels], and whether it has a touch screen."""
+        self.command(
+            "Emulation.setDeviceMetricsOverride",
+            width=width,
+            height=height,
+            deviceScaleFactor=1,
+            mobile=touch,
+        )
+        self.command("Emulation.setTouchEmulationEnabled", enabled=touch)
+
+    def prefer(self, **features: str) -> None:
+        """Sets media features, such as `prefers_color_scheme="dark"`; without any, resets them."""
+        named = [{"name": k.replace("_", "-"), "value": v} for k, v in features.items()]
+        self.command("Emulation.setEmulatedMedia", features=named)
+
+    # -- what the user sees ----------------------------------------------------------------
+
+    def picture(self) -> Image:
+        """Returns a screenshot of the page as RGB, shape (height, width, 3)."""
+        data = self.command("Page.captureScreenshot", format="png", optimizeForSpeed=True)["data"]
+        encoded = np.frombuffer(base64.b64decode(data), np.uint8)
+        image = cv2.imdecode(encoded, cv2.IMREAD_COLOR)
+        assert image is not None
+        return np.ascontiguousarray(image[:, :, ::-1])
+
+    def picture_until(self, what: str, accept: Callable[[Image], Any]) -> Image:
+        """Takes screenshots until one is accepted, and returns it; the check may assert."""
+        images: list[Image] = []
+
+        def accepted() -> bool:
+            images[:] = [self.picture()]
+            return bool(accept(images[0]))
+
+        path = self.downloads / "rejected.png"
+        try:
+            wait_until(f"{what} (see {path})", accepted, poll_period=0.02)
+        except BaseException:
+            if images:
+                cv2.imwrite(str(path), images[0][:, :, ::-1])
+            raise
+        return images[0]
+
+    # -- input -----------------------------------------------------------------------------
+
+    def mouse(
+        self, kind: str, at: Point, *, button: str = "none", held: int = 0, modifiers: int = 0
+    ) -> None:
+        """Sends an event of the mouse; `kind` is Moved, Pressed or Released."""
+        self.command(
+            "Input.dispatchMouseEvent",
+            type=f"mouse{kind}",
+            x=at[0],
+            y=at[1],
+            button=button,
+            buttons=held,
+            clickCount=int(kind != "Moved"),
+            modifiers=modifiers,
+        )
+
+    def click(self, at: Point | str, *, modifiers: int = 0) -> None:
+        """Clicks at a point, or in the centre of the element of a CSS selector."""
+        if isinstance(at, str):
+            at = self.center(at)
+        self.mouse("Moved", at, modifiers=modifiers)
+        self.mouse("Pressed", at, button="left", held=1, modifiers=modifiers)
+        self.mouse("Released", at, button="left", modifiers=modifiers)
+
+    def press(self, at: Point, *, modifiers: int = 0) -> None:
+        """Presses the left button of the mouse."""
+        self.mouse("Moved", at, modifiers=modifiers)
+        self.mouse("Pressed", at, button="left", held=1, modifiers=modifiers)
+
+    def drag_over(self, points: Sequence[Point], *, modifiers: int = 0) -> None:
+        """Moves the mouse over points while its left button is held."""
+        for point in points:
+            self.mouse("Moved", point, button="left", held=1, modifiers=modifiers)
+
+    def release(self, at: Point, *, modifiers: int = 0) -> None:
+        """Releases the left button of the mouse."""
+        self.mouse("Released", at, button="left", modifiers=modifiers)
+
+    def drag(self, start: Point, end: Point, *, steps: int = 4, modifiers: int = 0) -> None:
+        """Drags with the left button of the mouse."""
+        self.press(start, modifiers=modifiers)
+        self.drag_over(line(start, end, steps), modifiers=modifiers)
+        self.release(end, modifiers=modifiers)
+
+    def wheel(self, at: Point, delta: float) -> None:
+        """Turns the wheel of the mouse; a negative delta is away from the user [CSS pixels]."""
+        self.command(
+            "Input.dispatchMouseEvent", type="mouseWheel", x=at[0], y=at[1], deltaX=0, deltaY=delta
+        )
+
+    def touch(self, kind: str, *points: Point) -> None:
+        """Sends an event of the touch screen; `kind` is Start, Move, End or Cancel.
+
+        Args:
+            kind: The kind of event.
+            points: All fingers that touch the screen after the event.
+        """
+        fingers = [{"x": x, "y": y, "id": i} for i, (x, y) in enumerate(points)]
+        self.command("Input.dispatchTouchEvent", type=f"touch{kind}", touchPoints=fingers)
+
+    def key_down(self, key: str, *, modifiers: int = 0) -> None:
+        """Presses a key, such as `a` or `ArrowUp`."""
+        text = _TEXTS.get(key, key if len(key) == 1 else "")
+        self.command(
+            "Input.dispatchKeyEvent",
+            type="keyDown",
+            modifiers=modifiers,
+            text=text,
+            unmodifiedText=text,
+            **_key(key),
+        )
+
+    def key_up(self, key: str) -> None:
+        """Releases a key."""
+        self.command("Input.dispatchKeyEvent", type="keyUp", **_key(key))
+
+    def key(self, key: str, *, modifiers: int = 0) -> None:
+        """Presses and releases a key."""
+        self.key_down(key, modifiers=modifiers)
+        self.key_up(key)
+
+    def type(self, text: str) -> None:
+        """Types a text into the element that has the focus."""
+        for character in text:
+            self.key(character)
+
+    def fill(self, selector: str, text: str) -> None:
+        """Replaces the text of a field, as with the mouse and the keyboard."""
+        self.click(selector)
+        self.evaluate("document.activeElement.select()")
+        self.type(text)
+
+    def center(self, selector: str) -> Point:
+        """Scrolls to the element of a CSS selector and returns its centre.
+
+        It waits until the element is visible, has stopped moving, and nothing is in front of it.
+        """
+        last: list[Any] = [None]
+
+        def settled() -> Any:
+            before, last[0] = last[0], self.driver.execute_async_script(_CENTER, selector)
+            return last[0] if last[0] == before else None
+
+        x, y = wait_until(f"{selector} can be clicked", settled, poll_period=0.0)
+        return x, y
+
+    # -- logs ------------------------------------------------------------------------------
+
+    def console(self) -> list[str]:
+        """Returns the warnings and errors of the console since the last call."""
+        entries = self.driver.get_log("browser")
+        return [e["message"] for e in entries if e["level"] in ("WARNING", "SEVERE")]
+
+    def requested_urls(self) -> list[str]:
+        """Returns the addresses of all requests of the page since the last call."""
+        urls = []
+        for entry in self.driver.get_log("performance"):
+            message = json.loads(entry["message"])["message"]
+            if message["method"] == "Network.requestWillBeSent":
+                urls.append(message["params"]["request"]["url"])
+            elif message["method"] == "Network.webSocketCreated":
+                urls.append(message["params"]["url"])
+        return urls
+
+    def downloaded(self, pattern: str) -> Path:
+        """Waits for a complete download whose name matches a pattern, and returns its path."""
+
+        def found() -> Path | None:
+            return next((path for path in self.downloads.glob(pattern)), None)
+
+        return Path(wait_until(f"a download {pattern}", found))
+
+    def freeze(self) -> None:
+        """Freezes the page, as the browser does with tabs that have been hidden for long."""
+        self.command("Page.setWebLifecycleState", state="frozen")
+
+    def thaw(self) -> None:
+        """Continues a frozen page."""
+        self.command("Page.setWebLifecycleState", state="active")
+
+
+def line(start: Point, end: Point, steps: int) -> list[Point]:
+    """Returns points from `start` (exclusive) to `end` (inclusive)."""
+    fractions = [i / steps for i in range(1, steps + 1)]
+    return [
+        (start[0] + f * (end[0] - start[0]), start[1] + f * (end[1] - start[1])) for f in fractions
+    ]
+
+
+def _key(key: str) -> dict[str, Any]:
+    code, number = _KEYS.get(key) or (
+        f"{'Digit' if key.isdigit() else 'Key'}{key.upper()}" if key.isalnum() else "",
+        ord(key.upper()),
+    )
+    return {"key": key, "code": code, "windowsVirtualKeyCode": number}
+
+
+# -- pixels --------------------------------------------------------------------------------
+
+
+def mask(image: Image, color: Sequence[int], tolerance: float = 0.15) -> npt.NDArray[np.bool_]:
+    """Returns which pixels have the hue of a colour; lines and areas may blend with the background.
+
+    Args:
+        image: RGB image, shape (height, width, 3).
+        color: Red, green and blue, 0 to 255, not grey.
+        tolerance: Maximum difference of a component of the hue, whose components are 0 to 1.
+    """
+    wanted, _ = _hue(np.array(color, float))
+    found, strength = _hue(image.astype(float))
+    return (strength > 60) & (np.abs(found - wanted).max(axis=-1) < tolerance)
+
+
+def _hue(colors: npt.NDArray[np.float64]) -> tuple[Any, Any]:
+    """Returns the hue of each colour, and its strength relative to grey."""
+    colored = colors - colors.min(axis=-1, keepdims=True)
+    strength = colored.max(axis=-1)
+    return colored / np.maximum(strength, 1.0)[..., None], strength
+
+
+def centroid(image: Image, color: Sequence[int], *, least: int = 30) -> Point:
+    """Returns the mean position of the pixels of a colour.
+
+    Raises:
+        AssertionError: There are less than `least` such pixels.
+    """
+    rows, columns = np.nonzero(mask(image, color))
+    assert len(rows) >= least, f"{len(rows)} pixels have the colour {tuple(color)}"
+    return float(columns.mean()) + 0.5, float(rows.mean()) + 0.5
+
+
+@contextlib.contextmanager
+def keys_held(browser: Chromium, *keys: str) -> Any:
+    """Holds keys for the duration of the block."""
+    for key in keys:
+        browser.key_down(key)
+    try:
+        yield
+    finally:
+        for key in reversed(keys):
+            browser.key_up(key)

@@ -1,0 +1,256 @@
+"""The server: files of the page, and who may connect."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import socket
+import threading
+from typing import Any
+
+import aiohttp
+import pytest
+from raw_web_client import RawWebClient
+from waiting import wait_until
+
+from flatland.errors import FlatlandError
+from flatland.web import WebViewer
+from flatland.web.access import Access
+
+
+def get(url: str, **options: Any) -> tuple[int, Any, bytes]:
+    """Returns the status, the headers and the body of an answer."""
+
+    async def get() -> tuple[int, Any, bytes]:
+        async with aiohttp.ClientSession() as session, session.get(url, **options) as answer:
+            return answer.status, answer.headers, await answer.read()
+
+    return asyncio.run(get())
+
+
+class TestFiles:
+    def test_the_page_is_served_with_a_strict_policy(self, viewer):
+        status, headers, body = get(viewer.url)
+        assert status == 200
+        assert headers["Content-Type"] == "text/html; charset=utf-8"
+        assert b"<!doctype html>" in body[:100].lower()
+        policy = headers["Content-Security-Policy"]
+        assert "default-src 'self'" in policy
+        assert "unsafe" not in policy
+        assert headers["X-Content-Type-Options"] == "nosniff"
+        assert headers["Referrer-Policy"] == "no-referrer"
+
+    def test_a_file_is_not_sent_again_if_it_is_the_same(self, viewer):
+        tag = get(viewer.url)[1]["ETag"]
+        status, _, body = get(viewer.url, headers={"If-None-Match": tag})
+        assert (status, body) == (304, b"")
+
+    @pytest.mark.parametrize(
+        "path", ["nothing.js", "../server.py", "%2e%2e/server.py", "..%2fserver.py", "%00.js", "js"]
+    )
+    def test_other_files_are_not_served(self, viewer, path):
+        async def get_raw() -> bytes:
+            reader, writer = await asyncio.open_connection("127.0.0.1", viewer.port)
+            request = f"GET /{path} HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n"
+            writer.write(request.encode())
+            answer = await reader.read()
+            writer.close()
+            return answer
+
+        answer = asyncio.run(get_raw())
+        assert answer.startswith((b"HTTP/1.1 404", b"HTTP/1.1 400"))
+        assert b"import" not in answer
+
+
+class TestAccess:
+    def test_pages_of_other_sites_may_not_connect(self, viewer):
+        with pytest.raises(aiohttp.WSServerHandshakeError) as error:
+            RawWebClient(viewer.url, headers={"Origin": "http://example.org"})
+        assert error.value.status == 403
+
+    def test_the_own_page_may_connect(self, viewer):
+        with RawWebClient(
+            viewer.url, look=False, headers={"Origin": viewer.url.rstrip("/")}
+        ) as client:
+            assert client.wait("hello")["title"] == "flatland"
+
+    def test_names_of_other_machines_are_refused(self, viewer):
+        assert get(viewer.url, headers={"Host": "example.org"})[0] == 403
+        with pytest.raises(aiohttp.WSServerHandshakeError) as error:
+            RawWebClient(viewer.url, headers={"Host": "example.org:80"})
+        assert error.value.status == 403
+        for name in ("localhost:9000", "127.0.0.1", "[::1]:8000"):
+            assert get(viewer.url, headers={"Host": name})[0] == 200
+
+    def test_a_token_is_required_if_the_viewer_has_one(self):
+        with WebViewer(port=0, token="sesame & co") as viewer:
+            assert viewer.url.endswith("/?token=sesame%20%26%20co")
+            with RawWebClient(viewer.url, look=False) as client:
+                client.wait("hello")
+            plain = viewer.url.partition("?")[0]
+            for wrong in (
+                plain,
+                f"{plain}?token=",
+                f"{plain}?token=Sesame",
+                f"{plain}?token=%c3%a4",
+            ):
+                with RawWebClient(wrong, look=False) as client:
+                    assert client.wait_closed() == (4401, "the token is missing or wrong")
+                    assert client.received == []
+
+    def test_other_hosts_get_a_random_token(self):
+        tokens = {Access.for_host("0.0.0.0", None).token for _ in range(3)}
+        assert len(tokens) == 3
+        assert all(token and len(token) >= 20 for token in tokens)
+        for host in ("127.0.0.1", "localhost", "::1"):
+            assert Access.for_host(host, None).token is None
+
+    def test_the_viewer_of_all_addresses_is_reached_with_its_token(self):
+        with WebViewer("0.0.0.0", 0) as viewer:
+            url = f"http://127.0.0.1:{viewer.port}/?{viewer.url.partition('?')[2]}"
+            with RawWebClient(url, look=False) as client:
+                client.wait("hello")
+
+    def test_a_read_only_viewer_refuses_changes(self, world, simulation):
+        with WebViewer(port=0, read_only=True) as viewer:
+            viewer.add_world(world, simulation=simulation)
+            with RawWebClient(viewer.url) as client:
+                assert client.wait_model("robot")
+                robot = client.model("robot")["id"]
+                for kind, fields in (
+                    ("pause", {}),
+                    ("set_rate", {"rate": 1}),
+                    ("delete", {"model": robot}),
+                    ("drive", {"model": robot, "linear": [1, 0]}),
+                    ("spawn", {"file": "box.model.yaml", "name": "b", "pose": [1, 1, 0]}),
+                ):
+                    reply = client.reply(kind, **fields)
+                    assert (reply["ok"], reply["error"]) == (False, "this viewer is read-only")
+                assert client.ask("files")
+            assert not world.paused
+            assert [model.name for model in world.models] == ["robot"]
+
+
+@pytest.mark.parametrize(
+    ("text", "reason"),
+    [
+        ("", "not JSON"),
+        ("{", "not JSON"),
+        ("[" * 5000, "not JSON"),
+        ('{"type": "set_rate", "rate": NaN}', "not JSON"),
+        ('{"type": "set_rate", "rate": %s}' % ("9" * 5000), "not JSON"),
+        ("[]", "not a JSON object"),
+        ("{}", "unknown type"),
+        ('{"type": ["look"]}', "unknown type"),
+        ('{"type": "eval"}', "unknown type"),
+        ('{"type": "pause", "id": "x"}', "pause: id must be an integer"),
+        ('{"type": "pause", "world": -1}', "pause: world must be an integer"),
+        ('{"type": "pause", "more": 1}', "pause: unknown field 'more'"),
+        ('{"type": "move", "model": 1}', "move: pose is missing"),
+        ('{"type": "move", "model": 1, "pose": [1, 2]}', "move: pose must be [x, y, theta]"),
+        ('{"type": "move", "model": 1, "pose": [1, 2, 1e999]}', "move: pose must be"),
+        ('{"type": "move", "model": true, "pose": [1, 2, 3]}', "move: model must be an integer"),
+        ('{"type": "set_rate", "rate": -1}', "set_rate: rate must be a number from 0"),
+        ('{"type": "step", "n": 0}', "step: n must be an integer from 1"),
+        ('{"type": "look", "worlds": 0}', "look: worlds must be a list"),
+        ('{"type": "look", "scans": 1}', "look: scans must be true or false"),
+        ('{"type": "preview", "file": "a\\u0000b"}', "preview: file must be a text without"),
+        ('{"type": "preview", "file": "\\ud800"}', "preview: file must be a text without"),
+    ],
+)
+def test_a_malformed_message_closes_that_connection_and_nothing_else(url, text, reason):
+    with RawWebClient(url) as other, RawWebClient(url) as client:
+        client.send_text(text)
+        code, found = client.wait_closed()
+        assert code == 1008
+        assert found.startswith(reason)
+        other.wait(2)
+        assert other.ask("describe_series")
+
+
+class TestLimits:
+    def test_binary_messages_are_refused(self, url):
+        with RawWebClient(url) as client:
+            client.send_bytes(b"\x00\x01")
+            assert client.wait_closed() == (1003, "only text is accepted")
+
+    def test_large_messages_are_refused(self, url):
+        with RawWebClient(url) as client:
+            client.send_text(json.dumps({"type": "preview", "file": "x" * 17000}))
+            assert client.wait_closed()[0] == 1009
+
+    def test_too_many_messages_are_refused(self, url):
+        with RawWebClient(url, look=False) as client, RawWebClient(url) as other:
+            client.send_many(['{"type": "pause", "world": 7}'] * 2000)
+            code, reason = client.wait_closed()
+            # A reset of the connection, because of messages that nobody reads, may come first.
+            assert (code, reason) in [(1008, "more than 120 messages per second"), (None, None)]
+            assert len([m for m in client.received if m.get("type") == "reply"]) < 1000
+            other.wait(2)
+
+    def test_requests_that_wait_are_limited(self, url, world):
+        release = threading.Event()
+        with RawWebClient(url) as client:
+            client.wait("models")
+            blocked = world.post(lambda: release.wait(30))
+            numbers = [client.send("pause") for _ in range(70)]
+            reply = client.wait("reply", lambda message: not message["ok"])
+            assert reply["error"] == "too many requests wait for the simulator"
+            assert reply["id"] > numbers[50]
+            release.set()
+            blocked.result(30)
+            client.wait("reply", lambda message: message["id"] == numbers[0])
+
+    def test_too_many_clients_are_refused(self, viewer, monkeypatch):
+        monkeypatch.setattr("flatland.web.server.MAX_CLIENTS", 2)
+        with RawWebClient(viewer.url, look=False) as first, RawWebClient(viewer.url, look=False):
+            first.wait("hello")
+            with RawWebClient(viewer.url, look=False) as third:
+                assert third.wait_closed() == (1013, "too many clients")
+
+
+class TestLifecycle:
+    def test_a_port_in_use_is_a_clear_error(self, viewer):
+        with pytest.raises(FlatlandError, match=f"cannot listen on port {viewer.port} of '127.0.0"):
+            WebViewer(port=viewer.port).start()
+
+    def test_an_unknown_host_is_a_clear_error(self):
+        with pytest.raises(FlatlandError, match="cannot listen on port 0 of 'no such host'"):
+            WebViewer("no such host", 0).start()
+
+    @pytest.mark.parametrize("port", [-1, 65536])
+    def test_an_invalid_port_is_a_clear_error(self, port):
+        with pytest.raises(ValueError, match="port must be from 0 to 65535"):
+            WebViewer(port=port)
+
+    def test_close_disconnects_clients_and_ends_the_thread(self, url, viewer):
+        with RawWebClient(url) as client:
+            client.wait("models")
+            viewer.close()
+            viewer.close()
+            assert client.wait_closed() == (1001, "the viewer ends")
+        assert "flatland-web" not in {thread.name for thread in threading.enumerate()}
+        with socket.socket() as free, pytest.raises(ConnectionRefusedError):
+            free.connect(("127.0.0.1", viewer.port))
+        with pytest.raises(FlatlandError, match="the viewer is closed"):
+            viewer.start()
+
+    def test_a_viewer_that_was_not_started_can_be_closed(self, world):
+        viewer = WebViewer(port=0)
+        viewer.add_world(world)
+        viewer.close()
+        with pytest.raises(FlatlandError, match="the viewer is closed"):
+            viewer.add_world(world)
+
+    def test_twenty_clients_see_the_world_and_may_vanish(self, url, viewer):
+        clients = [RawWebClient(url) for _ in range(20)]
+        try:
+            for client in clients:
+                client.wait(2)
+            for client in clients[:10]:
+                client.vanish()
+            wait_until("ten clients are gone", lambda: len(viewer._hub.clients) == 10)
+            assert clients[-1].ask("describe_series")
+        finally:
+            for client in clients:
+                client.close()

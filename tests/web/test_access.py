@@ -1,0 +1,154 @@
+"""Accessibility, keyboard only, phones, and requests to other hosts."""
+
+from __future__ import annotations
+
+import importlib.util
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+from urllib.parse import urlsplit
+
+import pytest
+from chromium import PHONE, Chromium, centroid
+from viewed_world import ROBOT_COLOR, ViewedWorld
+from viewer_page import ViewerPage
+from waiting import wait_until
+
+
+@pytest.fixture(scope="module")
+def axe() -> str:
+    """The source of axe-core; the package that contains it is not imported."""
+    found = importlib.util.find_spec("axe_playwright_python")
+    if found is None or found.origin is None:
+        pytest.skip("axe-core is not installed (make setup-dev installs it)")
+    return Path(found.origin).with_name("axe.min.js").read_text(encoding="utf-8")
+
+
+@pytest.fixture
+def violations(page: ViewerPage, axe: str) -> Callable[[], list[Any]]:
+    """Returns what axe finds in the page in its current state."""
+    # Not as a <script>, which the content security policy of the page forbids.
+    page.browser.driver.execute_script(axe)
+
+    def find() -> list[Any]:
+        result = page.browser.driver.execute_async_script(
+            """
+            const done = arguments[0];
+            axe.run(document, {resultTypes: ["violations"]}).then(done, (e) => done(String(e)));
+            """
+        )
+        assert isinstance(result, dict), result
+        return [
+            (rule["id"], node["target"], node["failureSummary"])
+            for rule in result["violations"]
+            for node in rule["nodes"]
+        ]
+
+    return find
+
+
+@pytest.fixture(params=["light", "dark"])
+def scheme(request: pytest.FixtureRequest, browser: Chromium) -> Iterator[str]:
+    """The colours that the user prefers."""
+    browser.prefer(prefers_color_scheme=request.param)
+    yield request.param
+    browser.prefer()
+
+
+def test_axe_finds_no_violation(
+    scheme: str, page: ViewerPage, violations: Callable[[], list[Any]]
+) -> None:
+    browser = page.browser
+    assert violations() == []
+    page.select("robot")
+    browser.until("document.querySelector('#inspector').textContent.includes('DiffDrive')")
+    assert violations() == []
+    browser.click("#spawn")
+    browser.until("document.querySelector('#spawn-dialog').checkVisibility()")
+    assert violations() == []
+
+
+def test_axe_finds_no_violation_on_a_phone(
+    page: ViewerPage, violations: Callable[[], list[Any]]
+) -> None:
+    page.browser.resize(*PHONE, touch=True)
+    try:
+        page.wait_for_frame()
+        assert violations() == []
+    finally:
+        page.browser.resize(1200, 800)
+
+
+def test_light_and_dark(browser: Chromium, page: ViewerPage) -> None:
+    brightness = {}
+    for scheme in ("light", "dark"):
+        browser.prefer(prefers_color_scheme=scheme)
+        page.wait_for_frame()
+        image = page.browser.picture()
+        brightness[scheme] = float(image.mean())
+        assert centroid(page.canvas(image), ROBOT_COLOR) == pytest.approx(page.screen(-2, 1), abs=3)
+    browser.prefer()
+    assert brightness["dark"] < 100 < 150 < brightness["light"]
+
+
+def test_the_page_fits_a_phone(room: ViewedWorld, page: ViewerPage) -> None:
+    browser = page.browser
+    browser.resize(*PHONE, touch=True)
+    try:
+        browser.open(room.viewer.url)
+        page.wait_until_shown()
+        width, scroll = browser.evaluate("[innerWidth, document.documentElement.scrollWidth]")
+        assert (width, scroll) == (PHONE[0], PHONE[0])
+        x, y = page.screen(-2, 1)
+        browser.touch("Start", (x, y))
+        browser.touch("End")
+        browser.until("document.querySelector('#inspector').checkVisibility()")
+        browser.until("document.querySelector('#inspector').innerText.includes('robot')")
+        x, y = browser.center("#pause")
+        browser.touch("Start", (x, y))
+        browser.touch("End")
+        wait_until("the world is paused", lambda: room.ask(lambda: room.world.paused))
+        small = browser.evaluate(
+            "[...document.querySelectorAll('button')].filter((b) => b.checkVisibility()"
+            " && (b.offsetWidth < 24 || b.offsetHeight < 24)).map((b) => b.id || b.outerHTML)"
+        )
+        assert small == []
+    finally:
+        browser.resize(1200, 800)
+
+
+def test_all_requests_go_to_the_simulator(room: ViewedWorld, browser: Chromium) -> None:
+    browser.requested_urls()
+    page = ViewerPage(browser)
+    page.open(room.viewer.url)
+    urls = [urlsplit(url) for url in browser.requested_urls()]
+    remote = [url for url in urls if url.scheme not in ("data", "blob", "about")]
+    assert {url.netloc for url in remote} == {urlsplit(room.viewer.url).netloc}
+    assert {url.scheme for url in remote} == {"http", "ws"}
+    assert len(remote) > 3
+    assert browser.console() == []
+
+
+def test_everything_is_possible_with_the_keyboard(room: ViewedWorld, page: ViewerPage) -> None:
+    browser = page.browser
+
+    def focus(selector: str) -> None:
+        """Presses the tabulator until an element has the focus."""
+        for _ in range(80):
+            browser.key("Tab")
+            if browser.evaluate("document.activeElement.matches(arguments[0])", selector):
+                return
+        pytest.fail(f"{selector} is not reached with the tabulator")
+
+    focus("#pause")
+    browser.key(" ")
+    wait_until("the world is paused", lambda: room.ask(lambda: room.world.paused))
+    focus("#spawn")
+    browser.key("Enter")
+    browser.until("document.querySelector('#spawn-dialog').checkVisibility()")
+    assert browser.evaluate(
+        "document.querySelector('#spawn-dialog').contains(document.activeElement)"
+    )
+    browser.key("Escape")
+    browser.until("!document.querySelector('#spawn-dialog').checkVisibility()")
+    assert browser.evaluate("document.activeElement.id") == "spawn"

@@ -1,0 +1,172 @@
+"""What the page shows: the moving robot, displays, the view, and links to it."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from chromium import Chromium, Image, centroid, line, mask
+from viewed_world import CRATE_COLOR, ROBOT_COLOR, WALL_COLOR, ViewedWorld
+from viewer_page import ViewerPage
+from waiting import wait_until
+
+from flatland import Twist
+
+FORWARD = Twist(linear_x=1.0)
+
+
+def drive(room: ViewedWorld, twist: Twist) -> None:
+    room.ask(lambda: room.world.command("/cmd_vel").set(twist))
+
+
+def close_to(point: Any, tolerance: float = 3.0) -> Any:
+    return pytest.approx(point, abs=tolerance)
+
+
+def pixels(image: Image, color: tuple[int, int, int]) -> int:
+    return int(np.count_nonzero(mask(image, color)))
+
+
+def test_the_picture_shows_the_robot_move(room: ViewedWorld, page: ViewerPage) -> None:
+    page.show("scans", False)
+    start = centroid(page.canvas(page.browser.picture()), ROBOT_COLOR)
+    assert start == close_to(page.screen(-2, 1))
+    drive(room, FORWARD)
+    metre = page.scale()
+
+    def moved(image: Image) -> bool:
+        x, y = centroid(page.canvas(image), ROBOT_COLOR)
+        assert y == close_to(start[1])
+        return x > start[0] + metre
+
+    page.browser.picture_until("the robot one metre further", moved)
+    drive(room, Twist())
+    room.ask(room.world.pause)
+    page.wait_for_pause()
+    page.wait_for_frame()
+    x, y, _ = room.pose("robot")
+    assert centroid(page.canvas(page.browser.picture()), ROBOT_COLOR) == close_to(page.screen(x, y))
+
+
+def test_walls_models_and_scans_are_drawn_where_they_are(
+    room: ViewedWorld, page: ViewerPage
+) -> None:
+    page.show("scans", False)
+    image = page.canvas(page.browser.picture())
+    assert centroid(image, CRATE_COLOR) == close_to(page.screen(2, -2))
+    rows, columns = np.nonzero(mask(image, WALL_COLOR))
+    left, top = page.screen(-5, 5)
+    right, bottom = page.screen(5, -5)
+    limits = (columns.min(), columns.max(), rows.min(), rows.max())
+    assert limits == close_to((left, right, top, bottom))
+
+
+@pytest.mark.parametrize(
+    ("display", "color"), [("layers", WALL_COLOR), ("models", CRATE_COLOR)], ids=str
+)
+def test_a_display_is_switched_off_and_on(
+    page: ViewerPage, display: str, color: tuple[int, int, int]
+) -> None:
+    page.show("scans", False)
+    page.browser.picture_until("it is drawn", lambda image: pixels(page.canvas(image), color) > 100)
+    page.show(display, False)
+    page.browser.picture_until("it is gone", lambda image: pixels(page.canvas(image), color) < 10)
+    page.show(display, True)
+    page.browser.picture_until("it is back", lambda image: pixels(page.canvas(image), color) > 100)
+
+
+@pytest.mark.parametrize("display", ["scans", "frames", "names", "trails"])
+def test_a_display_changes_the_picture(room: ViewedWorld, page: ViewerPage, display: str) -> None:
+    for name in ("scans", "frames", "names", "trails"):
+        page.show(name, name == display)
+    drive(room, FORWARD)
+    page.browser.until("flatland.state.worlds[0].models.robot.pose[0] > -1")
+    drive(room, Twist())
+    room.ask(room.world.pause)
+    page.wait_for_pause()
+    page.wait_for_frame()
+    shown = page.canvas(page.browser.picture()).astype(int)
+    page.show(display, False)
+
+    def is_gone(image: Image) -> bool:
+        return int((np.abs(page.canvas(image) - shown).max(axis=-1) > 25).sum()) > 30
+
+    page.browser.picture_until(f"{display} are not drawn", is_gone)
+
+
+def test_lasers_scan_only_for_those_who_look(room: ViewedWorld, page: ViewerPage) -> None:
+    def wanted() -> bool:
+        return room.ask(lambda: room.world.output("/scan").wanted)
+
+    page.browser.until("flatland.state.worlds[0].scans === 1")
+    assert wanted()
+    page.show("scans", False)
+    wait_until("the laser rests", lambda: not wanted())
+    page.show("scans", True)
+    wait_until("the laser scans", wanted)
+
+
+def test_wheel_and_drag_zoom_and_pan(page: ViewerPage) -> None:
+    browser, before = page.browser, page.scale()
+    ground = page.screen(0, 3)
+    browser.wheel(ground, -240)
+    browser.until("flatland.toScreen(1, 0)[0] - flatland.toScreen(0, 0)[0] > arguments[0]", before)
+    assert page.world(ground) == close_to((0, 3), 0.3)
+    start = page.screen(0, 3)
+    end = (start[0] + 120, start[1] - 50)
+    browser.drag(start, end)
+    assert page.screen(0, 3) == close_to(end)
+
+
+def test_keys_and_fingers_zoom(page: ViewerPage) -> None:
+    browser = page.browser
+    browser.resize(1200, 800, touch=True)
+    try:
+        center, before = page.screen(0, 0), page.scale()
+        near = [(center[0] - 40, center[1]), (center[0] + 40, center[1])]
+        far = [(center[0] - 120, center[1]), (center[0] + 120, center[1])]
+        browser.touch("Start", *near)
+        for left, right in zip(line(near[0], far[0], 6), line(near[1], far[1], 6), strict=True):
+            browser.touch("Move", left, right)
+        browser.touch("End")
+        assert page.scale() == pytest.approx(3 * before, rel=0.1)
+        assert page.screen(0, 0) == close_to(center, 6)
+    finally:
+        browser.resize(1200, 800)
+
+
+def test_the_view_follows_the_selected_robot(room: ViewedWorld, page: ViewerPage) -> None:
+    page.select("robot")
+    page.browser.click("#follow")
+    page.browser.until("flatland.state.followed === 'robot'")
+    drive(room, FORWARD)
+    page.browser.until("flatland.state.worlds[0].models.robot.pose[0] > -1")
+    room.ask(room.world.pause)
+    page.wait_for_pause()
+    page.wait_for_frame()
+    x, y, _ = room.pose("robot")
+    box = page.browser.evaluate(
+        "((b) => [b.x + b.width / 2, b.y + b.height / 2])"
+        "(document.querySelector('#canvas').getBoundingClientRect())"
+    )
+    assert page.screen(x, y) == close_to(box)
+    page.browser.drag(page.screen(0, 3), page.screen(1, 3))
+    page.browser.until("flatland.state.followed === null")
+
+
+def test_a_link_restores_the_view(
+    room: ViewedWorld, page: ViewerPage, other_browser: Chromium
+) -> None:
+    browser = page.browser
+    browser.wheel(page.screen(1, 1), -360)
+    browser.drag(page.screen(0, 2), page.screen(0.5, 2.5))
+    page.show("names", False)
+    browser.click("#share")
+    url = browser.until("location.hash.includes('zoom') && location.href")
+    assert browser.evaluate("document.querySelector('#notices').innerText").startswith("Link")
+    other = ViewerPage(other_browser)
+    other.open(url)
+    assert other.scale() == pytest.approx(page.scale(), rel=0.01)
+    assert other.screen(1, 1) == close_to(page.screen(1, 1), 3)
+    assert not other_browser.evaluate("document.querySelector('[data-display=names]').checked")
