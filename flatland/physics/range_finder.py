@@ -15,8 +15,6 @@ from flatland.physics.body import PhysicsBody
 if TYPE_CHECKING:
     from typing import Self
 
-    from flatland.physics.world import PhysicsWorld
-
 BeamFan = _core.BeamFan
 """End points of beams, shape (n, 2), prepared for scans; may be shared by range finders."""
 
@@ -119,10 +117,6 @@ class RangeFinder:
     def beams(self) -> int:
         """Number of beams."""
         return self._core.beams
-
-    def is_random(self, world: PhysicsWorld) -> bool:
-        """Returns whether scans depend on the number of the update: noise, or materials."""
-        return self._core.is_random(world._core)
 
     def __deepcopy__(self, memo: dict[int, object]) -> Self:
         """Returns this object, which is immutable."""

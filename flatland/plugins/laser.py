@@ -78,6 +78,7 @@ class Laser(ModelPlugin):
         # Calls of `compute_ranges` have random numbers of their own, so that they do not change the
         # scans that are emitted.
         self._computed = self._uncounted_stream("compute_ranges")
+        self._has_noise = noise is not None
         no_hit = read_no_hit(config, self.range)
         self._mask = read_layers(config, self.world)
         self._sends_transform: bool = config.get("broadcast_tf", "bool", True)
@@ -215,7 +216,7 @@ class Laser(ModelPlugin):
     @property
     def _is_random(self) -> bool:
         """Whether scans depend on the number of the update: noise, or materials of the world."""
-        return self._finder.is_random(self.world.physics)
+        return self._has_noise or self.world.physics.has_materials
 
     def _request(self, stream: NoiseStream) -> ScanRequest:
         return ScanRequest(self._finder, self.body, stream.key, stream.updates)
@@ -263,17 +264,17 @@ def compute_scans(
         StaleHandleError: The body of a laser was destroyed, or its world is closed.
         WorldLockedError: A world is stepping.
     """
-    noisy = [laser for laser in lasers if laser._is_random]
+    are_random = [laser._is_random for laser in lasers]
     requests = []
-    for laser in lasers:
-        if laser._is_random:
+    for laser, is_random in zip(lasers, are_random, strict=True):
+        if is_random:
             laser._computed.begin_update()
         requests.append(laser._request(laser._computed))
     try:
         scans = _perform(requests, out, num_threads)
     except BaseException:
-        for laser in noisy:
-            laser._computed.updates -= 1
+        for laser, is_random in zip(lasers, are_random, strict=True):
+            laser._computed.updates -= is_random
         raise
     for laser, scan in zip(lasers, scans, strict=True):
         laser._keep(scan)

@@ -87,9 +87,9 @@ class SemanticScan(ModelPlugin):
 
     @staticmethod
     def _read_classes(config: YamlReader) -> dict[str, str]:
-        if "classes" not in config:
+        entries = config.optional_subnode("classes", "map")
+        if entries.is_null:
             return {}
-        entries = config.subnode("classes", "map")
         patterns = entries.keys()
         classes = {pattern: entries.get(pattern, "string") for pattern in patterns}
         for pattern, name in classes.items():

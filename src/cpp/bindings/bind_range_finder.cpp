@@ -254,13 +254,6 @@ void bind_range_finder(py::module_& module) {
            py::arg("no_hit"), py::arg("noise"), py::arg("uses_materials"), py::arg("is_cone"))
       .def_property_readonly("beams", &RangeFinder::beams)
       .def_property_readonly("readings", &RangeFinder::readings)
-      .def(
-          "is_random",
-          [](const RangeFinder& self, World& world) {
-            world.check_readable();
-            return self.is_random(world.rays());
-          },
-          py::arg("world"))
       .def("scan_labels", &py_scan_labels, py::arg("world"), py::arg("body"), py::arg("stream"),
            py::arg("update"))
       .def("scan", &py_scan, py::arg("world"), py::arg("body"), py::arg("stream"),

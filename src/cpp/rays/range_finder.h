@@ -73,10 +73,6 @@ class RangeFinder {
   bool has_intensities(const RayScene& scene) const {
     return !parameters_.is_cone && (parameters_.reflect_mask != 0 || sees_materials(scene));
   }
-  // Whether a scan depends on the number of its update.
-  bool is_random(const RayScene& scene) const {
-    return parameters_.noise.has_value() || sees_materials(scene);
-  }
 
   // Pose of the sensor in the world frame from that of its body.
   std::array<double, 3> pose_of(const std::array<double, 3>& body) const;

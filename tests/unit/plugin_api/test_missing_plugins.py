@@ -162,7 +162,7 @@ def test_the_advice_of_the_error_is_correct(files, empty_world, checkout):
         ("my_plugins::Laser", '"Laser"'),
         ("flatland_plugins/DiffDrive", '"DiffDrive"'),
         ("diff_drive", '"DiffDrive"'),
-        ("ModelTFPublisher", '"ModelTfPublisher"'),
+        ("ModelTFPublisher", '"ModelTfPublisher" or "PosePublisher"'),
         ("Pump", ""),
         ("PedestrianCrowd", ""),
         ("DummyModelPlugn", ""),
