@@ -22,6 +22,7 @@ GROWTH = "growth"  # the module that measures curves
 MODULES = (
     "scans",
     "lasers",
+    "materials",
     "steps",
     "jam",
     "plugin_steps",
