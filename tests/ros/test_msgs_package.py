@@ -107,6 +107,7 @@ def test_all_types_are_of_the_package(package: str, ros: Any) -> None:
         "/spawn_model": "SpawnModel",
         "/move_model": "MoveModel",
         "/delete_model": "DeleteModel",
+        "/set_appearance": "SetAppearance",
         "/set_rate": "SetRate",
     }
     for service, name in services.items():
