@@ -24,9 +24,7 @@ GROUPS = (
 def server(module_launcher: Any, write_world: Callable[..., Path]) -> Any:
     world = write_world("[]")
     text = world.read_text()
-    world.write_text(
-        f"{text}\nplugins: [{{name: people, type: Pedestrians, groups: {GROUPS}}}]\n"
-    )
+    world.write_text(f"{text}\nplugins: [{{name: people, type: Pedestrians, groups: {GROUPS}}}]\n")
     return module_launcher.server(world)
 
 

@@ -76,7 +76,7 @@ def test_all_missing_plugins_of_a_world_are_in_one_error(files):
         f'World Plugin "W" type "Weather": no plugin "flatland_plugins::Weather" [{world}:9]',
     ]
     assert advice.startswith("C++ plugins cannot be loaded, ")
-    assert advice.count("flatland_plugins::") == 10
+    assert advice.count("flatland_plugins::") == 11
 
 
 def test_missing_world_plugins_are_reported_before_any_world_plugin_starts(files, caplog):
@@ -161,7 +161,7 @@ def test_the_advice_of_the_error_is_correct(files, empty_world, checkout):
         ("diff_drive", '"DiffDrive"'),
         ("ModelTFPublisher", '"ModelTfPublisher"'),
         ("Pump", ""),
-        ("PedestrianCrowd", ""),
+        ("PedestrianCrowd", '"Pedestrians"'),
         ("DummyModelPlugn", ""),
         ("DummyWorldPlugins", ""),
         ("Plugin", ""),
