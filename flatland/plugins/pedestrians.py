@@ -18,7 +18,17 @@ from flatland.plugin_api.parameters import at_key, read_rate
 from flatland.plugin_api.plugin import WorldPlugin
 from flatland.plugin_api.schedule import when_due
 from flatland.plugin_api.update_timer import UpdateTimer
-from flatland.plugins import _people_config as people_config
+from flatland.plugins._people_config import (
+    BODY_TYPES,
+    MODELS,
+    ORCA,
+    SOCIAL_FORCE,
+    read_choice,
+    read_groups,
+    read_legs,
+    read_numbers,
+    read_positive,
+)
 from flatland.plugins._people_models import BODY, LEGS, model_text, parties_of, preferred_speeds
 from flatland.values import People, PeopleStates, TrackedPeople
 
@@ -26,7 +36,7 @@ if TYPE_CHECKING:
     from flatland.config.reader import YamlReader
     from flatland.entities.model import Model
     from flatland.plugin_api.ports import Output
-    from flatland.plugins._people_config import Group
+    from flatland.plugins._people_config import Group, Stop
     from flatland.timekeeper import Timekeeper
 
 _CLEARANCE: Final = 0.02  # between a person on a way and the wall, at least [m]
@@ -45,13 +55,13 @@ class Pedestrians(WorldPlugin):
 
     def on_initialize(self, config: YamlReader) -> None:
         """Reads the parameters and creates the people."""
-        self._groups = people_config.read_groups(config)
-        self._legs = people_config.read_legs(config)
+        self._groups = read_groups(config)
+        self._legs = read_legs(config)
         self._layers: list[str] = config.get_list(
             "layers", "string", ["all"] if self._legs is None else []
         )
-        self._body_type = people_config.read_choice(config, "body_type", people_config.BODY_TYPES)
-        self._mass = people_config.read_positive(config, "mass", 75.0)
+        self._body_type = read_choice(config, "body_type", BODY_TYPES)
+        self._mass = read_positive(config, "mass", 75.0)
         self._awareness = config.get("robot_awareness", "float", 1.0, minimum=0, maximum=1)
         self._bits = self._read_bits(config)
         self._frame_id: str = config.get("world_frame_id", "string", "map")
@@ -95,14 +105,14 @@ class Pedestrians(WorldPlugin):
         return body_bits | leg_bits
 
     def _create_crowd(self, config: YamlReader) -> Crowd:
-        model = people_config.read_choice(config, "model", people_config.MODELS)
-        rate = people_config.read_positive(config, "update_rate", 20.0)
-        numbers = people_config.read_numbers(
-            config, "social_force", people_config.SOCIAL_FORCE
-        ) | people_config.read_numbers(config, "orca", people_config.ORCA)
-        numbers["sight"] = people_config.read_positive(config, "sight", 4.0)
+        model = read_choice(config, "model", MODELS)
+        rate = read_positive(config, "update_rate", 20.0)
+        numbers = read_numbers(config, "social_force", SOCIAL_FORCE) | read_numbers(
+            config, "orca", ORCA
+        )
+        numbers["sight"] = read_positive(config, "sight", 4.0)
         numbers["fluctuation"] = config.get("fluctuation", "float", 0.1, finite=True, minimum=0)
-        numbers["cell"] = people_config.read_positive(config, "cell", 0.1)
+        numbers["cell"] = read_positive(config, "cell", 0.1)
         numbers["clearance"] = max(group.radius for group in self._groups) + _CLEARANCE
         if self._legs is not None:
             numbers["leg_radius"] = self._legs.radius
@@ -153,7 +163,7 @@ class Pedestrians(WorldPlugin):
         )
         return route, waypoints
 
-    def _add_stop(self, stop: people_config.Stop) -> int:
+    def _add_stop(self, stop: Stop) -> int:
         waypoint = self._crowd.add_waypoint(
             stop.low,
             stop.high,

@@ -9,7 +9,6 @@ from typing import Any
 
 import pytest
 from geometry_msgs.msg import Pose2D, PoseArray
-from waiting import wait_until
 
 from flatland.msg import PeopleStates
 from flatland.srv import DeleteModel, DirectPeople, RemovePeople, SpawnPeople
@@ -22,12 +21,8 @@ GROUPS = (
 
 @pytest.fixture(scope="module", autouse=True)
 def server(module_launcher: Any, write_world: Callable[..., Path]) -> Any:
-    world = write_world("[]")
-    text = world.read_text()
-    world.write_text(
-        f"{text}\nplugins: [{{name: people, type: Pedestrians, groups: {GROUPS}}}]\n"
-    )
-    return module_launcher.server(world)
+    plugins = f"[{{name: people, type: Pedestrians, groups: {GROUPS}}}]"
+    return module_launcher.server(write_world(plugins=plugins))
 
 
 def states(ros: Any) -> Any:
@@ -35,14 +30,15 @@ def states(ros: Any) -> Any:
 
 
 def test_the_topics_carry_the_same_people(ros: Any) -> None:
-    people = states(ros)
+    topic = states(ros)
+    people = topic.next()
     assert people.name == ["a_0", "a_1"]
     assert people.group == ["a", "a"]
     assert people.header.frame_id == "map"
-    poses = ros.topic("/people", PoseArray)
+    poses = ros.topic("/people", PoseArray).next()
     assert poses.header.frame_id == "map"
     assert len(poses.poses) == len(people.pose) == len(people.twist) == len(people.standing) == 2
-    wait_until(lambda: math.hypot(states(ros).twist[0].linear.x, 0.0) > 0.3)
+    topic.until(lambda moving: moving.twist[0].linear.x > 0.3)
 
 
 def test_people_are_spawned_directed_and_removed(ros: Any) -> None:
@@ -54,16 +50,16 @@ def test_people_are_spawned_directed_and_removed(ros: Any) -> None:
     sent = ros.call("/direct_people", DirectPeople, ["b_0"], DirectPeople._request_class.SEND, goal)
     assert (sent.success, sent.message) == (True, "")
 
-    def has_arrived() -> bool:
-        people = states(ros)
+    def has_arrived(people: Any) -> bool:
         pose = people.pose[people.name.index("b_0")]
         return math.hypot(pose.x - 2, pose.y + 2) < 0.4
 
-    wait_until(has_arrived)
+    topic = states(ros)
+    topic.until(has_arrived)
     assert ros.call("/delete_model", DeleteModel, "b_1").success
     removed = ros.call("/remove_people", RemovePeople, ["b_0", "b_2"])
     assert (removed.success, removed.message) == (True, "")
-    wait_until(lambda: states(ros).name == ["a_0", "a_1"])
+    topic.until(lambda people: people.name == ["a_0", "a_1"])
 
 
 def test_failed_calls_report_a_reason_and_change_nothing(ros: Any) -> None:
@@ -77,4 +73,4 @@ def test_failed_calls_report_a_reason_and_change_nothing(ros: Any) -> None:
     assert (answer.success, "nobody" in answer.message) == (False, True)
     answer = ros.call("/direct_people", DirectPeople, ["a_0"], 7, Pose2D())
     assert "action must be from 0 to 2" in answer.message
-    assert states(ros).name == ["a_0", "a_1"]
+    assert states(ros).next().name == ["a_0", "a_1"]

@@ -1,9 +1,9 @@
 // What the core does in each step besides the physics, and when code of plugins is to be called.
 //
-// A plan contains controllers and crowds, which move bodies, and records of updates that were due but for
-// which no code was called, because the result was not wanted. They are carried out in the order of
-// the plugins to which they belong, so that code that is called in between finds the world as if
-// each plugin had been called in each step. All of it are values that refer to objects by id.
+// A plan contains controllers and crowds, which move bodies, and records of updates that were due
+// but for which no code was called, because the result was not wanted. They are carried out in the
+// order of the plugins to which they belong, so that code that is called in between finds the world
+// as if each plugin had been called in each step. All of it are values that refer to objects by id.
 #pragma once
 
 #include <cstdint>

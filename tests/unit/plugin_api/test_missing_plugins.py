@@ -164,7 +164,7 @@ def test_the_advice_of_the_error_is_correct(files, empty_world, checkout):
         ("diff_drive", '"DiffDrive"'),
         ("ModelTFPublisher", '"ModelTfPublisher" or "PosePublisher"'),
         ("Pump", ""),
-        ("PedestrianCrowd", ""),
+        ("PedestrianCrowd", '"Pedestrians"'),
         ("DummyModelPlugn", ""),
         ("DummyWorldPlugins", ""),
         ("Plugin", ""),
