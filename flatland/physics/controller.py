@@ -133,7 +133,7 @@ class DriveController(Controller):
         )
 
     @property
-    def traction_state(self) -> tuple[float, bool, Pose]:
+    def traction_state(self) -> tuple[float, bool, tuple[float, float, float]]:
         """Part of the limits that the last step required, and the pose that the brakes hold.
 
         The part is above 1 if the drive slipped or stalled. The second value is whether the drive
@@ -322,7 +322,20 @@ class PathController(Controller):
         self._core.hold_controller(self.id)
 
     @property
-    def state(self) -> tuple[int, int, bool, bool, int, float, int, Pose, Pose, int]:
+    def state(
+        self,
+    ) -> tuple[
+        int,
+        int,
+        bool,
+        bool,
+        int,
+        float,
+        int,
+        tuple[float, float, float],
+        tuple[float, float, float],
+        int,
+    ]:
         """Everything that changes.
 
         Last waypoint reached, next one, whether the body moves, whether it moves forwards along the

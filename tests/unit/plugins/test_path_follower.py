@@ -6,6 +6,7 @@ import itertools
 import math
 from typing import Any
 
+import numpy as np
 import pytest
 
 import flatland
@@ -170,6 +171,19 @@ class TestModes:
         places = [w for before, w in itertools.pairwise(first) if w != before]
         pairs = set(itertools.pairwise(places))
         assert len(pairs) == 12  # from each of four places to the three others
+
+    def test_new_random_numbers_of_a_reseeded_plugin(self, follow: Any) -> None:
+        def places(seed: int) -> list[Point]:
+            world = follow("waypoints: [[1, 0], [2, 0], [3, 0]], mode: random", seed=1)
+            plugin(world).reseed(np.random.default_rng(seed))
+            found = []
+            for _ in range(20):
+                world.step(100)
+                found.append(pose(world))
+            return found
+
+        assert places(5) == places(5)
+        assert places(5) != places(6)
 
     def test_once_returns_with_the_next_start(self, follow: Any) -> None:
         world = follow("waypoints: [[1, 0]], mode: once, start: false, start_topic: go")
