@@ -23,6 +23,18 @@ export function significant(value, digits = 4) {
 }
 
 /**
+ * Returns the value of a topic as text with a line for each field.
+ *
+ * @param {any} value
+ */
+export function describeValue(value) {
+  if (value === null || typeof value !== "object" || Array.isArray(value)) return brief(value);
+  return Object.entries(value)
+    .map(([key, item]) => `${key}: ${key === "stamp" && Number.isInteger(item) ? `${item / 1e9} s` : brief(item)}`)
+    .join("\n");
+}
+
+/**
  * Returns any value of a message as short text.
  *
  * @param {any} value
@@ -34,7 +46,9 @@ export function brief(value, limit = 160) {
   if (typeof value === "number") text = Number.isInteger(value) ? String(value) : significant(value);
   else if (typeof value === "string") text = value;
   else if (value === null || value === undefined) text = "–";
-  else if (Array.isArray(value) && value.length > 8) text = `${value.length} values`;
+  else if (Array.isArray(value) && value.length > 2 && Array.isArray(value[0])) {
+    text = `${value.length} × ${value[0].length} values`;
+  } else if (Array.isArray(value) && value.length > 8) text = `${value.length} values`;
   else if (Array.isArray(value)) text = `[${value.map((item) => brief(item, 40)).join(", ")}]`;
   else if (typeof value === "object") {
     text = Object.entries(value).map(([key, item]) => `${key}: ${brief(item, 60)}`).join("  ");

@@ -165,10 +165,10 @@ export class Hotkeys {
       ["Wheel, pinch", "Zoom"],
       ["Right click", "Menu of a model"],
       ["Double click", "Centre the model"],
-      ["← → ↑ ↓, W A S D", "Drive the selected robot; Q and E sideways"],
-      ["Shift and arrows", "Move the view while a robot is selected"],
+      ["Arrows, W A S D", "Drive the selected robot; Q and E sideways"],
+      ["Shift, arrows", "Move the view while a robot is selected"],
       ["Enter", "Click at the centre of the view"],
-      ["Finger on the selected model", "Move it"],
+      ["Touch", "Drag the selected model to move it"],
     ];
     const pointer = element("dl");
     for (const [shown, text] of others) pointer.append(element("dt", {}, shown), element("dd", {}, text));

@@ -16,7 +16,7 @@ import { WorldState } from "./world_state.js";
  * @property {void} redraw  something that is drawn has changed
  * @property {import("./protocol.js").DetailsMessage} details
  * @property {import("./protocol.js").ValuesMessage} values
- * @property {{level: string, text: string}} notice
+ * @property {{level: string, text: string, topic?: string}} notice  replaces those of the same topic
  */
 
 /** @type {Display[]} */
@@ -96,9 +96,10 @@ export class Session extends Emitter {
   /**
    * @param {"info" | "warning" | "error"} level
    * @param {string} text
+   * @param {string} [topic]  earlier notices of the same topic are removed
    */
-  notify(level, text) {
-    this.emit("notice", { level, text });
+  notify(level, text, topic) {
+    this.emit("notice", { level, text, topic });
   }
 
   /**
@@ -108,8 +109,9 @@ export class Session extends Emitter {
    */
   show(index) {
     if (index === this.currentIndex) return;
+    // The address may name a model before the server has listed the worlds.
+    if (this.currentIndex !== null) this.selectedName = null;
     this.currentIndex = index;
-    this.selectedName = null;
     this.emit("current", undefined);
     this.emit("selection", undefined);
     this.look();
@@ -130,11 +132,6 @@ export class Session extends Emitter {
    */
   setDisplay(display, shown) {
     this.displays[display] = shown;
-    for (const world of this.worlds.values()) {
-      if (display === "scans" && !shown) world.clearScans();
-      if (display === "frames" && !shown) world.frames = [];
-      if (display === "trails") world.trails.clear();
-    }
     this.emit("displays", undefined);
     this.emit("redraw", undefined);
     this.look();
@@ -248,7 +245,7 @@ export class Session extends Emitter {
         this.emit("status", world);
         return;
       case "frames":
-        world.frames = this.displays.frames ? message.frames : [];
+        world.frames = message.frames;
         break;
       case "details":
         if (world === this.world) this.emit("details", /** @type {any} */ (message));
@@ -271,7 +268,7 @@ export class Session extends Emitter {
     if (!world?.present) return;
     if (data.kind === "edges") world.applyEdges(data);
     else if (data.kind === "poses") world.applyPoses(data);
-    else if (this.displays.scans) world.applyScans(data);
+    else world.applyScans(data);
     this.emit("redraw", undefined);
   }
 }

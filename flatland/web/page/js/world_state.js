@@ -227,12 +227,6 @@ export class WorldState {
     this.scansVersion++;
   }
 
-  /** Removes the latest scans, for example when their display is turned off. */
-  clearScans() {
-    for (const laser of this.lasers.values()) laser.ranges = null;
-    this.scansVersion++;
-  }
-
   /**
    * Returns the pose of a body, null before the first one has arrived.
    *

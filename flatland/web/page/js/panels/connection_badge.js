@@ -39,9 +39,12 @@ export function createConnectionBadge(session, stage) {
     message.hidden = text === "";
   };
 
+  let wasLost = false;
   connection.on("state", (state) => {
     update();
-    if (state === "reconnecting") session.notify("warning", "Connection lost; reconnecting");
+    if (state === "reconnecting") session.notify("warning", "Connection lost; reconnecting", "connection");
+    else if (state === "connected" && wasLost) session.notify("info", "Connected again", "connection");
+    wasLost = state === "reconnecting";
   });
   let lastReason = "";
   connection.on("reason", (reason) => {

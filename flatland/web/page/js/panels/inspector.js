@@ -1,5 +1,5 @@
 import { byId, element, icon, setText } from "../dom.js";
-import { brief, fixed, significant } from "../format.js";
+import { brief, describeValue, fixed, significant } from "../format.js";
 
 /** Time between two updates of the pose from the view [ms]. */
 const POSE_PERIOD = 200;
@@ -27,6 +27,7 @@ export class Inspector {
       if (this.shownId !== (session.selected?.id ?? null)) this.rebuild();
     });
     session.on("hello", () => this.rebuild());
+    session.on("current", () => this.rebuild());
     session.on("details", (details) => this.update(details));
     stage.on("frame", () => this.updatePose());
   }
@@ -36,6 +37,8 @@ export class Inspector {
     this.shownId = selected?.id ?? null;
     this.isEdited = false;
     if (!selected) {
+      const place = this.session.world ? "Select a model in the view or in the list." : "Enlarge a world to select a model.";
+      setText(this.empty, place);
       this.root.replaceChildren(this.empty);
       return;
     }
@@ -158,7 +161,7 @@ export class Inspector {
       const [name, text] = /** @type {any} */ (row.children);
       setText(name, topic);
       name.title = kind ? `${type}, ${kind}` : type;
-      setText(text, brief(value));
+      setText(text, describeValue(value));
     });
     while (section.children.length > topics.length + 1) section.lastElementChild?.remove();
   }

@@ -40,6 +40,15 @@ export function createToolbar(session, stage, tools, actions) {
   byId("zoom-in").addEventListener("click", actions.zoomIn);
   byId("zoom-out").addEventListener("click", actions.zoomOut);
 
+  const updateWorld = () => {
+    for (const id of [...Object.keys(names), "spawn", "fit", "zoom-in", "zoom-out"]) {
+      /** @type {HTMLButtonElement} */ (byId(id)).disabled = session.world === null;
+    }
+  };
+  session.on("current", updateWorld);
+  session.on("hello", updateWorld);
+  updateWorld();
+
   const panel = byId("panel-toggle");
   /** @param {boolean} open */
   const setPanel = (open) => {

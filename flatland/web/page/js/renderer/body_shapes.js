@@ -2,7 +2,7 @@ import { shapeEdges, shapePoints } from "../world_state.js";
 import { addAttributes, createFloatTexture, createProgram, uploadFloatTexture } from "./gl.js";
 import { readable } from "./palette.js";
 import { bodyEdgesVertex, bodyFillVertex, colorFragment, coloredEdgesFragment } from "./shaders.js";
-import { useProgram } from "./view.js";
+import { lineWeight, useProgram } from "./view.js";
 
 /** Width of outlines [CSS pixels]. */
 const WIDTH = 1.8;
@@ -118,7 +118,7 @@ export class BodyShapes {
     }
     if (this.edgeCount > 0) {
       useProgram(gl, programs.edges, viewport);
-      gl.uniform1f(programs.edges.uniform("u_width"), WIDTH * viewport.ratio);
+      gl.uniform1f(programs.edges.uniform("u_width"), WIDTH * lineWeight(viewport) * viewport.ratio);
       gl.bindVertexArray(this.edgeArray);
       gl.drawArraysInstanced(gl.TRIANGLE_STRIP, 0, 4, this.edgeCount);
     }

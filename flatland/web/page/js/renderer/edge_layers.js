@@ -1,7 +1,8 @@
+import { sortIntoCells, visibleRanges } from "./edge_cells.js";
 import { addAttributes, createProgram } from "./gl.js";
 import { readable } from "./palette.js";
 import { edgesFragment, edgesVertex, flatFragment, thinVertex } from "./shaders.js";
-import { useProgram } from "./view.js";
+import { lineWeight, useProgram } from "./view.js";
 
 /** Width of the edges of a layer [CSS pixels]. */
 const WIDTH = 1.6;
@@ -13,7 +14,7 @@ const MANY_EDGES = 20_000;
  * @property {WebGLBuffer} buffer
  * @property {WebGLVertexArrayObject} wide  one instance for each edge
  * @property {WebGLVertexArrayObject} thin  two vertices for each edge
- * @property {number} count
+ * @property {import("./edge_cells.js").Cell[]} cells
  * @property {number} meanLength  [m]
  */
 
@@ -71,19 +72,19 @@ export class EdgeLayers {
    */
   upload(edges) {
     const { gl } = this;
+    const sorted = sortIntoCells(edges);
     const buffer = gl.createBuffer();
     const wide = gl.createVertexArray();
     const thin = gl.createVertexArray();
     addAttributes(gl, wide, buffer, 16, 1, [{ location: 0, size: 4 }]);
     addAttributes(gl, thin, buffer, 8, 0, [{ location: 0, size: 2 }]);
     gl.bindBuffer(gl.ARRAY_BUFFER, buffer);
-    gl.bufferData(gl.ARRAY_BUFFER, edges, gl.STATIC_DRAW);
+    gl.bufferData(gl.ARRAY_BUFFER, sorted.edges, gl.STATIC_DRAW);
     let length = 0;
     for (let i = 0; i < edges.length; i += 4) {
       length += Math.hypot(edges[i + 2] - edges[i], edges[i + 3] - edges[i + 1]);
     }
-    const count = edges.length / 4;
-    return { buffer, wide, thin, count, meanLength: length / count };
+    return { buffer, wide, thin, cells: sorted.cells, meanLength: (4 * length) / edges.length };
   }
 
   /**
@@ -96,19 +97,24 @@ export class EdgeLayers {
     for (const layer of world.layers) {
       const entry = layer.visible && layer.edges ? this.buffers.get(layer.edges) : undefined;
       if (!entry) continue;
+      const ranges = visibleRanges(entry.cells, viewport.camera);
+      const count = ranges.reduce((sum, range) => sum + range.count, 0);
       // From far away, thousands of edges are shorter than their width: plain lines look the same.
-      const isThin = entry.count > MANY_EDGES && entry.meanLength * viewport.camera.zoom < 4;
+      const isThin = count > MANY_EDGES && entry.meanLength * viewport.camera.zoom < 4;
       const program = isThin ? this.program.thin : this.program.wide;
       useProgram(gl, program, viewport);
       const [r, g, b, a] = readable(layer.color, palette);
       gl.uniform4f(program.uniform("u_color"), r * a, g * a, b * a, a);
+      gl.bindVertexArray(isThin ? entry.thin : entry.wide);
       if (isThin) {
-        gl.bindVertexArray(entry.thin);
-        gl.drawArrays(gl.LINES, 0, 2 * entry.count);
-      } else {
-        gl.uniform1f(program.uniform("u_width"), WIDTH * viewport.ratio);
-        gl.bindVertexArray(entry.wide);
-        gl.drawArraysInstanced(gl.TRIANGLE_STRIP, 0, 4, entry.count);
+        for (const range of ranges) gl.drawArrays(gl.LINES, 2 * range.start, 2 * range.count);
+        continue;
+      }
+      gl.uniform1f(program.uniform("u_width"), WIDTH * lineWeight(viewport) * viewport.ratio);
+      gl.bindBuffer(gl.ARRAY_BUFFER, entry.buffer);
+      for (const range of ranges) {
+        gl.vertexAttribPointer(0, 4, gl.FLOAT, false, 16, 16 * range.start);
+        gl.drawArraysInstanced(gl.TRIANGLE_STRIP, 0, 4, range.count);
       }
     }
   }

@@ -5,6 +5,7 @@ import { readable } from "./palette.js";
 
 /**
  * @typedef {import("./edge_batch.js").EdgeBatch} EdgeBatch
+ * @typedef {import("./label_places.js").LabelPlaces} LabelPlaces
  * @typedef {import("./palette.js").Palette} Palette
  * @typedef {import("./view.js").Viewport} Viewport
  * @typedef {import("../world_state.js").WorldState} WorldState
@@ -12,6 +13,8 @@ import { readable } from "./palette.js";
 
 /** Smallest distance of lines of the grid [CSS pixels]. */
 const GRID_SPACING = 28;
+/** Number of lines among which the name of a frame finds a free one. */
+const FRAME_LINES = 8;
 
 /**
  * Returns the distance of the lines of the grid: 1, 2 or 5 times a power of ten [m].
@@ -119,44 +122,56 @@ export function resolveFrames(frames) {
  *
  * @param {EdgeBatch} batch
  * @param {import("./text_labels.js").TextLabels} labels
+ * @param {LabelPlaces} places
  * @param {Viewport} viewport
  * @param {WorldState} world
  * @param {Palette} palette
  */
-export function addFrames(batch, labels, { camera }, world, palette) {
+export function addFrames(batch, labels, places, { camera }, world, palette) {
   const poses = resolveFrames(world.frames);
   const link = packColor([...palette.warning.slice(0, 3), 0.5]);
   for (const { parent, child } of world.frames) {
     const [a, b] = [poses.get(parent), poses.get(child)];
     if (a && b) batch.add(a[0], a[1], b[0], b[1], link, 1);
   }
-  /** @type {Map<string, number>} */
-  const rows = new Map();
   for (const [name, pose] of poses) {
     addAxes(batch, pose, 24 / camera.zoom, palette);
-    // Frames at the same place get their names below each other.
-    const cell = camera.toScreen(pose[0], pose[1]).map((part) => Math.round(part / 12)).join();
-    const row = rows.get(cell) ?? 0;
-    rows.set(cell, row + 1);
-    labels.add(name, pose[0], pose[1], 14 + 14 * row);
+    addLabel(labels, places, camera, name, pose, 14, FRAME_LINES);
   }
+}
+
+/**
+ * Adds a label below a point unless it would cover others.
+ *
+ * @param {import("./text_labels.js").TextLabels} labels
+ * @param {LabelPlaces} places
+ * @param {import("../camera.js").Camera} camera
+ * @param {string} text
+ * @param {ArrayLike<number>} point  [m]
+ * @param {number} dy  distance of the first line from the point [CSS pixels]
+ * @param {number} lines  number of lines to try
+ */
+function addLabel(labels, places, camera, text, point, dy, lines) {
+  const [px, py] = camera.toScreen(point[0], point[1]);
+  if (px < -80 || py < -40 - dy || px > camera.width + 80 || py > camera.height + 40) return;
+  const shift = places.take(px, py + dy, labels.width(text), lines);
+  if (shift !== null) labels.add(text, point[0], point[1], dy + shift);
 }
 
 /**
  * Adds the names of the models in the view, below the models.
  *
  * @param {import("./text_labels.js").TextLabels} labels
+ * @param {LabelPlaces} places
  * @param {Viewport} viewport
  * @param {WorldState} world
  */
-export function addNames(labels, { camera }, world) {
+export function addNames(labels, places, { camera }, world) {
   for (const model of world.models.values()) {
     const body = model.bodies[0];
     const pose = world.bodyPose(body);
     if (!pose) continue;
-    const [px, py] = camera.toScreen(pose[0], pose[1]);
-    if (px < -80 || py < -40 || px > camera.width + 80 || py > camera.height + 40) continue;
-    labels.add(model.name, pose[0], pose[1], Math.min(body.radius * camera.zoom, 400) + 11);
+    addLabel(labels, places, camera, model.name, pose, Math.min(body.radius * camera.zoom, 400) + 11, 1);
   }
 }
 

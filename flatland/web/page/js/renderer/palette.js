@@ -49,7 +49,7 @@ export function createPalette(dark) {
 }
 
 /** Smallest difference of luminance between a line and the background. */
-const CONTRAST = 0.3;
+const CONTRAST = 0.38;
 
 /** @param {ArrayLike<number>} color */
 function luminance(color) {

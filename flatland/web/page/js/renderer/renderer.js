@@ -1,6 +1,7 @@
 import { BodyPrograms } from "./body_shapes.js";
 import { EdgeBatch, createColoredEdgeProgram } from "./edge_batch.js";
 import { EdgeProgram } from "./edge_layers.js";
+import { LabelPlaces } from "./label_places.js";
 import { addFrames, addGrid, addJoints, addNames, addShapelessModels } from "./marks.js";
 import { createPalette } from "./palette.js";
 import { ScanPrograms } from "./scan_clouds.js";
@@ -110,8 +111,9 @@ export class Renderer {
     }
     batch.flush(viewport);
     if (displays.scans) graphics.scans.drawPoints(viewport, palette);
-    if (displays.frames) addFrames(batch, labels, viewport, world, palette);
-    if (displays.names && !isGrid) addNames(labels, viewport, world);
+    const places = new LabelPlaces();
+    if (displays.names && !isGrid) addNames(labels, places, viewport, world);
+    if (displays.frames) addFrames(batch, labels, places, viewport, world, palette);
     overlay?.(batch, labels, viewport, palette);
     batch.flush(viewport);
     labels.draw(viewport, palette);

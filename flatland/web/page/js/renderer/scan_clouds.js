@@ -1,6 +1,6 @@
 import { FLOAT_TEXTURE_WIDTH, addAttributes, createFloatTexture, createProgram, uploadFloatTexture } from "./gl.js";
 import { colorFragment, scanAreaVertex, scanPointsFragment, scanPointsVertex } from "./shaders.js";
-import { useProgram } from "./view.js";
+import { lineWeight, useProgram } from "./view.js";
 
 /** Diameter of a point [CSS pixels]. */
 const POINT_SIZE = 3.2;
@@ -140,7 +140,7 @@ export class ScanClouds {
     const { gl } = this;
     const program = this.programs.points;
     this.prepare(program, viewport, palette);
-    gl.uniform1f(program.uniform("u_pointSize"), POINT_SIZE * viewport.ratio);
+    gl.uniform1f(program.uniform("u_pointSize"), POINT_SIZE * lineWeight(viewport) * viewport.ratio);
     gl.bindVertexArray(this.pointArray);
     gl.drawArrays(gl.POINTS, 0, last.start + last.count);
   }

@@ -11,7 +11,7 @@ const HALO = 2;
 
 /** @typedef {{x: number, y: number, width: number, height: number, advance: number}} Glyph */
 
-/** Text at points of the world. Glyphs are drawn once into an atlas; a frame is one draw call. */
+/** Text at points of the world. Glyphs are drawn once into an atlas; a frame is two draw calls. */
 export class TextLabels {
   /** @param {WebGL2RenderingContext} gl */
   constructor(gl) {
@@ -84,6 +84,17 @@ export class TextLabels {
   }
 
   /**
+   * Returns the width of a line of text [CSS pixels].
+   *
+   * @param {string} text
+   */
+  width(text) {
+    let sum = 0;
+    for (const character of text) sum += this.glyph(character)?.advance ?? 0;
+    return sum / this.ratio;
+  }
+
+  /**
    * Adds a line of text whose centre is above or below a point.
    *
    * @param {string} text
@@ -126,9 +137,13 @@ export class TextLabels {
     gl.bufferData(gl.ARRAY_BUFFER, new Float32Array(this.words), gl.STREAM_DRAW);
     useProgram(gl, program, viewport);
     gl.uniform2f(program.uniform("u_atlasSize"), ATLAS_SIZE, ATLAS_SIZE);
-    gl.uniform3fv(program.uniform("u_ink"), palette.ink);
-    gl.uniform3fv(program.uniform("u_halo"), palette.background);
     gl.bindVertexArray(this.array);
+    // All halos first, so that none covers a neighbouring glyph.
+    gl.uniform3fv(program.uniform("u_color"), palette.background);
+    gl.uniform2f(program.uniform("u_channels"), 0.8, 0.8);
+    gl.drawArraysInstanced(gl.TRIANGLE_STRIP, 0, 4, this.words.length / GLYPH_WORDS);
+    gl.uniform3fv(program.uniform("u_color"), palette.ink);
+    gl.uniform2f(program.uniform("u_channels"), 1, 0);
     gl.drawArraysInstanced(gl.TRIANGLE_STRIP, 0, 4, this.words.length / GLYPH_WORDS);
   }
 }

@@ -10,6 +10,19 @@
  * @property {import("../camera.js").Camera} camera
  */
 
+/** Scale below which lines and points become thinner [CSS pixels per metre]. */
+const FULL_WEIGHT_ZOOM = 14;
+const LEAST_WEIGHT = 0.6;
+
+/**
+ * Returns the factor of the widths of lines and points, which keeps small views legible.
+ *
+ * @param {Viewport} viewport
+ */
+export function lineWeight({ camera }) {
+  return Math.max(LEAST_WEIGHT, Math.min(1, camera.zoom / FULL_WEIGHT_ZOOM));
+}
+
 /**
  * Activates a program and sets the uniforms of the view.
  *

@@ -1,3 +1,4 @@
+import { fixed } from "../format.js";
 import { packColor } from "../renderer/edge_batch.js";
 
 /** @typedef {import("./tool_box.js").Spot} Spot */
@@ -24,8 +25,7 @@ export class MeasureTool {
     const dx = line.x2 - line.x1;
     const dy = line.y2 - line.y1;
     const angle = (Math.atan2(dy, dx) * 180) / Math.PI;
-    const length = `${Math.hypot(dx, dy).toFixed(3)} m`;
-    return `${length}  (Δx ${dx.toFixed(3)} m, Δy ${dy.toFixed(3)} m, ${angle.toFixed(1)}°)`;
+    return `${fixed(Math.hypot(dx, dy), 3)} m  (Δx ${fixed(dx, 3)} m, Δy ${fixed(dy, 3)} m, ${fixed(angle, 1)}°)`;
   }
 
   /** @param {Spot} spot */

@@ -1,3 +1,4 @@
+import { fixed } from "../format.js";
 import { modelAt, modelRadius } from "../hit.js";
 import { packColor } from "../renderer/edge_batch.js";
 import { addArrow, addModelAt } from "../renderer/marks.js";
@@ -98,7 +99,7 @@ export class SelectTool {
       this.dragged = new ModelDrag(session, pressed.model, pressed.mode, pose, pressed.spot);
     }
     this.dragged.to(spot);
-    const [x, y, theta] = this.dragged.pose.map((part) => part.toFixed(2));
+    const [x, y, theta] = this.dragged.pose.map((part) => fixed(part));
     this.hint = `x ${x} m, y ${y} m, θ ${theta} rad`;
     this.stage.invalidate();
   }

@@ -1,0 +1,31 @@
+/** Height of a line of text, with the space to the next [CSS pixels]. */
+export const LINE_HEIGHT = 15;
+
+/** Finds places for labels that do not cover each other. */
+export class LabelPlaces {
+  /** @type {{left: number, right: number, top: number}[]} */
+  taken = [];
+
+  /**
+   * Takes the first free line below a point.
+   *
+   * @param {number} px  centre [CSS pixels]
+   * @param {number} py  centre of the first line
+   * @param {number} width
+   * @param {number} lines  number of lines to try
+   * @returns {number | null} distance of the free line from the first one, null if all are taken
+   */
+  take(px, py, width, lines) {
+    const [left, right] = [px - width / 2, px + width / 2];
+    for (let line = 0; line < lines; line++) {
+      const top = py + line * LINE_HEIGHT;
+      const isTaken = this.taken.some(
+        (other) => left < other.right && right > other.left && Math.abs(top - other.top) < LINE_HEIGHT,
+      );
+      if (isTaken) continue;
+      this.taken.push({ left, right, top });
+      return line * LINE_HEIGHT;
+    }
+    return null;
+  }
+}
