@@ -124,9 +124,7 @@ def measure(folder: Path) -> tuple[float, float, int]:
                 browser.open(viewer.url)
                 times.append(browser.until("window.loadTime") / 1e3)
                 time.sleep(0.5)  # between two loads, which otherwise overlap
-            frames = [
-                browser.driver.execute_async_script(PAN, WINDOW) for _ in range(WINDOWS)
-            ]
+            frames = [browser.driver.execute_async_script(PAN, WINDOW) for _ in range(WINDOWS)]
         finally:
             simulation.stop()
             thread.join()

@@ -547,7 +547,7 @@ class WorldFeed:
                 "time": last.time,
                 "paused": last.paused,
                 "rate": None if rate is None else 0 if math.isinf(rate) else rate,
-                "real_time_factor": self._real_time_factor(),
+                "real_time_factor": None if last.lockstep else self._real_time_factor(),
                 "lockstep": last.lockstep,
                 "stale": round(silence, 1) if silence > STALE_AFTER else 0,
             }

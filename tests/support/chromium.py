@@ -62,6 +62,21 @@ _KEYS: Final = {
 }
 _TEXTS: Final = {"Enter": "\r", "Tab": ""}
 SHIFT: Final = 8  # modifier of key and mouse events
+# Passes the centre of an element that can be clicked to the callback after the next frame.
+_CENTER: Final = """
+const [selector, done] = arguments;
+const find = () => {
+  const element = document.querySelector(selector);
+  if (!element || !element.checkVisibility({visibilityProperty: true})) return null;
+  element.scrollIntoView({block: "nearest", inline: "nearest"});
+  const box = element.getBoundingClientRect();
+  const x = box.x + box.width / 2, y = box.y + box.height / 2;
+  const top = document.elementFromPoint(x, y);
+  const isHit = top && (element.contains(top) || top.closest("label")?.control === element);
+  return isHit ? [x, y] : null;
+};
+requestAnimationFrame(() => done(find()));
+"""
 
 
 def missing_programs() -> list[str]:
@@ -282,22 +297,15 @@ class Chromium:
     def center(self, selector: str) -> Point:
         """Scrolls to the element of a CSS selector and returns its centre.
 
-        It waits until the element is visible, and nothing else is in front of it.
+        It waits until the element is visible, has stopped moving, and nothing is in front of it.
         """
-        x, y = self.until(
-            """((element) => {
-                if (!element || !element.checkVisibility({visibilityProperty: true})) return null;
-                element.scrollIntoView({block: "nearest", inline: "nearest"});
-                const box = element.getBoundingClientRect();
-                const x = box.x + box.width / 2, y = box.y + box.height / 2;
-                const top = document.elementFromPoint(x, y);
-                const label = top && top.closest("label");
-                const hit = top && (element.contains(top) || top.contains(element) ||
-                    (label && label.control === element));
-                return hit ? [x, y] : null;
-            })(document.querySelector(arguments[0]))""",
-            selector,
-        )
+        last: list[Any] = [None]
+
+        def settled() -> Any:
+            before, last[0] = last[0], self.driver.execute_async_script(_CENTER, selector)
+            return last[0] if last[0] == before else None
+
+        x, y = wait_until(f"{selector} can be clicked", settled, poll_period=0.0)
         return x, y
 
     # -- logs ------------------------------------------------------------------------------

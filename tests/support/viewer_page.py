@@ -28,7 +28,9 @@ class ViewerPage:
         self.browser.until("Boolean(window.flatland && flatland.state)")
         self.wait_for_connection("connected")
         self.browser.until(
-            "Object.keys(flatland.state.worlds[0]?.models ?? {}).length > 0 && flatland.frames > 2"
+            "flatland.frames > 2 && flatland.state.worlds.length > 0 &&"
+            " flatland.state.worlds.every(({models}) => Object.keys(models).length > 0"
+            " && Object.values(models).every(({pose}) => pose))"
         )
 
     def wait_for_connection(self, text: str) -> None:
@@ -73,9 +75,11 @@ class ViewerPage:
         return math.hypot(x1 - x0, y1 - y0)
 
     def wait_for_frame(self) -> None:
-        """Waits until the page has drawn a frame with the current state."""
-        frames = self.browser.evaluate("flatland.frames")
-        self.browser.until("flatland.frames > arguments[0] + 1", frames)
+        """Waits until the page has drawn what it has received."""
+        # The page draws before the callbacks that are requested later.
+        self.browser.driver.execute_async_script(
+            "requestAnimationFrame(() => requestAnimationFrame(arguments[0]))"
+        )
 
     def canvas(self, image: Image) -> Image:
         """Returns the part of a screenshot that is the canvas; the rest is black."""
@@ -92,22 +96,19 @@ class ViewerPage:
     # -- controls --------------------------------------------------------------------------
 
     def select(self, name: str) -> None:
-        """Selects a model with a click on it."""
+        """Selects a model with a click on it, and waits for its details."""
         x, y, _ = self.pose(name)
         self.browser.click(self.screen(x, y))
-        self.browser.until("document.querySelector('#inspector').checkVisibility()")
-        self.browser.until(
-            "document.querySelector('#inspector').innerText.includes(arguments[0])", name
-        )
+        self.browser.until("flatland.state.selected === arguments[0]", name)
+        self.browser.until("document.querySelector('#details dl') !== null")
 
     def show(self, display: str, shown: bool) -> None:
         """Switches a display on or off: layers, models, scans, frames, names, trails."""
-        selector = f'input[data-display="{display}"]'
-        if self.browser.evaluate(f"document.querySelector('{selector}').checked") != shown:
-            self.reach(selector)
-            self.browser.click(selector)
-        self.browser.until(f"document.querySelector('{selector}').checked === arguments[0]", shown)
+        if self.browser.evaluate("flatland.state.displays[arguments[0]]", display) != shown:
+            self.browser.click(f'input[data-display="{display}"]')
+        self.browser.until("flatland.state.displays[arguments[0]] === arguments[1]", display, shown)
+        self.wait_for_frame()
 
-    def reach(self, selector: str) -> None:
-        """Opens the panel or menu that contains an element."""
-        raise NotImplementedError
+    def wait_for_pause(self, paused: bool = True) -> None:
+        """Waits until the page shows the world as paused, or as running."""
+        self.browser.until("flatland.state.worlds[0].paused === arguments[0]", paused)

@@ -86,9 +86,7 @@ def test_light_and_dark(browser: Chromium, page: ViewerPage) -> None:
         page.wait_for_frame()
         image = page.browser.picture()
         brightness[scheme] = float(image.mean())
-        assert centroid(page.canvas(image), ROBOT_COLOR) == pytest.approx(
-            page.screen(-2, 1), abs=3
-        )
+        assert centroid(page.canvas(image), ROBOT_COLOR) == pytest.approx(page.screen(-2, 1), abs=3)
     browser.prefer()
     assert brightness["dark"] < 100 < 150 < brightness["light"]
 
@@ -148,7 +146,9 @@ def test_everything_is_possible_with_the_keyboard(room: ViewedWorld, page: Viewe
     focus("#spawn")
     browser.key("Enter")
     browser.until("document.querySelector('#spawn-dialog').checkVisibility()")
-    assert browser.evaluate("document.querySelector('#spawn-dialog').contains(document.activeElement)")
+    assert browser.evaluate(
+        "document.querySelector('#spawn-dialog').contains(document.activeElement)"
+    )
     browser.key("Escape")
     browser.until("!document.querySelector('#spawn-dialog').checkVisibility()")
     assert browser.evaluate("document.activeElement.id") == "spawn"

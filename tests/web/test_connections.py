@@ -110,9 +110,7 @@ def test_twenty_clients(room: ViewedWorld, page: ViewerPage) -> None:
             while not isinstance(message := client.recv(), bytes) or message[0] != 3:
                 pass  # until a scan
         turned = page.pose("robot")[2]
-        page.browser.until(
-            "flatland.state.worlds[0].models.robot.pose[2] !== arguments[0]", turned
-        )
+        page.browser.until("flatland.state.worlds[0].models.robot.pose[2] !== arguments[0]", turned)
     start = time_of(room)
     wait_until("the simulation continues", lambda: time_of(room) > start + 0.5)
 

@@ -38,7 +38,7 @@ def test_a_model_is_dragged_while_the_world_is_paused(room: ViewedWorld, page: V
 
 def test_a_paused_world_remains_paused_after_a_drag(room: ViewedWorld, page: ViewerPage) -> None:
     room.ask(room.world.pause)
-    page.browser.until("flatland.state.worlds[0].paused")
+    page.wait_for_pause()
     page.browser.drag(page.screen(2, -2), page.screen(3, 3))
     wait_until("the crate is there", lambda: room.pose("crate")[:2] == close_to((3, 3)))
     page.browser.evaluate("new Promise(requestAnimationFrame)")
@@ -104,7 +104,9 @@ def test_errors_of_the_simulator_are_shown(room: ViewedWorld, page: ViewerPage) 
     browser.fill("#spawn-name", "robot")
     browser.click("#spawn-ok")
     browser.click(page.screen(3, 3))
-    browser.until("document.body.innerText.includes('robot') && document.body.innerText.match(/exists|already/)")
+    browser.until(
+        "document.body.innerText.includes('robot') && document.body.innerText.match(/exists|already/)"
+    )
     assert sorted(room.names()) == ["crate", "robot"]
 
 

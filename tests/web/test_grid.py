@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from pathlib import Path
 
+import cv2
 import numpy as np
 import pytest
 from chromium import Chromium, Image, mask
@@ -42,21 +43,9 @@ def grid(rooms: list[ViewedWorld], browser: Chromium) -> Iterator[ViewerPage]:
     browser.open("about:blank")
 
 
-def quarters(image: Image) -> list[Image]:
-    """The four quarters of a screenshot, row by row."""
-    height, width = image.shape[0] // 2, image.shape[1] // 2
-    return [
-        image[y : y + height, x : x + width] for y in (0, height) for x in (0, width)
-    ]
-
-
 def robots(image: Image) -> int:
     """The number of connected areas of the colour of the robot."""
-    import cv2
-
-    count, _, stats, _ = cv2.connectedComponentsWithStats(
-        mask(image, ROBOT_COLOR).astype(np.uint8)
-    )
+    count, _, stats, _ = cv2.connectedComponentsWithStats(mask(image, ROBOT_COLOR).astype(np.uint8))
     return sum(int(stats[i, cv2.CC_STAT_AREA]) > 20 for i in range(1, count))
 
 
@@ -68,13 +57,14 @@ def test_all_worlds_are_visible_and_one_is_enlarged(
     rooms[2].ask(lambda: rooms[2].world.command("/cmd_vel").set(Twist(linear_x=1.0)))
     browser.until("flatland.state.worlds[2].models.robot.pose[0] > -1")
     assert grid.pose("robot", 1) == pytest.approx((-2, 1, 0))
-    tile = browser.evaluate("flatland.tile(2)")
-    browser.click((tile[0] + tile[2] / 2, tile[1] + tile[3] / 2))
+    browser.click(".tile:nth-child(3)")
+    browser.until("flatland.state.current === 2")
     browser.picture_until("one robot", lambda image: robots(grid.canvas(image)) == 1)
-    grid.select("robot")
     browser.click("#pause")
     wait_until("that world is paused", lambda: rooms[2].ask(lambda: rooms[2].world.paused))
     assert not rooms[1].ask(lambda: rooms[1].world.paused)
+    browser.click("#all-worlds")
+    browser.picture_until("four robots again", lambda image: robots(grid.canvas(image)) == 4)
 
 
 def test_worlds_come_and_go(rooms: list[ViewedWorld], grid: ViewerPage) -> None:

@@ -38,7 +38,7 @@ def speed(room: ViewedWorld) -> tuple[float, float]:
 def test_pause_and_resume(room: ViewedWorld, page: ViewerPage) -> None:
     page.browser.click("#pause")
     wait_until("the world is paused", lambda: is_paused(room))
-    page.browser.until("flatland.state.worlds[0].paused")
+    page.wait_for_pause()
     shown = page.browser.until("document.querySelector('#time').textContent")
     assert any(character.isdigit() for character in shown)
     page.browser.click("#pause")
@@ -64,13 +64,16 @@ def test_a_pause_by_another_program_is_displayed(room: ViewedWorld, page: Viewer
 
 def test_the_rate_and_the_real_time_factor(room: ViewedWorld, page: ViewerPage) -> None:
     browser = page.browser
-    browser.until("/1[.,]0|100/.test(document.querySelector('#rtf').textContent)")
-    browser.click("#rate")
+    factor = "parseFloat(document.querySelector('#rtf').textContent)"
+    browser.until(f"Math.abs({factor} - 1) < 0.1")
+    browser.evaluate("document.querySelector('#rate').focus()")
     browser.key("Home")
-    wait_until("a lower rate", lambda: room.ask(lambda: room.simulation.rate) < 200)
-    rate = room.ask(lambda: room.simulation.rate)
-    browser.until("flatland.state.worlds[0].rate <= arguments[0] + 1", rate)
-    browser.until("!/1[.,]0|100/.test(document.querySelector('#rtf').textContent)")
+    wait_until("a lower rate", lambda: room.ask(lambda: room.simulation.rate) == 10)
+    browser.until("document.querySelector('#rate-text').textContent.startsWith('10 Hz')")
+    browser.until(f"Math.abs({factor} - 0.05) < 0.02")
+    browser.key("End")
+    wait_until("no limit", lambda: room.ask(lambda: room.simulation.rate) == math.inf)
+    browser.until(f"{factor} > 2")
 
 
 # -- driving -------------------------------------------------------------------------------

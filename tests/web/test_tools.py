@@ -64,9 +64,7 @@ def test_recording(room: ViewedWorld, page: ViewerPage) -> None:
     assert last.mean() > first.mean() + 5
 
 
-def test_the_inspector_shows_the_values_of_the_model(
-    room: ViewedWorld, page: ViewerPage
-) -> None:
+def test_the_inspector_shows_the_values_of_the_model(room: ViewedWorld, page: ViewerPage) -> None:
     page.select("crate")
     mass = 1.6 * 0.6
     page.browser.until(
@@ -87,5 +85,16 @@ def test_the_inspector_shows_contacts(room: ViewedWorld, page: ViewerPage) -> No
 
 
 def test_plots_show_published_numbers(room: ViewedWorld, page: ViewerPage) -> None:
-    page.browser.click("#plots")
-    raise AssertionError("which controls?")
+    browser = page.browser
+    browser.click("#plots-toggle")
+    name = browser.until(
+        "[...document.querySelector('#plot-series').options].map((o) => o.value)"
+        ".find((value) => value.includes('scan') || value.includes('twist'))"
+    )
+    browser.evaluate(
+        "((s) => { s.value = arguments[0]; s.dispatchEvent(new Event('change')); })"
+        "(document.querySelector('#plot-series'))",
+        name,
+    )
+    drawn = browser.until("document.querySelector('figure.plot output').textContent !== '–'")
+    assert drawn

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
 import numpy as np
@@ -10,6 +9,7 @@ import pytest
 from chromium import Chromium, Image, centroid, line, mask
 from viewed_world import CRATE_COLOR, ROBOT_COLOR, WALL_COLOR, ViewedWorld
 from viewer_page import ViewerPage
+from waiting import wait_until
 
 from flatland import Twist
 
@@ -43,7 +43,7 @@ def test_the_picture_shows_the_robot_move(room: ViewedWorld, page: ViewerPage) -
     page.browser.picture_until("the robot one metre further", moved)
     drive(room, Twist())
     room.ask(room.world.pause)
-    page.browser.until("flatland.state.worlds[0].paused")
+    page.wait_for_pause()
     page.wait_for_frame()
     x, y, _ = room.pose("robot")
     assert centroid(page.canvas(page.browser.picture()), ROBOT_COLOR) == close_to(page.screen(x, y))
@@ -90,7 +90,7 @@ def test_a_display_changes_the_picture(room: ViewedWorld, page: ViewerPage, disp
         )
         drive(room, Twist())
     room.ask(room.world.pause)
-    page.browser.until("flatland.state.worlds[0].paused")
+    page.wait_for_pause()
     page.show(display, False)
     page.wait_for_frame()
     without = page.canvas(page.browser.picture()).astype(int)
@@ -106,14 +106,12 @@ def test_lasers_scan_only_for_those_who_look(room: ViewedWorld, page: ViewerPage
     def wanted() -> bool:
         return room.ask(lambda: room.world.output("/scan").wanted)
 
-    page.show("scans", True)
-    page.browser.until("flatland.state.worlds[0].models.robot !== undefined")
-    room_wants = wanted
-    from waiting import wait_until
-
-    wait_until("the laser scans", room_wants)
+    page.browser.until("flatland.state.worlds[0].scans === 1")
+    assert wanted()
     page.show("scans", False)
     wait_until("the laser rests", lambda: not wanted())
+    page.show("scans", True)
+    wait_until("the laser scans", wanted)
 
 
 def test_wheel_and_drag_zoom_and_pan(page: ViewerPage) -> None:
@@ -121,7 +119,6 @@ def test_wheel_and_drag_zoom_and_pan(page: ViewerPage) -> None:
     ground = page.screen(0, 3)
     browser.wheel(ground, -240)
     browser.until("flatland.toScreen(1, 0)[0] - flatland.toScreen(0, 0)[0] > arguments[0]", before)
-    browser.evaluate("new Promise(requestAnimationFrame)")
     assert page.world(ground) == close_to((0, 3), 0.3)
     start = page.screen(0, 3)
     end = (start[0] + 120, start[1] - 50)
@@ -148,22 +145,21 @@ def test_keys_and_fingers_zoom(page: ViewerPage) -> None:
 
 def test_the_view_follows_the_selected_robot(room: ViewedWorld, page: ViewerPage) -> None:
     page.select("robot")
-    page.reach("#follow")
     page.browser.click("#follow")
-    start = page.screen(-2, 1)
+    page.browser.until("flatland.state.followed === 'robot'")
     drive(room, FORWARD)
-
-    def followed() -> bool:
-        x, y, _ = page.pose("robot")
-        return x > -1 and math.dist(page.screen(x, y), start) > 0
-
-    page.browser.until("flatland.state.worlds[0].models.robot.pose[0] > -0.5")
-    robot = page.browser.evaluate(
-        "((p) => flatland.toScreen(p[0], p[1]))(flatland.state.worlds[0].models.robot.pose)"
+    page.browser.until("flatland.state.worlds[0].models.robot.pose[0] > -1")
+    room.ask(room.world.pause)
+    page.wait_for_pause()
+    page.wait_for_frame()
+    x, y, _ = room.pose("robot")
+    box = page.browser.evaluate(
+        "((b) => [b.x + b.width / 2, b.y + b.height / 2])"
+        "(document.querySelector('#canvas').getBoundingClientRect())"
     )
-    ground = page.screen(-2, 1)
-    assert ground[0] < start[0] - 0.5 * page.scale() or robot == close_to(start, 60)
-    assert followed()
+    assert page.screen(x, y) == close_to(box)
+    page.browser.drag(page.screen(0, 3), page.screen(1, 3))
+    page.browser.until("flatland.state.followed === null")
 
 
 def test_a_link_restores_the_view(
@@ -171,12 +167,11 @@ def test_a_link_restores_the_view(
 ) -> None:
     browser = page.browser
     browser.wheel(page.screen(1, 1), -360)
-    browser.evaluate("new Promise((done) => setTimeout(done, 400))")
     browser.drag(page.screen(0, 2), page.screen(0.5, 2.5))
     page.show("names", False)
-    page.reach("#share")
     browser.click("#share")
     url = browser.until("location.hash.includes('zoom') && location.href")
+    assert browser.evaluate("document.querySelector('#notices').innerText").startswith("Link")
     other = ViewerPage(other_browser)
     other.open(url)
     assert other.scale() == pytest.approx(page.scale(), rel=0.01)

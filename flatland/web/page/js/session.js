@@ -109,8 +109,9 @@ export class Session extends Emitter {
    */
   show(index) {
     if (index === this.currentIndex) return;
+    // The address may name a model before the server has listed the worlds.
+    if (this.currentIndex !== null) this.selectedName = null;
     this.currentIndex = index;
-    this.selectedName = null;
     this.emit("current", undefined);
     this.emit("selection", undefined);
     this.look();
