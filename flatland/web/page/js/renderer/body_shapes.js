@@ -1,6 +1,7 @@
-import { shapeEdges, shapePoints } from "../world_state.js";
+import { shapeEdges, shapePoints } from "../shapes.js";
 import { addAttributes, createFloatTexture, createProgram, uploadFloatTexture } from "./gl.js";
 import { readable } from "./palette.js";
+import { forCorners } from "./quads.js";
 import { bodyEdgesVertex, bodyFillVertex, colorFragment, coloredEdgesFragment } from "./shaders.js";
 import { lineWeight, useProgram } from "./view.js";
 
@@ -30,25 +31,28 @@ export class BodyShapes {
   /**
    * @param {WebGL2RenderingContext} gl
    * @param {BodyPrograms} programs
+   * @param {import("./quads.js").Quads} quads
    */
-  constructor(gl, programs) {
+  constructor(gl, programs, quads) {
     this.gl = gl;
     this.programs = programs;
+    this.quads = quads;
     this.texture = createFloatTexture(gl);
     this.fillBuffer = gl.createBuffer();
     this.edgeBuffer = gl.createBuffer();
     this.fillArray = gl.createVertexArray();
     this.edgeArray = gl.createVertexArray();
-    addAttributes(gl, this.fillArray, this.fillBuffer, FILL_STRIDE, 0, [
+    addAttributes(gl, this.fillArray, this.fillBuffer, FILL_STRIDE, [
       { location: 0, size: 2 },
       { location: 1, size: 4, type: gl.UNSIGNED_BYTE, normalized: true, offset: 12 },
       { location: 2, size: 1, offset: 8 },
     ]);
-    addAttributes(gl, this.edgeArray, this.edgeBuffer, EDGE_STRIDE, 1, [
+    addAttributes(gl, this.edgeArray, this.edgeBuffer, EDGE_STRIDE, [
       { location: 0, size: 4 },
       { location: 1, size: 4, type: gl.UNSIGNED_BYTE, normalized: true, offset: 20 },
       { location: 2, size: 1, offset: 16 },
     ]);
+    quads.attach(this.edgeArray);
     this.fillCount = 0;
     this.edgeCount = 0;
     this.shapesVersion = -1;
@@ -102,7 +106,7 @@ export class BodyShapes {
     gl.bindBuffer(gl.ARRAY_BUFFER, this.fillBuffer);
     gl.bufferData(gl.ARRAY_BUFFER, packWithColor(fills, 4), gl.STATIC_DRAW);
     gl.bindBuffer(gl.ARRAY_BUFFER, this.edgeBuffer);
-    gl.bufferData(gl.ARRAY_BUFFER, packWithColor(edges, 6), gl.STATIC_DRAW);
+    gl.bufferData(gl.ARRAY_BUFFER, forCorners(packWithColor(edges, 6), 6), gl.STATIC_DRAW);
   }
 
   /** @param {import("./view.js").Viewport} viewport */
@@ -119,8 +123,7 @@ export class BodyShapes {
     if (this.edgeCount > 0) {
       useProgram(gl, programs.edges, viewport);
       gl.uniform1f(programs.edges.uniform("u_width"), WIDTH * lineWeight(viewport) * viewport.ratio);
-      gl.bindVertexArray(this.edgeArray);
-      gl.drawArraysInstanced(gl.TRIANGLE_STRIP, 0, 4, this.edgeCount);
+      this.quads.draw(this.edgeArray, 0, this.edgeCount);
     }
   }
 

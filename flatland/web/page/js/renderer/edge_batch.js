@@ -5,6 +5,8 @@ import { useProgram } from "./view.js";
 /** Words of an edge: four coordinates, colour, width, time. */
 export const EDGE_WORDS = 7;
 const STRIDE = 4 * EDGE_WORDS;
+/** Words of the four vertices of an edge. */
+const QUAD_WORDS = 4 * EDGE_WORDS;
 
 /**
  * Returns the program that draws edges with colours of their own.
@@ -21,15 +23,17 @@ export function createColoredEdgeProgram(gl) {
  *
  * @param {WebGL2RenderingContext} gl
  * @param {WebGLBuffer} buffer
+ * @param {import("./quads.js").Quads} quads
  */
-export function createColoredEdgeArray(gl, buffer) {
+export function createColoredEdgeArray(gl, buffer, quads) {
   const array = gl.createVertexArray();
-  addAttributes(gl, array, buffer, STRIDE, 1, [
+  addAttributes(gl, array, buffer, STRIDE, [
     { location: 0, size: 4 },
     { location: 1, size: 4, type: gl.UNSIGNED_BYTE, normalized: true, offset: 16 },
     { location: 2, size: 1, offset: 20 },
     { location: 3, size: 1, offset: 24 },
   ]);
+  quads.attach(array);
   return array;
 }
 
@@ -50,15 +54,17 @@ export class EdgeBatch {
   /**
    * @param {WebGL2RenderingContext} gl
    * @param {import("./gl.js").Program} program
+   * @param {import("./quads.js").Quads} quads
    */
-  constructor(gl, program) {
+  constructor(gl, program, quads) {
     this.gl = gl;
     this.program = program;
-    this.floats = new Float32Array(EDGE_WORDS * 256);
+    this.quads = quads;
+    this.floats = new Float32Array(QUAD_WORDS * 256);
     this.words = new Uint32Array(this.floats.buffer);
     this.count = 0;
     this.buffer = gl.createBuffer();
-    this.array = createColoredEdgeArray(gl, this.buffer);
+    this.array = createColoredEdgeArray(gl, this.buffer, quads);
   }
 
   /**
@@ -72,8 +78,8 @@ export class EdgeBatch {
    * @param {number} width  [CSS pixels]
    */
   add(x1, y1, x2, y2, color, width) {
-    const at = EDGE_WORDS * this.count++;
-    if (at + EDGE_WORDS > this.floats.length) {
+    const at = QUAD_WORDS * this.count++;
+    if (at + QUAD_WORDS > this.floats.length) {
       const floats = new Float32Array(2 * this.floats.length);
       floats.set(this.floats);
       this.floats = floats;
@@ -86,6 +92,9 @@ export class EdgeBatch {
     this.words[at + 4] = color;
     this.floats[at + 5] = width;
     this.floats[at + 6] = 0;
+    for (let i = EDGE_WORDS; i < QUAD_WORDS; i += EDGE_WORDS) {
+      this.words.copyWithin(at + i, at, at + EDGE_WORDS);
+    }
   }
 
   /**
@@ -119,12 +128,11 @@ export class EdgeBatch {
     if (this.count === 0) return;
     const { gl, program } = this;
     gl.bindBuffer(gl.ARRAY_BUFFER, this.buffer);
-    gl.bufferData(gl.ARRAY_BUFFER, this.floats.subarray(0, EDGE_WORDS * this.count), gl.STREAM_DRAW);
+    gl.bufferData(gl.ARRAY_BUFFER, this.words.subarray(0, QUAD_WORDS * this.count), gl.STREAM_DRAW);
     useProgram(gl, program, viewport);
     gl.uniform1f(program.uniform("u_lifetime"), 0);
     gl.uniform1f(program.uniform("u_ratio"), viewport.ratio);
-    gl.bindVertexArray(this.array);
-    gl.drawArraysInstanced(gl.TRIANGLE_STRIP, 0, 4, this.count);
+    this.quads.draw(this.array, 0, this.count);
     this.count = 0;
   }
 }

@@ -1,6 +1,7 @@
 import { sortIntoCells, visibleRanges } from "./edge_cells.js";
 import { addAttributes, createProgram } from "./gl.js";
 import { readable } from "./palette.js";
+import { forCorners } from "./quads.js";
 import { edgesFragment, edgesVertex, flatFragment, thinVertex } from "./shaders.js";
 import { lineWeight, useProgram } from "./view.js";
 
@@ -11,8 +12,9 @@ const MANY_EDGES = 20_000;
 
 /**
  * @typedef {object} LayerBuffer
- * @property {WebGLBuffer} buffer
- * @property {WebGLVertexArrayObject} wide  one instance for each edge
+ * @property {WebGLBuffer} quadBuffer
+ * @property {WebGLBuffer} lineBuffer
+ * @property {WebGLVertexArrayObject} wide  a quad for each edge
  * @property {WebGLVertexArrayObject} thin  two vertices for each edge
  * @property {import("./edge_cells.js").Cell[]} cells
  * @property {number} meanLength  [m]
@@ -32,10 +34,12 @@ export class EdgeLayers {
   /**
    * @param {WebGL2RenderingContext} gl
    * @param {EdgeProgram} program
+   * @param {import("./quads.js").Quads} quads
    */
-  constructor(gl, program) {
+  constructor(gl, program, quads) {
     this.gl = gl;
     this.program = program;
+    this.quads = quads;
     /** @type {Map<Float32Array, LayerBuffer>} */
     this.buffers = new Map();
     this.version = -1;
@@ -53,9 +57,10 @@ export class EdgeLayers {
 
   /** @param {Set<Float32Array | null>} used */
   keepOnly(used) {
-    for (const [edges, { buffer, wide, thin }] of this.buffers) {
+    for (const [edges, { quadBuffer, lineBuffer, wide, thin }] of this.buffers) {
       if (used.has(edges)) continue;
-      this.gl.deleteBuffer(buffer);
+      this.gl.deleteBuffer(quadBuffer);
+      this.gl.deleteBuffer(lineBuffer);
       this.gl.deleteVertexArray(wide);
       this.gl.deleteVertexArray(thin);
       this.buffers.delete(edges);
@@ -73,18 +78,23 @@ export class EdgeLayers {
   upload(edges) {
     const { gl } = this;
     const sorted = sortIntoCells(edges);
-    const buffer = gl.createBuffer();
+    const quadBuffer = gl.createBuffer();
+    const lineBuffer = gl.createBuffer();
     const wide = gl.createVertexArray();
     const thin = gl.createVertexArray();
-    addAttributes(gl, wide, buffer, 16, 1, [{ location: 0, size: 4 }]);
-    addAttributes(gl, thin, buffer, 8, 0, [{ location: 0, size: 2 }]);
-    gl.bindBuffer(gl.ARRAY_BUFFER, buffer);
+    addAttributes(gl, wide, quadBuffer, 16, [{ location: 0, size: 4 }]);
+    addAttributes(gl, thin, lineBuffer, 8, [{ location: 0, size: 2 }]);
+    this.quads.attach(wide);
+    gl.bindBuffer(gl.ARRAY_BUFFER, quadBuffer);
+    gl.bufferData(gl.ARRAY_BUFFER, forCorners(sorted.edges, 4), gl.STATIC_DRAW);
+    gl.bindBuffer(gl.ARRAY_BUFFER, lineBuffer);
     gl.bufferData(gl.ARRAY_BUFFER, sorted.edges, gl.STATIC_DRAW);
     let length = 0;
     for (let i = 0; i < edges.length; i += 4) {
       length += Math.hypot(edges[i + 2] - edges[i], edges[i + 3] - edges[i + 1]);
     }
-    return { buffer, wide, thin, cells: sorted.cells, meanLength: (4 * length) / edges.length };
+    const meanLength = (4 * length) / edges.length;
+    return { quadBuffer, lineBuffer, wide, thin, cells: sorted.cells, meanLength };
   }
 
   /**
@@ -105,17 +115,13 @@ export class EdgeLayers {
       useProgram(gl, program, viewport);
       const [r, g, b, a] = readable(layer.color, palette);
       gl.uniform4f(program.uniform("u_color"), r * a, g * a, b * a, a);
-      gl.bindVertexArray(isThin ? entry.thin : entry.wide);
       if (isThin) {
+        gl.bindVertexArray(entry.thin);
         for (const range of ranges) gl.drawArrays(gl.LINES, 2 * range.start, 2 * range.count);
         continue;
       }
       gl.uniform1f(program.uniform("u_width"), WIDTH * lineWeight(viewport) * viewport.ratio);
-      gl.bindBuffer(gl.ARRAY_BUFFER, entry.buffer);
-      for (const range of ranges) {
-        gl.vertexAttribPointer(0, 4, gl.FLOAT, false, 16, 16 * range.start);
-        gl.drawArraysInstanced(gl.TRIANGLE_STRIP, 0, 4, range.count);
-      }
+      for (const { start, count: length } of ranges) this.quads.draw(entry.wide, start, length);
     }
   }
 }

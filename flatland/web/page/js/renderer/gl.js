@@ -81,16 +81,14 @@ export function createProgram(gl, vertex, fragment, attributes) {
  * @param {WebGLVertexArrayObject} array
  * @param {WebGLBuffer} buffer
  * @param {number} stride  [bytes]
- * @param {number} divisor  1: one element for each instance
  * @param {Attribute[]} attributes
  */
-export function addAttributes(gl, array, buffer, stride, divisor, attributes) {
+export function addAttributes(gl, array, buffer, stride, attributes) {
   gl.bindVertexArray(array);
   gl.bindBuffer(gl.ARRAY_BUFFER, buffer);
   for (const { location, size, type = gl.FLOAT, normalized = false, offset = 0 } of attributes) {
     gl.enableVertexAttribArray(location);
     gl.vertexAttribPointer(location, size, type, normalized, stride, offset);
-    gl.vertexAttribDivisor(location, divisor);
   }
   gl.bindVertexArray(null);
 }

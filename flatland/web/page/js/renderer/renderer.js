@@ -4,6 +4,7 @@ import { EdgeProgram } from "./edge_layers.js";
 import { LabelPlaces } from "./label_places.js";
 import { addFrames, addGrid, addJoints, addNames, addShapelessModels } from "./marks.js";
 import { createPalette } from "./palette.js";
+import { Quads } from "./quads.js";
 import { ScanPrograms } from "./scan_clouds.js";
 import { TextLabels } from "./text_labels.js";
 import { WorldGraphics } from "./world_graphics.js";
@@ -39,9 +40,10 @@ export class Renderer {
       bodies: new BodyPrograms(gl),
       scans: new ScanPrograms(gl),
       coloredEdges: createColoredEdgeProgram(gl),
+      quads: new Quads(gl),
     };
-    this.batch = new EdgeBatch(gl, this.programs.coloredEdges);
-    this.labels = new TextLabels(gl);
+    this.batch = new EdgeBatch(gl, this.programs.coloredEdges, this.programs.quads);
+    this.labels = new TextLabels(gl, this.programs.quads);
     /** @type {Map<WorldState, WorldGraphics>} */
     this.graphics = new Map();
     gl.enable(gl.BLEND);

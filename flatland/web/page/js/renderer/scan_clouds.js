@@ -1,4 +1,11 @@
-import { FLOAT_TEXTURE_WIDTH, addAttributes, createFloatTexture, createProgram, uploadFloatTexture } from "./gl.js";
+import { NO_HIT } from "../protocol.js";
+import {
+  FLOAT_TEXTURE_WIDTH,
+  addAttributes,
+  createFloatTexture,
+  createProgram,
+  uploadFloatTexture,
+} from "./gl.js";
 import { colorFragment, scanAreaVertex, scanPointsFragment, scanPointsVertex } from "./shaders.js";
 import { lineWeight, useProgram } from "./view.js";
 
@@ -13,7 +20,7 @@ const MAX_AREAS = 8;
  *
  * @typedef {object} Span  beams of a laser in the buffers
  * @property {LaserState} laser
- * @property {number} start
+ * @property {number} start  index of the first vertex, which is the laser itself
  * @property {number} count
  */
 
@@ -22,7 +29,7 @@ export class ScanPrograms {
   /** @param {WebGL2RenderingContext} gl */
   constructor(gl) {
     this.points = createProgram(gl, scanPointsVertex, scanPointsFragment, ["a_beam", "a_range"]);
-    this.areas = createProgram(gl, scanAreaVertex, colorFragment, ["a_beam", "a_range", "a_nextRange"]);
+    this.areas = createProgram(gl, scanAreaVertex, colorFragment, ["a_beam", "a_range"]);
   }
 }
 
@@ -41,12 +48,9 @@ export class ScanClouds {
     this.texture = createFloatTexture(gl);
     this.beamBuffer = gl.createBuffer();
     this.rangeBuffer = gl.createBuffer();
-    this.pointArray = gl.createVertexArray();
-    this.areaArray = gl.createVertexArray();
-    addAttributes(gl, this.pointArray, this.beamBuffer, 8, 0, [{ location: 0, size: 2 }]);
-    addAttributes(gl, this.pointArray, this.rangeBuffer, 2, 0, [
-      { location: 1, size: 1, type: gl.UNSIGNED_SHORT },
-    ]);
+    this.array = gl.createVertexArray();
+    addAttributes(gl, this.array, this.beamBuffer, 8, [{ location: 0, size: 2 }]);
+    addAttributes(gl, this.array, this.rangeBuffer, 2, [{ location: 1, size: 1, type: gl.UNSIGNED_SHORT }]);
     /** @type {Span[]} */
     this.spans = [];
     this.layout = "";
@@ -67,7 +71,7 @@ export class ScanClouds {
     for (const span of this.spans) {
       span.laser = present[index];
       const { info, model, pose, ranges } = span.laser;
-      if (ranges) this.ranges.set(ranges, span.start);
+      if (ranges) this.ranges.set(ranges, span.start + 1);
       this.lasers.set([...pose, info.range_max], 8 * index);
       this.lasers.set([info.angle_min, info.angle_increment, span.count, model.index % 8], 8 * index + 4);
       index++;
@@ -92,14 +96,14 @@ export class ScanClouds {
     for (const laser of lasers) {
       const count = laser.ranges?.length ?? 0;
       this.spans.push({ laser, start, count });
-      start += count;
+      start += count + 1;
     }
+    // The vertices of a laser begin with the centre of its area, which is not a point: no hit.
     const beams = new Float32Array(2 * start);
     this.spans.forEach((span, index) => {
-      for (let i = 0; i < span.count; i++) beams.set([index, i], 2 * (span.start + i));
+      for (let i = 0; i <= span.count; i++) beams.set([index, i - 1], 2 * (span.start + i));
     });
-    // One more range, because each triangle also reads the range of the next beam.
-    this.ranges = new Uint16Array(start + 1);
+    this.ranges = new Uint16Array(start).fill(NO_HIT);
     const rows = Math.max(1, Math.ceil((2 * lasers.length) / FLOAT_TEXTURE_WIDTH));
     this.lasers = new Float32Array(4 * FLOAT_TEXTURE_WIDTH * rows);
     gl.bindBuffer(gl.ARRAY_BUFFER, this.beamBuffer);
@@ -119,15 +123,8 @@ export class ScanClouds {
     const program = this.programs.areas;
     this.prepare(program, viewport, palette);
     gl.uniform1f(program.uniform("u_opacity"), AREA_OPACITY);
-    for (const { start, count } of shown) {
-      addAttributes(gl, this.areaArray, this.beamBuffer, 8, 1, [{ location: 0, size: 2, offset: 8 * start }]);
-      addAttributes(gl, this.areaArray, this.rangeBuffer, 2, 1, [
-        { location: 1, size: 1, type: gl.UNSIGNED_SHORT, offset: 2 * start },
-        { location: 2, size: 1, type: gl.UNSIGNED_SHORT, offset: 2 * start + 2 },
-      ]);
-      gl.bindVertexArray(this.areaArray);
-      gl.drawArraysInstanced(gl.TRIANGLES, 0, 3, count - 1);
-    }
+    gl.bindVertexArray(this.array);
+    for (const { start, count } of shown) gl.drawArrays(gl.TRIANGLE_FAN, start, count + 1);
   }
 
   /**
@@ -141,8 +138,8 @@ export class ScanClouds {
     const program = this.programs.points;
     this.prepare(program, viewport, palette);
     gl.uniform1f(program.uniform("u_pointSize"), POINT_SIZE * lineWeight(viewport) * viewport.ratio);
-    gl.bindVertexArray(this.pointArray);
-    gl.drawArrays(gl.POINTS, 0, last.start + last.count);
+    gl.bindVertexArray(this.array);
+    gl.drawArrays(gl.POINTS, 0, last.start + last.count + 1);
   }
 
   /**
@@ -163,7 +160,6 @@ export class ScanClouds {
     gl.deleteTexture(this.texture);
     gl.deleteBuffer(this.beamBuffer);
     gl.deleteBuffer(this.rangeBuffer);
-    gl.deleteVertexArray(this.pointArray);
-    gl.deleteVertexArray(this.areaArray);
+    gl.deleteVertexArray(this.array);
   }
 }

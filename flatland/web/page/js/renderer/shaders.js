@@ -15,7 +15,7 @@ vec2 toPixels(vec2 p) { return mat2(u_matrix.xy, u_matrix.zw) * (p - u_center); 
 vec4 toClip(vec2 pixels) { return vec4(2.0 * pixels / u_size, 0.0, 1.0); }
 `;
 
-/** A line with round caps, drawn as an instance of four vertices. */
+/** A line with round caps, drawn as a quad. */
 const CAPSULE = `
 out vec2 v_local;
 flat out float v_length;
@@ -24,7 +24,7 @@ vec2 capsule(vec2 a, vec2 b, float width) {
   vec2 d = b - a;
   float len = length(d);
   vec2 along = len > 1e-5 ? d / len : vec2(1.0, 0.0);
-  float end = float(gl_VertexID >> 1);
+  float end = float((gl_VertexID >> 1) & 1);
   float side = float(gl_VertexID & 1) * 2.0 - 1.0;
   float r = 0.5 * width + 1.0;
   v_local = vec2(end * (len + 2.0 * r) - r, side * r);
@@ -166,22 +166,16 @@ void main() {
   color = vec4(v_color, 1.0) * clamp(0.5 * u_pointSize - d + 0.5, 0.0, 1.0);
 }`;
 
-/** A triangle between two beams, drawn as an instance of three vertices. */
+/** A fan of triangles; beam -1 is its centre, the laser. */
 export const scanAreaVertex = `${HEAD}${VIEW}${SCAN}
 in vec2 a_beam;
 in float a_range;
-in float a_nextRange;
 uniform float u_opacity;
 flat out vec4 v_color;
 void main() {
   vec4 pose = laserTexel(a_beam.x, 0), beams = laserTexel(a_beam.x, 1);
   v_color = vec4(u_palette[int(beams.w)], 1.0) * u_opacity;
-  float range = gl_VertexID == 1 ? a_range : a_nextRange;
-  vec2 p = pose.xy;
-  if (gl_VertexID > 0 && a_beam.y + 1.5 < beams.z) {
-    p = beamEnd(pose, beams, a_beam.y + float(gl_VertexID - 1), range);
-  }
-  gl_Position = toClip(toPixels(p));
+  gl_Position = toClip(toPixels(a_beam.y < 0.0 ? pose.xy : beamEnd(pose, beams, a_beam.y, a_range)));
 }`;
 
 export const textVertex = `${HEAD}${VIEW}
@@ -191,7 +185,7 @@ in vec4 a_texels;   // offset and size in the atlas [texels]
 uniform vec2 u_atlasSize;
 out vec2 v_texel;
 void main() {
-  vec2 corner = vec2(float(gl_VertexID >> 1), float(gl_VertexID & 1));
+  vec2 corner = vec2(float((gl_VertexID >> 1) & 1), float(gl_VertexID & 1));
   v_texel = (a_texels.xy + corner * a_texels.zw) / u_atlasSize;
   vec2 anchor = floor(toPixels(a_anchor) + 0.5 * u_size) - 0.5 * u_size;
   gl_Position = toClip(anchor + vec2(a_box.x + corner.x * a_box.z, -(a_box.y + corner.y * a_box.w)));

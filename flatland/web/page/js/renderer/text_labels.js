@@ -1,4 +1,5 @@
 import { addAttributes, createProgram } from "./gl.js";
+import { forCorners } from "./quads.js";
 import { textFragment, textVertex } from "./shaders.js";
 import { useProgram } from "./view.js";
 
@@ -13,18 +14,23 @@ const HALO = 2;
 
 /** Text at points of the world. Glyphs are drawn once into an atlas; a frame is two draw calls. */
 export class TextLabels {
-  /** @param {WebGL2RenderingContext} gl */
-  constructor(gl) {
+  /**
+   * @param {WebGL2RenderingContext} gl
+   * @param {import("./quads.js").Quads} quads
+   */
+  constructor(gl, quads) {
     this.gl = gl;
+    this.quads = quads;
     this.program = createProgram(gl, textVertex, textFragment, ["a_anchor", "a_box", "a_texels"]);
     this.texture = gl.createTexture();
     this.buffer = gl.createBuffer();
     this.array = gl.createVertexArray();
-    addAttributes(gl, this.array, this.buffer, 4 * GLYPH_WORDS, 1, [
+    addAttributes(gl, this.array, this.buffer, 4 * GLYPH_WORDS, [
       { location: 0, size: 2 },
       { location: 1, size: 4, offset: 8 },
       { location: 2, size: 4, offset: 24 },
     ]);
+    quads.attach(this.array);
     const canvas = document.createElement("canvas");
     canvas.width = canvas.height = ATLAS_SIZE;
     this.context = /** @type {CanvasRenderingContext2D} */ (canvas.getContext("2d"));
@@ -111,7 +117,18 @@ export class TextLabels {
       if (!glyph) continue;
       const top = Math.round(dy * this.ratio - glyph.height / 2);
       left = Math.round(exact);
-      this.words.push(x, y, left, top, glyph.width, glyph.height, glyph.x, glyph.y, glyph.width, glyph.height);
+      this.words.push(
+        x,
+        y,
+        left,
+        top,
+        glyph.width,
+        glyph.height,
+        glyph.x,
+        glyph.y,
+        glyph.width,
+        glyph.height,
+      );
       exact += glyph.advance;
     }
   }
@@ -134,16 +151,17 @@ export class TextLabels {
       gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MAG_FILTER, gl.LINEAR);
     }
     gl.bindBuffer(gl.ARRAY_BUFFER, this.buffer);
-    gl.bufferData(gl.ARRAY_BUFFER, new Float32Array(this.words), gl.STREAM_DRAW);
+    const glyphs = forCorners(new Float32Array(this.words), GLYPH_WORDS);
+    gl.bufferData(gl.ARRAY_BUFFER, glyphs, gl.STREAM_DRAW);
     useProgram(gl, program, viewport);
     gl.uniform2f(program.uniform("u_atlasSize"), ATLAS_SIZE, ATLAS_SIZE);
-    gl.bindVertexArray(this.array);
+    const count = this.words.length / GLYPH_WORDS;
     // All halos first, so that none covers a neighbouring glyph.
     gl.uniform3fv(program.uniform("u_color"), palette.background);
     gl.uniform2f(program.uniform("u_channels"), 0.8, 0.8);
-    gl.drawArraysInstanced(gl.TRIANGLE_STRIP, 0, 4, this.words.length / GLYPH_WORDS);
+    this.quads.draw(this.array, 0, count);
     gl.uniform3fv(program.uniform("u_color"), palette.ink);
     gl.uniform2f(program.uniform("u_channels"), 1, 0);
-    gl.drawArraysInstanced(gl.TRIANGLE_STRIP, 0, 4, this.words.length / GLYPH_WORDS);
+    this.quads.draw(this.array, 0, count);
   }
 }

@@ -1,21 +1,25 @@
 import { TRAIL_CAPACITY, TRAIL_LIFETIME } from "../trails.js";
 import { EDGE_WORDS, createColoredEdgeArray, packColor } from "./edge_batch.js";
+import { forCorners } from "./quads.js";
 import { useProgram } from "./view.js";
 
 const WIDTH = 2;
 const OPACITY = 0.75;
+const QUAD_BYTES = 4 * 4 * EDGE_WORDS;
 
 /** Draws the trails of a world. A frame uploads only the segments added since the last one. */
 export class TrailLines {
   /**
    * @param {WebGL2RenderingContext} gl
    * @param {import("./gl.js").Program} program  of coloured edges
+   * @param {import("./quads.js").Quads} quads
    */
-  constructor(gl, program) {
+  constructor(gl, program, quads) {
     this.gl = gl;
     this.program = program;
+    this.quads = quads;
     this.buffer = gl.createBuffer();
-    this.array = createColoredEdgeArray(gl, this.buffer);
+    this.array = createColoredEdgeArray(gl, this.buffer, quads);
     this.isAllocated = false;
     this.uploaded = 0;
     this.generation = -1;
@@ -31,7 +35,7 @@ export class TrailLines {
     const { gl } = this;
     gl.bindBuffer(gl.ARRAY_BUFFER, this.buffer);
     if (!this.isAllocated) {
-      gl.bufferData(gl.ARRAY_BUFFER, 4 * EDGE_WORDS * TRAIL_CAPACITY, gl.DYNAMIC_DRAW);
+      gl.bufferData(gl.ARRAY_BUFFER, QUAD_BYTES * TRAIL_CAPACITY, gl.DYNAMIC_DRAW);
       this.isAllocated = true;
     }
     if (this.generation !== trails.generation || this.palette !== palette) this.uploaded = 0;
@@ -41,7 +45,7 @@ export class TrailLines {
     while (from < trails.added) {
       const start = from % TRAIL_CAPACITY;
       const count = Math.min(trails.added - from, TRAIL_CAPACITY - start);
-      gl.bufferSubData(gl.ARRAY_BUFFER, 4 * EDGE_WORDS * start, packSegments(trails, start, count, palette));
+      gl.bufferSubData(gl.ARRAY_BUFFER, QUAD_BYTES * start, packSegments(trails, start, count, palette));
       from += count;
     }
     this.uploaded = trails.added;
@@ -59,8 +63,7 @@ export class TrailLines {
     gl.uniform1f(program.uniform("u_time"), trails.time - trails.epoch);
     gl.uniform1f(program.uniform("u_lifetime"), TRAIL_LIFETIME);
     gl.uniform1f(program.uniform("u_ratio"), viewport.ratio);
-    gl.bindVertexArray(this.array);
-    gl.drawArraysInstanced(gl.TRIANGLE_STRIP, 0, 4, count);
+    this.quads.draw(this.array, 0, count);
   }
 
   dispose() {
@@ -85,5 +88,5 @@ function packSegments(trails, start, count, palette) {
     floats[at + 5] = WIDTH;
     floats[at + 6] = trails.times[start + i];
   }
-  return floats;
+  return forCorners(floats, EDGE_WORDS);
 }

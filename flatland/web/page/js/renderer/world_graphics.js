@@ -9,6 +9,7 @@ import { TrailLines } from "./trail_lines.js";
  * @property {import("./body_shapes.js").BodyPrograms} bodies
  * @property {import("./scan_clouds.js").ScanPrograms} scans
  * @property {import("./gl.js").Program} coloredEdges
+ * @property {import("./quads.js").Quads} quads
  */
 
 /** The buffers and textures of a world. */
@@ -18,10 +19,10 @@ export class WorldGraphics {
    * @param {Programs} programs
    */
   constructor(gl, programs) {
-    this.layers = new EdgeLayers(gl, programs.layers);
-    this.bodies = new BodyShapes(gl, programs.bodies);
+    this.layers = new EdgeLayers(gl, programs.layers, programs.quads);
+    this.bodies = new BodyShapes(gl, programs.bodies, programs.quads);
     this.scans = new ScanClouds(gl, programs.scans);
-    this.trails = new TrailLines(gl, programs.coloredEdges);
+    this.trails = new TrailLines(gl, programs.coloredEdges, programs.quads);
   }
 
   /**
