@@ -169,6 +169,14 @@ class StepSchedule:
         for controller in getattr(plugin, "_controllers", ()):
             if controller.alive:
                 controller.remove()
+        self._drop_targets(plugin)
+
+    def _drop_targets(self, plugin: FlatlandPlugin) -> None:
+        """Drops commands that were set since the last step; other threads may add some meanwhile."""
+        for _ in range(len(self.targets)):
+            entry = self.targets.popleft()
+            if entry[0] is not plugin:
+                self.targets.append(entry)
 
     def _changed(self, phase: _Phase) -> None:
         phase.orders.clear()

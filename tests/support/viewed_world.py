@@ -15,11 +15,11 @@ from pathlib import Path
 from typing import Any, Final, TypeVar
 
 import pytest
-from flatland.web import WebViewer
 from waiting import TIMEOUT
 
 from flatland import World
 from flatland.simulation import Simulation
+from flatland.web import WebViewer
 
 R = TypeVar("R")
 

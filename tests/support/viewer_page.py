@@ -24,14 +24,16 @@ class ViewerPage:
         self.wait_until_shown()
 
     def wait_until_shown(self) -> None:
-        """Waits until the page is connected and has drawn the models of its first world."""
-        self.browser.until("Boolean(window.flatland && flatland.state)")
+        """Waits until the page is connected and has drawn the walls and models of all worlds."""
+        self.browser.until("Boolean(window.flatland)")
         self.wait_for_connection("connected")
         self.browser.until(
-            "flatland.frames > 2 && flatland.state.worlds.length > 0 &&"
-            " flatland.state.worlds.every(({models}) => Object.keys(models).length > 0"
-            " && Object.values(models).every(({pose}) => pose))"
+            "((worlds) => worlds.length > 0 && worlds.every(({layers, models}) =>"
+            " Object.keys(models).length > 0"
+            " && layers.every(({edges}) => edges > 0)"
+            " && Object.values(models).every(({pose}) => pose)))(flatland.state.worlds)"
         )
+        self.wait_for_frame()  # which fits the view to the world
 
     def wait_for_connection(self, text: str) -> None:
         """Waits for a state of the connection: connected, reconnecting."""

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from chromium import SHIFT, Chromium, Image, line, mask
+from chromium import Chromium, Image, line, mask
 from viewed_world import CRATE_COLOR, ViewedWorld, viewed_room
 from viewer_page import ViewerPage
 from waiting import wait_until
@@ -26,14 +26,26 @@ def test_a_model_is_dragged_while_the_world_is_paused(room: ViewedWorld, page: V
     browser.press(start)
     browser.drag_over(line(start, end, 5))
     wait_until("the world is paused", lambda: room.ask(lambda: room.world.paused))
-    wait_until("the crate is there", lambda: room.pose("crate")[:2] == close_to((-1, -3)))
     browser.release(end)
+    wait_until("the crate is there", lambda: room.pose("crate") == close_to((-1, -3, 0)))
     wait_until("the world runs again", lambda: not room.ask(lambda: room.world.paused))
-    assert room.pose("crate") == close_to((-1, -3, 0))
-    page.browser.until(
+    browser.until(
         "Math.hypot(flatland.state.worlds[0].models.crate.pose[0] + 1,"
         " flatland.state.worlds[0].models.crate.pose[1] + 3) < 0.1"
     )
+
+
+def test_escape_ends_a_drag_without_effect(room: ViewedWorld, page: ViewerPage) -> None:
+    browser = page.browser
+    start, end = page.screen(2, -2), page.screen(-1, -3)
+    browser.press(start)
+    browser.drag_over(line(start, end, 5))
+    wait_until("the world is paused", lambda: room.ask(lambda: room.world.paused))
+    browser.key("Escape")
+    wait_until("the world runs again", lambda: not room.ask(lambda: room.world.paused))
+    browser.release(end)
+    page.wait_for_frame()
+    assert room.pose("crate") == close_to((2, -2, 0), 1e-6)
 
 
 def test_a_paused_world_remains_paused_after_a_drag(room: ViewedWorld, page: ViewerPage) -> None:
@@ -46,10 +58,17 @@ def test_a_paused_world_remains_paused_after_a_drag(room: ViewedWorld, page: Vie
 
 
 def test_a_model_is_turned(room: ViewedWorld, page: ViewerPage) -> None:
-    page.browser.drag(page.screen(2.6, -2), page.screen(2, -1.4), steps=8, modifiers=SHIFT)
+    page.select("crate")
+    radius = math.hypot(0.8, 0.3) + 14 / page.scale()  # of the ring around a selected model
+    start, end = page.screen(2 + radius, -2), page.screen(2, -2 + radius)
+    corner = page.screen(2 + radius, -2 + radius)
+    page.browser.press(start)
+    page.browser.drag_over([*line(start, corner, 4), *line(corner, end, 4)])
+    wait_until("the world is paused", lambda: room.ask(lambda: room.world.paused))
+    page.browser.release(end)
     wait_until(
         "the crate is turned by 90 degrees",
-        lambda: room.pose("crate") == close_to((2, -2, math.pi / 2), 0.15),
+        lambda: room.pose("crate") == close_to((2, -2, math.pi / 2)),
     )
     wait_until("the world runs again", lambda: not room.ask(lambda: room.world.paused))
 
@@ -66,47 +85,80 @@ def test_a_world_runs_again_after_the_page_vanishes_in_a_drag(
     page.browser.release(start)
 
 
+def select_file(page: ViewerPage, name: str) -> None:
+    """Opens the dialog and selects a model file with the keyboard."""
+    browser = page.browser
+    browser.click("#spawn")
+    options = browser.until(
+        "document.querySelector('#spawn-dialog').open &&"
+        " [...document.querySelector('#spawn-file').options].map((option) => option.text)"
+    )
+    wanted = next(option for option in options if name in option)
+    browser.evaluate("document.querySelector('#spawn-file').focus()")
+    browser.type(wanted)
+    browser.until(
+        "document.querySelector('#spawn-file').selectedOptions[0].text === arguments[0]", wanted
+    )
+
+
 def test_a_model_is_spawned_with_a_preview(room: ViewedWorld, page: ViewerPage) -> None:
     browser = page.browser
     page.show("scans", False)
+    page.show("names", False)
 
     def cyan(image: Image) -> int:
         return int(np.count_nonzero(mask(page.canvas(image), CRATE_COLOR)))
 
     before = cyan(browser.picture())
-    browser.click("#spawn")
-    browser.until("document.querySelector('#spawn-dialog').checkVisibility()")
-    options = browser.evaluate(
-        "[...document.querySelector('#spawn-file').options].map((o) => [o.value, o.text])"
-    )
-    value = next(v for v, text in options if "crate" in v or "crate" in text)
-    browser.evaluate(
-        "((s) => { s.value = arguments[0];"
-        " s.dispatchEvent(new Event('change', {bubbles: true})); })"
-        "(document.querySelector('#spawn-file'))",
-        value,
-    )
+    select_file(page, "crate")
+    browser.until("document.querySelector('#spawn-preview').ariaLabel.includes('1.60 by 0.60')")
+    preview = browser.picture()
+    assert cyan(preview) > before
     browser.fill("#spawn-name", "second")
-    preview = browser.until("document.querySelector('#spawn-preview') && true")
-    assert preview
     browser.click("#spawn-ok")
-    place = page.screen(-3, -3)
+    place, ahead = page.screen(-3, -3), page.screen(-3, 2)
+    still = browser.picture().astype(int)
     browser.mouse("Moved", place)
+
+    def outline(image: Image) -> bool:
+        x, y = map(int, place)
+        reach = int(page.scale())
+        area = slice(y - reach, y + reach), slice(x - reach, x + reach)
+        return int((np.abs(image[area] - still[area]).max(axis=-1) > 40).sum()) > 100
+
+    browser.picture_until("the outline follows the pointer", outline)
     browser.click(place)
+    browser.mouse("Moved", ahead)
+    assert "second" not in room.names()
+    browser.click(ahead)
     wait_until("the model is in the world", lambda: "second" in room.names())
-    assert room.pose("second")[:2] == close_to((-3, -3))
-    browser.picture_until("both crates are visible", lambda i: cyan(i) > 1.6 * before)
+    assert room.pose("second") == close_to((-3, -3, math.pi / 2))
+    browser.until("flatland.state.selected === 'second'")
+    browser.picture_until("both crates are visible", lambda image: cyan(image) > 1.8 * before)
+
+
+def test_a_model_is_spawned_at_typed_coordinates(room: ViewedWorld, page: ViewerPage) -> None:
+    browser = page.browser
+    select_file(page, "robot")
+    browser.fill("#spawn-name", "second")
+    browser.click("#spawn-by-numbers")
+    for field, text in (("x", "3"), ("y", "1.5"), ("theta", "0.5")):
+        browser.fill(f"#spawn-{field}", text)
+    browser.click("#spawn-ok")
+    wait_until("the model is in the world", lambda: "second" in room.names())
+    assert room.pose("second") == close_to((3, 1.5, 0.5), 1e-6)
+    room.ask(lambda: room.world.command("/second/cmd_vel"))
 
 
 def test_errors_of_the_simulator_are_shown(room: ViewedWorld, page: ViewerPage) -> None:
     browser = page.browser
-    browser.click("#spawn")
+    select_file(page, "crate")
     browser.fill("#spawn-name", "robot")
+    browser.click("#spawn-number")
+    browser.click("#spawn-by-numbers")
     browser.click("#spawn-ok")
-    browser.click(page.screen(3, 3))
-    browser.until(
-        "document.body.innerText.includes('robot') && document.body.innerText.match(/exists|already/)"
-    )
+    text = browser.until("document.querySelector('#notices [data-level=error]')?.innerText")
+    assert "robot" in text
     assert sorted(room.names()) == ["crate", "robot"]
 
 
@@ -126,11 +178,11 @@ def test_a_model_is_moved_to_typed_coordinates(room: ViewedWorld, page: ViewerPa
     page.select("crate")
     page.browser.fill("#pose-x", "-1.5")
     page.browser.fill("#pose-y", "2.25")
-    page.browser.fill("#pose-theta", "30")
+    page.browser.fill("#pose-theta", "0.5")
     page.browser.click("#pose-apply")
     wait_until(
         "the crate is there",
-        lambda: room.pose("crate") == close_to((-1.5, 2.25, math.radians(30)), 0.01),
+        lambda: room.pose("crate") == close_to((-1.5, 2.25, 0.5), 1e-6),
     )
 
 

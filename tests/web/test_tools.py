@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import math
 import re
 
 import cv2
 import numpy as np
 import pytest
-from chromium import mask
+from chromium import Image, mask
 from viewed_world import ROBOT_COLOR, WALL_COLOR, ViewedWorld
 from viewer_page import ViewerPage
 
@@ -23,10 +24,12 @@ def test_measure(page: ViewerPage) -> None:
     browser.click(start)
     browser.mouse("Moved", end)
     browser.click(end)
-    text = browser.until(
-        r"document.body.innerText.match(/(?<![\d.,])(?:5[.,]0\d?|4[.,]9\d?) ?m/)?.[0]"
+    measured = browser.until(
+        "(document.querySelector('#hint').textContent.match(/^4.9|^5.0/)?.input)"
     )
-    assert float(re.findall(r"[\d.]+", text.replace(",", "."))[0]) == pytest.approx(5, abs=0.1)
+    length, dx, dy, angle = map(float, re.findall(r"-?\d+\.\d+", measured))
+    assert (length, dx, dy) == pytest.approx((5, 3, 4), abs=0.05)
+    assert angle == pytest.approx(math.degrees(math.atan2(4, 3)), abs=1)
 
 
 def test_screenshot(page: ViewerPage) -> None:
@@ -80,21 +83,30 @@ def test_the_inspector_shows_the_values_of_the_model(room: ViewedWorld, page: Vi
 
 def test_the_inspector_shows_contacts(room: ViewedWorld, page: ViewerPage) -> None:
     room.ask(lambda: room.world.move_model("robot", (4.65, 2, 0)))
+    page.browser.until("flatland.state.worlds[0].models.robot.pose[0] > 4")
     page.select("robot")
     page.browser.until("document.querySelector('#inspector').textContent.includes('walls')")
 
 
 def test_plots_show_published_numbers(room: ViewedWorld, page: ViewerPage) -> None:
     browser = page.browser
+    room.ask(lambda: room.world.command("/cmd_vel").set(Twist(angular_z=0.5)))
     browser.click("#plots-toggle")
-    name = browser.until(
-        "[...document.querySelector('#plot-series').options].map((o) => o.value)"
-        ".find((value) => value.includes('scan') || value.includes('twist'))"
+    options = "[...document.querySelector('#plot-series').options].map((option) => option.value)"
+    names = browser.until(f"{options}.length > 1 && {options}")
+    name = next(each for each in names if "twist" in each and "angular" in each)
+    browser.evaluate("document.querySelector('#plot-series').focus()")
+    browser.type(name)
+    browser.until("Boolean(document.querySelector('figure.plot output'))")
+    browser.until("parseFloat(document.querySelector('figure.plot output').textContent) === 0.5")
+    box = browser.evaluate(
+        "((b) => [b.x, b.y, b.width, b.height].map(Math.round))"
+        "(document.querySelector('figure.plot canvas').getBoundingClientRect())"
     )
-    browser.evaluate(
-        "((s) => { s.value = arguments[0]; s.dispatchEvent(new Event('change')); })"
-        "(document.querySelector('#plot-series'))",
-        name,
-    )
-    drawn = browser.until("document.querySelector('figure.plot output').textContent !== '–'")
-    assert drawn
+    x, y, width, height = box
+
+    def curve(image: Image) -> bool:
+        part = image[y : y + height, x : x + width].astype(int)
+        return int((part.max(axis=-1) - part.min(axis=-1) > 60).sum()) > 20
+
+    browser.picture_until("the curve", curve)

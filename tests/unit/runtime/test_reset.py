@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import math
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -184,6 +185,19 @@ def test_models_bodies_and_plugins_are_new(world: World) -> None:
     for old in (body, robot):
         with pytest.raises(StaleHandleError):
             _ = old.pose
+
+
+def test_a_command_that_was_not_carried_out_does_not_survive_its_plugin(world: World) -> None:
+    world.command("/cmd_vel").set(Twist(linear_x=1.0))
+    world.reset()
+    world.step(10)
+    world.command("/cmd_vel").set(Twist(linear_x=1.0))
+    world.command("/b/cmd_vel").set(Twist(linear_x=1.0))
+    world.delete_model("robot")
+    world.step(10)
+    state = world.state()
+    vx, vy, _ = state.velocities[state.names.index("second")]
+    assert math.hypot(vx, vy) == pytest.approx(1.0)
 
 
 def test_a_command_of_another_type_is_not_kept(world: World, files: Any) -> None:
