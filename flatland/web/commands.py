@@ -144,7 +144,7 @@ class Commands:
             else:
                 self._drives.pop((client, feed, found), None)
                 if moves:
-                    await _stop(feed, found)
+                    feed.post(_stopping(feed, found))
 
         return await self._newest.run(("drive", client, feed, number, topic), run)
 
@@ -179,6 +179,13 @@ class Commands:
             [key for key in self._drives if key[0] is client],
         )
 
+    def forget_world(self, feed: WorldFeed) -> None:
+        """Ends the holds and stops the robots of a world that is not shown any more."""
+        self._end(
+            [key for key in self._holds if key[1] is feed],
+            [key for key in self._drives if key[1] is feed],
+        )
+
     def _end(
         self,
         holds: list[tuple[Client, WorldFeed, int]],
@@ -186,12 +193,10 @@ class Commands:
     ) -> None:
         for client, feed, number in holds:
             del self._holds[client, feed, number]
-            if not feed.world.closed:
-                feed.spawn(between_steps(feed.world, _releasing(feed, client, number)))
+            feed.post(_releasing(feed, client, number))
         for client, feed, topic in drives:
             del self._drives[client, feed, topic]
-            if not feed.world.closed:
-                feed.spawn(_stop(feed, topic))
+            feed.post(_stopping(feed, topic))
 
 
 class _Newest:
@@ -257,12 +262,12 @@ def _releasing(feed: WorldFeed, client: Client, number: int) -> Callable[[], Non
     return lambda: feed.holds.release((client, number))
 
 
-async def _stop(feed: WorldFeed, topic: str) -> None:
+def _stopping(feed: WorldFeed, topic: str) -> Callable[[], None]:
     def stop() -> None:
         if topic in feed.world.ports.commands:
             feed.world.command(topic).set(Twist())
 
-    await between_steps(feed.world, stop)
+    return stop
 
 
 def _now() -> float:

@@ -7,7 +7,7 @@ import json
 import logging
 import math
 from collections import deque
-from collections.abc import Callable, Coroutine, Iterator
+from collections.abc import Callable, Iterator
 from concurrent.futures import Future
 from dataclasses import dataclass, field
 from typing import Any, Final, TypeVar
@@ -227,16 +227,21 @@ class WorldFeed:
         """
         await _wait_for(self.world, future)
 
-    def spawn(self, work: Coroutine[Any, Any, None]) -> None:
-        """Starts something that ends by itself, or with the world."""
-        task = asyncio.create_task(work)
+    def post(self, action: Callable[[], None]) -> None:
+        """Has an action carried out between two steps, even if the server ends before."""
+        if self.world.closed:
+            return
+        self.world.post(action).add_done_callback(_log_failure)
+        task = asyncio.create_task(self._carry_out_requests())
         self._jobs.add(task)
-        task.add_done_callback(self._job_done)
+        task.add_done_callback(self._jobs.discard)
 
-    def _job_done(self, task: asyncio.Task[None]) -> None:
-        self._jobs.discard(task)
-        if not task.cancelled() and task.exception() is not None and not self.world.closed:
-            _LOG.warning("web viewer: %s", task.exception())
+    async def _carry_out_requests(self) -> None:
+        """Carries out the requests that wait, unless a simulation does."""
+        requests = self.world.requests
+        while requests.actions and not requests.served:
+            if not await asyncio.to_thread(requests.process_if_idle):
+                await asyncio.sleep(_POLL_PERIOD)
 
     def draw(self, lines: LayerContents) -> None:
         """Shows lines in addition to the layers, instead of earlier lines of the same name."""
@@ -589,6 +594,11 @@ class WorldFeed:
         if not count:
             return None
         return encoding.scans_message(self.index, self._revision, time, count, parts)
+
+
+def _log_failure(done: Future[None]) -> None:
+    if not done.cancelled() and done.exception() is not None:
+        _LOG.warning("web viewer: %s", done.exception())
 
 
 def _json(message: dict[str, Any]) -> str:

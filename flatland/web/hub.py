@@ -78,6 +78,7 @@ class Hub:
         task = self._tasks.pop(feed)
         if task is not asyncio.current_task():
             task.cancel()
+        self._commands.forget_world(feed)
         for client in self.clients:
             client.update_feeds()
             client.send({"type": "gone", "world": index})

@@ -195,6 +195,10 @@ class WebViewer:
             watch.cancel()
             await self._hub.close()
             await runner.cleanup()
+            rest = asyncio.all_tasks() - {asyncio.current_task()}
+            for task in rest:
+                task.cancel()
+            await asyncio.gather(*rest, return_exceptions=True)
             await asyncio.get_running_loop().shutdown_default_executor()
 
     # -- worlds ----------------------------------------------------------------------------

@@ -212,6 +212,21 @@ class TestHold:
         wait_until("the world is resumed", lambda: not world.paused)
 
 
+@pytest.mark.parametrize("closes", [False, True])
+def test_a_world_that_is_not_shown_any_more_is_left_alone(world, simulation, viewer, closes):
+    handle = viewer.add_world(world, simulation=simulation)
+    with RawWebClient(viewer.url) as client:
+        robot = client.wait_model("robot")["id"]
+        client.ask("drive", model=robot, linear=[0.5, 0])
+        client.ask("hold", model=robot)
+        if closes:
+            viewer.close()
+        else:
+            viewer.remove_world(handle)
+        wait_until("the world is resumed", lambda: not world.paused)
+        wait_until("it stops", lambda: world.command("/cmd_vel").value.linear_x == 0)
+
+
 class TestDrive:
     def test_a_robot_drives_and_stops(self, client, robot, world):
         client.ask("drive", model=robot, linear=[0.5, 0], angular=0.0)
