@@ -149,8 +149,12 @@ class StepSchedule:
         return number
 
     def remove(self, plugin: FlatlandPlugin) -> None:
-        """Removes the hooks and the controllers of a plugin."""
+        """Removes the hooks, the controllers and the new commands of a plugin."""
         self.settle()
+        for _ in range(len(self.targets)):
+            target = self.targets.popleft()
+            if target[0] is not plugin:
+                self.targets.append(target)
         for phase in self._phases.values():
             hook = phase.hooks.pop(plugin, None)
             if hook is None:

@@ -208,3 +208,23 @@ def test_a_hook_during_the_removal_of_a_model_may_not_step(
     assert isinstance(error, WorldError)
     assert "step must not be called from a plugin's hook" in str(error)
     assert world.time == time
+
+
+def test_actions_run_in_this_thread_only_if_no_other_serves_or_steps() -> None:
+    requests, done = Requests(), []
+    with ThreadPoolExecutor(1) as other:
+        requests.post(lambda: done.append(1))
+        assert other.submit(requests.process_if_idle).result()
+        assert done == [1]
+        requests.post(lambda: done.append(2))
+        with requests.serving(lambda: None):
+            assert requests.served
+            assert not other.submit(requests.process_if_idle).result()
+            assert requests.process_if_idle()
+        assert not requests.served
+        requests.post(lambda: done.append(3))
+        with requests.lock:  # as during a step
+            assert not other.submit(requests.process_if_idle).result()
+        assert done == [1, 2]
+        assert other.submit(requests.process_if_idle).result()
+    assert done == [1, 2, 3]

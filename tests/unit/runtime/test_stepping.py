@@ -383,3 +383,13 @@ def test_what_a_function_before_a_step_raises_is_a_fault_of_its_plugin(files: An
         world.step(20)
     assert 'Model Plugin "drive"' in caught.value.__notes__[0]
     assert world.timekeeper.sim_time_ns > 20 * 5_000_000
+
+
+def test_a_command_to_a_model_that_is_deleted_before_the_next_step(files: Any) -> None:
+    cart = CART.format(drive="DiffDrive")
+    world = room(files, {"a": cart, "b": cart})
+    world.command("/a/cmd_vel").set(flatland.Twist(1.0))
+    world.command("/b/cmd_vel").set(flatland.Twist(1.0))
+    world.delete_model("a")
+    world.step(100)
+    assert world.model("b").bodies[0].velocity[0] > 0.1

@@ -13,7 +13,11 @@ export function exposeScripting(session, stage) {
     paused: world.status?.paused ?? null,
     rate: world.status?.rate ?? null,
     edges: world.layers.reduce((sum, { edges }) => sum + (edges?.length ?? 0) / 4, 0),
-    layers: world.layers.map(({ name, visible, edges }) => ({ name, visible, edges: (edges?.length ?? 0) / 4 })),
+    layers: world.layers.map(({ name, visible, edges }) => ({
+      name,
+      visible,
+      edges: (edges?.length ?? 0) / 4,
+    })),
     models: Object.fromEntries(
       [...world.models.values()].map((model) => [model.name, { id: model.id, pose: world.modelPose(model) }]),
     ),

@@ -190,7 +190,12 @@ export class Stage extends Emitter {
     }
     if (last && last.world === world && last.key === key) {
       const [x0, y0, x1, y1] = last.bounds;
-      bounds = [Math.min(x0, bounds[0]), Math.min(y0, bounds[1]), Math.max(x1, bounds[2]), Math.max(y1, bounds[3])];
+      bounds = [
+        Math.min(x0, bounds[0]),
+        Math.min(y0, bounds[1]),
+        Math.max(x1, bounds[2]),
+        Math.max(y1, bounds[3]),
+      ];
     }
     this.fitted.set(camera, { world, key, bounds });
     camera.fit(bounds);

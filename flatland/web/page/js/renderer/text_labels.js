@@ -111,7 +111,18 @@ export class TextLabels {
       if (!glyph) continue;
       const top = Math.round(dy * this.ratio - glyph.height / 2);
       left = Math.round(exact);
-      this.words.push(x, y, left, top, glyph.width, glyph.height, glyph.x, glyph.y, glyph.width, glyph.height);
+      this.words.push(
+        x,
+        y,
+        left,
+        top,
+        glyph.width,
+        glyph.height,
+        glyph.x,
+        glyph.y,
+        glyph.width,
+        glyph.height,
+      );
       exact += glyph.advance;
     }
   }
