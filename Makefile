@@ -66,8 +66,9 @@ docs: setup  ## check the links of all pages, build the documentation site in bu
 	@tools/build_docs.sh
 
 .PHONY: pictures
-pictures: setup-dev  ## generate the images of README.md and docs/, on a virtual screen
-	@. ./setup.bash && python tools/draw_pictures.py && python tools/show_pictures.py
+pictures: setup-dev  ## generate the images of README.md and docs/, on a virtual screen and in Chromium
+	@. ./setup.bash && python tools/draw_pictures.py && python tools/show_pictures.py && \
+	  PYTHONPATH="tests/support:$$PYTHONPATH" python tools/browser_pictures.py
 
 .PHONY: dev
 dev:  ## build the extension and the messages in the source tree, for use with PYTHONPATH=.

@@ -35,14 +35,16 @@ def plot(panels: Sequence[Panel], path: Path) -> None:
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    rows = -(-len(panels) // COLUMNS)
-    figure = Figure(figsize=(COLUMNS * PANEL_SIZE[0], rows * PANEL_SIZE[1]), layout="constrained")
+    columns = min(COLUMNS, len(panels))
+    rows = -(-len(panels) // columns)
+    figure = Figure(figsize=(columns * PANEL_SIZE[0], rows * PANEL_SIZE[1]), layout="constrained")
     FigureCanvasAgg(figure)
-    grid = figure.subplots(rows, COLUMNS, squeeze=False).ravel()
+    grid = figure.subplots(rows, columns, squeeze=False).ravel()
     for axes, panel in zip(grid, panels):  # noqa: B905 - the last axes can remain empty
         for curve in panel.curves:
             axes.loglog(curve.x, curve.y, marker="o", markersize=4, label=curve.label)
-        axes.set(title=panel.title, xlabel=panel.x_label, ylabel=panel.y_label)
+        axes.set_title(panel.title, fontsize="medium")
+        axes.set(xlabel=panel.x_label, ylabel=panel.y_label)
         axes.grid(True, which="major", alpha=0.4)
         axes.legend()
     for axes in grid[len(panels) :]:

@@ -115,7 +115,7 @@ def _touching() -> Panel:
                 times.append(1e3 * step_time(world, PERIOD, 0.5))
         curves.append(Curve(label, list(TOUCHING_COUNTS), times))
     return Panel(
-        "A step of touching robots with Bumper and BoolSensor",
+        "A step of touching robots, Bumper and BoolSensor",
         "robots",
         "time of a step [ms]",
         curves,

@@ -67,6 +67,16 @@ class World:
         position_iterations: int,
         only_physics: bool,
     ) -> _RunResult: ...
+    def run_paced(
+        self,
+        step: int,
+        n: int,
+        dt: float,
+        velocity_iterations: int,
+        position_iterations: int,
+        due: float,
+        period: float,
+    ) -> tuple[_RunResult, float, float, float, float]: ...
     def interrupt(self) -> None: ...
     def clear_interrupt(self) -> None: ...
     def add_clock(self, is_after: bool, kind: str, half_step: int, cycle: int) -> int: ...

@@ -11,17 +11,7 @@ output=${1:-build/docs/html}
 
 # Sphinx has an environment of its own: the programs of ROS import what is installed in .venv.
 requires=$(requirements "$python" project optional-dependencies docs)
-identity="$("$python" --version) $venv $requires"
-if [[ $(cat "$venv/flatland-requirements" 2>/dev/null) != "$identity" ]]; then
-  echo "flatland: installing Sphinx in $venv"
-  mkdir -p build/docs
-  /usr/bin/python3 -m venv --clear --system-site-packages "$venv"
-  pip_install "pip install of Sphinx" "$venv/bin/python" -r <(echo "$requires")
-  # The packages in .venv come after those of this environment.
-  site='import sysconfig; print(sysconfig.get_path("platlib"))'
-  "$python" -c "$site" >"$("$venv/bin/python" -c "$site")/flatland.pth"
-  echo "$identity" >"$venv/flatland-requirements"
-fi
+make_environment Sphinx "$venv" "$requires"
 
 # All pages are built: Sphinx repeats no warnings of pages that have not changed.
 rm -rf "$output"

@@ -37,3 +37,19 @@ EOF
 pip_install() {
   quietly "$1" "$2" -m pip --disable-pip-version-check --no-input install "${@:3}"
 }
+
+# make_environment WHAT VENV REQUIREMENTS: creates a virtual environment with the given requirements, one per line, on
+# top of .venv, unless it exists already. WHAT is for messages.
+make_environment() {
+  local what=$1 venv=$2 requires=$3 python=$PWD/.venv/bin/python identity site
+  identity="$("$python" --version) $venv $requires"
+  if [[ $(cat "$venv/flatland-requirements" 2>/dev/null) == "$identity" ]]; then return; fi
+  echo "flatland: installing $what in $venv"
+  mkdir -p "$(dirname "$venv")"
+  /usr/bin/python3 -m venv --clear --system-site-packages "$venv"
+  pip_install "pip install of $what" "$venv/bin/python" -r <(echo "$requires")
+  # flatland, and what else is required, come from .venv, after the packages of this environment.
+  site='import sysconfig; print(sysconfig.get_path("platlib"))'
+  "$python" -c "$site" >"$("$venv/bin/python" -c "$site")/flatland.pth"
+  echo "$identity" >"$venv/flatland-requirements"
+}

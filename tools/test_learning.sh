@@ -13,17 +13,7 @@ python=$root/.venv/bin/python
 requires=$(for extra in gym learning ray test; do
   requirements "$python" project optional-dependencies "$extra"
 done | grep -v '^flatland-sim\|^matplotlib' && echo 'numpy<2')
-identity="$("$python" --version) $venv $requires"
-if [[ $(cat "$venv/flatland-requirements" 2>/dev/null) != "$identity" ]]; then
-  echo "flatland: installing PyTorch and Ray in $venv"
-  mkdir -p build/learning
-  /usr/bin/python3 -m venv --clear --system-site-packages "$venv"
-  pip_install "pip install of PyTorch and Ray" "$venv/bin/python" -r <(echo "$requires")
-  # flatland, and what else it requires, come from .venv.
-  site='import sysconfig; print(sysconfig.get_path("platlib"))'
-  "$python" -c "$site" >"$("$venv/bin/python" -c "$site")/flatland.pth"
-  echo "$identity" >"$venv/flatland-requirements"
-fi
+make_environment "PyTorch and Ray" "$venv" "$requires"
 
 . ./setup.bash
 if [[ $# == 0 ]]; then set -- tests/learning; fi

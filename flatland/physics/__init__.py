@@ -24,7 +24,15 @@ from flatland.physics.controller import (
 )
 from flatland.physics.fixture import PhysicsFixture
 from flatland.physics.joint import PhysicsJoint
-from flatland.physics.plan import END_OF_ORDER, RunEnd, RunResult, StepPlan, StepRun, run_worlds
+from flatland.physics.plan import (
+    END_OF_ORDER,
+    RunEnd,
+    RunResult,
+    StepPlan,
+    StepRun,
+    WorkTimes,
+    run_worlds,
+)
 from flatland.physics.queries import RayHit
 from flatland.physics.range_finder import (
     BeamFan,
@@ -66,6 +74,7 @@ __all__ = [
     "TricycleController",
     "TweenController",
     "VelocityController",
+    "WorkTimes",
     "ease",
     "easings",
     "run_worlds",

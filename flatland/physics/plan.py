@@ -63,6 +63,22 @@ class StepRun(NamedTuple):
     only_physics: bool
 
 
+class WorkTimes(NamedTuple):
+    """Wall times of the complete steps of a paced run.
+
+    Attributes:
+        waited: Of the waits between the steps [s].
+        total: Of all steps [s].
+        least: Of the shortest step [s].
+        most: Of the longest step [s].
+    """
+
+    waited: float
+    total: float
+    least: float
+    most: float
+
+
 def run_worlds(runs: Sequence[StepRun], num_threads: int) -> list[RunResult | Exception]:
     """Performs steps of several worlds in parallel, without the GIL if that takes long.
 
@@ -165,6 +181,30 @@ class StepPlan:
             WorldLockedError: The world is in use.
         """
         return self._core.run(*run[1:])
+
+    def run_paced(self, run: StepRun, due: float, period: float) -> tuple[RunResult, WorkTimes]:
+        """Performs steps as `run`, the first one at once and then one each period.
+
+        Between two steps it waits without the GIL, and other threads may use the world. Short steps
+        in which no code is due, and for which no contacts are wanted, are performed together when
+        the last one of them is due. The run ends before a wait after 25 ms, if a step was late, and
+        with an interrupt, after the steps that were due before it.
+
+        Args:
+            run: The steps of this world, not those that end after the physics step.
+            due: When the first step was due [s], on the clock of `time.perf_counter`.
+            period: Wall time between two steps [s].
+
+        Returns:
+            As `run`, and the wall times of the complete steps.
+
+        Raises:
+            ValueError: A number is out of range.
+            StaleHandleError: The world is closed.
+            WorldLockedError: The world is in use.
+        """
+        result, *times = self._core.run_paced(*run[1:6], due, period)
+        return result, WorkTimes(*times)
 
     def begin_step(self, step: int) -> int:
         """Begins a step in which code is called.

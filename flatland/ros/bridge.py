@@ -79,6 +79,11 @@ class Bridge(WorldObserver):
         return self._clock.watches_steps
 
     @property
+    def watches_time(self) -> bool:
+        """Whether the clock publishes from a thread of its own."""
+        return self._clock.watches_time
+
+    @property
     def wants_transforms(self) -> bool:
         """Whether `/tf` has subscribers."""
         return self._tf.connected

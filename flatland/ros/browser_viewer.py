@@ -9,10 +9,12 @@ import time
 from typing import TYPE_CHECKING, Final
 
 from flatland.errors import FlatlandError
+from flatland.ros.service_calls import REGISTRATION_TIMEOUT
 
 if TYPE_CHECKING:
     from flatland.ros.operations import Operations
     from flatland.ros.parameters import WebParameters
+    from flatland.ros.transport.registrar import Registrar
     from flatland.simulation import Simulation
     from flatland.web import WebViewer
 
@@ -25,21 +27,27 @@ _PORT_POLL_PERIOD: Final = 0.2  # s
 class BrowserViewer:
     """Shows the world of the node in the browser.
 
-    The server starts after the first step, in a thread of its own, because importing its modules
-    takes longer than loading a small world. If it cannot start, the simulation continues without
-    it.
+    The server starts after the first step and after the registration of topics and services, in a
+    thread of its own, because importing its modules takes longer than loading a small world. If it
+    cannot start, the simulator continues without it.
     """
 
     def __init__(
-        self, simulation: Simulation, operations: Operations, parameters: WebParameters
+        self,
+        registrar: Registrar,
+        simulation: Simulation,
+        operations: Operations,
+        parameters: WebParameters,
     ) -> None:
         """Schedules the start of the server.
 
         Args:
+            registrar: Registers the topics and services of the node, which comes first.
             simulation: Simulation of the world.
             operations: What clients can do.
             parameters: Address and access.
         """
+        self._registrar = registrar
         self._simulation = simulation
         self._operations = operations
         self._parameters = parameters
@@ -60,6 +68,7 @@ class BrowserViewer:
 
     def _start(self) -> None:
         """Starts the server, or logs why it cannot start."""
+        self._registrar.flush(REGISTRATION_TIMEOUT)
         try:
             viewer = self._open()
         except ImportError as error:

@@ -36,6 +36,10 @@ class NodeClock(Protocol):
     def watches_steps(self) -> bool:
         """Whether the clock is to be notified of each step, not only of the last one of several."""
 
+    @property
+    def watches_time(self) -> bool:
+        """Whether the time is published by another thread than that of the steps."""
+
     def step_started(self, time_ns: int) -> None:
         """A step starts at a simulated time [ns]."""
 
@@ -88,6 +92,11 @@ class SimulatedClock:
     def watches_steps(self) -> bool:
         """Whether each step is published."""
         return self._ticker is None and self._topic.connected
+
+    @property
+    def watches_time(self) -> bool:
+        """Whether the rate is limited, and there are subscribers."""
+        return self._ticker is not None and self._topic.connected
 
     def step_started(self, time_ns: int) -> None:
         """Has no effect."""
@@ -187,6 +196,11 @@ class WallClock:
     def watches_steps(self) -> bool:
         """Returns True: a stamp is the wall time of a step."""
         return True
+
+    @property
+    def watches_time(self) -> bool:
+        """Returns False: nothing is published."""
+        return False
 
     def step_started(self, time_ns: int) -> None:
         """Renews the stamp of the current simulated time if it is too old."""

@@ -290,7 +290,9 @@ class ServerNode:
             if parameters.web is not None:
                 from flatland.ros.browser_viewer import BrowserViewer
 
-                browser_viewer = BrowserViewer(simulation, operations, parameters.web)
+                browser_viewer = BrowserViewer(
+                    self._registrar, simulation, operations, parameters.web
+                )
             if parameters.initialpose_model:
                 from flatland.ros.initial_pose import InitialPose
 

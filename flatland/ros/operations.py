@@ -55,9 +55,9 @@ class Operations:
         return self._simulation.holds
 
     @property
-    def rate(self) -> float:
-        """Target steps per second of wall time [Hz], inf for as many as possible."""
-        return self._simulation.rate
+    def rate(self) -> float | None:
+        """Target steps per second of wall time [Hz], inf for no limit, None in lockstep."""
+        return None if self.lockstep else self._simulation.rate
 
     @property
     def lockstep(self) -> bool:

@@ -73,6 +73,14 @@ class WorldObserver:
         return True
 
     @property
+    def watches_time(self) -> bool:
+        """Whether another thread passes on the time while a `Simulation` waits between two steps.
+
+        Otherwise, `time_advanced` may be called up to 25 ms of wall time late.
+        """
+        return False
+
+    @property
     def wants_transforms(self) -> bool:
         """Whether `transforms_sent` is to be called in this step."""
         return True
@@ -185,6 +193,11 @@ class Observers:
     def watch_steps(self) -> bool:
         """Whether an observer is to be notified of each step."""
         return any(observer.watches_steps for observer in self._of_steps)
+
+    @property
+    def watch_time(self) -> bool:
+        """Whether an observer is to be notified of the time without delay."""
+        return any(observer.watches_time for observer in self._of_time)
 
     @property
     def want_transforms(self) -> bool:

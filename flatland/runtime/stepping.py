@@ -11,13 +11,33 @@ from flatland.physics import END_OF_ORDER, RunEnd, StepRun, to_report
 if TYPE_CHECKING:
     from contextlib import ExitStack
 
-    from flatland.physics import RunResult, StepReport
+    from flatland.physics import RunResult, StepReport, WorkTimes
     from flatland.runtime.body_monitor import BodyMonitor
     from flatland.runtime.change_log import ChangeLog
     from flatland.runtime.contacts import ContactReporter
     from flatland.runtime.faults import Faults
     from flatland.runtime.observer import Observers
     from flatland.world import World
+
+
+class Pace:
+    """The wall times at which steps are due.
+
+    Attributes:
+        due: When the next step is due [s], on the clock of `time.perf_counter`.
+        period: Wall time between two steps [s].
+        is_interrupted: Returns whether the caller has something else to do.
+        times: The wall times of the last steps; None if there was only one, without a wait.
+    """
+
+    __slots__ = ("due", "is_interrupted", "period", "times")
+
+    def __init__(self, due: float, period: float, is_interrupted: Callable[[], bool]) -> None:
+        """Creates a pace; the arguments are the attributes."""
+        self.due = due
+        self.period = period
+        self.is_interrupted = is_interrupted
+        self.times: WorkTimes | None = None
 
 
 class Stepping:
@@ -80,7 +100,26 @@ class Stepping:
         self._requests.refuse_in_plugin("step")
         return self._step_up_to(n, while_paused=False)
 
-    def _step_up_to(self, n: int, while_paused: bool) -> int:
+    def step_paced(self, n: int, pace: Pace) -> int:
+        """Steps at most n times: the first time at once, then at the times of a pace.
+
+        Returns after a step in which code has been called, before a request is processed, if a step
+        was late, and after 25 ms.
+
+        Args:
+            n: Maximum number of steps, at least 1.
+            pace: The times; its `times` are set.
+
+        Returns:
+            As `step_up_to`.
+
+        Raises:
+            Exception: As `World.step`.
+        """
+        self._requests.refuse_in_plugin("step")
+        return self._step_up_to(n, while_paused=False, pace=pace)
+
+    def _step_up_to(self, n: int, while_paused: bool, pace: Pace | None = None) -> int:
         requests, faults = self._requests, self._faults
         made = 1
         with requests.lock:
@@ -89,7 +128,7 @@ class Stepping:
                 requests.hook_thread = threading.get_ident()
                 self._observers.step_started()
                 try:
-                    made = self._advance(n)
+                    made = self._advance(n, pace)
                 finally:
                     self._observers.step_finished()
                     requests.hook_thread = None
@@ -152,8 +191,12 @@ class Stepping:
         if self._requests.actions:
             self._requests.process()
 
-    def _advance(self, n: int) -> int:
+    def _advance(self, n: int, pace: Pace | None) -> int:
         """Performs up to n steps, at least one unless another thread interrupts.
+
+        Args:
+            n: Number of steps.
+            pace: When the steps are due; None to perform them as fast as possible.
 
         Returns:
             The number of steps.
@@ -163,11 +206,20 @@ class Stepping:
         """
         run = self._begin_run(n)
         if run is not None:
-            return self._end_run(run, self._plan.run(run))
+            return self._end_run(run, self._perform(run, pace))
         timekeeper = self._timekeeper
         step, rest = divmod(timekeeper.sim_time_ns, timekeeper.step_size_ns)
         self._make_step(step, is_aligned=not rest)
         return 1
+
+    def _perform(self, run: StepRun, pace: Pace | None) -> RunResult:
+        """Performs steps in the core."""
+        if pace is None:
+            return self._plan.run(run)
+        if run.n == 1 or self._observers.watch_time or pace.is_interrupted():
+            return self._plan.run(run._replace(n=1))
+        result, pace.times = self._plan.run_paced(run, pace.due, pace.period)
+        return result
 
     @property
     def _is_watched(self) -> bool:

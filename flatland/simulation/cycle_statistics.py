@@ -61,22 +61,26 @@ class CycleWindow:
         self._min = math.inf
         self._max = 0.0
 
-    def add(self, worked: float, count: int = 1) -> None:
-        """Adds a cycle, or several of the same length.
+    def add(
+        self, worked: float, count: int = 1, extremes: tuple[float, float] | None = None
+    ) -> None:
+        """Adds a cycle, or several.
 
         Args:
             worked: Wall time spent working in all of them [s].
             count: Number of cycles.
+            extremes: Wall time spent working in the shortest and in the longest one [s]; None if
+                all are of the same length.
         """
         if not count:
             return
         self._count += count
         self._sum += worked
-        worked /= count
-        if worked < self._min:
-            self._min = worked
-        if worked > self._max:
-            self._max = worked
+        least, most = extremes or (worked / count, worked / count)
+        if least < self._min:
+            self._min = least
+        if most > self._max:
+            self._max = most
 
     def statistics(self, now: float, now_ns: int) -> CycleStatistics:
         """Returns the statistics of the cycles added, of which there must be at least one.

@@ -12,6 +12,8 @@ from typing import Final, TypeVar
 
 from flatland.defaults import MAX_LAG
 from flatland.errors import WorldError
+from flatland.physics import WorkTimes
+from flatland.runtime.stepping import Pace
 from flatland.simulation.cycle_statistics import CycleStatistics, CycleWindow
 from flatland.simulation.pause_holds import PauseHolds
 from flatland.simulation.rate_monitor import RateMonitor
@@ -44,6 +46,38 @@ class RunResult:
     def steps_per_second(self) -> float:
         """Steps per second of wall time."""
         return self.steps / self.wall_time if self.wall_time > 0 else 0.0
+
+
+class _Cycle:
+    """The steps between two waits of the loop.
+
+    Attributes:
+        count: Number of steps.
+        waited: Wall time that the core waited between them [s].
+    """
+
+    __slots__ = ("_times", "count", "waited")
+
+    def __init__(self, count: int, times: WorkTimes | None = None) -> None:
+        self.count = count
+        self.waited = 0.0 if times is None else times.waited
+        self._times = times
+
+    def extremes(self, worked: float) -> tuple[float, float] | None:
+        """Returns the wall times of the shortest and of the longest step [s].
+
+        The time that was not spent in steps of the core belongs to the last step.
+
+        Args:
+            worked: Wall time of the cycle without waits [s].
+
+        Returns:
+            None if the steps are of the same length.
+        """
+        times = self._times
+        if times is None or self.count < 2:
+            return None
+        return times.least, max(times.most, worked - times.total)
 
 
 class _ElapsedTime:
@@ -124,6 +158,8 @@ class Simulation:
         self._clock = clock
         self._wait = wait
         self._wake = threading.Event()
+        # The core can wait between steps on the clock of this module only.
+        self._is_real_time = clock is time.perf_counter and wait is threading.Event.wait
         self._stopped = False
         self._steps = StepRequests(world, clock)
 
@@ -155,6 +191,7 @@ class Simulation:
         """Makes `run` return after the current step; safe from any thread."""
         self._stopped = True
         self._wake.set()
+        self.world.physics.plan.interrupt()
 
     def post(self, action: Callable[[], R]) -> Future[R]:
         """Queues an action that runs between two steps; safe from any thread, see `World.post`.
@@ -184,6 +221,7 @@ class Simulation:
             raise ValueError(f"the number of steps must be at least 1, got {count}")
         done = self._steps.add(count)
         self._wake.set()
+        self.world.physics.plan.interrupt()
         if self._stopped:
             self._steps.fail()
         return done
@@ -234,19 +272,20 @@ class Simulation:
                 period, due = self._period, begin
                 window = self._new_window(begin)
                 monitor.reset()
+            left = (duration_ns - elapsed.update()) / timekeeper.step_size_ns
             if period:
-                count = 1
-                world.step()
+                cycle = self._paced_cycle(due, period, left)
             else:
-                count = world.stepping.step_up_to(steps)
+                cycle = _Cycle(world.stepping.step_up_to(steps))
             end = clock()
-            window.add(end - begin, count)
+            worked = end - begin - cycle.waited
+            window.add(worked, cycle.count, cycle.extremes(worked))
             if end - window.start >= self._report_period:
                 self._finish(window, end)
                 window = self._new_window(end)
             if period:
-                monitor.add(end - begin, end)
-                due += period
+                monitor.add(worked, end)
+                due += cycle.count * period
                 if world.paused:
                     due = max(due, end)
                 elif end - due > max(max_lag, period):
@@ -259,7 +298,22 @@ class Simulation:
                 self._wait_until(end + _PAUSED_PERIOD, period)
             else:
                 left = duration_ns - elapsed.update()
-                steps = _next_steps(steps, end - begin, left / timekeeper.step_size_ns)
+                steps = _next_steps(steps, worked, left / timekeeper.step_size_ns)
+
+    def _paced_cycle(self, due: float, period: float, left: float) -> _Cycle:
+        """Performs a step, and further ones in the core as long as that calls no Python code.
+
+        Args:
+            due: Wall time at which the first step was due [s].
+            period: Wall time between two steps [s].
+            left: Number of steps to the end of the run, may be infinite.
+        """
+        if not self._is_real_time:
+            self.world.step()
+            return _Cycle(1)
+        pace = Pace(due, period, self._wake.is_set)
+        count = self.world.stepping.step_paced(math.ceil(min(left, _MAX_STEPS)), pace)
+        return _Cycle(count, pace.times)
 
     def _wait_until(self, due: float, period: float) -> float:
         """Waits until a wall time and runs requests meanwhile.

@@ -150,7 +150,7 @@ class Capture:
         self._wanted_for = wanted_for
         if not demand.scans:
             self._last.clear()
-        wanted = {output: None for _, output in scene.lasers.values() if demand.scans}
+        wanted = {sensor.output: None for sensor in scene.lasers.values() if demand.scans}
         for number in demand.inspected:
             if number in scene.models:
                 wanted.update(dict.fromkeys(outputs_of(world, scene.models[number])))
@@ -171,14 +171,12 @@ class Capture:
 
     def _new_scans(self) -> list[NewScan]:
         last, found = self._last, []
-        for number, (laser, _output) in self.scene.lasers.items():
-            scan = laser.last_scan
-            if scan is None or last.get(number) is scan:
+        for number, sensor in self.scene.lasers.items():
+            scan = sensor.last_scan()
+            if scan is None or last.get(number) is scan[0]:
                 continue
-            last[number] = scan
-            pose, ranges = scan
+            last[number], pose, ranges = scan
             # The caller of `compute_scans` may overwrite an array of its own.
-            found.append(
-                NewScan(number, pose, ranges if ranges.base is None else ranges.copy(), laser.range)
-            )
+            copy = ranges if ranges.base is None else ranges.copy()
+            found.append(NewScan(number, pose, copy, sensor.range_max))
         return found

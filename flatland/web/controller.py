@@ -79,7 +79,8 @@ class DefaultController:
     @property
     def rate(self) -> float | None:
         """Target steps per second of wall time [Hz], inf for no limit, None if there is none."""
-        return None if self._simulation is None else self._simulation.rate
+        simulation = self._simulation
+        return None if simulation is None or simulation.lockstep else simulation.rate
 
     @property
     def lockstep(self) -> bool:

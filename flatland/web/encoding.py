@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import struct
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import Final
 
 import numpy as np
@@ -22,7 +22,6 @@ MAX_FRACTION: Final = 0xFFFE  # stands for `range_max`
 _HEADER: Final = struct.Struct("<BBHId")
 _TWO_COUNTS: Final = struct.Struct("<II")
 _COUNT: Final = struct.Struct("<I")
-_SCAN: Final = struct.Struct("<IIfff")
 
 Numbers = npt.NDArray[np.uint16]
 Ids = npt.NDArray[np.uint32]
@@ -56,17 +55,19 @@ def poses_message(world: int, revision: int, time: float, ids: Ids, poses: Float
     return head + ids.astype("<u4").tobytes() + poses.astype("<f4").tobytes()
 
 
-def scans_message(world: int, revision: int, time: float, scans: Iterable[bytes]) -> bytes:
+def scans_message(
+    world: int, revision: int, time: float, count: int, parts: Iterable[bytes]
+) -> bytes:
     """Returns the message of some scans.
 
     Args:
         world: Index of the world.
         revision: Revision of the world.
         time: Simulated time [s].
-        scans: Results of `scan_parts`.
+        count: Number of scans.
+        parts: Parts of `ScanParts`.
     """
-    parts = list(scans)
-    head = _HEADER.pack(SCANS, VERSION, world, revision, time) + _COUNT.pack(len(parts))
+    head = _HEADER.pack(SCANS, VERSION, world, revision, time) + _COUNT.pack(count)
     return b"".join((head, *parts))
 
 
@@ -90,19 +91,32 @@ def quantized(ranges: FloatArray, range_max: FloatArray) -> Numbers:
     return scaled.astype("<u2")
 
 
-def scan_parts(ids: Iterable[int], poses: Iterable[Pose], fractions: Numbers) -> list[bytes]:
-    """Returns the parts of `scans_message` for scans with the same number of beams.
+class ScanParts:
+    """The parts of `scans_message` for scans with the same number of beams.
 
-    Args:
-        ids: Id of each laser.
-        poses: (x, y, theta) of each laser at the time of its scan, world frame [m, rad].
-        fractions: Ranges as returned by `quantized`, shape (k, n).
+    Attributes:
+        all: The parts of all scans, one after the other.
     """
-    count = fractions.shape[1]
-    if count % 2:  # The parts that follow are aligned to 4 bytes.
-        fractions = np.pad(fractions, ((0, 0), (0, 1)), constant_values=NO_HIT)
-    size, data = fractions.shape[1] * fractions.itemsize, fractions.tobytes()
-    return [
-        _SCAN.pack(number, count, *pose) + data[start : start + size]
-        for number, pose, start in zip(ids, poses, range(0, len(data), size), strict=True)
-    ]
+
+    def __init__(self, ids: Sequence[int], poses: Sequence[Pose], fractions: Numbers) -> None:
+        """Encodes scans.
+
+        Args:
+            ids: Id of each laser.
+            poses: (x, y, theta) of each laser at the time of its scan, world frame [m, rad].
+            fractions: Ranges as returned by `quantized`, shape (k, n).
+        """
+        count = fractions.shape[1]
+        padded = count + count % 2  # The parts that follow are aligned to 4 bytes.
+        rows = np.zeros(
+            len(ids),
+            [("id", "<u4"), ("beams", "<u4"), ("pose", "<f4", 3), ("ranges", "<u2", padded)],
+        )
+        rows["id"], rows["beams"], rows["pose"] = ids, count, poses
+        rows["ranges"][:, :count] = fractions
+        self.all = rows.tobytes()
+        self._size = rows.itemsize
+
+    def __getitem__(self, index: int) -> bytes:
+        """Returns the part of one scan."""
+        return self.all[index * self._size : (index + 1) * self._size]

@@ -165,7 +165,8 @@ class WorldFeed:
         self._poses = np.empty((0, 3), np.float32)
         self._changed = np.empty(0, np.int64)  # the capture in which each pose changed
         self._tick = 0
-        self._scans: dict[int, tuple[int, bytes]] = {}
+        self._scans: dict[int, tuple[int, encoding.ScanParts, int]] = {}
+        self._newest_scans: list[tuple[int, bytes]] = []  # of the last capture, with their number
         self._last: Captured | None = None
         self._answered = -math.inf
         self._times: deque[tuple[float, float]] = deque()
@@ -173,6 +174,7 @@ class WorldFeed:
         self._status_version = 0
         self._status_due = -math.inf
         self._jobs: set[asyncio.Task[None]] = set()
+        self._stale_timer: asyncio.TimerHandle
         self._shared: dict[str, tuple[int, bytes]] = {}
         self._details_due = self._frames_due = -math.inf
         self._details: dict[int, tuple[int, str]] = {}
@@ -265,6 +267,7 @@ class WorldFeed:
             self.world.post(self._capture.end)
         self._times.clear()
         self._scans.clear()
+        self._newest_scans = []
         self._details.clear()
         self._parameters.clear()
         self._values.clear()
@@ -290,14 +293,10 @@ class WorldFeed:
     async def _update(self, now: float) -> None:
         demand = self._demand(now)
         self._layers_changed = False
-        task = asyncio.ensure_future(between_steps(self.world, lambda: self._capture.take(demand)))
+        loop = asyncio.get_running_loop()
+        self._stale_timer = loop.call_later(STALE_AFTER, self._tell_stale)
         try:
-            while not task.done():
-                await asyncio.wait({task}, timeout=STALE_AFTER)
-                if not task.done():
-                    self._set_status(asyncio.get_running_loop().time())
-                    self._wake_all()
-            captured = task.result()
+            captured = await between_steps(self.world, lambda: self._capture.take(demand))
             await self._read_parameters(captured.details)
             self._apply(captured, now)
         except PLUGIN_FAULTS as error:
@@ -306,7 +305,14 @@ class WorldFeed:
                 _LOG.warning("web viewer: the world cannot be captured: %s", error)
                 await asyncio.sleep(1.0)
         finally:
-            task.cancel()
+            self._stale_timer.cancel()
+
+    def _tell_stale(self) -> None:
+        """Tells the clients, again and again, that the simulator does not answer."""
+        loop = asyncio.get_running_loop()
+        self._set_status(loop.time())
+        self._wake_all()
+        self._stale_timer = loop.call_later(STALE_AFTER, self._tell_stale)
 
     def _wake_all(self) -> None:
         for wake in self._lookers:
@@ -364,6 +370,7 @@ class WorldFeed:
         self._body_ids = np.array(change.body_ids, np.uint32)
         self._poses = np.full((len(change.body_ids), 3), np.nan, np.float32)
         self._changed = np.full(len(change.body_ids), self._tick, np.int64)
+        self._newest_scans = []
         lasers = {laser["id"] for _, model in self._models.values() for laser in model["lasers"]}
         self._scans = {number: scan for number, scan in self._scans.items() if number in lasers}
 
@@ -378,16 +385,18 @@ class WorldFeed:
         by_count: dict[int, list[NewScan]] = {}
         for scan in scans:
             by_count.setdefault(len(scan.ranges), []).append(scan)
-        for same in by_count.values():
+        self._newest_scans = []
+        for count, same in by_count.items():
             fractions = encoding.quantized(
-                np.stack([scan.ranges for scan in same]),
+                np.concatenate([scan.ranges for scan in same]).reshape(-1, count),
                 np.array([scan.range_max for scan in same], np.float32),
             )
-            parts = encoding.scan_parts(
+            parts = encoding.ScanParts(
                 [scan.laser for scan in same], [scan.pose for scan in same], fractions
             )
-            for scan, part in zip(same, parts, strict=True):
-                self._scans[scan.laser] = (self._tick, part)
+            self._newest_scans.append((len(same), parts.all))
+            for row, scan in enumerate(same):
+                self._scans[scan.laser] = (self._tick, parts, row)
 
     async def _read_parameters(self, details: list[Details]) -> None:
         """Reads the parameters of the plugins of models that were not inspected before."""
@@ -538,7 +547,7 @@ class WorldFeed:
                 "time": last.time,
                 "paused": last.paused,
                 "rate": None if rate is None else 0 if math.isinf(rate) else rate,
-                "real_time_factor": self._real_time_factor(),
+                "real_time_factor": None if last.lockstep else self._real_time_factor(),
                 "lockstep": last.lockstep,
                 "stale": round(silence, 1) if silence > STALE_AFTER else 0,
             }
@@ -570,16 +579,16 @@ class WorldFeed:
         return message or None
 
     def _scans_message(self, since: int, time: float) -> bytes | None:
-        shared = self._shared.get("scans")
-        if since == self._tick - 1 and shared is not None and shared[0] == self._tick:
-            return shared[1] or None
-        parts = [part for tick, part in self._scans.values() if tick > since]
-        message = b""
-        if parts:
-            message = encoding.scans_message(self.index, self._revision, time, parts)
+        """Returns the scans after a capture."""
         if since == self._tick - 1:
-            self._shared["scans"] = (self._tick, message)
-        return message or None
+            count = sum(number for number, _ in self._newest_scans)
+            parts = [data for _, data in self._newest_scans]
+        else:
+            parts = [scans[row] for tick, scans, row in self._scans.values() if tick > since]
+            count = len(parts)
+        if not count:
+            return None
+        return encoding.scans_message(self.index, self._revision, time, count, parts)
 
 
 def _json(message: dict[str, Any]) -> str:

@@ -15,12 +15,12 @@ from flatland.geometry import FloatArray, Pose
 from flatland.physics import PhysicsFixture
 from flatland.plugin_api.plugin import describe
 from flatland.plugin_api.ports import Output
-from flatland.plugins.laser import Laser
-from flatland.values import LaserScan, Twist
+from flatland.values import Twist
+from flatland.web.ranging import RangingSensor, find_sensor
 from flatland.world import World
 
 _TIME_LIMIT: Final = 1e-3  # s between two steps for descriptions; the rest follows later
-_CHECK_PERIOD: Final = 0.25  # s between two searches for changed shapes and colours
+_CHECK_PERIOD: Final = 0.5  # s between two searches for changed shapes and colours
 
 Description = dict[str, Any]
 
@@ -51,7 +51,7 @@ class TrackedModel:
         model: The model.
         bodies: Its bodies, when it was described.
         body_ids: Ids of the bodies.
-        lasers: Its lasers by id, with the output of each.
+        lasers: Its lasers and similar sensors by id.
         key: Changes when the description is outdated.
     """
 
@@ -59,7 +59,7 @@ class TrackedModel:
     model: Model
     bodies: list[Body]
     body_ids: list[int]
-    lasers: dict[int, tuple[Laser, Output[Any]]]
+    lasers: dict[int, RangingSensor]
     key: object
 
 
@@ -86,7 +86,7 @@ class Scene:
     Attributes:
         models: The models by id, in the order in which they were described.
         bodies: All bodies of these models.
-        lasers: All lasers of these models by id, with their outputs.
+        lasers: All lasers and similar sensors of these models by id.
     """
 
     def __init__(
@@ -107,7 +107,7 @@ class Scene:
         self._check_due = 0.0
         self.models: dict[int, TrackedModel] = {}
         self.bodies: list[Body] = []
-        self.lasers: dict[int, tuple[Laser, Output[Any]]] = {}
+        self.lasers: dict[int, RangingSensor] = {}
 
     def update(self) -> SceneChange:
         """Describes new and changed models, for a limited time; the next call continues."""
@@ -162,16 +162,14 @@ class Scene:
         known = TrackedModel(number, model, bodies, [], {}, _key(model))
         for body in bodies:
             known.body_ids.append(body_ids.get(body) or next(self._ids))
-        former_lasers = {laser: n for n, (laser, _) in former.lasers.items()} if former else {}
+        former_lasers = {s.plugin: n for n, s in former.lasers.items()} if former else {}
         topics: list[Output[Any]] = []
         for plugin in model.plugins:
             own = outputs.get(describe(plugin), [])
             topics += own
-            if isinstance(plugin, Laser):
-                scans = [output for output in own if output.value_type is LaserScan]
-                if scans:
-                    laser_id = former_lasers.get(plugin) or next(self._ids)
-                    known.lasers[laser_id] = (plugin, scans[0])
+            sensor = find_sensor(plugin, own)
+            if sensor is not None and sensor.body in known.bodies:
+                known.lasers[former_lasers.get(plugin) or next(self._ids)] = sensor
         self._known[model] = self.models[number] = known
         change.described[number] = self._describe(known, topics)
 
@@ -193,8 +191,8 @@ class Scene:
             "file": model.path,
             "bodies": [self._describe_body(body, ids[body]) for body in known.bodies],
             "lasers": [
-                _describe_laser(laser, number, output.topic, ids[laser.body])
-                for number, (laser, output) in known.lasers.items()
+                _describe_sensor(sensor, number, ids[sensor.body])
+                for number, sensor in known.lasers.items()
             ],
             "joints": [
                 {
@@ -250,27 +248,18 @@ def copy_layers(world: World) -> list[LayerContents]:
     ]
 
 
-def _describe_laser(laser: Laser, number: int, topic: str, body: int) -> Description:
-    # As seen from above, beams of a sensor that is mounted upside down turn the other way.
-    direction = -1.0 if _is_upside_down(laser) else 1.0
+def _describe_sensor(sensor: RangingSensor, number: int, body: int) -> Description:
     return {
         "id": number,
-        "name": laser.name,
-        "topic": topic,
+        "name": sensor.plugin.name,
+        "topic": sensor.output.topic,
         "body": body,
-        "origin": list(laser.origin),
-        "angle_min": direction * laser.angles.minimum,
-        "angle_increment": direction * laser.angles.increment,
-        "count": laser.angles.count,
-        "range_max": laser.range,
+        "origin": list(sensor.origin),
+        "angle_min": sensor.angle_min,
+        "angle_increment": sensor.angle_increment,
+        "count": sensor.count,
+        "range_max": sensor.range_max,
     }
-
-
-def _is_upside_down(laser: Laser) -> bool:
-    angles = laser.angles
-    y = laser.beam_ends[:2, 1] / laser.range
-    upright = np.sin(angles.minimum + angles.increment * np.arange(len(y)))
-    return bool(np.abs(y - upright).sum() > np.abs(y + upright).sum())
 
 
 def _key(model: Model) -> object:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import json
 import struct
 import time
@@ -108,6 +109,16 @@ class RawWebClient:
 
     def send_text(self, text: str) -> None:
         self._runner.run(self._socket.send_str(text))
+
+    def send_many(self, texts: list[str]) -> None:
+        """Sends messages without a pause, until the server has closed the connection."""
+
+        async def send() -> None:
+            with contextlib.suppress(ConnectionError):
+                for text in texts:
+                    await self._socket.send_str(text)
+
+        self._runner.run(send())
 
     def send_bytes(self, data: bytes) -> None:
         self._runner.run(self._socket.send_bytes(data))

@@ -196,6 +196,7 @@ WRITTEN_IN = {
     "The node does not end": "flatland/ros/shutdown.py",
     "RViz displays no scan": "flatland/ros/frame_monitor.py",
     "The viewer does not open": "flatland/viewer/app.py",
+    "The viewer in the browser does not start": "flatland/ros/browser_viewer.py",
     "The viewer does not find a master": "flatland/viewer/app.py",
 }
 

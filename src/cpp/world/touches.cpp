@@ -57,6 +57,7 @@ void TouchCollectors::set_ends_runs(TouchCollector& collector, bool ends_runs) {
   collector.ends_runs = ends_runs;
   const auto count = static_cast<std::int64_t>(collector.touches.size());
   ending_ += ends_runs ? count : -count;
+  ending_collectors_ += ends_runs ? 1 : -1;
 }
 
 void TouchCollectors::set_owned(Id body, bool is_owned) {

@@ -56,6 +56,8 @@ class TouchCollectors {
   bool empty() const { return collectors_.size() == 0; }
   // Whether any collector that ends runs has contacts.
   bool end_run() const { return ending_ > 0; }
+  // Whether there is such a collector.
+  bool can_end_run() const { return ending_collectors_ > 0; }
   void set_ends_runs(TouchCollector& collector, bool ends_runs);
 
   // Contacts of bodies that are not owned by a model or a layer are ignored.
@@ -80,6 +82,7 @@ class TouchCollectors {
   std::unordered_map<Id, std::vector<Id>> by_body_;
   std::unordered_map<Id, bool> owned_;
   std::int64_t ending_ = 0;  // contacts of collectors that end runs
+  std::int64_t ending_collectors_ = 0;
 };
 
 }  // namespace flatland

@@ -174,6 +174,19 @@ RunResult World::run(std::int64_t k, std::int64_t n, double dt, int velocity_ite
   return result;
 }
 
+void World::interrupt() {
+  {
+    const std::lock_guard<std::mutex> lock(interrupt_mutex_);
+    interrupted_ = true;
+  }
+  interrupt_.notify_all();
+}
+
+bool World::wait_until(std::chrono::steady_clock::time_point time) {
+  std::unique_lock<std::mutex> lock(interrupt_mutex_);
+  return !interrupt_.wait_until(lock, time, [this] { return interrupted_.load(); });
+}
+
 std::vector<Id> World::still_invalid() const {
   std::vector<Id> ids;
   for (const Id id : invalid_) {

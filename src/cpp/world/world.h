@@ -13,8 +13,11 @@
 
 #include <array>
 #include <atomic>
+#include <chrono>
+#include <condition_variable>
 #include <cstddef>
 #include <memory>
+#include <mutex>
 #include <string>
 #include <thread>
 #include <vector>
@@ -76,10 +79,13 @@ class World final : private b2DestructionListener {
   // exclusive use of the world.
   RunResult run(std::int64_t k, std::int64_t n, double dt, int velocity_iterations,
                 int position_iterations, bool only_physics);
-  // Makes `run` return after the current step; safe from any thread. It has an effect until
-  // `clear_interrupt` is called.
-  void interrupt() { interrupted_ = true; }
+  // Makes `run` return after the current step, and `wait_until` at once; safe from any thread. It
+  // has an effect until `clear_interrupt` is called.
+  void interrupt();
   void clear_interrupt() { interrupted_ = false; }
+  // Waits for a time unless interrupted. Returns whether the time has come. Requires no use of the
+  // world.
+  bool wait_until(std::chrono::steady_clock::time_point time);
 
   // Duration of the last step in wall time [s], an estimate of that of the next one.
   double last_step_time() const { return last_step_time_; }
@@ -195,6 +201,8 @@ class World final : private b2DestructionListener {
   std::vector<Id> invalid_;      // bodies that the last step left so
 
   std::atomic<bool> interrupted_{false};
+  std::mutex interrupt_mutex_;
+  std::condition_variable interrupt_;
   std::atomic<int> users_{0};  // kExclusive, or the number of shared uses
   std::atomic<std::thread::id> owner_{};
   std::atomic<const char*> activity_{nullptr};

@@ -15,6 +15,17 @@ from flatland.simulation import Simulation
 from flatland.values import Twist
 from flatland.web import WebViewer, feed
 
+MANIFEST = """<library path=".">
+<class name="test::Fan" type="ranging_plugins.Fan" base_class_type="flatland::ModelPlugin"/>
+<class name="test::Cone" type="ranging_plugins.Cone" base_class_type="flatland::ModelPlugin"/>
+</library>
+"""
+WORLD = """
+properties: {}
+layers: [{name: walls, map: room.yaml}]
+models: [{name: robot, model: robot.model.yaml, pose: [3, 5, 0]}]
+"""
+
 
 def wanted(world: Any) -> set[str]:
     """Returns the topics of the outputs that are computed."""
@@ -364,3 +375,42 @@ def test_a_step_is_not_held_up_by_the_viewer(url, simulation: Simulation, world,
         finally:
             release.set()
         client.wait("status", lambda message: message["time"] > start + 0.4)
+
+
+class TestOtherSensors:
+    def test_an_upside_down_laser_turns_the_other_way(self, files, viewer):
+        files.write_map("room", ["##########", *["#........#"] * 8, "##########"])
+        files.write(
+            "robot.model.yaml",
+            "bodies: [{name: b, footprints: []}]\n"
+            "plugins: [{type: Laser, name: l, body: b, range: 20, upside_down: true,\n"
+            "  angle: {min: 0, max: 1, increment: 0.5}}]",
+        )
+        viewer.add_world(files.load(WORLD))
+        with RawWebClient(viewer.url) as client:
+            (laser,) = client.wait_model("robot")["lasers"]
+            assert (laser["angle_min"], laser["angle_increment"]) == (0, -0.5)
+
+    def test_plugins_with_similar_values_are_shown(self, files, viewer, monkeypatch):
+        files.write("manifest.xml", MANIFEST)
+        monkeypatch.setenv("FLATLAND_PLUGIN_PATH", str(files.folder / "manifest.xml"))
+        files.write_map("room", ["##########", *["#........#"] * 8, "##########"])
+        files.write(
+            "robot.model.yaml",
+            "bodies: [{name: b, footprints: []}]\n"
+            "plugins: [{type: test::Fan, name: fan}, {type: test::Cone, name: cone}]",
+        )
+        world = files.load(WORLD)
+        viewer.add_world(world)
+        with RawWebClient(viewer.url) as client:
+            fan, cone = client.wait_model("robot")["lasers"]
+            assert (fan["name"], fan["count"], fan["range_max"]) == ("fan", 3, 8)
+            assert (cone["angle_min"], cone["angle_increment"]) == (-0.4, 0.1)
+            client.ask("look", scans=True)
+            wait_until("the outputs are wanted", lambda: len(wanted(world)) == 2)
+            world.step()
+            scans = client.wait(3).scans()
+            pose, ranges = scans[fan["id"]]
+            np.testing.assert_allclose(pose, [4, 5, 0], atol=1e-6)
+            np.testing.assert_allclose(ranges / 65534 * 8, [1, 2, 65535 / 65534 * 8], atol=1e-3)
+            np.testing.assert_allclose(scans[cone["id"]][1] / 65534 * 4, [3] * 9, atol=1e-3)

@@ -87,5 +87,7 @@ export function saveFile(blob, name) {
 export function takesKeys(target) {
   if (!(target instanceof HTMLElement)) return false;
   if (target.closest("dialog, [role=menu]")) return true;
-  return target.matches("input, select, textarea, [contenteditable]") && !target.matches("input[type=checkbox]");
+  return (
+    target.matches("input, select, textarea, [contenteditable]") && !target.matches("input[type=checkbox]")
+  );
 }

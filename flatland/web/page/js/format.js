@@ -30,7 +30,10 @@ export function significant(value, digits = 4) {
 export function describeValue(value) {
   if (value === null || typeof value !== "object" || Array.isArray(value)) return brief(value);
   return Object.entries(value)
-    .map(([key, item]) => `${key}: ${key === "stamp" && Number.isInteger(item) ? `${item / 1e9} s` : brief(item)}`)
+    .map(
+      ([key, item]) =>
+        `${key}: ${key === "stamp" && Number.isInteger(item) ? `${item / 1e9} s` : brief(item)}`,
+    )
     .join("\n");
 }
 
@@ -51,7 +54,9 @@ export function brief(value, limit = 160) {
   } else if (Array.isArray(value) && value.length > 8) text = `${value.length} values`;
   else if (Array.isArray(value)) text = `[${value.map((item) => brief(item, 40)).join(", ")}]`;
   else if (typeof value === "object") {
-    text = Object.entries(value).map(([key, item]) => `${key}: ${brief(item, 60)}`).join("  ");
+    text = Object.entries(value)
+      .map(([key, item]) => `${key}: ${brief(item, 60)}`)
+      .join("  ");
   } else text = String(value);
   return text.length > limit ? `${text.slice(0, limit - 1)}…` : text;
 }

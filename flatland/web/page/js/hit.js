@@ -1,5 +1,5 @@
 import { inversePoint, isInside, segmentDistance } from "./geometry.js";
-import { shapeEdges } from "./world_state.js";
+import { shapeEdges } from "./shapes.js";
 
 /**
  * @typedef {import("./world_state.js").WorldState} WorldState
@@ -44,7 +44,9 @@ function isHit(body, [x, y], tolerance) {
       return Math.hypot(x - shape.center[0], y - shape.center[1]) <= shape.radius + tolerance;
     }
     if (shape.kind === "polygon" && isInside(x, y, shape.points)) return true;
-    return shapeEdges(shape).some(([ax, ay, bx, by]) => segmentDistance(x, y, [ax, ay], [bx, by]) <= tolerance);
+    return shapeEdges(shape).some(
+      ([ax, ay, bx, by]) => segmentDistance(x, y, [ax, ay], [bx, by]) <= tolerance,
+    );
   });
 }
 

@@ -57,7 +57,13 @@ export class Hotkeys {
       { keys: [" "], shown: "Space", text: "Pause or resume", run: actions.togglePause, writes: true },
       { keys: ["."], shown: ".", text: "Single step", run: actions.step, writes: true },
       { keys: ["n"], shown: "N", text: "Spawn a model", run: actions.openSpawn, writes: true },
-      { keys: ["delete", "backspace"], shown: "Delete", text: "Delete the selected model", run: actions.deleteSelected, writes: true },
+      {
+        keys: ["delete", "backspace"],
+        shown: "Delete",
+        text: "Delete the selected model",
+        run: actions.deleteSelected,
+        writes: true,
+      },
       { keys: ["v"], shown: "V", text: "Select and move models", run: () => tools.use("select") },
       { keys: ["h"], shown: "H", text: "Move the view only", run: () => tools.use("pan") },
       { keys: ["m"], shown: "M", text: "Measure distances", run: () => tools.use("measure") },
@@ -85,7 +91,12 @@ export class Hotkeys {
   press(event) {
     if (event.defaultPrevented || event.ctrlKey || event.metaKey || event.altKey) return;
     if (takesKeys(event.target) || document.querySelector("dialog[open]")) return;
-    if (event.key === " " && event.target instanceof Element && event.target.closest("button, summary, input")) return;
+    if (
+      event.key === " " &&
+      event.target instanceof Element &&
+      event.target.closest("button, summary, input")
+    )
+      return;
     if (!event.shiftKey && this.tools.name === "select" && this.drive.press(event.code)) {
       event.preventDefault();
       return;
@@ -153,7 +164,10 @@ export class Hotkeys {
     for (const { shown, text } of this.hotkeys) {
       if (shown === "→" || shown === "↑" || shown === "↓") continue;
       const names = shown === "←" ? ["←", "→", "↑", "↓"] : [shown];
-      keys.append(element("dt", {}, ...names.map((name) => element("kbd", {}, name))), element("dd", {}, text));
+      keys.append(
+        element("dt", {}, ...names.map((name) => element("kbd", {}, name))),
+        element("dd", {}, text),
+      );
     }
     /** @type {[string, string][]} */
     const others = [

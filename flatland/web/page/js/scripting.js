@@ -11,7 +11,13 @@ export function exposeScripting(session, stage) {
     name: world.name,
     time: world.status?.time ?? 0,
     paused: world.status?.paused ?? null,
-    layers: world.layers.map(({ name, visible, edges }) => ({ name, visible, edges: (edges?.length ?? 0) / 4 })),
+    rate: world.status?.rate ?? null,
+    edges: world.layers.reduce((sum, { edges }) => sum + (edges?.length ?? 0) / 4, 0),
+    layers: world.layers.map(({ name, visible, edges }) => ({
+      name,
+      visible,
+      edges: (edges?.length ?? 0) / 4,
+    })),
     models: Object.fromEntries(
       [...world.models.values()].map((model) => [model.name, { id: model.id, pose: world.modelPose(model) }]),
     ),
@@ -52,6 +58,18 @@ export function exposeScripting(session, stage) {
       const { left, top } = stage.canvas.getBoundingClientRect();
       const [px, py] = stage.camera.toScreen(x, y);
       return [left + px, top + py];
+    },
+    /**
+     * Returns the small view of a world in the grid: left, top, width and height on the page
+     * [CSS pixels], null while one world is enlarged.
+     *
+     * @param {number} index
+     */
+    tile(index) {
+      const found = session.world ? undefined : stage.tiles().find(({ world }) => world.index === index);
+      if (!found) return null;
+      const { left, top } = stage.canvas.getBoundingClientRect();
+      return [left + found.left, top + found.top, found.width, found.height];
     },
     /**
      * Returns the point of the world at a position on the page [m].

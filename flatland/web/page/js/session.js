@@ -109,8 +109,9 @@ export class Session extends Emitter {
    */
   show(index) {
     if (index === this.currentIndex) return;
+    // The address may name a model before the server has listed the worlds.
+    if (this.currentIndex !== null) this.selectedName = null;
     this.currentIndex = index;
-    this.selectedName = null;
     this.emit("current", undefined);
     this.emit("selection", undefined);
     this.look();
@@ -131,11 +132,6 @@ export class Session extends Emitter {
    */
   setDisplay(display, shown) {
     this.displays[display] = shown;
-    for (const world of this.worlds.values()) {
-      if (display === "scans" && !shown) world.clearScans();
-      if (display === "frames" && !shown) world.frames = [];
-      if (display === "trails") world.trails.clear();
-    }
     this.emit("displays", undefined);
     this.emit("redraw", undefined);
     this.look();
@@ -249,7 +245,7 @@ export class Session extends Emitter {
         this.emit("status", world);
         return;
       case "frames":
-        world.frames = this.displays.frames ? message.frames : [];
+        world.frames = message.frames;
         break;
       case "details":
         if (world === this.world) this.emit("details", /** @type {any} */ (message));
@@ -272,7 +268,7 @@ export class Session extends Emitter {
     if (!world?.present) return;
     if (data.kind === "edges") world.applyEdges(data);
     else if (data.kind === "poses") world.applyPoses(data);
-    else if (this.displays.scans) world.applyScans(data);
+    else world.applyScans(data);
     this.emit("redraw", undefined);
   }
 }

@@ -13,6 +13,9 @@ const GAP = 6;
 /** Duration of an animated change of the view [ms]. */
 const GLIDE_TIME = 220;
 const MAX_PIXEL_RATIO = 2;
+/** What the view of an empty world shows [m].
+ * @type {import("./geometry.js").Bounds} */
+const EMPTY_BOUNDS = [-5, -5, 5, 5];
 
 /**
  * The canvas: decides what is drawn where, and draws when something has changed.
@@ -43,6 +46,9 @@ export class Stage extends Emitter {
     this.overlay = null;
     /** @type {WeakMap<WorldState, Camera>} */
     this.tileCameras = new WeakMap();
+    /** What each camera was fitted to last.
+     * @type {WeakMap<Camera, {world: WorldState, key: string, bounds: import("./geometry.js").Bounds}>} */
+    this.fitted = new WeakMap();
     this.dark = dark;
     this.isDirty = true;
     /** @type {Renderer | null} */
@@ -119,6 +125,7 @@ export class Stage extends Emitter {
   fit() {
     this.followed = null;
     this.isFitting = true;
+    this.fitted.delete(this.camera);
     this.invalidate();
     this.emit("view", undefined);
   }
@@ -163,7 +170,35 @@ export class Stage extends Emitter {
     const model = this.followed === null ? null : world.modelByName(this.followed);
     const pose = model && world.modelPose(model);
     if (pose) [camera.x, camera.y] = pose;
-    else if (this.isFitting && world.present) camera.fit(world.fitBounds());
+    else if (this.isFitting && world.present) this.fitTo(camera, world);
+  }
+
+  /**
+   * Fits a view to a world. While the view and the shapes of the world stay the same, models that
+   * move only enlarge the area, so that the view is steady.
+   *
+   * @param {Camera} camera
+   * @param {WorldState} world
+   */
+  fitTo(camera, world) {
+    const key = [world.layersVersion, world.shapesVersion, camera.width, camera.height, camera.angle].join();
+    const last = this.fitted.get(camera);
+    let bounds = world.fitBounds();
+    if (!bounds) {
+      camera.fit(EMPTY_BOUNDS);
+      return;
+    }
+    if (last && last.world === world && last.key === key) {
+      const [x0, y0, x1, y1] = last.bounds;
+      bounds = [
+        Math.min(x0, bounds[0]),
+        Math.min(y0, bounds[1]),
+        Math.max(x1, bounds[2]),
+        Math.max(y1, bounds[3]),
+      ];
+    }
+    this.fitted.set(camera, { world, key, bounds });
+    camera.fit(bounds);
   }
 
   /**
@@ -203,7 +238,7 @@ export class Stage extends Emitter {
       this.tileCameras.set(world, camera);
       camera.width = width;
       camera.height = height;
-      camera.fit(world.fitBounds());
+      this.fitTo(camera, world);
     }
     return {
       left: Math.round(left * ratio),

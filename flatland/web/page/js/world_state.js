@@ -1,3 +1,4 @@
+import { shapesRadius } from "./shapes.js";
 import { Trails } from "./trails.js";
 
 /**
@@ -227,12 +228,6 @@ export class WorldState {
     this.scansVersion++;
   }
 
-  /** Removes the latest scans, for example when their display is turned off. */
-  clearScans() {
-    for (const laser of this.lasers.values()) laser.ranges = null;
-    this.scansVersion++;
-  }
-
   /**
    * Returns the pose of a body, null before the first one has arrived.
    *
@@ -264,7 +259,7 @@ export class WorldState {
   /**
    * Returns the bounds of all layers, or of the models of a world without layers.
    *
-   * @returns {Bounds}
+   * @returns {Bounds | null} null for an empty world
    */
   fitBounds() {
     if (this.bounds && this.layers.some((layer) => layer.edges?.length)) return this.bounds;
@@ -277,59 +272,6 @@ export class WorldState {
       x1 = Math.max(x1, pose[0] + body.radius);
       y1 = Math.max(y1, pose[1] + body.radius);
     }
-    return x0 <= x1 && y0 <= y1 ? [x0, y0, x1, y1] : [-5, -5, 5, 5];
+    return x0 <= x1 && y0 <= y1 ? [x0, y0, x1, y1] : null;
   }
-}
-
-/**
- * Returns the radius of the circle around the origin that contains all shapes.
- *
- * @param {Shape[]} shapes
- */
-export function shapesRadius(shapes) {
-  let radius = 0;
-  for (const shape of shapes) {
-    if (shape.kind === "circle") {
-      radius = Math.max(radius, Math.hypot(...shape.center) + shape.radius);
-    } else {
-      for (const [ax, ay, bx, by] of shapeEdges(shape)) {
-        radius = Math.max(radius, Math.hypot(ax, ay), Math.hypot(bx, by));
-      }
-    }
-  }
-  return radius;
-}
-
-const CIRCLE_EDGES = 40;
-
-/**
- * Returns the outline of a shape as edges.
- *
- * @param {Shape} shape
- * @returns {number[][]} x1, y1, x2, y2 of each edge [m]
- */
-export function shapeEdges(shape) {
-  const points = shapePoints(shape);
-  const closed = shape.kind !== "edges";
-  const edges = [];
-  for (let i = closed ? 0 : 1; i < points.length; i++) {
-    const [ax, ay] = points[(i + points.length - 1) % points.length];
-    edges.push([ax, ay, ...points[i]]);
-  }
-  return edges;
-}
-
-/**
- * Returns the vertices of a shape.
- *
- * @param {Shape} shape
- * @returns {import("./protocol.js").Point[]}
- */
-export function shapePoints(shape) {
-  if (shape.kind !== "circle") return shape.points;
-  const { center, radius } = shape;
-  return Array.from({ length: CIRCLE_EDGES }, (_, i) => {
-    const angle = (2 * Math.PI * i) / CIRCLE_EDGES;
-    return [center[0] + radius * Math.cos(angle), center[1] + radius * Math.sin(angle)];
-  });
 }

@@ -37,7 +37,9 @@ export class Inspector {
     this.shownId = selected?.id ?? null;
     this.isEdited = false;
     if (!selected) {
-      const place = this.session.world ? "Select a model in the view or in the list." : "Enlarge a world to select a model.";
+      const place = this.session.world
+        ? "Select a model in the view or in the list."
+        : "Enlarge a world to select a model.";
       setText(this.empty, place);
       this.root.replaceChildren(this.empty);
       return;
@@ -178,8 +180,16 @@ export class Inspector {
     const summary = /** @type {Element} */ (section.firstElementChild);
     const parts = plugins.map(({ name, type, parameters }) => {
       const list = element("dl", { class: "facts" });
-      renderFacts(list, Object.entries(parameters).map(([each, value]) => [each, brief(value, 300)]));
-      return element("div", { class: "topic" }, element("span", {}, name, " ", element("code", {}, type)), list);
+      renderFacts(
+        list,
+        Object.entries(parameters).map(([each, value]) => [each, brief(value, 300)]),
+      );
+      return element(
+        "div",
+        { class: "topic" },
+        element("span", {}, name, " ", element("code", {}, type)),
+        list,
+      );
     });
     section.replaceChildren(summary, ...parts);
   }

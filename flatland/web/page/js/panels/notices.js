@@ -13,8 +13,17 @@ export function createNotices(session) {
   const list = byId("notices");
   session.on("notice", ({ level, text, topic = text }) => {
     for (const old of [...list.children]) if (old.getAttribute("data-topic") === topic) old.remove();
-    const close = element("button", { type: "button", class: "button square", "aria-label": "Dismiss" }, icon("close"));
-    const notice = element("div", { class: "notice", "data-level": level, "data-topic": topic }, element("p", {}, text), close);
+    const close = element(
+      "button",
+      { type: "button", class: "button square", "aria-label": "Dismiss" },
+      icon("close"),
+    );
+    const notice = element(
+      "div",
+      { class: "notice", "data-level": level, "data-topic": topic },
+      element("p", {}, text),
+      close,
+    );
     close.addEventListener("click", () => notice.remove());
     list.append(notice);
     while (list.children.length > MAX_NOTICES) list.firstElementChild?.remove();

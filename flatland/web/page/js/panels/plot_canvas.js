@@ -35,7 +35,8 @@ export class PlotCanvas {
     /** @type {(time: number) => number} */
     const xOf = (time) => MARGIN.left + (1 - (now - time) / span) * (width - MARGIN.left - MARGIN.right);
     /** @type {(value: number) => number} */
-    const yOf = (value) => height - MARGIN.bottom - ((value - low) / (high - low)) * (height - MARGIN.top - MARGIN.bottom);
+    const yOf = (value) =>
+      height - MARGIN.bottom - ((value - low) / (high - low)) * (height - MARGIN.top - MARGIN.bottom);
 
     context.font = FONT;
     context.textBaseline = "middle";

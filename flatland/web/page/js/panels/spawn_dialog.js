@@ -2,7 +2,7 @@ import { byId, element, setText } from "../dom.js";
 import { transformPoint } from "../geometry.js";
 import { css } from "../renderer/palette.js";
 import { spawnModel } from "../tools/spawn_tool.js";
-import { shapePoints } from "../world_state.js";
+import { shapePoints } from "../shapes.js";
 import { parseNumber } from "./inspector.js";
 
 /** @typedef {import("../protocol.js").PreviewBody} PreviewBody */
@@ -45,8 +45,8 @@ export class SpawnDialog {
     if (!reply) return;
     const before = this.file.value;
     this.file.replaceChildren(
-      ...reply.result.map(
-        (/** @type {import("../protocol.js").ModelFile} */ { label, path }) => element("option", { value: path }, label),
+      ...reply.result.map((/** @type {import("../protocol.js").ModelFile} */ { label, path }) =>
+        element("option", { value: path }, label),
       ),
     );
     if (this.file.options.length === 0) {
@@ -141,7 +141,10 @@ export class SpawnDialog {
     for (const { points, color, isOpen } of polygons) {
       context.beginPath();
       for (const [x, y] of points) {
-        context.lineTo(canvas.width / 2 + (x - (x0 + x1) / 2) * zoom, canvas.height / 2 - (y - (y0 + y1) / 2) * zoom);
+        context.lineTo(
+          canvas.width / 2 + (x - (x0 + x1) / 2) * zoom,
+          canvas.height / 2 - (y - (y0 + y1) / 2) * zoom,
+        );
       }
       if (!isOpen) context.closePath();
       context.fillStyle = css([color[0], color[1], color[2], 0.3]);
@@ -149,6 +152,9 @@ export class SpawnDialog {
       context.strokeStyle = getComputedStyle(canvas).color;
       context.stroke();
     }
-    canvas.setAttribute("aria-label", `Outline of the model, ${(x1 - x0).toFixed(2)} by ${(y1 - y0).toFixed(2)} m`);
+    canvas.setAttribute(
+      "aria-label",
+      `Outline of the model, ${(x1 - x0).toFixed(2)} by ${(y1 - y0).toFixed(2)} m`,
+    );
   }
 }

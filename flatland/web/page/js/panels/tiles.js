@@ -37,7 +37,11 @@ export function createTiles(session, stage) {
     if (session.world) return;
     root.replaceChildren(
       ...[...session.worlds.values()].map((world) => {
-        const button = element("button", { type: "button", class: "tile" }, element("span", {}, label(world)));
+        const button = element(
+          "button",
+          { type: "button", class: "tile" },
+          element("span", {}, label(world)),
+        );
         button.addEventListener("click", () => {
           session.show(world.index);
           stage.fit();

@@ -1,4 +1,4 @@
-import { shapeEdges, shapePoints } from "../world_state.js";
+import { shapeEdges, shapePoints } from "../shapes.js";
 import { addAttributes, createFloatTexture, createProgram, uploadFloatTexture } from "./gl.js";
 import { readable } from "./palette.js";
 import { bodyEdgesVertex, bodyFillVertex, colorFragment, coloredEdgesFragment } from "./shaders.js";

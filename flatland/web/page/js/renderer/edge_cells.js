@@ -62,7 +62,8 @@ export function visibleRanges(cells, camera) {
   const ranges = [];
   for (const { start, count, bounds } of cells) {
     const [x0, y0, x1, y1] = bounds;
-    const isOutside = x0 > camera.x + reach || x1 < camera.x - reach || y0 > camera.y + reach || y1 < camera.y - reach;
+    const isOutside =
+      x0 > camera.x + reach || x1 < camera.x - reach || y0 > camera.y + reach || y1 < camera.y - reach;
     if (isOutside) continue;
     const last = ranges.at(-1);
     if (last && last.start + last.count === start) last.count += count;

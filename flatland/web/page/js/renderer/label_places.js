@@ -3,8 +3,9 @@ export const LINE_HEIGHT = 15;
 
 /** Finds places for labels that do not cover each other. */
 export class LabelPlaces {
-  /** @type {{left: number, right: number, top: number}[]} */
-  taken = [];
+  /** Labels by horizontal bands of one line.
+   * @type {Map<number, {left: number, right: number, top: number}[]>} */
+  bands = new Map();
 
   /**
    * Takes the first free line below a point.
@@ -19,11 +20,15 @@ export class LabelPlaces {
     const [left, right] = [px - width / 2, px + width / 2];
     for (let line = 0; line < lines; line++) {
       const top = py + line * LINE_HEIGHT;
-      const isTaken = this.taken.some(
+      const band = Math.floor(top / LINE_HEIGHT);
+      const near = [band - 1, band, band + 1].flatMap((each) => this.bands.get(each) ?? []);
+      const isTaken = near.some(
         (other) => left < other.right && right > other.left && Math.abs(top - other.top) < LINE_HEIGHT,
       );
       if (isTaken) continue;
-      this.taken.push({ left, right, top });
+      const own = this.bands.get(band);
+      if (own) own.push({ left, right, top });
+      else this.bands.set(band, [{ left, right, top }]);
       return line * LINE_HEIGHT;
     }
     return null;

@@ -1,4 +1,4 @@
-import { shapeEdges } from "../world_state.js";
+import { shapeEdges } from "../shapes.js";
 import { composePoses, inversePoint, transformPoint } from "../geometry.js";
 import { packColor } from "./edge_batch.js";
 import { readable } from "./palette.js";
@@ -106,7 +106,10 @@ export function resolveFrames(frames) {
     const frame = byChild.get(name);
     // A loop of parents ends at the number of frames.
     /** @type {import("../geometry.js").Pose} */
-    const pose = !frame || depth > frames.length ? [0, 0, 0] : composePoses(resolve(frame.parent, depth + 1), frame.pose);
+    const pose =
+      !frame || depth > frames.length
+        ? [0, 0, 0]
+        : composePoses(resolve(frame.parent, depth + 1), frame.pose);
     resolved.set(name, pose);
     return pose;
   };

@@ -1,4 +1,10 @@
-import { FLOAT_TEXTURE_WIDTH, addAttributes, createFloatTexture, createProgram, uploadFloatTexture } from "./gl.js";
+import {
+  FLOAT_TEXTURE_WIDTH,
+  addAttributes,
+  createFloatTexture,
+  createProgram,
+  uploadFloatTexture,
+} from "./gl.js";
 import { colorFragment, scanAreaVertex, scanPointsFragment, scanPointsVertex } from "./shaders.js";
 import { lineWeight, useProgram } from "./view.js";
 

@@ -200,11 +200,10 @@ void main() {
 export const textFragment = `${HEAD}
 in vec2 v_texel;
 uniform sampler2D u_atlas;   // red: glyph, green: halo
-uniform vec3 u_ink;
-uniform vec3 u_halo;
+uniform vec3 u_color;
+uniform vec2 u_channels;     // weights of glyph and halo
 out vec4 color;
 void main() {
   vec4 texel = texture(u_atlas, v_texel);
-  float alpha = max(texel.r, 0.8 * texel.g);
-  color = vec4(mix(u_halo, u_ink, texel.r), 1.0) * alpha;
+  color = vec4(u_color, 1.0) * max(u_channels.x * texel.r, u_channels.y * texel.g);
 }`;

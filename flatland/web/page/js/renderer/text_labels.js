@@ -11,7 +11,7 @@ const HALO = 2;
 
 /** @typedef {{x: number, y: number, width: number, height: number, advance: number}} Glyph */
 
-/** Text at points of the world. Glyphs are drawn once into an atlas; a frame is one draw call. */
+/** Text at points of the world. Glyphs are drawn once into an atlas; a frame is two draw calls. */
 export class TextLabels {
   /** @param {WebGL2RenderingContext} gl */
   constructor(gl) {
@@ -111,7 +111,18 @@ export class TextLabels {
       if (!glyph) continue;
       const top = Math.round(dy * this.ratio - glyph.height / 2);
       left = Math.round(exact);
-      this.words.push(x, y, left, top, glyph.width, glyph.height, glyph.x, glyph.y, glyph.width, glyph.height);
+      this.words.push(
+        x,
+        y,
+        left,
+        top,
+        glyph.width,
+        glyph.height,
+        glyph.x,
+        glyph.y,
+        glyph.width,
+        glyph.height,
+      );
       exact += glyph.advance;
     }
   }
@@ -137,9 +148,13 @@ export class TextLabels {
     gl.bufferData(gl.ARRAY_BUFFER, new Float32Array(this.words), gl.STREAM_DRAW);
     useProgram(gl, program, viewport);
     gl.uniform2f(program.uniform("u_atlasSize"), ATLAS_SIZE, ATLAS_SIZE);
-    gl.uniform3fv(program.uniform("u_ink"), palette.ink);
-    gl.uniform3fv(program.uniform("u_halo"), palette.background);
     gl.bindVertexArray(this.array);
+    // All halos first, so that none covers a neighbouring glyph.
+    gl.uniform3fv(program.uniform("u_color"), palette.background);
+    gl.uniform2f(program.uniform("u_channels"), 0.8, 0.8);
+    gl.drawArraysInstanced(gl.TRIANGLE_STRIP, 0, 4, this.words.length / GLYPH_WORDS);
+    gl.uniform3fv(program.uniform("u_color"), palette.ink);
+    gl.uniform2f(program.uniform("u_channels"), 1, 0);
     gl.drawArraysInstanced(gl.TRIANGLE_STRIP, 0, 4, this.words.length / GLYPH_WORDS);
   }
 }

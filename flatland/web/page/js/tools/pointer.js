@@ -171,7 +171,11 @@ export class PointerInput {
     // While the view follows a model, it stays in the centre.
     const isFollowing = this.stage.followed !== null;
     this.stage.moveView((view) => {
-      view.zoomAt(Math.exp(-delta * speed), isFollowing ? camera.width / 2 : px, isFollowing ? camera.height / 2 : py);
+      view.zoomAt(
+        Math.exp(-delta * speed),
+        isFollowing ? camera.width / 2 : px,
+        isFollowing ? camera.height / 2 : py,
+      );
     });
   }
 

@@ -1,0 +1,139 @@
+"""`flatland view`."""
+
+from __future__ import annotations
+
+import re
+import signal
+import socket
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import pytest
+from flatland_command import main, run
+from raw_web_client import RawWebClient
+from waiting import TIMEOUT, wait_until
+
+QUIET = ("--port", "0", "--no-browser")
+
+
+@contextmanager
+def shown(*arguments: str) -> Iterator[tuple[subprocess.Popen[str], str]]:
+    """Starts the command; yields its process and the address that it prints."""
+    command = [sys.executable, "-W", "error", "-m", "flatland", "view", *arguments, *QUIET]
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    try:
+        assert process.stdout is not None
+        line = process.stdout.readline()
+        found = re.fullmatch(r"\S+ is shown at (http://\S+)\n", line)
+        assert found, line
+        yield process, found[1]
+    finally:
+        process.kill()
+        process.communicate(timeout=TIMEOUT)
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_the_world_is_shown_until_a_signal(world_file, number):
+    with shown(world_file, "--seed", "1") as (process, url):
+        with RawWebClient(url) as client:
+            assert client.wait_model("robot")
+            assert client.wait("status", lambda message: message["time"] > 0.2)["rate"] == 200
+            assert client.wait("status")["paused"] is False
+            process.send_signal(number)
+            assert client.wait_closed()[0] == 1001
+        output, errors = process.communicate(timeout=TIMEOUT)
+        assert (process.returncode, output, errors) == (128 + number, "", "")
+
+
+def test_the_options(world_file):
+    options = (
+        "--paused",
+        "--rate",
+        "50",
+        "--read-only",
+        "--token",
+        "sesame",
+        "--step-size",
+        "0.01",
+    )
+    with shown(world_file, *options) as (_process, url):
+        assert url.endswith("/?token=sesame")
+        with RawWebClient(url, look=False) as client:
+            assert client.wait("hello")["read_only"]
+            client.ask("look", worlds=[0])
+            status = client.wait("status")
+            assert (status["paused"], status["rate"], status["time"]) == (True, 50, 0)
+            world = [m for m in client.received if isinstance(m, dict) and m["type"] == "world"]
+            assert world[0]["step_size"] == 0.01
+
+
+def test_it_ends_after_the_duration(world_file, capsys):
+    assert main("view", world_file, *QUIET, "--rate", "0", "--duration", "0.5") == 0
+    assert re.fullmatch(r"\S+ is shown at http://127.0.0.1:\d+/\n", capsys.readouterr().out)
+
+
+def test_other_machines_need_a_token(world_file, capsys):
+    assert main("view", world_file, *QUIET, "--host", "0.0.0.0", "--duration", "0.1") == 0
+    assert re.search(r" at http://\S+:\d+/\?token=\S{20,}\n", capsys.readouterr().out)
+
+
+def test_a_browser_is_opened_if_there_is_a_display(world_file, monkeypatch, capsys):
+    opened: list[str] = []
+    monkeypatch.setattr("webbrowser.open", opened.append)
+    for variable in ("DISPLAY", "WAYLAND_DISPLAY"):
+        monkeypatch.delenv(variable, raising=False)
+    assert main("view", world_file, "--port", "0", "--duration", "0.1") == 0
+    assert opened == []
+    monkeypatch.setenv("DISPLAY", ":99")
+    assert main("view", world_file, *QUIET, "--duration", "0.1") == 0
+    assert opened == []
+    assert main("view", world_file, "--port", "0", "--duration", "0.1") == 0
+    wait_until("a browser is opened", lambda: opened)
+    assert opened == [capsys.readouterr().out.split()[-1]]
+
+
+def test_a_port_in_use_is_an_error_before_the_world_is_loaded(world_file, capsys):
+    with socket.create_server(("127.0.0.1", 0)) as other:
+        port = other.getsockname()[1]
+        assert main("view", "nothing.yaml", "--port", str(port), "--no-browser") == 1
+    error = capsys.readouterr().err
+    assert error == (
+        f"flatland: the viewer cannot listen on port {port} of '127.0.0.1': Address already in use "
+        "(hint: choose another port; 0 for any free one)\n"
+    )
+
+
+def test_an_invalid_world_is_an_error(capsys):
+    assert main("view", "nothing.yaml", *QUIET) == 1
+    assert "nothing.yaml" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("option", "error"),
+    [
+        (("--port", "70000"), "must be an integer from 0 to 65535, got '70000'"),
+        (("--port", "x"), "must be an integer from 0 to 65535, got 'x'"),
+        (("--token", ""), "must not be empty or contain control characters"),
+        (("--rate", "-1"), "must be a number above 0, got '-1'"),
+        (("--step-size", "0"), "must be a number above 0, got '0'"),
+    ],
+)
+def test_invalid_options_are_errors(world_file, capsys, option, error):
+    with pytest.raises(SystemExit) as exit_code:
+        main("view", world_file, *option)
+    assert exit_code.value.code == 2
+    assert error in capsys.readouterr().err
+
+
+def test_without_aiohttp_the_error_names_the_package(world_file, tmp_path, monkeypatch: Any):
+    (tmp_path / "aiohttp.py").write_text("raise ImportError('No module named aiohttp')")
+    monkeypatch.setenv("PYTHONPATH", f"{tmp_path}:{':'.join(sys.path)}")
+    result = run("view", world_file, *QUIET)
+    assert result.returncode == 1
+    assert result.stderr == (
+        "flatland: the viewer needs aiohttp (No module named aiohttp): "
+        "apt-get install python3-aiohttp\n"
+    )

@@ -1,0 +1,191 @@
+"""Parts of the viewer without a connection."""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from flatland.plugin_api.ports import Output
+from flatland.values import LaserScan, NavSatFix, Odometry
+from flatland.web import encoding, messages
+from flatland.web.access import Access, is_loopback
+from flatland.web.numbers import as_json, find_number, number_at, series_of
+
+
+class TestRanges:
+    def test_ranges_are_fractions_of_the_maximum(self):
+        ranges = np.array([[0, 5, 10, np.nan, np.inf, -np.inf, 9.9999]], np.float32)
+        fractions = encoding.quantized(ranges, np.array([10], np.float32))
+        assert fractions.tolist() == [[0, 32767, 65535, 65535, 65535, 0, 65533]]
+
+    @given(
+        st.lists(st.floats(0, 1, exclude_max=True, width=32), min_size=1, max_size=9),
+        st.floats(0.1, 1e6),
+    )
+    def test_the_error_is_below_one_step(self, fractions, length):
+        length = np.float32(length)
+        ranges = np.array([fractions], np.float32) * length
+        found = encoding.quantized(ranges, np.array([length])).astype(np.float64)
+        hit = ranges < length
+        np.testing.assert_allclose(
+            (found / 65534 * length)[hit], ranges[hit], atol=float(length) / 1e5
+        )
+
+    def test_lasers_may_have_different_ranges(self):
+        ranges = np.array([[1, 3], [1, 3]], np.float32)
+        fractions = encoding.quantized(ranges, np.array([2, 4], np.float32))
+        assert fractions.tolist() == [[32767, 65535], [16384, 49151]]
+
+
+class TestMessages:
+    @given(st.text(max_size=50) | st.recursive(st.none() | st.integers() | st.text(), st.lists))
+    def test_anything_is_either_a_message_or_malformed(self, value: Any):
+        text = value if isinstance(value, str) else json.dumps(value)
+        with pytest.raises(messages.MessageError):
+            messages.parse(text)
+
+    @given(
+        st.sampled_from(sorted(messages._FIELDS)),
+        st.dictionaries(
+            st.sampled_from(["model", "pose", "rate", "n", "worlds", "file", "name", "linear"]),
+            st.none()
+            | st.booleans()
+            | st.integers()
+            | st.floats()
+            | st.text(max_size=5)
+            | st.lists(st.integers() | st.floats() | st.text(max_size=3), max_size=4),
+        ),
+    )
+    def test_fields_are_checked(self, kind, fields):
+        try:
+            message = messages.parse(json.dumps({"type": kind, **fields}))
+        except messages.MessageError:
+            return
+        for name, value in message.fields.items():
+            numbers = value if isinstance(value, tuple) else (value,)
+            assert all(math.isfinite(n) for n in numbers if isinstance(n, float)), name
+
+    def test_angles_of_poses_are_wrapped(self):
+        message = messages.parse('{"type": "move", "model": 3, "pose": [1, 2, 7]}')
+        assert message.fields["pose"] == (1, 2, pytest.approx(7 - 2 * math.pi))
+
+    def test_all_types_are_described(self, checkout):
+        page = (checkout / "docs" / "web_protocol.md").read_text()
+        for kind, (required, optional) in messages._FIELDS.items():
+            (row,) = [
+                line
+                for line in page.splitlines()
+                if line.startswith("|") and f"`{kind}`" in line.split("|")[1]
+            ]
+            assert all(f"`{name}`" in row for name in (*required, *optional)), kind
+
+
+@dataclass(frozen=True)
+class Reading:
+    """A value with nested numbers."""
+
+    stamp: int
+    level: float
+    on: bool
+    parts: dict[str, float]
+    pair: tuple[float, float]
+    many: Any = None
+
+
+class TestNumbers:
+    READING = Reading(5, 0.5, True, {"a": 1.0}, (2.0, math.nan), np.arange(20))
+
+    def test_numbers_at_paths(self):
+        for path, expected in (
+            ("level", 0.5),
+            ("on", 1.0),
+            ("parts/a", 1.0),
+            ("pair/0", 2.0),
+            ("pair/1", None),  # NaN
+            ("many/19", 19.0),
+            ("many/20", None),
+            ("many/-1", None),
+            ("many", None),
+            ("nothing", None),
+            ("__class__/__name__", None),
+        ):
+            assert number_at(self.READING, path.split("/")) == expected, path
+
+    def test_series_of_a_value_and_of_a_type(self):
+        output = Output("/a/b", Reading)
+        assert series_of(output) == ["/a/b/level", "/a/b/on", "/a/b/pair/0", "/a/b/pair/1"]
+        output.emit(self.READING)
+        assert series_of(output) == [
+            "/a/b/level",
+            "/a/b/on",
+            "/a/b/parts/a",
+            "/a/b/pair/0",
+            "/a/b/pair/1",
+        ]
+        assert series_of(Output("fix", NavSatFix)) == [
+            "/fix/latitude",
+            "/fix/longitude",
+            "/fix/altitude",
+        ]
+        assert "/odom/pose/2" in series_of(Output("odom", Odometry))
+        assert series_of(Output("on", bool)) == ["/on"]
+
+    def test_the_longest_topic_is_the_output(self):
+        outputs = {"/a": Output("/a", float), "/a/b": Output("/a/b", Reading)}
+        assert find_number(outputs, "/a/b/pair/0") == (outputs["/a/b"], ["pair", "0"])
+        assert find_number(outputs, "/a/c") == (outputs["/a"], ["c"])
+        assert find_number(outputs, "/c") is None
+
+    def test_values_are_json(self):
+        shown = as_json(self.READING)
+        json.dumps(shown, allow_nan=False)
+        assert shown["pair"] == [2.0, "nan"]
+        assert shown["many"][-1] == "… 20 items"
+        scan = LaserScan(1, "f", 0, 1, 1, 0, 0, 0, 9, np.ones(500, np.float32), np.zeros(0))
+        assert len(as_json(scan)["ranges"]) == 17
+        nested: Any = []
+        nested.append(nested)
+        json.dumps(as_json(nested))
+        assert as_json(object()).startswith("<object")
+
+
+class TestAccess:
+    @pytest.mark.parametrize("host", ["localhost", "LOCALHOST", "127.0.0.1", "127.8.9.1", "::1"])
+    def test_loopback(self, host):
+        assert is_loopback(host)
+
+    @pytest.mark.parametrize("host", ["0.0.0.0", "10.0.0.1", "", "localhost.example.org", "::"])
+    def test_other_hosts(self, host):
+        assert not is_loopback(host)
+
+    @pytest.mark.parametrize(
+        ("origin", "host", "allowed"),
+        [
+            (None, "localhost:8000", True),
+            ("http://localhost:8000", "localhost:8000", True),
+            ("https://viewer.example.org", "viewer.example.org", True),
+            ("http://localhost:8001", "localhost:8000", False),
+            ("http://localhost:8000.example.org", "localhost:8000", False),
+            ("null", "localhost:8000", False),
+            ("", "localhost:8000", False),
+        ],
+    )
+    def test_origins(self, origin, host, allowed):
+        assert Access("127.0.0.1", None).allows_origin(origin, host) is allowed
+
+    @pytest.mark.parametrize("host", ["example.org", "", "[", "127.0.0.1.example.org", "10.0.0.1"])
+    def test_foreign_names_of_the_server(self, host):
+        assert not Access("127.0.0.1", None).allows_host(host)
+        assert Access("127.0.0.1", "token").allows_host(host)
+
+    def test_addresses(self):
+        assert Access("::1", None).url(80) == "http://[::1]:80/"
+        assert Access("localhost", "a b").url(80) == "http://localhost:80/?token=a%20b"
+        assert "0.0.0.0" not in Access.for_host("0.0.0.0", None).url(80)
