@@ -15,15 +15,22 @@ from flatland.geometry import Pose
 from flatland.physics.body import PhysicsBody
 from flatland.physics.contact import ContactEvent, ContactInfo
 from flatland.physics.controller import (
+    AckermannController,
     Controller,
+    DriveController,
+    OmniController,
+    PathController,
+    RollingWheel,
     TricycleController,
     TweenController,
     VelocityController,
+    WheelsController,
     ease,
     easings,
 )
 from flatland.physics.fixture import PhysicsFixture
 from flatland.physics.joint import PhysicsJoint
+from flatland.physics.material import Material
 from flatland.physics.plan import (
     END_OF_ORDER,
     RunEnd,
@@ -36,6 +43,7 @@ from flatland.physics.plan import (
 from flatland.physics.queries import RayHit
 from flatland.physics.range_finder import (
     BeamFan,
+    LabelledScan,
     RangeFinder,
     RangeNoise,
     Scan,
@@ -48,11 +56,17 @@ from flatland.physics.world import PhysicsWorld, StepReport, to_report
 __all__ = [
     "BOX2D_VERSION",
     "END_OF_ORDER",
+    "AckermannController",
     "BeamFan",
     "ContactEvent",
     "ContactInfo",
     "Controller",
+    "LabelledScan",
+    "Material",
+    "DriveController",
     "OldManifold",
+    "OmniController",
+    "PathController",
     "PhysicsBody",
     "PhysicsFixture",
     "PhysicsJoint",
@@ -62,6 +76,7 @@ __all__ = [
     "RangeFinder",
     "RangeNoise",
     "RayHit",
+    "RollingWheel",
     "RunEnd",
     "RunResult",
     "Scan",
@@ -74,6 +89,7 @@ __all__ = [
     "TricycleController",
     "TweenController",
     "VelocityController",
+    "WheelsController",
     "WorkTimes",
     "ease",
     "easings",

@@ -12,6 +12,7 @@ from flatland.config.reader import ReadYaml, YamlReader
 from flatland.errors import WorldError
 from flatland.geometry import DoubleArray
 from flatland.loading.model_source import ModelSpec
+from flatland.runtime.appearance import Appearance
 from flatland.runtime.layer_maps import LayerMaps
 from flatland.runtime.many_models import ManyModels, plain_pose
 from flatland.runtime.placement import IfBlocked, Models, check_if_blocked
@@ -47,7 +48,7 @@ if TYPE_CHECKING:
 R = TypeVar("R")
 
 
-class Contents(ManyModels, LayerMaps, SavedStates):
+class Contents(ManyModels, LayerMaps, Appearance, SavedStates):
     """Everything that is in a world; the base class of `World`, which creates and steps it.
 
     Changes that a plugin's hook requests take effect after the step.

@@ -18,11 +18,16 @@ from flatland import values
 
 _BUILT_IN: dict[type[Any], str] = {
     bool: "boolean",
+    values.AckermannCommand: "ackermann",
     values.Collisions: "collisions",
     values.Imu: "imu",
+    values.JointState: "joint_state",
     values.LaserScan: "laser_scan",
     values.NavSatFix: "nav_sat_fix",
     values.Odometry: "odometry",
+    values.PoseStamped: "pose_stamped",
+    values.Range: "range",
+    values.SemanticScan: "semantic_scan",
     values.Transform: "transform",
     values.Twist: "twist",
     values.TwistWithCovariance: "twist_with_covariance",

@@ -19,6 +19,7 @@ WorldClass bind_world(pybind11::module_& module);
 void bind_bodies(WorldClass& world);
 void bind_fixtures(WorldClass& world);
 void bind_joints(WorldClass& world);
+void bind_motions(WorldClass& world);
 void bind_contacts(pybind11::module_& module, WorldClass& world);
 void bind_raycast(WorldClass& world);
 void bind_range_finder(pybind11::module_& module);
