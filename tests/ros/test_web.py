@@ -170,7 +170,8 @@ def test_the_inspector_shows_the_latest_values_of_topics(client: WebClient, ros:
 
     client.until("a value", lambda: values().get("/odometry/ground_truth", {}).get("value"))
     topics = values()
-    assert str(round(truth.pose.pose.position.x, 3)) in str(topics["/odometry/ground_truth"])
+    x = topics["/odometry/ground_truth"]["value"]["pose"][0]
+    assert x == pytest.approx(truth.pose.pose.position.x, abs=1e-6)
     assert topics["/cmd_vel"]["kind"] == "command"
     assert "/scan" in topics
 
