@@ -39,9 +39,9 @@ WATCH_LOADING = """
 (() => {
   const look = () => {
     const world = window.flatland?.state?.worlds?.[0];
-    const complete = world && Object.keys(world.models ?? {}).length === ROBOTS && world.edges === EDGES;
-    if (complete && flatland.frames > 0) window.loadTime = performance.now();
-    else requestAnimationFrame(look);
+    if (world && Object.keys(world.models).length === ROBOTS && world.layers[0].edges === EDGES) {
+      requestAnimationFrame(() => { window.loadTime = performance.now(); });
+    } else requestAnimationFrame(look);
   };
   look();
 })();

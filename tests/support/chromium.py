@@ -10,7 +10,7 @@ import base64
 import contextlib
 import json
 import shutil
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import Any, Final
 
@@ -147,6 +147,17 @@ class Chromium:
         """Opens a tab, in front of the current one, and returns its handle."""
         self.driver.switch_to.new_window("tab")
         return self.driver.current_window_handle
+
+    @contextlib.contextmanager
+    def tab_in_front(self) -> Iterator[None]:
+        """Hides the current tab behind a new one for the duration of the block."""
+        hidden = self.driver.current_window_handle
+        self.new_tab()
+        try:
+            yield
+        finally:
+            self.driver.close()
+            self.driver.switch_to.window(hidden)
 
     def evaluate(self, expression: str, *arguments: Any) -> Any:
         """Returns the value of an expression of JavaScript; the arguments are `arguments[0]`, …."""
@@ -312,8 +323,13 @@ class Chromium:
 
     def console(self) -> list[str]:
         """Returns the warnings and errors of the console since the last call."""
-        entries = self.driver.get_log("browser")
-        return [e["message"] for e in entries if e["level"] in ("WARNING", "SEVERE")]
+        return [
+            entry["message"]
+            for entry in self.driver.get_log("browser")
+            if entry["level"] in ("WARNING", "SEVERE")
+            # The connection of a page that was left for another one.
+            and not entry["message"].endswith("Page entered Back-Forward Cache.")
+        ]
 
     def requested_urls(self) -> list[str]:
         """Returns the addresses of all requests of the page since the last call."""
@@ -339,8 +355,10 @@ class Chromium:
         self.command("Page.setWebLifecycleState", state="frozen")
 
     def thaw(self) -> None:
-        """Continues a frozen page."""
+        """Continues a frozen page, which becomes visible."""
         self.command("Page.setWebLifecycleState", state="active")
+        with self.tab_in_front():  # otherwise the page remains hidden
+            pass
 
 
 def line(start: Point, end: Point, steps: int) -> list[Point]:
@@ -394,7 +412,7 @@ def centroid(image: Image, color: Sequence[int], *, least: int = 30) -> Point:
 
 
 @contextlib.contextmanager
-def keys_held(browser: Chromium, *keys: str) -> Any:
+def keys_held(browser: Chromium, *keys: str) -> Iterator[None]:
     """Holds keys for the duration of the block."""
     for key in keys:
         browser.key_down(key)

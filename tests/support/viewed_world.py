@@ -103,6 +103,11 @@ class ViewedWorld:
         """Returns the names of all models."""
         return self.ask(lambda: [model.name for model in self.world.models])
 
+    def scans_wanted(self) -> bool:
+        """Returns whether anything receives the scans of the robot."""
+        # Unlike `World.output`, the registry does not make the output wanted.
+        return self.ask(lambda: self.world.ports.find_output("/scan").wanted)
+
     def reset(self) -> None:
         """Returns to the state after loading, not paused."""
 

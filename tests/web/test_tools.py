@@ -94,7 +94,8 @@ def test_plots_show_published_numbers(room: ViewedWorld, page: ViewerPage) -> No
     browser.click("#plots-toggle")
     options = "[...document.querySelector('#plot-series').options].map((option) => option.value)"
     names = browser.until(f"{options}.length > 1 && {options}")
-    name = next(each for each in names if "twist" in each and "angular" in each)
+    name = "/odometry/ground_truth/twist/2"
+    assert name in names
     browser.evaluate("document.querySelector('#plot-series').focus()")
     browser.type(name)
     browser.until("Boolean(document.querySelector('figure.plot output'))")

@@ -96,15 +96,12 @@ def test_a_display_changes_the_picture(room: ViewedWorld, page: ViewerPage, disp
 
 
 def test_lasers_scan_only_for_those_who_look(room: ViewedWorld, page: ViewerPage) -> None:
-    def wanted() -> bool:
-        return room.ask(lambda: room.world.output("/scan").wanted)
-
     page.browser.until("flatland.state.worlds[0].scans === 1")
-    assert wanted()
+    assert room.scans_wanted()
     page.show("scans", False)
-    wait_until("the laser rests", lambda: not wanted())
+    wait_until("the laser rests", lambda: not room.scans_wanted())
     page.show("scans", True)
-    wait_until("the laser scans", wanted)
+    wait_until("the laser scans", room.scans_wanted)
 
 
 def test_wheel_and_drag_zoom_and_pan(page: ViewerPage) -> None:
