@@ -22,6 +22,7 @@ GROWTH = "growth"  # the module that measures curves
 MODULES = (
     "scans",
     "lasers",
+    "materials",
     "steps",
     "jam",
     "plugin_steps",
@@ -30,8 +31,10 @@ MODULES = (
     "lockstep",
     "real_time",
     "large_map",
+    "random_worlds",
     "markers",
     "placement",
+    "people",
     "copies",
     "gym_steps",
     "web_page",

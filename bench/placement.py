@@ -1,4 +1,4 @@
-"""Placement: random free poses, and the nearest free pose of a blocked model."""
+"""Requests: random free poses, the nearest free pose of a blocked model, its appearance."""
 
 from __future__ import annotations
 
@@ -20,6 +20,8 @@ def rows(unit: float) -> list[Row]:
         origin = world.layers[0].body.pose
         wall = (origin[0] + float(edge[0]), origin[1] + float(edge[1]), 0.0)
         moved = best_of(lambda: world.move_model(model.name, wall, if_blocked="nearest"))
+        look = {"color": (0.0, 0.5, 0.0), "layers": [world.layers[0].name], "visible": True}
+        painted = best_of(lambda: world.set_appearance(model.name, **look))
     return [
         Row(
             f"{POSES} random free poses in one connected area, benchmark world",
@@ -34,5 +36,12 @@ def rows(unit: float) -> list[Row]:
             "U",
             10.0,
             note=f"{moved * 1e3:.2f} ms",
+        ),
+        Row(
+            "set_appearance of a model: colour, layers and visibility",
+            painted / unit,
+            "U",
+            0.1,
+            note=f"{painted * 1e6:.0f} us",
         ),
     ]

@@ -35,6 +35,12 @@ PARAMETERS: dict[str, dict[str, Any]] = {
         "range": RANGE,
         "angle": {"min": -2.356194490192345, "max": 2.3562, "increment": 4.71238898038469 / 1080},
     },
+    "Sonar": {"body": "base", "range": 5.0, "field_of_view": 0.5},
+    "SemanticScan": {
+        "body": "base",
+        "range": RANGE,
+        "angle": {"min": -2.356194490192345, "max": 2.3562, "increment": 4.71238898038469 / 1080},
+    },
     "DiffDrive": {"body": "base"},
     "TricycleDrive": {
         "body": "base",
@@ -42,7 +48,30 @@ PARAMETERS: dict[str, dict[str, Any]] = {
         "rear_left_wheel_joint": "left",
         "rear_right_wheel_joint": "right",
     },
+    "AckermannDrive": {"body": "base", "wheelbase": 0.5, "max_steer_angle": 0.6},
+    "OmniDrive": {
+        "body": "base",
+        "layout": "mecanum",
+        "wheelbase": 0.3,
+        "track": 0.3,
+        "max_wheel_speed": 1.0,
+        "max_wheel_acceleration": 2.0,
+    },
+    "PathFollower": {
+        "body": "base",
+        "waypoints": [[0.5, 0.0], [0.5, 0.5]],
+        "speed": 0.1,
+        "acceleration": 0.1,
+    },
+    "WheelStates": {
+        "wheels": [
+            {"name": "left", "position": [0.0, 0.15], "radius": 0.1},
+            {"name": "right", "position": [0.0, -0.15], "radius": 0.1},
+        ]
+    },
+    "Hitch": {"update_rate": float("inf")},
     "ModelTfPublisher": {"publish_tf_world": True},
+    "PosePublisher": {"message": "odometry"},
     "Bumper": {},
     "BoolSensor": {},
     "Gps": {"body": "base", "update_rate": float("inf")},
@@ -58,6 +87,8 @@ PARAMETERS: dict[str, dict[str, Any]] = {
 }
 NOTES = {
     "Laser": f"{BEAMS} beams",
+    "Sonar": "127 rays",
+    "SemanticScan": f"{BEAMS} beams",
     "TricycleDrive": "4 bodies, 3 joints",
     "ModelTfPublisher": "4 bodies, 3 joints",
     "Bumper": "in contact with a post",
@@ -120,7 +151,8 @@ def world_with(plugin: str | None, observers: Sequence[WorldObserver] = ()) -> I
         with flatland.World.from_yaml(path, seed=1, observers=observers) as loaded:
             loaded.model("robot").body("base").set_velocity(0.0, 0.0, TURN)
             for topic in loaded.ports.commands:
-                loaded.command(topic).set(flatland.Twist(0.1, 0.0, TURN))
+                if loaded.command(topic).value_type is flatland.Twist:
+                    loaded.command(topic).set(flatland.Twist(0.1, 0.0, TURN))
             loaded.step(100)
             yield loaded
 
@@ -136,6 +168,23 @@ def _stepper(world: flatland.World, outputs_wanted: bool) -> Callable[[], None]:
                 _ = output.latest
 
     return run
+
+
+def _run_of(drive: str, entry: dict[str, Any]) -> Row:
+    """Compares a run of steps of a drive in mode `force` with one in mode `velocity`."""
+    given = PARAMETERS[drive]
+    with world_with(drive) as plain:
+        PARAMETERS[drive] = {**given, "mode": "force", **entry}
+        try:
+            with world_with(drive) as forced:
+                plain_time, forced_time = best_pair(
+                    lambda: plain.step(STEPS), lambda: forced.step(STEPS), SECONDS
+                )
+        finally:
+            PARAMETERS[drive] = given
+    note = f"{forced_time / STEPS * 1e6:.2f} µs"
+    name = f"step in the core with {drive}, mode force / velocity"
+    return Row(name, forced_time / plain_time, "", 1.5, note=note)
 
 
 def rows(unit: float) -> list[Row]:
@@ -165,4 +214,5 @@ def rows(unit: float) -> list[Row]:
                 which = "outputs wanted" if wanted else "outputs not wanted"
                 with world_with(name, [TransformListener()] if wanted else []) as world:
                     row(f"step with {name}, {which}", _stepper(world, wanted), NOTES.get(name, ""))
+    found.append(_run_of("DiffDrive", {"max_force": 50.0, "max_torque": 5.0}))
     return found

@@ -100,7 +100,8 @@ nitpick_ignore_regex = [
     (r"py:class", r"(builtins|collections\.abc|concurrent\.futures|contextlib|os|threading)\..*"),
     (r"py:class", "Future"),
     (r"py:(class|exc)", r"(gymnasium|pathlib|pettingzoo)\..*"),
-    (r"py:exc", r"(ClosedEnvironmentError|InvalidAction|ResetNeeded)"),  # of Gymnasium
+    # Of Gymnasium.
+    (r"py:exc", r"(ClosedEnvironmentError|DependencyNotInstalled|InvalidAction|ResetNeeded)"),
     # Names that flatland.gym imports only for type checkers, or that are not described.
     (r"py:class", r"(FleetEnv|Laser|Touches)"),
     (r"py:class", r"flatland\._core\..*"),

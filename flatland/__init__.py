@@ -35,6 +35,7 @@ if TYPE_CHECKING:
     )
     from flatland.loading.model_source import ModelSpec
     from flatland.maps.occupancy_grid import OccupancyGrid
+    from flatland.physics.material import Material
     from flatland.plugin_api.dynamics_limits import DynamicsLimits
     from flatland.plugin_api.plugin import ModelPlugin, WorldPlugin
     from flatland.plugin_api.ports import Command, Output
@@ -45,12 +46,18 @@ if TYPE_CHECKING:
     from flatland.runtime.snapshot import WorldSnapshot
     from flatland.timekeeper import Timekeeper
     from flatland.values import (
+        AckermannCommand,
         Collision,
         Collisions,
         Imu,
+        JointState,
         LaserScan,
         NavSatFix,
         Odometry,
+        PoseStamped,
+        Range,
+        SemanticLabel,
+        SemanticScan,
         Transform,
         Twist,
         TwistWithCovariance,
@@ -62,6 +69,7 @@ if TYPE_CHECKING:
 __version__ = VERSION
 
 __all__ = [
+    "AckermannCommand",
     "BatchError",
     "Body",
     "Collision",
@@ -73,9 +81,11 @@ __all__ = [
     "FlatlandError",
     "Imu",
     "Joint",
+    "JointState",
     "LaserScan",
     "Layer",
     "MapFileError",
+    "Material",
     "Model",
     "ModelContact",
     "ModelPlugin",
@@ -89,6 +99,10 @@ __all__ = [
     "PhysicsError",
     "Place",
     "PluginError",
+    "PoseStamped",
+    "Range",
+    "SemanticLabel",
+    "SemanticScan",
     "StaleHandleError",
     "Timekeeper",
     "Transform",
@@ -110,6 +124,7 @@ __all__ = [
 
 # Imported when they are first used: the ROS node publishes its time before it needs any of them.
 _MODULES = {
+    "AckermannCommand": "flatland.values",
     "BatchError": "flatland.errors",
     "Body": "flatland.entities.body",
     "Collision": "flatland.values",
@@ -120,10 +135,12 @@ _MODULES = {
     "DynamicsLimits": "flatland.plugin_api.dynamics_limits",
     "FlatlandError": "flatland.errors",
     "Imu": "flatland.values",
+    "JointState": "flatland.values",
     "Joint": "flatland.entities.joint",
     "LaserScan": "flatland.values",
     "Layer": "flatland.entities.layer",
     "MapFileError": "flatland.errors",
+    "Material": "flatland.physics.material",
     "Model": "flatland.entities.model",
     "ModelContact": "flatland.entities.contact",
     "ModelPlugin": "flatland.plugin_api.plugin",
@@ -137,6 +154,10 @@ _MODULES = {
     "PhysicsError": "flatland.errors",
     "Place": "flatland.errors",
     "PluginError": "flatland.errors",
+    "PoseStamped": "flatland.values",
+    "Range": "flatland.values",
+    "SemanticLabel": "flatland.values",
+    "SemanticScan": "flatland.values",
     "StaleHandleError": "flatland.errors",
     "Timekeeper": "flatland.timekeeper",
     "Transform": "flatland.values",

@@ -9,8 +9,9 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
+import numpy.typing as npt
 
-from flatland.geometry import DoubleArray, FloatArray, Pose, Vector2
+from flatland.geometry import BoolArray, DoubleArray, FloatArray, Pose, Vector2
 from flatland.timekeeper import NANOSECONDS
 
 
@@ -31,6 +32,40 @@ class Twist:
     linear_x: float = 0.0
     linear_y: float = 0.0
     angular_z: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class AckermannCommand:
+    """A command to a car, as in `ackermann_msgs/AckermannDriveStamped`.
+
+    Attributes:
+        steering_angle: Angle of a wheel in the middle of the front axle, to the left [rad].
+        steering_angle_velocity: Limit of the rate of change of the angle [rad/s], 0 for none.
+        speed: Speed of the centre of the rear axle [m/s].
+        acceleration: Limit of the rate of change of the speed [m/s²], 0 for none.
+    """
+
+    steering_angle: float = 0.0
+    steering_angle_velocity: float = 0.0
+    speed: float = 0.0
+    acceleration: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class JointState:
+    """Angles and speeds of wheels, as in `sensor_msgs/JointState`.
+
+    Attributes:
+        stamp: Simulated time [ns].
+        names: Names of the wheels.
+        positions: Angles [rad].
+        velocities: Speeds [rad/s].
+    """
+
+    stamp: int
+    names: tuple[str, ...]
+    positions: tuple[float, ...]
+    velocities: tuple[float, ...]
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -73,6 +108,85 @@ class LaserScan:
         )
 
 
+@dataclass(frozen=True, slots=True)
+class Range:
+    """A reading of a range sensor with a cone, as in `sensor_msgs/Range`.
+
+    Attributes:
+        stamp: Simulated time [ns].
+        frame_id: Frame of the sensor; the cone is symmetric about its x axis.
+        radiation_type: `ultrasound` or `infrared`.
+        field_of_view: Angle of the cone [rad].
+        min_range: Minimum range [m].
+        max_range: Maximum range [m].
+        range: Distance of the nearest object [m]; by default, -inf below the minimum range and inf
+            without an object (REP 117).
+    """
+
+    stamp: int
+    frame_id: str
+    radiation_type: str
+    field_of_view: float
+    min_range: float
+    max_range: float
+    range: float
+
+
+@dataclass(frozen=True, slots=True)
+class SemanticLabel:
+    """What beams of a `SemanticScan` hit.
+
+    Attributes:
+        name: Name of the model, or first name of the layer.
+        body: Name of the body.
+        layers: Names of the layers of the footprint, or of the layer; `all` for all layers.
+        class_name: Class of objects.
+    """
+
+    name: str
+    body: str
+    layers: tuple[str, ...]
+    class_name: str
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class SemanticScan:
+    """One scan of a planar laser with what each beam hit.
+
+    Attributes:
+        stamp: Simulated time of all beams [ns].
+        frame_id: Frame of the sensor.
+        angle_min: Angle of the first beam [rad].
+        angle_max: Angle of the last beam as configured [rad].
+        angle_increment: Angle between beams [rad], negative for a clockwise scan.
+        range_min: Minimum range [m].
+        range_max: Maximum range [m].
+        ranges: Range of each beam [m], shape (n,), float32.
+        labels: For each beam, the index of its label in the table, shape (n,), uint32; 0 if the
+            reading is not that of a hit.
+        table: The labels of this scan. The first one is that of no hit, with empty names.
+    """
+
+    stamp: int
+    frame_id: str
+    angle_min: float
+    angle_max: float
+    angle_increment: float
+    range_min: float
+    range_max: float
+    ranges: FloatArray
+    labels: npt.NDArray[np.uint32]
+    table: tuple[SemanticLabel, ...]
+
+    def __repr__(self) -> str:
+        """Returns the number of beams, the classes, the stamp and the frame."""
+        classes = sorted({label.class_name for label in self.table[1:]})
+        return (
+            f"SemanticScan({len(self.ranges)} beams, classes: {', '.join(classes) or 'none'}, "
+            f"stamp {self.stamp / NANOSECONDS:.3f} s, frame {self.frame_id!r})"
+        )
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Odometry:
     """Pose and velocity of a body, as in `nav_msgs/Odometry`.
@@ -94,6 +208,21 @@ class Odometry:
     twist: Pose
     pose_covariance: DoubleArray = field(default_factory=lambda: ZERO_COVARIANCE)
     twist_covariance: DoubleArray = field(default_factory=lambda: ZERO_COVARIANCE)
+
+
+@dataclass(frozen=True, slots=True)
+class PoseStamped:
+    """Pose of a frame at one time, as in `geometry_msgs/PoseStamped`.
+
+    Attributes:
+        stamp: Simulated time [ns].
+        frame_id: Frame of the pose.
+        pose: Pose (x, y, yaw) [m, m, rad].
+    """
+
+    stamp: int
+    frame_id: str
+    pose: Pose
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -202,3 +331,48 @@ class Transform:
     y: float
     yaw: float
     roll: float = 0.0
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class People:
+    """Positions of people, as in `geometry_msgs/PoseArray`.
+
+    Attributes:
+        stamp: Simulated time [ns].
+        frame_id: Frame of the world.
+        names: Names of the models, which are not part of the message.
+        poses: Poses (x, y, yaw) [m, rad], shape (n, 3).
+    """
+
+    stamp: int
+    frame_id: str
+    names: tuple[str, ...]
+    poses: DoubleArray
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PeopleStates:
+    """The states of people, as in the message `PeopleStates`.
+
+    Attributes:
+        stamp: Simulated time [ns].
+        frame_id: Frame of the world.
+        names: Names of the models.
+        poses: Poses (x, y, yaw) [m, rad], shape (n, 3).
+        groups: Names of the groups.
+        velocities: Velocities (vx, vy, omega) in the world frame [m/s, rad/s], shape (n, 3).
+        standing: Whether each person stands on purpose, shape (n,).
+    """
+
+    stamp: int
+    frame_id: str
+    names: tuple[str, ...]
+    poses: DoubleArray
+    groups: tuple[str, ...]
+    velocities: DoubleArray
+    standing: BoolArray
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class TrackedPeople(PeopleStates):
+    """The states of people, as in `people_msgs/People`."""

@@ -7,20 +7,25 @@ import importlib.resources
 import keyword
 import os
 import re
+import secrets
 import sys
 import tempfile
 from collections.abc import Iterator
 from importlib.resources.abc import Traversable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-from flatland.cli.arguments import Commands, add_command
+from flatland.cli.arguments import Commands, add_command, count, positive
 from flatland.errors import FlatlandError
+from flatland.worldgen import generate
 
 _EXAMPLES = (
     "flatland new robot rover",
     "flatland new world arena",
+    "flatland new world floor --office --seed 7",
+    "flatland new world depot --warehouse --seed 7 --size 80x40",
     "flatland new plugin speedometer",
     "flatland new world lab --folder worlds",
 )
@@ -34,6 +39,9 @@ _NEXT = {
     ),
     "plugin": ("python3 -m unittest discover -s {path}/test",),
 }
+_TEMPLATES = {"robot": "flatland.worldgen", "world": "flatland.cli", "plugin": "flatland.cli"}
+_RANDOM_OPTIONS = ("seed", "size", "resolution", "radius")
+_MAX_DRAWN_SEED = 2**31
 _PIXELS_PER_METRE = 20
 _ROOM = (8.0, 6.0)  # m
 
@@ -46,7 +54,8 @@ def add(commands: Commands) -> None:
         summary="create a robot, a world or a plugin to start from",
         description="Creates commented files that run: a robot with a drive and a laser scanner "
         "(the file NAME.model.yaml), a world with a map and a robot (the folder NAME), or a ROS "
-        "package with a plugin and its test (the folder NAME). Existing files are never changed.",
+        "package with a plugin and its test (the folder NAME). The map of a world can be a random "
+        "floor plan. Existing files are never changed.",
         examples=_EXAMPLES,
     )
     parser.add_argument("kind", choices=sorted(_NEXT), help="what to create")
@@ -57,12 +66,49 @@ def add(commands: Commands) -> None:
         default=Path(),
         help="existing folder to create it in (default: the current one)",
     )
+    group = parser.add_argument_group("random worlds")
+    kinds = group.add_mutually_exclusive_group()
+    for kind, text in (
+        ("office", "rooms with furniture along corridors"),
+        ("maze", "passages with several ways"),
+        ("warehouse", "racks along aisles, docks and goods"),
+    ):
+        kinds.add_argument(
+            f"--{kind}",
+            dest="plan",
+            action="store_const",
+            const=kind,
+            help=f"a random {kind}: {text}",
+        )
+    group.add_argument("--seed", type=count, help="of the random numbers (default: a new one)")
+    group.add_argument(
+        "--size", type=_size, metavar="WxH", help="width and height in metres (default: 60x25)"
+    )
+    group.add_argument(
+        "--resolution", type=positive, help="cell of the map in metres (default: 0.05)"
+    )
+    group.add_argument(
+        "--radius",
+        type=positive,
+        help="of the largest robot that reaches every free place, in metres (default: 0.3)",
+    )
     parser.set_defaults(run=_new)
 
 
 def _new(options: argparse.Namespace) -> int:
-    path = create(options.kind, options.name, options.folder)
-    print(f"created {path}")
+    given = {name: getattr(options, name) for name in _RANDOM_OPTIONS}
+    given = {name: value for name, value in given.items() if value is not None}
+    if options.plan is not None and options.kind != "world":
+        options.parser.error(f"--{options.plan} is an option of `flatland new world`")
+    if options.plan is None and given:
+        options.parser.error(f"--{next(iter(given))} requires --office, --maze or --warehouse")
+    if options.plan is None:
+        path = create(options.kind, options.name, options.folder)
+        print(f"created {path}")
+    else:
+        given.setdefault("seed", secrets.randbelow(_MAX_DRAWN_SEED))
+        path = create_random(options.plan, options.name, options.folder, **given)
+        print(f"created {path}, seed {given['seed']}")
     print("next:")
     for command in _NEXT[options.kind]:
         print(f"  {command.format(path=path, name=options.name)}")
@@ -86,10 +132,7 @@ def create(kind: str, name: str, folder: Path) -> Path:
     """
     _check_name(kind, name)
     target = folder / (f"{name}.model.yaml" if kind == "robot" else name)
-    if target.exists() or target.is_symlink():
-        raise FlatlandError(f"{target} exists, choose another name or --folder")
-    if not folder.is_dir():
-        raise FlatlandError(f"the folder {folder} does not exist")
+    _check_target(target)
     # In a temporary folder first, so that nothing incomplete is left behind.
     with tempfile.TemporaryDirectory(dir=folder, prefix=".flatland-new-") as temporary:
         content = Path(temporary) / "content"
@@ -101,6 +144,50 @@ def create(kind: str, name: str, folder: Path) -> Path:
         source = content / target.name if kind == "robot" else content
         os.rename(source, target)  # noqa: PTH104
     return target
+
+
+def create_random(kind: str, name: str, folder: Path, **arguments: Any) -> Path:
+    """Creates a random world.
+
+    Args:
+        kind: `office`, `maze` or `warehouse`.
+        name: Name of the world.
+        folder: Existing folder to create it in.
+        **arguments: Further arguments of `flatland.worldgen.generate`.
+
+    Returns:
+        The folder of the world.
+
+    Raises:
+        FlatlandError: The name or an argument is invalid, or the folder of the world exists.
+        OSError: A file cannot be written; nothing is left behind.
+    """
+    _check_name("world", name)
+    target = folder / name
+    _check_target(target)
+    try:
+        generate(kind, **arguments).write(target)
+    except ValueError as error:
+        raise FlatlandError(str(error)) from None
+    return target
+
+
+def _size(text: str) -> tuple[float, float]:
+    """Converts WIDTHxHEIGHT in metres."""
+    try:
+        width, height = (float(side) for side in text.split("x"))
+    except ValueError:
+        raise argparse.ArgumentTypeError(
+            f"must be WIDTHxHEIGHT in metres, as in 60x25, got {text!r}"
+        ) from None
+    return width, height
+
+
+def _check_target(target: Path) -> None:
+    if target.exists() or target.is_symlink():
+        raise FlatlandError(f"{target} exists, choose another name or --folder")
+    if not target.parent.is_dir():
+        raise FlatlandError(f"the folder {target.parent} does not exist")
 
 
 def _check_name(kind: str, name: str) -> None:
@@ -120,7 +207,7 @@ def _check_name(kind: str, name: str) -> None:
 
 
 def _write_templates(kind: str, name: str, folder: Path) -> None:
-    root = importlib.resources.files("flatland.cli") / "templates" / kind
+    root = importlib.resources.files(_TEMPLATES[kind]) / "templates" / kind
     class_name = "".join(part.capitalize() for part in name.split("_"))
     for parts, template in _files(root):
         path = folder.joinpath(*(part.replace("__name__", name) for part in parts))

@@ -64,9 +64,9 @@ class ModelDrawing:
 
     Attributes:
         name: Name of the model.
-        outlines: Fixtures of all bodies.
+        outlines: Fixtures of all visible bodies.
         center: Pose of the first body, moved to the centre of the bounds of its fixtures; None
-            for a body without fixtures.
+            for a body that is hidden or has no fixtures.
         width: Shorter side of these bounds [m].
         color: Colour of the first body.
     """
@@ -153,7 +153,12 @@ def capture_scene(world: World, layers: Iterable[str] | None, scans: bool) -> Sc
     return Scene(
         layers=[_draw_layer(layer) for layer in dict.fromkeys(map(world.layer, names))],
         models=[_draw_model(model) for model in models],
-        joints=[_draw_joint(joint) for model in models for joint in model.joints],
+        joints=[
+            _draw_joint(joint)
+            for model in models
+            for joint in model.joints
+            if all(body.visible for body in joint.bodies)
+        ],
         scans=[
             _draw_scan(plugin)
             for model in models
@@ -183,6 +188,8 @@ def _local_outlines(body: Body) -> list[tuple[DoubleArray, bool]]:
 def _draw_model(model: Model) -> ModelDrawing:
     outlines = []
     for body in model.bodies:
+        if not body.visible:
+            continue
         pose = body.pose
         outlines += [
             Outline(transform_points(pose, points), body.color, is_sensor)
@@ -190,7 +197,7 @@ def _draw_model(model: Model) -> ModelDrawing:
         ]
     first = model.bodies[0]
     bounds = _bounds_of_all([points for points, _ in _local_outlines(first)])
-    if bounds is None:
+    if bounds is None or not first.visible:
         return ModelDrawing(model.name, outlines, None, 0.0, first.color)
     x_min, y_min, x_max, y_max = bounds
     center = compose(first.pose, ((x_min + x_max) / 2, (y_min + y_max) / 2, 0.0))

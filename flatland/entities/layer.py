@@ -9,7 +9,7 @@ import numpy as np
 
 from flatland.entities.body import Body, Color, Entity
 from flatland.geometry import DoubleArray, FloatArray, Pose, transform_points
-from flatland.physics import PhysicsWorld
+from flatland.physics import Material, PhysicsWorld
 
 if TYPE_CHECKING:
     from flatland.maps.occupancy_grid import OccupancyGrid
@@ -27,6 +27,8 @@ class Layer(Entity):
         color: Color for drawings as (r, g, b, a), each in [0, 1].
         properties: Entry `properties` of the world file, used for drawings.
         body: Static body at the origin of the layer.
+        material: Material of all walls, including those that are added; None for plain walls.
+        class_name: Class of objects that the walls belong to, for labels of sensors.
         exact_edge_count: Number of edges of the map before simplification.
         unknown_map_keys: Keys of the map file that flatland does not use, sorted.
         map_path: The map file; empty for a layer without one.
@@ -43,6 +45,8 @@ class Layer(Entity):
         color: Color,
         properties: dict[str, Any],
         *,
+        material: Material | None = None,
+        class_name: str = "",
         origin: Pose = (0.0, 0.0, 0.0),
         edges: FloatArray | None = None,
         exact_edge_count: int = 0,
@@ -58,6 +62,8 @@ class Layer(Entity):
             category_bits: Bits of all names.
             color: Color for drawings as (r, g, b, a), each in [0, 1].
             properties: Entry `properties` of the world file.
+            material: Material of all walls; None for plain walls.
+            class_name: Class of objects that the walls belong to, by default the first name.
             origin: Pose of the body in the world frame [m, rad].
             edges: Edges (x1, y1, x2, y2) in the frame of the body [m], shape (n, 4).
             exact_edge_count: Number of edges of the map before simplification.
@@ -70,13 +76,16 @@ class Layer(Entity):
         self.category_bits = category_bits
         self.color = color
         self.properties = properties
+        self.material = material
+        self.class_name = class_name or self.name
         self.exact_edge_count = exact_edge_count
         self.unknown_map_keys = tuple(unknown_map_keys)
         self.map_path = map_path
         self.map_topic = map_topic
         self.grid: OccupancyGrid | None = None
         self.map_version = 0
-        self.body = Body(physics.create_body("static", origin), self, self.name, color)
+        physics_body = physics.create_body("static", origin)
+        self.body = Body(physics_body, self, self.name, color, self.class_name)
         if edges is not None and len(edges):
             self.add_edges(edges)
 
@@ -107,3 +116,5 @@ class Layer(Entity):
             category_bits=self.category_bits,
             mask_bits=self.category_bits,
         )
+        if self.material is not None:
+            self.body.set_material(self.material)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import PurePath
 from typing import TYPE_CHECKING
 
 from flatland.entities.body import Body, Entity
@@ -27,6 +28,11 @@ class Model(Entity):
         bodies: Bodies in the order of the file; the first one defines the pose of the model.
         joints: Joints in the order of the file.
         plugins: Plugins in the order of the file.
+        class_name: Class of objects that the model belongs to, for labels of sensors: the entry
+            `class` of the model file, by default the name of the file without extensions, or the
+            name of the model if it was spawned from a text.
+        followers: Plugins of other models whose `model_moved` is also called for this model, such
+            as those that are connected to it.
         displacement: Offset (dx, dy) of the actual pose from the requested pose after the last
             spawn or move [m]; (0, 0) unless `if_blocked` was `nearest`.
     """
@@ -37,9 +43,11 @@ class Model(Entity):
         self.name = name
         self.namespace = clean_name(namespace)
         self.path = path
+        self.class_name = _class_of(path) or name
         self.bodies: list[Body] = []
         self.joints: list[Joint] = []
         self.plugins: list[ModelPlugin] = []
+        self.followers: list[ModelPlugin] = []
         self.displacement: Vector2 = (0.0, 0.0)
 
     def __repr__(self) -> str:
@@ -146,3 +154,9 @@ class Model(Entity):
         for body, pose in zip(self.bodies, poses, strict=True):
             body.set_pose(*pose)
             body.set_velocity(0.0, 0.0, 0.0)
+
+
+def _class_of(path: str) -> str:
+    """Returns the name of a YAML file without extensions, empty for other paths."""
+    name = PurePath(path).name
+    return name.partition(".")[0] if name.endswith((".yaml", ".yml")) else ""

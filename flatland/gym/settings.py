@@ -86,7 +86,7 @@ class Settings:
 
     @property
     def world_name(self) -> str:
-        """Name of the world for users: its file, or the folder of a file `world.yaml`."""
+        """The name of the file for users, or that of the folder of a file `world.yaml`."""
         path = Path(self.world)
         return path.parent.name if path.name == "world.yaml" and path.parent.name else path.stem
 

@@ -14,6 +14,7 @@ from flatland.entities.joint import Joint
 from flatland.entities.model import Model
 from flatland.errors import PhysicsError
 from flatland.geometry import IDENTITY, Pose, compose
+from flatland.loading.materials import read_class, read_material
 from flatland.physics import PhysicsJoint, PhysicsWorld
 
 _LOG = logging.getLogger("flatland")
@@ -59,6 +60,7 @@ class ModelLoader:
         Raises:
             YamlError: The file is invalid.
         """
+        self._model.class_name = read_class(self._reader, self._model.class_name)
         bodies = self._reader.subnode("bodies", "list")
         for entry in bodies.items():
             with entry.collect_errors():
@@ -122,6 +124,7 @@ class ModelLoader:
         color = reader.get("color", "color", BODY_COLOR, finite=True)
         linear_damping = reader.get("linear_damping", "float", 0.0, finite=True, minimum=0)
         angular_damping = reader.get("angular_damping", "float", 0.0, finite=True, minimum=0)
+        class_name = read_class(reader, self._model.class_name)
         footprints = reader.subnode("footprints", "list")
         reader.ensure_accessed_all()
         physics_body = _create(
@@ -132,7 +135,7 @@ class ModelLoader:
             linear_damping=linear_damping,
             angular_damping=angular_damping,
         )
-        body = Body(physics_body, self._model, name, color)
+        body = Body(physics_body, self._model, name, color, class_name)
         self._model.bodies.append(body)
         for footprint in footprints.items():
             with footprint.collect_errors():
@@ -169,17 +172,20 @@ class ModelLoader:
             "category_bits": category_bits,
             "mask_bits": category_bits if reader.get("collision", "bool", True) else 0,
         }
+        material = read_material(reader)
         if kind not in FOOTPRINT_TYPES:
             return  # reported above
         if kind == "circle":
             radius = reader.get("radius", "float", finite=True, minimum=0)
             center = reader.get("center", "vector", (0.0, 0.0), finite=True)
             reader.ensure_accessed_all()
-            _create(reader, body.create_circle, center, radius, **properties)
+            fixture = _create(reader, body.create_circle, center, radius, **properties)
         else:
             points = reader.get_list("points", "vector", min_size=3, max_size=8, finite=True)
             reader.ensure_accessed_all()
-            _create(reader, body.create_polygon, points, **properties)
+            fixture = _create(reader, body.create_polygon, points, **properties)
+        if material is not None:
+            fixture.material = material
 
     def _load_joint(self, entry: YamlReader) -> None:
         name = entry.get("name", "string")

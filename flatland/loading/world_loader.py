@@ -17,6 +17,7 @@ from flatland.entities.layer import Layer
 from flatland.errors import Place, UnreadableFileError, WorldError, YamlError
 from flatland.geometry import IDENTITY
 from flatland.graph_names import resolve_topic
+from flatland.loading.materials import read_class, read_material
 from flatland.maps.grid_map import grid_map
 from flatland.maps.map_file import LayerMap, load_map
 from flatland.plugin_api.missing_plugins import (
@@ -196,6 +197,8 @@ def _load_layer(world: World, reader: YamlReader, simplify_map: int) -> None:
     map_path = reader.get("map", "string", "")
     color = reader.get("color", "color", LAYER_COLOR, finite=True)
     properties = reader.optional_subnode("properties", "map")
+    material = read_material(reader)
+    class_name = read_class(reader, names[0])
     reader.ensure_accessed_all()
     is_registered = False
     with reader.collect_errors():
@@ -222,7 +225,14 @@ def _load_layer(world: World, reader: YamlReader, simplify_map: int) -> None:
     bits = world.collision_filter.category_bits(names)
     if layer_map is None:
         layer = Layer(
-            world.physics, names, bits, color, properties.plain() or {}, map_topic=map_topic
+            world.physics,
+            names,
+            bits,
+            color,
+            properties.plain() or {},
+            material=material,
+            class_name=class_name,
+            map_topic=map_topic,
         )
     else:
         try:
@@ -232,6 +242,8 @@ def _load_layer(world: World, reader: YamlReader, simplify_map: int) -> None:
                 bits,
                 color,
                 properties.plain() or {},
+                material=material,
+                class_name=class_name,
                 origin=layer_map.origin,
                 edges=layer_map.edges,
                 exact_edge_count=layer_map.exact_edge_count,

@@ -15,15 +15,23 @@ from flatland.geometry import Pose
 from flatland.physics.body import PhysicsBody
 from flatland.physics.contact import ContactEvent, ContactInfo
 from flatland.physics.controller import (
+    AckermannController,
     Controller,
+    DriveController,
+    OmniController,
+    PathController,
+    RollingWheel,
     TricycleController,
     TweenController,
     VelocityController,
+    WheelsController,
     ease,
     easings,
 )
+from flatland.physics.crowd import Crowd, PersonState, RouteOrder
 from flatland.physics.fixture import PhysicsFixture
 from flatland.physics.joint import PhysicsJoint
+from flatland.physics.material import Material
 from flatland.physics.plan import (
     END_OF_ORDER,
     RunEnd,
@@ -36,6 +44,7 @@ from flatland.physics.plan import (
 from flatland.physics.queries import RayHit
 from flatland.physics.range_finder import (
     BeamFan,
+    LabelledScan,
     RangeFinder,
     RangeNoise,
     Scan,
@@ -48,11 +57,19 @@ from flatland.physics.world import PhysicsWorld, StepReport, to_report
 __all__ = [
     "BOX2D_VERSION",
     "END_OF_ORDER",
+    "AckermannController",
     "BeamFan",
     "ContactEvent",
     "ContactInfo",
     "Controller",
+    "Crowd",
+    "DriveController",
+    "LabelledScan",
+    "Material",
     "OldManifold",
+    "OmniController",
+    "PathController",
+    "PersonState",
     "PhysicsBody",
     "PhysicsFixture",
     "PhysicsJoint",
@@ -62,6 +79,8 @@ __all__ = [
     "RangeFinder",
     "RangeNoise",
     "RayHit",
+    "RollingWheel",
+    "RouteOrder",
     "RunEnd",
     "RunResult",
     "Scan",
@@ -74,6 +93,7 @@ __all__ = [
     "TricycleController",
     "TweenController",
     "VelocityController",
+    "WheelsController",
     "WorkTimes",
     "ease",
     "easings",

@@ -10,6 +10,9 @@ import numpy.typing as npt
 from flatland.geometry import FloatArray, Pose, Vector2
 from flatland.physics.controller import (
     NO_LIMITS,
+    AckermannController,
+    OmniController,
+    PathController,
     SpeedLimits,
     TricycleController,
     TweenController,
@@ -21,6 +24,7 @@ from flatland.physics.handle import Handle
 if TYPE_CHECKING:
     from flatland.physics.fixture import PhysicsFixture
     from flatland.physics.joint import PhysicsJoint
+    from flatland.physics.material import Material
 
 
 class PhysicsBody(Handle):
@@ -177,6 +181,94 @@ class PhysicsBody(Handle):
         self.world.plan.is_used = True
         controller = self._core.add_tween_controller(self.id, delta, duration, mode, easing)
         return TweenController(self.world, controller)
+
+    def control_ackermann(
+        self,
+        *,
+        wheelbase: float,
+        track: float,
+        rear_center: Vector2,
+        front_joints: Sequence[tuple[PhysicsJoint, float]],
+        takes_twist: bool,
+    ) -> AckermannController:
+        """Creates a controller of a car, which is not carried out automatically yet.
+
+        Args:
+            wheelbase: Distance of the axles [m].
+            track: Distance of the front wheels [m].
+            rear_center: Centre of the rear axle in the frame of the body [m].
+            front_joints: Revolute joints of the left and the right front wheel, each with the sign
+                of its angle if the wheel is steered to the left; may be empty. Their limits are set
+                to the angles of the wheels.
+            takes_twist: Whether commands are velocities of the rear center and yaw rates.
+
+        Raises:
+            ValueError: An argument is invalid.
+            StaleHandleError: The body or a joint was destroyed.
+            WorldLockedError: The world is stepping.
+        """
+        self.world.plan.is_used = True
+        joints = [(joint.id, sign) for joint, sign in front_joints]
+        controller = self._core.add_ackermann_controller(
+            self.id, wheelbase, track, rear_center, joints, takes_twist
+        )
+        return AckermannController(self.world, controller)
+
+    def control_omni(
+        self, wheels: Sequence[Pose], *, wheel_speed: float, wheel_acceleration: float
+    ) -> OmniController:
+        """Creates a controller of a holonomic drive, which is not carried out automatically yet.
+
+        Args:
+            wheels: For each wheel, the factors of the velocity (forward, sideways, omega) of the
+                body in the speed at which its rim rolls.
+            wheel_speed: Largest speed of the rims [m/s], 0 for no limit.
+            wheel_acceleration: Largest acceleration of the rims [m/s²], 0 for no limit.
+
+        Raises:
+            ValueError: A limit is negative or NaN.
+            StaleHandleError: The body was destroyed.
+            WorldLockedError: The world is stepping.
+        """
+        self.world.plan.is_used = True
+        controller = self._core.add_omni_controller(
+            self.id, list(wheels), wheel_speed, wheel_acceleration
+        )
+        return OmniController(self.world, controller)
+
+    def control_path(
+        self,
+        waypoints: Sequence[Pose],
+        *,
+        mode: str,
+        faces_forward: bool,
+        linear: SpeedLimits,
+        angular: SpeedLimits,
+        wait: float,
+        key: int,
+    ) -> PathController:
+        """Creates a controller of a motion along waypoints, which is not carried out yet.
+
+        Args:
+            waypoints: Poses after the current pose of the body, world frame [m, rad].
+            mode: `loop`, `once`, `there_and_back` or `random`.
+            faces_forward: Whether the body turns towards the next waypoint and then drives there;
+                otherwise it reaches the angle of a waypoint on the way.
+            linear: Limits of speed [m/s], which is above 0, acceleration and deceleration [m/s²].
+            angular: The same of the rotation [rad/s, rad/s²].
+            wait: Time at each waypoint [s].
+            key: Key of the random numbers of mode `random`, from 0 to 2^64 - 1.
+
+        Raises:
+            ValueError: An argument is invalid.
+            StaleHandleError: The body was destroyed.
+            WorldLockedError: The world is stepping.
+        """
+        self.world.plan.is_used = True
+        controller = self._core.add_path_controller(
+            self.id, list(waypoints), mode, faces_forward, linear, angular, wait, key
+        )
+        return PathController(self.world, controller)
 
     def apply_force(self, force: Sequence[float], point: Sequence[float]) -> None:
         """Applies a force to a dynamic body during the next step and wakes the body.
@@ -393,6 +485,16 @@ class PhysicsBody(Handle):
             category_bits,
             mask_bits,
         )
+
+    def set_material(self, material: Material) -> None:
+        """Gives all present fixtures of the body a material.
+
+        Raises:
+            ValueError: A number is not from 0 to 1, or `transmission` + `specular` is above 1.
+            StaleHandleError: The body was destroyed.
+            WorldLockedError: The world is stepping.
+        """
+        self._core.set_body_material(self.id, *material)
 
     def edges(self) -> FloatArray:
         """Returns the edges (x1, y1, x2, y2) of the body in the body frame [m], shape (n, 4)."""

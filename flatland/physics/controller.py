@@ -2,14 +2,42 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
 from flatland import _core
-from flatland.geometry import Pose
+from flatland.geometry import Pose, Vector2
 from flatland.physics.handle import Handle
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from flatland.physics.body import PhysicsBody
 
 SpeedLimits = tuple[float, float, float]
 """Limits of velocity, acceleration and deceleration; 0 for no limit."""
 
 NO_LIMITS: SpeedLimits = (0.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True, slots=True)
+class RollingWheel:
+    """A wheel on the ground.
+
+    Attributes:
+        body: Body on which the wheel is mounted.
+        position: Point of the body at which the wheel touches the ground, body frame [m].
+        heading: Direction in which the wheel rolls, body frame [rad].
+        radius: Radius of the wheel [m].
+        slide: Cotangent of the angle from the heading to the direction in which the wheel moves
+            freely: 0 for wheels that slide sideways, 1 or -1 for mecanum wheels.
+    """
+
+    body: PhysicsBody
+    position: Vector2
+    heading: float
+    radius: float
+    slide: float
 
 
 class Controller(Handle):
@@ -66,7 +94,55 @@ class Controller(Handle):
         self._core.advance_controller(self.id, dt)
 
 
-class VelocityController(Controller):
+class DriveController(Controller):
+    """Handle of the controller of a drive, which sets velocities or applies forces."""
+
+    __slots__ = ()
+
+    def set_traction(
+        self,
+        bodies: Iterable[PhysicsBody],
+        *,
+        holonomic: bool,
+        at_center: bool,
+        max_force: float,
+        max_torque: float,
+        grip: float,
+        radius: float,
+    ) -> None:
+        """Makes the drive push its body with bounded forces instead of setting the velocity.
+
+        Args:
+            bodies: The driven body, and those that move with it as if they were rigid.
+            holonomic: Whether the motors push in all directions, or only forwards and backwards.
+            at_center: Whether the forces act at the common centre of mass, as those of a car, or at
+                the origin of the body, as those of a single axle.
+            max_force: Force of the motors [N].
+            max_torque: Torque of the motors [N m].
+            grip: Friction coefficient on the ground times gravity [m/s²]; may be infinite.
+            radius: Radius at which the friction acts [m], 0 for the radius of gyration.
+
+        Raises:
+            ValueError: A limit is negative or NaN, or the body is not dynamic.
+            StaleHandleError: The controller was removed, or a body destroyed.
+            WorldLockedError: The world is stepping.
+        """
+        ids = [body.id for body in bodies]
+        self._core.set_traction(
+            self.id, ids, holonomic, at_center, max_force, max_torque, grip, radius
+        )
+
+    @property
+    def traction_state(self) -> tuple[float, bool, Pose]:
+        """Part of the limits that the last step required, and the pose that the brakes hold.
+
+        The part is above 1 if the drive slipped or stalled. The second value is whether the drive
+        is braked.
+        """
+        return self._core.traction_state(self.id)
+
+
+class VelocityController(DriveController):
     """Moves the origin of a body with a velocity in the frame of the body, before each step.
 
     A velocity is (forward, sideways, omega) [m/s, rad/s]. It is set in every step, so that
@@ -106,7 +182,7 @@ class VelocityController(Controller):
         self._core.set_twist_limits(self.id, linear, angular)
 
 
-class TricycleController(Controller):
+class TricycleController(DriveController):
     """Steers and drives the front wheel of a body, which follows without slip, before each step.
 
     The state is (steering angle [rad], steering velocity [rad/s], speed of the front wheel [m/s],
@@ -145,6 +221,134 @@ class TricycleController(Controller):
     @state.setter
     def state(self, state: tuple[float, float, float, float]) -> None:
         self._core.set_tricycle_state(self.id, *state)
+
+
+class AckermannController(DriveController):
+    """Steers and drives a car, which follows without slip, before each step.
+
+    The car is a single track: the steering angle is that of a wheel between the front wheels.
+    """
+
+    __slots__ = ()
+
+    def set_target(self, speed: float, angular: float) -> None:
+        """Sets the command, from the next step on.
+
+        Args:
+            speed: Speed of the centre of the rear axle [m/s].
+            angular: Steering angle [rad]; the yaw rate if the drive takes a twist [rad/s].
+        """
+        self._core.set_ackermann_target(self.id, speed, angular)
+
+    def set_limits(self, linear: SpeedLimits, angular: SpeedLimits, max_angle: float) -> None:
+        """Sets limits of velocity, acceleration and deceleration.
+
+        Args:
+            linear: Limits of the speed [m/s].
+            angular: Limits of the steering angle [rad/s].
+            max_angle: Largest steering angle [rad].
+
+        Raises:
+            ValueError: A limit is negative or NaN, or the angle is not between 0 and 90 degrees.
+        """
+        self._core.set_ackermann_limits(self.id, linear, angular, max_angle)
+
+    @property
+    def state(self) -> tuple[float, float, float, float]:
+        """Steering angle [rad], its rate [rad/s], speed [m/s] and commanded angle [rad]."""
+        return self._core.ackermann_state(self.id)
+
+
+class OmniController(DriveController):
+    """Moves the origin of a body in all directions, within limits of its wheels.
+
+    The velocity (forward, sideways, omega) [m/s, rad/s] changes along a straight line.
+    """
+
+    __slots__ = ()
+
+    def set_target(self, forward: float, sideways: float, omega: float) -> None:
+        """Sets the commanded velocity, from the next step on."""
+        self._core.set_omni_target(self.id, forward, sideways, omega)
+
+    def set_limits(self, linear: SpeedLimits, angular: SpeedLimits) -> None:
+        """Sets limits of velocity [m/s, rad/s], acceleration and deceleration.
+
+        Args:
+            linear: Limits of the speed, and of the acceleration along each axis of the body.
+            angular: Limits of the angular velocity.
+
+        Raises:
+            ValueError: A limit is negative or NaN.
+        """
+        self._core.set_omni_limits(self.id, linear, angular)
+
+    @property
+    def velocity(self) -> Pose:
+        """The commanded velocity within the limits, as of the last step."""
+        return self._core.omni_velocity(self.id)
+
+
+class PathController(Controller):
+    """Moves a body along waypoints, before and after each step."""
+
+    __slots__ = ()
+
+    def set_start(self, is_started: bool, starts: int) -> None:
+        """Sets whether the body moves, from the next step on.
+
+        Args:
+            is_started: Whether it moves; otherwise it stops at the next waypoint.
+            starts: Number of commands to start so far.
+        """
+        self._core.set_path_start(self.id, is_started, starts)
+
+    def set_key(self, key: int) -> None:
+        """Sets the key of the random numbers, from 0 to 2^64 - 1."""
+        self._core.set_path_key(self.id, key)
+
+    def restart(self) -> None:
+        """Continues from the current pose of the body, which was moved."""
+        self._core.restart_path(self.id)
+
+    def hold(self) -> None:
+        """Moves the body to its pose on the path, after the physics step.
+
+        Raises:
+            ValueError: The pose is out of range.
+            StaleHandleError: The controller was removed.
+            WorldLockedError: The world is stepping.
+        """
+        self._core.hold_controller(self.id)
+
+    @property
+    def state(self) -> tuple[int, int, bool, bool, int, float, int, Pose, Pose, int]:
+        """Everything that changes.
+
+        Last waypoint reached, next one, whether the body moves, whether it moves forwards along the
+        path, number of legs begun, time of the leg [s], number of starts used, pose, pose at the
+        beginning of the leg [m, rad], key of the random numbers. Waypoint 0 is the initial pose.
+        """
+        return self._core.path_state(self.id)
+
+
+class WheelsController(Controller):
+    """Measures how far wheels roll, after each step."""
+
+    __slots__ = ()
+
+    def measure(self) -> None:
+        """Adds the motion since the last measurement; called by the core after each step."""
+        self._core.hold_controller(self.id)
+
+    def skip(self) -> None:
+        """Makes the next measurement start from the current poses."""
+        self._core.skip_wheel_motion(self.id)
+
+    @property
+    def states(self) -> list[tuple[float, float]]:
+        """Angle [rad] and speed [rad/s] of each wheel, positive if it rolls forwards."""
+        return self._core.wheel_states(self.id)
 
 
 class TweenController(Controller):

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Final
 
 from flatland.geometry import DoubleArray, Vector2
 from flatland.physics.handle import Handle
+from flatland.physics.material import Material
 
 if TYPE_CHECKING:
     from flatland.physics.body import PhysicsBody
@@ -99,3 +100,17 @@ class PhysicsFixture(Handle):
     @mask_bits.setter
     def mask_bits(self, bits: int) -> None:
         self._core.set_fixture_filter(self.id, self.category_bits, bits)
+
+    @property
+    def material(self) -> Material | None:
+        """Material of the surface, None for a plain one; can be set, not removed.
+
+        Raises:
+            ValueError: A number is not from 0 to 1, or `transmission` + `specular` is above 1.
+        """
+        material = self._core.fixture_material(self.id)
+        return None if material is None else Material(*material)
+
+    @material.setter
+    def material(self, material: Material) -> None:
+        self._core.set_fixture_material(self.id, *material)

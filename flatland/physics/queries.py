@@ -47,6 +47,11 @@ class PhysicsQueries:
 
     # -- rays ------------------------------------------------------------------------------
 
+    @property
+    def has_materials(self) -> bool:
+        """Whether a fixture has a material. `ray_cast` and `cast_rays` ignore materials."""
+        return self._core.has_materials
+
     def ray_cast(
         self, start: Sequence[float], end: Sequence[float], mask: int = ALL_BITS
     ) -> RayHit | None:

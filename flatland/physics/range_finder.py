@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
+import numpy as np
 import numpy.typing as npt
 
 from flatland import _core
@@ -13,6 +14,8 @@ from flatland.physics.body import PhysicsBody
 
 if TYPE_CHECKING:
     from typing import Self
+
+    from flatland.physics.world import PhysicsWorld
 
 BeamFan = _core.BeamFan
 """End points of beams, shape (n, 2), prepared for scans; may be shared by range finders."""
@@ -28,12 +31,31 @@ class Scan(NamedTuple):
         pose: Pose (x, y, theta) of the sensor in the world frame [m, rad].
         ranges: Range of each beam [m], shape (n,).
         intensities: 255 for a beam whose reading is that of a reflecting fixture, else 0, shape
-            (n,); None for a range finder without `reflect_mask`.
+            (n,). In a world with materials, other hits have an intensity I from 0 to 255:
+            I = 255 reflectance cos(angle of incidence) / max(range, 1 m)². None for a range finder
+            without `reflect_mask` in a world without materials, and for a cone.
     """
 
     pose: Pose
     ranges: FloatArray
     intensities: FloatArray | None
+
+
+class LabelledScan(NamedTuple):
+    """A scan with what the beams hit.
+
+    Attributes:
+        pose: Pose (x, y, theta) of the sensor in the world frame [m, rad].
+        ranges: Range of each beam [m], shape (n,).
+        labels: For each beam, 1 + the index of an entry of `hits`, or 0 if its reading is not that
+            of a hit, shape (n,).
+        hits: The bodies that were hit, each as its id and the categories of the fixture.
+    """
+
+    pose: Pose
+    ranges: FloatArray
+    labels: npt.NDArray[np.uint32]
+    hits: list[tuple[int, int]]
 
 
 class RangeFinder:
@@ -56,6 +78,8 @@ class RangeFinder:
         range_min: float = 0.0,
         no_hit: float = float("nan"),
         noise: RangeNoise | None = None,
+        uses_materials: bool = True,
+        is_cone: bool = False,
     ) -> None:
         """Creates a range finder.
 
@@ -70,6 +94,9 @@ class RangeFinder:
                 can make ranges negative.
             no_hit: Range that is reported for a beam without a hit [m].
             noise: Noise model; None for exact ranges.
+            uses_materials: Whether materials let beams pass and reflect them; otherwise each
+                fixture stops all beams.
+            is_cone: Whether there is a single reading, that of the nearest hit of all beams.
 
         Raises:
             ValueError: An array has a wrong shape, a number is not finite or out of range, or
@@ -84,12 +111,18 @@ class RangeFinder:
             range_min=range_min,
             no_hit=no_hit,
             noise=noise,
+            uses_materials=uses_materials,
+            is_cone=is_cone,
         )
 
     @property
     def beams(self) -> int:
         """Number of beams."""
         return self._core.beams
+
+    def is_random(self, world: PhysicsWorld) -> bool:
+        """Returns whether scans depend on the number of the update: noise, or materials."""
+        return self._core.is_random(world._core)
 
     def __deepcopy__(self, memo: dict[int, object]) -> Self:
         """Returns this object, which is immutable."""
@@ -109,6 +142,13 @@ class RangeFinder:
             WorldLockedError: The world is stepping.
         """
         return Scan(*self._core.scan(body._core, body.id, stream, update))
+
+    def scan_labels(self, body: PhysicsBody, stream: int, update: int) -> LabelledScan:
+        """Performs the same scan as `scan`, and finds out which bodies the beams hit.
+
+        Arguments and errors are those of `scan`.
+        """
+        return LabelledScan(*self._core.scan_labels(body._core, body.id, stream, update))
 
 
 class ScanRequest(NamedTuple):

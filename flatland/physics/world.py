@@ -10,6 +10,7 @@ from flatland import _core
 from flatland.geometry import DoubleArray, FloatArray
 from flatland.physics.body import PhysicsBody
 from flatland.physics.contact import ContactEvent, ContactInfo, to_events, to_infos
+from flatland.physics.controller import RollingWheel, WheelsController
 from flatland.physics.fixture import PhysicsFixture
 from flatland.physics.joint import PhysicsJoint
 from flatland.physics.plan import StepPlan
@@ -316,6 +317,21 @@ class PhysicsWorld(PhysicsQueries):
             collide_connected,
         )
         return PhysicsJoint(self, joint)
+
+    def measure_wheels(self, wheels: Sequence[RollingWheel]) -> WheelsController:
+        """Creates a controller that measures how far wheels roll; not carried out yet.
+
+        Args:
+            wheels: The wheels, at least one.
+
+        Raises:
+            ValueError: There is no wheel, or a radius is not positive.
+            StaleHandleError: A body was destroyed.
+            WorldLockedError: The world is stepping.
+        """
+        self.plan.is_used = True
+        rows = [(w.body.id, *w.position, w.heading, w.radius, w.slide) for w in wheels]
+        return WheelsController(self, self._core.add_rolling_wheels(rows))
 
     def _check_own(self, *bodies: PhysicsBody) -> None:
         for body in bodies:

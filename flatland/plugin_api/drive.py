@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 import math
 import time
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 from flatland.geometry import IDENTITY, DoubleArray, Pose, Vector2, compose, invert, rotate
 from flatland.plugin_api.after_step import (
@@ -26,7 +26,7 @@ from flatland.plugin_api.parameters import (
 )
 from flatland.plugin_api.schedule import when_due
 from flatland.plugin_api.update_timer import UpdateTimer
-from flatland.values import Odometry, Twist
+from flatland.values import AckermannCommand, Odometry, Twist
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -39,12 +39,14 @@ if TYPE_CHECKING:
 
 _LOG = logging.getLogger("flatland")
 
+C = TypeVar("C", Twist, AckermannCommand)
+
 WARNING_PERIOD = 1.0  # s of wall time between two warnings of one drive, at least
 # m/s, rad/s; beyond the speed of any robot, and small enough for the range of the physics.
 MAX_COMMAND = 1e6
 
 
-class TwistGuard:
+class CommandGuard(Generic[C]):
     """Rejects commands that are not finite, so that the previous command remains in effect."""
 
     def __init__(self, owner: str) -> None:
@@ -56,13 +58,14 @@ class TwistGuard:
         self._owner = owner
         self._last_warning = -math.inf
 
-    def __call__(self, twist: Twist) -> bool:
+    @classmethod
+    def of(cls, plugin: ModelPlugin) -> CommandGuard[C]:
+        """Creates the guard of the commands of a drive."""
+        return cls(f'plugin "{plugin.name}" of model "{plugin.model.name}"')
+
+    def __call__(self, command: C) -> bool:
         """Returns whether a command is valid; otherwise logs a warning, at most one a second."""
-        if (
-            abs(twist.linear_x) <= MAX_COMMAND
-            and abs(twist.linear_y) <= MAX_COMMAND
-            and abs(twist.angular_z) <= MAX_COMMAND
-        ):
+        if all(abs(getattr(command, name)) <= MAX_COMMAND for name in command.__slots__):
             return True
         now = time.monotonic()
         if now - self._last_warning >= WARNING_PERIOD:
@@ -70,7 +73,7 @@ class TwistGuard:
             _LOG.warning(
                 "%s: %s is not finite or out of range, the previous command remains in effect",
                 self._owner,
-                twist,
+                command,
             )
         return False
 
@@ -87,7 +90,7 @@ def open_twist_command(plugin: ModelPlugin, topic: str) -> Command[Twist]:
     Raises:
         PluginError: The topic is not a legal name.
     """
-    guard = TwistGuard(f'plugin "{plugin.name}" of model "{plugin.model.name}"')
+    guard: CommandGuard[Twist] = CommandGuard.of(plugin)
     return plugin.command(topic, Twist, accept=guard)
 
 

@@ -9,39 +9,32 @@ import re
 from typing import Final
 
 _PEDESTRIANS: Final = (
-    "flatland has no connection to pedsim_ros; a Python plugin can receive its agents with "
+    "use the world plugin Pedestrians, which does not need pedsim_ros; with pedsim_ros, a Python "
+    "plugin can receive its agents with "
     "self.ros.subscribe and move the body with body.set_velocity"
 )
 _RANDOM_MOTION: Final = (
-    "use Tween for a periodic motion; for a random one, write a Python plugin that calls "
-    "body.set_velocity with numbers of self.rng"
+    "use PathFollower with mode: random, which moves to waypoints in random order"
 )
-_HOLONOMIC: Final = (
-    "no included drive moves sideways; write a Python plugin that calls "
-    "body.set_velocity(vx, vy, omega)"
-)
-_STEERED: Final = "use TricycleDrive, whose command has the steering angle of a single front wheel"
+_HOLONOMIC: Final = "use OmniDrive, which moves in all directions"
+_STEERED: Final = "use AckermannDrive"
 _DIFFERENTIAL: Final = "use DiffDrive"
 _RADIATION: Final = "flatland has no model of radiation; write a Python plugin"
 
 _ALTERNATIVES: Final = {
     "PedsimMovement": _PEDESTRIANS,
     "VehicleMovement": _PEDESTRIANS,
-    "PosePub": "use ModelTfPublisher with publish_tf_world: true, which sends the pose to /tf; "
-    "a drive publishes it on its topic ground_truth_pub",
+    "PosePub": "use PosePublisher, which publishes the true pose of a body",
     "RandomMove": _RANDOM_MOTION,
     "RandomWandering": _RANDOM_MOTION,
-    "Tween2": "use Tween, which moves to a single pose; for several waypoints, write a Python "
-    "plugin",
+    "Tween2": "use Tween for a motion to a single pose, or PathFollower for several waypoints",
     "DiffDrive2": _DIFFERENTIAL,
     "Diff_drive": _DIFFERENTIAL,
-    "AckermannDrive": _STEERED,
     "SingleTrackDrive": _STEERED,
-    "DackermannDrive": "TricycleDrive steers only the front wheel; for four steered wheels, write "
-    "a Python plugin",
+    "DackermannDrive": "AckermannDrive steers only the front wheels; for four steered wheels, "
+    "write a Python plugin",
     "Holo": _HOLONOMIC,
     "HoloSecondOrder": _HOLONOMIC,
-    "OmniDrive": _HOLONOMIC,
     "RandomGates": "use RandomWall, which adds walls at random places",
     "MockLidar3D": "use Laser for scans in one plane",
     "TrajectoryRecorder": "record the ground truth odometry of a drive with rosbag",

@@ -444,9 +444,12 @@ class WorldPlugin(FlatlandPlugin):
 
     Attributes:
         world_config: Reader of the whole world file.
+        recorded_methods: Names of the methods that may be called by `World.call_plugin`, so that
+            recordings repeat the calls.
     """
 
     base_class_type = "flatland::WorldPlugin"
+    recorded_methods: ClassVar[frozenset[str]] = frozenset()
 
     world_config: YamlReader
 

@@ -2,26 +2,26 @@
 
 from __future__ import annotations
 
-import functools
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
 from flatland.geometry import FloatArray, Pose, compose
-from flatland.physics import BeamFan, RangeFinder, Scan, ScanRequest, scan_all
+from flatland.physics import RangeFinder, Scan, ScanRequest, scan_all
 from flatland.plugin_api.after_step import update_after_step
-from flatland.plugin_api.parameters import (
-    at_key,
-    read_body,
-    read_pose,
-    read_rate,
-)
+from flatland.plugin_api.parameters import read_body, read_pose, read_rate
 from flatland.plugin_api.plugin import ModelPlugin
 from flatland.plugin_api.schedule import HookBatch, in_batches, when_due
 from flatland.plugin_api.update_timer import UpdateTimer
+from flatland.plugins._beams import (
+    BeamAngles,
+    read_layers,
+    read_no_hit,
+    read_range,
+    read_range_min,
+)
 from flatland.plugins._range_noise import read_range_noise
 from flatland.values import LaserScan
 
@@ -32,66 +32,7 @@ if TYPE_CHECKING:
     from flatland.plugin_api.noise import NoiseStream
     from flatland.timekeeper import Timekeeper
 
-MAX_BEAMS = 1_000_000
-MAX_RANGE = 1e6  # m; the spacing of single-precision numbers is 6 cm there
 REFLECTANCE_LAYER = "reflectance"
-
-
-@dataclass(frozen=True, slots=True)
-class BeamAngles:
-    """The beam angles of a laser [rad]; beam i is at `minimum + i * increment`."""
-
-    minimum: float
-    maximum: float
-    increment: float
-    count: int
-
-    @classmethod
-    def from_config(cls, reader: YamlReader) -> BeamAngles:
-        """Reads the beam angles.
-
-        Args:
-            reader: Reader of the map `angle`.
-
-        Raises:
-            YamlError: A number is missing or not finite, the sign of the increment does not fit
-                the limits, or there would be more than `MAX_BEAMS` beams.
-        """
-        numbers = [reader.get(key, "float") for key in ("min", "max", "increment")]
-        reader.ensure_accessed_all()
-        if not all(map(math.isfinite, numbers)):
-            raise reader.error(f'Invalid "angle" params, must be finite, got {numbers}')
-        minimum, maximum, increment = numbers
-        if increment == 0:
-            raise reader.error('Invalid "angle" params, increment must not be zero!')
-        if increment > 0 and maximum < minimum:
-            raise reader.error('Invalid "angle" params, must have max > min when increment > 0')
-        if increment < 0 and minimum < maximum:
-            raise reader.error('Invalid "angle" params, must have min > max when increment < 0')
-        # A product, as the quotient overflows for a tiny increment.
-        if abs(maximum - minimum) >= (MAX_BEAMS - 0.5) * abs(increment):
-            raise reader.error(
-                f'Invalid "angle" params, more than {MAX_BEAMS} beams between {minimum} and '
-                f"{maximum} in steps of {increment}"
-            )
-        count = math.floor((maximum - minimum) / increment + 0.5) + 1
-        return cls(minimum, maximum, increment, count)
-
-    @functools.lru_cache(maxsize=16)  # noqa: B019 - shared by all robots of one kind
-    def end_points(self, length: float, upside_down: bool) -> FloatArray:
-        """Returns the ends of beams of a length [m], sensor frame, shape (count, 2), read-only."""
-        angles = self.minimum + self.increment * np.arange(self.count, dtype=np.float64)
-        if upside_down:
-            angles = -angles
-        ends = length * np.stack([np.cos(angles), np.sin(angles)], axis=1)
-        points = np.ascontiguousarray(ends, dtype=np.float32)
-        points.flags.writeable = False
-        return points
-
-    @functools.lru_cache(maxsize=16)  # noqa: B019 - shared by all robots of one kind
-    def fan(self, length: float, upside_down: bool) -> BeamFan:
-        """Returns the beams of a length [m] prepared for scans, sensor frame."""
-        return BeamFan(self.end_points(length, upside_down))
 
 
 class Laser(ModelPlugin):
@@ -105,9 +46,9 @@ class Laser(ModelPlugin):
         scan_time: Reported time between scans [s].
         time_increment: Reported time between beams [s].
         origin: (x, y, theta) of the sensor in the body frame.
-        intensities: Intensities of the last scan computed: 255 for a beam whose nearest hit is in
-            the layer `reflectance`, else 0; shape (n,), or (0,) in a world without that layer;
-            float32.
+        intensities: Intensities of the last scan computed, shape (n,), float32: 255 for a beam
+            whose nearest hit is in the layer `reflectance`; in a world with materials, those of
+            `flatland.physics.Scan` for other hits; else 0. Shape (0,) in a world with neither.
         beam_ends: End point of each beam in the sensor frame [m], shape (n, 2), read-only.
         last_scan: Pose of the sensor in the world frame and ranges [m], shape (n,), of the last
             scan computed; None before the first one. The ranges are those of the emitted scan.
@@ -124,22 +65,21 @@ class Laser(ModelPlugin):
             PluginError: The topic is not a legal name.
         """
         self.body = read_body(config, self.model)
-        self.range = self._read_range(config)
+        self.range = read_range(config)
         self.angles = BeamAngles.from_config(config.subnode("angle", "map"))
         self.origin = read_pose(config, "origin")
         self.timer = UpdateTimer(read_rate(config))
         hook = update_after_step(self, config, self.timer)
         self._always_publish: bool = config.get("always_publish", "bool", False)
-        self.range_min = self._read_range_min(config)
+        self.range_min = read_range_min(config, self.range)
         self.scan_time, self.time_increment = self._read_times(config)
         noise = read_range_noise(config, self.range)
         self._noise = self.noise_stream("scan")
         # Calls of `compute_ranges` have random numbers of their own, so that they do not change the
         # scans that are emitted.
         self._computed = self._uncounted_stream("compute_ranges")
-        self._has_noise = noise is not None
-        no_hit = self._read_no_hit(config)
-        self._mask = self._read_mask(config)
+        no_hit = read_no_hit(config, self.range)
+        self._mask = read_layers(config, self.world)
         self._sends_transform: bool = config.get("broadcast_tf", "bool", True)
         upside_down: bool = config.get("upside_down", "bool", False)
         self._roll = math.pi if upside_down else 0.0
@@ -192,24 +132,6 @@ class Laser(ModelPlugin):
                 stamp, self._body_frame_id, self.frame_id, *self.origin, roll=self._roll
             )
 
-    @staticmethod
-    def _read_range(config: YamlReader) -> float:
-        length: float = config.get("range", "float")
-        if not 0 < length <= MAX_RANGE:
-            raise at_key(config, "range").error(
-                f'Invalid "range", must be greater than 0 and at most {MAX_RANGE:g} m, got {length}'
-            )
-        return length
-
-    def _read_range_min(self, config: YamlReader) -> float:
-        shortest: float = config.get("range_min", "float", 0.0)
-        if not 0 <= shortest < self.range:
-            raise config.invalid(
-                "range_min",
-                f'must not be negative and less than "range", {self.range:g} m, got {shortest}',
-            )
-        return shortest
-
     def _read_times(self, config: YamlReader) -> tuple[float, float]:
         scan_time, time_increment = (
             config.get(key, "float", 0.0, finite=True, minimum=0)
@@ -224,23 +146,6 @@ class Laser(ModelPlugin):
                 f"{scan_time:g} s, got {time_increment:g} s per beam, {duration:g} s in total",
             )
         return scan_time, time_increment
-
-    def _read_no_hit(self, config: YamlReader) -> float:
-        values = {"nan": math.nan, "inf": math.inf, "range": self.range}
-        name = config.get("no_hit", "string", "nan")
-        if name not in values:
-            raise at_key(config, "no_hit").error(
-                f'Invalid "no_hit", must be one of: {", ".join(values)}, got {name}'
-            )
-        return values[name]
-
-    def _read_mask(self, config: YamlReader) -> int:
-        layers = config.get_list("layers", "string", ["all"])
-        collision_filter = self.world.collision_filter
-        unknown = collision_filter.unknown(layers)
-        if unknown:
-            raise at_key(config, "layers").error(f"Cannot find layer(s): {{{','.join(unknown)}}}")
-        return collision_filter.category_bits(layers)
 
     @when_due
     def before_physics_step(self, timekeeper: Timekeeper) -> None:
@@ -304,8 +209,13 @@ class Laser(ModelPlugin):
         return compute_scans((self,))[0]
 
     def state(self) -> int | None:
-        """Returns the number of scans that were computed with noise on request, None for 0."""
+        """Returns the number of random scans that were computed on request, None for 0."""
         return self._computed.updates or None
+
+    @property
+    def _is_random(self) -> bool:
+        """Whether scans depend on the number of the update: noise, or materials of the world."""
+        return self._finder.is_random(self.world.physics)
 
     def _request(self, stream: NoiseStream) -> ScanRequest:
         return ScanRequest(self._finder, self.body, stream.key, stream.updates)
@@ -313,8 +223,7 @@ class Laser(ModelPlugin):
     def _keep(self, scan: Scan) -> None:
         """Sets the attributes that describe the last scan."""
         self.last_scan = (scan.pose, scan.ranges)
-        if scan.intensities is not None:
-            self.intensities = scan.intensities
+        self.intensities = _no_intensities() if scan.intensities is None else scan.intensities
 
     def cast_without_noise(self) -> tuple[Pose, FloatArray]:
         """Casts the beams from the current pose without changing the state of the laser.
@@ -354,10 +263,10 @@ def compute_scans(
         StaleHandleError: The body of a laser was destroyed, or its world is closed.
         WorldLockedError: A world is stepping.
     """
-    noisy = [laser for laser in lasers if laser._has_noise]
+    noisy = [laser for laser in lasers if laser._is_random]
     requests = []
     for laser in lasers:
-        if laser._has_noise:
+        if laser._is_random:
             laser._computed.begin_update()
         requests.append(laser._request(laser._computed))
     try:

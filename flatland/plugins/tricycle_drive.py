@@ -10,18 +10,18 @@ from flatland.plugin_api.dynamics_limits import DynamicsLimits
 from flatland.plugin_api.parameters import at_key, read_body, read_not_negative
 from flatland.plugin_api.plugin import ModelPlugin
 from flatland.plugin_api.schedule import when_due
+from flatland.plugin_api.traction import read_traction
+from flatland.plugin_api.wheel_joint import TOLERANCE, WheelJoint, is_off
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from flatland.config.reader import YamlReader
     from flatland.entities.body import Body
-    from flatland.entities.joint import Joint
     from flatland.entities.model import Model
     from flatland.geometry import Pose, Vector2
     from flatland.timekeeper import Timekeeper
 
-_TOLERANCE = 1e-5  # m between an anchor and its required position
 _COMMANDS = ("steering", "twist")
 
 
@@ -46,71 +46,34 @@ class TricycleGeometry:
         Raises:
             YamlError: A joint does not exist, or its type or anchors are invalid.
         """
-        front = _WheelJoint(config, "front_wheel_joint", model)
-        rear_left = _WheelJoint(config, "rear_left_wheel_joint", model)
-        rear_right = _WheelJoint(config, "rear_right_wheel_joint", model)
+        front = WheelJoint(config, "front_wheel_joint", model)
+        rear_left = WheelJoint(config, "rear_left_wheel_joint", model)
+        rear_right = WheelJoint(config, "rear_right_wheel_joint", model)
         front.check_type("revolute", "Front wheel joint must be a revolute joint")
         rear_left.check_type("weld", "Rear left wheel joint must be a weld joint")
         rear_right.check_type("weld", "Rear right wheel joint must be a weld joint")
         front_anchor = front.body_anchor(body)
         left_anchor = rear_left.body_anchor(body)
         right_anchor = rear_right.body_anchor(body)
-        if _off(front_anchor, (0.0, 0.0)):
+        if is_off(front_anchor, (0.0, 0.0)):
             raise front.error("Front wheel joint must have its body anchored at (0, 0)")
         self.front_joint = front.joint
-        # The angle of a joint is that of its body B relative to its body A.
-        self.steering_sign = 1.0 if front.joint.bodies[0] is body else -1.0
+        self.steering_sign = front.steering_sign(body)
         self.rear_center = (
             (left_anchor[0] + right_anchor[0]) / 2,
             (left_anchor[1] + right_anchor[1]) / 2,
         )
-        if not _off(left_anchor, right_anchor):
+        if not is_off(left_anchor, right_anchor):
             raise rear_left.error("The rear wheel joints must not have the same anchor")
-        if _off(self.rear_center, _foot(front_anchor, left_anchor, right_anchor)):
+        if is_off(self.rear_center, _foot(front_anchor, left_anchor, right_anchor)):
             raise rear_left.error(
                 "The mid point between the rear wheel anchors on the body must equal the "
                 "perpendicular intersection between the rear axel (line segment between rear "
                 "anchors) and the front wheel anchor"
             )
         self.wheelbase = math.dist(front_anchor, self.rear_center)
-        if self.wheelbase <= _TOLERANCE:
+        if self.wheelbase <= TOLERANCE:
             raise front.error("The front wheel joint must not be anchored on the rear axle")
-
-
-class _WheelJoint:
-    """A joint named by a parameter, and the place of that parameter for errors."""
-
-    def __init__(self, config: YamlReader, key: str, model: Model) -> None:
-        name = config.get(key, "string")
-        self._place = at_key(config, key)
-        joint = model.find_joint(name)
-        if joint is None:
-            raise self.error(f'Joint with name "{name}" does not exist')
-        self.joint: Joint = joint
-
-    def error(self, text: str) -> Exception:
-        return self._place.error(text)
-
-    def check_type(self, kind: str, text: str) -> None:
-        if self.joint.type != kind:
-            raise self.error(text)
-
-    def body_anchor(self, body: Body) -> Vector2:
-        """Returns the anchor on the body; raises if the one on the wheel is not at its origin."""
-        (ax, ay), (bx, by) = self.joint.anchors.tolist()
-        if self.joint.bodies[0] is body:
-            anchor, wheel_anchor = (ax, ay), (bx, by)
-        elif self.joint.bodies[1] is body:
-            anchor, wheel_anchor = (bx, by), (ax, ay)
-        else:
-            raise self.error(f'Joint "{self.joint.name}" does not anchor on body "{body.name}"')
-        if _off(wheel_anchor, (0.0, 0.0)):
-            raise self.error(f'Joint "{self.joint.name}" must be anchored at (0, 0) on the wheel')
-        return anchor
-
-
-def _off(point: Vector2, target: Vector2) -> bool:
-    return abs(point[0] - target[0]) > _TOLERANCE or abs(point[1] - target[1]) > _TOLERANCE
 
 
 def _foot(point: Vector2, start: Vector2, end: Vector2) -> Vector2:
@@ -127,6 +90,7 @@ class TricycleDrive(ModelPlugin):
 
     Attributes:
         geometry: Positions of the wheels.
+        traction: Limits of the forces in mode `force`; None in mode `velocity`.
     """
 
     def on_initialize(self, config: YamlReader) -> None:
@@ -166,6 +130,7 @@ class TricycleDrive(ModelPlugin):
             )
         )
         self._set_limits()
+        self.traction = read_traction(config, self.body, self._controller, at_center=True)
 
     @staticmethod
     def _read_command_type(config: YamlReader) -> str:
@@ -280,7 +245,8 @@ class TricycleDrive(ModelPlugin):
     def state(self) -> object:
         """Returns the state of the front wheel and of the odometry."""
         *wheel, target_angle = self._controller.state
-        return (tuple(wheel), target_angle, self._odometer.state())
+        state = (tuple(wheel), target_angle, self._odometer.state())
+        return state if self.traction is None else (*state, self._controller.traction_state)
 
     def _publish_now(self, timekeeper: Timekeeper) -> None:
         self._publish(timekeeper.sim_time_ns, self.body.pose)

@@ -242,10 +242,12 @@ _CHANGES: Final[dict[str, Callable[..., object]]] = {
     "move_model": World.move_model,
     "delete_model": World.delete_model,
     "reset": World.reset,
+    "set_appearance": World.set_appearance,
     "set_layer_map": lambda world, name, source: world.set_layer_map(name, source),
     "spawn_models": World.spawn_models,
     "move_models": World.move_models,
     "delete_models": World.delete_models,
+    "call_plugin": World.call_plugin,
 }
 
 

@@ -12,6 +12,7 @@ import rospy
 from flatland.errors import PLUGIN_FAULTS, PluginError
 from flatland.graph_names import resolve_topic
 from flatland.plugin_api.plugin import FlatlandPlugin, describe
+from flatland.ros.message_types import service_class
 from flatland.ros.transport.publisher import Publisher
 from flatland.ros.transport.registrar import Registrar
 from flatland.ros.transport.service import Service, wait_for
@@ -116,13 +117,13 @@ class PluginRos:
         return subscriber
 
     def advertise_service(
-        self, name: str, service_type: type[Any], handler: Callable[[Any], Any]
+        self, name: str, service_type: type[Any] | str, handler: Callable[[Any], Any]
     ) -> Service:
         """Advertises a service.
 
         Args:
             name: Name in the namespace of the model.
-            service_type: ROS service class.
+            service_type: ROS service class, or the name of a service of flatland.
             handler: Called with each request between two steps; returns the response. Its
                 exceptions are reported to the client.
 
@@ -145,7 +146,7 @@ class PluginRos:
         service = Service(
             self._registrar,
             self._resolve(name),
-            service_type,
+            service_class(service_type) if isinstance(service_type, str) else service_type,
             lambda request: wait_for(self._post(lambda: run(request)), self._plugin.world.requests),
             owner=self._owner,
         )

@@ -9,6 +9,7 @@ from typing import Any
 import rospy
 from std_srvs.srv import Empty, EmptyResponse
 
+from flatland.ros.appearance_service import AppearanceService
 from flatland.ros.batch_services import BatchServices
 from flatland.ros.clock import NodeClock
 from flatland.ros.layer_maps import LayerMaps
@@ -64,6 +65,7 @@ class Services:
         StepService(self._calls, clock)
         ResetService(self._calls)
         LayerMaps(self._calls)
+        AppearanceService(self._calls)
         ModelStatesService(self._calls)
         ModelStatesTopic(self._calls, model_states_rate)
         BatchServices(self._calls, if_blocked, move_keeps_odometry=move_keeps_odometry)

@@ -12,6 +12,7 @@ from flatland.config.reader import ReadYaml, YamlReader
 from flatland.errors import WorldError
 from flatland.geometry import DoubleArray
 from flatland.loading.model_source import ModelSpec
+from flatland.runtime.appearance import Appearance
 from flatland.runtime.layer_maps import LayerMaps
 from flatland.runtime.many_models import ManyModels, plain_pose
 from flatland.runtime.placement import IfBlocked, Models, check_if_blocked
@@ -47,7 +48,7 @@ if TYPE_CHECKING:
 R = TypeVar("R")
 
 
-class Contents(ManyModels, LayerMaps, SavedStates):
+class Contents(ManyModels, LayerMaps, Appearance, SavedStates):
     """Everything that is in a world; the base class of `World`, which creates and steps it.
 
     Changes that a plugin's hook requests take effect after the step.
@@ -232,6 +233,35 @@ class Contents(ManyModels, LayerMaps, SavedStates):
             WorldError: The model does not exist.
         """
         self._change("delete_model", {"name": name}, lambda: self._models.delete(name))
+
+    def call_plugin(
+        self, plugin: WorldPlugin | str, method: str, arguments: Mapping[str, object]
+    ) -> Any:
+        """Calls a method of a world plugin between two steps, as a change of the world.
+
+        Recordings contain the call with its arguments, so that a replay repeats it.
+
+        Args:
+            plugin: The plugin or its name.
+            method: One of `WorldPlugin.recorded_methods` of its class.
+            arguments: Arguments of the method by name: values that a recording can contain.
+
+        Returns:
+            What the method returns; None if a hook calls this: it is then called after the step.
+
+        Raises:
+            WorldError: The plugin or the method does not exist.
+        """
+        name = plugin if isinstance(plugin, str) else plugin.name
+        found = next((one for one in self.plugins if plugin in (one, one.name)), None)
+        if found is None or method not in type(found).recorded_methods:
+            raise WorldError(f'world plugin "{name}" with the method {method} does not exist')
+        call = getattr(found, method)
+        return self._change(
+            "call_plugin",
+            {"plugin": name, "method": method, "arguments": dict(arguments)},
+            lambda: call(**arguments),
+        )
 
     def _change(
         self, kind: str, arguments: Mapping[str, object], action: Callable[[], R]

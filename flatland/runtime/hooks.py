@@ -200,8 +200,12 @@ class HookTable:
         return self._contact_hooks[hook].between(body_a.entity, body_b.entity)
 
     def of_move(self, model: Model) -> HookList:
-        """Returns the hook `model_moved` of the plugins of a model that are not disabled."""
-        return [(plugin, plugin.model_moved) for plugin in model.plugins if plugin in self._order]
+        """Returns the hook `model_moved` of the plugins of a model and of its followers.
+
+        Plugins that are disabled or have ended are omitted.
+        """
+        plugins = (*model.plugins, *model.followers)
+        return [(plugin, plugin.model_moved) for plugin in plugins if plugin in self._order]
 
     def has_any(self, *hooks: str) -> bool:
         """Returns whether any plugin overrides one of some contact hooks."""

@@ -112,6 +112,8 @@ def _make_layer(world: World, layer: Layer, layer_map: LayerMap) -> Layer:
             layer.category_bits,
             layer.color,
             layer.properties,
+            material=layer.material,
+            class_name=layer.class_name,
             origin=layer_map.origin,
             exact_edge_count=layer_map.exact_edge_count,
             unknown_map_keys=layer_map.unknown_keys,

@@ -48,6 +48,9 @@ class WorldObserver:
     def model_moved(self, model: Model) -> None:
         """A model was moved by a request."""
 
+    def model_changed(self, model: Model) -> None:
+        """The colour, layers or visibility of bodies of a model may have changed."""
+
     def model_removed(self, model: Model) -> None:
         """A model was removed from the world."""
 
@@ -180,6 +183,15 @@ class Observers:
     def model_moved(self, model: Model) -> None:
         """Notifies all observers."""
         self._notify("model_moved", model)
+
+    def model_changed(self, model: Model) -> None:
+        """Notifies all observers."""
+        self._notify("model_changed", model)
+
+    @property
+    def watch_appearance(self) -> bool:
+        """Whether an observer overrides `model_changed`."""
+        return any(_overrides(observer, "model_changed") for observer in self._all)
 
     def model_removed(self, model: Model) -> None:
         """Notifies all observers."""

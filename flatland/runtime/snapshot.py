@@ -11,6 +11,7 @@ from flatland.copying.record import Recorder
 from flatland.entities.collision_filter import CollisionFilter
 from flatland.errors import WorldError
 from flatland.loading.world_loader import reload_world
+from flatland.runtime.appearance import appearance_of
 from flatland.runtime.clone import clone_world
 from flatland.runtime.uncopyable import check_revivable, located, parts_outside
 from flatland.timekeeper import NANOSECONDS
@@ -140,6 +141,8 @@ class WorldStates:
         for model in reversed(models):
             if model not in kept:
                 world._models.delete(model.name)
+        watched = kept if world._observers.watch_appearance else ()
+        appearances = [(model, appearance_of(model)) for model in models if model in watched]
         ports, time_ns = _Ports(world), world.timekeeper.sim_time_ns
         world.physics.become_copy_of(snapshot._physics)
         error = snapshot._record.write_back()
@@ -147,6 +150,9 @@ class WorldStates:
         if world.timekeeper.sim_time_ns != time_ns:
             world._observers.time_advanced(world.timekeeper.sim_time_ns)
         self._notify(ports, snapshot, revived)
+        for model, appearance in appearances:
+            if appearance_of(model) != appearance:
+                world._observers.model_changed(model)
         if error is not None:
             raise error
 

@@ -168,7 +168,7 @@ class StepSchedule:
         self._drop_targets(plugin)
 
     def _drop_targets(self, plugin: FlatlandPlugin) -> None:
-        """Drops commands that were set since the last step; other threads may add some meanwhile."""
+        """Drops commands that were set since the last step; other threads may add more."""
         for _ in range(len(self.targets)):
             entry = self.targets.popleft()
             if entry[0] is not plugin:

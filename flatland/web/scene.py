@@ -52,7 +52,8 @@ class TrackedModel:
         bodies: Its bodies, when it was described.
         body_ids: Ids of the bodies.
         lasers: Its lasers and similar sensors by id.
-        key: Changes when the description is outdated.
+        key: Changes when the description is outdated, except for layers of footprints.
+        layer_bits: Layers of all footprints, when it was described.
     """
 
     id: int
@@ -61,6 +62,7 @@ class TrackedModel:
     body_ids: list[int]
     lasers: dict[int, RangingSensor]
     key: object
+    layer_bits: list[int]
 
 
 @dataclass(slots=True, eq=False)
@@ -105,6 +107,7 @@ class Scene:
         self._known: dict[Model, TrackedModel] = {}
         self._order: list[Model] = []
         self._check_due = 0.0
+        self._checked_change = -1  # of `World.change_count`, at the last search
         self.models: dict[int, TrackedModel] = {}
         self.bodies: list[Body] = []
         self.lasers: dict[int, RangingSensor] = {}
@@ -143,7 +146,15 @@ class Scene:
             change.removed.append(known.id)
 
     def _renew_changed(self, change: SceneChange) -> None:
-        changed = [known for known in self.models.values() if _key(known.model) != known.key]
+        # Only requests change layers, and their search takes longer.
+        may_have_changed = self._world.change_count != self._checked_change
+        self._checked_change = self._world.change_count
+        changed = [
+            known
+            for known in self.models.values()
+            if _key(known.model) != known.key
+            or (may_have_changed and _layer_bits(known.model) != known.layer_bits)
+        ]
         outputs = self._outputs_by_owner() if changed else {}
         for known in changed:
             self._add(known.model, known.id, outputs, change)
@@ -159,7 +170,7 @@ class Scene:
         former = self.models.get(number)
         body_ids = dict(zip(former.bodies, former.body_ids, strict=True)) if former else {}
         bodies = list(model.bodies)
-        known = TrackedModel(number, model, bodies, [], {}, _key(model))
+        known = TrackedModel(number, model, bodies, [], {}, _key(model), _layer_bits(model))
         for body in bodies:
             known.body_ids.append(body_ids.get(body) or next(self._ids))
         former_lasers = {s.plugin: n for n, s in former.lasers.items()} if former else {}
@@ -202,6 +213,7 @@ class Scene:
                     "anchors": joint.anchors.tolist(),
                 }
                 for joint in model.joints
+                if all(body.visible for body in joint.bodies)
             ],
             "commands": [c.topic for c in commands if c.value_type is Twist],
             "outputs": [output.topic for output in outputs],
@@ -213,7 +225,9 @@ class Scene:
             "name": body.name,
             "color": list(body.color),
             "type": body.type,
-            "shapes": [describe_shape(f, self._layer_names(f)) for f in body.fixtures],
+            "shapes": [
+                describe_shape(f, self._layer_names(f)) for f in body.fixtures if body.visible
+            ],
         }
 
     def _layer_names(self, fixture: PhysicsFixture) -> list[str]:
@@ -264,4 +278,11 @@ def _describe_sensor(sensor: RangingSensor, number: int, body: int) -> Descripti
 
 def _key(model: Model) -> object:
     """Returns what changes with the description of a model."""
-    return (model.name, [(body.id, body.color, body.fixture_ids) for body in model.bodies])
+    return (
+        model.name,
+        [(body.id, body.color, body.visible, body.fixture_ids) for body in model.bodies],
+    )
+
+
+def _layer_bits(model: Model) -> list[int]:
+    return [fixture.category_bits for body in model.bodies for fixture in body.fixtures]

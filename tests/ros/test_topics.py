@@ -84,6 +84,7 @@ SERVICES = {
     "/delete_models",
     "/move_models",
     "/get_model_states",
+    "/set_appearance",
     "/set_layer_map",
     "/step_world",
     "/reset_world",

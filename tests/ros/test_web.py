@@ -150,6 +150,22 @@ def test_page_and_topic_drive_the_same_command(client: WebClient, ros: Any) -> N
     truth.until(lambda message: message.twist.twist.linear.x == 0)
 
 
+def test_the_inspector_shows_the_latest_values_of_topics(client: WebClient, ros: Any) -> None:
+    robot = client.model("robot")
+    truth = ros.topic("/odometry/ground_truth", Odometry).next()
+    client.look(inspect=robot["id"])
+
+    def values() -> dict[str, Any]:
+        details = [text for text in client.texts if text["type"] == "details"]
+        return {topic["topic"]: topic for topic in details[-1]["topics"]} if details else {}
+
+    client.until("a value", lambda: values().get("/odometry/ground_truth", {}).get("value"))
+    topics = values()
+    assert str(round(truth.pose.pose.position.x, 3)) in str(topics["/odometry/ground_truth"])
+    assert topics["/cmd_vel"]["kind"] == "command"
+    assert "/scan" in topics
+
+
 def test_a_drag_in_rviz_and_one_on_the_page_share_the_pause(client: WebClient, ros: Any) -> None:
     from visualization_msgs.msg import InteractiveMarkerFeedback as Feedback
 

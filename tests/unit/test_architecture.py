@@ -15,7 +15,7 @@ FLOORS = (
     ("physics", "values"),
     ("config", "entities"),
     ("copying", "maps", "plugin_api"),
-    ("loading", "plugins"),
+    ("loading", "plugins", "worldgen"),
     ("runtime",),
     ("world",),
     ("simulation", "drawing", "recording"),

@@ -90,9 +90,19 @@ class InteractiveMarkers(WorldObserver):
         self._server.insert(model_handle(model, name))
         self._apply_without_clients()
 
+    def model_changed(self, model: Model) -> None:
+        """Replaces the marker of a model whose colours or visibility have changed."""
+        name = self._name_of(model)
+        if name is None or self._closed:
+            return
+        self._server.erase(name)
+        self._server.insert(model_handle(model, name))
+        self._invalidate_published(name)
+        self._apply_without_clients()
+
     def model_removed(self, model: Model) -> None:
         """Removes the marker of a model."""
-        name = next((name for name, other in self._models.items() if other is model), None)
+        name = self._name_of(model)
         if name is None or self._closed:
             return
         self._drags.end(name)
@@ -100,6 +110,9 @@ class InteractiveMarkers(WorldObserver):
         del self._models[name], self._published[name]
         self._server.erase(name)
         self._apply_without_clients()
+
+    def _name_of(self, model: Model) -> str | None:
+        return next((name for name, other in self._models.items() if other is model), None)
 
     def _apply_without_clients(self) -> None:
         # Without clients nothing is published, so that the update rate does not matter.

@@ -96,7 +96,7 @@ class _ModelOutline:
     """Outline of a model in the frame of its first body.
 
     Attributes:
-        markers: One marker for each body with footprints.
+        markers: One marker for each visible body with footprints.
         radius: Upper bound of the distance of points from the origin [m].
     """
 
@@ -110,9 +110,10 @@ class _ModelOutline:
                 self._add(body, compose(to_first, body.pose), np.concatenate(outlines))
 
     def _add(self, body: Body, pose: Pose, points: DoubleArray) -> None:
-        marker = _marker(Marker.LINE_LIST, (LINE_WIDTH, 0.0, 0.0), body.color)
-        marker.pose = pose_message(pose)
-        marker.points = [Point(*point) for point in points.tolist()]
-        self.markers.append(marker)
+        if body.visible:
+            marker = _marker(Marker.LINE_LIST, (LINE_WIDTH, 0.0, 0.0), body.color)
+            marker.pose = pose_message(pose)
+            marker.points = [Point(*point) for point in points.tolist()]
+            self.markers.append(marker)
         max_distance = np.hypot(points[:, 0], points[:, 1]).max()
         self.radius = max(self.radius, float(max_distance) + math.hypot(pose[0], pose[1]))

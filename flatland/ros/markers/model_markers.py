@@ -30,8 +30,11 @@ JOINT_CUBE: Final = (0.03, 0.03, 0.03)
 _LINE_POINTS: Final = struct.Struct("<18d")
 _CUBE_POINTS: Final = struct.Struct("<12d")
 
-Shapes = list[tuple[Color, list[int]]]
-"""Colour of each body, and the ids of its fixtures; a change means that markers are outdated."""
+Shapes = list[tuple[Color, bool, list[int]]]
+"""Colour and visibility of each body, and the ids of its fixtures.
+
+A change means that markers are outdated.
+"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,8 +75,8 @@ class ModelMarkers:
             time_ns: Stamp of the markers, simulated time [ns].
         """
         bodies = self._model.bodies
-        # Plugins can change footprints and colours.
-        shapes = [(body.color, body.fixture_ids) for body in bodies]
+        # Plugins and requests can change footprints, colours and visibility.
+        shapes = [(body.color, body.visible, body.fixture_ids) for body in bodies]
         if shapes != self._shapes:
             self._build()
             self._shapes = shapes
@@ -107,9 +110,15 @@ class ModelMarkers:
         model, markers = self._model, PackedMarkers(self._model.name)
         self._footprints = [
             [add_footprint(markers, fixture, body.color) for fixture in body.fixtures]
+            if body.visible
+            else []
             for body in model.bodies
         ]
-        self._joints = [_add_joint(markers, joint, model.bodies) for joint in model.joints]
+        self._joints = [
+            _add_joint(markers, joint, model.bodies)
+            for joint in model.joints
+            if all(body.visible for body in joint.bodies)
+        ]
         self._poses = []
         while len(markers) < previous_count:
             markers.add_deletion()

@@ -2,6 +2,8 @@
 #include <pybind11/stl.h>
 
 #include <algorithm>
+#include <optional>
+#include <stdexcept>
 #include <string>
 #include <tuple>
 #include <vector>
@@ -73,6 +75,24 @@ py::array_t<Scalar> to_array(const std::vector<std::array<Scalar, kWidth>>& rows
   return array;
 }
 
+using PyMaterial = std::tuple<float, float, float>;
+
+Material checked_material(double reflectance, double transmission, double specular) {
+  const auto checked_share = [](double share, const char* name) {
+    if (share >= 0.0 && share <= 1.0) return static_cast<float>(share);
+    throw std::invalid_argument(std::string(name) + " must be from 0 to 1, got " + to_text(share));
+  };
+  const Material material{checked_share(reflectance, "reflectance"),
+                          checked_share(transmission, "transmission"),
+                          checked_share(specular, "specular")};
+  constexpr double kTolerance = 1e-9;
+  if (transmission + specular > 1.0 + kTolerance) {
+    throw std::invalid_argument("transmission + specular must be at most 1, got " +
+                                to_text(transmission + specular));
+  }
+  return material;
+}
+
 const char* shape_name(const b2Fixture& fixture) {
   if (fixture.GetType() == b2Shape::e_circle) return "circle";
   return fixture.GetType() == b2Shape::e_polygon ? "polygon" : "edge";
@@ -119,6 +139,31 @@ void bind_fixtures(WorldClass& world) {
   world.def("fixture_filter", [](const World& self, Id id) {
     const b2Filter& filter = self.read_fixture(id)->GetFilterData();
     return std::make_tuple(filter.categoryBits, filter.maskBits);
+  });
+  world.def("fixture_material", [](World& self, Id id) -> std::optional<PyMaterial> {
+    const b2Fixture* fixture = self.read_fixture(id);
+    const Materials& materials = self.rays().materials();
+    const std::uint16_t number = materials.number_of(RayScene::Fixtures::slot_of(id_of(fixture)));
+    if (number == 0) return std::nullopt;
+    const Material& material = materials.at(number);
+    return PyMaterial{material.reflectance, material.transmission, material.specular};
+  });
+  world.def("set_fixture_material",
+            [](World& self, Id id, double reflectance, double transmission, double specular) {
+              const Material material = checked_material(reflectance, transmission, specular);
+              self.rays().set_material(self.change_fixture(id), material);
+            });
+  world.def("set_body_material",
+            [](World& self, Id id, double reflectance, double transmission, double specular) {
+              const Material material = checked_material(reflectance, transmission, specular);
+              const b2Body* body = self.change_body(id);
+              for (const b2Fixture* f = body->GetFixtureList(); f != nullptr; f = f->GetNext()) {
+                self.rays().set_material(f, material);
+              }
+            });
+  world.def_property_readonly("has_materials", [](World& self) {
+    self.check_readable();
+    return !self.rays().materials().is_empty();
   });
   world.def("set_fixture_filter",
             [](World& self, Id id, std::int64_t category_bits, std::int64_t mask_bits) {

@@ -43,7 +43,8 @@ std::shared_ptr<BeamFan> make_fan(const Ends& ends) {
 
 RangeFinder make_finder(const std::shared_ptr<BeamFan>& fan, const PyPose& origin, double length,
                         std::int64_t mask, std::int64_t reflect_mask, double range_min,
-                        double no_hit, std::optional<RangeNoise> noise) {
+                        double no_hit, std::optional<RangeNoise> noise, bool uses_materials,
+                        bool is_cone) {
   const auto& [x, y, theta] = origin;
   checked_vector(x, y, "origin");
   checked_finite(theta, "origin angle");
@@ -54,7 +55,9 @@ RangeFinder make_finder(const std::shared_ptr<BeamFan>& fan, const PyPose& origi
       checked_bits(reflect_mask, "reflect_mask"),
       {checked_not_negative(range_min, "range_min"),
        std::isfinite(no_hit) ? checked_finite(no_hit, "no_hit") : static_cast<float>(no_hit)},
-      std::move(noise)};
+      std::move(noise),
+      uses_materials,
+      is_cone};
   return RangeFinder(fan, parameters);
 }
 
@@ -86,12 +89,14 @@ class PyScans {
  public:
   // Readings are written to new arrays.
   void add(World& world, const RangeFinder& finder, Id body, const NoiseKey& key) {
-    add(world, finder, body, key, Ranges(static_cast<py::ssize_t>(finder.beams())));
+    add(world, finder, body, key, Ranges(static_cast<py::ssize_t>(finder.readings())));
   }
 
   void add(World& world, const RangeFinder& finder, Id body, const NoiseKey& key, Ranges ranges) {
     std::optional<Ranges> intensities;
-    if (finder.has_intensities()) intensities.emplace(static_cast<py::ssize_t>(finder.beams()));
+    if (finder.has_intensities(world.rays())) {
+      intensities.emplace(static_cast<py::ssize_t>(finder.beams()));
+    }
     scans_.push_back({&world, &finder, body, key, std::move(ranges), std::move(intensities), {}});
     beams_ += finder.beams();
   }
@@ -146,6 +151,29 @@ py::tuple py_scan(const RangeFinder& finder, World& world, Id body, std::uint64_
   return scans.run(world.threads(), 1).front();
 }
 
+// A scan with what the beams hit: (pose, ranges, labels, [(body, category bits)]).
+py::tuple py_scan_labels(const RangeFinder& finder, World& world, Id body, std::uint64_t stream,
+                         std::uint64_t update) {
+  const Triple pose = finder.pose_of(pose_of(world, body));
+  Ranges ranges(static_cast<py::ssize_t>(finder.readings()));
+  py::array_t<std::uint32_t> labels(static_cast<py::ssize_t>(finder.beams()));
+  HitTable hits{labels.mutable_data(), {}};
+  const Readings out{ranges.mutable_data(), nullptr, &hits};
+  const ScanJob job{&world.rays(), &finder, to_transform(pose), {stream, update}, out};
+  {
+    SharedUses uses;
+    uses.add(world);
+    without_gil_if(finder.beams() > kShortScans, uses,
+                   [&] { scan_all({job}, world.threads(), 1); });
+  }
+  std::vector<std::tuple<Id, std::uint16_t>> entries;
+  for (const HitTable::Entry& entry : hits.entries) {
+    entries.emplace_back(entry.body, entry.category_bits);
+  }
+  return py::make_tuple(std::make_tuple(pose[0], pose[1], pose[2]), std::move(ranges),
+                        std::move(labels), std::move(entries));
+}
+
 // A view of row `i` of the output array.
 Ranges row_of(const Ranges& out, py::ssize_t i) {
   return Ranges({out.shape(1)}, {out.strides(1)}, out.data(i, 0), out);
@@ -156,12 +184,12 @@ Ranges checked_output(const py::object& out, const std::vector<PyJob>& jobs) {
     throw py::type_error("out must be a C-contiguous array of type float32");
   }
   auto array = py::cast<Ranges>(out);
-  const std::size_t beams = jobs.empty() ? 0 : std::get<1>(jobs.front())->beams();
+  const std::size_t beams = jobs.empty() ? 0 : std::get<1>(jobs.front())->readings();
   for (const PyJob& job : jobs) {
-    if (std::get<1>(job)->beams() != beams) {
+    if (std::get<1>(job)->readings() != beams) {
       throw py::value_error("out requires scans with the same number of beams, got " +
                             std::to_string(beams) + " and " +
-                            std::to_string(std::get<1>(job)->beams()));
+                            std::to_string(std::get<1>(job)->readings()));
     }
   }
   const bool fits = array.ndim() == 2 && array.shape(0) == static_cast<py::ssize_t>(jobs.size()) &&
@@ -223,8 +251,18 @@ void bind_range_finder(py::module_& module) {
       "A fan of beams with what stops them and how they are read; immutable.")
       .def(py::init(&make_finder), py::kw_only(), py::arg("fan").none(false), py::arg("origin"),
            py::arg("length"), py::arg("mask"), py::arg("reflect_mask"), py::arg("range_min"),
-           py::arg("no_hit"), py::arg("noise"))
+           py::arg("no_hit"), py::arg("noise"), py::arg("uses_materials"), py::arg("is_cone"))
       .def_property_readonly("beams", &RangeFinder::beams)
+      .def_property_readonly("readings", &RangeFinder::readings)
+      .def(
+          "is_random",
+          [](const RangeFinder& self, World& world) {
+            world.check_readable();
+            return self.is_random(world.rays());
+          },
+          py::arg("world"))
+      .def("scan_labels", &py_scan_labels, py::arg("world"), py::arg("body"), py::arg("stream"),
+           py::arg("update"))
       .def("scan", &py_scan, py::arg("world"), py::arg("body"), py::arg("stream"),
            py::arg("update"));
   module.def("scan_all", &py_scan_all, py::arg("jobs"), py::arg("out"), py::arg("num_threads"));

@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "bindings/bindings.h"
+#include "bindings/controllers.h"
 #include "world/bodies.h"
 #include "world/errors.h"
 
@@ -21,46 +22,7 @@ namespace py = pybind11;
 namespace flatland {
 namespace {
 
-using Limits = std::tuple<double, double, double>;
-using PyTriple = std::tuple<double, double, double>;
-
 Phase phase_of(bool is_after) { return is_after ? Phase::kAfter : Phase::kBefore; }
-
-double checked_limit(double limit) {
-  if (!(limit >= 0.0)) {
-    throw py::value_error("a limit must not be negative or NaN, got " + to_text(limit));
-  }
-  return limit;
-}
-
-SpeedLimits to_limits(const Limits& limits) {
-  const auto& [velocity, acceleration, deceleration] = limits;
-  return {checked_limit(velocity), checked_limit(acceleration), checked_limit(deceleration)};
-}
-
-Controller& changed_controller(World& world, Id id) {
-  world.check_changeable();
-  Controller* controller = world.plan().find_controller(id);
-  if (controller == nullptr) throw StaleHandleError("the controller was removed");
-  return *controller;
-}
-
-template <typename Kind>
-Kind& motion_of(World& world, Id id) {
-  Kind* motion = std::get_if<Kind>(&changed_controller(world, id).motion);
-  if (motion == nullptr) throw PhysicsError("the controller is of another kind");
-  return *motion;
-}
-
-Id add_controller(World& world, Id body, Motion motion) {
-  world.change_body(body);  // throws if it does not exist
-  Controller controller;
-  controller.body = body;
-  controller.motion = std::move(motion);
-  return world.plan().add_controller(controller);
-}
-
-PyTriple to_python(const Triple& t) { return {t[0], t[1], t[2]}; }
 
 void bind_tricycle(WorldClass& world) {
   world.def(
@@ -141,7 +103,7 @@ void bind_tween(WorldClass& world) {
     return py::make_tuple(motion.progress, motion.exact_progress, motion.is_forward);
   });
   world.def("hold_controller", [](World& self, Id id) {
-    const Controller& controller = changed_controller(self, id);
+    Controller& controller = changed_controller(self, id);
     hold(self, self.change_body(controller.body), controller.motion);
   });
 }
@@ -175,6 +137,7 @@ void bind_controllers(WorldClass& world) {
             });
   bind_tricycle(world);
   bind_tween(world);
+  bind_motions(world);
   world.def("has_controller",
             [](World& self, Id id) { return self.plan().find_controller(id) != nullptr; });
   world.def("remove_controller", [](World& self, Id id) {

@@ -12,6 +12,7 @@ PYBIND11_MODULE(_core, module) {
   flatland::bind_errors();
   flatland::WorldClass world = flatland::bind_world(module);
   flatland::bind_bodies(world);
+  flatland::bind_crowd(module, world);
   flatland::bind_fixtures(world);
   flatland::bind_joints(world);
   flatland::bind_contacts(module, world);

@@ -26,7 +26,9 @@ BeamFan::BeamFan(const float* ends, std::size_t count) : ends_(ends, ends + 2 * 
     order_.push_back(static_cast<std::uint32_t>(i));
   }
   const auto angle_less = [&](std::uint32_t a, std::uint32_t b) { return angles[a] < angles[b]; };
-  std::stable_sort(order_.begin(), order_.end(), angle_less);
+  if (!std::is_sorted(order_.begin(), order_.end(), angle_less)) {
+    std::stable_sort(order_.begin(), order_.end(), angle_less);
+  }
 
   x_.resize(order_.size());
   y_.resize(order_.size());

@@ -3,12 +3,26 @@
 // `draw_solids`. Function templates of other headers must not be used: the linker could choose a
 // copy compiled for an instruction set that the processor lacks.
 
+//
+// With kFindsFixtures, the kernel also records which fixture each ray hits, and fixtures may let
+// rays pass (see HitRules). Of several fixtures at the same distance, one is recorded that depends
+// neither on the instruction set nor on other scans: edges are always drawn in the same order, and
+// circles and polygons replace fixtures with higher slots.
+
+template <bool kFindsFixtures>
 struct Kernel {
   using Floats = Lanes::Floats;
+  using Words = Lanes::Words;
   using Mask = Lanes::Mask;
 
   const ScanView& scan;
   const ScanFrame& frame;
+  const HitView* hits;  // null without kFindsFixtures
+
+  // A fixture to be drawn, used only with kFindsFixtures.
+  struct Object {
+    std::uint32_t fixture, pass_limit;
+  };
 
   // -- rays and their hits -----------------------------------------------------------------------
 
@@ -38,12 +52,49 @@ struct Kernel {
   }
 
   // Records the hits of a vector of rays that are nearer than their previous ones; NaN is a miss.
-  FLATLAND_INLINE void record_hits(std::int32_t first, Floats fraction, Mask is_hit) const {
+  FLATLAND_INLINE void record_hits(std::int32_t first, Floats fraction, Mask is_hit,
+                                   const Object& object) const {
     const Floats before = Lanes::load(scan.fraction + first);
-    const Mask is_nearer = Lanes::both(Lanes::less_equal(Lanes::broadcast(0.0F), fraction),
-                                       Lanes::less(fraction, before));
-    Lanes::store(scan.fraction + first,
-                 Lanes::select(Lanes::both(is_hit, is_nearer), fraction, before));
+    if constexpr (kFindsFixtures) {
+      Floats fixture = Lanes::load(hits->fixture + first);
+      const Mask is_ahead = Lanes::less_equal(least_fraction(first), fraction);
+      const Mask is_first = Lanes::less(Lanes::words(object.fixture), Lanes::as_words(fixture));
+      const Mask is_nearer = Lanes::either(Lanes::less(fraction, before),
+                                           Lanes::both(Lanes::equal(fraction, before), is_first));
+      const Mask is_new =
+          stopped(first, Lanes::both(Lanes::both(is_hit, is_ahead), is_nearer), object);
+      if (!Lanes::any(is_new)) return;
+      Lanes::store(scan.fraction + first, Lanes::select(is_new, fraction, before));
+      fixture = Lanes::select(is_new, Lanes::as_floats(Lanes::words(object.fixture)), fixture);
+      Lanes::store(hits->fixture + first, fixture);
+    } else {
+      const Mask is_nearer = Lanes::both(Lanes::less_equal(Lanes::broadcast(0.0F), fraction),
+                                         Lanes::less(fraction, before));
+      Lanes::store(scan.fraction + first,
+                   Lanes::select(Lanes::both(is_hit, is_nearer), fraction, before));
+    }
+  }
+
+  // The least fraction of a hit of a vector of rays.
+  FLATLAND_INLINE Floats least_fraction(std::int32_t first) const {
+    if (hits->nearest == nullptr) return Lanes::broadcast(0.0F);
+    return Lanes::load(hits->nearest + first);
+  }
+
+  // Returns which rays of a vector an object stops.
+  FLATLAND_INLINE Mask stopped(std::int32_t first, Mask is_hit, const Object& object) const {
+    if (object.pass_limit == Materials::kOpaque || !Lanes::any(is_hit)) return is_hit;
+    const auto* words = reinterpret_cast<const float*>(hits->words);
+    const Words fate =
+        fate_word(Lanes::as_words(Lanes::load(words + first)), hits->leg ^ object.fixture);
+    return Lanes::but_not(is_hit, Lanes::less(fate, Lanes::words(object.pass_limit)));
+  }
+
+  // Returns a fixture as an object, which is invisible if rays do not end at it.
+  FLATLAND_INLINE Object object_of(std::uint32_t fixture) const {
+    if (fixture == hits->excluded) return {fixture, Materials::kInvisible};
+    const std::uint16_t number = fixture < hits->count ? hits->number[fixture] : std::uint16_t{0};
+    return {fixture, hits->pass_limit[number]};
   }
 
   // End points of a vector of rays in the world frame.
@@ -161,6 +212,9 @@ struct Kernel {
         const Interval rays{found.begin[i], found.end[i]};
         const float distance = found.distance[i] * rounding;
         if (!frame.masks.pass(node.category_bits[i]) || !is_visible(rays, distance)) continue;
+        if constexpr (kFindsFixtures) {
+          if (is_before(node, i)) continue;
+        }
         // Insertion sort, with the nearest entry on top of the stack.
         std::size_t top = size++;
         for (; top > first && stack[top - 1].distance < distance; --top) {
@@ -169,6 +223,15 @@ struct Kernel {
         stack[top] = {distance, rays, node.child[i]};
       }
     }
+  }
+
+  // Whether a box is nearer than the least distance of all hits.
+  FLATLAND_INLINE bool is_before(const EdgeTree::Node& node, std::uint32_t i) const {
+    const float x0 = node.min_x[i] - frame.origin.x, x1 = node.max_x[i] - frame.origin.x;
+    const float y0 = node.min_y[i] - frame.origin.y, y1 = node.max_y[i] - frame.origin.y;
+    const float xx = x0 * x0 > x1 * x1 ? x0 * x0 : x1 * x1;
+    const float yy = y0 * y0 > y1 * y1 ? y0 * y0 : y1 * y1;
+    return xx + yy < hits->least_distance * hits->least_distance;
   }
 
   // -- edges -------------------------------------------------------------------------------------
@@ -183,12 +246,18 @@ struct Kernel {
   // `find_edge_on`.
   template <bool kIsEdgeOn>
   FLATLAND_INLINE void draw_edges(const EdgeTree::Leaf& leaf, const Edges& edges, std::uint32_t set,
-                                  std::int32_t first) const {
+                                  std::int32_t first, const Object* objects) const {
     const Floats zero = Lanes::broadcast(0.0F);
     const Floats miss = Lanes::broadcast(kMissFraction);
     const Floats d_x = Lanes::load(scan.d_x + first);
     const Floats d_y = Lanes::load(scan.d_y + first);
     Floats nearest = Lanes::load(scan.fraction + first);
+    Floats fixture = nearest;
+    Floats least = zero;
+    if constexpr (kFindsFixtures) {
+      fixture = Lanes::load(hits->fixture + first);
+      least = least_fraction(first);
+    }
     for (; set != 0; set &= set - 1) {
       const int i = __builtin_ctz(set);
       const Floats side_a = d_x * edges.a_y[i] - d_y * edges.a_x[i];
@@ -205,11 +274,21 @@ struct Kernel {
                                           Lanes::less_equal(zero, Lanes::max(side_a, side_b)));
       // A fraction of NaN is a miss.
       const Mask is_ahead =
-          Lanes::both(Lanes::not_equal(denominator, zero), Lanes::less_equal(zero, fraction));
-      const Floats hit = Lanes::select(Lanes::both(is_crossed, is_ahead), fraction, miss);
-      nearest = Lanes::min(hit, nearest);
+          Lanes::both(Lanes::not_equal(denominator, zero), Lanes::less_equal(least, fraction));
+      if constexpr (kFindsFixtures) {
+        const Object& object = objects[i];
+        const Mask is_hit = Lanes::both(is_crossed, is_ahead);
+        const Mask is_new =
+            stopped(first, Lanes::both(is_hit, Lanes::less(fraction, nearest)), object);
+        nearest = Lanes::select(is_new, fraction, nearest);
+        fixture = Lanes::select(is_new, Lanes::as_floats(Lanes::words(object.fixture)), fixture);
+      } else {
+        const Floats hit = Lanes::select(Lanes::both(is_crossed, is_ahead), fraction, miss);
+        nearest = Lanes::min(hit, nearest);
+      }
     }
     Lanes::store(scan.fraction + first, nearest);
+    if constexpr (kFindsFixtures) Lanes::store(hits->fixture + first, fixture);
   }
 
   // Finds the edges whose lines pass through the origin of the rays, within the rounding errors.
@@ -222,8 +301,10 @@ struct Kernel {
     return Lanes::bits(simd::abs(numerator) <= kEdgeOn * size);
   }
 
-  // Draws the edges of a leaf; `rays` covers all of them.
-  FLATLAND_INLINE void draw_leaf(const EdgeTree::Leaf& leaf, Interval leaf_rays) const {
+  // Draws the edges of a leaf; `rays` covers all of them. The fixtures are null without
+  // kFindsFixtures.
+  FLATLAND_INLINE void draw_leaf(const EdgeTree::Leaf& leaf, const EdgeTree::LeafFixtures* fixtures,
+                                 Interval leaf_rays) const {
     const simd::Floats a_x = simd::load(leaf.x1) - frame.origin.x;
     const simd::Floats a_y = simd::load(leaf.y1) - frame.origin.y;
     const simd::Floats b_x = simd::load(leaf.x2) - frame.origin.x;
@@ -242,17 +323,24 @@ struct Kernel {
           frame.masks.pass(leaf.category_bits[i]) || frame.masks.pass(leaf.coincident_bits[i]);
       wanted |= static_cast<std::uint32_t>(passes) << i;
     }
+    Object objects[EdgeTree::kFanOut];
+    if constexpr (kFindsFixtures) {
+      for (std::uint32_t i = 0; i < leaf.count; ++i) {
+        objects[i] = object_of(is_second(leaf, i) ? fixtures->coincident[i] : fixtures->fixture[i]);
+        if (objects[i].pass_limit == Materials::kInvisible) wanted &= ~(1U << i);
+      }
+    }
     const std::uint32_t edge_on = wanted & find_edge_on(a_x, a_y, b_x, b_y, numerator);
     if (edge_on != 0) {
       any_of(leaf_rays, [&](std::int32_t first, std::int32_t, std::int32_t) {
-        draw_edges<true>(leaf, edges, edge_on, first);
+        draw_edges<true>(leaf, edges, edge_on, first, objects);
         return false;
       });
       wanted &= ~edge_on;
     }
     if (leaf_rays.end - (leaf_rays.begin & -Lanes::kWidth) <= kFewVectors * Lanes::kWidth) {
       any_of(leaf_rays, [&](std::int32_t first, std::int32_t, std::int32_t) {
-        draw_edges<false>(leaf, edges, wanted, first);
+        draw_edges<false>(leaf, edges, wanted, first, objects);
         return false;
       });
       return;
@@ -262,15 +350,23 @@ struct Kernel {
     const simd::Floats zero = simd::broadcast(0.0F);
     const simd::Ints is_partial = simd::abs(turn) < 2.0F - kNearTolerance;
     Rays rays = find_rays(from + simd::min(turn, zero), from + simd::max(turn, zero), ~is_partial);
-    draw_runs(leaf, edges, wanted, {rays.begin, simd::min(rays.end, scan.count)});
+    draw_runs(leaf, edges, wanted, {rays.begin, simd::min(rays.end, scan.count)}, objects);
     if ((Lanes::bits(rays.end > scan.count) & wanted) == 0) return;
-    draw_runs(leaf, edges, wanted, {simd::Ints{}, rays.end - scan.count});
+    draw_runs(leaf, edges, wanted, {simd::Ints{}, rays.end - scan.count}, objects);
+  }
+
+  // Whether the second of two coincident edges is the one that rays hit: it stops them and the
+  // first one does not, or it has a preferred category.
+  FLATLAND_INLINE bool is_second(const EdgeTree::Leaf& leaf, std::uint32_t i) const {
+    if (!frame.masks.pass(leaf.coincident_bits[i])) return false;
+    return !frame.masks.pass(leaf.category_bits[i]) ||
+           (leaf.coincident_bits[i] & hits->preferred) != 0;
   }
 
   // Draws the edges of a set into the rays that they cover, which do not extend beyond the full
   // circle.
   FLATLAND_INLINE void draw_runs(const EdgeTree::Leaf& leaf, const Edges& edges,
-                                 std::uint32_t wanted, Rays rays) const {
+                                 std::uint32_t wanted, Rays rays, const Object* objects) const {
     const simd::Ints is_empty = rays.begin >= rays.end;
     wanted &= ~Lanes::bits(is_empty);
     const std::int32_t begin = simd::lowest(is_empty ? simd::Ints{} + scan.count : rays.begin);
@@ -278,14 +374,14 @@ struct Kernel {
     for (std::int32_t first = begin & -Lanes::kWidth; first < end; first += Lanes::kWidth) {
       const std::uint32_t set =
           wanted & Lanes::bits((rays.begin < first + Lanes::kWidth) & (rays.end > first));
-      if (set != 0) draw_edges<false>(leaf, edges, set, first);
+      if (set != 0) draw_edges<false>(leaf, edges, set, first, objects);
     }
   }
 
   // -- circles and polygons ----------------------------------------------------------------------
 
   FLATLAND_INLINE void draw_circle(const b2CircleShape& circle, const b2Transform& body,
-                                   Interval rays) const {
+                                   Interval rays, const Object& object) const {
     const b2Vec2 position = body.p + b2Mul(body.q, circle.m_p);
     const b2Vec2 s = scan.pose.p - position;
     const float b = b2Dot(s, s) - circle.m_radius * circle.m_radius;
@@ -304,13 +400,13 @@ struct Kernel {
       const Floats a = -(c + root);
       const Mask is_hit = Lanes::both(Lanes::less_equal(zero, sigma),
                                       Lanes::less_equal(Lanes::broadcast(b2_epsilon), rr));
-      record_hits(first, a / rr, Lanes::both(is_hit, Lanes::less_equal(a, rr)));
+      record_hits(first, a / rr, Lanes::both(is_hit, Lanes::less_equal(a, rr)), object);
       return false;
     });
   }
 
   FLATLAND_INLINE void draw_polygon(const b2PolygonShape& polygon, const b2Transform& body,
-                                    Interval rays) const {
+                                    Interval rays, const Object& object) const {
     const b2Vec2 p1 = b2MulT(body.q, scan.pose.p - body.p);
     float numerators[b2_maxPolygonVertices];
     bool is_outside = false;
@@ -347,7 +443,8 @@ struct Kernel {
         enters = Lanes::either(enters, is_entry);
       }
       record_hits(first, lower,
-                  Lanes::but_not(Lanes::both(enters, Lanes::less_equal(lower, upper)), misses));
+                  Lanes::but_not(Lanes::both(enters, Lanes::less_equal(lower, upper)), misses),
+                  object);
       return false;
     });
   }
@@ -373,40 +470,75 @@ struct Kernel {
           !is_visible(rays, found.distance[i] * kCircleRounding)) {
         continue;
       }
+      Object object{};
+      if constexpr (kFindsFixtures) {
+        object = object_of(slot_of(fixture));
+        if (object.pass_limit == Materials::kInvisible) continue;
+      }
       const b2Transform& body = fixture.GetBody()->GetTransform();
       if (fixture.GetType() == b2Shape::e_circle) {
-        draw_circle(*static_cast<const b2CircleShape*>(fixture.GetShape()), body, rays);
+        draw_circle(*static_cast<const b2CircleShape*>(fixture.GetShape()), body, rays, object);
       } else {
-        draw_polygon(*static_cast<const b2PolygonShape*>(fixture.GetShape()), body, rays);
+        draw_polygon(*static_cast<const b2PolygonShape*>(fixture.GetShape()), body, rays, object);
       }
     }
   }
 };
 
 void set_frame(const ScanView& scan, const ScanFrame& frame, const b2Transform& body) {
-  Kernel{scan, frame}.set_frame(body);
+  Kernel<false>{scan, frame, nullptr}.set_frame(body);
 }
 
 void draw_tree(const ScanView& scan, const ScanFrame& frame, const EdgeTree::Node* nodes,
                const EdgeTree::Leaf* leaves) {
-  const Kernel kernel{scan, frame};
-  kernel.traverse(nodes, 1.0F,
-                  [&](std::uint32_t leaf, Interval rays) { kernel.draw_leaf(leaves[leaf], rays); });
+  const Kernel<false> kernel{scan, frame, nullptr};
+  kernel.traverse(nodes, 1.0F, [&](std::uint32_t leaf, Interval rays) {
+    kernel.draw_leaf(leaves[leaf], nullptr, rays);
+  });
 }
 
-void draw_solids(const ScanView& scan, const ScanFrame& frame, b2Fixture* const* solids,
-                 std::size_t count) {
-  const Kernel kernel{scan, frame};
+void find_in_tree(const ScanView& scan, const ScanFrame& frame, const HitView& hits,
+                  const EdgeTree::Node* nodes, const EdgeTree::Leaf* leaves,
+                  const EdgeTree::LeafFixtures* fixtures) {
+  const Kernel<true> kernel{scan, frame, &hits};
+  kernel.traverse(nodes, 1.0F, [&](std::uint32_t leaf, Interval rays) {
+    kernel.draw_leaf(leaves[leaf], fixtures + leaf, rays);
+  });
+}
+
+template <bool kFindsFixtures>
+FLATLAND_INLINE void draw_all(const Kernel<kFindsFixtures>& kernel, b2Fixture* const* solids,
+                              std::size_t count) {
   for (std::size_t i = 0; i < count; i += simd::kWidth) {
     kernel.draw_solids(solids + i, count - i < simd::kWidth ? count - i : simd::kWidth);
   }
 }
 
-void draw_solid_tree(const ScanView& scan, const ScanFrame& frame, const EdgeTree::Node* nodes,
-                     b2Fixture* const* solids, std::size_t count) {
-  const Kernel kernel{scan, frame};
+void draw_solids(const ScanView& scan, const ScanFrame& frame, b2Fixture* const* solids,
+                 std::size_t count) {
+  draw_all(Kernel<false>{scan, frame, nullptr}, solids, count);
+}
+
+void find_in_solids(const ScanView& scan, const ScanFrame& frame, const HitView& hits,
+                    b2Fixture* const* solids, std::size_t count) {
+  draw_all(Kernel<true>{scan, frame, &hits}, solids, count);
+}
+
+template <bool kFindsFixtures>
+FLATLAND_INLINE void draw_leaves(const Kernel<kFindsFixtures>& kernel, const EdgeTree::Node* nodes,
+                                 b2Fixture* const* solids, std::size_t count) {
   kernel.traverse(nodes, kCircleRounding, [&](std::uint32_t leaf, Interval) {
     const std::size_t first = simd::kWidth * leaf;
     kernel.draw_solids(solids + first, count - first < simd::kWidth ? count - first : simd::kWidth);
   });
+}
+
+void draw_solid_tree(const ScanView& scan, const ScanFrame& frame, const EdgeTree::Node* nodes,
+                     b2Fixture* const* solids, std::size_t count) {
+  draw_leaves(Kernel<false>{scan, frame, nullptr}, nodes, solids, count);
+}
+
+void find_in_solid_tree(const ScanView& scan, const ScanFrame& frame, const HitView& hits,
+                        const EdgeTree::Node* nodes, b2Fixture* const* solids, std::size_t count) {
+  draw_leaves(Kernel<true>{scan, frame, &hits}, nodes, solids, count);
 }

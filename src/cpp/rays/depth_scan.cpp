@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 
 #include "rays/instruction_set.h"
 #include "rays/simd.h"
@@ -22,6 +23,23 @@ static_assert(AlignedFloats::kBlock % simd::kWidth == 0, "a block consists of wh
 struct Interval {
   std::int32_t begin, end;
 };
+
+// The hits of a scan that finds fixtures; see HitRules.
+struct HitView {
+  const float* nearest;  // null if there are no limits
+  float* fixture;
+  const std::uint16_t* number;  // of the material of a fixture, by its slot
+  std::size_t count;            // of these numbers; fixtures with other slots have no material
+  const std::uint32_t* pass_limit;
+  const std::uint32_t* words;
+  std::uint32_t leg, excluded;
+  std::uint16_t preferred;
+  float least_distance;  // [m]; hits are not nearer
+};
+
+std::uint32_t slot_of(const b2Fixture& fixture) {
+  return static_cast<std::uint32_t>(const_cast<b2Fixture&>(fixture).GetUserData().pointer);
+}
 
 // A node or leaf that remains to be drawn.
 struct StackEntry {
@@ -104,6 +122,9 @@ struct Functions {
   decltype(&baseline::draw_tree) draw_tree;
   decltype(&baseline::draw_solids) draw_solids;
   decltype(&baseline::draw_solid_tree) draw_solid_tree;
+  decltype(&baseline::find_in_tree) find_in_tree;
+  decltype(&baseline::find_in_solids) find_in_solids;
+  decltype(&baseline::find_in_solid_tree) find_in_solid_tree;
 };
 
 const Functions& functions() {
@@ -111,17 +132,20 @@ const Functions& functions() {
 #if defined(__x86_64__)
     switch (instruction_set()) {
       case InstructionSet::kAvx512:
-        return Functions{avx512::set_frame, avx512::draw_tree, avx512::draw_solids,
-                         avx512::draw_solid_tree};
+        return Functions{avx512::set_frame,         avx512::draw_tree,    avx512::draw_solids,
+                         avx512::draw_solid_tree,   avx512::find_in_tree, avx512::find_in_solids,
+                         avx512::find_in_solid_tree};
       case InstructionSet::kAvx2:
-        return Functions{avx2::set_frame, avx2::draw_tree, avx2::draw_solids,
-                         avx2::draw_solid_tree};
+        return Functions{avx2::set_frame,         avx2::draw_tree,    avx2::draw_solids,
+                         avx2::draw_solid_tree,   avx2::find_in_tree, avx2::find_in_solids,
+                         avx2::find_in_solid_tree};
       case InstructionSet::kBaseline:
         break;
     }
 #endif
-    return Functions{baseline::set_frame, baseline::draw_tree, baseline::draw_solids,
-                     baseline::draw_solid_tree};
+    return Functions{baseline::set_frame,         baseline::draw_tree,    baseline::draw_solids,
+                     baseline::draw_solid_tree,   baseline::find_in_tree, baseline::find_in_solids,
+                     baseline::find_in_solid_tree};
   }();
   return kSelected;
 }
@@ -141,6 +165,20 @@ ScanView view_of(const BeamFan& fan, const b2Transform& pose, ScanBuffer& buffer
           pose};
 }
 
+HitView hits_of(const HitRules& rules, ScanBuffer& buffer, bool has_nearest, float least_distance) {
+  const Materials& materials = *rules.materials;
+  return {has_nearest ? buffer.nearest.data() : nullptr,
+          buffer.fixture.data(),
+          materials.numbers().data(),
+          materials.numbers().size(),
+          materials.pass_limits().data(),
+          rules.words,
+          rules.leg,
+          rules.excluded,
+          rules.preferred,
+          least_distance};
+}
+
 // Bound of the difference between the diamond angle of a ray in the frame of a body and in the fan.
 // It is caused by the rounding of coordinates and is largest for short rays far from the origin of
 // the world.
@@ -158,13 +196,24 @@ ScanFrame world_frame(const BeamFan& fan, const b2Transform& pose, RayMasks mask
 
 }  // namespace
 
-DepthScan::DepthScan(const BeamFan& fan, const b2Transform& pose, ScanBuffer& buffer)
-    : fan_(fan), pose_(pose), buffer_(buffer) {
+DepthScan::DepthScan(const BeamFan& fan, const b2Transform& pose, ScanBuffer& buffer,
+                     const HitRules* rules)
+    : fan_(fan), pose_(pose), buffer_(buffer), rules_(rules) {
   buffer.d_x.resize(fan.count());
   buffer.d_y.resize(fan.count());
   // Whole vectors are read from the start of any run of rays on.
   buffer.fraction.resize(fan.count() + AlignedFloats::kBlock);
   std::fill_n(buffer.fraction.data(), buffer.fraction.size(), kMissFraction);
+  if (rules == nullptr) return;
+  buffer.fixture.resize(fan.count());
+  std::memset(buffer.fixture.data(), 0xFF, buffer.fixture.size() * sizeof(float));
+}
+
+float* DepthScan::limit_nearest() {
+  has_nearest_ = true;
+  buffer_.nearest.resize(fan_.count());
+  std::fill_n(buffer_.nearest.data(), buffer_.nearest.size(), 0.0F);
+  return buffer_.nearest.data();
 }
 
 void DepthScan::draw(const EdgeTree& tree, const b2Transform& body, RayMasks masks) {
@@ -178,20 +227,41 @@ void DepthScan::draw(const EdgeTree& tree, const b2Transform& body, RayMasks mas
   if (!is_same) functions().set_frame(view, frame, body);
   frame_ = body;
   has_frame_ = true;
-  functions().draw_tree(view, frame, tree.nodes().data(), tree.leaves().data());
+  if (rules_ == nullptr) {
+    functions().draw_tree(view, frame, tree.nodes().data(), tree.leaves().data());
+  } else {
+    functions().find_in_tree(view, frame, hits_of(*rules_, buffer_, has_nearest_, least_distance_),
+                             tree.nodes().data(), tree.leaves().data(),
+                             tree.leaf_fixtures().data());
+  }
 }
 
 void DepthScan::draw(const std::vector<b2Fixture*>& solids, RayMasks masks) {
   if (solids.empty() || fan_.count() == 0) return;
-  functions().draw_solids(view_of(fan_, pose_, buffer_), world_frame(fan_, pose_, masks),
-                          solids.data(), solids.size());
+  const ScanView view = view_of(fan_, pose_, buffer_);
+  const ScanFrame frame = world_frame(fan_, pose_, masks);
+  if (rules_ == nullptr) {
+    functions().draw_solids(view, frame, solids.data(), solids.size());
+  } else {
+    functions().find_in_solids(view, frame,
+                               hits_of(*rules_, buffer_, has_nearest_, least_distance_),
+                               solids.data(), solids.size());
+  }
 }
 
 void DepthScan::draw(const SolidTree& tree, RayMasks masks) {
   draw(tree.loose(), masks);
   if (tree.is_empty() || fan_.count() == 0) return;
-  functions().draw_solid_tree(view_of(fan_, pose_, buffer_), world_frame(fan_, pose_, masks),
-                              tree.nodes().data(), tree.solids().data(), tree.solids().size());
+  const ScanView view = view_of(fan_, pose_, buffer_);
+  const ScanFrame frame = world_frame(fan_, pose_, masks);
+  const std::vector<b2Fixture*>& solids = tree.solids();
+  if (rules_ == nullptr) {
+    functions().draw_solid_tree(view, frame, tree.nodes().data(), solids.data(), solids.size());
+  } else {
+    functions().find_in_solid_tree(view, frame,
+                                   hits_of(*rules_, buffer_, has_nearest_, least_distance_),
+                                   tree.nodes().data(), solids.data(), solids.size());
+  }
 }
 
 }  // namespace flatland

@@ -12,13 +12,16 @@
 #include <box2d/b2_fixture.h>
 #include <box2d/b2_math.h>
 
+#include <cstddef>
 #include <cstdint>
+#include <cstring>
 #include <limits>
 #include <vector>
 
 #include "rays/aligned_floats.h"
 #include "rays/beam_fan.h"
 #include "rays/edge_tree.h"
+#include "rays/materials.h"
 #include "rays/solid_tree.h"
 
 namespace flatland {
@@ -37,15 +40,36 @@ struct RayMasks {
 };
 
 // The memory of scans, for any number of them one after the other: for each ray, the vector along
-// it in some frame, and the fraction of the nearest hit.
+// it in some frame, and the fraction of the nearest hit. The others are only used to find fixtures:
+// the least fraction of a hit, and the bits of the slot of the fixture that is hit.
 struct ScanBuffer {
-  AlignedFloats d_x, d_y, fraction;
+  AlignedFloats d_x, d_y, fraction, nearest, fixture;
+};
+
+// How fixtures are hit, for scans that find out which ones are. A ray passes a fixture that
+// transmits if a random word is below its limit: `fate_word` of the word of the ray and of the slot
+// of the fixture with the bits of the leg.
+struct HitRules {
+  static constexpr std::uint32_t kNoFixture = 0xFFFFFFFFU;
+  // The legs of a path: before and after a reflection.
+  static constexpr std::uint32_t kDirect = 0;
+  static constexpr std::uint32_t kReflected = 0x80000000U;
+
+  const Materials* materials;
+  const std::uint32_t* words;  // for each ray in sorted order, whole blocks; see `draw_words`
+  std::uint32_t leg;
+  std::uint32_t excluded;   // a fixture that is not hit, or kNoFixture
+  std::uint16_t preferred;  // of two coincident edges, the one with these categories is hit
 };
 
 class DepthScan {
  public:
   // The fan and the buffer must outlive the scan. Initially all rays are misses.
-  DepthScan(const BeamFan& fan, const b2Transform& pose, ScanBuffer& buffer);
+  DepthScan(const BeamFan& fan, const b2Transform& pose, ScanBuffer& buffer)
+      : DepthScan(fan, pose, buffer, nullptr) {}
+  // A scan that also finds the fixtures, at about 1.3 times the cost. The rules must outlive it.
+  DepthScan(const BeamFan& fan, const b2Transform& pose, ScanBuffer& buffer, const HitRules& rules)
+      : DepthScan(fan, pose, buffer, &rules) {}
 
   // Draws the edges of a tree; `body` is the pose of the frame of the tree.
   void draw(const EdgeTree& tree, const b2Transform& body, RayMasks masks);
@@ -57,11 +81,25 @@ class DepthScan {
   // drawing, hits at or beyond these fractions are ignored; the caller may change them in between.
   float* fractions() { return buffer_.fraction.data(); }
   const float* fractions() const { return buffer_.fraction.data(); }
+  // Ignores hits of each ray at lower fractions than these, which are initially 0; only for scans
+  // that find fixtures.
+  float* limit_nearest();
+  // Allows to skip what is nearer than the least distance [m] of all these limits.
+  void set_least_distance(float distance) { least_distance_ = distance; }
+  // Copies the slots of the fixtures that the rays hit; unspecified for a miss.
+  void copy_fixtures(std::uint32_t* slots) const {
+    std::memcpy(slots, buffer_.fixture.data(), fan_.count() * sizeof(*slots));
+  }
 
  private:
+  DepthScan(const BeamFan& fan, const b2Transform& pose, ScanBuffer& buffer, const HitRules* rules);
+
   const BeamFan& fan_;
   b2Transform pose_;
   ScanBuffer& buffer_;
+  const HitRules* rules_;
+  bool has_nearest_ = false;
+  float least_distance_ = 0.0F;
   b2Transform frame_;  // of the vectors along the rays in the buffer, that of the tree drawn last
   bool has_frame_ = false;
 };

@@ -119,6 +119,7 @@ class EdgeTreeBuilder {
 
   std::uint32_t make_leaf(Range range) {
     EdgeTree::Leaf leaf;
+    EdgeTree::LeafFixtures fixtures;
     leaf.count = static_cast<std::uint32_t>(range.size());
     for (std::size_t i = 0; i < kFanOut; ++i) {
       const TreeEdge& edge = edges_[std::min(range.begin + i, range.end - 1)];
@@ -132,8 +133,11 @@ class EdgeTreeBuilder {
       leaf.normal_y[i] = normal.y;
       leaf.category_bits[i] = edge.category_bits;
       leaf.coincident_bits[i] = edge.coincident_bits;
+      fixtures.fixture[i] = edge.fixture;
+      fixtures.coincident[i] = edge.coincident_fixture;
     }
     tree_.leaves_.push_back(leaf);
+    tree_.leaf_fixtures_.push_back(fixtures);
     return EdgeTree::kLeafBit | static_cast<std::uint32_t>(tree_.leaves_.size() - 1);
   }
 
@@ -212,20 +216,21 @@ class EdgeTreeBuilder {
 void merge_coincident(std::vector<TreeEdge>& edges) {
   const auto place = [](const TreeEdge& e) { return std::tie(e.x1, e.y1, e.x2, e.y2); };
   const auto is_before = [&](const TreeEdge& a, const TreeEdge& b) {
-    return std::tuple_cat(place(a), std::tie(a.category_bits)) <
-           std::tuple_cat(place(b), std::tie(b.category_bits));
+    return std::tuple_cat(place(a), std::tie(a.material, a.category_bits, a.fixture)) <
+           std::tuple_cat(place(b), std::tie(b.material, b.category_bits, b.fixture));
   };
   std::sort(edges.begin(), edges.end(), is_before);
   std::size_t kept = 0;
   for (const TreeEdge& edge : edges) {
     TreeEdge* last = kept == 0 ? nullptr : &edges[kept - 1];
-    if (last != nullptr && place(*last) == place(edge)) {
+    if (last != nullptr && place(*last) == place(edge) && last->material == edge.material) {
       if (edge.category_bits == last->category_bits ||
           edge.category_bits == last->coincident_bits) {
         continue;
       }
       if (last->coincident_bits == 0) {
         last->coincident_bits = edge.category_bits;
+        last->coincident_fixture = edge.fixture;
         continue;
       }
     }

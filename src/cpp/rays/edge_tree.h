@@ -14,10 +14,15 @@ struct TreeEdge {
   float x1, y1, x2, y2;
   std::uint16_t category_bits;
   std::uint16_t coincident_bits = 0;  // categories of a coincident edge; 0 without one
+  std::uint16_t material = 0;         // its number; see Materials
+  // Slots of the fixtures of this edge and of the coincident one.
+  std::uint32_t fixture = 0;
+  std::uint32_t coincident_fixture = 0;
 };
 
 // Removes duplicate edges, and merges two coincident edges with different categories into one,
-// because layers of a world often have most of their walls in common.
+// because layers of a world often have most of their walls in common. Edges with different
+// materials remain.
 void merge_coincident(std::vector<TreeEdge>& edges);
 
 class EdgeTree {
@@ -34,6 +39,11 @@ class EdgeTree {
     std::uint32_t count;
   };
 
+  // Slots of the fixtures of a leaf, apart from it because most scans do not need them.
+  struct LeafFixtures {
+    std::uint32_t fixture[kFanOut], coincident[kFanOut];
+  };
+
   // Up to 8 children, each a node or a leaf, with their bounding boxes.
   struct Node {
     float min_x[kFanOut], min_y[kFanOut], max_x[kFanOut], max_y[kFanOut];
@@ -48,11 +58,13 @@ class EdgeTree {
   // The first node is the root; a tree without edges has no nodes.
   const std::vector<Node>& nodes() const { return nodes_; }
   const std::vector<Leaf>& leaves() const { return leaves_; }
+  const std::vector<LeafFixtures>& leaf_fixtures() const { return leaf_fixtures_; }
   std::uint16_t category_bits() const { return category_bits_; }
 
  private:
   std::vector<Node> nodes_;
   std::vector<Leaf> leaves_;
+  std::vector<LeafFixtures> leaf_fixtures_;
   std::uint16_t category_bits_ = 0;
 
   friend class EdgeTreeBuilder;

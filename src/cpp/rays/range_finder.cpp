@@ -1,17 +1,33 @@
 #include "rays/range_finder.h"
 
+#include <box2d/b2_body.h>
+#include <box2d/b2_fixture.h>
+
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <map>
 #include <stdexcept>
 #include <utility>
 
+#include "world/contacts.h"
 #include "world/errors.h"
 
 namespace flatland {
 namespace {
 
 constexpr float kReflective = 255.0F;
+// Intensities do not depend on the range below this one [m].
+constexpr float kReferenceRange = 1.0F;
+
+// Replaces the first range by the shortest one; NaN if all are misses.
+void keep_nearest(float* ranges, std::size_t count) {
+  float nearest = std::numeric_limits<float>::quiet_NaN();
+  for (std::size_t i = 0; i < count; ++i) {
+    if (!(nearest <= ranges[i]) && !std::isnan(ranges[i])) nearest = ranges[i];
+  }
+  ranges[0] = nearest;
+}
 
 }  // namespace
 
@@ -35,33 +51,103 @@ std::array<double, 3> RangeFinder::pose_of(const std::array<double, 3>& body) co
 
 void RangeFinder::scan(const SceneView& scene, const b2Transform& pose, const NoiseKey& key,
                        const Readings& out, ScanMemory& memory) const {
-  DepthScan hits(*fan_, pose, memory.buffer);
-  scene.draw(hits, {parameters_.mask, kAnyCategory});
   memory.ranges.resize(beams() + AlignedFloats::kBlock);
-  float* ranges = memory.ranges.data();
-  write_ranges(hits.fractions(), ranges);
-
-  bool* is_hit = nullptr;
-  if (out.intensities != nullptr) {
-    if (memory.flags < beams()) {
-      memory.reflects = std::make_unique<bool[]>(beams());
-      memory.is_hit = std::make_unique<bool[]>(beams());
-      memory.flags = beams();
-    }
-    std::fill_n(memory.reflects.get(), beams(), false);
-    is_hit = memory.is_hit.get();
-    find_reflections(hits, scene, *fan_, {parameters_.mask, parameters_.reflect_mask},
-                     memory.limits, memory.reflects.get());
+  const bool needs_hits = out.intensities != nullptr || out.hits != nullptr;
+  if (needs_hits && memory.flags < beams()) {
+    memory.reflects = std::make_unique<bool[]>(beams());
+    memory.is_hit = std::make_unique<bool[]>(beams());
+    memory.flags = beams();
   }
+  const bool is_traced = sees_materials(scene.scene()) || out.hits != nullptr;
+  if (is_traced) {
+    scan_traced(scene, pose, key, out, memory);
+  } else {
+    scan_plain(scene, pose, out, memory);
+  }
+  float* ranges = memory.ranges.data();
+  if (parameters_.is_cone) keep_nearest(ranges, beams());
+
+  bool* is_hit = needs_hits ? memory.is_hit.get() : nullptr;
   if (parameters_.noise) {
-    parameters_.noise->apply(ranges, beams(), key, parameters_.limits, is_hit);
+    parameters_.noise->apply(ranges, readings(), key, parameters_.limits, is_hit);
   } else {
     if (is_hit != nullptr) std::fill_n(is_hit, beams(), true);
-    apply_limits(ranges, beams(), parameters_.limits);
+    apply_limits(ranges, readings(), parameters_.limits);
   }
-  std::copy_n(ranges, beams(), out.ranges);
+  std::copy_n(ranges, readings(), out.ranges);
   for (std::size_t i = 0; out.intensities != nullptr && i < beams(); ++i) {
-    out.intensities[i] = memory.reflects[i] && is_hit[i] ? kReflective : 0.0F;
+    if (!is_traced) out.intensities[i] = memory.reflects[i] ? kReflective : 0.0F;
+    if (!is_hit[i]) out.intensities[i] = 0.0F;
+  }
+  for (std::size_t i = 0; out.hits != nullptr && i < beams(); ++i) {
+    if (!is_hit[i] || !std::isfinite(ranges[i])) out.hits->labels[i] = 0;
+  }
+}
+
+void RangeFinder::scan_plain(const SceneView& scene, const b2Transform& pose, const Readings& out,
+                             ScanMemory& memory) const {
+  DepthScan hits(*fan_, pose, memory.buffer);
+  scene.draw(hits, {parameters_.mask, kAnyCategory});
+  write_ranges(hits.fractions(), memory.ranges.data());
+  if (out.intensities == nullptr) return;
+  std::fill_n(memory.reflects.get(), beams(), false);
+  find_reflections(hits, scene, *fan_, {parameters_.mask, parameters_.reflect_mask}, memory.limits,
+                   memory.reflects.get());
+}
+
+void RangeFinder::scan_traced(const SceneView& scene, const b2Transform& pose, const NoiseKey& key,
+                              const Readings& out, ScanMemory& memory) const {
+  const TraceRules rules{parameters_.mask, parameters_.reflect_mask, key,
+                         sees_materials(scene.scene()), out.intensities != nullptr};
+  RayEnds& ends = memory.ends;
+  trace(scene, *fan_, pose, rules, memory.buffer, memory.trace, ends);
+  // Whole vectors are read.
+  ends.fraction.resize(AlignedFloats::rounded(fan_->count()) + AlignedFloats::kBlock,
+                       kMissFraction);
+  write_ranges(ends.fraction.data(), memory.ranges.data());
+  if (out.intensities != nullptr) write_intensities(ends, out.intensities);
+  if (out.hits != nullptr) write_labels(scene.scene(), ends, *out.hits);
+}
+
+void RangeFinder::write_intensities(RayEnds& ends, float* intensities) const {
+  float* brightness = ends.brightness.data();
+  const float* fraction = ends.fraction.data();
+  const std::size_t count = fan_->count();
+  for (std::size_t i = 0; i < count; ++i) {
+    const float range = std::max(fraction[i] * parameters_.length, kReferenceRange);
+    brightness[i] = kReflective * brightness[i] / (range * range);
+  }
+  for (std::size_t i = 0; parameters_.reflect_mask != 0 && i < count; ++i) {
+    if (ends.is_preferred[i] != 0) brightness[i] = kReflective;
+  }
+  for (const BeamFan::Run& run : fan_->runs()) {
+    std::copy_n(brightness + run.sorted, run.count, intensities + run.original);
+  }
+  if (!fan_->runs().empty()) return;
+  std::fill_n(intensities, beams(), 0.0F);
+  for (std::size_t i = 0; i < count; ++i) intensities[fan_->order()[i]] = brightness[i];
+}
+
+void RangeFinder::write_labels(const RayScene& scene, const RayEnds& ends, HitTable& hits) const {
+  std::fill_n(hits.labels, beams(), 0U);
+  hits.entries.clear();
+  std::map<std::pair<Id, std::uint16_t>, std::uint32_t> label_of;
+  std::uint32_t last_slot = HitRules::kNoFixture;
+  std::uint32_t label = 0;
+  for (std::size_t i = 0; i < fan_->count(); ++i) {
+    if (!(ends.fraction[i] <= 1.0F)) continue;
+    // Consecutive rays often hit the same fixture.
+    if (ends.fixture[i] != last_slot) {
+      last_slot = ends.fixture[i];
+      const b2Fixture* fixture = scene.fixture_at(last_slot);
+      const Id body = id_of(fixture->GetBody());
+      const std::uint16_t bits = fixture->GetFilterData().categoryBits;
+      const auto next = static_cast<std::uint32_t>(hits.entries.size() + 1);
+      const auto [known, is_new] = label_of.try_emplace({body, bits}, next);
+      label = known->second;
+      if (is_new) hits.entries.push_back({body, bits});
+    }
+    hits.labels[fan_->order()[i]] = label;
   }
 }
 

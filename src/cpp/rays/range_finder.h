@@ -14,6 +14,7 @@
 #include "rays/depth_scan.h"
 #include "rays/range_noise.h"
 #include "rays/scene_view.h"
+#include "rays/trace.h"
 
 namespace flatland {
 
@@ -24,12 +25,28 @@ struct ScanMemory {
   std::vector<float> limits;
   std::unique_ptr<bool[]> reflects, is_hit;
   std::size_t flags = 0;  // size of the arrays above
+  TraceMemory trace;
+  RayEnds ends;
 };
 
-// Where the readings of a scan are written. `intensities` is null if they are not needed.
+// What the beams of a scan hit: the bodies with the categories of their fixtures.
+struct HitTable {
+  struct Entry {
+    Id body;
+    std::uint16_t category_bits;
+  };
+
+  // For each beam, 0 for none, else 1 + the index of an entry.
+  std::uint32_t* labels;
+  std::vector<Entry> entries;
+};
+
+// Where the readings of a scan are written. `intensities` and `hits` are null if they are not
+// needed.
 struct Readings {
   float* ranges;
   float* intensities;
+  HitTable* hits = nullptr;
 };
 
 // Immutable, without references to a world.
@@ -42,6 +59,8 @@ class RangeFinder {
     std::uint16_t reflect_mask;    // categories that reflect; 0 for no intensities
     RangeLimits limits;
     std::optional<RangeNoise> noise;
+    bool uses_materials;  // otherwise all fixtures stop the beams
+    bool is_cone;         // whether there is only one reading, that of the nearest hit
   };
 
   // The fan has the end points of the beams in the frame of the sensor. Throws
@@ -49,18 +68,39 @@ class RangeFinder {
   RangeFinder(std::shared_ptr<const BeamFan> fan, const Parameters& parameters);
 
   std::size_t beams() const { return fan_->size(); }
-  bool has_intensities() const { return parameters_.reflect_mask != 0; }
+  // Number of ranges of a scan.
+  std::size_t readings() const { return parameters_.is_cone ? 1 : beams(); }
+  bool has_intensities(const RayScene& scene) const {
+    return !parameters_.is_cone && (parameters_.reflect_mask != 0 || sees_materials(scene));
+  }
+  // Whether a scan depends on the number of its update.
+  bool is_random(const RayScene& scene) const {
+    return parameters_.noise.has_value() || sees_materials(scene);
+  }
 
   // Pose of the sensor in the world frame from that of its body.
   std::array<double, 3> pose_of(const std::array<double, 3>& body) const;
 
   // Performs a scan from a pose of the sensor. The intensity is 255 where the reading is that of a
-  // reflecting fixture at the distance of the nearest hit, else 0.
+  // reflecting fixture at the distance of the nearest hit, else 0. In a world with materials, other
+  // hits have the intensity of a surface that scatters light (Lambert): 255 times the reflectance
+  // times the cosine of the angle of incidence, divided by the square of the range [m] if it is
+  // greater than 1.
   void scan(const SceneView& scene, const b2Transform& pose, const NoiseKey& key,
             const Readings& out, ScanMemory& memory) const;
 
  private:
+  bool sees_materials(const RayScene& scene) const {
+    return parameters_.uses_materials && !scene.materials().is_empty();
+  }
   void write_ranges(const float* fractions, float* ranges) const;
+  void scan_plain(const SceneView& scene, const b2Transform& pose, const Readings& out,
+                  ScanMemory& memory) const;
+  void scan_traced(const SceneView& scene, const b2Transform& pose, const NoiseKey& key,
+                   const Readings& out, ScanMemory& memory) const;
+  // Replaces the brightnesses by intensities.
+  void write_intensities(RayEnds& ends, float* intensities) const;
+  void write_labels(const RayScene& scene, const RayEnds& ends, HitTable& hits) const;
 
   std::shared_ptr<const BeamFan> fan_;
   Parameters parameters_;

@@ -77,3 +77,17 @@ void draw_beams(const NoiseKey& key, std::uint32_t first_beam, BeamDraws& out) {
     Lanes::store(out.normal[1] + i, normals.second);
   }
 }
+
+// One random word for each beam; beams share counters as for normal noise.
+void draw_words(const NoiseKey& key, std::size_t count, std::uint32_t* words) {
+  for (std::size_t group = 0; group < count; group += kBeamsPerGroup) {
+    const auto first_counter = static_cast<std::uint32_t>(group / 4);
+    for (std::size_t lane = 0; lane < kBeamsPerGroup / 4; lane += Lanes::kWidth) {
+      const RandomWords random(key, first_counter + static_cast<std::uint32_t>(lane),
+                               kWordsAttempt);
+      for (std::size_t part = 0; part < 4; ++part) {
+        Lanes::store(words + group + lane + part * (kBeamsPerGroup / 4), random.word[part]);
+      }
+    }
+  }
+}

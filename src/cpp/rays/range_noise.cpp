@@ -17,8 +17,10 @@ namespace flatland {
 namespace {
 
 // Beams that share 16 counters; see add_normal_noise.
-constexpr std::size_t kBeamsPerGroup = 64;
+constexpr std::size_t kBeamsPerGroup = kWordsPerGroup;
 constexpr std::size_t kBeamsPerDraw = 16;
+// The number of the attempt in the counters of `draw_words`. Noise uses the numbers from 0 on.
+constexpr std::uint32_t kWordsAttempt = 0x80000000U;
 
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
 constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
@@ -67,6 +69,7 @@ struct Functions {
   decltype(&baseline::scale) scale;
   decltype(&baseline::add_normal_noise) add_normal_noise;
   decltype(&baseline::draw_beams) draw_beams;
+  decltype(&baseline::draw_words) draw_words;
 };
 
 const Functions& functions() {
@@ -74,16 +77,17 @@ const Functions& functions() {
 #if defined(__x86_64__)
     switch (instruction_set()) {
       case InstructionSet::kAvx512:
-        return Functions{avx512::limit, avx512::scale, avx512::add_normal_noise,
-                         avx512::draw_beams};
+        return Functions{avx512::limit, avx512::scale, avx512::add_normal_noise, avx512::draw_beams,
+                         avx512::draw_words};
       case InstructionSet::kAvx2:
-        return Functions{avx2::limit, avx2::scale, avx2::add_normal_noise, avx2::draw_beams};
+        return Functions{avx2::limit, avx2::scale, avx2::add_normal_noise, avx2::draw_beams,
+                         avx2::draw_words};
       case InstructionSet::kBaseline:
         break;
     }
 #endif
     return Functions{baseline::limit, baseline::scale, baseline::add_normal_noise,
-                     baseline::draw_beams};
+                     baseline::draw_beams, baseline::draw_words};
   }();
   return kSelected;
 }
@@ -258,6 +262,10 @@ void RangeNoise::apply_beam_model(float* ranges, std::size_t count, const NoiseK
 
 void apply_limits(float* ranges, std::size_t count, const RangeLimits& limits) {
   functions().limit(ranges, count, limits);
+}
+
+void draw_words(const NoiseKey& key, std::size_t count, std::uint32_t* words) {
+  functions().draw_words(key, count, words);
 }
 
 void to_ranges(const float* fractions, std::size_t count, float length, float* ranges) {

@@ -74,6 +74,10 @@ class RangeNoise {
 // Applies the limits to ranges without noise.
 void apply_limits(float* ranges, std::size_t count, const RangeLimits& limits);
 
+// Random words for the beams of one update, independent of its noise. Writes whole groups.
+inline constexpr std::size_t kWordsPerGroup = 64;
+void draw_words(const NoiseKey& key, std::size_t count, std::uint32_t* words);
+
 // Ranges of consecutive rays [m], NaN for a miss, from their fractions of a length [m]. Writes
 // whole vectors of up to 16 ranges.
 void to_ranges(const float* fractions, std::size_t count, float length, float* ranges);

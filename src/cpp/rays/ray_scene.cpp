@@ -7,21 +7,31 @@
 #include <algorithm>
 #include <utility>
 
+#include "world/contacts.h"
+
 namespace flatland {
 namespace {
 
-void collect_edges(const b2Body& body, std::vector<TreeEdge>& edges) {
+std::uint32_t slot_of(const b2Fixture* fixture) {
+  return RayScene::Fixtures::slot_of(id_of(fixture));
+}
+
+void collect_edges(const b2Body& body, const Materials& materials, std::vector<TreeEdge>& edges) {
   for (const b2Fixture* f = body.GetFixtureList(); f != nullptr; f = f->GetNext()) {
     if (f->GetType() != b2Shape::e_edge || f->IsSensor()) continue;
     const auto* edge = static_cast<const b2EdgeShape*>(f->GetShape());
-    edges.push_back({edge->m_vertex1.x, edge->m_vertex1.y, edge->m_vertex2.x, edge->m_vertex2.y,
-                     f->GetFilterData().categoryBits});
+    TreeEdge added{edge->m_vertex1.x, edge->m_vertex1.y, edge->m_vertex2.x, edge->m_vertex2.y,
+                   f->GetFilterData().categoryBits};
+    added.fixture = slot_of(f);
+    added.material = materials.number_of(added.fixture);
+    edges.push_back(added);
   }
 }
 
-std::shared_ptr<const EdgeTree> make_tree(const std::vector<const b2Body*>& bodies) {
+std::shared_ptr<const EdgeTree> make_tree(const std::vector<const b2Body*>& bodies,
+                                          const Materials& materials) {
   std::vector<TreeEdge> edges;
-  for (const b2Body* body : bodies) collect_edges(*body, edges);
+  for (const b2Body* body : bodies) collect_edges(*body, materials, edges);
   if (bodies.size() > 1) merge_coincident(edges);
   return std::make_shared<const EdgeTree>(std::move(edges));
 }
@@ -46,6 +56,10 @@ void RayScene::add(b2Fixture* fixture) {
 }
 
 void RayScene::remove_body(const b2Body* body) {
+  for (const b2Fixture* f = body->GetFixtureList(); f != nullptr && !materials_.is_empty();
+       f = f->GetNext()) {
+    materials_.erase(slot_of(f));
+  }
   const auto has_solid = [body](const b2Fixture* fixture) { return fixture->GetBody() == body; };
   solids_.erase(std::remove_if(solids_.begin(), solids_.end(), has_solid), solids_.end());
   const auto is_same_body = [body](const EdgeBody& candidate) { return candidate.body == body; };
@@ -60,7 +74,13 @@ void RayScene::changed(const b2Fixture* fixture) {
   is_grouped_ = false;
 }
 
+void RayScene::set_material(const b2Fixture* fixture, const Material& material) {
+  materials_.set(slot_of(fixture), material);
+  changed(fixture);
+}
+
 void RayScene::clear() {
+  materials_.clear();
   solids_.clear();
   edge_bodies_.clear();
   edge_groups_.clear();
@@ -78,6 +98,8 @@ void RayScene::become_copy_of(RayScene& source,
   }
   std::vector<EdgeBody> bodies = source.edge_bodies_;
   for (EdgeBody& edge_body : bodies) edge_body.body = copy_of(edge_body.body);
+  Materials materials = source.materials_;
+  materials_ = std::move(materials);
   solids_ = std::move(solids);
   edge_groups_ = std::move(groups);
   edge_bodies_ = std::move(bodies);
@@ -126,7 +148,7 @@ void RayScene::make_groups() {
     const bool is_unchanged = known != edge_groups_.end() &&
                               std::none_of(group.bodies.begin(), group.bodies.end(),
                                            [this](const b2Body* body) { return is_changed(body); });
-    group.tree = is_unchanged ? known->tree : make_tree(group.bodies);
+    group.tree = is_unchanged ? known->tree : make_tree(group.bodies, materials_);
   }
   edge_groups_ = std::move(groups);
   for (EdgeBody& edge_body : edge_bodies_) edge_body.is_changed = false;

@@ -4,6 +4,7 @@
 #include <box2d/b2_math.h>
 
 #include <cstddef>
+#include <cstdint>
 #include <functional>
 #include <memory>
 #include <mutex>
@@ -11,6 +12,8 @@
 
 #include "rays/beam_fan.h"
 #include "rays/edge_tree.h"
+#include "rays/materials.h"
+#include "world/slot_map.h"
 
 class b2Body;
 class b2Fixture;
@@ -30,11 +33,18 @@ struct EdgeGroup {
 // tree with other bodies.
 class RayScene {
  public:
+  using Fixtures = SlotMap<b2Fixture*, IdKind::kFixture>;
+
+  // The fixtures of the world must outlive the scene.
+  explicit RayScene(const Fixtures& fixtures) : fixtures_(fixtures) {}
+
   void add(b2Fixture* fixture);
   // Removes all fixtures of a body.
   void remove_body(const b2Body* body);
   // To be called after a change of the category bits or the sensor flag of a fixture.
   void changed(const b2Fixture* fixture);
+  // Gives a fixture a material.
+  void set_material(const b2Fixture* fixture, const Material& material);
   void clear();
   // Makes this scene that of a copy of a world, which shares the trees of edges.
   void become_copy_of(RayScene& source, const std::function<const b2Body*(const b2Body*)>& copy_of,
@@ -44,6 +54,12 @@ class RayScene {
   const std::vector<b2Fixture*>& solids() const { return solids_; }
   const std::vector<EdgeGroup>& edge_groups();
   FanCache& fans() { return fans_; }
+  const Materials& materials() const { return materials_; }
+  // The fixture whose id has a slot; null if it was destroyed.
+  const b2Fixture* fixture_at(std::uint32_t slot) const {
+    b2Fixture* const* fixture = fixtures_.at_slot(slot);
+    return fixture == nullptr ? nullptr : *fixture;
+  }
 
  private:
   struct EdgeBody {
@@ -58,6 +74,8 @@ class RayScene {
   void find_moved_bodies();
   void make_groups();
 
+  const Fixtures& fixtures_;
+  Materials materials_;
   std::vector<b2Fixture*> solids_;
   std::vector<EdgeBody> edge_bodies_;
   std::vector<EdgeGroup> edge_groups_;

@@ -15,7 +15,10 @@ inline constexpr std::uint16_t kAnyCategory = 0xFFFF;
 // The fixtures of a world while it does not change. Several threads may use a view at a time.
 class SceneView {
  public:
-  explicit SceneView(RayScene& scene) : edges_(scene.edge_groups()), solids_(scene.solids()) {}
+  explicit SceneView(RayScene& scene)
+      : scene_(scene), edges_(scene.edge_groups()), solids_(scene.solids()) {}
+
+  const RayScene& scene() const { return scene_; }
 
   // Prepares for this number of scans, which may be worth a tree of circles and polygons.
   void prepare(std::size_t scans);
@@ -23,6 +26,7 @@ class SceneView {
   void draw(DepthScan& scan, RayMasks masks) const;
 
  private:
+  const RayScene& scene_;
   const std::vector<EdgeGroup>& edges_;
   const std::vector<b2Fixture*>& solids_;
   SolidTree tree_;

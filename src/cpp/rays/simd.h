@@ -131,6 +131,7 @@ struct Lanes8 {
   static FLATLAND_INLINE Floats max(Floats a, Floats b) { return simd::max(a, b); }
   static FLATLAND_INLINE Floats sqrt(Floats a) { return simd::sqrt(a); }
   static FLATLAND_INLINE Mask less(Floats a, Floats b) { return a < b; }
+  static FLATLAND_INLINE Mask less(Words a, Words b) { return a < b; }
   static FLATLAND_INLINE Mask less_equal(Floats a, Floats b) { return a <= b; }
   static FLATLAND_INLINE Mask equal(Floats a, Floats b) { return a == b; }
   static FLATLAND_INLINE Mask not_equal(Floats a, Floats b) { return a != b; }

@@ -83,6 +83,9 @@ struct Lanes16 {
   static FLATLAND_INLINE Mask less(Floats a, Floats b) {
     return _mm512_cmp_ps_mask(a, b, _CMP_LT_OQ);
   }
+  static FLATLAND_INLINE Mask less(Words a, Words b) {
+    return _mm512_cmplt_epu32_mask(reinterpret_cast<__m512i>(a), reinterpret_cast<__m512i>(b));
+  }
   static FLATLAND_INLINE Mask less_equal(Floats a, Floats b) {
     return _mm512_cmp_ps_mask(a, b, _CMP_LE_OQ);
   }

@@ -26,7 +26,7 @@ double crossing_change(const SpeedLimits& limits, double speed, double dt) {
   return speed + acceleration * (dt - time_to_zero);
 }
 
-void advance_motion(World&, b2Body* body, TwistMotion& motion, double dt) {
+void advance_motion(World& world, b2Body* body, TwistMotion& motion, double dt) {
   const double forward = motion.velocity[0] =
       motion.linear.step(motion.velocity[0], motion.target[0], dt);
   const double omega = motion.velocity[2] =
@@ -36,12 +36,13 @@ void advance_motion(World&, b2Body* body, TwistMotion& motion, double dt) {
   const double s = sin(yaw);
   if (!motion.is_holonomic) {
     // Without the terms of a sideways velocity of 0, which could change the sign of a zero.
-    set_velocity(body, {forward * c, forward * s, omega});
+    drive(world, body, motion.traction, {forward * c, forward * s, omega}, dt);
     return;
   }
   const double sideways = motion.velocity[1] =
       motion.linear.step(motion.velocity[1], motion.target[1], dt);
-  set_velocity(body, {c * forward - s * sideways, s * forward + c * sideways, omega});
+  drive(world, body, motion.traction,
+        {c * forward - s * sideways, s * forward + c * sideways, omega}, dt);
 }
 
 // sqrt(x^2 + y^2), correctly rounded in all but a few cases, as math.hypot of Python; that of the C
@@ -66,8 +67,8 @@ double exact_hypot(double x, double y) {
   return ldexp(root + (fma(-root, root, high) + low) / (2.0 * root), exponent);
 }
 
-// Turns the front wheel towards an angle within the limits.
-void steer(World& world, TricycleMotion& motion, double target, double dt) {
+// Turns a wheel towards an angle within the limits. Returns whether joints have to be set.
+bool turn_wheel(SteeredWheel& motion, double target, double dt) {
   const double remaining = target - motion.angle;
   const double acceleration = motion.angular.acceleration;
   double velocity = remaining / dt;
@@ -80,12 +81,22 @@ void steer(World& world, TricycleMotion& motion, double target, double dt) {
   const double limit = motion.max_angle;
   if (limit != 0.0) angle = lesser(greater(angle, -limit), limit);
   motion.angle = angle;
-  if (motion.is_displayed && angle == motion.displayed_angle) return;
+  if (motion.is_displayed && angle == motion.displayed_angle) return false;
   motion.is_displayed = true;
   motion.displayed_angle = angle;
-  b2Joint* joint = world.find_joint(motion.joint);
-  const double joint_angle = angle * motion.steering_sign;
-  if (joint != nullptr) set_limits(joint, AngleLimits(joint_angle, joint_angle));
+  return true;
+}
+
+void set_joint_angle(World& world, Id id, double angle) {
+  b2Joint* joint = world.find_joint(id);
+  if (joint != nullptr) set_limits(joint, AngleLimits(angle, angle));
+}
+
+// Turns the front wheel towards an angle within the limits.
+void steer(World& world, TricycleMotion& motion, double target, double dt) {
+  if (turn_wheel(motion, target, dt)) {
+    set_joint_angle(world, motion.joint, motion.angle * motion.steering_sign);
+  }
 }
 
 // Turns the front wheel for a velocity of the rear center and a yaw rate. The front wheel moves
@@ -127,7 +138,36 @@ void advance_motion(World& world, b2Body* body, TricycleMotion& motion, double d
   const double sideways = -omega * motion.rear_center[0];
   const double c = cos(yaw);
   const double s = sin(yaw);
-  set_velocity(body, {c * forward - s * sideways, s * forward + c * sideways, omega});
+  drive(world, body, motion.traction,
+        {c * forward - s * sideways, s * forward + c * sideways, omega}, dt);
+}
+
+// Returns the steering angle for a velocity of the rear center and a yaw rate.
+double angle_for_twist(const AckermannMotion& motion) {
+  const double v = motion.target[0];
+  const double across = motion.wheelbase * motion.target[2];
+  if (v == 0.0 && across == 0.0) return motion.target_angle;  // A stop keeps the angle.
+  const double angle = atan2(v < 0.0 ? -across : across, fabs(v));
+  return lesser(greater(angle, -motion.max_angle), motion.max_angle);
+}
+
+void advance_motion(World& world, b2Body* body, AckermannMotion& motion, double dt) {
+  motion.target_angle = motion.takes_twist ? angle_for_twist(motion) : motion.target[2];
+  if (turn_wheel(motion, motion.target_angle, dt)) {
+    const auto angles = ackermann_angles(motion.angle, motion.wheelbase, motion.track);
+    for (std::size_t i = 0; i < 2; ++i) {
+      set_joint_angle(world, motion.joints[i], angles[i] * motion.steering_signs[i]);
+    }
+  }
+  const double v = motion.speed = motion.linear.step(motion.speed, motion.target[0], dt);
+  const double omega = v * tan(motion.angle) / motion.wheelbase;
+  const double yaw = pose_of(*body)[2];
+  const double forward = v + omega * motion.rear_center[1];
+  const double sideways = -omega * motion.rear_center[0];
+  const double c = cos(yaw);
+  const double s = sin(yaw);
+  drive(world, body, motion.traction,
+        {c * forward - s * sideways, s * forward + c * sideways, omega}, dt);
 }
 
 void set_progress(TweenMotion& motion, double progress) {
@@ -178,7 +218,25 @@ void advance_motion(World& world, b2Body* body, TweenMotion& motion, double dt) 
   hold_motion(world, body, motion);
 }
 
+void advance_motion(World& world, b2Body* body, OmniMotion& motion, double dt) {
+  advance_omni(world, body, motion, dt);
+}
+
+void advance_motion(World&, b2Body* body, PathMotion& motion, double dt) {
+  advance_path(body, motion, dt);
+}
+
+void advance_motion(World&, b2Body*, RollingWheels&, double) {}
+
 }  // namespace
+
+std::array<double, 2> ackermann_angles(double angle, double wheelbase, double track) {
+  // The centre of rotation is at a distance L cos / sin to the left of the rear axle's centre.
+  const double across = wheelbase * sin(angle);
+  const double along = wheelbase * cos(angle);
+  const double shift = 0.5 * track * sin(angle);
+  return {atan2(across, along - shift), atan2(across, along + shift)};
+}
 
 double SpeedLimits::step(double v, double target, double dt) const {
   if (velocity != 0.0) target = lesser(greater(target, -velocity), velocity);
@@ -198,10 +256,20 @@ void advance(World& world, b2Body* body, Motion& motion, double dt) {
   std::visit([&](auto& kind) { advance_motion(world, body, kind, dt); }, motion);
 }
 
-void hold(World& world, b2Body* body, const Motion& motion) {
-  if (const auto* tween = std::get_if<TweenMotion>(&motion)) hold_motion(world, body, *tween);
+void hold(World& world, b2Body* body, Motion& motion) {
+  if (const auto* tween = std::get_if<TweenMotion>(&motion)) {
+    hold_motion(world, body, *tween);
+  } else if (const auto* path = std::get_if<PathMotion>(&motion)) {
+    hold_path(world, body, *path);
+  } else if (auto* wheels = std::get_if<RollingWheels>(&motion)) {
+    measure_wheels(world, *wheels);
+  }
 }
 
-bool has_hold(const Motion& motion) { return std::holds_alternative<TweenMotion>(motion); }
+bool has_hold(const Motion& motion) {
+  return std::holds_alternative<TweenMotion>(motion) ||
+         std::holds_alternative<PathMotion>(motion) ||
+         std::holds_alternative<RollingWheels>(motion);
+}
 
 }  // namespace flatland

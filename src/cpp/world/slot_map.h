@@ -20,7 +20,8 @@ enum class IdKind : std::uint64_t {
   kJoint = 3,
   kController = 4,
   kRecord = 5,
-  kTouches = 6
+  kTouches = 6,
+  kCrowd = 7
 };
 
 // Values by id. The id of an erased value is never valid again, even if its slot is reused.
@@ -49,6 +50,13 @@ class SlotMap {
     return &slots_[slot].value;
   }
   const Value* find(Id id) const { return const_cast<SlotMap*>(this)->find(id); }
+
+  // The part of an id that identifies the value among those that exist.
+  static std::uint32_t slot_of(Id id) { return static_cast<std::uint32_t>(id); }
+  // Returns the value in a slot, or null if the slot is free.
+  const Value* at_slot(std::uint32_t slot) const {
+    return slot < slots_.size() && slots_[slot].is_used() ? &slots_[slot].value : nullptr;
+  }
 
   void erase(Id id) {
     if (find(id) == nullptr) return;

@@ -46,6 +46,16 @@ void StepPlan::remove_body(Id body) {
   for (const Id id : removed) remove_controller(id);
 }
 
+Id StepPlan::add_crowd(const crowd::Settings& settings) {
+  is_sorted_ = false;
+  return crowds_.insert(crowd::Crowd(settings));
+}
+
+void StepPlan::remove_crowd(Id id) {
+  crowds_.erase(id);
+  is_sorted_ = false;
+}
+
 Id StepPlan::add_record(const Record& record) {
   if (record.clock >= clocks_.size()) throw std::invalid_argument("the clock does not exist");
   is_sorted_ = false;
@@ -93,6 +103,9 @@ void StepPlan::sort() {
     const std::size_t phase = (after_clocks_ & bit(record.clock)) != 0 ? 1 : 0;
     actions_[phase].push_back({record.order, Kind::kRecord, id});
   });
+  crowds_.for_each([&](Id id, const crowd::Crowd& crowd) {
+    if (crowd.is_automatic) actions_[0].push_back({crowd.order, Kind::kCrowd, id});
+  });
   for (auto& actions : actions_) {
     std::sort(actions.begin(), actions.end(), [](const Action& a, const Action& b) {
       return std::tie(a.order, a.kind, a.id) < std::tie(b.order, b.kind, b.id);
@@ -114,6 +127,13 @@ void StepPlan::carry_out_one(World& world, const Action& action, double dt) {
   if (action.kind == Kind::kRecord) {
     Record* record = records_.find(action.id);
     if (record != nullptr) make_record(world, *record);
+    return;
+  }
+  if (action.kind == Kind::kCrowd) {
+    crowd::Crowd* crowd = crowds_.find(action.id);
+    if (crowd != nullptr && crowd->is_automatic && crowd->last_step != number_) {
+      advance_now(world, *crowd, dt);
+    }
     return;
   }
   Controller* controller = controllers_.find(action.id);
@@ -157,10 +177,16 @@ void StepPlan::advance_now(World& world, Controller& controller, double dt) {
   advance(world, world.change_body(controller.body), controller.motion, dt);
 }
 
+void StepPlan::advance_now(World& world, crowd::Crowd& crowd, double dt) {
+  crowd.last_step = number_;
+  crowd.advance(world, step_, dt);
+}
+
 void StepPlan::remove_all() {
   StepPlan emptied = *this;
   emptied.controllers_.clear();
   emptied.records_.clear();
+  emptied.crowds_.clear();
   emptied.exclude_ids_of(*this);
   emptied.failed_.clear();
   emptied.is_sorted_ = false;
@@ -170,6 +196,7 @@ void StepPlan::remove_all() {
 void StepPlan::exclude_ids_of(const StepPlan& other) {
   controllers_.exclude_ids_of(other.controllers_);
   records_.exclude_ids_of(other.records_);
+  crowds_.exclude_ids_of(other.crowds_);
 }
 
 void StepPlan::clear() { *this = StepPlan(); }

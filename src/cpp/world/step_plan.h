@@ -1,6 +1,6 @@
 // What the core does in each step besides the physics, and when code of plugins is to be called.
 //
-// A plan contains controllers, which move bodies, and records of updates that were due but for
+// A plan contains controllers and crowds, which move bodies, and records of updates that were due but for
 // which no code was called, because the result was not wanted. They are carried out in the order of
 // the plugins to which they belong, so that code that is called in between finds the world as if
 // each plugin had been called in each step. All of it are values that refer to objects by id.
@@ -9,6 +9,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "crowd/crowd.h"
 #include "world/controllers.h"
 #include "world/rate_clock.h"
 #include "world/slot_map.h"
@@ -47,7 +48,10 @@ class StepPlan {
   static constexpr std::size_t kMostClocks = 62;
   static constexpr std::int64_t kEnd = INT64_MAX;  // after all plugins
 
-  bool empty() const { return clocks_.empty() && controllers_.size() == 0 && records_.size() == 0; }
+  bool empty() const {
+    return clocks_.empty() && controllers_.size() == 0 && records_.size() == 0 &&
+           crowds_.size() == 0;
+  }
 
   // Throws std::invalid_argument if there are kMostClocks clocks already.
   std::uint32_t add_clock(Phase phase, const RateClock& clock);
@@ -63,6 +67,11 @@ class StepPlan {
   void remove_body(Id body);
   // To be called after a change of the order of a controller or of whether it is automatic.
   void order_changed() { is_sorted_ = false; }
+
+  Id add_crowd(const crowd::Settings& settings);
+  // Null if it does not exist.
+  crowd::Crowd* find_crowd(Id id) { return crowds_.find(id); }
+  void remove_crowd(Id id);
 
   // Throws std::invalid_argument for an unknown clock.
   Id add_record(const Record& record);
@@ -84,6 +93,8 @@ class StepPlan {
   std::vector<Id> take_failed();
   // Advances a controller now, and not again in this step.
   void advance_now(World& world, Controller& controller, double dt);
+  // Carries out a crowd now, and not again in this step.
+  void advance_now(World& world, crowd::Crowd& crowd, double dt);
 
   // Removes everything.
   void clear();
@@ -93,7 +104,7 @@ class StepPlan {
   void exclude_ids_of(const StepPlan& other);
 
  private:
-  enum class Kind : std::uint8_t { kAdvance, kHold, kRecord };
+  enum class Kind : std::uint8_t { kAdvance, kHold, kCrowd, kRecord };
   struct Action {
     std::int64_t order;
     Kind kind;
@@ -109,6 +120,7 @@ class StepPlan {
   std::uint64_t called_clocks_ = 0;
   SlotMap<Controller, IdKind::kController> controllers_;
   SlotMap<Record, IdKind::kRecord> records_;
+  SlotMap<crowd::Crowd, IdKind::kCrowd> crowds_;
 
   bool is_sorted_ = true;
   std::vector<Action> actions_[2];  // by phase

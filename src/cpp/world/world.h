@@ -194,7 +194,7 @@ class World final : private b2DestructionListener {
   SlotMap<b2Fixture*, IdKind::kFixture> fixtures_;
   SlotMap<JointRecord, IdKind::kJoint> joints_;
   ContactRecorder contacts_;
-  RayScene rays_;
+  RayScene rays_{fixtures_};
   StepPlan plan_;
   ThreadPool threads_;
   double last_step_time_ = 1.0;  // the first step may be long

@@ -94,6 +94,44 @@ def test_odometry() -> None:
     assert list(message.twist.covariance) == [0.0] * 36
 
 
+def test_pose_stamped() -> None:
+    message = sent(flatland.PoseStamped(STAMP, "map", (1.0, -2.0, 2.0)))
+    assert header(message) == (1_234_567_890, 987_654_321, "map")
+    position = message.pose.position
+    assert (position.x, position.y, position.z) == (1.0, -2.0, 0.0)
+    assert quaternion(message.pose.orientation) == (0, 0, math.sin(1.0), math.cos(1.0))
+
+
+def test_range() -> None:
+    message = sent(flatland.Range(STAMP, "sonar", "infrared", 0.5, 0.1, 4.0, math.inf))
+    assert header(message) == (1_234_567_890, 987_654_321, "sonar")
+    assert message.radiation_type == message.INFRARED
+    assert message.field_of_view == pytest.approx(0.5)
+    assert (message.min_range, message.max_range) == pytest.approx((0.1, 4.0))
+    assert message.range == math.inf
+    other = sent(flatland.Range(0, "sonar", "ultrasound", 0.5, 0.1, 4.0, 1.0))
+    assert (other.radiation_type, other.range) == (other.ULTRASOUND, 1.0)
+
+
+def test_semantic_scan() -> None:
+    table = (
+        flatland.SemanticLabel("", "", (), ""),
+        flatland.SemanticLabel("chair1", "leg", ("2d", "3d"), "chair"),
+    )
+    ranges, labels = np.float32([1.5, math.nan]), np.uint32([1, 0])
+    message = sent(
+        flatland.SemanticScan(STAMP, "eye", -1.0, 0.5, 0.25, 0.125, 8.0, ranges, labels, table)
+    )
+    assert header(message) == (1_234_567_890, 987_654_321, "eye")
+    assert (message.angle_min, message.angle_max, message.angle_increment) == (-1.0, 0.5, 0.25)
+    assert (message.range_min, message.range_max) == (0.125, 8.0)
+    np.testing.assert_array_equal(message.ranges, ranges)
+    assert list(message.labels) == [1, 0]
+    assert [
+        (label.name, label.body, tuple(label.layers), label.class_name) for label in message.table
+    ] == [("", "", (), ""), ("chair1", "leg", ("2d", "3d"), "chair")]
+
+
 def test_twist_with_covariance() -> None:
     covariance = np.arange(36.0).reshape(6, 6)
     message = sent(flatland.TwistWithCovariance(STAMP, "base", (1.0, 2.0, 3.0), covariance))

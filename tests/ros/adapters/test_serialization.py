@@ -51,6 +51,32 @@ VALUES = st.one_of(
         BEAMS,
     ),
     st.builds(flatland.Odometry, STAMPS, TEXTS, TEXTS, POSES, TRIPLES, matrices(6), matrices(6)),
+    st.builds(flatland.PoseStamped, STAMPS, TEXTS, POSES),
+    st.builds(
+        flatland.Range,
+        STAMPS,
+        TEXTS,
+        st.sampled_from(["ultrasound", "infrared"]),
+        *[SMALL] * 4,
+    ),
+    st.builds(
+        flatland.SemanticScan,
+        STAMPS,
+        TEXTS,
+        *[SMALL] * 5,
+        BEAMS,
+        st.integers(0, 20).flatmap(lambda n: arrays(np.uint32, n)),
+        st.lists(
+            st.builds(
+                flatland.SemanticLabel,
+                TEXTS,
+                TEXTS,
+                st.lists(TEXTS, max_size=3).map(tuple),
+                TEXTS,
+            ),
+            max_size=4,
+        ).map(tuple),
+    ),
     st.builds(flatland.TwistWithCovariance, STAMPS, TEXTS, TRIPLES, matrices(6)),
     st.builds(
         flatland.Imu,

@@ -289,6 +289,7 @@ PLUGINS: dict[str, tuple[str, str, str]] = {
             ("Imu", "body", ""),
             ("Tween", "body", ""),
             ("BoolSensor", "body", ""),
+            ("PosePublisher", "body", ""),
             ("TricycleDrive", "body", ""),
             ("ModelTfPublisher", "reference", ""),
         )
@@ -324,6 +325,16 @@ PLUGINS: dict[str, tuple[str, str, str]] = {
         "type: Gps, body: base, ref_lat: 91",
         "Gps",
         'Invalid "ref_lat", must be from -90 to 90, got 91.0',
+    ),
+    "PosePublisher of another message": (
+        "type: PosePublisher, message: tf",
+        "PosePublisher",
+        'Invalid "message", must be one of: pose, odometry, got tf',
+    ),
+    "PosePublisher of a pose with a child frame": (
+        "type: PosePublisher, child_frame_id: base",
+        "PosePublisher",
+        'Invalid "child_frame_id", only used with "message: odometry"',
     ),
     "Dummy with another number": (
         "type: DummyModelPlugin, dummy_param_float: 0.123456, "

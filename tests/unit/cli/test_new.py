@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import subprocess
 import sys
 import xml.etree.ElementTree as ElementTree
@@ -13,6 +14,7 @@ from flatland_command import main
 from waiting import TIMEOUT
 
 import flatland
+from flatland import worldgen
 
 
 @pytest.fixture(autouse=True)
@@ -80,6 +82,63 @@ def test_a_plugin_is_a_ros_package_with_a_manifest(monkeypatch, capsys) -> None:
     manifest = export.attrib["plugin"].replace("${prefix}", "speedy")
     monkeypatch.setenv("FLATLAND_PLUGIN_PATH", str(Path(manifest).absolute()))
     assert main("check", "speedy/worlds/demo.yaml") == 0, capsys.readouterr().out
+
+
+@pytest.mark.parametrize("kind", ["office", "maze", "warehouse"])
+def test_random_world(folder: Path, capsys: Any, kind: str) -> None:
+    arguments = ("--size", "15x14", "--resolution", "0.1", "--radius", "0.2")
+    assert main("new", "world", "lab", f"--{kind}", "--seed", "3", *arguments) == 0
+    printed = capsys.readouterr().out
+    assert printed.startswith("created lab, seed 3\n")
+    assert "flatland run lab/world.yaml" in printed
+    assert main("check", "lab/world.yaml") == 0, capsys.readouterr().out
+    generated = worldgen.generate(kind, 3, (15, 14), resolution=0.1, radius=0.2)
+    for name, data in generated.files("lab").items():
+        assert (folder / "lab" / name).read_bytes() == data
+    assert [path.name for path in folder.iterdir()] == ["lab"]
+
+
+def test_the_seed_of_a_random_world_is_drawn_and_printed(capsys: Any) -> None:
+    assert main("new", "world", "one", "--maze", "--size", "8x8") == 0
+    found = re.match(r"created one, seed (\d+)\n", capsys.readouterr().out)
+    assert found is not None
+    assert main("new", "world", "two", "--maze", "--size", "8x8", "--seed", found[1]) == 0
+    assert Path("one/map.pgm").read_bytes() == Path("two/map.pgm").read_bytes()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "message"),
+    [
+        ("world lab --office --size 5x5", 1, "at least 12 x 10 m, got 5 x 5 m"),
+        ("world lab --maze --size 400x400", 1, "at most 40000000 cells"),
+        ("world lab --maze --size 1000x9", 1, "at most 500 m along each side"),
+        ("world lab --maze --radius 2", 1, "radius must be from 0.1 to 0.45 m, got 2"),
+        ("world lab --maze --size big", 2, "must be WIDTHxHEIGHT in metres, as in 60x25"),
+        ("world lab --maze --seed -1", 2, "must be an integer of at least 0, got '-1'"),
+        ("world lab --maze --office", 2, "not allowed with argument --maze"),
+        ("world lab --castle", 2, "--castle"),
+        ("world lab --seed 1", 2, "--seed requires --office, --maze or --warehouse"),
+        ("robot lab --maze", 2, "--maze is an option of `flatland new world`"),
+        ("world 2d --maze", 1, "the name must start with a letter"),
+    ],
+)
+def test_invalid_random_worlds_leave_nothing_behind(
+    folder: Path, capsys: Any, arguments: str, code: int, message: str
+) -> None:
+    try:
+        result = main("new", *arguments.split())
+    except SystemExit as error:  # of argparse
+        result = error.code
+    assert result == code
+    assert message in capsys.readouterr().err
+    assert not list(folder.iterdir())
+
+
+def test_a_random_world_changes_no_existing_folder(folder: Path, capsys: Any) -> None:
+    Path("lab").mkdir()
+    assert main("new", "world", "lab", "--maze") == 1
+    assert "lab exists, choose another name" in capsys.readouterr().err
+    assert not list((folder / "lab").iterdir())
 
 
 def test_no_placeholder_is_left(folder: Path) -> None:

@@ -202,6 +202,20 @@ class TestChanges:
             assert message["models"][0]["bodies"][0]["color"] == [1, 1, 0, 1]
             assert message["models"][0]["id"] == robot["id"]
 
+    def test_a_changed_appearance_is_sent(self, url, world):
+        with RawWebClient(url) as client:
+            robot = client.wait_model("robot")
+            [shape, *_] = robot["bodies"][0]["shapes"]
+            assert shape["layers"] == ["walls"]
+            world.between_steps(lambda: world.set_appearance("robot", visible=False))
+            [hidden] = client.wait("models")["models"]
+            assert (hidden["id"], hidden["bodies"][0]["shapes"]) == (robot["id"], [])
+            world.between_steps(lambda: world.set_appearance("robot", visible=True))
+            assert client.wait("models")["models"] == [robot]
+            # New layers alone are found, too.
+            world.between_steps(lambda: world.set_appearance("robot", layers="all"))
+            assert client.wait("models")["models"] == [robot]
+
     def test_new_edges_of_a_layer_are_sent(self, url, world):
         with RawWebClient(url) as client:
             client.wait("models")

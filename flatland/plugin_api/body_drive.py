@@ -1,0 +1,135 @@
+"""The common part of drives that report odometry and the velocity of their wheels."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from flatland.plugin_api.drive import Odometer, open_twist_command
+from flatland.plugin_api.plugin import ModelPlugin
+from flatland.plugin_api.schedule import when_due
+from flatland.values import Twist, TwistWithCovariance
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from flatland.config.reader import YamlReader
+    from flatland.entities.body import Body
+    from flatland.geometry import Pose, Vector2
+    from flatland.physics import DriveController
+    from flatland.plugin_api.ports import Command, Output
+    from flatland.plugin_api.traction import Traction
+    from flatland.plugin_api.update_timer import UpdateTimer
+    from flatland.timekeeper import Timekeeper
+
+
+class BodyDrive(ModelPlugin):
+    """Drives a body by a controller of the core, and emits where it is and how it moves.
+
+    A subclass creates the controller, calls `open_reports` and `open_twist`, and passes commands
+    to the controller in `set_target`.
+
+    Attributes:
+        body: The driven body.
+        traction: Limits of the forces in mode `force`; None in mode `velocity`.
+        timer: Timer of the updates.
+    """
+
+    body: Body
+    traction: Traction | None
+    timer: UpdateTimer
+    _controller: DriveController
+    _moves_sideways = False
+
+    def open_reports(self, config: YamlReader, center: Vector2 = (0.0, 0.0)) -> None:
+        """Declares the outputs and arranges for the updates; for `on_initialize`.
+
+        Args:
+            config: Parameters of the drive.
+            center: Point of the body that moves along its x axis, body frame [m].
+
+        Raises:
+            YamlError: A parameter is invalid.
+            PluginError: A topic is not a legal name.
+        """
+        self._odometer = Odometer(
+            self,
+            config,
+            self.body,
+            twist_in_local_frame=True,
+            sends_transform=True,
+            publish=config.get("enable_odom_pub", "bool", True),
+            center=center,
+        )
+        self.world_frame_id = self._odometer.world_frame_id
+        twist_topic = config.get("twist_pub", "string", "twist")
+        self._twist: Output[TwistWithCovariance] | None = None
+        if config.get("enable_twist_pub", "bool", True):
+            self._twist = self.output(twist_topic, TwistWithCovariance)
+        outputs = () if self._twist is None else (self._twist,)
+        self.timer = self._odometer.schedule(config, self._publish_now, outputs)
+
+    def open_twist(self, config: YamlReader) -> Command[Twist]:
+        """Declares the command of a velocity; for `on_initialize`.
+
+        Raises:
+            YamlError: The topic is not a string.
+            PluginError: The topic is not a legal name.
+        """
+        command = open_twist_command(self, config.get("twist_sub", "string", "cmd_vel"))
+        command.on_change = self.command_changed
+        return command
+
+    def command_changed(self) -> None:
+        """Passes the command to the controller before the next step; safe from any thread."""
+        self.set_before_step(self.set_target)
+
+    def set_target(self) -> None:
+        """Passes the command to the controller."""
+        raise NotImplementedError
+
+    @when_due
+    def before_physics_step(self, timekeeper: Timekeeper) -> None:
+        """Moves the body, then reports where it is and how it moves now."""
+        self.set_target()
+        # In every step; otherwise friction and contacts would slow the robot down.
+        self._controller.advance(timekeeper.step_size)
+        if self.timer.check_update(timekeeper):
+            self._publish_now(timekeeper)
+
+    def model_moved(self, previous: Mapping[str, Pose], keep_odometry: bool) -> None:
+        """Keeps the odometry, or displaces it along with the model."""
+        self._odometer.move(previous[self.body.name], keep_odometry)
+
+    def state(self) -> object:
+        """Returns the state of the controller and of the odometry."""
+        state = (*self.drive_state(), self._odometer.state())
+        return state if self.traction is None else (*state, self._controller.traction_state)
+
+    def drive_state(self) -> tuple[object, ...]:
+        """Returns what changes in the controller, apart from the traction."""
+        raise NotImplementedError
+
+    def _publish_now(self, timekeeper: Timekeeper) -> None:
+        twist = self._twist
+        odometer = self._odometer
+        odometer.begin_update()
+        wants_twist = twist is not None and twist.wanted
+        if not (wants_twist or odometer.sends_transform or odometer.wanted):
+            return
+        stamp, pose, velocity = timekeeper.sim_time_ns, self.body.pose, self.body.velocity
+        odometer.report(stamp, pose, velocity)
+        if twist is not None and wants_twist:
+            forward, sideways, yaw_rate = odometer.measure(pose, velocity)
+            noise = odometer.twist_noise
+            twist.emit(
+                TwistWithCovariance(
+                    stamp,
+                    odometer.child_frame_id,
+                    (
+                        forward + noise.sample(0),
+                        sideways + noise.sample(1) if self._moves_sideways else 0.0,
+                        yaw_rate + noise.sample(2),
+                    ),
+                    odometer.twist_covariance(pose, velocity),
+                )
+            )

@@ -1,0 +1,117 @@
+"""The parameter `mode: force`: a drive pushes its body with bounded forces on the ground."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Final
+
+from flatland.plugin_api.parameters import at_key, read_not_negative
+
+if TYPE_CHECKING:
+    from flatland.config.reader import YamlReader
+    from flatland.entities.body import Body
+    from flatland.entities.model import Model
+    from flatland.physics import DriveController
+
+GRAVITY: Final = 9.80665  # m/s², standard gravity
+
+_MODES: Final = ("velocity", "force")
+_KEYS: Final = ("max_force", "max_torque", "friction", "grip_radius")
+
+
+@dataclass(frozen=True, slots=True)
+class Traction:
+    """The limits of the forces of a drive.
+
+    Attributes:
+        max_force: Force of the motors [N]: forwards and backwards, or in all directions if the
+            drive is holonomic.
+        max_torque: Torque of the motors [N m].
+        friction: Friction coefficient of the wheels on the ground; infinite without slip.
+        grip_radius: Radius at which the friction of the wheels withstands a torque [m], 0 for the
+            radius of gyration.
+    """
+
+    max_force: float
+    max_torque: float
+    friction: float
+    grip_radius: float
+
+
+def read_traction(
+    config: YamlReader,
+    body: Body,
+    controller: DriveController,
+    *,
+    holonomic: bool = False,
+    needs_torque: bool = False,
+    at_center: bool = False,
+) -> Traction | None:
+    """Reads `mode` and the limits of forces, and sets those of a controller.
+
+    Args:
+        config: Parameters of the drive.
+        body: The driven body.
+        controller: Controller of the drive.
+        holonomic: Whether the motors push in all directions.
+        needs_torque: Whether `max_torque` is required.
+        at_center: Whether the forces act at the centre of mass, as those of a car, whose axles
+            share the load, or at the origin of the body.
+
+    Returns:
+        The limits; None in mode `velocity`.
+
+    Raises:
+        YamlError: A parameter is invalid, or the body cannot be moved by forces.
+    """
+    mode: str = config.get("mode", "string", "velocity")
+    if mode not in _MODES:
+        raise at_key(config, "mode").error(
+            f'Invalid "mode", must be one of: {", ".join(_MODES)}, got {mode}'
+        )
+    if mode == "velocity":
+        for key in _KEYS:
+            if key in config:
+                raise at_key(config, key).error(f'"{key}" requires "mode: force"')
+        return None
+    if body.type != "dynamic" or body.inertia <= 0.0:
+        raise at_key(config, "mode").error(
+            f'"mode: force" requires a dynamic body with a mass, but body "{body.name}" '
+            + ("has none" if body.type == "dynamic" else f"is {body.type}")
+        )
+    traction = Traction(
+        max_force=config.get("max_force", "float", minimum=0),
+        max_torque=(
+            config.get("max_torque", "float", minimum=0)
+            if needs_torque
+            else read_not_negative(config, "max_torque", math.inf)
+        ),
+        friction=read_not_negative(config, "friction", 1.0),
+        grip_radius=config.get("grip_radius", "float", 0.0, minimum=0, finite=True),
+    )
+    controller.set_traction(
+        connected_bodies(body),
+        holonomic=holonomic,
+        at_center=at_center,
+        max_force=traction.max_force,
+        max_torque=traction.max_torque,
+        grip=traction.friction * GRAVITY,
+        radius=traction.grip_radius,
+    )
+    return traction
+
+
+def connected_bodies(body: Body) -> list[Body]:
+    """Returns a body of a model and those that joints of the model connect to it, directly or not.
+
+    Args:
+        body: The body; first in the result.
+    """
+    found = [body]
+    model: Model = body.entity  # type: ignore[assignment]
+    for each in found:
+        for joint in model.joints:
+            if each in joint.bodies:
+                found += [other for other in joint.bodies if other not in found]
+    return found

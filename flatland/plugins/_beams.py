@@ -1,0 +1,145 @@
+"""The beams of range finders, and the parameters that these have in common."""
+
+from __future__ import annotations
+
+import functools
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from flatland.physics import BeamFan
+from flatland.plugin_api.parameters import at_key
+
+if TYPE_CHECKING:
+    from flatland.config.reader import YamlReader
+    from flatland.geometry import FloatArray
+    from flatland.world import World
+
+MAX_BEAMS = 1_000_000
+MAX_RANGE = 1e6  # m; the spacing of single-precision numbers is 6 cm there
+
+
+@dataclass(frozen=True, slots=True)
+class BeamAngles:
+    """The beam angles of a laser [rad]; beam i is at `minimum + i * increment`."""
+
+    minimum: float
+    maximum: float
+    increment: float
+    count: int
+
+    @classmethod
+    def from_config(cls, reader: YamlReader) -> BeamAngles:
+        """Reads the beam angles.
+
+        Args:
+            reader: Reader of the map `angle`.
+
+        Raises:
+            YamlError: A number is missing or not finite, the sign of the increment does not fit
+                the limits, or there would be more than `MAX_BEAMS` beams.
+        """
+        numbers = [reader.get(key, "float") for key in ("min", "max", "increment")]
+        reader.ensure_accessed_all()
+        if not all(map(math.isfinite, numbers)):
+            raise reader.error(f'Invalid "angle" params, must be finite, got {numbers}')
+        minimum, maximum, increment = numbers
+        if increment == 0:
+            raise reader.error('Invalid "angle" params, increment must not be zero!')
+        if increment > 0 and maximum < minimum:
+            raise reader.error('Invalid "angle" params, must have max > min when increment > 0')
+        if increment < 0 and minimum < maximum:
+            raise reader.error('Invalid "angle" params, must have min > max when increment < 0')
+        # A product, as the quotient overflows for a tiny increment.
+        if abs(maximum - minimum) >= (MAX_BEAMS - 0.5) * abs(increment):
+            raise reader.error(
+                f'Invalid "angle" params, more than {MAX_BEAMS} beams between {minimum} and '
+                f"{maximum} in steps of {increment}"
+            )
+        count = math.floor((maximum - minimum) / increment + 0.5) + 1
+        return cls(minimum, maximum, increment, count)
+
+    @functools.lru_cache(maxsize=16)  # noqa: B019 - shared by all robots of one kind
+    def end_points(self, length: float, upside_down: bool) -> FloatArray:
+        """Returns the ends of beams of a length [m], sensor frame, shape (count, 2), read-only."""
+        angles = self.minimum + self.increment * np.arange(self.count, dtype=np.float64)
+        if upside_down:
+            angles = -angles
+        ends = length * np.stack([np.cos(angles), np.sin(angles)], axis=1)
+        points = np.ascontiguousarray(ends, dtype=np.float32)
+        points.flags.writeable = False
+        return points
+
+    @functools.lru_cache(maxsize=16)  # noqa: B019 - shared by all robots of one kind
+    def fan(self, length: float, upside_down: bool) -> BeamFan:
+        """Returns the beams of a length [m] prepared for scans, sensor frame."""
+        return BeamFan(self.end_points(length, upside_down))
+
+
+def read_range(config: YamlReader) -> float:
+    """Reads the maximum range [m].
+
+    Raises:
+        YamlError: The value is not a number, not positive or above `MAX_RANGE`.
+    """
+    length: float = config.get("range", "float")
+    if not 0 < length <= MAX_RANGE:
+        raise at_key(config, "range").error(
+            f'Invalid "range", must be greater than 0 and at most {MAX_RANGE:g} m, got {length}'
+        )
+    return length
+
+
+def read_range_min(config: YamlReader, length: float) -> float:
+    """Reads the minimum range [m].
+
+    Args:
+        config: Parameters of the plugin.
+        length: Maximum range [m].
+
+    Raises:
+        YamlError: The value is not a number, negative, or not less than the maximum range.
+    """
+    shortest: float = config.get("range_min", "float", 0.0)
+    if not 0 <= shortest < length:
+        raise config.invalid(
+            "range_min",
+            f'must not be negative and less than "range", {length:g} m, got {shortest}',
+        )
+    return shortest
+
+
+def read_no_hit(config: YamlReader, length: float, default: str = "nan") -> float:
+    """Reads the range that is reported without a hit [m].
+
+    Args:
+        config: Parameters of the plugin.
+        length: Maximum range [m].
+        default: Name of the default value.
+
+    Raises:
+        YamlError: The value is not one of the names.
+    """
+    values = {"nan": math.nan, "inf": math.inf, "range": length}
+    name = config.get("no_hit", "string", default)
+    if name not in values:
+        raise at_key(config, "no_hit").error(
+            f'Invalid "no_hit", must be one of: {", ".join(values)}, got {name}'
+        )
+    return values[name]
+
+
+def read_layers(config: YamlReader, world: World) -> int:
+    """Reads the names of the detected layers, and returns their category bits.
+
+    Raises:
+        YamlError: A layer does not exist.
+    """
+    layers = config.get_list("layers", "string", ["all"])
+    collision_filter = world.collision_filter
+    unknown = collision_filter.unknown(layers)
+    if unknown:
+        raise at_key(config, "layers").error(f"Cannot find layer(s): {{{','.join(unknown)}}}")
+    return collision_filter.category_bits(layers)

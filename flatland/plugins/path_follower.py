@@ -1,0 +1,168 @@
+"""A motion along waypoints, for shuttles, doors, lifts and forklifts."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from flatland.geometry import IDENTITY, Pose, compose
+from flatland.plugin_api.after_step import AFTER, BEFORE, NeverDue
+from flatland.plugin_api.parameters import (
+    MAX_COORDINATE,
+    at_key,
+    read_body_or_first,
+    read_not_negative,
+)
+from flatland.plugin_api.plugin import ModelPlugin
+from flatland.plugin_api.schedule import when_due
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from flatland.config.reader import YamlReader
+    from flatland.physics.controller import SpeedLimits
+    from flatland.plugin_api.ports import Command
+    from flatland.timekeeper import Timekeeper
+
+MODES = ("loop", "once", "there_and_back", "random")
+FRAMES = ("start", "world")
+HEADINGS = ("waypoint", "forward")
+
+_NUMBERS = {"waypoint": (2, 3), "forward": (2,)}  # of a waypoint
+_FORMS = {2: "[x, y]", 3: "[x, y, theta]"}
+
+
+class PathFollower(ModelPlugin):
+    """Moves a body along waypoints, with limits of speed and acceleration.
+
+    The motion is prescribed: contacts neither stop nor deflect the body. The core carries it out in
+    each step (`flatland.physics.PathController`).
+    """
+
+    def on_initialize(self, config: YamlReader) -> None:
+        """Reads the parameters; the path starts at the current pose of the body."""
+        self._body = read_body_or_first(config, self.model, "body")
+        heading = _read_choice(config, "heading", HEADINGS)
+        frame = _read_choice(config, "frame", FRAMES)
+        origin = self._body.pose if frame == "start" else IDENTITY
+        waypoints = [compose(origin, each) for each in _read_waypoints(config, heading)]
+        self._start_command: Command[bool] | None = None
+        self._is_started: bool = config.get("start", "bool", True)
+        self._starts = 0
+        topic = config.get("start_topic", "string", "")
+        if topic:
+            self._start_command = self.command(topic, bool, default=self._is_started)
+        elif not self._is_started:
+            raise at_key(config, "start").error('"start: false" requires a "start_topic"')
+        self._controller = self.control(
+            self._body.control_path(
+                waypoints,
+                mode=_read_choice(config, "mode", MODES),
+                faces_forward=heading == "forward",
+                linear=_read_limits(config, ""),
+                angular=_read_limits(config, "angular_"),
+                wait=config.get("wait", "float", 0.0, minimum=0, finite=True),
+                key=_draw_key(self.rng),
+            )
+        )
+        self._controller.set_start(self._is_started, 0)
+        if self._start_command is not None:
+            self._start_command.on_change = self._start_changed
+        for hook in (BEFORE, AFTER):
+            self.call_when_due(hook, NeverDue())
+
+    def _start_changed(self) -> None:
+        self.set_before_step(self._set_start)
+
+    def _set_start(self) -> None:
+        command = self._start_command
+        if command is None:
+            return
+        if command.value:
+            self._starts = command.received
+        self._is_started = command.value
+        self._controller.set_start(self._is_started, self._starts)
+
+    @property
+    def waypoint(self) -> int:
+        """Number of the last waypoint that was reached; 0 is the initial pose of the body."""
+        return self._controller.state[0]
+
+    @property
+    def is_moving(self) -> bool:
+        """Whether the body is on its way to a waypoint, or waits to leave for it."""
+        return self._controller.state[2]
+
+    def reseed(self, rng: np.random.Generator) -> None:
+        """Continues the random numbers from states that are drawn from a generator."""
+        super().reseed(rng)
+        self._controller.set_key(_draw_key(self.rng))
+
+    @when_due
+    def before_physics_step(self, timekeeper: Timekeeper) -> None:
+        """Advances the motion by one step."""
+        self._controller.advance(timekeeper.step_size)
+
+    @when_due
+    def after_physics_step(self, timekeeper: Timekeeper) -> None:
+        """Moves the body to its pose on the path."""
+        del timekeeper
+        self._controller.hold()
+
+    def model_moved(self, previous: Mapping[str, Pose], keep_odometry: bool) -> None:
+        """Continues to the same waypoint from the new pose."""
+        del previous, keep_odometry
+        self._controller.restart()
+
+    def state(self) -> object:
+        """Returns the state of the motion."""
+        return (self._controller.state, self._is_started, self._starts)
+
+
+def _draw_key(rng: np.random.Generator) -> int:
+    return int(rng.integers(0, 2**64, dtype=np.uint64))
+
+
+def _read_choice(config: YamlReader, key: str, choices: tuple[str, ...]) -> str:
+    """Reads one of several words, by default the first one."""
+    choice: str = config.get(key, "string", choices[0])
+    if choice not in choices:
+        raise at_key(config, key).error(
+            f'Invalid "{key}", must be one of: {", ".join(choices)}, got {choice}'
+        )
+    return choice
+
+
+def _read_limits(config: YamlReader, prefix: str) -> SpeedLimits:
+    """Reads the limits of speed, acceleration and deceleration of the translation or rotation."""
+    key = f"{prefix}speed"
+    speed: float = config.get(key, "float", 1.0, finite=True)
+    if speed <= 0.0:
+        raise at_key(config, key).error(f'Invalid "{key}", must be greater than 0, got {speed}')
+    acceleration = read_not_negative(config, f"{prefix}acceleration", 0.0)
+    deceleration = read_not_negative(config, f"{prefix}deceleration", acceleration)
+    return (
+        speed,
+        0.0 if math.isinf(acceleration) else acceleration,
+        0.0 if math.isinf(deceleration) else deceleration,
+    )
+
+
+def _read_waypoints(config: YamlReader, heading: str) -> list[Pose]:
+    """Reads the waypoints in their frame; the angle is 0 if it is not given."""
+    waypoints: list[Pose] = []
+    sizes = _NUMBERS[heading]
+    for entry in config.subnode("waypoints", "list").items():
+        if not entry.is_list or len(entry) not in sizes:
+            expected = " or ".join(_FORMS[size] for size in sizes)
+            raise entry.error(f'A waypoint with "heading: {heading}" must be {expected}')
+        numbers = [
+            entry.get(i, "float", finite=True, minimum=-MAX_COORDINATE, maximum=MAX_COORDINATE)
+            for i in range(len(entry))
+        ]
+        waypoints.append((numbers[0], numbers[1], numbers[2] if len(numbers) > 2 else 0.0))
+    if not waypoints:
+        raise at_key(config, "waypoints").error('Invalid "waypoints", must not be empty')
+    return waypoints

@@ -1,0 +1,208 @@
+#include "crowd/crowd.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "crowd/random.h"
+#include "world/bodies.h"
+#include "world/world.h"
+
+namespace flatland::crowd {
+
+std::uint32_t Crowd::add_waypoint(const Waypoint& waypoint) {
+  auto index = static_cast<std::uint32_t>(waypoints_.size());
+  // A waypoint without a spacing is temporary: it is on no route, and its number is used again once
+  // nobody is sent there.
+  for (std::uint32_t i = 0; waypoint.spacing == 0.0 && i < waypoints_.size(); ++i) {
+    const bool is_free = waypoints_[i].spacing == 0.0 &&
+                         std::none_of(people_.begin(), people_.end(),
+                                      [i](const Person& person) { return person.sent_to == i; });
+    if (is_free) index = std::min(index, i);
+  }
+  if (index == waypoints_.size()) {
+    waypoints_.emplace_back();
+    queues_.emplace_back();
+    fields_.emplace_back();
+  }
+  waypoints_[index] = waypoint;
+  fields_[index].reset();
+  if (grid_ != nullptr) {
+    const Vec size{grid_->cell() * static_cast<double>(grid_->columns()),
+                   grid_->cell() * static_cast<double>(grid_->rows())};
+    const Vec high = grid_->low() + size;
+    const Place& place = waypoint.place;
+    const bool is_inside = place.low.x > grid_->low().x && place.low.y > grid_->low().y &&
+                           place.high.x < high.x && place.high.y < high.y;
+    if (!is_inside) has_grid_ = false;
+  }
+  return index;
+}
+
+std::uint32_t Crowd::add_route(const Route& route) {
+  routes_.push_back(route);
+  return static_cast<std::uint32_t>(routes_.size() - 1);
+}
+
+std::uint32_t Crowd::add_party(std::uint32_t route, std::uint32_t first_leg, bool is_backward) {
+  Party party;
+  party.route = route;
+  party.leg = first_leg;
+  party.is_backward = is_backward;
+  parties_.push_back(party);
+  return static_cast<std::uint32_t>(parties_.size() - 1);
+}
+
+std::uint32_t Crowd::add_person(Person person) {
+  person.number = next_number_++;
+  own_.insert(person.body);
+  for (const Id leg : person.legs) {
+    if (leg != 0) own_.insert(leg);
+  }
+  people_.push_back(person);
+  return person.number;
+}
+
+void Crowd::remove_person(Id body) {
+  const auto found = std::find_if(people_.begin(), people_.end(),
+                                  [body](const Person& person) { return person.body == body; });
+  if (found == people_.end()) return;
+  own_.erase(found->body);
+  for (const Id leg : found->legs) own_.erase(leg);
+  for (auto& queue : queues_) {
+    queue.erase(std::remove(queue.begin(), queue.end(), found->number), queue.end());
+  }
+  people_.erase(found);
+}
+
+Person* Crowd::find(Id body) {
+  const auto found = std::find_if(people_.begin(), people_.end(),
+                                  [body](const Person& person) { return person.body == body; });
+  return found == people_.end() ? nullptr : &*found;
+}
+
+std::uint32_t Crowd::target_of(const Person& person) const {
+  if (person.sent_to != kNone) return person.sent_to;
+  const Party& party = parties_[person.party];
+  return party.is_done ? kNone : routes_[party.route].waypoints[party.leg];
+}
+
+bool Crowd::is_standing(const Person& person) const {
+  const Party& party = parties_[person.party];
+  if (person.is_stopped || person.stop_until != 0 || party.is_waiting || party.is_done) return true;
+  const std::uint32_t target = target_of(person);
+  const auto& queue = queues_[target];
+  return std::find(queue.begin(), queue.end(), person.number) != queue.end();
+}
+
+std::size_t Crowd::reach_of(World& world, std::uint32_t waypoint) {
+  read_surroundings(world);
+  const FlowField* field = field_of(waypoint);
+  return field == nullptr ? 1 : field->reached();
+}
+
+Vec Crowd::way_from(World& world, std::uint32_t waypoint, Vec place) {
+  read_surroundings(world);
+  const FlowField* field = field_of(waypoint);
+  return field == nullptr ? unit(waypoints_[waypoint].place.nearest(place) - place, {1.0, 0.0})
+                          : field->direction(place);
+}
+
+std::vector<double> Crowd::state() const {
+  std::vector<double> numbers{static_cast<double>(settings_.key >> 32U),
+                              static_cast<double>(settings_.key & 0xFFFFFFFFU)};
+  const auto add = [&](std::initializer_list<double> more) { numbers.insert(numbers.end(), more); };
+  for (const Person& p : people_) {
+    add({static_cast<double>(p.number), static_cast<double>(p.party), p.radius, p.speed,
+         static_cast<double>(p.is_aware), static_cast<double>(p.is_stopped),
+         static_cast<double>(p.sent_to), static_cast<double>(p.stop_until),
+         static_cast<double>(p.draws), p.velocity.x, p.velocity.y, p.heading, p.phase,
+         p.acceleration.x, p.acceleration.y});
+  }
+  for (const Party& p : parties_) {
+    add({static_cast<double>(p.route), static_cast<double>(p.leg),
+         static_cast<double>(p.is_backward), static_cast<double>(p.is_waiting),
+         static_cast<double>(p.is_done), static_cast<double>(p.wait_until),
+         static_cast<double>(p.draws)});
+  }
+  for (const auto& queue : queues_) {
+    add({static_cast<double>(queue.size())});
+    numbers.insert(numbers.end(), queue.begin(), queue.end());
+  }
+  return numbers;
+}
+
+void Crowd::read_surroundings(const World& world) {
+  if (surroundings_.read(world.engine(), own_)) has_grid_ = false;
+  if (has_grid_) return;
+  has_grid_ = true;
+  for (auto& field : fields_) field.reset();
+  const Walls& walls = surroundings_.walls();
+  grid_.reset();
+  if (walls.empty()) return;
+  Vec low = walls.low();
+  Vec high = walls.high();
+  for (const Waypoint& waypoint : waypoints_) {
+    low = {std::min(low.x, waypoint.place.low.x), std::min(low.y, waypoint.place.low.y)};
+    high = {std::max(high.x, waypoint.place.high.x), std::max(high.y, waypoint.place.high.y)};
+  }
+  const Vec margin{1.0, 1.0};  // m, to walk around a wall at the border
+  grid_ = std::make_shared<const FreeGrid>(walls, low - margin, high + margin, settings_.cell,
+                                           settings_.clearance);
+}
+
+void Crowd::read_people(World& world) {
+  for (std::size_t i = people_.size(); i-- > 0;) {
+    Person& person = people_[i];
+    const b2Body* body = world.find_body(person.body);
+    if (body == nullptr) {
+      remove_person(person.body);
+      continue;
+    }
+    const Triple pose = pose_of(*body);
+    person.position = {pose[0], pose[1]};
+    person.heading = pose[2];
+    if (settings_.is_dynamic) {
+      const b2Vec2 v = body->GetLinearVelocity();
+      person.velocity = {static_cast<double>(v.x), static_cast<double>(v.y)};
+    }
+  }
+}
+
+const FlowField* Crowd::field_of(std::uint32_t waypoint) {
+  if (grid_ == nullptr) return nullptr;
+  auto& field = fields_[waypoint];
+  if (field == nullptr) {
+    field = std::make_shared<const FlowField>(*grid_, waypoints_[waypoint].place);
+  }
+  return field.get();
+}
+
+Vec Crowd::way_to(std::uint32_t waypoint, Vec p) {
+  const Vec straight = waypoints_[waypoint].place.nearest(p) - p;
+  const FlowField* field = field_of(waypoint);
+  if (field == nullptr) return unit(straight);
+  // The directions of the grid are coarse next to the place.
+  const double close = 3.0 * grid_->cell();
+  if (square(straight) < close * close && surroundings_.walls().is_clear(p, p + straight)) {
+    return unit(straight);
+  }
+  return field->direction(p);
+}
+
+double Crowd::draw(std::uint64_t& draws, std::uint64_t stream, Span span) {
+  return span.least + (span.most - span.least) * uniform(settings_.key, stream, draws++);
+}
+
+void Crowd::advance(World& world, std::int64_t k, double dt) {
+  if (k % settings_.interval == 0) update(world, k, dt);
+  if (!settings_.is_dynamic) return;
+  for (const Person& person : people_) {
+    b2Body* body = world.find_body(person.body);
+    if (body == nullptr) continue;
+    const Vec change = dt * person.acceleration;
+    body->SetLinearVelocity(body->GetLinearVelocity() +
+                            b2Vec2(static_cast<float>(change.x), static_cast<float>(change.y)));
+  }
+}
+
+}  // namespace flatland::crowd

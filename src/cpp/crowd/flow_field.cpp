@@ -1,0 +1,182 @@
+#include "crowd/flow_field.h"
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <limits>
+#include <queue>
+#include <utility>
+
+namespace flatland::crowd {
+namespace {
+
+constexpr double kMostCells = 4e6;
+constexpr double kClearance = 0.4;     // beyond which walls do not slow down [m]
+constexpr double kMostSlowness = 4.0;  // next to a wall
+constexpr float kNever = std::numeric_limits<float>::infinity();
+constexpr double kUnit = 127.0;  // length of the stored directions
+
+// The arrival times at the cells, by the fast marching method: J. Sethian, "A fast marching level
+// set method for monotonically advancing fronts", Proc. Natl. Acad. Sci. 93 (1996).
+class Front {
+ public:
+  explicit Front(const FreeGrid& grid)
+      : grid_(grid),
+        times_(static_cast<std::size_t>(grid.columns() * grid.rows()), kNever),
+        is_final_(times_.size(), false) {}
+
+  void start(std::size_t cell) {
+    times_[cell] = 0.0F;
+    front_.push({0.0F, cell});
+  }
+
+  void advance() {
+    const auto columns = static_cast<std::size_t>(grid_.columns());
+    while (!front_.empty()) {
+      const std::size_t cell = front_.top().second;
+      front_.pop();
+      if (is_final_[cell]) continue;
+      is_final_[cell] = true;
+      const std::size_t column = cell % columns;
+      if (column > 0) update(cell - 1);
+      if (column + 1 < columns) update(cell + 1);
+      if (cell >= columns) update(cell - columns);
+      if (cell + columns < times_.size()) update(cell + columns);
+    }
+  }
+
+  float time(std::int64_t column, std::int64_t row) const {
+    if (column < 0 || row < 0 || column >= grid_.columns() || row >= grid_.rows()) return kNever;
+    return times_[static_cast<std::size_t>(row * grid_.columns() + column)];
+  }
+
+ private:
+  void update(std::size_t cell) {
+    if (is_final_[cell] || grid_.slowness(cell) == 0.0F) return;
+    const auto column = static_cast<std::int64_t>(cell) % grid_.columns();
+    const auto row = static_cast<std::int64_t>(cell) / grid_.columns();
+    double first = std::min(time(column - 1, row), time(column + 1, row));
+    double second = std::min(time(column, row - 1), time(column, row + 1));
+    if (first > second) std::swap(first, second);
+    const double crossing = grid_.cell() * static_cast<double>(grid_.slowness(cell));
+    double arrival = first + crossing;
+    if (arrival > second) {
+      const double difference = second - first;
+      arrival =
+          0.5 * (first + second + std::sqrt(2.0 * crossing * crossing - difference * difference));
+    }
+    const auto rounded = static_cast<float>(arrival);
+    if (rounded >= times_[cell]) return;
+    times_[cell] = rounded;
+    front_.push({rounded, cell});
+  }
+
+  using Entry = std::pair<float, std::size_t>;
+
+  const FreeGrid& grid_;
+  std::vector<float> times_;
+  std::vector<bool> is_final_;
+  std::priority_queue<Entry, std::vector<Entry>, std::greater<>> front_;
+};
+
+// The derivative of the arrival time from the side from which the front came.
+double upwind(float before, float here, float after) {
+  if (std::min(before, after) >= here) return 0.0;
+  return before < after ? static_cast<double>(here - before) : static_cast<double>(after - here);
+}
+
+}  // namespace
+
+Vec Place::nearest(Vec p) const {
+  return {std::min(std::max(p.x, low.x), high.x), std::min(std::max(p.y, low.y), high.y)};
+}
+
+FreeGrid::FreeGrid(const Walls& walls, Vec low, Vec high, double cell, double radius) : low_(low) {
+  const Vec size = high - low;
+  cell_ = std::max(
+      {cell, std::sqrt(size.x * size.y / kMostCells), std::max(size.x, size.y) / kMostCells});
+  columns_ = static_cast<std::int64_t>(size.x / cell_) + 1;
+  rows_ = static_cast<std::int64_t>(size.y / cell_) + 1;
+  slowness_.resize(static_cast<std::size_t>(columns_ * rows_));
+  for (std::size_t i = 0; i < slowness_.size(); ++i) {
+    const double gap = walls.distance(center(i), radius + kClearance) - radius;
+    const double slowness = std::min(kClearance / std::max(gap, 1e-9), kMostSlowness);
+    slowness_[i] = gap < 0.0 ? 0.0F : static_cast<float>(slowness);
+  }
+}
+
+Vec FreeGrid::center(std::size_t index) const {
+  const auto i = static_cast<std::int64_t>(index);
+  return {low_.x + (static_cast<double>(i % columns_) + 0.5) * cell_,
+          low_.y + (static_cast<double>(i / columns_) + 0.5) * cell_};
+}
+
+FlowField::FlowField(const FreeGrid& grid, const Place& place)
+    : low_(grid.low()), cell_(grid.cell()), columns_(grid.columns()), rows_(grid.rows()) {
+  Front front(grid);
+  directions_.resize(static_cast<std::size_t>(columns_ * rows_));
+  // Not the whole place: a part of it may be on the other side of a wall.
+  const double reach = 0.75 * cell_;
+  for (std::size_t i = 0; i < directions_.size(); ++i) {
+    const Vec center = grid.center(i);
+    if (grid.slowness(i) > 0.0F && length(place.nearest(center) - center) <= reach) front.start(i);
+  }
+  front.advance();
+  for (std::int64_t row = 0; row < rows_; ++row) {
+    for (std::int64_t column = 0; column < columns_; ++column) {
+      const float here = front.time(column, row);
+      if (here == kNever) continue;
+      ++reached_;
+      const Vec slope{upwind(front.time(column - 1, row), here, front.time(column + 1, row)),
+                      upwind(front.time(column, row - 1), here, front.time(column, row + 1))};
+      // At the place itself there is no slope.
+      const Vec center = grid.center(index(column, row));
+      const Vec direction = unit(-slope, unit(place.nearest(center) - center, {1.0, 0.0}));
+      directions_[index(column, row)] = {
+          static_cast<std::int8_t>(std::lround(kUnit * direction.x)),
+          static_cast<std::int8_t>(std::lround(kUnit * direction.y))};
+    }
+  }
+}
+
+Vec FlowField::direction(Vec p) const {
+  const double x = (p.x - low_.x) / cell_ - 0.5;
+  const double y = (p.y - low_.y) / cell_ - 0.5;
+  constexpr double kMargin = 8.0;  // cells
+  if (!(x > -kMargin && y > -kMargin && x < static_cast<double>(columns_) + kMargin &&
+        y < static_cast<double>(rows_) + kMargin)) {
+    return {};
+  }
+  const auto column = static_cast<std::int64_t>(std::floor(x));
+  const auto row = static_cast<std::int64_t>(std::floor(y));
+  const auto at = [&](std::int64_t c, std::int64_t r) {
+    return c < 0 || r < 0 || c >= columns_ || r >= rows_ ? Direction{} : directions_[index(c, r)];
+  };
+  const double u = x - static_cast<double>(column);
+  const double v = y - static_cast<double>(row);
+  Vec sum;
+  for (int i = 0; i < 4; ++i) {
+    const Direction d = at(column + i % 2, row + i / 2);
+    const double weight = (i % 2 == 1 ? u : 1.0 - u) * (i / 2 == 1 ? v : 1.0 - v);
+    sum += weight * Vec{static_cast<double>(d.x), static_cast<double>(d.y)};
+  }
+  if (square(sum) > 1.0) return unit(sum);
+  // Outside the free space, for example after a push: to the nearest cell with a way.
+  constexpr std::int64_t kSearch = 4;
+  double nearest = std::numeric_limits<double>::infinity();
+  Vec target;
+  for (std::int64_t r = row - kSearch; r <= row + kSearch; ++r) {
+    for (std::int64_t c = column - kSearch; c <= column + kSearch; ++c) {
+      const Direction d = at(c, r);
+      if (d.x == 0 && d.y == 0) continue;
+      const Vec offset{static_cast<double>(c) - x, static_cast<double>(r) - y};
+      if (square(offset) < nearest) {
+        nearest = square(offset);
+        target = offset;
+      }
+    }
+  }
+  return unit(target);
+}
+
+}  // namespace flatland::crowd

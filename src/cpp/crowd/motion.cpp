@@ -1,0 +1,262 @@
+// How people move: velocities by the model of the crowd, without contacts, and steps of the legs.
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+#include "crowd/crowd.h"
+#include "crowd/gait.h"
+#include "crowd/orca.h"
+#include "crowd/random.h"
+#include "world/bodies.h"
+#include "world/world.h"
+
+namespace flatland::crowd {
+namespace {
+
+constexpr double kTurn = 6.283185307179586;
+constexpr std::uint64_t kFluctuations = std::uint64_t{3} << 40U;  // a stream of random numbers
+
+constexpr double kSkin = 2e-4;              // gap that single precision may use up [m]
+constexpr double kParting = 0.5;            // most speed at which overlaps are resolved [m/s]
+constexpr double kWallSight = 1.0;          // distance at which walls are considered [m]
+constexpr double kNegligible = 0.01;        // acceleration [m/s²]
+constexpr double kMostSpeed = 1.3;          // as a multiple of the preferred speed
+constexpr double kMostAcceleration = 20.0;  // of dynamic bodies [m/s²]
+constexpr double kTurning = 0.2;            // time constant of the heading [s]
+constexpr double kStanding = 0.05;          // speed below which the heading remains [m/s]
+
+double normalized(double angle) { return std::remainder(angle, kTurn); }
+
+double most_speed(const Person& person) { return std::max(kMostSpeed * person.speed, 0.5); }
+
+// The speed at which a gap may close within a period, or must open if it is negative.
+double closing_offset(double gap, double period) {
+  return std::min((kSkin - gap) / period, kParting);
+}
+
+}  // namespace
+
+void Crowd::find_neighbours() {
+  const auto count = static_cast<std::uint32_t>(people_.size());
+  std::vector<std::uint32_t> sorted(count);
+  std::iota(sorted.begin(), sorted.end(), 0U);
+  std::sort(sorted.begin(), sorted.end(), [&](std::uint32_t a, std::uint32_t b) {
+    const double xa = people_[a].position.x;
+    const double xb = people_[b].position.x;
+    return xa != xb ? xa < xb : a < b;
+  });
+  const double sight2 = settings_.sight * settings_.sight;
+  std::vector<std::pair<std::uint32_t, std::uint32_t>> pairs;
+  for (std::uint32_t s = 0; s < count; ++s) {
+    const Vec p = people_[sorted[s]].position;
+    for (std::uint32_t t = s + 1; t < count; ++t) {
+      const Vec offset = people_[sorted[t]].position - p;
+      if (offset.x > settings_.sight) break;
+      if (square(offset) < sight2) pairs.emplace_back(sorted[s], sorted[t]);
+    }
+  }
+  neighbour_starts_.assign(count + 1, 0);
+  for (const auto& [a, b] : pairs) {
+    ++neighbour_starts_[a + 1];
+    ++neighbour_starts_[b + 1];
+  }
+  std::partial_sum(neighbour_starts_.begin(), neighbour_starts_.end(), neighbour_starts_.begin());
+  neighbours_.resize(2 * pairs.size());
+  std::vector<std::uint32_t> next(neighbour_starts_.begin(), neighbour_starts_.end() - 1);
+  for (const auto& [a, b] : pairs) {
+    neighbours_[next[a]++] = b;
+    neighbours_[next[b]++] = a;
+  }
+}
+
+Vec Crowd::by_social_force(std::size_t i, const Choice& choice, Vec preferred, double period) {
+  const Person& person = people_[i];
+  const SocialForces& forces = settings_.forces;
+  const Walls& walls = surroundings_.walls();
+  Vec sum = driving_acceleration(forces, preferred, person.velocity);
+  Vec others;
+  int members = 1;
+  for (std::uint32_t k = neighbour_starts_[i]; k < neighbour_starts_[i + 1]; ++k) {
+    const Person& other = people_[neighbours_[k]];
+    const Vec offset = person.position - other.position;
+    if (other.party == person.party) {
+      sum += group_repulsion(forces, offset);
+      continue;
+    }
+    const Vec push = repulsion(forces, offset, other.velocity - forces.relative * person.velocity);
+    if (square(push) < kNegligible * kNegligible) continue;
+    if (!walls.is_clear(person.position, other.position)) continue;
+    sum += view_weight(forces, choice.direction, push) * push;
+  }
+  for (const Obstacle& obstacle : surroundings_.obstacles()) {
+    if (obstacle.is_dynamic && !person.is_aware) continue;
+    Vec away;
+    if (length(obstacle.center - person.position) - obstacle.radius > settings_.sight) continue;
+    const double gap = obstacle.gap(person.position, away);
+    const Vec velocity = obstacle.velocity_at(person.position - gap * away);
+    // The surface repels like a person who touches it from inside.
+    const Vec push = repulsion(forces, (std::max(gap, 0.0) + person.radius) * away,
+                               velocity - forces.relative * person.velocity);
+    sum += view_weight(forces, choice.direction, push) * push;
+  }
+  near_.clear();
+  walls.find_near(person.position, person.radius + kWallSight, near_);
+  keep_sides(person.position, near_);
+  for (const NearPoint& wall : near_) {
+    sum += wall_repulsion(forces, person.position - wall.point, person.radius);
+  }
+  for (const Person& other : people_) {
+    if (other.party != person.party || other.number == person.number) continue;
+    others += other.position;
+    ++members;
+  }
+  if (members > 1 && square(preferred) > 0.0) {
+    const Vec center = (1.0 / (members - 1)) * others;
+    sum += group_attraction(forces, members, choice.direction, person.velocity,
+                            center - person.position);
+  }
+  return limited(person.velocity + period * sum, kMostSpeed * person.speed);
+}
+
+Vec Crowd::by_orca(std::size_t i, Vec preferred, double period) {
+  const Person& person = people_[i];
+  constexpr double kMargin = 0.05;  // added to the radius [m]
+  planes_.clear();
+  near_.clear();
+  surroundings_.walls().find_near(person.position, person.radius + kWallSight, near_);
+  keep_sides(person.position, near_);
+  for (const NearPoint& wall : near_) {
+    planes_.push_back(keep_off(unit(person.position - wall.point, {1.0, 0.0}),
+                               wall.distance - person.radius, {}, settings_.wall_horizon));
+  }
+  for (const Obstacle& obstacle : surroundings_.obstacles()) {
+    if (obstacle.is_dynamic && !person.is_aware) continue;
+    if (length(obstacle.center - person.position) - obstacle.radius > settings_.sight) continue;
+    Vec away;
+    const double gap = obstacle.gap(person.position, away) - person.radius - kMargin;
+    const Vec velocity = obstacle.velocity_at(person.position);
+    planes_.push_back(keep_off(away, gap, velocity, settings_.wall_horizon));
+  }
+  const std::size_t hard = planes_.size();
+  const Disc disc{person.position, person.velocity, person.radius + 0.5 * kMargin};
+  for (std::uint32_t k = neighbour_starts_[i]; k < neighbour_starts_[i + 1]; ++k) {
+    const Person& other = people_[neighbours_[k]];
+    if (!surroundings_.walls().is_clear(person.position, other.position)) continue;
+    planes_.push_back(avoid(disc, {other.position, other.velocity, other.radius + 0.5 * kMargin},
+                            settings_.horizon, 0.5, period));
+  }
+  return nearest_point(planes_, hard, most_speed(person), preferred);
+}
+
+// Returns the velocity nearest to the chosen one with which the person touches neither walls nor
+// others until the next update. Each half-plane keeps a gap along the line between the nearest
+// points, which is sufficient because all shapes are convex. People before number `decided_` move
+// with their chosen velocities; those after it are taken to stand still, and will consider the
+// velocity of this person in turn. Standing still is therefore always possible.
+Vec Crowd::without_contact(std::size_t i, Vec velocity, double period) {
+  const Person& person = people_[i];
+  planes_.clear();
+  near_.clear();
+  const double fastest = most_speed(person);
+  surroundings_.walls().find_near(person.position, person.radius + kSkin + fastest * period, near_);
+  for (const NearPoint& wall : near_) {
+    const Vec away = unit(person.position - wall.point, {1.0, 0.0});
+    planes_.push_back({away, closing_offset(wall.distance - person.radius, period)});
+  }
+  const std::size_t hard = planes_.size();
+  for (const Obstacle& obstacle : surroundings_.obstacles()) {
+    if (obstacle.is_dynamic && !person.is_aware) continue;
+    Vec away;
+    const double reach = person.radius + 2.0 * fastest * period + obstacle.radius;
+    if (length(obstacle.center - person.position) > reach) continue;
+    const double gap = obstacle.gap(person.position, away);
+    const Vec moved = obstacle.velocity_at(person.position - gap * away);
+    const double offset = closing_offset(gap - person.radius, period) + dot(moved, away);
+    planes_.push_back({away, std::min(offset, fastest)});
+  }
+  for (std::uint32_t k = neighbour_starts_[i]; k < neighbour_starts_[i + 1]; ++k) {
+    const std::size_t j = neighbours_[k];
+    const Person& other = people_[j];
+    const Vec offset = person.position - other.position;
+    const double gap = length(offset) - person.radius - other.radius;
+    if (gap > kSkin + (fastest + most_speed(other)) * period) continue;
+    const Vec away = unit(offset, {person.number < other.number ? 1.0 : -1.0, 0.0});
+    const Vec moved = j < decided_ ? chosen_[j] : Vec{};
+    planes_.push_back({away, closing_offset(gap, period) + dot(moved, away)});
+  }
+  return nearest_point(planes_, hard, fastest, velocity);
+}
+
+void Crowd::update(World& world, std::int64_t step, double dt) {
+  const double period = dt * static_cast<double>(settings_.interval);
+  read_people(world);
+  read_surroundings(world);
+  find_neighbours();
+  std::vector<Choice> choices(people_.size());
+  std::vector<Vec> wanted(people_.size());
+  for (std::size_t i = 0; i < people_.size(); ++i) {
+    Person& person = people_[i];
+    const Choice choice = choices[i] = choose(person, step, dt, period);
+    Vec preferred = choice.velocity;
+    if (square(preferred) > 0.0) {
+      preferred += settings_.fluctuation * normal(settings_.key, kFluctuations + person.number,
+                                                  2 * static_cast<std::uint64_t>(step));
+    }
+    wanted[i] = settings_.model == Settings::Model::kSocialForce
+                    ? by_social_force(i, choice, preferred, period)
+                    : by_orca(i, preferred, period);
+  }
+  chosen_.assign(people_.size(), {});
+  for (decided_ = 0; decided_ < people_.size(); ++decided_) {
+    const std::size_t i = decided_;
+    chosen_[i] = settings_.is_dynamic ? wanted[i] : without_contact(i, wanted[i], period);
+    move_body(world, i, choices[i], chosen_[i], period);
+  }
+}
+
+void Crowd::move_body(World& world, std::size_t i, const Choice& choice, Vec velocity,
+                      double period) {
+  Person& person = people_[i];
+  b2Body* body = world.find_body(person.body);
+  const double speed = length(velocity);
+  double turn = 0.0;
+  const Vec facing = speed > kStanding ? velocity : choice.direction;
+  if (square(facing) > 0.0) {
+    const double error = normalized(std::atan2(facing.y, facing.x) - person.heading);
+    turn = error * std::min(1.0 / kTurning, 1.0 / period);
+  }
+  if (settings_.is_dynamic) {
+    person.acceleration = limited((1.0 / period) * (velocity - person.velocity), kMostAcceleration);
+    body->SetAngularVelocity(static_cast<float>(turn));
+  } else {
+    person.velocity = velocity;
+    set_velocity(body, {velocity.x, velocity.y, turn});
+  }
+  person.phase = advance_phase(person.phase, speed * period, speed);
+  person.heading += turn * period;
+  if (person.legs[0] != 0) move_legs(world, person, person.position + period * velocity, period);
+}
+
+void Crowd::move_legs(World& world, const Person& person, Vec next, double period) {
+  const Walls& walls = surroundings_.walls();
+  const Vec ahead{std::cos(person.heading), std::sin(person.heading)};
+  const double along = leg_offset(person.phase, length(person.velocity));
+  for (int side = 0; side < 2; ++side) {
+    b2Body* leg = world.find_body(person.legs[side]);
+    if (leg == nullptr) continue;
+    const double sign = side == 0 ? 1.0 : -1.0;
+    Vec offset = sign * (along * ahead + 0.5 * settings_.leg_spacing * left_of(ahead));
+    // A foot does not step through a wall.
+    for (int tries = 0;
+         tries < 3 && walls.distance(next + offset, settings_.leg_radius) < settings_.leg_radius;
+         ++tries) {
+      offset = 0.5 * offset;
+    }
+    const Triple pose = pose_of(*leg);
+    const Vec step = next + offset - Vec{pose[0], pose[1]};
+    const Vec velocity = limited((1.0 / period) * step, 10.0);
+    set_velocity(leg, {velocity.x, velocity.y, normalized(person.heading - pose[2]) / period});
+  }
+}
+
+}  // namespace flatland::crowd

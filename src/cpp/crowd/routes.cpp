@@ -1,0 +1,155 @@
+// Where people want to walk: waypoints, waiting, queues and stops.
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+
+#include "crowd/crowd.h"
+#include "crowd/random.h"
+
+namespace flatland::crowd {
+namespace {
+
+// Streams of random numbers of people and of parties differ.
+constexpr std::uint64_t kStops = std::uint64_t{1} << 40U;
+constexpr std::uint64_t kParties = std::uint64_t{2} << 40U;
+
+constexpr double kArrival = 0.7;   // time constant of the approach to a point in a queue [s]
+constexpr double kPatience = 0.1;  // distance to that point at which people stand still [m]
+constexpr double kCounter = 0.3;   // distance to the head of a queue at which it is reached [m]
+
+std::int64_t steps(double seconds, double dt) {
+  return static_cast<std::int64_t>(std::ceil(seconds / dt));
+}
+
+}  // namespace
+
+bool Crowd::has_arrived(const Person& person, std::uint32_t waypoint) const {
+  const Place& place = waypoints_[waypoint].place;
+  return place.contains(person.position) &&
+         surroundings_.walls().is_clear(person.position, place.nearest(person.position));
+}
+
+Crowd::Choice Crowd::approach(const Person& person, std::uint32_t waypoint) {
+  const Vec way = way_to(waypoint, person.position);
+  return {person.speed * way, way};
+}
+
+void Crowd::arrive(Party& party, std::uint32_t waypoint, std::int64_t step, double dt) {
+  const Span wait = waypoints_[waypoint].wait;
+  if (wait.most <= 0.0) {
+    leave(party, waypoint);
+    return;
+  }
+  const auto stream = kParties + static_cast<std::uint64_t>(&party - parties_.data());
+  party.is_waiting = true;
+  party.wait_until = step + steps(draw(party.draws, stream, wait), dt);
+}
+
+void Crowd::leave(Party& party, std::uint32_t waypoint) {
+  party.is_waiting = false;
+  for (const Person& person : people_) {
+    if (&parties_[person.party] != &party) continue;
+    auto& queue = queues_[waypoint];
+    queue.erase(std::remove(queue.begin(), queue.end(), person.number), queue.end());
+  }
+  const Route& route = routes_[party.route];
+  const auto count = static_cast<std::uint32_t>(route.waypoints.size());
+  switch (route.order) {
+    case Route::Order::kLoop:
+      party.leg = (party.leg + 1) % count;
+      break;
+    case Route::Order::kOnce:
+      party.is_done = party.leg + 1 == count;
+      if (!party.is_done) ++party.leg;
+      break;
+    case Route::Order::kBackAndForth:
+      if (count == 1) break;
+      if (party.is_backward ? party.leg == 0 : party.leg + 1 == count) {
+        party.is_backward = !party.is_backward;
+      }
+      party.leg = party.is_backward ? party.leg - 1 : party.leg + 1;
+      break;
+    case Route::Order::kRandom: {
+      if (count == 1) break;
+      // Any other waypoint, with the same probability.
+      const auto stream = kParties + static_cast<std::uint64_t>(&party - parties_.data());
+      const auto skip =
+          static_cast<std::uint32_t>(draw(party.draws, stream, {1.0, static_cast<double>(count)}));
+      party.leg = (party.leg + std::min(skip, count - 1)) % count;
+      break;
+    }
+  }
+}
+
+Crowd::Choice Crowd::queue_up(Person& person, Party& party, std::uint32_t waypoint,
+                              std::int64_t step, double dt) {
+  auto& queue = queues_[waypoint];
+  const double spacing = waypoints_[waypoint].spacing;
+  const auto place = std::find(queue.begin(), queue.end(), person.number);
+  const auto position_of = [&](std::uint32_t number) {
+    return std::find_if(people_.begin(), people_.end(),
+                        [number](const Person& p) { return p.number == number; })
+        ->position;
+  };
+  if (place == queue.end()) {
+    const Vec tail = queue.empty() ? waypoints_[waypoint].place.nearest(person.position)
+                                   : position_of(queue.back());
+    const double reach = std::max(2.0 * spacing, waypoints_[waypoint].place.radius);
+    if (length(tail - person.position) < reach &&
+        surroundings_.walls().is_clear(person.position, tail)) {
+      queue.push_back(person.number);
+    }
+    return approach(person, waypoint);
+  }
+  Vec goal = waypoints_[waypoint].place.nearest(person.position);
+  if (place == queue.begin()) {
+    if (!party.is_waiting && length(goal - person.position) < kCounter) {
+      arrive(party, waypoint, step, dt);
+    }
+  } else {
+    const Vec ahead = position_of(*(place - 1));
+    goal = ahead + spacing * unit(person.position - ahead);
+  }
+  const Vec remaining = goal - person.position;
+  const Vec way = unit(waypoints_[waypoint].place.nearest(person.position) - person.position);
+  if (length(remaining) < kPatience) return {{}, way};
+  return {limited((1.0 / kArrival) * remaining, person.speed), way};
+}
+
+Crowd::Choice Crowd::choose(Person& person, std::int64_t step, double dt, double period) {
+  Party& party = parties_[person.party];
+  const Vec facing{std::cos(person.heading), std::sin(person.heading)};
+  if (party.is_waiting && step >= party.wait_until) {
+    leave(party, routes_[party.route].waypoints[party.leg]);
+  }
+  if (person.is_stopped) return {{}, facing};
+  if (person.sent_to != kNone) {
+    if (!has_arrived(person, person.sent_to)) return approach(person, person.sent_to);
+    person.is_stopped = true;
+    return {{}, facing};
+  }
+  const Route& route = routes_[party.route];
+  if (person.stop_until != 0) {
+    if (step < person.stop_until) return {{}, facing};
+    person.stop_until = 0;
+  } else if (route.stop_interval > 0.0 && !party.is_waiting && !party.is_done) {
+    const std::uint64_t stream = kStops + person.number;
+    if (draw(person.draws, stream, {0.0, 1.0}) < period / route.stop_interval) {
+      person.stop_until = step + steps(draw(person.draws, stream, route.stop), dt);
+      return {{}, facing};
+    }
+  }
+  const std::uint32_t waypoint = route.waypoints[party.leg];
+  if (party.is_done) {
+    return has_arrived(person, waypoint) ? Choice{{}, facing} : approach(person, waypoint);
+  }
+  if (waypoints_[waypoint].is_queue) return queue_up(person, party, waypoint, step, dt);
+  if (has_arrived(person, waypoint)) {
+    if (!party.is_waiting) arrive(party, waypoint, step, dt);
+    if (party.is_waiting || party.is_done) return {{}, facing};
+    return approach(person, route.waypoints[party.leg]);
+  }
+  return approach(person, waypoint);
+}
+
+}  // namespace flatland::crowd

@@ -1,0 +1,62 @@
+#include "crowd/social_force.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace flatland::crowd {
+namespace {
+
+constexpr double kRightAngle = 1.5707963267948966;
+// Half the field of view without turning the head [rad], and the least distance of two members of
+// a group [m]; both from the source.
+constexpr double kGroupView = kRightAngle;
+constexpr double kGroupDistance = 0.8;
+
+}  // namespace
+
+Vec driving_acceleration(const SocialForces& forces, Vec preferred, Vec velocity) {
+  return (1.0 / forces.relaxation_time) * (preferred - velocity);
+}
+
+Vec repulsion(const SocialForces& forces, Vec offset, Vec other_velocity) {
+  // The potential is V0 exp(-b / sigma); b is the semi-minor axis of the ellipse with the foci at
+  // the other person and at its position after `look_ahead`.
+  const Vec step = forces.look_ahead * other_velocity;
+  const Vec later = offset - step;
+  const double here = length(offset);
+  const double there = length(later);
+  const double sum = here + there;
+  constexpr double kLeast = 1e-3;  // m; on the line between the foci, b is 0
+  const double b = std::max(0.5 * std::sqrt(std::max(sum * sum - square(step), 0.0)), kLeast);
+  const double size = forces.strength / forces.range * std::exp(-b / forces.range);
+  const Vec slope = sum / (4.0 * b) * (unit(offset, {1.0, 0.0}) + unit(later));
+  // The gradient of b, which grows beyond all limits next to the foci.
+  constexpr double kMostSlope = 3.0;
+  return size * limited(slope, kMostSlope);
+}
+
+double view_weight(const SocialForces& forces, Vec heading, Vec push) {
+  const double along = -dot(heading, push);
+  return along >= length(push) * std::cos(forces.half_view) ? 1.0 : forces.behind;
+}
+
+Vec wall_repulsion(const SocialForces& forces, Vec offset, double radius) {
+  const double gap = length(offset) - radius;
+  return forces.wall_strength * std::exp(-std::max(gap, 0.0) / forces.wall_range) * unit(offset);
+}
+
+Vec group_attraction(const SocialForces& forces, int size, Vec heading, Vec velocity,
+                     Vec to_center) {
+  Vec sum;
+  const double angle = std::fabs(std::atan2(cross(heading, to_center), dot(heading, to_center)));
+  // Somebody who must turn the head to see the others walks more slowly.
+  if (angle > kGroupView) sum -= forces.gaze * (angle - kGroupView) * velocity;
+  if (length(to_center) > 0.5 * (size - 1)) sum += forces.cohesion * unit(to_center);
+  return sum;
+}
+
+Vec group_repulsion(const SocialForces& forces, Vec offset) {
+  return length(offset) < kGroupDistance ? forces.spacing * unit(offset, {1.0, 0.0}) : Vec{};
+}
+
+}  // namespace flatland::crowd

@@ -1,0 +1,150 @@
+#include "crowd/walls.h"
+
+#include <algorithm>
+#include <cmath>
+#include <tuple>
+#include <utility>
+
+namespace flatland::crowd {
+namespace {
+
+constexpr double kCell = 0.5;       // m
+constexpr double kMostCells = 4e6;  // beyond which cells are larger
+
+bool crosses(const Segment& segment, Vec from, Vec to) {
+  const Vec along = to - from;
+  const Vec side = segment.b - segment.a;
+  return cross(along, segment.a - from) * cross(along, segment.b - from) <= 0.0 &&
+         cross(side, from - segment.a) * cross(side, to - segment.a) <= 0.0;
+}
+
+}  // namespace
+
+Vec nearest_on(const Segment& segment, Vec p) {
+  const Vec along = segment.b - segment.a;
+  const double size = square(along);
+  if (size == 0.0) return segment.a;
+  const double t = std::min(std::max(dot(p - segment.a, along) / size, 0.0), 1.0);
+  return segment.a + t * along;
+}
+
+Walls::Walls(std::vector<Segment> segments) : segments_(std::move(segments)) {
+  if (segments_.empty()) return;
+  low_ = high_ = segments_[0].a;
+  for (const Segment& segment : segments_) {
+    for (const Vec p : {segment.a, segment.b}) {
+      low_ = {std::min(low_.x, p.x), std::min(low_.y, p.y)};
+      high_ = {std::max(high_.x, p.x), std::max(high_.y, p.y)};
+    }
+  }
+  const Vec size = high_ - low_;
+  cell_ = std::max(
+      {kCell, std::sqrt(size.x * size.y / kMostCells), std::max(size.x, size.y) / kMostCells});
+  columns_ = static_cast<std::int64_t>(size.x / cell_) + 1;
+  rows_ = static_cast<std::int64_t>(size.y / cell_) + 1;
+  // Two passes: the number of segments in each cell, then the segments themselves.
+  starts_.assign(static_cast<std::size_t>(columns_ * rows_) + 1, 0);
+  const double reach = 0.5 * std::sqrt(2.0) * cell_ * (1.0 + 1e-6);
+  const auto each_cell = [&](auto&& visit) {
+    for (std::uint32_t i = 0; i < segments_.size(); ++i) {
+      const Segment& s = segments_[i];
+      visit_cells({std::min(s.a.x, s.b.x), std::min(s.a.y, s.b.y)},
+                  {std::max(s.a.x, s.b.x), std::max(s.a.y, s.b.y)},
+                  [&](std::int64_t column, std::int64_t row) {
+                    const Vec center{low_.x + (static_cast<double>(column) + 0.5) * cell_,
+                                     low_.y + (static_cast<double>(row) + 0.5) * cell_};
+                    if (square(nearest_on(s, center) - center) > reach * reach) return;
+                    visit(static_cast<std::size_t>(row * columns_ + column), i);
+                  });
+    }
+  };
+  each_cell([&](std::size_t cell, std::uint32_t) { ++starts_[cell + 1]; });
+  for (std::size_t cell = 1; cell < starts_.size(); ++cell) starts_[cell] += starts_[cell - 1];
+  members_.resize(starts_.back());
+  std::vector<std::uint32_t> next(starts_.begin(), starts_.end() - 1);
+  each_cell([&](std::size_t cell, std::uint32_t i) { members_[next[cell]++] = i; });
+}
+
+std::int64_t Walls::column_of(double x) const {
+  const double column = std::floor((x - low_.x) / cell_);
+  return static_cast<std::int64_t>(
+      std::min(std::max(column, 0.0), static_cast<double>(columns_ - 1)));
+}
+
+std::int64_t Walls::row_of(double y) const {
+  const double row = std::floor((y - low_.y) / cell_);
+  return static_cast<std::int64_t>(std::min(std::max(row, 0.0), static_cast<double>(rows_ - 1)));
+}
+
+template <typename Visit>
+void Walls::visit_cells(Vec low, Vec high, Visit&& visit) const {
+  const std::int64_t last_column = column_of(high.x);
+  const std::int64_t last_row = row_of(high.y);
+  for (std::int64_t row = row_of(low.y); row <= last_row; ++row) {
+    for (std::int64_t column = column_of(low.x); column <= last_column; ++column) {
+      visit(column, row);
+    }
+  }
+}
+
+void Walls::find_near(Vec p, double range, std::vector<NearPoint>& found) const {
+  if (empty()) return;
+  const Vec margin{range, range};
+  visit_cells(p - margin, p + margin, [&](std::int64_t column, std::int64_t row) {
+    const auto cell = static_cast<std::size_t>(row * columns_ + column);
+    for (std::uint32_t k = starts_[cell]; k < starts_[cell + 1]; ++k) {
+      const Vec point = nearest_on(segments_[members_[k]], p);
+      // A segment is in several cells; it counts in that of its nearest point.
+      if (column_of(point.x) != column || row_of(point.y) != row) continue;
+      const double distance = length(point - p);
+      if (distance <= range) found.push_back({point, distance});
+    }
+  });
+}
+
+double Walls::distance(Vec p, double range) const {
+  if (empty()) return range;
+  double nearest = range * range;
+  const Vec margin{range, range};
+  visit_cells(p - margin, p + margin, [&](std::int64_t column, std::int64_t row) {
+    const auto cell = static_cast<std::size_t>(row * columns_ + column);
+    for (std::uint32_t k = starts_[cell]; k < starts_[cell + 1]; ++k) {
+      nearest = std::min(nearest, square(nearest_on(segments_[members_[k]], p) - p));
+    }
+  });
+  return std::sqrt(nearest);
+}
+
+bool Walls::is_clear(Vec from, Vec to) const {
+  if (empty()) return true;
+  bool is_clear = true;
+  visit_cells({std::min(from.x, to.x), std::min(from.y, to.y)},
+              {std::max(from.x, to.x), std::max(from.y, to.y)},
+              [&](std::int64_t column, std::int64_t row) {
+                const auto cell = static_cast<std::size_t>(row * columns_ + column);
+                for (std::uint32_t k = starts_[cell]; is_clear && k < starts_[cell + 1]; ++k) {
+                  is_clear = !crosses(segments_[members_[k]], from, to);
+                }
+              });
+  return is_clear;
+}
+
+void keep_sides(Vec p, std::vector<NearPoint>& points) {
+  std::sort(points.begin(), points.end(), [](const NearPoint& a, const NearPoint& b) {
+    return std::tie(a.distance, a.point.x, a.point.y) < std::tie(b.distance, b.point.x, b.point.y);
+  });
+  constexpr double kTolerance = 1e-6;  // cosine of the angle between walls at a right angle
+  std::size_t kept = 0;
+  for (const NearPoint& each : points) {
+    const Vec direction = unit(each.point - p);
+    const bool is_new =
+        std::all_of(points.begin(), points.begin() + static_cast<std::ptrdiff_t>(kept),
+                    [&](const NearPoint& other) {
+                      return dot(direction, unit(other.point - p)) <= kTolerance;
+                    });
+    if (is_new) points[kept++] = each;
+  }
+  points.resize(kept);
+}
+
+}  // namespace flatland::crowd

@@ -1,0 +1,58 @@
+// The walls around people, in a grid of cells for queries of a neighbourhood.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "crowd/vec.h"
+
+namespace flatland::crowd {
+
+struct Segment {
+  Vec a, b;
+};
+
+// Returns the point of a segment that is nearest to p.
+Vec nearest_on(const Segment& segment, Vec p);
+
+struct NearPoint {
+  Vec point;
+  double distance = 0.0;
+};
+
+// Immutable, so that copies of a crowd share it.
+class Walls {
+ public:
+  explicit Walls(std::vector<Segment> segments);
+
+  bool empty() const { return segments_.empty(); }
+  Vec low() const { return low_; }
+  Vec high() const { return high_; }
+
+  // Appends the nearest points of all segments within a range.
+  void find_near(Vec p, double range, std::vector<NearPoint>& found) const;
+  // The distance to the nearest segment, at most `range`.
+  double distance(Vec p, double range) const;
+  // Whether no segment crosses the straight line between two points.
+  bool is_clear(Vec from, Vec to) const;
+
+ private:
+  template <typename Visit>
+  void visit_cells(Vec low, Vec high, Visit&& visit) const;
+  std::int64_t column_of(double x) const;
+  std::int64_t row_of(double y) const;
+
+  std::vector<Segment> segments_;
+  Vec low_, high_;
+  double cell_ = 1.0;
+  std::int64_t columns_ = 0, rows_ = 0;
+  std::vector<std::uint32_t> starts_;  // of the cells in `members_`
+  std::vector<std::uint32_t> members_;
+};
+
+// Keeps one point for each side on which there are walls: the nearest one, and others at an angle
+// of at least 90 degrees to those that are kept. A wall that consists of many segments counts once.
+void keep_sides(Vec p, std::vector<NearPoint>& points);
+
+}  // namespace flatland::crowd

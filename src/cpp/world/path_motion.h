@@ -1,0 +1,76 @@
+// The motion of a body along waypoints, with limits of speed and acceleration.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include "world/speed_limits.h"
+#include "world/triple.h"
+
+class b2Body;
+
+namespace flatland {
+
+class World;
+
+// The fastest motion from rest to rest over a distance: the speed rises to a peak, remains there,
+// and falls to zero.
+struct Trapezoid {
+  double distance = 0.0;
+  double peak = 0.0;    // speed
+  double rise = 0.0;    // duration of the acceleration [s]
+  double cruise = 0.0;  // at the peak speed [s]
+  double fall = 0.0;    // [s]
+
+  // The limit of the speed is above 0; a limit of 0 of acceleration or deceleration is none.
+  static Trapezoid over(double distance, const SpeedLimits& limits);
+  double duration() const { return rise + cruise + fall; }
+  // Returns the distance travelled after t seconds.
+  double at(double t) const;
+};
+
+// Waypoints, the first of which is the pose of the body at the start, and limits; shared by copies.
+struct Path {
+  enum class Mode : std::uint8_t { kLoop, kOnce, kThereAndBack, kRandom };
+
+  std::vector<Triple> waypoints;  // world frame [m, rad]
+  Mode mode = Mode::kLoop;
+  bool faces_forward = false;  // turns towards the next waypoint first, and drives forwards
+  SpeedLimits linear, angular;
+  double wait = 0.0;  // at each waypoint [s]
+};
+
+struct PathMotion {
+  std::shared_ptr<const Path> path;
+  std::uint64_t key = 0;     // of the random numbers of mode kRandom
+  bool is_dynamic = false;   // whether the body is
+  bool is_started = true;    // otherwise, the body stops at the next waypoint
+  std::uint64_t starts = 0;  // number of commands to start
+
+  std::size_t waypoint = 0;  // of the last one that was reached
+  std::size_t next = 0;      // where the body drives to, or was to drive to
+  bool is_forward = true;    // the direction along the waypoints
+  bool is_moving = false;    // including the time of waiting
+  bool is_finished = false;  // with mode kOnce: at the end of the path
+  std::uint64_t legs = 0;    // number of motions between waypoints that have begun
+  std::uint64_t used_starts = 0;
+
+  double time = 0.0;  // since the beginning of this leg [s]
+  double wait = 0.0;  // at its beginning [s]
+  Triple from{}, to{};
+  Trapezoid turn;   // before the drive
+  Trapezoid drive;  // as a share of the way if the body does not face forward
+  Triple pose{};
+  Triple velocity{};
+};
+
+// Advances the motion by dt seconds and sets the velocity of the body. Throws as `advance`.
+void advance_path(b2Body* body, PathMotion& motion, double dt);
+// Moves the body to the pose of the motion.
+void hold_path(World& world, b2Body* body, const PathMotion& motion);
+// Continues from another pose of the body.
+void restart_path(PathMotion& motion, const Triple& pose);
+
+}  // namespace flatland

@@ -1,0 +1,15 @@
+#pragma once
+
+namespace flatland {
+
+// Limits of a velocity and of its rate of change; 0 is no limit.
+struct SpeedLimits {
+  double velocity = 0.0;
+  double acceleration = 0.0;  // away from zero
+  double deceleration = 0.0;  // towards zero
+
+  // Returns the velocity after one step of dt seconds towards a target.
+  double step(double v, double target, double dt) const;
+};
+
+}  // namespace flatland

@@ -1,0 +1,264 @@
+"""AckermannDrive: the single track, the angles of the wheels, limits, commands and errors."""
+
+from __future__ import annotations
+
+import math
+import sys
+from pathlib import Path
+from types import ModuleType, SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+import flatland
+from flatland.recording import Replay
+from flatland.values import AckermannCommand
+
+WHEEL = "footprints: [{type: circle, radius: 0.05, density: 1, collision: false}]"
+BODIES = f"""
+- name: base
+  footprints: [{{type: circle, radius: 0.4, center: [1, 0.1], density: 100}}]
+- {{name: fl, pose: [2.5, 0.8, 0], {WHEEL}}}
+- {{name: fr, pose: [2.5, -0.8, 0], {WHEEL}}}
+- {{name: rl, pose: [0.5, 0.8, 0], {WHEEL}}}
+- {{name: rr, pose: [0.5, -0.8, 0], {WHEEL}}}
+"""
+ANCHORS = {"fl": (2.5, 0.8), "fr": (2.5, -0.8), "rl": (0.5, 0.8), "rr": (0.5, -0.8)}
+WHEELBASE, TRACK, REAR = 2.0, 1.6, 0.5
+
+
+def joints(**changes: tuple[float, float]) -> str:
+    lines = []
+    for name, anchor in {**ANCHORS, **changes}.items():
+        kind = "revolute" if name.startswith("f") else "weld"
+        ends = [f"{{name: base, anchor: {list(anchor)}}}", f"{{name: {name}, anchor: [0, 0]}}"]
+        if name == "fr":  # the order of the bodies of a joint does not matter
+            ends.reverse()
+        lines.append(f"- {{type: {kind}, name: {name}_j, bodies: [{', '.join(ends)}]}}")
+    return "\n".join(lines)
+
+
+def drive(text: str = "", limit: float = 0.8) -> str:
+    return (
+        "[{type: AckermannDrive, name: drive, body: base, front_left_wheel_joint: fl_j, "
+        "front_right_wheel_joint: fr_j, rear_left_wheel_joint: rl_j, "
+        f"rear_right_wheel_joint: rr_j, max_steer_angle: {limit}, {text}}}]"
+    )
+
+
+@pytest.fixture
+def car(plugin_world: Any) -> Any:
+    def load(text: str = "", **options: Any) -> flatland.World:
+        limit = options.pop("limit", 0.8)
+        options = {"bodies": BODIES, "joints": joints(), **options}
+        world: flatland.World = plugin_world(drive(text, limit), **options)
+        return world
+
+    return load
+
+
+def command(world: flatland.World, v: float, angular: float) -> None:
+    world.command("/cmd_vel").set(flatland.Twist(v, 0.0, angular))
+
+
+def plugin(world: flatland.World) -> Any:
+    return world.model("robot").plugin("drive")
+
+
+def base(world: flatland.World) -> flatland.Body:
+    return world.model("robot").body("base")
+
+
+class TestMotion:
+    def test_twist_moves_the_rear_center(self, car: Any) -> None:
+        world = car(pose=(0.0, 0.0, 0.7))
+        command(world, 1.2, 0.3)
+        plugin(world).before_physics_step(world.timekeeper)
+        vx, vy, omega = base(world).velocity
+        assert omega == pytest.approx(0.3, abs=1e-5)
+        c, s = math.cos(0.7), math.sin(0.7)
+        rear = (vx - omega * s * REAR, vy + omega * c * REAR)
+        assert rear == pytest.approx((1.2 * c, 1.2 * s), abs=1e-5)
+        assert plugin(world).steering_angle == pytest.approx(math.atan(WHEELBASE * 0.3 / 1.2))
+
+    def test_circle_of_the_single_track(self, car: Any) -> None:
+        world = car("command: steering")
+        command(world, 1.0, 0.5)
+        radius = WHEELBASE / math.tan(0.5)
+        world.step(round(math.pi * radius / 0.005))
+        x, y, theta = base(world).pose
+        rear = (x + REAR * math.cos(theta), y + REAR * math.sin(theta))
+        centre = (rear[0] - radius * math.sin(theta), rear[1] + radius * math.cos(theta))
+        assert centre == pytest.approx((REAR, radius), abs=0.02)
+        assert theta == pytest.approx(math.pi, abs=0.01)
+
+    def test_backwards_the_same_curve(self, car: Any) -> None:
+        world = car()
+        command(world, -1.0, 0.3)
+        plugin(world).before_physics_step(world.timekeeper)
+        assert plugin(world).steering_angle == pytest.approx(-math.atan(WHEELBASE * 0.3))
+        assert base(world).velocity[2] == pytest.approx(0.3, abs=1e-5)
+
+    def test_angle_limit_keeps_the_speed(self, car: Any) -> None:
+        world = car(limit=0.4)
+        command(world, 1.0, 5.0)
+        plugin(world).before_physics_step(world.timekeeper)
+        assert plugin(world).steering_angle == pytest.approx(0.4)
+        assert base(world).velocity[2] == pytest.approx(math.tan(0.4) / WHEELBASE, abs=1e-5)
+
+    def test_no_turn_in_place_and_a_stop_keeps_the_angle(self, car: Any) -> None:
+        world = car()
+        command(world, 0.0, 1.0)
+        world.step()
+        assert plugin(world).steering_angle == pytest.approx(0.8)
+        assert base(world).velocity == pytest.approx((0, 0, 0), abs=1e-6)
+        command(world, 0.0, 0.0)
+        world.step()
+        assert plugin(world).steering_angle == pytest.approx(0.8)
+
+    def test_limits_of_speed_steering_rate_and_acceleration(self, car: Any) -> None:
+        world = car(
+            "command: steering, linear_dynamics: {velocity_limit: 1, acceleration_limit: 0.5}, "
+            "angular_dynamics: {velocity_limit: 0.2}"
+        )
+        command(world, 3.0, 0.7)
+        world.step(200)
+        assert plugin(world).speed == pytest.approx(0.5)
+        assert plugin(world).steering_angle == pytest.approx(0.2)
+        world.step(600)
+        assert plugin(world).speed == pytest.approx(1.0)
+        assert plugin(world).steering_angle == pytest.approx(0.7)
+
+
+class TestWheels:
+    @pytest.mark.parametrize("angle", [0.6, -0.35, 0.0])
+    def test_axes_of_the_front_wheels_meet_on_the_rear_axle(self, car: Any, angle: float) -> None:
+        world = car("command: steering")
+        command(world, 0.3, angle)
+        world.step(50)
+        yaw = base(world).pose[2]
+        for name in ("fl", "fr"):
+            x, y = ANCHORS[name]
+            turn = WHEELBASE / math.tan(angle) if angle else math.inf
+            expected = math.atan(WHEELBASE / (turn - y)) if angle else 0.0
+            heading = world.model("robot").body(name).pose[2] - yaw
+            assert heading == pytest.approx(expected, abs=2e-3), (name, x)
+
+    def test_geometry_of_the_joints_equals_that_of_parameters(
+        self, car: Any, plugin_world: Any
+    ) -> None:
+        geometry = plugin(car()).geometry
+        assert (geometry.wheelbase, geometry.track) == pytest.approx((WHEELBASE, TRACK))
+        assert geometry.rear_center == pytest.approx((REAR, 0.0))
+        text = (
+            "[{type: AckermannDrive, name: drive, body: base, wheelbase: 2, rear_axle: [0.5, 0], "
+            "max_steer_angle: 0.8}]"
+        )
+        plain, jointed = plugin_world(text), car()
+        for world in (plain, jointed):
+            command(world, 1.0, 0.4)
+            world.step(100)
+        assert base(plain).pose == pytest.approx(base(jointed).pose, abs=2e-3)
+
+
+class TestAckermannCommand:
+    def test_command_contains_limits(self, car: Any) -> None:
+        world = car("command: ackermann, linear_dynamics: {acceleration_limit: 2}")
+        world.command("/ackermann_cmd").set(AckermannCommand(0.5, 0.25, 1.0, 0.5))
+        world.step(200)
+        assert plugin(world).steering_angle == pytest.approx(0.25)
+        assert plugin(world).speed == pytest.approx(0.5)
+        world.command("/ackermann_cmd").set(AckermannCommand(0.5, 0.0, 1.5, 0.0))
+        world.step(40)
+        assert plugin(world).steering_angle == pytest.approx(0.5)
+        assert plugin(world).speed == pytest.approx(0.5 + 2 * 0.2)
+
+    def test_commands_are_recorded(self, car: Any, tmp_path: Path) -> None:
+        world = car("command: ackermann")
+        world.record(tmp_path / "run.flog")
+        world.command("/ackermann_cmd").set(AckermannCommand(0.5, 0.25, 1.0, 0.5))
+        world.step(200)
+        world.close()
+        replay = Replay(tmp_path / "run.flog")
+        replay.run()
+        replay.close()
+        assert (replay.difference, replay.last_step) == (None, 200)
+
+    def test_invalid_commands_are_rejected(self, car: Any) -> None:
+        world = car("command: ackermann")
+        world.command("/ackermann_cmd").set(AckermannCommand(speed=1.0))
+        world.command("/ackermann_cmd").set(AckermannCommand(speed=math.nan))
+        world.step()
+        assert plugin(world).speed == 1.0
+
+    def test_message(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        """The adapter converts a message of the package, which need not be installed."""
+        pytest.importorskip("rospy")
+        package, module = ModuleType("ackermann_msgs"), ModuleType("ackermann_msgs.msg")
+        module.AckermannDriveStamped = type("AckermannDriveStamped", (), {})
+        monkeypatch.setitem(sys.modules, "ackermann_msgs", package)
+        monkeypatch.setitem(sys.modules, "ackermann_msgs.msg", module)
+        from flatland.ros import adapters
+
+        monkeypatch.delitem(sys.modules, "flatland.ros.adapters.ackermann", raising=False)
+        monkeypatch.setattr(adapters, "_adapters", dict(adapters._adapters))
+        adapter = adapters.find_adapter(AckermannCommand)
+        assert adapter is not None
+        assert adapter.from_message is not None
+        fields = SimpleNamespace(
+            steering_angle=0.1, steering_angle_velocity=0.2, speed=3.0, acceleration=4.0, jerk=5.0
+        )
+        found = adapter.from_message(SimpleNamespace(drive=fields))
+        assert found == AckermannCommand(0.1, 0.2, 3.0, 4.0)
+        monkeypatch.delitem(sys.modules, "flatland.ros.adapters.ackermann")
+
+
+def test_odometry_and_twist(car: Any) -> None:
+    world = car("odom_frame_id: odom2, odom_pose_noise: [0.01, 0.01, 0], pub_rate: 50")
+    truth, odometry = world.output("/odometry/ground_truth"), world.output("/odometry/filtered")
+    twist = world.output("/twist")
+    command(world, 1.0, 0.2)
+    world.step(100)
+    assert truth.latest.twist[2] == pytest.approx(0.2, abs=1e-4)
+    assert odometry.latest.frame_id == "odom2"
+    assert odometry.latest.pose != truth.latest.pose
+    assert np.diag(odometry.latest.pose_covariance)[0] == 0.01
+    assert twist.latest.twist == pytest.approx((1.0, 0.0, 0.2), abs=1e-2)
+
+
+@pytest.mark.parametrize(
+    ("text", "moved", "message"),
+    [
+        ("command: drive", {}, "must be one of: twist, steering, ackermann, got drive"),
+        ("", {"fr": (2.4, -0.8)}, "The wheels of the front axle must have the same x"),
+        ("", {"rl": (0.5, -0.9)}, "The left wheel of the rear axle must have a greater y"),
+        ("", {"rl": (0.5, 0.9)}, "The centres of both axles must have the same y"),
+        ("", {"rl": (3, 0.8), "rr": (3, -0.8)}, "The front axle must have a greater x"),
+        ("wheel: 1", {}, "wheel"),
+    ],
+)
+def test_errors(plugin_world: Any, text: str, moved: Any, message: str) -> None:
+    bodies = BODIES
+    for name, (x, y) in moved.items():
+        bodies = bodies.replace(
+            f"name: {name}, pose: {[*ANCHORS[name], 0]}", f"name: {name}, pose: {[x, y, 0]}"
+        )
+    error = plugin_world.error(drive(text), bodies=bodies, joints=joints(**moved))
+    assert message in error
+    assert "robot.model.yaml" in error
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("max_steer_angle: 0.5", "wheelbase"),
+        ("wheelbase: 0, max_steer_angle: 0.5", 'Invalid "wheelbase", must be greater than 0'),
+        ("wheelbase: 1", "max_steer_angle"),
+        ("wheelbase: 1, max_steer_angle: 1.6", "must be above 0 and at most 1.553, got 1.6"),
+        ("front_left_wheel_joint: x, max_steer_angle: 0.5", 'Joint with name "x" does not exist'),
+    ],
+)
+def test_errors_of_parameters(plugin_world: Any, text: str, message: str) -> None:
+    entry = f"[{{type: AckermannDrive, name: drive, body: base, {text}}}]"
+    assert message in plugin_world.error(entry)

@@ -1,0 +1,306 @@
+"""`mode: force` of the drives, compared with closed-form motions."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import pytest
+
+import flatland
+
+G = 9.80665
+DISC = """
+- name: base
+  footprints: [{type: circle, radius: 0.25, density: 254.64790894703253}]
+"""  # 50 kg, I = m r^2 / 2
+MASS, INERTIA = 50.0, 50.0 * 0.25**2 / 2
+WALL = """
+bodies:
+  - name: slab
+    type: static
+    footprints:
+      - {type: polygon, density: 1, points: [[0, -1], [0.2, -1], [0.2, 1], [0, 1]]}
+"""
+DT = 0.005
+
+
+def diff(text: str) -> str:
+    return f"[{{type: DiffDrive, name: drive, body: base, mode: force, {text}}}]"
+
+
+@pytest.fixture
+def robot(plugin_world: Any) -> Any:
+    def load(plugins: str, **options: Any) -> flatland.World:
+        world: flatland.World = plugin_world(plugins, **{"bodies": DISC, **options})
+        return world
+
+    return load
+
+
+def drive(world: flatland.World, x: float, omega: float = 0.0, y: float = 0.0) -> None:
+    world.command("/cmd_vel").set(flatland.Twist(x, y, omega))
+
+
+def base(world: flatland.World) -> flatland.Body:
+    return world.model("robot").body("base")
+
+
+def test_mass_of_the_robot(robot: Any) -> None:
+    world = robot(diff("max_force: 1, max_torque: 1"))
+    assert (base(world).mass, base(world).inertia) == pytest.approx((MASS, INERTIA), rel=1e-5)
+
+
+class TestDriving:
+    def test_constant_force_up_to_the_target(self, robot: Any) -> None:
+        world = robot(diff("max_force: 40, max_torque: 5"), pose=(0.0, 0.0, 0.6))
+        drive(world, 1.0)
+        for k in range(1, 400):
+            world.step()
+            vx, vy, omega = base(world).velocity
+            v = min(40.0 / MASS * k * DT, 1.0)
+            assert (vx, vy) == pytest.approx((v * math.cos(0.6), v * math.sin(0.6)), abs=1e-5)
+            assert omega == pytest.approx(0.0, abs=1e-6)
+
+    def test_constant_torque_up_to_the_target(self, robot: Any) -> None:
+        world = robot(diff("max_force: 40, max_torque: 0.5, friction: .inf"))
+        drive(world, 0.0, 2.0)
+        for k in range(1, 1500):
+            world.step()
+            expected = min(0.5 / INERTIA * k * DT, 2.0)
+            assert base(world).velocity[2] == pytest.approx(expected, abs=1e-4)
+
+    def test_braking_with_the_same_force(self, robot: Any) -> None:
+        world = robot(diff("max_force: 40, max_torque: 5"))
+        drive(world, 1.0)
+        world.step(400)
+        drive(world, 0.0)
+        world.step(100)
+        assert base(world).velocity[0] == pytest.approx(1.0 - 0.8 * 0.5, abs=1e-5)
+        world.step(200)
+        assert base(world).velocity[0] == pytest.approx(0.0, abs=1e-4)
+
+    def test_limits_of_acceleration_apply_to_the_command(self, robot: Any) -> None:
+        world = robot(
+            diff("max_force: 40, max_torque: 5, linear_dynamics: {acceleration_limit: 0.2}")
+        )
+        drive(world, 1.0)
+        world.step(200)
+        assert base(world).velocity[0] == pytest.approx(0.2, abs=1e-5)
+
+    def test_wheels_spin_if_the_grip_is_less_than_the_force(self, robot: Any) -> None:
+        world = robot(diff("max_force: 400, max_torque: 5, friction: 0.3"))
+        drive(world, 2.0)
+        world.step(100)
+        assert base(world).velocity[0] == pytest.approx(0.3 * G * 0.5, abs=1e-4)
+
+    def test_without_limits_the_motion_is_that_of_the_default_mode(self, robot: Any) -> None:
+        text = "max_force: .inf, max_torque: .inf, friction: .inf"
+        forced, plain = robot(diff(text)), robot("[{type: DiffDrive, name: drive, body: base}]")
+        for world in (forced, plain):
+            drive(world, 0.7, 0.9)
+            world.step(400)
+        assert base(forced).pose == pytest.approx(base(plain).pose, abs=1e-4)
+
+
+class TestResistance:
+    @pytest.mark.parametrize(("force", "friction"), [(60.0, 1.0), (400.0, 0.2)])
+    def test_stall_force_at_a_wall(self, robot: Any, force: float, friction: float) -> None:
+        bumper = "{type: Bumper, name: bumper}"
+        entry = diff(f"max_force: {force}, max_torque: 5, friction: {friction}")
+        world = robot(entry.replace("}]", f"}}, {bumper}]"))
+        world.spawn_model("\n" + WALL, "wall", pose=(0.3, 0.0, 0.0))
+        collisions = world.output("/collisions")
+        drive(world, 1.0)
+        world.step(400)
+        [collision] = collisions.latest.collisions
+        expected = min(force, friction * MASS * G)
+        assert sum(collision.magnitude_forces) == pytest.approx(expected, rel=1e-3)
+        assert base(world).velocity == pytest.approx((0, 0, 0), abs=1e-6)
+
+    def test_sliding_sideways_with_coulomb_friction(self, robot: Any) -> None:
+        world = robot(diff("max_force: 40, max_torque: 5, friction: 0.4"))
+        base(world).set_velocity(0.0, 1.5, 0.0)
+        for k in range(1, 120):
+            world.step()
+            expected = max(0.0, 1.5 - 0.4 * G * k * DT)
+            assert base(world).velocity[1] == pytest.approx(expected, abs=1e-4)
+        # The distance of the sum of steps, v0^2 / (2 mu g) less half a step.
+        assert base(world).pose[1] == pytest.approx(1.5**2 / (2 * 0.4 * G) - 1.5 * DT / 2, abs=1e-3)
+
+    def test_spinning_slows_down_by_the_friction_at_the_grip_radius(self, robot: Any) -> None:
+        world = robot(diff("max_force: 40, max_torque: .inf, friction: 0.4, grip_radius: 0.2"))
+        base(world).set_velocity(0.0, 0.0, 20.0)
+        world.step(50)
+        deceleration = 0.4 * MASS * G * 0.2 / INERTIA
+        assert base(world).velocity[2] == pytest.approx(20.0 - deceleration * 0.25, abs=1e-3)
+
+    def test_brakes_hold_below_the_force_and_yield_above(self, robot: Any) -> None:
+        def displacement(push: float) -> float:
+            world = robot(diff("max_force: 40, max_torque: 5"))
+            for _ in range(200):
+                base(world).apply_force((push, 0.0), base(world).world_center)
+                world.step()
+            return base(world).pose[0]
+
+        assert abs(displacement(39.0)) < 1e-3
+        # 10 N more than the brakes, which act one step later, for 200 steps.
+        expected = (10.0 * 200 * 201 / 2 + 40.0 * 200) * DT**2 / MASS
+        assert displacement(50.0) == pytest.approx(expected, rel=1e-3)
+
+    def test_a_robot_that_is_pushed_by_another(self, plugin_world: Any) -> None:
+        """The stronger robot pushes the braked one with the difference of the forces."""
+        plugins = diff("max_force: 90, max_torque: 50, friction: .inf")
+        world = plugin_world(plugins, bodies=DISC, namespace="a")
+        world.spawn_model("robot.model.yaml", "other", "b", pose=(0.5, 0.0, math.pi))
+        world.command("/a/cmd_vel").set(flatland.Twist(5.0))
+        other = world.model("other").bodies[0]
+        limits = {"holonomic": False, "at_center": False, "grip": math.inf, "radius": 0.0}
+        brakes = world.model("other").plugin("drive")._controller
+        brakes.set_traction([other], max_force=95.0, max_torque=50.0, **limits)
+        world.step(200)
+        assert other.pose[0] == pytest.approx(0.5, abs=1e-3)
+        brakes.set_traction([other], max_force=30.0, max_torque=50.0, **limits)
+        world.step(20)
+        before = other.velocity[0]
+        world.step(100)
+        assert other.velocity[0] - before == pytest.approx(60 / (2 * MASS) * 0.5, rel=0.02)
+
+    def test_an_axle_without_motors_rolls_freely_and_does_not_slide(self, robot: Any) -> None:
+        world = robot(diff("max_force: 0, max_torque: 0, friction: .inf"), pose=(0, 0, 0.5))
+        base(world).set_velocity(1.0, 0.0, 0.0)
+        world.step(100)
+        vx, vy, omega = base(world).velocity
+        along = math.cos(0.5)
+        assert (vx, vy) == pytest.approx((along * math.cos(0.5), along * math.sin(0.5)), abs=1e-4)
+        assert omega == pytest.approx(0.0, abs=1e-5)
+
+
+def test_car_slides_out_of_a_curve_that_is_too_narrow(robot: Any) -> None:
+    """The grip allows v^2 / R = mu g; a slower car follows the curve, a faster one does not."""
+    car = (
+        "[{type: AckermannDrive, name: drive, body: base, wheelbase: 1, rear_axle: [-0.5, 0], "
+        "max_steer_angle: 1, command: steering, mode: force, max_force: 1000, friction: 0.5}]"
+    )
+    radius = math.hypot(1.0 / math.tan(0.3), 0.5)  # of the centre of mass
+    limit = math.sqrt(0.5 * G * radius)  # of its speed
+
+    def motion(speed: float) -> tuple[float, float]:
+        """Returns the curvature of the path and the acceleration across it."""
+        world = robot(car)
+        rear = speed * math.cos(math.atan(0.5 * math.tan(0.3)))
+        world.command("/cmd_vel").set(flatland.Twist(rear, 0.0, 0.3))
+        # The car enters the curve at its speed.
+        yaw_rate = rear * math.tan(0.3)
+        base(world).set_velocity(rear, 0.5 * yaw_rate, yaw_rate)
+        world.model("robot").plugin("drive")._controller.advance(1e3)  # the steering has turned
+        base(world).set_velocity(rear, 0.5 * yaw_rate, yaw_rate)
+        world.step(5)
+        vx, vy, _ = base(world).velocity
+        world.step()
+        wx, wy, _ = base(world).velocity
+        turn = math.atan2(vx * wy - vy * wx, vx * wx + vy * wy) / DT
+        return turn / math.hypot(vx, vy), turn * math.hypot(vx, vy)
+
+    curvature, _ = motion(0.95 * limit)
+    assert curvature == pytest.approx(1 / radius, rel=0.01)
+    curvature, acceleration = motion(1.3 * limit)
+    assert acceleration < 0.5 * G * 1.001
+    assert curvature < 0.65 / radius
+
+
+def test_car_accelerates_with_its_force(robot: Any) -> None:
+    world = robot(
+        "[{type: AckermannDrive, name: drive, body: base, wheelbase: 1, max_steer_angle: 1, "
+        "mode: force, max_force: 60}]"
+    )
+    drive(world, 2.0)
+    world.step(100)
+    assert base(world).velocity == pytest.approx((60.0 / MASS * 0.5, 0.0, 0.0), abs=1e-5)
+
+
+def test_tricycle_accelerates_with_its_force(plugin_world: Any) -> None:
+    wheel = "footprints: [{type: circle, radius: 0.05, density: 100, collision: false}]"
+    places = {"front": (0.0, 0.0), "left": (-0.6, 0.3), "right": (-0.6, -0.3)}
+    bodies, joints = DISC, ""
+    for name, (x, y) in places.items():
+        kind = "revolute" if name == "front" else "weld"
+        bodies += f"- {{name: {name}, pose: [{x}, {y}, 0], {wheel}}}\n"
+        joints += (
+            f"- {{type: {kind}, name: {name}, bodies: [{{name: base, anchor: [{x}, {y}]}}, "
+            f"{{name: {name}, anchor: [0, 0]}}]}}\n"
+        )
+    world = plugin_world(
+        "[{type: TricycleDrive, name: drive, body: base, front_wheel_joint: front, "
+        "rear_left_wheel_joint: left, rear_right_wheel_joint: right, mode: force, max_force: 60}]",
+        bodies=bodies,
+        joints=joints,
+    )
+    mass = sum(body.mass for body in world.model("robot").bodies)
+    assert mass > MASS + 2.0
+    drive(world, 2.0)
+    world.step(100)
+    # The joints of the wheels are solved iteratively.
+    assert base(world).velocity[0] == pytest.approx(60.0 / mass * 0.5, rel=1e-3)
+    world.step(400)
+    assert base(world).velocity[0] == pytest.approx(2.0, abs=1e-3)
+
+
+def test_omni_drive_pushes_in_all_directions(robot: Any) -> None:
+    world = robot(
+        "[{type: OmniDrive, name: drive, body: base, mode: force, max_force: 50, max_torque: 5}]"
+    )
+    drive(world, 3.0, 0.0, 4.0)
+    world.step(100)
+    assert base(world).velocity[:2] == pytest.approx((0.3, 0.4), abs=1e-4)
+
+
+def test_bodies_on_joints_are_accelerated_together(plugin_world: Any) -> None:
+    bodies = (
+        DISC
+        + "- {name: arm, pose: [0, 0.3, 0], footprints: [{type: circle, radius: 0.1, \
+  density: 318.3098861837907, layers: []}]}"
+    )
+    joints = "[{name: j, type: revolute, bodies: [{name: base, anchor: [0, 0.3]}, \
+  {name: arm, anchor: [0, 0]}]}]"
+    world = plugin_world(
+        diff("max_force: 60, max_torque: 1000, friction: .inf"),
+        bodies=bodies.replace("\\\n", ""),
+        joints=joints.replace("\\\n", ""),
+    )
+    total = sum(body.mass for body in world.model("robot").bodies)
+    assert total == pytest.approx(60.0, rel=1e-4)
+    drive(world, 3.0)
+    world.step(200)
+    assert base(world).velocity[0] == pytest.approx(1.0, abs=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("plugins", "bodies", "message"),
+    [
+        (diff("max_torque: 1"), DISC, "max_force"),
+        (diff("max_force: 1"), DISC, "max_torque"),
+        (diff("max_force: -1, max_torque: 1"), DISC, "max_force"),
+        (diff("max_force: 1, max_torque: 1, friction: .nan"), DISC, "friction"),
+        (
+            diff("max_force: 1, max_torque: 1"),
+            DISC.replace("- name: base", "- name: base\n  type: kinematic"),
+            'requires a dynamic body with a mass, but body "base" is kinematic',
+        ),
+        (diff("max_force: 1, max_torque: 1"), "[{name: base, footprints: []}]", "has none"),
+        (
+            "[{type: DiffDrive, name: d, body: base, mode: push}]",
+            DISC,
+            'Invalid "mode", must be one of: velocity, force, got push',
+        ),
+        (
+            "[{type: DiffDrive, name: d, body: base, max_force: 5}]",
+            DISC,
+            '"max_force" requires "mode: force"',
+        ),
+    ],
+)
+def test_errors(plugin_world: Any, plugins: str, bodies: str, message: str) -> None:
+    error = plugin_world.error(plugins, bodies=bodies)
+    assert message in error
+    assert "robot.model.yaml" in error

@@ -1,0 +1,166 @@
+"""The worlds with paths, drives, forces and trailers: repeatable, copied, recorded and changed."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import flatland
+from flatland import Twist, World
+from flatland.recording import Replay
+
+
+def traffic(world: World, part: int) -> None:
+    world.command("/door").set(part == 0)
+    world.command("/forklift/go").set(part == 0)
+
+
+def drives(world: World, part: int) -> None:
+    side = 1.0 if part == 0 else -1.0
+    world.command("/car/cmd_vel").set(Twist(1.5, 0.0, 0.4 * side))
+    world.command("/mecanum/cmd_vel").set(Twist(0.4, 0.5 * side, 0.6))
+    world.command("/trio/cmd_vel").set(Twist(-0.3, 0.4 * side, -0.5))
+
+
+def pushing(world: World, part: int) -> None:
+    world.command("/strong/cmd_vel").set(Twist(1.0))
+    world.command("/weak/cmd_vel").set(Twist(1.0 if part == 0 else 0.0))
+    world.command("/pusher/cmd_vel").set(Twist(0.8, 0.0, 0.2 * part))
+
+
+def trailers(world: World, part: int) -> None:
+    world.command("/cmd_vel").set(Twist(1.5, 0.0, 0.3))
+    if part:
+        world.command("/trailer1/hitch").set(False)
+
+
+WORLDS = {"traffic": traffic, "drives": drives, "pushing": pushing, "trailers": trailers}
+STEPS = 300
+
+
+@pytest.fixture(params=WORLDS)
+def load(request: pytest.FixtureRequest, checkout: Path) -> Any:
+    """Returns the function that commands a world, and one that loads it."""
+    loaded: list[World] = []
+
+    def from_yaml(seed: int = 3) -> World:
+        path = checkout / "worlds" / request.param / "world.yaml"
+        loaded.append(World.from_yaml(path, seed=seed))
+        return loaded[-1]
+
+    yield WORLDS[request.param], from_yaml
+    for world in loaded:
+        world.close()
+
+
+Load = tuple[Callable[[World, int], None], Callable[..., World]]
+
+
+def run(world: World, command: Callable[[World, int], None], *, single: bool = False) -> str:
+    """Steps a world with two commands, and returns the hash of its state."""
+    for part in (0, 1):
+        command(world, part)
+        if single:
+            for _ in range(STEPS):
+                world.step()
+        else:
+            world.step(STEPS)
+    return str(world.state_hash())
+
+
+def test_runs_are_equal_with_single_steps_and_after_a_reset(load: Load) -> None:
+    command, from_yaml = load
+    world = from_yaml()
+    first = run(world, command)
+    assert run(from_yaml(), command, single=True) == first
+    world.reset()
+    assert run(world, command) == first
+
+
+def test_snapshot_and_clone(load: Load) -> None:
+    command, from_yaml = load
+    world = from_yaml()
+    run(world, command)
+    saved = world.snapshot()
+    end = run(world, command)
+    world.restore(saved)
+    with world.clone() as copy:
+        assert run(copy, command) == end
+    assert run(world, command) == end
+
+
+def test_recordings_are_repeated(load: Load, tmp_path: Path) -> None:
+    command, from_yaml = load
+    path = tmp_path / "run.flog"
+    with from_yaml() as world:
+        world.record(path)
+        run(world, command)
+        world.move_model(world.models[0].name, (3.0, 3.0, 1.0), "allow")
+        run(world, command)
+    replay = Replay(path)
+    replay.run()
+    replay.close()
+    assert (replay.difference, replay.last_step) == (None, 4 * STEPS)
+
+
+def test_models_are_moved_deleted_and_spawned_again(load: Load) -> None:
+    command, from_yaml = load
+    world = from_yaml()
+    run(world, command)
+    for model in list(world.models):
+        world.move_model(model.name, (4.0, 4.0, 0.5), "allow")
+        world.step(20)
+        bounds = 30.0
+        assert all(math.dist(other.pose[:2], (0, 0)) < bounds for other in world.models)
+        name, path, namespace = model.name, model.path, model.namespace
+        world.delete_model(name)
+        world.step(20)
+        world.spawn_model(path, name, namespace, (2.0, 2.0, 0.0), "nearest")
+        world.step(20)
+    assert len(world.models) == len(set(world.models))
+
+
+def test_steps_need_no_hooks(load: Load) -> None:
+    """While no output is wanted, the core performs the steps."""
+    command, from_yaml = load
+    world = from_yaml()
+    run(world, command)
+    assert not world.plugin_host.hooks.has_unscheduled
+
+
+def test_trailers_follow_on_the_circles_of_the_closed_form(checkout: Path) -> None:
+    """In a steady turn, an axle at the distance l behind a hook at c behind another axle has the
+
+    radius of the circle R1 with R1^2 = R0^2 + c^2 - l^2.
+    """
+    with World.from_yaml(checkout / "worlds" / "trailers" / "world.yaml", seed=1) as world:
+        world.command("/cmd_vel").set(Twist(1.0, 0.0, 0.2))
+        world.step(6000)
+        squared = (1.0 / 0.2) ** 2
+        for name, offset in (("trailer1", 0.75), ("trailer2", 0.85), ("trailer3", 0.85)):
+            squared += offset**2 - 1.5**2
+            vx, vy, omega = world.model(name).bodies[0].velocity
+            assert omega == pytest.approx(0.2, rel=0.02)
+            assert math.hypot(vx, vy) / omega == pytest.approx(math.sqrt(squared), rel=0.01)
+
+
+def test_the_stronger_robot_wins(checkout: Path) -> None:
+    with World.from_yaml(checkout / "worlds" / "pushing" / "world.yaml", seed=1) as world:
+        for name in ("strong", "weak"):
+            world.command(f"/{name}/cmd_vel").set(flatland.Twist(0.5))
+        world.step(1000)
+        assert world.model("weak").pose[0] > 4.5
+
+
+@pytest.mark.parametrize("page", ["drives.md", "moving_models.md"])
+def test_examples_of_the_documentation_are_parts_of_files(checkout: Path, page: str) -> None:
+    text = (checkout / "docs" / page).read_text()
+    examples = re.findall(r"^```yaml\n# (worlds/\S+)\n(.*?)^```", text, re.MULTILINE | re.DOTALL)
+    assert examples
+    for name, example in examples:
+        assert example in (checkout / name).read_text(), name

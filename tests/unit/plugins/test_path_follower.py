@@ -1,0 +1,263 @@
+"""PathFollower: the motion in closed form, modes, starts, moves, and errors."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from typing import Any
+
+import pytest
+
+import flatland
+from flatland.plugins.path_follower import PathFollower
+
+KINEMATIC = """
+- name: base
+  type: kinematic
+  footprints: [{type: circle, radius: 0.2, density: 1}]
+"""
+Point = tuple[float, float, float]
+
+
+def entry(text: str) -> str:
+    return f"[{{type: PathFollower, name: path, body: base, {text}}}]"
+
+
+@pytest.fixture
+def follow(plugin_world: Any) -> Any:
+    def load(text: str, **options: Any) -> flatland.World:
+        options = {"bodies": KINEMATIC, "step_size": 0.01, **options}
+        world: flatland.World = plugin_world(entry(text), **options)
+        return world
+
+    return load
+
+
+def pose(world: flatland.World) -> Point:
+    return world.model("robot").body("base").pose
+
+
+def plugin(world: flatland.World) -> Any:
+    return world.model("robot").plugin("path")
+
+
+def trapezoid(t: float, length: float, v: float, a: float, b: float) -> float:
+    """Returns the distance after t seconds of the fastest motion from rest to rest."""
+    if v * v / 2 * (1 / a + 1 / b) > length:
+        v = math.sqrt(2 * length / (1 / a + 1 / b))
+    cruise = (length - v * v / 2 * (1 / a + 1 / b)) / v
+    if t < v / a:
+        return a * t * t / 2
+    if t < v / a + cruise:
+        return v * (t - v / a / 2)
+    end = v / a + cruise + v / b
+    return length if t >= end else length - b * (end - t) ** 2 / 2
+
+
+class TestMotion:
+    @pytest.mark.parametrize("length", [0.2, 3.0], ids=["triangle", "trapezoid"])
+    def test_profile(self, follow: Any, length: float) -> None:
+        world = follow(
+            f"waypoints: [[{length}, 0]], mode: once, speed: 0.8, acceleration: 0.5, "
+            "deceleration: 1.25"
+        )
+        found, expected = [], []
+        for k in range(1, 700):
+            world.step()
+            found.append(pose(world)[0])
+            expected.append(trapezoid(k * 0.01, length, 0.8, 0.5, 1.25))
+        assert found == pytest.approx(expected, abs=1e-6)
+        assert found[-1] == pytest.approx(length, abs=1e-7)
+
+    def test_the_slower_one_of_translation_and_rotation_determines_the_time(
+        self, follow: Any
+    ) -> None:
+        world = follow(
+            "waypoints: [[1, 0, 1.5]], mode: once, speed: 10, angular_speed: 0.5, "
+            "angular_acceleration: 0.25"
+        )
+        for k in (50, 100, 150, 200):
+            world.step(50)
+            angle = trapezoid(k * 0.01, 1.5, 0.5, 0.25, 0.25)
+            assert pose(world) == pytest.approx((angle / 1.5, 0.0, angle), abs=1e-6)
+
+    def test_forward_heading_turns_first(self, follow: Any) -> None:
+        world = follow("waypoints: [[0, 2]], mode: once, heading: forward, angular_speed: 1")
+        world.step(100)
+        assert pose(world) == pytest.approx((0.0, 0.0, 1.0), abs=1e-6)
+        world.step(157)  # the turn takes pi / 2 s
+        assert pose(world) == pytest.approx((0.0, 2.57 - math.pi / 2, math.pi / 2), abs=1e-6)
+        world.step(101)
+        assert pose(world) == pytest.approx((0.0, 2.0, math.pi / 2), abs=1e-6)
+
+    def test_the_shorter_rotation_is_taken(self, follow: Any) -> None:
+        world = follow("waypoints: [[0, 0, -3]], mode: once", pose=(0.0, 0.0, 3.0))
+        world.step(1000)
+        assert pose(world)[2] == pytest.approx(0.0, abs=1e-6)  # -3 relative to the start
+        world = follow("waypoints: [[0, 0, -3]], mode: once, frame: world", pose=(0.0, 0.0, 3.0))
+        world.step(10)
+        assert pose(world)[2] % math.tau == pytest.approx(3.1, abs=1e-6)
+        world.step(1000)
+        assert pose(world)[2] == pytest.approx(-3.0, abs=1e-6)
+
+    def test_waypoints_are_relative_to_the_start_or_the_world(self, follow: Any) -> None:
+        start = (1.0, 2.0, math.pi / 2)
+        world = follow("waypoints: [[2, 1]], mode: once", pose=start)
+        world.step(500)
+        assert pose(world) == pytest.approx((0.0, 4.0, math.pi / 2), abs=1e-6)
+        world = follow("waypoints: [[2, 1]], mode: once, frame: world", pose=start)
+        world.step(500)
+        assert pose(world) == pytest.approx((2.0, 1.0, 0.0), abs=1e-6)
+
+    def test_velocity_is_that_of_the_motion(self, follow: Any) -> None:
+        world = follow("waypoints: [[3, 4]], mode: once, speed: 0.5")
+        world.step(10)
+        assert world.model("robot").body("base").velocity == pytest.approx((0.3, 0.4, 0), abs=1e-4)
+        world.step(2000)
+        assert world.model("robot").body("base").velocity == (0.0, 0.0, 0.0)
+
+    def test_no_drift_in_an_hour(self, follow: Any) -> None:
+        """The place after 543 rounds with waiting times is that of the closed form."""
+        world = follow("waypoints: [[1.5, 0], [1.5, 1.5]], wait: 0.5, speed: 1", step_size=0.05)
+        period = 1.5 + 1.5 + 1.5 * math.sqrt(2) + 1.5
+        world.step(72000)
+        diagonal = 3600.0 % period - 4.0  # since the body left the second waypoint
+        place = 1.5 - diagonal / math.sqrt(2)
+        assert pose(world)[:2] == pytest.approx((place, place), abs=1e-5)
+
+    @pytest.mark.parametrize("body", ["dynamic", "static"])
+    def test_other_types_of_bodies(self, follow: Any, body: str) -> None:
+        world = follow(
+            "waypoints: [[1, 0, 1]], mode: once", bodies=KINEMATIC.replace("kinematic", body)
+        )
+        world.step(50)
+        assert pose(world) == pytest.approx((0.5, 0.0, 0.5), abs=1e-6)
+
+
+class TestModes:
+    def test_loop(self, follow: Any) -> None:
+        world = follow("waypoints: [[1, 0], [1, 1]]")
+        seen = []
+        for _ in range(4):
+            world.step(100)
+            seen.append(pose(world)[:2])
+        back = 1 - 1 / math.sqrt(2)
+        assert seen[:3] == [pytest.approx(p, abs=1e-6) for p in ((1, 0), (1, 1), (back, back))]
+        assert seen[3] == pytest.approx((4 - 2 - math.sqrt(2), 0), abs=1e-6)
+
+    def test_there_and_back(self, follow: Any) -> None:
+        world = follow("waypoints: [[1, 0], [1, 1]], mode: there_and_back, wait: 1")
+        seen = []
+        for _ in range(8):
+            world.step(100)
+            seen.append(tuple(round(n, 5) for n in pose(world)[:2]))
+        assert seen == [(1, 0), (1, 0), (1, 1), (1, 1), (1, 0), (1, 0), (0, 0), (0, 0)]
+
+    def test_random_visits_all_others_and_depends_on_the_seed_only(self, follow: Any) -> None:
+        def visits(seed: int) -> list[int]:
+            world = follow(
+                "waypoints: [[1, 0], [2, 0], [3, 0]], mode: random, speed: 100", seed=seed
+            )
+            found = []
+            for _ in range(400):
+                world.step()
+                found.append(plugin(world).waypoint)
+            return found
+
+        first = visits(1)
+        assert first == visits(1)
+        assert first != visits(2)
+        places = [w for before, w in itertools.pairwise(first) if w != before]
+        pairs = set(itertools.pairwise(places))
+        assert len(pairs) == 12  # from each of four places to the three others
+
+    def test_once_returns_with_the_next_start(self, follow: Any) -> None:
+        world = follow("waypoints: [[1, 0]], mode: once, start: false, start_topic: go")
+        world.step(300)
+        assert pose(world)[0] == 0.0
+        for expected in (1.0, 0.0, 1.0):
+            world.command("/go").set(True)
+            world.step(300)
+            assert pose(world)[0] == pytest.approx(expected, abs=1e-6)
+        world.command("/go").set(False)
+        world.step(300)
+        assert pose(world)[0] == pytest.approx(1.0, abs=1e-6)
+
+    def test_false_stops_at_the_next_waypoint(self, follow: Any) -> None:
+        world = follow("waypoints: [[1, 0], [2, 0]], start_topic: go")
+        world.step(50)
+        world.command("/go").set(False)
+        world.step(300)
+        assert pose(world)[0] == pytest.approx(1.0, abs=1e-6)
+        assert (plugin(world).waypoint, plugin(world).is_moving) == (1, False)
+        world.command("/go").set(True)
+        world.step(50)
+        assert pose(world)[0] == pytest.approx(1.5, abs=1e-6)
+
+
+def test_equal_waypoints_do_not_hang(follow: Any) -> None:
+    world = follow("waypoints: [[0, 0], [0, 0]]")
+    world.step(10)
+    assert pose(world) == (0.0, 0.0, 0.0)
+
+
+def test_a_moved_model_continues_to_the_same_waypoint(follow: Any) -> None:
+    world = follow("waypoints: [[2, 0]], mode: once")
+    world.step(50)
+    world.move_model("robot", (0.0, 1.0, 0.0))
+    world.step()
+    x, y, _ = pose(world)
+    assert (x, y) == pytest.approx((0.01 * 2 / math.sqrt(5), 1 - 0.01 / math.sqrt(5)), abs=1e-6)
+    world.step(300)
+    assert pose(world) == pytest.approx((2.0, 0.0, 0.0), abs=1e-6)
+
+
+def test_a_path_pushes_dynamic_bodies_and_is_not_deflected(follow: Any) -> None:
+    world = follow("waypoints: [[1, 0]], mode: once, speed: 0.5")
+    crate = """
+bodies:
+  - name: box
+    footprints: [{type: circle, radius: 0.1, density: 1}]
+"""
+    world.spawn_model("\n" + crate, "crate", pose=(0.6, 0.0, 0.0))
+    world.step(250)
+    assert pose(world) == pytest.approx((1.0, 0.0, 0.0), abs=1e-6)
+    assert world.model("crate").pose[0] > 1.29
+
+
+def test_python_steps_equal_those_of_the_core(follow: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    text = "waypoints: [[1, 0.3, 0.4], [0.2, 0.7]], speed: 0.7, acceleration: 0.4, wait: 0.2"
+    core = follow(text)
+    core.step(600)
+    for hook in ("before_physics_step", "after_physics_step"):
+        method = getattr(PathFollower, hook)
+        # Without the mark of `when_due`, the hook is called in every step.
+        monkeypatch.setattr(PathFollower, hook, lambda self, t, method=method: method(self, t))
+    python = follow(text)
+    python.step(600)
+    assert pose(core) == pose(python)
+    assert plugin(core).state() == plugin(python).state()
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("waypoints: []", 'Invalid "waypoints", must not be empty'),
+        ("mode: loop", "waypoints"),
+        ("waypoints: [[1]]", "must be [x, y] or [x, y, theta]"),
+        ("waypoints: [[1, 0, 0]], heading: forward", "must be [x, y]"),
+        ("waypoints: [[.nan, 0]]", "finite"),
+        ("waypoints: [[1, 0]], speed: 0", 'Invalid "speed", must be greater than 0, got 0.0'),
+        ("waypoints: [[1, 0]], angular_speed: -1", 'Invalid "angular_speed"'),
+        ("waypoints: [[1, 0]], acceleration: -1", "acceleration"),
+        ("waypoints: [[1, 0]], wait: .inf", "wait"),
+        ("waypoints: [[1, 0]], mode: zigzag", "must be one of: loop, once, there_and_back, random"),
+        ("waypoints: [[1, 0]], frame: map", "must be one of: start, world, got map"),
+        ("waypoints: [[1, 0]], start: false", '"start: false" requires a "start_topic"'),
+        ("waypoints: [[1, 0]], spede: 1", "spede"),
+    ],
+)
+def test_errors(plugin_world: Any, text: str, message: str) -> None:
+    error = plugin_world.error(entry(text), bodies=KINEMATIC)
+    assert message in error
+    assert "robot.model.yaml" in error

@@ -1,0 +1,123 @@
+"""PosePublisher: poses, velocities, frames, stamps and rates."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+
+import flatland
+from flatland import Odometry, PoseStamped
+
+ARM = """
+- name: base
+  footprints: [{type: circle, radius: 0.2, density: 1}]
+- name: arm
+  type: kinematic
+  pose: [1, 0, 0.5]
+  footprints: [{type: circle, radius: 0.1, density: 1, collision: false}]
+"""
+STEP = 5_000_000  # ns
+
+Collect = Callable[[flatland.World, str], list[Any]]
+
+
+def test_the_pose_of_the_first_body_is_published_by_default(
+    plugin_world: Any, collect: Collect
+) -> None:
+    world = plugin_world(
+        "[{type: PosePublisher, name: truth, update_rate: 50}]", namespace="r1", pose=(1, 2, 0.5)
+    )
+    assert list(world.ports.outputs) == ["/r1/pose"]
+    poses = collect(world, "/r1/pose")
+    world.step(9)
+    assert [pose.stamp for pose in poses] == [0, 4 * STEP, 8 * STEP]
+    assert type(poses[0]) is PoseStamped
+    assert poses[0].frame_id == "map"
+    assert poses[0].pose == pytest.approx((1, 2, 0.5), abs=1e-6)
+
+
+def test_the_pose_is_that_before_the_step_or_after_it(plugin_world: Any, collect: Collect) -> None:
+    world = plugin_world(
+        "[{type: PosePublisher, name: a, topic: before},"
+        " {type: PosePublisher, name: b, topic: after, after_step: true}]"
+    )
+    before, after = collect(world, "/before"), collect(world, "/after")
+    world.model("robot").body("base").set_velocity(1.0, 0.0, 0.0)
+    world.step(3)
+    assert [pose.stamp for pose in before] == [0, STEP, 2 * STEP]
+    assert [pose.stamp for pose in after] == [STEP, 2 * STEP, 3 * STEP]
+    assert [pose.pose[0] for pose in before] == pytest.approx([0.0, 0.005, 0.01], abs=1e-6)
+    assert before[1:] == after[:2]
+
+
+def test_odometry_has_the_velocity_of_the_observed_frame_in_its_own_axes(
+    plugin_world: Any,
+) -> None:
+    world = plugin_world(
+        "[{type: PosePublisher, name: truth, body: arm, message: odometry, topic: truth,"
+        " frame_id: world, child_frame_id: tip, origin: [0.5, 0, 0.25]}]",
+        bodies=ARM,
+        namespace="r1",
+    )
+    truth = world.output("/r1/truth")
+    world.model("robot").body("arm").set_velocity(0.3, 0.1, 2.0)
+    world.step()
+    value = truth.latest
+    assert type(value) is Odometry
+    assert (value.frame_id, value.child_frame_id, value.stamp) == ("world", "r1_tip", 0)
+    tip = (1 + 0.5 * math.cos(0.5), 0.5 * math.sin(0.5), 0.75)
+    assert value.pose == pytest.approx(tip, abs=1e-6)
+    # v + omega x r: the tip is 0.5 m along the direction of 0.5 rad.
+    vx, vy = 0.3 - 2.0 * 0.5 * math.sin(0.5), 0.1 + 2.0 * 0.5 * math.cos(0.5)
+    c, s = math.cos(0.75), math.sin(0.75)
+    assert value.twist == pytest.approx((c * vx + s * vy, c * vy - s * vx, 2.0), abs=1e-6)
+    assert not value.pose_covariance.any()
+
+
+def test_the_twist_is_the_derivative_of_the_pose(plugin_world: Any, collect: Collect) -> None:
+    world = plugin_world(
+        "[{type: PosePublisher, name: truth, body: arm, message: odometry, origin: [0.4, 0.3, 1]}]",
+        bodies=ARM,
+    )
+    values = collect(world, "/odometry")
+    world.model("robot").body("arm").set_velocity(0.5, -0.2, 1.0)
+    world.step(3)
+    (x0, y0, a0), (x2, y2, a2) = values[0].pose, values[2].pose
+    vx, vy, omega = ((b - a) / 0.01 for a, b in ((x0, x2), (y0, y2), (a0, a2)))
+    c, s = math.cos(values[1].pose[2]), math.sin(values[1].pose[2])
+    central = (c * vx + s * vy, c * vy - s * vx, omega)
+    assert values[1].twist == pytest.approx(central, abs=1e-3)
+
+
+def test_a_moved_model_has_its_new_pose_at_once(plugin_world: Any, collect: Collect) -> None:
+    world = plugin_world("[{type: PosePublisher, name: truth}]")
+    poses = collect(world, "/pose")
+    world.step()
+    world.move_model("robot", (3, 4, 1))
+    world.step()
+    assert poses[-1].pose == pytest.approx((3, 4, 1), abs=1e-6)
+
+
+def test_snapshots_resets_and_clones_repeat_the_same_poses(
+    plugin_world: Any, collect: Collect
+) -> None:
+    world = plugin_world("[{type: PosePublisher, name: truth, update_rate: 60}]")
+    poses = collect(world, "/pose")
+    world.step(5)
+    snapshot = world.snapshot()
+    world.step(20)
+    expected = poses[-5:]
+    world.restore(snapshot)
+    world.step(20)
+    assert poses[-5:] == expected
+    world.restore(snapshot)
+    with world.clone() as clone:
+        values = collect(clone, "/pose")
+        clone.step(20)
+        assert values[-5:] == expected
+    world.reset()
+    world.step(25)
+    assert poses[-5:] == expected
