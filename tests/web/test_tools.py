@@ -96,9 +96,13 @@ def test_plots_show_published_numbers(room: ViewedWorld, page: ViewerPage) -> No
     names = browser.until(f"{options}.length > 1 && {options}")
     name = "/odometry/ground_truth/twist/2"
     assert name in names
-    browser.evaluate("document.querySelector('#plot-series').focus()")
-    browser.type(name)
-    browser.until("Boolean(document.querySelector('figure.plot output'))")
+    # Typed letters would select, and plot, each number whose name begins with them.
+    browser.evaluate(
+        "((list) => { list.value = arguments[0]; list.dispatchEvent(new Event('change')); })"
+        "(document.querySelector('#plot-series'))",
+        name,
+    )
+    browser.until("document.querySelector('figure.plot')?.dataset.series === arguments[0]", name)
     browser.until("parseFloat(document.querySelector('figure.plot output').textContent) === 0.5")
     box = browser.evaluate(
         "((b) => [b.x, b.y, b.width, b.height].map(Math.round))"
