@@ -77,8 +77,15 @@ class Crowd {
   Choice queue_up(Person& person, Party& party, std::uint32_t waypoint, std::int64_t step,
                   double dt);
   void arrive(Party& party, std::uint32_t waypoint, std::int64_t step, double dt);
-  void leave(Party& party, std::uint32_t waypoint);
+  void leave(Party& party, std::uint32_t waypoint, std::int64_t step);
   bool has_arrived(const Person& person, std::uint32_t waypoint) const;
+
+  // giving_way.cpp: who makes room for whom.
+  bool precedes(const Person& a, const Person& b) const;
+  void give_way(std::vector<Choice>& choices, std::int64_t step, double dt, double period);
+  void ask_for_room(std::size_t root, const std::vector<Choice>& choices,
+                    const std::vector<bool>& is_walking, std::vector<bool>& is_asked,
+                    std::int64_t until);
 
   // motion.cpp: how a person moves.
   void find_neighbours();

@@ -195,8 +195,12 @@ void Crowd::update(World& world, std::int64_t step, double dt) {
   std::vector<Choice> choices(people_.size());
   std::vector<Vec> wanted(people_.size());
   for (std::size_t i = 0; i < people_.size(); ++i) {
-    Person& person = people_[i];
-    const Choice choice = choices[i] = choose(person, step, dt, period);
+    choices[i] = choose(people_[i], step, dt, period);
+  }
+  give_way(choices, step, dt, period);
+  for (std::size_t i = 0; i < people_.size(); ++i) {
+    const Person& person = people_[i];
+    const Choice& choice = choices[i];
     Vec preferred = choice.velocity;
     if (square(preferred) > 0.0) {
       preferred += settings_.fluctuation * normal(settings_.key, kFluctuations + person.number,

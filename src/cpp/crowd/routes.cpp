@@ -37,7 +37,7 @@ Crowd::Choice Crowd::approach(const Person& person, std::uint32_t waypoint) {
 void Crowd::arrive(Party& party, std::uint32_t waypoint, std::int64_t step, double dt) {
   const Span wait = waypoints_[waypoint].wait;
   if (wait.most <= 0.0) {
-    leave(party, waypoint);
+    leave(party, waypoint, step);
     return;
   }
   const auto stream = kParties + static_cast<std::uint64_t>(&party - parties_.data());
@@ -45,8 +45,9 @@ void Crowd::arrive(Party& party, std::uint32_t waypoint, std::int64_t step, doub
   party.wait_until = step + steps(draw(party.draws, stream, wait), dt);
 }
 
-void Crowd::leave(Party& party, std::uint32_t waypoint) {
+void Crowd::leave(Party& party, std::uint32_t waypoint, std::int64_t step) {
   party.is_waiting = false;
+  party.since = step;
   for (const Person& person : people_) {
     if (&parties_[person.party] != &party) continue;
     auto& queue = queues_[waypoint];
@@ -120,7 +121,7 @@ Crowd::Choice Crowd::choose(Person& person, std::int64_t step, double dt, double
   Party& party = parties_[person.party];
   const Vec facing{std::cos(person.heading), std::sin(person.heading)};
   if (party.is_waiting && step >= party.wait_until) {
-    leave(party, routes_[party.route].waypoints[party.leg]);
+    leave(party, routes_[party.route].waypoints[party.leg], step);
   }
   if (person.is_stopped) return {{}, facing};
   if (person.sent_to != kNone) {
