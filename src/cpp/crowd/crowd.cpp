@@ -83,7 +83,7 @@ Person* Crowd::find(Id body) {
 std::uint32_t Crowd::target_of(const Person& person) const {
   if (person.sent_to != kNone) return person.sent_to;
   const Party& party = parties_[person.party];
-  return party.is_done ? kNone : routes_[party.route].waypoints[party.leg];
+  return routes_[party.route].waypoints[party.leg];
 }
 
 bool Crowd::is_standing(const Person& person) const {

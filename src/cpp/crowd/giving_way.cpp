@@ -32,23 +32,31 @@ bool Crowd::precedes(const Person& a, const Person& b) const {
   return since_a != since_b ? since_a < since_b : a.number < b.number;
 }
 
+Crowd::Stance Crowd::stance_of(const Person& person, const Choice& choice) const {
+  if (person.is_stopped || person.stop_until != 0) return Stance::kFixed;
+  const auto& queue = queues_[target_of(person)];
+  if (std::find(queue.begin(), queue.end(), person.number) != queue.end()) return Stance::kFixed;
+  return square(choice.velocity) > 0.0 ? Stance::kWalking : Stance::kIdle;
+}
+
 void Crowd::give_way(std::vector<Choice>& choices, std::int64_t step, double dt, double period) {
-  std::vector<bool> is_walking(people_.size());
+  std::vector<Stance> stances(people_.size());
   std::vector<std::size_t> blocked;
   for (std::size_t i = 0; i < people_.size(); ++i) {
     Person& person = people_[i];
-    is_walking[i] = square(choices[i].velocity) > 0.0 && !is_standing(person);
+    stances[i] = stance_of(person, choices[i]);
+    const bool is_walking = stances[i] == Stance::kWalking;
     const bool is_slow =
-        is_walking[i] && dot(person.velocity, choices[i].direction) < kSlow * person.speed;
+        is_walking && dot(person.velocity, choices[i].direction) < kSlow * person.speed;
     person.delay = std::min(std::max(person.delay + (is_slow ? period : -period), 0.0), kMostDelay);
-    if (is_walking[i] && person.delay > kPatience) blocked.push_back(i);
+    if (is_walking && person.delay > kPatience) blocked.push_back(i);
   }
   std::sort(blocked.begin(), blocked.end(),
             [this](std::size_t a, std::size_t b) { return precedes(people_[a], people_[b]); });
   const auto until = step + static_cast<std::int64_t>(std::ceil(kHold / dt));
   std::vector<bool> is_asked(people_.size());
   for (const std::size_t i : blocked) {
-    if (!is_asked[i]) ask_for_room(i, choices, is_walking, is_asked, until);
+    if (!is_asked[i]) ask_for_room(i, choices, stances, is_asked, until);
   }
   for (std::size_t i = 0; i < people_.size(); ++i) {
     Person& person = people_[i];
@@ -57,7 +65,7 @@ void Crowd::give_way(std::vector<Choice>& choices, std::int64_t step, double dt,
         std::lower_bound(people_.begin(), people_.end(), person.yields_to,
                          [](const Person& p, std::uint32_t number) { return p.number < number; });
     const bool is_over = other == people_.end() || other->number != person.yields_to ||
-                         step >= person.yield_until || !is_walking[i] || target_of(*other) == kNone;
+                         step >= person.yield_until || stances[i] == Stance::kFixed;
     if (is_over) {
       person.yields_to = kNone;
       person.yield_until = 0;
@@ -74,7 +82,7 @@ void Crowd::give_way(std::vector<Choice>& choices, std::int64_t step, double dt,
 }
 
 void Crowd::ask_for_room(std::size_t root, const std::vector<Choice>& choices,
-                         const std::vector<bool>& is_walking, std::vector<bool>& is_asked,
+                         const std::vector<Stance>& stances, std::vector<bool>& is_asked,
                          std::int64_t until) {
   const Person& first = people_[root];
   const std::uint32_t target = target_of(first);
@@ -88,7 +96,9 @@ void Crowd::ask_for_room(std::size_t root, const std::vector<Choice>& choices,
     for (std::uint32_t k = neighbour_starts_[i]; k < neighbour_starts_[i + 1]; ++k) {
       const std::size_t j = neighbours_[k];
       Person& other = people_[j];
-      if (is_asked[j] || !is_walking[j] || !precedes(first, other)) continue;
+      if (is_asked[j] || stances[j] == Stance::kFixed) continue;
+      const bool is_walking = stances[j] == Stance::kWalking;
+      if (is_walking && !precedes(first, other)) continue;
       const Vec offset = other.position - person.position;
       const double reach = person.radius + other.radius;
       if (dot(offset, way) <= 0.0 || std::fabs(cross(way, offset)) > reach + kMargin) continue;
@@ -96,7 +106,8 @@ void Crowd::ask_for_room(std::size_t root, const std::vector<Choice>& choices,
       if (!surroundings_.walls().is_clear(person.position, other.position)) continue;
       is_asked[j] = true;
       asking.push_back(j);
-      if (dot(choices[j].direction, way_to(target, other.position)) > kSameWay) continue;
+      const double cosine = dot(choices[j].direction, way_to(target, other.position));
+      if (is_walking && cosine > kSameWay) continue;  // this one waits for the same people
       other.yields_to = first.number;
       other.yield_until = until;
     }

@@ -192,6 +192,7 @@ void Crowd::update(World& world, std::int64_t step, double dt) {
   read_people(world);
   read_surroundings(world);
   find_neighbours();
+  count_guests();
   std::vector<Choice> choices(people_.size());
   std::vector<Vec> wanted(people_.size());
   for (std::size_t i = 0; i < people_.size(); ++i) {
