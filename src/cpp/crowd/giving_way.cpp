@@ -15,8 +15,8 @@ namespace flatland::crowd {
 namespace {
 
 constexpr double kSlow = 0.2;       // progress of blocked people, of the preferred speed, at most
-constexpr double kPatience = 1.0;   // time without progress after which people ask for room [s]
-constexpr double kMostDelay = 2.0;  // s
+constexpr double kPatience = 0.5;   // time without progress after which people ask for room [s]
+constexpr double kMostDelay = 1.0;  // s
 constexpr double kHold = 1.5;       // time for which people make room [s]
 constexpr double kReach = 0.4;      // gap to those who are asked, at most [m]
 constexpr double kMargin = 0.1;     // of the lane that is to be free [m]
