@@ -83,6 +83,8 @@ Vec Crowd::by_social_force(std::size_t i, const Choice& choice, Vec preferred, d
       sum += group_repulsion(forces, offset);
       continue;
     }
+    // Blocked people press forward: those who are to make room for them do not repel them.
+    if (other.yields_to == person.number && person.delay > 0.0) continue;
     const Vec push = repulsion(forces, offset, other.velocity - forces.relative * person.velocity);
     if (square(push) < kNegligible * kNegligible) continue;
     if (!walls.is_clear(person.position, other.position)) continue;
