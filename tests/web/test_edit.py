@@ -150,6 +150,29 @@ def test_a_model_is_spawned_at_typed_coordinates(room: ViewedWorld, page: Viewer
     room.ask(lambda: room.world.command("/second/cmd_vel"))
 
 
+def test_a_model_is_spawned_from_a_typed_path(room: ViewedWorld, page: ViewerPage) -> None:
+    browser = page.browser
+    browser.click("#spawn")
+    browser.until("document.querySelector('#spawn-dialog').open")
+    browser.evaluate("document.querySelector('#spawn-file').focus()")
+    browser.type("Other")
+    browser.until("document.querySelector('#spawn-path').checkVisibility()")
+    browser.click("#spawn-by-numbers")
+    browser.click("#spawn-ok")
+    error = "document.querySelector('#spawn-error').innerText"
+    browser.until(f"{error}.includes('path')")
+    browser.fill("#spawn-path", "missing.yaml")
+    browser.click("#spawn-ok")
+    browser.until(f"{error}.includes('missing.yaml')")
+    assert browser.evaluate("document.querySelector('#spawn-dialog').open")
+    browser.fill("#spawn-path", "crate.model.yaml")
+    browser.key("Enter")
+    browser.until("document.querySelector('#spawn-preview').ariaLabel.includes('1.60 by 0.60')")
+    browser.until("document.querySelector('#spawn-name').value === 'crate'")
+    browser.click("#spawn-ok")
+    wait_until("the model is in the world", lambda: "crate1" in room.names())
+
+
 def test_errors_of_the_simulator_are_shown(room: ViewedWorld, page: ViewerPage) -> None:
     browser = page.browser
     select_file(page, "crate")
