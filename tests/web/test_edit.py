@@ -14,6 +14,7 @@ from viewer_page import ViewerPage
 from waiting import wait_until
 
 from flatland import Twist
+from flatland.web import commands
 
 
 def close_to(pose: tuple[float, ...], tolerance: float = 0.1) -> object:
@@ -74,8 +75,9 @@ def test_a_model_is_turned(room: ViewedWorld, page: ViewerPage) -> None:
 
 
 def test_a_world_runs_again_after_the_page_vanishes_in_a_drag(
-    room: ViewedWorld, page: ViewerPage
+    room: ViewedWorld, page: ViewerPage, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    monkeypatch.setattr(commands, "HOLD_TIMEOUT", 1e6)
     start = page.screen(2, -2)
     page.browser.press(start)
     page.browser.drag_over(line(start, page.screen(0, -2), 3))
@@ -83,6 +85,8 @@ def test_a_world_runs_again_after_the_page_vanishes_in_a_drag(
     page.browser.open("about:blank")
     wait_until("the world runs again", lambda: not room.ask(lambda: room.world.paused))
     page.browser.release(start)
+    page.browser.driver.back()
+    page.wait_for_connection("connected")
 
 
 def select_file(page: ViewerPage, name: str) -> None:
