@@ -83,7 +83,7 @@ Person* Crowd::find(Id body) {
 std::uint32_t Crowd::target_of(const Person& person) const {
   if (person.sent_to != kNone) return person.sent_to;
   const Party& party = parties_[person.party];
-  return party.is_done ? kNone : routes_[party.route].waypoints[party.leg];
+  return routes_[party.route].waypoints[party.leg];
 }
 
 bool Crowd::is_standing(const Person& person) const {
@@ -115,14 +115,15 @@ std::vector<double> Crowd::state() const {
     add({static_cast<double>(p.number), static_cast<double>(p.party), p.radius, p.speed,
          static_cast<double>(p.is_aware), static_cast<double>(p.is_stopped),
          static_cast<double>(p.sent_to), static_cast<double>(p.stop_until),
-         static_cast<double>(p.draws), p.velocity.x, p.velocity.y, p.heading, p.phase,
+         static_cast<double>(p.draws), p.delay, static_cast<double>(p.yields_to),
+         static_cast<double>(p.yield_until), p.velocity.x, p.velocity.y, p.heading, p.phase,
          p.acceleration.x, p.acceleration.y});
   }
   for (const Party& p : parties_) {
     add({static_cast<double>(p.route), static_cast<double>(p.leg),
          static_cast<double>(p.is_backward), static_cast<double>(p.is_waiting),
          static_cast<double>(p.is_done), static_cast<double>(p.wait_until),
-         static_cast<double>(p.draws)});
+         static_cast<double>(p.draws), static_cast<double>(p.since)});
   }
   for (const auto& queue : queues_) {
     add({static_cast<double>(queue.size())});

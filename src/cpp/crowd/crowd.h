@@ -48,7 +48,7 @@ class Crowd {
   std::size_t party_count() const { return parties_.size(); }
   const std::vector<Person>& people() const { return people_; }
   Person* find(Id body);
-  // The waypoint to which a person walks, kNone if the person has none.
+  // The waypoint to which a person walks, or at which the person has arrived.
   std::uint32_t target_of(const Person& person) const;
   // Whether a person stands on purpose: stopped, waiting or in a queue.
   bool is_standing(const Person& person) const;
@@ -65,6 +65,10 @@ class Crowd {
     Vec direction;  // of the way, also of somebody who stands
   };
 
+  // Who gives way: those who walk to those with a higher priority, those who are idle at a waypoint
+  // to everybody, and those who are stopped or in a queue to nobody.
+  enum class Stance : std::uint8_t { kWalking, kIdle, kFixed };
+
   void read_surroundings(const World& world);
   void read_people(World& world);
   const FlowField* field_of(std::uint32_t waypoint);
@@ -77,8 +81,17 @@ class Crowd {
   Choice queue_up(Person& person, Party& party, std::uint32_t waypoint, std::int64_t step,
                   double dt);
   void arrive(Party& party, std::uint32_t waypoint, std::int64_t step, double dt);
-  void leave(Party& party, std::uint32_t waypoint);
+  void leave(Party& party, std::uint32_t waypoint, std::int64_t step);
+  void count_guests();
   bool has_arrived(const Person& person, std::uint32_t waypoint) const;
+
+  // giving_way.cpp: who makes room for whom.
+  bool precedes(const Person& a, const Person& b) const;
+  Stance stance_of(const Person& person, const Choice& choice) const;
+  void give_way(std::vector<Choice>& choices, std::int64_t step, double dt, double period);
+  void ask_for_room(std::size_t root, const std::vector<Choice>& choices,
+                    const std::vector<Stance>& stances, std::vector<bool>& is_asked,
+                    std::int64_t until);
 
   // motion.cpp: how a person moves.
   void find_neighbours();
@@ -104,6 +117,7 @@ class Crowd {
   std::vector<std::shared_ptr<const FlowField>> fields_;  // by waypoint, null if not needed yet
 
   // Of one update.
+  std::vector<std::uint32_t> guests_;  // people who stand at each waypoint
   std::vector<std::uint32_t> neighbours_, neighbour_starts_;
   std::vector<Vec> chosen_;
   std::size_t decided_ = 0;  // people whose velocity is chosen

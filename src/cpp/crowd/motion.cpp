@@ -83,6 +83,8 @@ Vec Crowd::by_social_force(std::size_t i, const Choice& choice, Vec preferred, d
       sum += group_repulsion(forces, offset);
       continue;
     }
+    // Blocked people press forward: those who are to make room for them do not repel them.
+    if (other.yields_to == person.number && person.delay > 0.0) continue;
     const Vec push = repulsion(forces, offset, other.velocity - forces.relative * person.velocity);
     if (square(push) < kNegligible * kNegligible) continue;
     if (!walls.is_clear(person.position, other.position)) continue;
@@ -192,11 +194,16 @@ void Crowd::update(World& world, std::int64_t step, double dt) {
   read_people(world);
   read_surroundings(world);
   find_neighbours();
+  count_guests();
   std::vector<Choice> choices(people_.size());
   std::vector<Vec> wanted(people_.size());
   for (std::size_t i = 0; i < people_.size(); ++i) {
-    Person& person = people_[i];
-    const Choice choice = choices[i] = choose(person, step, dt, period);
+    choices[i] = choose(people_[i], step, dt, period);
+  }
+  give_way(choices, step, dt, period);
+  for (std::size_t i = 0; i < people_.size(); ++i) {
+    const Person& person = people_[i];
+    const Choice& choice = choices[i];
     Vec preferred = choice.velocity;
     if (square(preferred) > 0.0) {
       preferred += settings_.fluctuation * normal(settings_.key, kFluctuations + person.number,

@@ -45,6 +45,7 @@ struct Party {
   bool is_done = false;         // at the last waypoint of a route of order kOnce
   std::int64_t wait_until = 0;  // step
   std::uint64_t draws = 0;      // of random numbers
+  std::int64_t since = 0;       // step in which they left their last waypoint
 };
 
 struct Person {
@@ -56,10 +57,13 @@ struct Person {
   double speed = 1.34;   // that the person prefers [m/s]
   bool is_aware = true;  // of robots
   bool is_stopped = false;
-  std::uint32_t sent_to = kNone;  // waypoint instead of that of the route
-  std::int64_t stop_until = 0;    // step
-  std::uint64_t draws = 0;        // of random numbers
-  Vec position, velocity;         // at the last update
+  std::uint32_t sent_to = kNone;    // waypoint instead of that of the route
+  std::int64_t stop_until = 0;      // step
+  std::uint64_t draws = 0;          // of random numbers
+  double delay = 0.0;               // time without progress [s]
+  std::uint32_t yields_to = kNone;  // number of the person for whom this one makes room
+  std::int64_t yield_until = 0;     // step
+  Vec position, velocity;           // at the last update
   double heading = 0.0;
   double phase = 0.0;  // of the gait
   Vec acceleration;    // of a dynamic body until the next update

@@ -13,9 +13,20 @@ namespace {
 constexpr std::uint64_t kStops = std::uint64_t{1} << 40U;
 constexpr std::uint64_t kParties = std::uint64_t{2} << 40U;
 
+constexpr double kPi = 3.141592653589793;
+constexpr double kRoom = 0.5;      // area that each person needs at a waypoint [m²]
 constexpr double kArrival = 0.7;   // time constant of the approach to a point in a queue [s]
 constexpr double kPatience = 0.1;  // distance to that point at which people stand still [m]
 constexpr double kCounter = 0.3;   // distance to the head of a queue at which it is reached [m]
+
+// The distance from a place within which there is room for `count` people.
+double room_for(const Place& place, std::uint32_t count) {
+  const Vec size = place.high - place.low;
+  const double half_girth = size.x + size.y;
+  const double missing = kRoom * count - size.x * size.y;
+  if (missing <= 0.0) return 0.0;
+  return (std::sqrt(half_girth * half_girth + kPi * missing) - half_girth) / kPi;
+}
 
 std::int64_t steps(double seconds, double dt) {
   return static_cast<std::int64_t>(std::ceil(seconds / dt));
@@ -23,8 +34,20 @@ std::int64_t steps(double seconds, double dt) {
 
 }  // namespace
 
+void Crowd::count_guests() {
+  guests_.assign(waypoints_.size(), 0);
+  for (const Person& person : people_) {
+    const Party& party = parties_[person.party];
+    const bool is_guest =
+        person.sent_to != kNone ? person.is_stopped : party.is_waiting || party.is_done;
+    if (!is_guest) continue;
+    ++guests_[target_of(person)];
+  }
+}
+
 bool Crowd::has_arrived(const Person& person, std::uint32_t waypoint) const {
-  const Place& place = waypoints_[waypoint].place;
+  Place place = waypoints_[waypoint].place;
+  place.radius = std::max(place.radius, room_for(place, guests_[waypoint] + 1));
   return place.contains(person.position) &&
          surroundings_.walls().is_clear(person.position, place.nearest(person.position));
 }
@@ -37,7 +60,7 @@ Crowd::Choice Crowd::approach(const Person& person, std::uint32_t waypoint) {
 void Crowd::arrive(Party& party, std::uint32_t waypoint, std::int64_t step, double dt) {
   const Span wait = waypoints_[waypoint].wait;
   if (wait.most <= 0.0) {
-    leave(party, waypoint);
+    leave(party, waypoint, step);
     return;
   }
   const auto stream = kParties + static_cast<std::uint64_t>(&party - parties_.data());
@@ -45,8 +68,9 @@ void Crowd::arrive(Party& party, std::uint32_t waypoint, std::int64_t step, doub
   party.wait_until = step + steps(draw(party.draws, stream, wait), dt);
 }
 
-void Crowd::leave(Party& party, std::uint32_t waypoint) {
+void Crowd::leave(Party& party, std::uint32_t waypoint, std::int64_t step) {
   party.is_waiting = false;
+  party.since = step;
   for (const Person& person : people_) {
     if (&parties_[person.party] != &party) continue;
     auto& queue = queues_[waypoint];
@@ -120,7 +144,7 @@ Crowd::Choice Crowd::choose(Person& person, std::int64_t step, double dt, double
   Party& party = parties_[person.party];
   const Vec facing{std::cos(person.heading), std::sin(person.heading)};
   if (party.is_waiting && step >= party.wait_until) {
-    leave(party, routes_[party.route].waypoints[party.leg]);
+    leave(party, routes_[party.route].waypoints[party.leg], step);
   }
   if (person.is_stopped) return {{}, facing};
   if (person.sent_to != kNone) {

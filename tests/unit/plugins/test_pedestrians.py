@@ -222,6 +222,42 @@ def test_ways_lead_through_doors(files: WorldFiles) -> None:
     assert people.people.poses[0, :2] == pytest.approx((8.0, 4.5), abs=0.6)
 
 
+@pytest.mark.parametrize("model", ["social_force", "orca"])
+def test_opposite_streams_pass_a_door(files: WorldFiles, model: str) -> None:
+    walls = [
+        "#############",
+        "#     #     #",
+        "#     #     #",
+        "#           #",
+        "#     #     #",
+        "#     #     #",
+        "#############",
+    ]  # with a door of 1 m at x = 6.5
+    groups = (
+        "[{name: right, count: 10, area: [1.2, 1.2, 5.5, 5.8], order: once, waypoints:"
+        " [{area: [8, 1.4, 11.6, 5.6]}]},"
+        " {name: left, count: 10, area: [7.5, 1.2, 11.8, 5.8], order: once, waypoints:"
+        " [{area: [1.4, 1.4, 5, 5.6]}]}]"
+    )
+    world = load(files, groups, f"model: {model}, ", walls)
+    people = people_of(world)
+    is_right = np.array([group == "right" for group in people.people.groups])
+    for _ in range(120):
+        world.step(200)
+        if ((people.people.poses[:, 0] > 6.5) == is_right).all():
+            break
+    assert ((people.people.poses[:, 0] > 6.5) == is_right).all()
+
+
+def test_a_place_holds_more_people_than_fit_within_its_radius(files: WorldFiles) -> None:
+    groups = "[{name: a, count: 12, order: once, waypoints: [{at: [5, 3], radius: 0.3}]}]"
+    world = load(files, groups)
+    people = people_of(world)
+    world.step(8000)
+    assert people.people.standing.all()
+    assert np.hypot(*(people.people.poses[:, :2] - (5.0, 3.0)).T).max() < 2.0
+
+
 def test_people_follow_a_map_that_is_replaced(files: WorldFiles) -> None:
     world = load(files, ONE % "[8, 4.5]", CALM)
     people = people_of(world)

@@ -1,0 +1,117 @@
+// How people who block each other give way.
+//
+// Whoever makes no progress asks those in front to make room, and they ask those behind them. The
+// scheme is a continuous form of priority inheritance: K. Okumura, M. Machida, X. Défago and
+// Y. Tamura, "Priority inheritance with backtracking for iterative multi-agent path finding",
+// Artificial Intelligence 310 (2022). As there, the priority of people grows with the time since
+// they left their last waypoint, so that everybody has the highest one eventually.
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+
+#include "crowd/crowd.h"
+
+namespace flatland::crowd {
+namespace {
+
+constexpr double kSlow = 0.2;       // progress of blocked people, of the preferred speed, at most
+constexpr double kPatience = 0.5;   // time without progress after which people ask for room [s]
+constexpr double kMostDelay = 1.0;  // s
+constexpr double kHold = 1.5;       // time for which people make room [s]
+constexpr double kReach = 0.4;      // gap to those who are asked, at most [m]
+constexpr double kMargin = 0.1;     // of the lane that is to be free [m]
+constexpr double kSameWay = 0.5;    // cosine of the angle between ways that are taken as the same
+constexpr double kSideways = 0.7;   // share of the sideways velocity of those who make room
+constexpr double kStraight = 0.05;  // offset from the axis of the lane that decides the side [m]
+
+}  // namespace
+
+bool Crowd::precedes(const Person& a, const Person& b) const {
+  const std::int64_t since_a = parties_[a.party].since;
+  const std::int64_t since_b = parties_[b.party].since;
+  return since_a != since_b ? since_a < since_b : a.number < b.number;
+}
+
+Crowd::Stance Crowd::stance_of(const Person& person, const Choice& choice) const {
+  if (person.is_stopped || person.stop_until != 0) return Stance::kFixed;
+  const auto& queue = queues_[target_of(person)];
+  if (std::find(queue.begin(), queue.end(), person.number) != queue.end()) return Stance::kFixed;
+  return square(choice.velocity) > 0.0 ? Stance::kWalking : Stance::kIdle;
+}
+
+void Crowd::give_way(std::vector<Choice>& choices, std::int64_t step, double dt, double period) {
+  std::vector<Stance> stances(people_.size());
+  std::vector<std::size_t> blocked;
+  for (std::size_t i = 0; i < people_.size(); ++i) {
+    Person& person = people_[i];
+    stances[i] = stance_of(person, choices[i]);
+    const bool is_walking = stances[i] == Stance::kWalking;
+    const bool is_slow =
+        is_walking && dot(person.velocity, choices[i].direction) < kSlow * person.speed;
+    person.delay = std::min(std::max(person.delay + (is_slow ? period : -period), 0.0), kMostDelay);
+    if (is_walking && person.delay > kPatience) blocked.push_back(i);
+  }
+  std::sort(blocked.begin(), blocked.end(),
+            [this](std::size_t a, std::size_t b) { return precedes(people_[a], people_[b]); });
+  const auto until = step + static_cast<std::int64_t>(std::ceil(kHold / dt));
+  std::vector<bool> is_asked(people_.size());
+  for (const std::size_t i : blocked) {
+    if (!is_asked[i]) ask_for_room(i, choices, stances, is_asked, until);
+  }
+  for (std::size_t i = 0; i < people_.size(); ++i) {
+    Person& person = people_[i];
+    if (person.yields_to == kNone) continue;
+    const auto other =
+        std::lower_bound(people_.begin(), people_.end(), person.yields_to,
+                         [](const Person& p, std::uint32_t number) { return p.number < number; });
+    const bool is_over = other == people_.end() || other->number != person.yields_to ||
+                         step >= person.yield_until || stances[i] == Stance::kFixed;
+    if (is_over) {
+      person.yields_to = kNone;
+      person.yield_until = 0;
+      continue;
+    }
+    // Ahead of the other one, and out of the lane: in doubt to the right of somebody who comes
+    // towards the other one.
+    const Vec way = way_to(target_of(*other), person.position);
+    const double aside = cross(way, person.position - other->position);
+    const double sign = aside > -kStraight ? 1.0 : -1.0;
+    const Vec direction = unit(way + sign * kSideways * left_of(way));
+    choices[i] = {person.speed * direction, direction};
+  }
+}
+
+void Crowd::ask_for_room(std::size_t root, const std::vector<Choice>& choices,
+                         const std::vector<Stance>& stances, std::vector<bool>& is_asked,
+                         std::int64_t until) {
+  const Person& first = people_[root];
+  const std::uint32_t target = target_of(first);
+  std::vector<std::size_t> asking{root};
+  is_asked[root] = true;
+  while (!asking.empty()) {
+    const std::size_t i = asking.back();
+    asking.pop_back();
+    const Person& person = people_[i];
+    const Vec way = i == root ? choices[i].direction : way_to(target, person.position);
+    for (std::uint32_t k = neighbour_starts_[i]; k < neighbour_starts_[i + 1]; ++k) {
+      const std::size_t j = neighbours_[k];
+      Person& other = people_[j];
+      if (is_asked[j] || stances[j] == Stance::kFixed) continue;
+      const bool is_walking = stances[j] == Stance::kWalking;
+      if (is_walking && !precedes(first, other)) continue;
+      const Vec offset = other.position - person.position;
+      const double reach = person.radius + other.radius;
+      if (dot(offset, way) <= 0.0 || std::fabs(cross(way, offset)) > reach + kMargin) continue;
+      if (length(offset) > reach + kReach) continue;
+      if (!surroundings_.walls().is_clear(person.position, other.position)) continue;
+      is_asked[j] = true;
+      asking.push_back(j);
+      const double cosine = dot(choices[j].direction, way_to(target, other.position));
+      if (is_walking && cosine > kSameWay) continue;  // this one waits for the same people
+      other.yields_to = first.number;
+      other.yield_until = until;
+    }
+  }
+}
+
+}  // namespace flatland::crowd
