@@ -111,8 +111,8 @@ def _choose_series(browser: Chromium, wanted: Sequence[str]) -> None:
             name,
         )
         browser.driver.execute_script(
-            "const list = document.querySelector('#plot-series'); list.value = arguments[0];"
-            "list.dispatchEvent(new Event('change', {bubbles: true}));",
+            "document.querySelector('#plot-series').value = arguments[0];"
+            "document.querySelector('#plot-add').click();",
             name,
         )
 

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import asyncio
 import dataclasses
-import json
 from collections import deque
 from typing import TYPE_CHECKING, Any, Final
 
 from aiohttp import WSCloseCode, WSMsgType, web
 
-from flatland.web.feed import Seen, View, WorldFeed
+from flatland.web.client_view import Seen, View
+from flatland.web.encoding import text_message
+from flatland.web.feed import WorldFeed
 from flatland.web.messages import Message, MessageError, parse
 
 if TYPE_CHECKING:
@@ -121,7 +122,7 @@ class Client:
     def send(self, message: dict[str, Any]) -> None:
         """Sends a message that must not be left out, before those of worlds."""
         if len(self._texts) < _MAX_TEXTS:
-            self._texts.append(json.dumps(message, separators=(",", ":")))
+            self._texts.append(text_message(message))
             self.wake()
 
     async def _write(self) -> None:

@@ -10,10 +10,11 @@ from typing import TYPE_CHECKING, Any, Final
 from flatland.errors import WorldError
 from flatland.plugin_api.plugin import describe
 from flatland.values import Twist
-from flatland.web.feed import WorldFeed, between_steps
+from flatland.web.feed import WorldFeed
 from flatland.web.messages import Message
 from flatland.web.model_files import check_file, model_files, preview
 from flatland.web.numbers import series_of
+from flatland.web.world_requests import between_steps
 
 if TYPE_CHECKING:
     from flatland.web.client import Client
@@ -120,8 +121,8 @@ class Commands:
         )
 
     async def _files(self, _client: Client, feed: WorldFeed, _fields: Any) -> list[dict[str, str]]:
-        feed.model_files = await asyncio.to_thread(model_files, feed.world)
-        return feed.model_files
+        feed.state.model_files = await asyncio.to_thread(model_files, feed.world)
+        return feed.state.model_files
 
     # -- velocity commands -----------------------------------------------------------------
 

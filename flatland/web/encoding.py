@@ -1,10 +1,11 @@
-"""The binary messages of the protocol, little endian; see `docs/web_protocol.md`."""
+"""Encodes messages of the server, binary ones little endian; see `docs/web_protocol.md`."""
 
 from __future__ import annotations
 
+import json
 import struct
 from collections.abc import Iterable, Sequence
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 import numpy.typing as npt
@@ -25,6 +26,11 @@ _COUNT: Final = struct.Struct("<I")
 
 Numbers = npt.NDArray[np.uint16]
 Ids = npt.NDArray[np.uint32]
+
+
+def text_message(message: dict[str, Any]) -> str:
+    """Returns a text message as JSON without spaces."""
+    return json.dumps(message, separators=(",", ":"))
 
 
 def edges_message(world: int, revision: int, time: float, layer: int, edges: FloatArray) -> bytes:

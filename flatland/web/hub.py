@@ -62,7 +62,7 @@ class Hub:
 
     async def _run(self, feed: WorldFeed) -> None:
         try:
-            feed.model_files = await asyncio.to_thread(model_files, feed.world)
+            feed.state.model_files = await asyncio.to_thread(model_files, feed.world)
             await feed.run()
         except asyncio.CancelledError:
             raise

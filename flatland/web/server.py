@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import hashlib
 import logging
 import re
 from collections.abc import Awaitable, Callable
@@ -96,7 +97,12 @@ class Server:
         kind = _TYPES.get(path.suffix)
         if kind is None or not _FILE_NAME.fullmatch(name) or not path.is_file():
             return web.Response(status=404, text="not found\n", headers=self._headers)
-        return web.FileResponse(path, headers={**self._headers, "Content-Type": kind})
+        content = path.read_bytes()
+        tag = hashlib.sha256(content).hexdigest()[:32]
+        headers = {**self._headers, "Content-Type": kind, "ETag": f'"{tag}"'}
+        if any(known.value in (tag, "*") for known in request.if_none_match or ()):
+            return web.Response(status=304, headers=headers)
+        return web.Response(body=content, headers=headers)
 
     async def _connect(self, request: web.Request) -> web.StreamResponse:
         if not self._access.allows_origin(request.headers.get("Origin"), request.host):

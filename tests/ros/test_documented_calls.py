@@ -1,4 +1,4 @@
-"""Runs the service calls of each page of the documentation against the office world."""
+"""Runs the service calls of each page of the documentation."""
 
 from __future__ import annotations
 
@@ -11,7 +11,15 @@ import pytest
 from waiting import TIMEOUT
 
 _CALL = re.compile(r"^rosservice call .*$", re.MULTILINE)
-PAGES = ["README.md", "docs/models.md", "docs/navigation.md", "docs/ros.md", "docs/viewer.md"]
+# The pages and their worlds.
+PAGES = {
+    "README.md": "office",
+    "docs/models.md": "office",
+    "docs/moving_models.md": "trailers",
+    "docs/navigation.md": "office",
+    "docs/ros.md": "office",
+    "docs/viewer.md": "office",
+}
 
 
 @pytest.mark.parametrize("page", PAGES)
@@ -19,7 +27,7 @@ def test_the_calls_of_a_page_succeed(
     launcher: Any, ros: Any, checkout: Path, ros_environment: dict[str, str], page: str
 ) -> None:
     del ros
-    launcher.server(checkout / "worlds" / "office" / "world.yaml")
+    launcher.server(checkout / "worlds" / PAGES[page] / "world.yaml")
     calls = _CALL.findall((checkout / page).read_text())
     assert calls
     for call in calls:

@@ -66,7 +66,38 @@ def test_axe_finds_no_violation(
     assert violations() == []
     browser.click("#spawn")
     browser.until("document.querySelector('#spawn-dialog').checkVisibility()")
+    browser.evaluate(
+        "((list) => { list.value = ''; list.dispatchEvent(new Event('change')); })"
+        "(document.querySelector('#spawn-file'))"
+    )
+    assert browser.evaluate("document.querySelector('#spawn-path').checkVisibility()")
     assert violations() == []
+
+
+def test_the_bar_of_the_time_is_not_crowded(page: ViewerPage) -> None:
+    browser = page.browser
+    try:
+        for width in (1200, 960, 870, 830, 700, 641):
+            browser.resize(width, 700)
+            page.wait_for_frame()
+            lines, overlapping, full = browser.evaluate(
+                """(() => {
+                  const size = (style) => parseFloat(style.lineHeight);
+                  const lines = [...document.querySelectorAll(".bottom dt")].map((label) =>
+                    Math.round(label.offsetHeight / size(getComputedStyle(label))));
+                  const kinds = "button, dt, dd, input, output, p";
+                  const boxes = [...document.querySelectorAll(`.bottom :is(${kinds})`)]
+                    .map((e) => [e.id || e.innerText, e.getBoundingClientRect()]);
+                  const overlapping = boxes.flatMap(([first, a], i) => boxes.slice(i + 1)
+                    .filter(([, b]) => a.left < b.right && b.left < a.right
+                      && a.top < b.bottom && b.top < a.bottom)
+                    .map(([second]) => `${first}, ${second}`));
+                  return [lines, overlapping, document.documentElement.scrollWidth];
+                })()"""
+            )
+            assert (width, lines, overlapping, full) == (width, [1, 1], [], width)
+    finally:
+        browser.resize(1200, 800)
 
 
 def test_axe_finds_no_violation_on_a_phone(

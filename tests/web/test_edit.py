@@ -14,6 +14,7 @@ from viewer_page import ViewerPage
 from waiting import wait_until
 
 from flatland import Twist
+from flatland.web import commands
 
 
 def close_to(pose: tuple[float, ...], tolerance: float = 0.1) -> object:
@@ -74,8 +75,9 @@ def test_a_model_is_turned(room: ViewedWorld, page: ViewerPage) -> None:
 
 
 def test_a_world_runs_again_after_the_page_vanishes_in_a_drag(
-    room: ViewedWorld, page: ViewerPage
+    room: ViewedWorld, page: ViewerPage, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    monkeypatch.setattr(commands, "HOLD_TIMEOUT", 1e6)
     start = page.screen(2, -2)
     page.browser.press(start)
     page.browser.drag_over(line(start, page.screen(0, -2), 3))
@@ -83,6 +85,8 @@ def test_a_world_runs_again_after_the_page_vanishes_in_a_drag(
     page.browser.open("about:blank")
     wait_until("the world runs again", lambda: not room.ask(lambda: room.world.paused))
     page.browser.release(start)
+    page.browser.driver.back()
+    page.wait_for_connection("connected")
 
 
 def select_file(page: ViewerPage, name: str) -> None:
@@ -148,6 +152,29 @@ def test_a_model_is_spawned_at_typed_coordinates(room: ViewedWorld, page: Viewer
     wait_until("the model is in the world", lambda: "second" in room.names())
     assert room.pose("second") == close_to((3, 1.5, 0.5), 1e-6)
     room.ask(lambda: room.world.command("/second/cmd_vel"))
+
+
+def test_a_model_is_spawned_from_a_typed_path(room: ViewedWorld, page: ViewerPage) -> None:
+    browser = page.browser
+    browser.click("#spawn")
+    browser.until("document.querySelector('#spawn-dialog').open")
+    browser.evaluate("document.querySelector('#spawn-file').focus()")
+    browser.type("Other")
+    browser.until("document.querySelector('#spawn-path').checkVisibility()")
+    browser.click("#spawn-by-numbers")
+    browser.click("#spawn-ok")
+    error = "document.querySelector('#spawn-error').innerText"
+    browser.until(f"{error}.includes('path')")
+    browser.fill("#spawn-path", "missing.yaml")
+    browser.click("#spawn-ok")
+    browser.until(f"{error}.includes('missing.yaml')")
+    assert browser.evaluate("document.querySelector('#spawn-dialog').open")
+    browser.fill("#spawn-path", "crate.model.yaml")
+    browser.key("Enter")
+    browser.until("document.querySelector('#spawn-preview').ariaLabel.includes('1.60 by 0.60')")
+    browser.until("document.querySelector('#spawn-name').value === 'crate'")
+    browser.click("#spawn-ok")
+    wait_until("the model is in the world", lambda: "crate1" in room.names())
 
 
 def test_errors_of_the_simulator_are_shown(room: ViewedWorld, page: ViewerPage) -> None:

@@ -96,13 +96,13 @@ def test_plots_show_published_numbers(room: ViewedWorld, page: ViewerPage) -> No
     names = browser.until(f"{options}.length > 1 && {options}")
     name = "/odometry/ground_truth/twist/2"
     assert name in names
-    # Typed letters would select, and plot, each number whose name begins with them.
-    browser.evaluate(
-        "((list) => { list.value = arguments[0]; list.dispatchEvent(new Event('change')); })"
-        "(document.querySelector('#plot-series'))",
-        name,
-    )
+    # Each typed letter selects a number whose name begins with the letters so far.
+    browser.type(name)
+    browser.until("document.querySelector('#plot-series').value === arguments[0]", name)
+    assert browser.evaluate("document.querySelectorAll('figure.plot').length") == 0
+    browser.key("Enter")
     browser.until("document.querySelector('figure.plot')?.dataset.series === arguments[0]", name)
+    assert browser.evaluate("document.querySelectorAll('figure.plot').length") == 1
     browser.until("parseFloat(document.querySelector('figure.plot output').textContent) === 0.5")
     box = browser.evaluate(
         "((b) => [b.x, b.y, b.width, b.height].map(Math.round))"

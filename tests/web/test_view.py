@@ -161,7 +161,7 @@ def test_a_link_restores_the_view(
     page.show("names", False)
     browser.click("#share")
     url = browser.until("location.hash.includes('zoom') && location.href")
-    assert browser.evaluate("document.querySelector('#notices').innerText").startswith("Link")
+    browser.until("document.querySelector('#notices').innerText.startsWith('Link')")
     other = ViewerPage(other_browser)
     other.open(url)
     assert other.scale() == pytest.approx(page.scale(), rel=0.01)

@@ -61,6 +61,25 @@ BeamFan::BeamFan(const float* ends, std::size_t count) : ends_(ends, ends + 2 * 
   find_runs(count);
 }
 
+BeamFan::~BeamFan() = default;
+
+MirroredFan::MirroredFan(const float* ends, std::size_t count) : fan(ends, count), place(count) {
+  // No ray has a length of zero, so that the order contains all of them.
+  for (std::size_t i = 0; i < count; ++i) place[fan.order()[i]] = static_cast<std::uint32_t>(i);
+}
+
+const MirroredFan& BeamFan::mirrored() const {
+  std::call_once(mirrored_flag_, [this] {
+    std::vector<float> ends(2 * count());
+    for (std::size_t i = 0; i < count(); ++i) {
+      ends[2 * i] = x_[i];
+      ends[2 * i + 1] = -y_[i];
+    }
+    mirrored_ = std::make_unique<const MirroredFan>(ends.data(), count());
+  });
+  return *mirrored_;
+}
+
 void BeamFan::find_runs(std::size_t count) {
   constexpr std::size_t kMaxRuns = 16;
   if (order_.size() != count) return;

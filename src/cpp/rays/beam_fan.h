@@ -11,11 +11,14 @@
 
 namespace flatland {
 
+struct MirroredFan;
+
 // Rays from the origin of a rangefinder to points in its frame, sorted by diamond angle (see
 // simd.h), with a lookup table for the rays between two angles. Immutable.
 class BeamFan {
  public:
   BeamFan(const float* ends, std::size_t count);
+  ~BeamFan();
 
   // Whether the fan was made from these end points.
   bool matches(const float* ends, std::size_t count) const;
@@ -41,6 +44,9 @@ class BeamFan {
   // into the next one; empty if there are too many runs or rays of zero length.
   const std::vector<Run>& runs() const { return runs_; }
 
+  // The fan with the opposite angles. Thread-safe; it is made by the first call.
+  const MirroredFan& mirrored() const;
+
   float min_length() const { return min_length_; }
   float max_length() const { return max_length_; }
 
@@ -60,6 +66,18 @@ class BeamFan {
   int cell_bits_ = 8;
   float min_length_ = 0.0F;
   float max_length_ = 0.0F;
+  mutable std::once_flag mirrored_flag_;
+  mutable std::unique_ptr<const MirroredFan> mirrored_;
+};
+
+// The rays of a fan with the opposite angles.
+struct MirroredFan {
+  // From end points that differ from the origin.
+  MirroredFan(const float* ends, std::size_t count);
+
+  BeamFan fan;
+  // For each sorted ray of the original fan, its place among those of this one.
+  std::vector<std::uint32_t> place;
 };
 
 // The most recently used fans, so that the rays of a laser are sorted only once. Thread-safe.

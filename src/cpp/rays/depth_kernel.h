@@ -106,9 +106,10 @@ struct Kernel {
     y = (pose.q.s * fan_x + pose.q.c * fan_y) + pose.p.y;
   }
 
-  // Computes the vectors along all rays in the frame of a body.
+  // Computes the vectors along the rays in the frame of a body.
   FLATLAND_INLINE void set_frame(const b2Transform& body) const {
-    for (std::int32_t first = 0; first < scan.count; first += Lanes::kWidth) {
+    const std::int32_t begin = scan.drawn.begin & -Lanes::kWidth;
+    for (std::int32_t first = begin; first < scan.drawn.end; first += Lanes::kWidth) {
       Floats x, y;
       load_ends(first, x, y);
       x = x - body.p.x;
@@ -196,7 +197,7 @@ struct Kernel {
                                 DrawLeaf&& draw_leaf) const {
     StackEntry stack[EdgeTree::kMaxDepth * EdgeTree::kFanOut];
     std::size_t size = 0;
-    stack[size++] = {0.0F, {0, scan.count}, 0};
+    stack[size++] = {0.0F, scan.drawn, 0};
     while (size > 0) {
       const StackEntry next = stack[--size];
       if (!is_visible(next.rays, next.distance)) continue;

@@ -60,6 +60,7 @@ struct ScanView {
   const std::int32_t* first_in_cell;
   int cell_bits;
   std::int32_t count;
+  Interval drawn;    // the rays that may have hits
   float *d_x, *d_y;  // vector along each ray in the current frame
   float* fraction;
   float fraction_per_metre;  // lower bound for all rays
@@ -150,7 +151,7 @@ const Functions& functions() {
   return kSelected;
 }
 
-ScanView view_of(const BeamFan& fan, const b2Transform& pose, ScanBuffer& buffer) {
+ScanView view_of(const BeamFan& fan, Interval drawn, const b2Transform& pose, ScanBuffer& buffer) {
   // A bit less than the reciprocal, so that rounding does not matter.
   const float fraction_per_metre = (1.0F - 1e-6F) / fan.max_length();
   return {fan.x(),
@@ -158,6 +159,7 @@ ScanView view_of(const BeamFan& fan, const b2Transform& pose, ScanBuffer& buffer
           fan.first_in_cell(),
           fan.cell_bits(),
           static_cast<std::int32_t>(fan.count()),
+          drawn,
           buffer.d_x.data(),
           buffer.d_y.data(),
           buffer.fraction.data(),
@@ -198,7 +200,11 @@ ScanFrame world_frame(const BeamFan& fan, const b2Transform& pose, RayMasks mask
 
 DepthScan::DepthScan(const BeamFan& fan, const b2Transform& pose, ScanBuffer& buffer,
                      const HitRules* rules)
-    : fan_(fan), pose_(pose), buffer_(buffer), rules_(rules) {
+    : fan_(fan),
+      pose_(pose),
+      buffer_(buffer),
+      rules_(rules),
+      last_(static_cast<std::int32_t>(fan.count())) {
   buffer.d_x.resize(fan.count());
   buffer.d_y.resize(fan.count());
   // Whole vectors are read from the start of any run of rays on.
@@ -218,7 +224,7 @@ float* DepthScan::limit_nearest() {
 
 void DepthScan::draw(const EdgeTree& tree, const b2Transform& body, RayMasks masks) {
   if (tree.nodes().empty() || !masks.pass(tree.category_bits()) || fan_.count() == 0) return;
-  const ScanView view = view_of(fan_, pose_, buffer_);
+  const ScanView view = view_of(fan_, {first_, last_}, pose_, buffer_);
   const b2Rot to_sensor = b2MulT(pose_.q, body.q);
   const ScanFrame frame{b2MulT(body.q, pose_.p - body.p), to_sensor.c, to_sensor.s,
                         angle_margin(fan_, pose_, body), masks};
@@ -238,7 +244,7 @@ void DepthScan::draw(const EdgeTree& tree, const b2Transform& body, RayMasks mas
 
 void DepthScan::draw(const std::vector<b2Fixture*>& solids, RayMasks masks) {
   if (solids.empty() || fan_.count() == 0) return;
-  const ScanView view = view_of(fan_, pose_, buffer_);
+  const ScanView view = view_of(fan_, {first_, last_}, pose_, buffer_);
   const ScanFrame frame = world_frame(fan_, pose_, masks);
   if (rules_ == nullptr) {
     functions().draw_solids(view, frame, solids.data(), solids.size());
@@ -252,7 +258,7 @@ void DepthScan::draw(const std::vector<b2Fixture*>& solids, RayMasks masks) {
 void DepthScan::draw(const SolidTree& tree, RayMasks masks) {
   draw(tree.loose(), masks);
   if (tree.is_empty() || fan_.count() == 0) return;
-  const ScanView view = view_of(fan_, pose_, buffer_);
+  const ScanView view = view_of(fan_, {first_, last_}, pose_, buffer_);
   const ScanFrame frame = world_frame(fan_, pose_, masks);
   const std::vector<b2Fixture*>& solids = tree.solids();
   if (rules_ == nullptr) {

@@ -71,6 +71,13 @@ class DepthScan {
   DepthScan(const BeamFan& fan, const b2Transform& pose, ScanBuffer& buffer, const HitRules& rules)
       : DepthScan(fan, pose, buffer, &rules) {}
 
+  // Limits the scan to the rays from `first` to `last` - 1, to be called before the first drawing.
+  // The fractions of all others must be -1.
+  void restrict_to(std::size_t first, std::size_t last) {
+    first_ = static_cast<std::int32_t>(first);
+    last_ = static_cast<std::int32_t>(last);
+  }
+
   // Draws the edges of a tree; `body` is the pose of the frame of the tree.
   void draw(const EdgeTree& tree, const b2Transform& body, RayMasks masks);
   // Draws circles and polygons.
@@ -86,7 +93,12 @@ class DepthScan {
   float* limit_nearest();
   // Allows to skip what is nearer than the least distance [m] of all these limits.
   void set_least_distance(float distance) { least_distance_ = distance; }
-  // Copies the slots of the fixtures that the rays hit; unspecified for a miss.
+  // The slot of the fixture that a ray hits, and those of all rays; unspecified for a miss.
+  std::uint32_t fixture(std::size_t ray) const {
+    std::uint32_t slot;
+    std::memcpy(&slot, buffer_.fixture.data() + ray, sizeof(slot));
+    return slot;
+  }
   void copy_fixtures(std::uint32_t* slots) const {
     std::memcpy(slots, buffer_.fixture.data(), fan_.count() * sizeof(*slots));
   }
@@ -102,6 +114,7 @@ class DepthScan {
   float least_distance_ = 0.0F;
   b2Transform frame_;  // of the vectors along the rays in the buffer, that of the tree drawn last
   bool has_frame_ = false;
+  std::int32_t first_ = 0, last_;
 };
 
 }  // namespace flatland

@@ -9,7 +9,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <unordered_map>
+#include <utility>
 
 #include "rays/range_noise.h"
 #include "rays/raycast.h"
@@ -21,6 +23,9 @@ namespace {
 // A mirror that reflects fewer rays has them cast one by one, at about 1 us each. The scan of an
 // image costs as much as some of them.
 constexpr std::uint32_t kFewRays = 2;
+// If a mirror reflects at most one of this number of rays in its direction, a fan of these rays
+// alone pays off.
+constexpr std::uint32_t kSparse = 4;
 // By how much a hit may seem to be behind the mirror because of rounding, as a part of the length
 // of a ray, and in metres.
 constexpr float kMirrorTolerance = 1e-5F;
@@ -113,7 +118,7 @@ class Tracer {
                              HitRules::kNoFixture, rules_.preferred};
     DepthScan hits(fan_, pose_, buffer, hit_rules);
     scene_.draw(hits, {rules_.mask, kAnyCategory});
-    take_ends(hits, fan_, pose_, ends_);
+    take_ends(hits);
     if (rules_.preferred != 0) find_preferred(buffer);
     if (materials_->has_mirrors()) reflect();
   }
@@ -127,51 +132,81 @@ class Tracer {
 
   const b2Fixture& fixture_at(std::uint32_t slot) const { return *scene_.scene().fixture_at(slot); }
 
-  // Sets the ends of all rays of a scan.
-  void take_ends(const DepthScan& hits, const BeamFan& fan, const b2Transform& pose,
-                 RayEnds& ends) const {
-    const std::size_t count = fan.count();
-    ends.fraction.assign(hits.fractions(), hits.fractions() + count);
-    ends.fixture.resize(count);
-    hits.copy_fixtures(ends.fixture.data());
+  // Sets the ends of all rays of the direct scan.
+  void take_ends(const DepthScan& hits) {
+    const std::size_t count = fan_.count();
+    ends_.fraction.assign(hits.fractions(), hits.fractions() + count);
+    ends_.fixture.resize(count);
+    hits.copy_fixtures(ends_.fixture.data());
     if (!rules_.needs_brightness) return;
-    ends.brightness.assign(count, 0.0F);
+    ends_.brightness.resize(count);
     // Consecutive rays often hit the same fixture.
     for (std::size_t first = 0; first < count;) {
-      const std::uint32_t slot = ends.fixture[first];
+      const std::uint32_t slot = ends_.fixture[first];
       std::size_t last = first + 1;
-      while (last < count && ends.fixture[last] == slot) ++last;
-      if (slot != HitRules::kNoFixture) write_brightness(fan, pose, slot, first, last, ends);
+      while (last < count && ends_.fixture[last] == slot) ++last;
+      write_brightness(slot, first, last);
       first = last;
     }
   }
 
-  // Writes the brightness of the rays from `first` to `last` - 1, which hit one fixture.
-  void write_brightness(const BeamFan& fan, const b2Transform& pose, std::uint32_t slot,
-                        std::size_t first, std::size_t last, RayEnds& ends) const {
-    const b2Fixture& fixture = fixture_at(slot);
-    const float reflectance = reflectance_of(slot);
-    const float* x = fan.x();
-    const float* y = fan.y();
-    const float* length = fan.length();
-    const float* fraction = ends.fraction.data();
-    float* brightness = ends.brightness.data();
-    if (fixture.GetType() != b2Shape::e_edge) {
+  // Writes the brightness of the rays from `first` to `last` - 1, which hit one fixture or none.
+  void write_brightness(std::uint32_t slot, std::size_t first, std::size_t last) {
+    float* brightness = ends_.brightness.data();
+    if (slot == HitRules::kNoFixture) {
+      std::fill(brightness + first, brightness + last, 0.0F);
+      return;
+    }
+    const Shade shade = shade_of(pose_, slot);
+    const float* fraction = ends_.fraction.data();
+    if (shade.curved != nullptr) {
       for (std::size_t i = first; i < last; ++i) {
-        if (!(fraction[i] <= 1.0F)) continue;
-        const b2Vec2 along = b2Mul(pose.q, b2Vec2(x[i], y[i]));
-        const b2Vec2 normal = surface_at(fixture, pose.p + fraction[i] * along).normal;
-        brightness[i] = reflectance * std::min(std::abs(b2Dot(normal, along)) / length[i], 1.0F);
+        brightness[i] = brightness_of(shade, fan_, pose_, i, fraction[i]);
       }
       return;
     }
-    // All rays have the same normal, here in the frame of the sensor.
-    const b2Vec2 normal = b2MulT(pose.q, surface_at(fixture, pose.p).normal);
+    const float* x = fan_.x();
+    const float* y = fan_.y();
+    const float* length = fan_.length();
     for (std::size_t i = first; i < last; ++i) {
-      const float height = std::abs(normal.x * x[i] + normal.y * y[i]);
+      const float height = std::abs(shade.normal.x * x[i] + shade.normal.y * y[i]);
       const float cosine = std::min(height / length[i], 1.0F);
-      brightness[i] = fraction[i] <= 1.0F ? reflectance * cosine : 0.0F;
+      brightness[i] = fraction[i] <= 1.0F ? shade.reflectance * cosine : 0.0F;
     }
+  }
+
+  // How bright a fixture is.
+  struct Shade {
+    std::uint32_t slot = HitRules::kNoFixture;
+    const b2Fixture* curved = nullptr;  // null if all points have the same normal
+    b2Vec2 normal{0.0F, 0.0F};          // in the frame of the rays
+    float reflectance = 0.0F;
+  };
+
+  Shade shade_of(const b2Transform& pose, std::uint32_t slot) const {
+    Shade shade;
+    shade.slot = slot;
+    shade.reflectance = reflectance_of(slot);
+    const b2Fixture& fixture = fixture_at(slot);
+    if (fixture.GetType() == b2Shape::e_edge) {
+      shade.normal = b2MulT(pose.q, surface_at(fixture, pose.p).normal);
+    } else {
+      shade.curved = &fixture;
+    }
+    return shade;
+  }
+
+  // Returns the brightness of the hit of a fixture; 0 for a miss.
+  static float brightness_of(const Shade& shade, const BeamFan& fan, const b2Transform& pose,
+                             std::size_t ray, float fraction) {
+    b2Vec2 normal = shade.normal;
+    const b2Vec2 along(fan.x()[ray], fan.y()[ray]);
+    if (shade.curved != nullptr) {
+      const b2Vec2 point = b2Mul(pose, fraction * along);
+      normal = b2MulT(pose.q, surface_at(*shade.curved, point).normal);
+    }
+    const float cosine = std::min(std::abs(b2Dot(normal, along)) / fan.length()[ray], 1.0F);
+    return fraction <= 1.0F ? shade.reflectance * cosine : 0.0F;
   }
 
   float reflectance_of(std::uint32_t slot) const {
@@ -227,11 +262,15 @@ class Tracer {
     std::unordered_map<std::uint64_t, std::uint32_t> known;
     std::uint64_t last_plane = ~std::uint64_t{0};
     std::uint32_t last = 0;
+    std::uint32_t slot = HitRules::kNoFixture;
+    std::uint64_t limit = 0;
     for (std::size_t i = fan_.count(); i-- > 0;) {
-      if (!is_hit(i)) continue;
-      const std::uint32_t slot = ends_.fixture[i];
-      const std::uint64_t limit = materials_->mirror_limit(slot);
-      if (limit == 0 || fate_word(memory_.words[i], HitRules::kDirect ^ slot) >= limit) continue;
+      if (ends_.fixture[i] != slot) {
+        slot = ends_.fixture[i];
+        limit = materials_->mirror_limit(slot);
+      }
+      if (limit == 0 || !is_hit(i)) continue;
+      if (fate_word(memory_.words[i], HitRules::kDirect ^ slot) >= limit) continue;
       const std::int32_t face = face_at(slot, i);
       const std::uint64_t plane = std::uint64_t{slot} << 32U | static_cast<std::uint32_t>(face);
       if (plane != last_plane) {
@@ -288,44 +327,76 @@ class Tracer {
             reflectance_of(callback.hit_slot) * cosine);
   }
 
+  // Returns the first and the last place of the rays of a mirror in the mirrored fan.
+  static std::pair<std::uint32_t, std::uint32_t> places_of(const MirroredFan& fan,
+                                                           const TraceMemory::Mirror& mirror,
+                                                           const std::uint32_t* rays) {
+    std::uint32_t low = fan.place[rays[0]];
+    std::uint32_t high = low;
+    for (std::uint32_t k = 1; k < mirror.count; ++k) {
+      low = std::min(low, fan.place[rays[k]]);
+      high = std::max(high, fan.place[rays[k]]);
+    }
+    return {low, high};
+  }
+
+  // Makes the mirrored fan of the rays of one mirror.
+  void make_fan(const TraceMemory::Mirror& mirror, const std::uint32_t* rays,
+                std::optional<MirroredFan>& fan) {
+    std::vector<float>& ends = memory_.image_ends;
+    ends.clear();
+    for (std::uint32_t k = 0; k < mirror.count; ++k) {
+      ends.push_back(fan_.x()[rays[k]]);
+      ends.push_back(-fan_.y()[rays[k]]);
+    }
+    fan.emplace(ends.data(), mirror.count);
+  }
+
   // Scans from the image of the sensor in a flat mirror: what is in front of the mirror is where
   // the rays would hit it without the mirror.
   void scan_image(const TraceMemory::Mirror& mirror, const std::uint32_t* rays) {
-    std::vector<float>& points = memory_.image_ends;
-    points.clear();
-    for (std::uint32_t i = 0; i < mirror.count; ++i) {
-      points.push_back(fan_.x()[rays[i]]);
-      points.push_back(-fan_.y()[rays[i]]);
-    }
-    const BeamFan fan(points.data(), points.size() / 2);
-    std::vector<std::uint32_t>& words = memory_.image_words;
-    words.resize(AlignedFloats::rounded(fan.count()));
-    const auto ray_of = [&](std::size_t i) { return rays[fan.order()[i]]; };
-    for (std::size_t i = 0; i < fan.count(); ++i) words[i] = memory_.words[ray_of(i)];
-
+    std::optional<MirroredFan> few;
+    const MirroredFan& all = fan_.mirrored();
+    const auto [low, high] = places_of(all, mirror, rays);
+    if (mirror.count * kSparse <= high - low) make_fan(mirror, rays, few);
+    const BeamFan& fan = few ? few->fan : all.fan;
+    const auto place_of = [&](std::uint32_t k) { return few ? few->place[k] : all.place[rays[k]]; };
     const b2Fixture& fixture = fixture_at(mirror.fixture);
     const b2Vec2 point = pose_.p + ends_.fraction[rays[0]] * along(rays[0]);
     const b2Transform image =
         image_of(surface_at(fixture, point).normal, point_of(fixture, mirror.face));
+    std::vector<std::uint32_t>& words = memory_.image_words;
+    words.resize(AlignedFloats::rounded(fan.count()));
     const HitRules hit_rules{materials_, words.data(), HitRules::kReflected, mirror.fixture,
                              rules_.preferred};
     DepthScan hits(fan, image, memory_.image, hit_rules);
+    float* fraction = hits.fractions();
+    std::fill_n(fraction, fan.count(), -1.0F);
     float* nearest = hits.limit_nearest();
     float least_distance = b2_maxFloat;
-    for (std::size_t i = 0; i < fan.count(); ++i) {
-      const float tolerance = kMirrorTolerance * (1.0F + 1.0F / fan.length()[i]);
-      nearest[i] = std::max(ends_.fraction[ray_of(i)] - tolerance, 0.0F);
-      least_distance = std::min(least_distance, nearest[i] * fan.length()[i]);
+    for (std::uint32_t k = 0; k < mirror.count; ++k) {
+      const std::uint32_t i = place_of(k);
+      words[i] = memory_.words[rays[k]];
+      fraction[i] = kMissFraction;
+      const float length = fan.length()[i];
+      const float tolerance = kMirrorTolerance * (1.0F + 1.0F / length);
+      nearest[i] = std::max(ends_.fraction[rays[k]] - tolerance, 0.0F);
+      least_distance = std::min(least_distance, nearest[i] * length);
     }
+    if (!few) hits.restrict_to(low, high + 1);
     // Less than the distance by more than the rounding of coordinates.
     hits.set_least_distance(std::max(0.999F * least_distance - 1e-3F, 0.0F));
     scene_.draw(hits, {rules_.mask, kAnyCategory});
-    RayEnds& ends = memory_.image_rays;
-    take_ends(hits, fan, image, ends);
-    for (std::size_t i = 0; i < fan.count(); ++i) {
-      const float fraction = std::max(ends.fraction[i], ends_.fraction[ray_of(i)]);
-      set_end(ray_of(i), fraction, ends.fixture[i],
-              rules_.needs_brightness ? ends.brightness[i] : 0.0F);
+    Shade shade;
+    for (std::uint32_t k = 0; k < mirror.count; ++k) {
+      const std::uint32_t i = place_of(k);
+      const std::uint32_t slot = hits.fixture(i);
+      float brightness = 0.0F;
+      if (rules_.needs_brightness && fraction[i] <= 1.0F) {
+        if (slot != shade.slot) shade = shade_of(image, slot);
+        brightness = brightness_of(shade, fan, image, i, fraction[i]);
+      }
+      set_end(rays[k], std::max(fraction[i], ends_.fraction[rays[k]]), slot, brightness);
     }
   }
 

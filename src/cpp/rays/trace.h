@@ -46,7 +46,6 @@ struct TraceMemory {
   std::vector<std::uint32_t> rays, sorted_rays, mirror_of_ray;  // that are reflected
   std::vector<std::uint32_t> words, image_words;                // of the rays
   std::vector<float> image_ends;
-  RayEnds image_rays;
 };
 
 // Finds where the rays of a scan end. A ray that hits a fixture with a material passes it with the

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import itertools
 import math
 import os
 import subprocess
@@ -208,6 +209,28 @@ def test_a_reflected_beam_ends_at_the_range_of_the_sensor() -> None:
     world, sensor = room(size=14.0)
     add_edge(world, [7, -14, 7, 14], MIRROR)
     assert math.isnan(finder([0.0, 0.01]).scan(sensor, 1, 1).ranges[0])  # 7 + 21 m > 20 m
+
+
+@pytest.mark.parametrize("turn", [0.0, 1.6, 3.1])
+def test_few_and_many_reflected_beams_have_the_same_ranges(turn: float) -> None:
+    world, sensor = room()
+    for x, y in itertools.product((-6, -4, 4, 6), repeat=2):
+        add_box(world, (x, y, x + y / 2), None)
+    ends = np.array([[2.0, 2.0], [-2.0, 2.5]]) @ np.array(
+        [[math.cos(turn), math.sin(turn)], [-math.sin(turn), math.cos(turn)]]
+    )
+    pane = add_edge(world, list(ends.ravel()), MIRROR)
+    scan = finder(np.linspace(-math.pi, math.pi, 1081)[:-1]).scan
+    many = scan(sensor, 1, 0).ranges
+    pane.set_material(Material(specular=0.0))
+    direct = scan(sensor, 1, 0).ranges
+    pane.set_material(Material(specular=0.1))
+    few = scan(sensor, 1, 0).ranges
+    is_mirror = many != direct
+    is_reflected = few != direct
+    assert is_mirror.sum() > 150
+    assert 5 < is_reflected.sum() < 0.25 * is_mirror.sum()
+    assert (few[is_reflected] == many[is_reflected]).all()
 
 
 def test_no_beam_leaves_a_room_with_mirrors_at_its_corners() -> None:

@@ -13,7 +13,7 @@ from waiting import wait_until
 
 from flatland.simulation import Simulation
 from flatland.values import Twist
-from flatland.web import WebViewer, feed
+from flatland.web import WebViewer, capture
 
 MANIFEST = """<library path=".">
 <class name="test::Fan" type="ranging_plugins.Fan" base_class_type="flatland::ModelPlugin"/>
@@ -262,9 +262,9 @@ class TestStatus:
 class TestNobodyLooks:
     def test_nothing_is_computed(self, url, world, viewer, monkeypatch):
         taken = []
-        take = feed.Capture.take
+        take = capture.Capture.take
         monkeypatch.setattr(
-            feed.Capture, "take", lambda self, demand: (taken.append(1), take(self, demand))[1]
+            capture.Capture, "take", lambda self, demand: (taken.append(1), take(self, demand))[1]
         )
         assert not world._observers.watch_steps
         with RawWebClient(url) as client:

@@ -62,6 +62,12 @@ export class Connection extends Emitter {
     };
   }
 
+  /** Closes the connection of a page that is left; `open` opens it again. */
+  close() {
+    if (this.socket) this.lose(this.socket, "");
+    clearTimeout(this.timer);
+  }
+
   /**
    * Sends a request.
    *

@@ -123,6 +123,9 @@ createShare(session, new ViewLink(session, stage));
 exposeScripting(session, stage);
 
 document.addEventListener("visibilitychange", () => session.setHidden(document.hidden));
+// The browser may keep a page that is left, with its connection, to return to it.
+window.addEventListener("pagehide", () => connection.close());
+window.addEventListener("pageshow", () => connection.open());
 window.addEventListener("online", () => connection.open());
 session.on("current", () => tools.use("select"));
 setText(byId("title"), session.title);

@@ -52,8 +52,9 @@ export class PlotCanvas {
     context.textAlign = "center";
     for (let i = 0; i <= 2; i++) {
       const time = now - (span * (2 - i)) / 2;
+      if (time < 0) continue;
       const x = Math.min(width - 24, Math.max(MARGIN.left + 8, xOf(time)));
-      context.fillText(`${significant(Math.max(0, time), 4)} s`, x, height - MARGIN.bottom / 2);
+      context.fillText(`${significant(time, 4)} s`, x, height - MARGIN.bottom / 2);
     }
 
     context.save();

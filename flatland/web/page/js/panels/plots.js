@@ -36,9 +36,12 @@ export class Plots {
     byId("plots-toggle").addEventListener("click", () => this.setOpen(this.panel.hasAttribute("hidden")));
     byId("plots-close").addEventListener("click", () => this.setOpen(false));
     this.select.addEventListener("focus", () => this.refreshNames());
-    this.select.addEventListener("change", () => {
-      if (this.select.value) this.add(this.select.value);
-      this.select.value = "";
+    byId("plot-add").addEventListener("click", () => this.addSelected());
+    // Not at "change": a typed name selects every number whose name begins with what is typed so far.
+    this.select.addEventListener("keydown", (event) => {
+      if (event.key !== "Enter" || !this.select.value) return;
+      event.preventDefault();
+      this.addSelected();
     });
     this.window.addEventListener("change", () => this.draw());
     session.on("values", (message) => this.receive(message));
@@ -78,7 +81,16 @@ export class Plots {
     this.select.dataset.key = key;
     const text = names.length > 0 ? "Select a number…" : "Nothing is published";
     const first = element("option", { value: "" }, text);
+    const before = this.select.value;
     this.select.replaceChildren(first, ...names.map((name) => element("option", { value: name }, name)));
+    if (names.includes(before)) this.select.value = before;
+  }
+
+  /** Adds a plot of the selected number. */
+  addSelected() {
+    if (this.select.value) this.add(this.select.value);
+    this.select.value = "";
+    this.select.focus();
   }
 
   /** @param {string} name */

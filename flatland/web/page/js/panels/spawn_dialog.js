@@ -20,15 +20,24 @@ export class SpawnDialog {
     this.tool = tool;
     this.dialog = /** @type {HTMLDialogElement} */ (byId("spawn-dialog"));
     this.file = /** @type {HTMLSelectElement} */ (byId("spawn-file"));
+    this.path = /** @type {HTMLInputElement} */ (byId("spawn-path"));
     this.name = /** @type {HTMLInputElement} */ (byId("spawn-name"));
     this.number = /** @type {HTMLInputElement} */ (byId("spawn-number"));
     this.namespace = /** @type {HTMLInputElement} */ (byId("spawn-namespace"));
     this.byNumbers = /** @type {HTMLInputElement} */ (byId("spawn-by-numbers"));
     /** @type {PreviewBody[] | null} */
     this.bodies = null;
+    /** @type {Promise<void>} */
+    this.preview = Promise.resolve();
     byId("spawn").addEventListener("click", () => this.open());
     byId("spawn-cancel").addEventListener("click", () => this.dialog.close());
     this.file.addEventListener("change", () => this.selectFile());
+    this.path.addEventListener("change", () => this.selectFile());
+    this.path.addEventListener("keydown", (event) => {
+      if (event.key !== "Enter") return;
+      event.preventDefault(); // The outline is shown before the model is placed.
+      this.selectFile();
+    });
     for (const id of ["spawn-by-pointer", "spawn-by-numbers"]) {
       byId(id).addEventListener("change", () => this.updatePlace());
     }
@@ -43,16 +52,13 @@ export class SpawnDialog {
     if (this.session.readOnly || !this.session.world || this.dialog.open) return;
     const reply = await this.session.attempt("files");
     if (!reply) return;
-    const before = this.file.value;
+    const before = this.file.selectedOptions[0]?.value;
     this.file.replaceChildren(
       ...reply.result.map((/** @type {import("../protocol.js").ModelFile} */ { label, path }) =>
         element("option", { value: path }, label),
       ),
+      element("option", { value: "" }, "Other file…"),
     );
-    if (this.file.options.length === 0) {
-      this.session.notify("warning", "There are no model files beside the world file");
-      return;
-    }
     if ([...this.file.options].some((option) => option.value === before)) this.file.value = before;
     this.setError("");
     this.updatePlace();
@@ -65,22 +71,33 @@ export class SpawnDialog {
     setText(byId("spawn-ok"), this.byNumbers.checked ? "Spawn" : "Place");
   }
 
+  /** Returns the selected or typed path of the model file. */
+  selectedPath() {
+    return this.file.value || this.path.value.trim();
+  }
+
   /** Proposes a name and shows the outline of the selected file. */
-  async selectFile() {
-    const path = this.file.value;
+  selectFile() {
+    const path = this.selectedPath();
+    byId("spawn-path-field").hidden = this.file.value !== "";
     const base = path.split("/").at(-1) ?? "";
     const stem = base.replace(/(\.model)?\.(ya?ml|lua)$/i, "");
     this.name.value = stem.replace(/[^A-Za-z0-9_]/g, "_").replace(/^(?![A-Za-z])/, "model_");
     this.bodies = null;
     this.setError("");
     this.drawPreview([]);
+    this.preview = path ? this.showOutline(path) : Promise.resolve();
+  }
+
+  /** @param {string} path */
+  async showOutline(path) {
     try {
       const { bodies } = await this.session.request("preview", { file: path });
-      if (this.file.value !== path) return;
+      if (this.selectedPath() !== path) return;
       this.bodies = bodies;
       this.drawPreview(bodies);
     } catch (error) {
-      if (this.file.value === path) this.setError(error instanceof Error ? error.message : String(error));
+      if (this.selectedPath() === path) this.setError(error instanceof Error ? error.message : String(error));
     }
   }
 
@@ -92,8 +109,15 @@ export class SpawnDialog {
     for (let i = 1; ; i++) if (!world.modelByName(`${name}${i}`)) return `${name}${i}`;
   }
 
-  submit() {
-    const file = this.file.value;
+  async submit() {
+    const file = this.selectedPath();
+    if (!file) {
+      this.path.focus();
+      this.setError("The path of a model file is missing");
+      return;
+    }
+    await this.preview;
+    if (!this.dialog.open || !this.bodies) return; // An error is shown.
     const namespace = this.namespace.value.trim();
     if (this.byNumbers.checked) {
       const pose = ["spawn-x", "spawn-y", "spawn-theta"].map((id) =>
@@ -109,7 +133,7 @@ export class SpawnDialog {
     }
     this.dialog.close();
     this.tools.use("spawn");
-    this.tool.begin({ file, namespace, nextName: () => this.nextName(), bodies: this.bodies ?? [] });
+    this.tool.begin({ file, namespace, nextName: () => this.nextName(), bodies: this.bodies });
     this.tools.updateHint();
     byId("canvas").focus();
   }

@@ -1,0 +1,83 @@
+"""Requests of the server to a world, carried out between two steps without blocking the loop."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from collections.abc import Callable
+from concurrent.futures import Future
+from typing import Final, TypeVar
+
+from flatland.world import World
+
+_LOG = logging.getLogger("flatland")
+
+_POLL_PERIOD: Final = 0.01  # s between two looks at a world that no simulation runs
+_SERVED_POLL_PERIOD: Final = 0.25  # s, in case the simulation that runs the world ends
+
+R = TypeVar("R")
+
+
+async def between_steps(world: World, action: Callable[[], R]) -> R:
+    """Returns the result of an action that runs between two steps, without blocking the loop.
+
+    The action runs in the thread that steps the world, or in a helper thread if none does at the
+    moment.
+
+    Raises:
+        Exception: Raised by the action.
+    """
+    return await wait_for(world, world.post(action))
+
+
+async def wait_for(world: World, future: Future[R]) -> R:
+    """Waits for a future that is completed between two steps, without blocking the loop.
+
+    Raises:
+        Exception: The exception of the future.
+    """
+    waiter = asyncio.wrap_future(future)
+    requests = world.requests
+    try:
+        while not waiter.done():
+            # Without a simulation that runs, whoever waits carries out the requests.
+            served = requests.served or await asyncio.to_thread(requests.process_if_idle)
+            await asyncio.wait({waiter}, timeout=_SERVED_POLL_PERIOD if served else _POLL_PERIOD)
+    except asyncio.CancelledError:
+        waiter.cancel()
+        raise
+    return waiter.result()
+
+
+class UnawaitedRequests:
+    """Requests to one world whose results nobody waits for."""
+
+    def __init__(self, world: World) -> None:
+        """Creates an empty list of requests.
+
+        Args:
+            world: The world that carries them out.
+        """
+        self._world = world
+        self._jobs: set[asyncio.Task[None]] = set()
+
+    def post(self, action: Callable[[], None]) -> None:
+        """Has an action carried out between two steps, even if the server ends before."""
+        if self._world.closed:
+            return
+        self._world.post(action).add_done_callback(_log_failure)
+        task = asyncio.create_task(self._carry_out())
+        self._jobs.add(task)
+        task.add_done_callback(self._jobs.discard)
+
+    async def _carry_out(self) -> None:
+        """Carries out the requests that wait, unless a simulation does."""
+        requests = self._world.requests
+        while requests.actions and not requests.served:
+            if not await asyncio.to_thread(requests.process_if_idle):
+                await asyncio.sleep(_POLL_PERIOD)
+
+
+def _log_failure(done: Future[None]) -> None:
+    if not done.cancelled() and done.exception() is not None:
+        _LOG.warning("web viewer: %s", done.exception())
