@@ -15,7 +15,7 @@ from typing import Any
 import pytest
 from waiting import BUILD_TIMEOUT
 
-DURATION = 60.0  # simulated time [s]
+DURATION = 20.0  # simulated time [s]
 SPEEDS = {"real time": 200, "five times": 1000, "as fast as possible": 0}  # update rates [Hz]
 # Topic, chain of frames from the fixed frame to the sensor, period of the scans [s].
 LASERS = [
@@ -23,7 +23,7 @@ LASERS = [
     ("/tricycle/scan", ["map", "tricycle_base_link", "tricycle_laser"], 0.1),
 ]
 PACKAGES = ["roscpp", "message_filters", "sensor_msgs", "tf2_ros"]
-FRAME_TIMEOUT = 500.0  # s; for 60 s of simulated time on a busy machine
+FRAME_TIMEOUT = 500.0  # s; on a busy machine
 RESULT = re.compile(r"received (\d+) passed (\d+) dropped (\d+) largest gap ([\d.]+)")
 
 
@@ -41,7 +41,7 @@ def build(folder: Path) -> Path:
 
 @pytest.mark.ros
 @pytest.mark.build
-def test_no_scan_of_a_minute_is_dropped_at_any_speed(
+def test_no_scan_is_dropped_at_any_speed(
     environment: dict[str, str],
     unused_port: Callable[[], int],
     start: Callable[..., Any],
