@@ -64,7 +64,8 @@ def test_no_scan_is_dropped_at_any_speed(
         assert passed == received, f"{name}: {counter.output}"
         if rate:
             # As fast as possible, the node drops scans that a slow subscriber does not take.
-            assert received == pytest.approx(DURATION / period + 1, abs=1), name
+            # The program stops when it next reads the time.
+            assert DURATION / period <= received <= 1.05 * DURATION / period + 2, name
             assert gap == pytest.approx(period, abs=1e-6), name
         else:
             assert received > DURATION / period / 10, name

@@ -33,7 +33,9 @@ class RawSubscriber:
             name: Name of the node; a publisher keeps one connection for each name.
         """
         self._message_type = message_type
-        (publisher,) = next(nodes for name, nodes in master.getSystemState()[0] if name == topic)
+        nodes = next(nodes for name, nodes in master.getSystemState()[0] if name == topic)
+        # The node of another test may not have been unregistered yet.
+        (publisher,) = nodes if len(nodes) == 1 else [n for n in nodes if n == "/flatland_server"]
         node = ServerProxy(master.lookupNode(publisher))
         code, text, protocol = node.requestTopic(name, topic, [["TCPROS"]])
         assert code == 1, text
