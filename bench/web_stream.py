@@ -81,16 +81,16 @@ def rows(_unit: float) -> list[Row]:
     ]
 
 
-def _watched(received: Callable[[], int], shares: Shares) -> tuple[float, float]:
+def _watched(received: Callable[[], tuple[int, float]], shares: Shares) -> tuple[float, float]:
     """Returns the bytes per second, and the least share of a core of all windows."""
-    least, bytes_start, start = float("inf"), received(), time.perf_counter()
+    least, (bytes_start, start) = float("inf"), received()
     shares.longest = 0.0
     for _ in range(WINDOWS):
         before, begin = shares.total(), time.perf_counter()
         time.sleep(WINDOW)
         least = min(least, (shares.total() - before) / (time.perf_counter() - begin))
-    bandwidth = (received() - bytes_start) / (time.perf_counter() - start)
-    return bandwidth, least
+    bytes_end, end = received()
+    return (bytes_end - bytes_start) / (end - start), least
 
 
 def _without_clients(world: flatland.World, viewer: WebViewer) -> tuple[float, float]:
@@ -116,8 +116,8 @@ def _step_time(world: flatland.World) -> float:
 
 
 @contextmanager
-def _watcher(url: str) -> Iterator[Callable[[], int]]:
-    """Starts a client; yields a function that returns the bytes that it has received."""
+def _watcher(url: str) -> Iterator[Callable[[], tuple[int, float]]]:
+    """Starts a client; yields a function that returns what `watcher.py` prints."""
     program = Path(__file__).with_name("watcher.py")
     process = subprocess.Popen(
         [sys.executable, str(program), url],
@@ -129,10 +129,11 @@ def _watcher(url: str) -> Iterator[Callable[[], int]]:
     assert pipe_in is not None
     assert pipe_out is not None
 
-    def received() -> int:
+    def received() -> tuple[int, float]:
         pipe_in.write("\n")
         pipe_in.flush()
-        return int(pipe_out.readline())
+        size, arrival = pipe_out.readline().split()
+        return int(size), float(arrival)
 
     try:
         received()

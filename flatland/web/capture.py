@@ -45,13 +45,11 @@ class NewScan:
         laser: Id of the laser.
         pose: Pose of the laser in the world frame at the time of the scan [m, rad].
         ranges: Range of each beam [m], shape (n,); not changed by anybody.
-        range_max: Maximum range [m].
     """
 
     laser: int
     pose: Pose
     ranges: FloatArray
-    range_max: float
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -170,13 +168,12 @@ class Capture:
                 output.unwant(self)
 
     def _new_scans(self) -> list[NewScan]:
-        last, found = self._last, []
-        for number, sensor in self.scene.lasers.items():
-            scan = sensor.last_scan()
-            if scan is None or last.get(number) is scan[0]:
+        sensors, last, found = self.scene.lasers, self._last, []
+        self._last = {number: sensor.latest() for number, sensor in sensors.items()}
+        for number, value in self._last.items():
+            if value is None or last.get(number) is value:
                 continue
-            last[number], pose, ranges = scan
-            # The caller of `compute_scans` may overwrite an array of its own.
-            copy = ranges if ranges.base is None else ranges.copy()
-            found.append(NewScan(number, pose, copy, sensor.range_max))
+            scan = sensors[number].scan_of(value)
+            if scan is not None:
+                found.append(NewScan(number, *scan))
         return found

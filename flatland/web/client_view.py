@@ -31,6 +31,7 @@ class Seen:
         layers: Version of the edges of each layer.
         models: Revision of the models.
         poses: Number of the capture.
+        bodies: Version of the selection of bodies whose poses were received in time.
         scans: Number of the capture.
         status: Version of the status.
         details: Number of the capture.
@@ -42,6 +43,7 @@ class Seen:
     layers: dict[int, int] = field(default_factory=dict)
     models: int = -1
     poses: int = -1
+    bodies: int = -1
     scans: int = -1
     status: int = -1
     details: int = -1

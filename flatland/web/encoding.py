@@ -4,27 +4,24 @@ from __future__ import annotations
 
 import json
 import struct
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from typing import Any, Final
 
 import numpy as np
 import numpy.typing as npt
 
-from flatland.geometry import FloatArray, Pose
+from flatland.geometry import FloatArray
 
 VERSION: Final = 1
 EDGES: Final = 1
 POSES: Final = 2
 SCANS: Final = 3
-
-NO_HIT: Final = 0xFFFF
-MAX_FRACTION: Final = 0xFFFE  # stands for `range_max`
+SAME_BODIES: Final = 4
 
 _HEADER: Final = struct.Struct("<BBHId")
 _TWO_COUNTS: Final = struct.Struct("<II")
 _COUNT: Final = struct.Struct("<I")
 
-Numbers = npt.NDArray[np.uint16]
 Ids = npt.NDArray[np.uint32]
 
 
@@ -61,68 +58,41 @@ def poses_message(world: int, revision: int, time: float, ids: Ids, poses: Float
     return head + ids.astype("<u4").tobytes() + poses.astype("<f4").tobytes()
 
 
-def scans_message(
-    world: int, revision: int, time: float, count: int, parts: Iterable[bytes]
-) -> bytes:
+def same_bodies_message(world: int, revision: int, time: float, poses: FloatArray) -> bytes:
+    """Returns the message of the poses of the bodies of the previous message of poses.
+
+    Args:
+        world: Index of the world.
+        revision: Revision of the world.
+        time: Simulated time [s].
+        poses: (x, y, theta) in the world frame [m, rad], shape (n, 3).
+    """
+    head = _HEADER.pack(SAME_BODIES, VERSION, world, revision, time) + _COUNT.pack(len(poses))
+    return head + poses.astype("<f4").tobytes()
+
+
+def scans_message(world: int, revision: int, time: float, groups: Sequence[bytes]) -> bytes:
     """Returns the message of some scans.
 
     Args:
         world: Index of the world.
         revision: Revision of the world.
         time: Simulated time [s].
-        count: Number of scans.
-        parts: Parts of `ScanParts`.
+        groups: Scans as returned by `scan_group`.
     """
-    head = _HEADER.pack(SCANS, VERSION, world, revision, time) + _COUNT.pack(count)
-    return b"".join((head, *parts))
+    head = _HEADER.pack(SCANS, VERSION, world, revision, time) + _COUNT.pack(len(groups))
+    return b"".join((head, *groups))
 
 
-def quantized(ranges: FloatArray, range_max: FloatArray) -> Numbers:
-    """Converts ranges to fractions of the maximum range.
+def scan_group(ids: Ids, poses: FloatArray, ranges: FloatArray) -> bytes:
+    """Returns the part of `scans_message` with scans of the same number of beams.
 
     Args:
-        ranges: Ranges of scans with the same number of beams [m], shape (k, n): NaN, inf or the
-            maximum range for no hit, -inf for a hit that is too close.
-        range_max: Maximum range of each scan [m], shape (k,).
-
-    Returns:
-        Range as a fraction of the maximum range, from 0 to `MAX_FRACTION`, or `NO_HIT`;
-        shape (k, n).
+        ids: Id of each laser, shape (k,).
+        poses: (x, y, theta) of each laser at the time of its scan, world frame [m, rad],
+            shape (k, 3).
+        ranges: Range of each beam [m], shape (k, n).
     """
-    scaled = ranges * (np.float32(MAX_FRACTION) / range_max)[:, np.newaxis]
-    is_hit = ranges < range_max[:, np.newaxis]  # False for NaN
-    np.maximum(scaled, 0.0, out=scaled)
-    scaled += 0.5
-    scaled[~is_hit] = NO_HIT
-    return scaled.astype("<u2")
-
-
-class ScanParts:
-    """The parts of `scans_message` for scans with the same number of beams.
-
-    Attributes:
-        all: The parts of all scans, one after the other.
-    """
-
-    def __init__(self, ids: Sequence[int], poses: Sequence[Pose], fractions: Numbers) -> None:
-        """Encodes scans.
-
-        Args:
-            ids: Id of each laser.
-            poses: (x, y, theta) of each laser at the time of its scan, world frame [m, rad].
-            fractions: Ranges as returned by `quantized`, shape (k, n).
-        """
-        count = fractions.shape[1]
-        padded = count + count % 2  # The parts that follow are aligned to 4 bytes.
-        rows = np.zeros(
-            len(ids),
-            [("id", "<u4"), ("beams", "<u4"), ("pose", "<f4", 3), ("ranges", "<u2", padded)],
-        )
-        rows["id"], rows["beams"], rows["pose"] = ids, count, poses
-        rows["ranges"][:, :count] = fractions
-        self.all = rows.tobytes()
-        self._size = rows.itemsize
-
-    def __getitem__(self, index: int) -> bytes:
-        """Returns the part of one scan."""
-        return self.all[index * self._size : (index + 1) * self._size]
+    counts = _TWO_COUNTS.pack(*ranges.shape)
+    columns = (ids.astype("<u4"), poses.astype("<f4"), ranges.astype("<f4"))
+    return counts + b"".join([column.tobytes() for column in columns])

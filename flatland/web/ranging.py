@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, fields
+from functools import partial
 from typing import Any, Final
 
 import numpy as np
@@ -30,6 +31,8 @@ class RangingSensor:
         angle_increment: Angle between two beams as seen from above [rad].
         count: Number of beams.
         range_max: Maximum range [m].
+        latest: Returns the last measurement, None before the first one; another object for each
+            one. To be called between two steps.
     """
 
     plugin: ModelPlugin
@@ -40,25 +43,26 @@ class RangingSensor:
     angle_increment: float
     count: int
     range_max: float
+    latest: Callable[[], Any]
 
-    def last_scan(self) -> tuple[object, Pose, FloatArray] | None:
-        """Returns the last scan: its identity, the pose of the sensor, and the range of each beam.
+    def scan_of(self, value: Any) -> tuple[Pose, FloatArray] | None:
+        """Returns the pose of the sensor, and the range of each beam; None for an invalid value.
 
-        To be called between two steps. The pose is that at the time of the scan for a `Laser`, else
-        the current one.
+        The pose is that at the time of the scan for a `Laser`, else the current one.
+
+        Args:
+            value: A measurement that was returned by `latest`.
         """
         if isinstance(self.plugin, Laser):
-            scan = self.plugin.last_scan
-            return None if scan is None else (scan, *scan)
-        value = self.output.latest
-        if value is None:
-            return None
+            pose, ranges = value
+            # The caller of `compute_scans` may overwrite an array of its own.
+            return pose, ranges if ranges.base is None else ranges.copy()
         pose = compose(self.body.pose, self.origin)
         if hasattr(value, "ranges"):
             ranges = np.asarray(value.ranges, np.float32)
         else:
             ranges = np.full(self.count, value.range, np.float32)
-        return (value, pose, ranges) if ranges.shape == (self.count,) else None
+        return (pose, ranges) if ranges.shape == (self.count,) else None
 
 
 def find_sensor(plugin: ModelPlugin, outputs: Iterable[Output[Any]]) -> RangingSensor | None:
@@ -87,8 +91,16 @@ def find_sensor(plugin: ModelPlugin, outputs: Iterable[Output[Any]]) -> RangingS
             first, step, count = -width / 2, width / (_CONE_BEAMS - 1), _CONE_BEAMS
         else:
             continue
-        return RangingSensor(plugin, output, body, origin, first, step, count, float(length))
+        latest = partial(getattr, *_source(plugin, output))
+        return RangingSensor(
+            plugin, output, body, origin, first, step, count, float(length), latest
+        )
     return None
+
+
+def _source(plugin: ModelPlugin, output: Output[Any]) -> tuple[object, str]:
+    """Returns the object that has the last measurement, and the name of its attribute."""
+    return (plugin, "last_scan") if isinstance(plugin, Laser) else (output, "latest")
 
 
 def _is_dataclass(output: Output[Any]) -> bool:

@@ -6,9 +6,27 @@ from collections.abc import Iterable
 
 import numpy as np
 
+from flatland.geometry import FloatArray
 from flatland.web import encoding
 from flatland.web.capture import NewScan
 from flatland.web.client_view import Seen
+
+
+class _Group:
+    """New scans of one capture with the same number of beams."""
+
+    def __init__(self, scans: list[NewScan]) -> None:
+        self._ids = np.array([scan.laser for scan in scans], np.uint32)
+        self._poses = np.array([scan.pose for scan in scans], np.float32)
+        self._ranges: FloatArray = np.concatenate([scan.ranges for scan in scans]).reshape(
+            len(scans), -1
+        )
+
+    def encoded(self, rows: list[int] | None = None) -> bytes:
+        """Returns the group in a message, with all scans or some."""
+        if rows is None:
+            return encoding.scan_group(self._ids, self._poses, self._ranges)
+        return encoding.scan_group(self._ids[rows], self._poses[rows], self._ranges[rows])
 
 
 class ScanState:
@@ -22,9 +40,9 @@ class ScanState:
         """
         self._index = index
         self._tick = 0
-        # By laser: the capture, the encoded scans of this capture, and the row of this laser.
-        self._scans: dict[int, tuple[int, encoding.ScanParts, int]] = {}
-        self._newest: list[tuple[int, bytes]] = []  # of the last capture, with their number
+        # By laser: the capture, the group of its scan, and the row in this group.
+        self._scans: dict[int, tuple[int, _Group, int]] = {}
+        self._newest: list[bytes] = []  # groups of the last capture
 
     def apply(self, scans: list[NewScan], tick: int) -> None:
         """Takes over the scans of a capture.
@@ -38,17 +56,11 @@ class ScanState:
         for scan in scans:
             by_count.setdefault(len(scan.ranges), []).append(scan)
         self._newest = []
-        for count, same in by_count.items():
-            fractions = encoding.quantized(
-                np.concatenate([scan.ranges for scan in same]).reshape(-1, count),
-                np.array([scan.range_max for scan in same], np.float32),
-            )
-            parts = encoding.ScanParts(
-                [scan.laser for scan in same], [scan.pose for scan in same], fractions
-            )
-            self._newest.append((len(same), parts.all))
+        for same in by_count.values():
+            group = _Group(same)
+            self._newest.append(group.encoded())
             for row, scan in enumerate(same):
-                self._scans[scan.laser] = (tick, parts, row)
+                self._scans[scan.laser] = (tick, group, row)
 
     def keep_only(self, lasers: Iterable[int]) -> None:
         """Forgets the scans of all other lasers, which do not exist any more."""
@@ -71,12 +83,14 @@ class ScanState:
         if seen.scans >= self._tick:
             return None
         since, seen.scans = seen.scans, self._tick
-        if since == self._tick - 1:
-            count = sum(number for number, _ in self._newest)
-            parts = [data for _, data in self._newest]
-        else:
-            parts = [scans[row] for tick, scans, row in self._scans.values() if tick > since]
-            count = len(parts)
-        if not count:
+        groups = self._newest if since == self._tick - 1 else self._groups_since(since)
+        if not groups:
             return None
-        return encoding.scans_message(self._index, revision, time, count, parts)
+        return encoding.scans_message(self._index, revision, time, groups)
+
+    def _groups_since(self, since: int) -> list[bytes]:
+        rows: dict[_Group, list[int]] = {}
+        for tick, group, row in self._scans.values():
+            if tick > since:
+                rows.setdefault(group, []).append(row)
+        return [group.encoded(some) for group, some in rows.items()]

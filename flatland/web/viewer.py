@@ -9,12 +9,14 @@ import threading
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
+from pathlib import Path
 from types import TracebackType
 from typing import Final
 
 import numpy as np
 from aiohttp import WSCloseCode, web
 
+from flatland.defaults import WEB_HOST, WEB_PORT
 from flatland.errors import FlatlandError
 from flatland.geometry import FloatArray
 from flatland.runtime.observer import WorldObserver
@@ -28,7 +30,6 @@ from flatland.world import World
 
 _LOG = logging.getLogger("flatland")
 
-DEFAULT_PORT: Final = 8000
 _CLOSE_TIMEOUT: Final = 5.0  # s
 
 
@@ -54,8 +55,8 @@ class WebViewer:
 
     def __init__(
         self,
-        host: str = "127.0.0.1",
-        port: int = DEFAULT_PORT,
+        host: str = WEB_HOST,
+        port: int = WEB_PORT,
         *,
         token: str | None = None,
         read_only: bool = False,
@@ -214,7 +215,7 @@ class WebViewer:
 
         Args:
             world: The world. If it is closed, it is removed.
-            name: Name for users; by default that of its file.
+            name: Name for users; by default that of its file, or of its folder for `world.yaml`.
             simulation: The simulation that steps the world, if there is one.
             controller: Carries out what clients request; None for one that acts on the world and
                 the simulation.
@@ -226,7 +227,7 @@ class WebViewer:
             FlatlandError: The viewer or the world is closed.
         """
         world.check_open()
-        name = name or world.path.rsplit("/", 1)[-1] or "world"
+        name = name or _name_of(world.path)
         if controller is None:
             controller = DefaultController(world, simulation)
         with self._lock:
@@ -304,3 +305,10 @@ class _LayerObserver(WorldObserver):
         """Removes the world."""
         if self.active:
             self._viewer.remove_world(self._handle)
+
+
+def _name_of(path: str) -> str:
+    """Returns the name of a world file for users."""
+    file = Path(path)
+    is_plain = file.stem in ("", "world")
+    return (file.absolute().parent.name if is_plain and path else file.stem) or "world"

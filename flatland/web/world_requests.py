@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import logging
 from collections.abc import Callable
 from concurrent.futures import Future
@@ -36,17 +37,31 @@ async def wait_for(world: World, future: Future[R]) -> R:
     Raises:
         Exception: The exception of the future.
     """
-    waiter = asyncio.wrap_future(future)
-    requests = world.requests
+    loop, requests = asyncio.get_running_loop(), world.requests
+    waiter = loop.create_future()
+
+    # Cheaper than `asyncio.wrap_future` and `asyncio.wait`; each capture waits.
+    def wake() -> None:
+        if not waiter.done():
+            waiter.set_result(None)
+
+    def wake_from_any_thread(_: Future[R]) -> None:
+        with contextlib.suppress(RuntimeError):  # The loop was closed.
+            loop.call_soon_threadsafe(wake)
+
+    future.add_done_callback(wake_from_any_thread)
     try:
-        while not waiter.done():
+        while not future.done():
             # Without a simulation that runs, whoever waits carries out the requests.
             served = requests.served or await asyncio.to_thread(requests.process_if_idle)
-            await asyncio.wait({waiter}, timeout=_SERVED_POLL_PERIOD if served else _POLL_PERIOD)
+            timer = loop.call_later(_SERVED_POLL_PERIOD if served else _POLL_PERIOD, wake)
+            await waiter
+            timer.cancel()
+            waiter = loop.create_future()
     except asyncio.CancelledError:
-        waiter.cancel()
+        future.cancel()
         raise
-    return waiter.result()
+    return future.result()
 
 
 class UnawaitedRequests:

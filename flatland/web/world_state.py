@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
+import numpy.typing as npt
 
 from flatland.geometry import DoubleArray, FloatArray, bounds_of, transform_points
 from flatland.web import encoding
@@ -59,7 +60,11 @@ class WorldState:
         self._body_ids = np.empty(0, np.uint32)
         self._poses = np.empty((0, 3), np.float32)
         self._changed = np.empty(0, np.int64)  # the capture in which each pose changed
-        self._shared: tuple[int, bytes] = (0, b"")  # the capture, and the poses that it changed
+        self._moved = np.empty(0, np.intp)  # the poses that changed in the last such capture
+        self._moved_tick = 0  # of this capture
+        self._moved_version = 0  # number of changes of this selection
+        # Its poses as messages with and without the ids of the bodies, once they are encoded.
+        self._shared: dict[bool, bytes] = {}
 
     # -- captures --------------------------------------------------------------------------
 
@@ -110,13 +115,19 @@ class WorldState:
         self._body_ids = np.array(change.body_ids, np.uint32)
         self._poses = np.full((len(change.body_ids), 3), np.nan, np.float32)
         self._changed = np.full(len(change.body_ids), self.tick, np.int64)
+        self._moved = np.empty(0, np.intp)
 
     def _apply_poses(self, motions: DoubleArray) -> None:
         poses = motions[:, :3].astype(np.float32)
-        moved = (poses != self._poses).any(axis=1)
-        if moved.any():
-            self._changed[moved] = self.tick
-            self._poses = poses
+        moved = np.flatnonzero((poses != self._poses).any(axis=1))
+        if not len(moved):
+            return
+        self._changed[moved] = self._moved_tick = self.tick
+        self._poses = poses
+        self._shared.clear()
+        if len(moved) != len(self._moved) or (moved != self._moved).any():
+            self._moved = moved
+            self._moved_version += 1
 
     # -- messages --------------------------------------------------------------------------
 
@@ -150,11 +161,16 @@ class WorldState:
             return None
         since, seen.poses = seen.poses, self.tick
         if since < self.tick - 1:
-            return self._poses_message(since) or None
+            return self._all_poses_since(since)
+        if self._moved_tick < self.tick:
+            return None
         # Most clients have received the previous poses and get the same object.
-        if self._shared[0] != self.tick:
-            self._shared = (self.tick, self._poses_message(since))
-        return self._shared[1] or None
+        with_ids = seen.bodies != self._moved_version
+        seen.bodies = self._moved_version
+        message = self._shared.get(with_ids)
+        if message is None:
+            message = self._shared[with_ids] = self._poses_message(self._moved, with_ids)
+        return message
 
     def _world_message(self) -> str:
         points = [layer.edges.reshape(-1, 2) for layer in self._layers]
@@ -200,10 +216,12 @@ class WorldState:
             }
         )
 
-    def _poses_message(self, since: int) -> bytes:
+    def _all_poses_since(self, since: int) -> bytes | None:
         moved = np.flatnonzero(self._changed > since)
-        if not len(moved):
-            return b""
-        return encoding.poses_message(
-            self._index, self.revision, self.time, self._body_ids[moved], self._poses[moved]
-        )
+        return self._poses_message(moved, with_ids=True) if len(moved) else None
+
+    def _poses_message(self, rows: npt.NDArray[np.intp], with_ids: bool) -> bytes:
+        head, poses = (self._index, self.revision, self.time), self._poses[rows]
+        if with_ids:
+            return encoding.poses_message(*head, self._body_ids[rows], poses)
+        return encoding.same_bodies_message(*head, poses)

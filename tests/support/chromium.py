@@ -13,6 +13,7 @@ import shutil
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import Any, Final
+from urllib.parse import urldefrag
 
 import cv2
 import numpy as np
@@ -32,6 +33,7 @@ _FLAGS: Final = (
     "--disable-dev-shm-usage",  # /dev/shm of containers is small
     "--use-angle=swiftshader",  # OpenGL without a graphics card
     "--enable-unsafe-swiftshader",
+    "--disable-gpu-compositing",  # of the page around the canvas, which the processor draws faster
     "--hide-scrollbars",
     "--force-color-profile=srgb",
     # Requests of the browser itself, which are no part of the page.
@@ -39,6 +41,11 @@ _FLAGS: Final = (
     "--disable-background-networking",
     "--disable-component-update",
     "--disable-sync",
+)
+_HARMLESS: Final = (
+    "Page entered Back-Forward Cache.",  # the connection of a page that was left for another one
+    "GPU stall due to ReadPixels",  # without GPU compositing, the browser reads the canvas
+    "this message will no longer repeat",
 )
 # Key: code and virtual key code, for keys that are not a single letter or digit.
 _KEYS: Final = {
@@ -140,7 +147,9 @@ class Chromium:
 
     def open(self, url: str) -> None:
         """Loads a page, also if the address differs from the current one only in its fragment."""
-        self.driver.get("about:blank")
+        # Only then: each navigation costs a process of the browser.
+        if urldefrag(self.driver.current_url).url == urldefrag(url).url:
+            self.driver.get("about:blank")
         self.driver.get(url)
 
     def new_tab(self) -> str:
@@ -327,8 +336,7 @@ class Chromium:
             entry["message"]
             for entry in self.driver.get_log("browser")
             if entry["level"] in ("WARNING", "SEVERE")
-            # The connection of a page that was left for another one.
-            and not entry["message"].endswith("Page entered Back-Forward Cache.")
+            and not any(text in entry["message"] for text in _HARMLESS)
         ]
 
     def requested_urls(self) -> list[str]:

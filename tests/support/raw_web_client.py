@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import dataclasses
 import json
 import struct
 import time
@@ -20,7 +21,7 @@ HEADER = struct.Struct("<BBHId")
 
 @dataclass(frozen=True)
 class Binary:
-    """A decoded binary message."""
+    """A decoded binary message; poses of the same bodies as before have kind 2 and no ids."""
 
     kind: int
     version: int
@@ -28,6 +29,7 @@ class Binary:
     revision: int
     time: float
     payload: bytes
+    bodies: list[int] | None = None  # of poses without ids
 
     def edges(self) -> tuple[int, np.ndarray]:
         layer, count = struct.unpack_from("<II", self.payload)
@@ -36,21 +38,41 @@ class Binary:
 
     def poses(self) -> dict[int, np.ndarray]:
         (count,) = struct.unpack_from("<I", self.payload)
-        assert len(self.payload) == 4 + 16 * count
-        ids = np.frombuffer(self.payload, "<u4", count, 4).tolist()
-        poses = np.frombuffer(self.payload, "<f4", offset=4 + 4 * count).reshape(count, 3)
-        return dict(zip(ids, poses, strict=True))
+        ids = np.frombuffer(self.payload, "<u4", count, 4).tolist() if self.bodies is None else []
+        poses = np.frombuffer(self.payload, "<f4", offset=4 + 4 * len(ids)).reshape(-1, 3)
+        assert len(poses) == count
+        return dict(zip(self.bodies or ids, poses, strict=True))
 
     def scans(self) -> dict[int, tuple[np.ndarray, np.ndarray]]:
-        (count,) = struct.unpack_from("<I", self.payload)
+        (groups,) = struct.unpack_from("<I", self.payload)
         found, offset = {}, 4
-        for _ in range(count):
-            number, beams = struct.unpack_from("<II", self.payload, offset)
-            pose = np.frombuffer(self.payload, "<f4", 3, offset + 8)
-            found[number] = pose, np.frombuffer(self.payload, "<u2", beams, offset + 20)
-            offset += 20 + 2 * (beams + beams % 2)
+        for _ in range(groups):
+            count, beams = struct.unpack_from("<II", self.payload, offset)
+            ids = np.frombuffer(self.payload, "<u4", count, offset + 8).tolist()
+            offset += 8 + 4 * count
+            poses = np.frombuffer(self.payload, "<f4", 3 * count, offset).reshape(count, 3)
+            offset += 12 * count
+            ranges = np.frombuffer(self.payload, "<f4", count * beams, offset)
+            offset += 4 * count * beams
+            scans = zip(poses, ranges.reshape(count, beams), strict=True)
+            found.update(zip(ids, scans, strict=True))
         assert offset == len(self.payload)
         return found
+
+
+class Decoder:
+    """Decodes the binary messages of one connection, in their order."""
+
+    def __init__(self) -> None:
+        self._bodies: dict[int, list[int]] = {}  # of the last poses, by world
+
+    def decode(self, data: bytes) -> Binary:
+        binary = Binary(*HEADER.unpack_from(data), data[HEADER.size :])
+        if binary.kind == 4:
+            return dataclasses.replace(binary, kind=2, bodies=self._bodies[binary.world])
+        if binary.kind == 2:
+            self._bodies[binary.world] = list(binary.poses())
+        return binary
 
 
 class RawWebClient:
@@ -60,6 +82,7 @@ class RawWebClient:
         self._runner = asyncio.Runner()
         self._id = 0
         self.received: list[Any] = []
+        self._decoder = Decoder()
         self.closed: aiohttp.WSMessage | None = None
         try:
             self._runner.run(self._connect(url, options))
@@ -150,7 +173,7 @@ class RawWebClient:
         if message.type is aiohttp.WSMsgType.TEXT:
             decoded: Any = json.loads(message.data)
         elif message.type is aiohttp.WSMsgType.BINARY:
-            decoded = Binary(*HEADER.unpack_from(message.data), message.data[HEADER.size :])
+            decoded = self._decoder.decode(message.data)
         else:
             self.closed = message
             return None

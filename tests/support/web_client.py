@@ -15,7 +15,7 @@ import pytest
 from waiting import TIMEOUT
 
 _HEADER = struct.Struct("<BBHId")
-EDGES, POSES = 1, 2  # kinds of binary messages
+EDGES, POSES, SAME_BODIES = 1, 2, 4  # kinds of binary messages
 
 
 class WebClient:
@@ -181,12 +181,17 @@ class WebClient:
             layer, count = struct.unpack_from("<II", data, _HEADER.size)
             numbers = struct.unpack_from(f"<{4 * count}f", data, _HEADER.size + 8)
             self._world(world)["edges"][layer] = list(zip(*[iter(numbers)] * 4, strict=True))
-        elif kind == POSES:
+        elif kind in (POSES, SAME_BODIES):
+            state, offset = self._world(world), _HEADER.size + 4
             (count,) = struct.unpack_from("<I", data, _HEADER.size)
-            ids = struct.unpack_from(f"<{count}I", data, _HEADER.size + 4)
-            numbers = struct.unpack_from(f"<{3 * count}f", data, _HEADER.size + 4 + 4 * count)
+            if kind == POSES:
+                state["bodies"] = struct.unpack_from(f"<{count}I", data, offset)
+                offset += 4 * count
+            numbers = struct.unpack_from(f"<{3 * count}f", data, offset)
             poses = zip(*[iter(numbers)] * 3, strict=True)
-            self._world(world)["poses"].update(zip(ids, poses, strict=True))
+            state["poses"].update(zip(state["bodies"], poses, strict=True))
 
     def _world(self, number: int) -> dict[str, Any]:
-        return self.worlds.setdefault(number, {"models": {}, "poses": {}, "edges": {}})
+        return self.worlds.setdefault(
+            number, {"models": {}, "poses": {}, "bodies": (), "edges": {}}
+        )

@@ -54,4 +54,5 @@ def page(room: ViewedWorld, browser: Chromium) -> Iterator[ViewerPage]:
     page.open(room.viewer.url)
     yield page
     assert browser.console() == []
+    browser.evaluate("localStorage.clear()")
     browser.open("about:blank")

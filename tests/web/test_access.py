@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.util
+import math
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -165,21 +166,21 @@ def test_all_requests_go_to_the_simulator(room: ViewedWorld, browser: Chromium) 
     assert browser.console() == []
 
 
-def test_everything_is_possible_with_the_keyboard(room: ViewedWorld, page: ViewerPage) -> None:
+def focus(browser: Chromium, selector: str) -> None:
+    """Presses the tabulator until an element has the focus."""
+    for _ in range(80):
+        browser.key("Tab")
+        if browser.evaluate("document.activeElement.matches(arguments[0])", selector):
+            return
+    pytest.fail(f"{selector} is not reached with the tabulator")
+
+
+def test_buttons_and_dialogs_need_no_mouse(room: ViewedWorld, page: ViewerPage) -> None:
     browser = page.browser
-
-    def focus(selector: str) -> None:
-        """Presses the tabulator until an element has the focus."""
-        for _ in range(80):
-            browser.key("Tab")
-            if browser.evaluate("document.activeElement.matches(arguments[0])", selector):
-                return
-        pytest.fail(f"{selector} is not reached with the tabulator")
-
-    focus("#pause")
+    focus(browser, "#pause")
     browser.key(" ")
     wait_until("the world is paused", lambda: room.ask(lambda: room.world.paused))
-    focus("#spawn")
+    focus(browser, "#spawn")
     browser.key("Enter")
     browser.until("document.querySelector('#spawn-dialog').checkVisibility()")
     assert browser.evaluate(
@@ -188,3 +189,59 @@ def test_everything_is_possible_with_the_keyboard(room: ViewedWorld, page: Viewe
     browser.key("Escape")
     browser.until("!document.querySelector('#spawn-dialog').checkVisibility()")
     assert browser.evaluate("document.activeElement.id") == "spawn"
+
+
+def test_a_model_is_spawned_moved_and_deleted_without_a_mouse(
+    room: ViewedWorld, page: ViewerPage
+) -> None:
+    browser = page.browser
+    browser.key("n")
+    browser.until("document.activeElement.id === 'spawn-file'")
+    browser.type("crate")
+    focus(browser, "#spawn-ok")
+    browser.key("Enter")
+    browser.until("document.querySelector('#hint').textContent.includes('position')")
+    for key in ("ArrowRight", "ArrowRight", "ArrowDown"):
+        browser.key(key)
+    view = browser.evaluate("flatland.state.view")
+    browser.key("Enter")
+    browser.until("document.querySelector('#hint').textContent.includes('heading')")
+    browser.key("ArrowUp")
+    browser.key("Enter")
+    wait_until("the crate is spawned", lambda: "crate1" in room.names())
+    assert view["x"] > 0 > view["y"], "the arrows have moved the view"
+    assert room.pose("crate1") == pytest.approx((view["x"], view["y"], math.pi / 2), abs=1e-3)
+    browser.until("flatland.state.selected === 'crate1'")
+    browser.until("document.querySelector('#pose-x')?.value")
+    focus(browser, "#pose-x")
+    browser.type("-3")
+    browser.key("Enter")
+    wait_until("the crate is moved", lambda: room.pose("crate1")[0] == pytest.approx(-3, abs=1e-3))
+    focus(browser, "[data-model=robot]")
+    browser.key("Enter")
+    browser.until("flatland.state.selected === 'robot'")
+    focus(browser, "[data-model=crate]")
+    browser.key("Enter")
+    browser.until("flatland.state.selected === 'crate'")
+    browser.key("Delete")
+    wait_until("the crate is deleted", lambda: sorted(room.names()) == ["crate1", "robot"])
+
+
+def test_a_model_is_selected_at_the_centre_of_the_view(page: ViewerPage) -> None:
+    browser = page.browser
+    focus(browser, "#canvas")
+    crate = page.pose("crate")
+    for _ in range(60):
+        x, y = (browser.evaluate("flatland.state.view")[name] for name in "xy")
+        right, up = crate[0] - x, crate[1] - y
+        if abs(right) < 0.5 and abs(up) < 0.25:
+            break
+        if abs(right) >= 0.5:
+            browser.key("ArrowRight" if right > 0 else "ArrowLeft")
+        if abs(up) >= 0.25:
+            browser.key("ArrowUp" if up > 0 else "ArrowDown")
+        browser.key("+") if page.scale() < 100 else None
+    browser.key("Enter")
+    browser.until("flatland.state.selected === 'crate'")
+    browser.key("Escape")
+    browser.until("flatland.state.selected === null")

@@ -193,7 +193,8 @@ def test_the_page_survives_a_restart_of_the_simulator(browser: Chromium, tmp_pat
         world.write_text(text.replace("name: robot", "name: rover"))
         program = ViewProgram(world, "--port", port)
         page.wait_for_connection("connected")
-        browser.until("flatland.state.worlds[0].models.rover")
+        # Models may arrive in several messages.
+        browser.until("(({rover, crate}) => rover && crate?.pose)(flatland.state.worlds[0].models)")
         assert page.models().keys() == {"rover", "crate"}
         assert page.pose("crate") == pytest.approx((3, 3, 0), abs=1e-6)
         seen = page.time()

@@ -116,6 +116,9 @@ def test_a_model_is_spawned_with_a_preview(room: ViewedWorld, page: ViewerPage) 
     before = cyan(browser.picture())
     select_file(page, "crate")
     browser.until("document.querySelector('#spawn-preview').ariaLabel.includes('1.60 by 0.60')")
+    ratios = "((e) => [e.width / e.height, e.clientWidth / e.clientHeight])"
+    drawn, shown = browser.evaluate(f"{ratios}(document.querySelector('#spawn-preview'))")
+    assert drawn == pytest.approx(shown, rel=0.01), "the outline is not distorted"
     preview = browser.picture()
     assert cyan(preview) > before
     browser.fill("#spawn-name", "second")

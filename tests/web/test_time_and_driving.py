@@ -131,6 +131,17 @@ def test_the_robot_stops_if_the_window_loses_the_focus(room: ViewedWorld, page: 
     page.browser.key_up("w")
 
 
+def test_the_robot_stops_if_the_tab_is_hidden(room: ViewedWorld, page: ViewerPage) -> None:
+    page.select("robot")
+    x, y = page.browser.center("#stick")
+    page.browser.touch("Start", (x, y))
+    page.browser.touch("Move", (x, y - 40))
+    wait_until("the robot drives", lambda: speed(room)[0] > 0.1)
+    with page.browser.tab_in_front():
+        wait_until("the robot stands", lambda: speed(room) == pytest.approx((0, 0), abs=1e-3))
+    page.browser.touch("Cancel")
+
+
 def test_the_robot_stops_if_the_tab_is_closed(room: ViewedWorld, browser: Chromium) -> None:
     first = browser.driver.current_window_handle
     browser.new_tab()

@@ -75,7 +75,7 @@ def test_the_inspector_shows_the_values_of_the_model(room: ViewedWorld, page: Vi
     )
     assert page.browser.evaluate("Number(document.querySelector('#pose-x').value)") == 2
     page.select("robot")
-    for text in ("DiffDrive", "Laser", "/scan", "pub_rate"):
+    for text in ("DiffDrive", "Laser", "/scan", "ranges: 311 values", "pub_rate"):
         page.browser.until(
             "document.querySelector('#inspector').textContent.includes(arguments[0])", text
         )

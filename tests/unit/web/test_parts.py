@@ -14,34 +14,9 @@ from hypothesis import strategies as st
 
 from flatland.plugin_api.ports import Output
 from flatland.values import LaserScan, NavSatFix, Odometry
-from flatland.web import encoding, messages
+from flatland.web import messages
 from flatland.web.access import Access, is_loopback
 from flatland.web.numbers import as_json, find_number, number_at, series_of
-
-
-class TestRanges:
-    def test_ranges_are_fractions_of_the_maximum(self):
-        ranges = np.array([[0, 5, 10, np.nan, np.inf, -np.inf, 9.9999]], np.float32)
-        fractions = encoding.quantized(ranges, np.array([10], np.float32))
-        assert fractions.tolist() == [[0, 32767, 65535, 65535, 65535, 0, 65533]]
-
-    @given(
-        st.lists(st.floats(0, 1, exclude_max=True, width=32), min_size=1, max_size=9),
-        st.floats(0.1, 1e6),
-    )
-    def test_the_error_is_below_one_step(self, fractions, length):
-        length = np.float32(length)
-        ranges = np.array([fractions], np.float32) * length
-        found = encoding.quantized(ranges, np.array([length])).astype(np.float64)
-        hit = ranges < length
-        np.testing.assert_allclose(
-            (found / 65534 * length)[hit], ranges[hit], atol=float(length) / 1e5
-        )
-
-    def test_lasers_may_have_different_ranges(self):
-        ranges = np.array([[1, 3], [1, 3]], np.float32)
-        fractions = encoding.quantized(ranges, np.array([2, 4], np.float32))
-        assert fractions.tolist() == [[32767, 65535], [16384, 49151]]
 
 
 class TestMessages:

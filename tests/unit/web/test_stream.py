@@ -89,6 +89,22 @@ class TestStart:
             assert names == [["robot"], *([f"box{number}"] for number in range(5))]
             assert [message["complete"] for message in messages] == [True] + 5 * [False]
 
+    @pytest.mark.parametrize(
+        ("path", "name"),
+        [
+            ("arena/world.yaml", "arena"),
+            ("arena/maze.yaml", "maze"),
+            ("world.yaml", None),
+            ("", "world"),
+        ],
+    )
+    def test_a_world_has_the_name_of_its_file_or_folder(self, files, world, viewer, path, name):
+        world.path = path and str(files.folder / path)
+        viewer.add_world(world)
+        with RawWebClient(viewer.url, look=False) as client:
+            (shown,) = client.wait("hello")["worlds"]
+            assert shown["name"] == (name or files.folder.name)
+
 
 class TestPoses:
     def test_poses_follow_the_bodies(self, url, world):
@@ -118,6 +134,22 @@ class TestPoses:
             assert set(poses) == {box}
             np.testing.assert_allclose(poses[box], [6, 7, 0.5], atol=1e-6)
 
+    def test_ids_are_sent_if_other_bodies_moved_than_before(self, url, world):
+        def has_ids(message: Any) -> bool:
+            return message.bodies is None
+
+        with RawWebClient(url) as client:
+            robot, other = client.wait_model("robot"), "box.model.yaml"
+            assert has_ids(client.wait(2))
+            world.command("/cmd_vel").set(Twist(0.0, 0.0, 2.0))
+            bodies = {body["id"] for body in robot["bodies"]}
+            assert set(client.wait(2, lambda m: not has_ids(m)).poses()) == bodies
+            world.spawn_model(other, "box", pose=(6, 6, 0))
+            box = client.wait_model("box")["bodies"][0]["id"]
+            assert set(client.wait(2, has_ids).poses()) == {*bodies, box}
+            assert set(client.wait(2, has_ids).poses()) == bodies
+            assert set(client.wait(2, lambda m: not has_ids(m)).poses()) == bodies
+
     def test_a_second_client_gets_all_poses(self, url, world):
         world.pause()
         with RawWebClient(url) as client:
@@ -143,7 +175,7 @@ class TestScans:
             pose, ranges = client.wait(3).scans()[laser]
             np.testing.assert_allclose(pose, [3.2, 5, 0], atol=1e-4)
             expected = [world.models[0].plugin("eye").cast_without_noise()[1]]
-            np.testing.assert_allclose(ranges / 65534 * 20, expected[0], atol=1e-3)
+            np.testing.assert_array_equal(ranges, expected[0])
             client.ask("look", scans=False)
             wait_until("the scans are not computed", lambda: wanted(world) == set())
 
@@ -426,5 +458,5 @@ class TestOtherSensors:
             scans = client.wait(3).scans()
             pose, ranges = scans[fan["id"]]
             np.testing.assert_allclose(pose, [4, 5, 0], atol=1e-6)
-            np.testing.assert_allclose(ranges / 65534 * 8, [1, 2, 65535 / 65534 * 8], atol=1e-3)
-            np.testing.assert_allclose(scans[cone["id"]][1] / 65534 * 4, [3] * 9, atol=1e-3)
+            np.testing.assert_array_equal(ranges, [1, 2, np.inf])
+            np.testing.assert_array_equal(scans[cone["id"]][1], [3] * 9)

@@ -1,92 +1,171 @@
-"""The state of a world as clients see it, without a world and a connection."""
+"""Messages for clients that receive all captures of a world, or only some."""
 
 from __future__ import annotations
 
-import json
+import itertools
+from collections.abc import Callable
+from typing import Any
 
 import numpy as np
+import pytest
+from raw_web_client import Decoder
 
-from flatland.geometry import FloatArray
-from flatland.web.capture import Captured
+from flatland.values import Twist
+from flatland.web.capture import Capture, Demand
 from flatland.web.client_view import Seen
-from flatland.web.scene import LayerContents, SceneChange
+from flatland.web.controller import DefaultController
+from flatland.web.scan_state import ScanState
 from flatland.web.world_state import WorldState
+from flatland.world import World
+
+ROBOTS = "[{name: a, model: robot.model.yaml, pose: [3, 3, 0]}, {name: b, model: robot.model.yaml, "
+ROBOTS += "namespace: b, pose: [7, 7, 2]}]"
 
 
-def layer(name: str, *edges: list[float]) -> LayerContents:
-    return LayerContents(name, (1, 1, 1, 1), (0, 0, 0), np.array(edges, np.float32))
+class Client:
+    """What one client knows."""
+
+    def __init__(self, state: WorldState, scans: ScanState) -> None:
+        self._state, self._scans = state, scans
+        self._seen, self._decoder = Seen(), Decoder()
+        self.poses: dict[int, Any] = {}
+        self.scans: dict[int, Any] = {}
+        self.received: list[int] = []  # kinds of messages
+
+    def receive(self) -> None:
+        poses = self._state.next_poses(self._seen)
+        scans = self._scans.next_message(self._seen, 1, 0.0)
+        self.received = [data[0] for data in (poses, scans) if data is not None]
+        if poses is not None:
+            self.poses.update(self._decoder.decode(poses).poses())
+        if scans is not None:
+            self.scans.update(self._decoder.decode(scans).scans())
 
 
-def captured(layers: list[LayerContents]) -> Captured:
-    """Returns the state of a world without models."""
-    return Captured(
-        time=1.0,
-        paused=False,
-        rate=None,
-        lockstep=False,
-        step_size=0.01,
-        change=SceneChange(),
-        layers=layers,
-        motions=np.empty((0, 6)),
-        scans=[],
-        frames=None,
-        details=[],
-        series={},
+class Captures:
+    """Captures a world for clients."""
+
+    def __init__(self, world: World) -> None:
+        self.world = world
+        self.capture = Capture(world, DefaultController(world, None), itertools.count(1))
+        self.state, self.scans = WorldState(0, "room"), ScanState(0)
+        while len(self.capture.scene.models) < len(
+            world.models
+        ):  # in limited time for each capture
+            self.take()
+
+    def take(self) -> None:
+        captured = self.capture.take(Demand(scans=True))
+        self.state.apply(captured)
+        self.scans.apply(captured.scans, self.state.tick)
+
+    def client(self) -> Client:
+        return Client(self.state, self.scans)
+
+    def bodies(self, *models: str) -> dict[int, Any]:
+        """Returns the pose of each body of some models by its id."""
+        return {
+            number: body.pose
+            for known in self.capture.scene.models.values()
+            if known.model.name in models
+            for number, body in zip(known.body_ids, known.bodies, strict=True)
+        }
+
+
+@pytest.fixture
+def captures(world: World, files: Any) -> Captures:
+    robots = files.load(
+        f"properties: {{}}\nlayers: [{{name: walls, map: room.yaml}}]\nmodels: {ROBOTS}"
     )
+    return Captures(robots)
 
 
-class Receiver:
-    """A client that keeps the edges of each layer by its index, as the page does."""
-
-    def __init__(self) -> None:
-        self.seen = Seen()
-        self.names: list[str] = []
-        self.edges: dict[int, FloatArray] = {}
-
-    def receive(self, state: WorldState) -> int:
-        """Receives everything; returns the number of messages with edges."""
-        count = 0
-        while (message := state.next_contents(self.seen)) is not None:
-            if isinstance(message, bytes):
-                (number,) = np.frombuffer(message, "<u4", 1, 16)
-                self.edges[int(number)] = np.frombuffer(message, "<f4", offset=24).reshape(-1, 4)
-                count += 1
-            elif json.loads(message)["type"] == "world":
-                self.names = [each["name"] for each in json.loads(message)["layers"]]
-        return count
-
-    def layers(self) -> dict[str, list[list[float]]]:
-        return {name: self.edges[number].tolist() for number, name in enumerate(self.names)}
+def drive(captures: Captures, *topics: str) -> None:
+    """Turns only the robots with these topics in the following steps."""
+    for topic in ("/cmd_vel", "/b/cmd_vel"):
+        captures.world.command(topic).set(Twist(0.2, 0, 0.5) if topic in topics else Twist())
 
 
-WALLS, DOORS = layer("walls", [0, 0, 1, 0]), layer("doors", [0, 0, 0, 2], [0, 2, 3, 2])
-BOTH = {"walls": [[0, 0, 1, 0]], "doors": [[0, 0, 0, 2], [0, 2, 3, 2]]}
+def assert_poses(client: Client, expected: dict[int, Any]) -> None:
+    assert set(expected) <= set(client.poses)
+    for number, pose in expected.items():
+        np.testing.assert_allclose(client.poses[number], pose, atol=1e-6)
 
 
-def test_edges_follow_a_new_order_of_layers() -> None:
-    state, client = WorldState(0, "room"), Receiver()
-    state.apply(captured([WALLS, DOORS]))
-    client.receive(state)
-    assert client.layers() == BOTH
-    state.apply(captured([DOORS, WALLS]))
-    client.receive(state)
-    assert client.names == ["doors", "walls"]
-    assert client.layers() == BOTH
+@pytest.mark.parametrize("received", ["all", "some", "alternating"])
+def test_poses_are_those_of_the_bodies_although_captures_are_missed(captures, received):
+    client, selections = captures.client(), [("/cmd_vel",), ("/b/cmd_vel",), ("/cmd_vel",) * 2]
+    receives: dict[str, Callable[[int], bool]] = {
+        "all": lambda _: True,
+        "some": lambda number: number % 5 != 1,
+        "alternating": lambda number: number % 2 == 0,
+    }
+    kinds = set()
+    for number in range(24):
+        drive(captures, *selections[number // 4 % 3])
+        captures.world.step(4)
+        captures.take()
+        if receives[received](number):
+            client.receive()
+            kinds |= set(client.received)
+            assert_poses(client, captures.bodies("a", "b"))
+    assert 2 in kinds
+    assert (4 in kinds) == (received != "alternating")
 
 
-def test_only_changed_edges_are_sent() -> None:
-    state, client = WorldState(0, "room"), Receiver()
-    state.apply(captured([WALLS, DOORS]))
-    assert client.receive(state) == 2
-    state.apply(captured([WALLS, layer("doors", [5, 5, 6, 6])]))
-    assert client.receive(state) == 1
-    assert client.layers() == {"walls": [[0, 0, 1, 0]], "doors": [[5, 5, 6, 6]]}
+def test_a_late_message_does_not_change_what_the_next_one_is_about(captures):
+    first, late = captures.client(), captures.client()
+    for number in range(6):
+        # The late client misses the capture in which only `b` moves.
+        drive(captures, "/b/cmd_vel" if number == 3 else "/cmd_vel")
+        captures.world.step(4)
+        captures.take()
+        first.receive()
+        if number != 3:
+            late.receive()
+        if number > 3:
+            assert_poses(late, captures.bodies("a", "b"))
+    assert late.poses.keys() == first.poses.keys()
 
 
-def test_a_layer_that_returns_is_sent_again() -> None:
-    state, client = WorldState(0, "room"), Receiver()
-    for layers in ([WALLS, DOORS], [WALLS], [WALLS, DOORS]):
-        state.apply(captured(layers))
-        client.edges = {n: e for n, e in client.edges.items() if n < len(layers)}
-        client.receive(state)
-    assert client.layers() == BOTH
+def test_bodies_of_a_model_that_replaces_another_one_have_new_ids(captures):
+    client, world = captures.client(), captures.world
+    drive(captures, "/cmd_vel", "/b/cmd_vel")
+    for _ in range(3):
+        world.step(4)
+        captures.take()
+        client.receive()
+    assert client.received[0] == 4
+    world.delete_model("b")
+    world.spawn_model("robot.model.yaml", "c", namespace="c", pose=(6, 3, 1))
+    captures.take()
+    client.receive()
+    assert client.received[0] == 2
+    assert_poses(client, captures.bodies("a", "c"))
+
+
+@pytest.mark.parametrize("missed", [0, 1, 2, 3])
+def test_a_late_client_receives_the_scans_that_are_new(captures, missed):
+    client, late, world = captures.client(), captures.client(), captures.world
+    drive(captures, "/cmd_vel", "/b/cmd_vel")
+    lasers = [model.plugin("eye") for model in world.models]
+    ids = {s.plugin: number for number, s in captures.capture.scene.lasers.items()}
+    scanned = [(0, 1), (0, 1), (0,), (0,)]
+    for number, some in enumerate(scanned):
+        world.step()
+        for index in some:
+            lasers[index].compute_ranges()
+        captures.take()
+        client.receive()
+        if number < len(scanned) - 1 - missed:
+            late.receive()
+    late.scans.clear()
+    late.receive()
+    new = {index for some in scanned[len(scanned) - 1 - missed :] for index in some}
+    assert set(late.scans) == {ids[lasers[index]] for index in new}
+    for laser, number in ids.items():
+        pose, ranges = laser.last_scan
+        for scans in (client.scans, late.scans):
+            if number in scans:
+                np.testing.assert_allclose(scans[number][0], pose, atol=1e-6)
+                np.testing.assert_array_equal(scans[number][1], ranges)

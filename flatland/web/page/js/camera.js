@@ -25,6 +25,16 @@ export class Camera {
   }
 
   /**
+   * Returns a camera with the same centre, scale and rotation.
+   *
+   * @param {number} width  of the viewport [pixels]
+   * @param {number} height  [pixels]
+   */
+  copy(width, height) {
+    return Object.assign(new Camera(), this, { width, height });
+  }
+
+  /**
    * @param {number} x  [m]
    * @param {number} y  [m]
    * @returns {Point} [pixels]

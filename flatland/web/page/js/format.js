@@ -37,6 +37,20 @@ export function describeValue(value) {
     .join("\n");
 }
 
+/** Last item of a list that the server has shortened. */
+const REST = /^… (\d+) items$/;
+
+/**
+ * Returns a long list as its length and first items.
+ *
+ * @param {any[]} list
+ */
+function briefList(list) {
+  const rest = REST.exec(String(list.at(-1)));
+  const first = list.slice(0, 3).map((item) => brief(item, 40));
+  return `${rest ? rest[1] : list.length} values: ${first.join(", ")}, …`;
+}
+
 /**
  * Returns any value of a message as short text.
  *
@@ -51,7 +65,7 @@ export function brief(value, limit = 160) {
   else if (value === null || value === undefined) text = "–";
   else if (Array.isArray(value) && value.length > 2 && Array.isArray(value[0])) {
     text = `${value.length} × ${value[0].length} values`;
-  } else if (Array.isArray(value) && value.length > 8) text = `${value.length} values`;
+  } else if (Array.isArray(value) && value.length > 8) text = briefList(value);
   else if (Array.isArray(value)) text = `[${value.map((item) => brief(item, 40)).join(", ")}]`;
   else if (typeof value === "object") {
     text = Object.entries(value)

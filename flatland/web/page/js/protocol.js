@@ -40,10 +40,10 @@
  *
  * @typedef {{kind: "edges", world: number, revision: number, time: number, layer: number,
  *   edges: Float32Array}} EdgesData  four numbers for each edge
- * @typedef {{kind: "poses", world: number, revision: number, time: number, ids: Uint32Array,
- *   poses: Float32Array}} PosesData  three numbers for each body
- * @typedef {{id: number, pose: Pose, ranges: Uint16Array}} Scan  fractions of the maximum range,
- *   MAX_FRACTION for the whole, NO_HIT for none
+ * @typedef {{kind: "poses", world: number, revision: number, time: number, ids: Uint32Array|null,
+ *   poses: Float32Array}} PosesData  three numbers for each body; without ids, the bodies are those
+ *   of the previous poses
+ * @typedef {{id: number, pose: Pose, ranges: Float32Array}} Scan
  * @typedef {{kind: "scans", world: number, revision: number, time: number, scans: Scan[]}} ScansData
  */
 
@@ -51,10 +51,6 @@
 export const SUBPROTOCOL = "flatland.1";
 /** Code that closes a connection without a valid token. */
 export const WRONG_TOKEN = 4401;
-/** Range of a beam that stands for the maximum range of its laser. */
-export const MAX_FRACTION = 0xfffe;
-/** Range of a beam that hits nothing. */
-export const NO_HIT = 0xffff;
 
 const BINARY_VERSION = 1;
 const HEADER_SIZE = 16;
@@ -92,28 +88,36 @@ export function decodeBinary(buffer) {
     };
   }
   if (kind === 3) return { kind: "scans", ...header, scans: decodeScans(view, start, first) };
+  if (kind === 4)
+    return { kind: "poses", ...header, ids: null, poses: new Float32Array(buffer, start, 3 * first) };
   return null;
 }
 
 /**
  * @param {DataView} view
  * @param {number} offset
- * @param {number} count
+ * @param {number} groups
  */
-function decodeScans(view, offset, count) {
+function decodeScans(view, offset, groups) {
+  const { buffer } = view;
   /** @type {Scan[]} */
   const scans = [];
-  for (let i = 0; i < count; i++) {
-    const id = view.getUint32(offset, true);
+  for (let group = 0; group < groups; group++) {
+    const count = view.getUint32(offset, true);
     const beams = view.getUint32(offset + 4, true);
-    /** @type {Pose} */
-    const pose = [
-      view.getFloat32(offset + 8, true),
-      view.getFloat32(offset + 12, true),
-      view.getFloat32(offset + 16, true),
-    ];
-    scans.push({ id, pose, ranges: new Uint16Array(view.buffer, offset + 20, beams) });
-    offset += 20 + 4 * Math.ceil(beams / 2);
+    const ids = new Uint32Array(buffer, offset + 8, count);
+    offset += 8 + 4 * count;
+    const poses = new Float32Array(buffer, offset, 3 * count);
+    offset += 12 * count;
+    const ranges = new Float32Array(buffer, offset, beams * count);
+    offset += 4 * beams * count;
+    for (let i = 0; i < count; i++) {
+      scans.push({
+        id: ids[i],
+        pose: [poses[3 * i], poses[3 * i + 1], poses[3 * i + 2]],
+        ranges: ranges.subarray(beams * i, beams * (i + 1)),
+      });
+    }
   }
   return scans;
 }

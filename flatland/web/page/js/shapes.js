@@ -23,6 +23,24 @@ export function shapesRadius(shapes) {
 }
 
 /**
+ * Returns how far shapes extend from the origin in a direction.
+ *
+ * @param {Shape[]} shapes
+ * @param {number} x  of a unit vector
+ * @param {number} y
+ * @returns {number} [m]
+ */
+export function shapesExtent(shapes, x, y) {
+  let extent = 0;
+  for (const shape of shapes) {
+    if (shape.kind === "circle") {
+      extent = Math.max(extent, shape.center[0] * x + shape.center[1] * y + shape.radius);
+    } else for (const point of shape.points) extent = Math.max(extent, point[0] * x + point[1] * y);
+  }
+  return extent;
+}
+
+/**
  * Returns the outline of a shape as edges.
  *
  * @param {Shape} shape

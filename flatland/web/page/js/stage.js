@@ -2,14 +2,13 @@ import { Camera } from "./camera.js";
 import { Emitter } from "./events.js";
 import { createContext } from "./renderer/gl.js";
 import { Renderer } from "./renderer/renderer.js";
+import { tilePlaces } from "./tile_places.js";
 
 /**
  * @typedef {import("./world_state.js").WorldState} WorldState
- * @typedef {{world: WorldState, left: number, top: number, width: number, height: number}} Tile
+ * @typedef {import("./tile_places.js").Place & {world: WorldState}} Tile
  */
 
-/** Space between the tiles of the grid of worlds [CSS pixels]. */
-const GAP = 6;
 /** Duration of an animated change of the view [ms]. */
 const GLIDE_TIME = 220;
 const MAX_PIXEL_RATIO = 2;
@@ -210,23 +209,8 @@ export class Stage extends Emitter {
     const { width, height } = this.camera;
     const { world, worlds } = this.session;
     if (world) return [{ world, left: 0, top: 0, width, height }];
-    const count = worlds.size;
-    if (count === 0) return [];
-    let best = { columns: 1, size: 0 };
-    for (let columns = 1; columns <= count; columns++) {
-      const size = Math.min(width / columns / 1.3, height / Math.ceil(count / columns));
-      if (size > best.size) best = { columns, size };
-    }
-    const rows = Math.ceil(count / best.columns);
-    const tileWidth = (width - GAP * (best.columns + 1)) / best.columns;
-    const tileHeight = (height - GAP * (rows + 1)) / rows;
-    return [...worlds.values()].map((each, i) => ({
-      world: each,
-      left: GAP + (i % best.columns) * (tileWidth + GAP),
-      top: GAP + Math.floor(i / best.columns) * (tileHeight + GAP),
-      width: Math.max(1, tileWidth),
-      height: Math.max(1, tileHeight),
-    }));
+    const places = tilePlaces(worlds.size, width, height);
+    return [...worlds.values()].map((each, i) => ({ world: each, ...places[i] }));
   }
 
   /** @param {Tile} tile */

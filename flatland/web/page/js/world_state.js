@@ -37,7 +37,7 @@ import { Trails } from "./trails.js";
  * @property {import("./protocol.js").LaserInfo} info
  * @property {Model} model
  * @property {Pose} pose  of the latest scan [m, rad]
- * @property {Uint16Array | null} ranges  of the latest scan, as fractions of the maximum range
+ * @property {Float32Array | null} ranges  of the latest scan [m]
  */
 
 const INITIAL_SLOTS = 256;
@@ -55,6 +55,8 @@ export class WorldState {
     this.shapesVersion = 0;
     this.posesVersion = 0;
     this.scansVersion = 0;
+    /** Bodies of the last poses. */
+    this.movedIds = new Uint32Array(0);
     this.slots = 0;
     this.arrivals = 0;
     /** Pose of each slot: x, y, heading, 1 if it is known. */
@@ -200,10 +202,11 @@ export class WorldState {
 
   /** @param {import("./protocol.js").PosesData} data */
   applyPoses({ ids, poses, time }) {
+    if (ids) this.movedIds = ids;
     this.time = time;
     this.trails.setTime(time);
-    for (let i = 0; i < ids.length; i++) {
-      const body = this.bodies.get(ids[i]);
+    for (let i = 0; i < this.movedIds.length; i++) {
+      const body = this.bodies.get(this.movedIds[i]);
       if (!body) continue;
       const at = 4 * body.slot;
       this.poses[at] = poses[3 * i];

@@ -21,6 +21,8 @@ export class Inspector {
     /** @type {HTMLInputElement[]} */
     this.fields = [];
     this.isEdited = false;
+    /** Whether the fields have contained a pose, which arrives after a new model. */
+    this.isFilled = false;
     this.empty = /** @type {HTMLElement} */ (this.root.firstElementChild);
     session.on("selection", () => this.rebuild());
     session.on("models", () => {
@@ -35,7 +37,7 @@ export class Inspector {
   rebuild() {
     const { selected, readOnly } = this.session;
     this.shownId = selected?.id ?? null;
-    this.isEdited = false;
+    this.isEdited = this.isFilled = false;
     if (!selected) {
       const place = this.session.world
         ? "Select a model in the view or in the list."
@@ -44,7 +46,8 @@ export class Inspector {
       this.root.replaceChildren(this.empty);
       return;
     }
-    const file = selected.file.split("/").slice(-2).join("/");
+    // A model that was not read from a file has a name such as <text>.
+    const file = selected.file.startsWith("<") ? "" : selected.file.split("/").slice(-2).join("/");
     const head = element("div", { class: "model-head" }, element("h3", {}, selected.name));
     if (file) head.append(element("span", { class: "muted", title: selected.file }, file));
     /** @type {HTMLElement[]} */
@@ -115,15 +118,18 @@ export class Inspector {
   /** Shows the pose of the view, unless the user edits it. */
   updatePose() {
     const now = performance.now();
-    if (this.isEdited || now - this.poseTime < POSE_PERIOD) return;
+    const isFocused = this.fields.includes(/** @type {any} */ (document.activeElement));
+    if (this.isFilled && (this.isEdited || isFocused || now - this.poseTime < POSE_PERIOD)) return;
     const { selected, world } = this.session;
     const pose = selected && world?.modelPose(selected);
-    if (!pose || this.fields.includes(/** @type {any} */ (document.activeElement))) return;
+    if (!pose) return;
     this.poseTime = now;
     this.fields.forEach((field, i) => {
       const text = pose[i].toFixed(3).replace(/^-(0\.0+)$/, "$1");
-      if (field.value !== text) field.value = text;
+      const isTyped = !this.isFilled && field.value !== "";
+      if (field.value !== text && !isTyped) field.value = text;
     });
+    this.isFilled = true;
   }
 
   /** @param {import("../protocol.js").DetailsMessage} details */

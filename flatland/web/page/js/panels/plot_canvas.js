@@ -1,7 +1,7 @@
 import { significant } from "../format.js";
 import { createPalette, css } from "../renderer/palette.js";
 
-const MARGIN = { left: 54, right: 8, top: 8, bottom: 18 };
+const MARGIN = { left: 54, right: 8, top: 8, bottom: 20 };
 const FONT = "11px system-ui, sans-serif";
 
 /** Draws one series over time. */
@@ -50,11 +50,12 @@ export class PlotCanvas {
       context.fillText(significant(value, 5), MARGIN.left - 6, y);
     }
     context.textAlign = "center";
-    for (let i = 0; i <= 2; i++) {
-      const time = now - (span * (2 - i)) / 2;
-      if (time < 0) continue;
-      const x = Math.min(width - 24, Math.max(MARGIN.left + 8, xOf(time)));
-      context.fillText(`${significant(time, 4)} s`, x, height - MARGIN.bottom / 2);
+    for (const time of ticks(Math.max(0, now - span), now)) {
+      const x = Math.round(xOf(time)) + 0.5;
+      line(context, x, height - MARGIN.bottom, x, height - MARGIN.bottom + 4);
+      const text = `${significant(time, 6)} s`;
+      const half = context.measureText(text).width / 2;
+      if (x - half > MARGIN.left && x + half < width) context.fillText(text, x, height - 7);
     }
 
     context.save();
@@ -115,7 +116,9 @@ function limits(values, first) {
     high = Math.max(high, values[i]);
   }
   if (low > high) [low, high] = [0, 1];
-  const margin = Math.max((high - low) * 0.08, Math.abs(high) * 1e-6, 1e-3);
+  const size = Math.max(Math.abs(low), Math.abs(high));
+  const isConstant = high - low <= 1e-6 * size;
+  const margin = isConstant ? size / 10 || 1 : (high - low) * 0.08;
   return { low: low - margin, high: high + margin };
 }
 

@@ -148,7 +148,10 @@ export class SpawnDialog {
     const canvas = /** @type {HTMLCanvasElement} */ (byId("spawn-preview"));
     const context = canvas.getContext("2d");
     if (!context) return;
-    context.clearRect(0, 0, canvas.width, canvas.height);
+    // This also clears it.
+    const ratio = window.devicePixelRatio;
+    canvas.width = Math.round(canvas.clientWidth * ratio);
+    canvas.height = Math.round(canvas.clientHeight * ratio);
     const polygons = bodies.flatMap(({ pose, color, shapes }) =>
       shapes.map((shape) => ({
         color,
@@ -161,7 +164,7 @@ export class SpawnDialog {
     const [xs, ys] = [all.map(([x]) => x), all.map(([, y]) => y)];
     const [x0, x1, y0, y1] = [Math.min(...xs), Math.max(...xs), Math.min(...ys), Math.max(...ys)];
     const zoom = Math.min(canvas.width / (x1 - x0 || 1), canvas.height / (y1 - y0 || 1)) * 0.8;
-    context.lineWidth = 2.5;
+    context.lineWidth = 1.8 * ratio;
     for (const { points, color, isOpen } of polygons) {
       context.beginPath();
       for (const [x, y] of points) {

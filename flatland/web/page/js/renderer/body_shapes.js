@@ -1,31 +1,80 @@
 import { shapeEdges, shapePoints } from "../shapes.js";
-import { addAttributes, createFloatTexture, createProgram, uploadFloatTexture } from "./gl.js";
+import { addAttributes, createNearestTexture, createProgram, uploadFloatTexture } from "./gl.js";
 import { readable } from "./palette.js";
 import { forCorners } from "./quads.js";
-import { bodyEdgesVertex, bodyFillVertex, colorFragment, coloredEdgesFragment } from "./shaders.js";
+import {
+  bodyDiscsFragment,
+  bodyDiscsVertex,
+  bodyEdgesVertex,
+  bodyFillVertex,
+  colorFragment,
+  coloredEdgesFragment,
+} from "./shaders.js";
 import { lineWeight, useProgram } from "./view.js";
 
 /** Width of outlines [CSS pixels]. */
 const WIDTH = 1.8;
 const FILL_OPACITY = 0.28;
-/** Bytes of a vertex of a fill: two floats, a slot and a colour. */
-const FILL_STRIDE = 16;
-/** Bytes of an edge: four floats, a slot and a colour. */
-const EDGE_STRIDE = 24;
+/** Words of a record: coordinates, slot of the body, colour. */
+const FILL_WORDS = 4;
+const EDGE_WORDS = 6;
+const DISC_WORDS = 5;
 
 /** Programs that draw bodies; shared by all worlds. */
 export class BodyPrograms {
   /** @param {WebGL2RenderingContext} gl */
   constructor(gl) {
-    const names = ["a_color", "a_slot"];
+    const names = ["a_slot", "a_color"];
     this.fill = createProgram(gl, bodyFillVertex, colorFragment, ["a_point", ...names]);
     this.edges = createProgram(gl, bodyEdgesVertex, coloredEdgesFragment, ["a_segment", ...names]);
+    this.discs = createProgram(gl, bodyDiscsVertex, bodyDiscsFragment, ["a_disc", ...names]);
+  }
+}
+
+/** Records of one kind of shapes in a buffer. */
+class ShapeBuffer {
+  /**
+   * @param {WebGL2RenderingContext} gl
+   * @param {number} words  of a record
+   */
+  constructor(gl, words) {
+    this.gl = gl;
+    this.words = words;
+    this.count = 0;
+    this.buffer = gl.createBuffer();
+    this.array = gl.createVertexArray();
+    addAttributes(gl, this.array, this.buffer, 4 * words, [
+      { location: 0, size: words - 2 },
+      { location: 1, size: 1, offset: 4 * (words - 2) },
+      { location: 2, size: 4, type: gl.UNSIGNED_BYTE, normalized: true, offset: 4 * (words - 1) },
+    ]);
+  }
+
+  /**
+   * Replaces all records.
+   *
+   * @param {number[]} values  words of the records; the last one of each is a colour of four bytes
+   * @param {boolean} isQuad  whether a record describes the four vertices of a quad, or one vertex
+   */
+  set(values, isQuad) {
+    const { gl, words } = this;
+    const floats = new Float32Array(values);
+    const integers = new Uint32Array(floats.buffer);
+    for (let i = words - 1; i < values.length; i += words) integers[i] = values[i];
+    this.count = values.length / words;
+    gl.bindBuffer(gl.ARRAY_BUFFER, this.buffer);
+    gl.bufferData(gl.ARRAY_BUFFER, isQuad ? forCorners(floats, words) : floats, gl.STATIC_DRAW);
+  }
+
+  dispose() {
+    this.gl.deleteBuffer(this.buffer);
+    this.gl.deleteVertexArray(this.array);
   }
 }
 
 /**
- * The shapes of all bodies of a world: one buffer of triangles and one of edges in the frames of
- * the bodies, and a texture of poses. A frame uploads the poses only.
+ * The shapes of all bodies of a world in the frames of the bodies, and a texture of poses. A frame
+ * uploads the poses only.
  */
 export class BodyShapes {
   /**
@@ -37,24 +86,12 @@ export class BodyShapes {
     this.gl = gl;
     this.programs = programs;
     this.quads = quads;
-    this.texture = createFloatTexture(gl);
-    this.fillBuffer = gl.createBuffer();
-    this.edgeBuffer = gl.createBuffer();
-    this.fillArray = gl.createVertexArray();
-    this.edgeArray = gl.createVertexArray();
-    addAttributes(gl, this.fillArray, this.fillBuffer, FILL_STRIDE, [
-      { location: 0, size: 2 },
-      { location: 1, size: 4, type: gl.UNSIGNED_BYTE, normalized: true, offset: 12 },
-      { location: 2, size: 1, offset: 8 },
-    ]);
-    addAttributes(gl, this.edgeArray, this.edgeBuffer, EDGE_STRIDE, [
-      { location: 0, size: 4 },
-      { location: 1, size: 4, type: gl.UNSIGNED_BYTE, normalized: true, offset: 20 },
-      { location: 2, size: 1, offset: 16 },
-    ]);
-    quads.attach(this.edgeArray);
-    this.fillCount = 0;
-    this.edgeCount = 0;
+    this.texture = createNearestTexture(gl);
+    this.fills = new ShapeBuffer(gl, FILL_WORDS);
+    this.edges = new ShapeBuffer(gl, EDGE_WORDS);
+    this.discs = new ShapeBuffer(gl, DISC_WORDS);
+    quads.attach(this.edges.array);
+    quads.attach(this.discs.array);
     this.shapesVersion = -1;
     this.posesVersion = -1;
     /** @type {import("./palette.js").Palette | null} */
@@ -82,17 +119,22 @@ export class BodyShapes {
    * @param {import("./palette.js").Palette} palette
    */
   rebuild(world, palette) {
-    const { gl } = this;
     /** @type {number[]} */
     const fills = [];
     /** @type {number[]} */
     const edges = [];
+    /** @type {number[][]} */
+    const discs = [];
     const packed = new Uint32Array(1);
     const bytes = new Uint8Array(packed.buffer);
     for (const body of world.bodies.values()) {
       bytes.set(readable(body.color, palette).map((part) => Math.round(255 * part)));
       const color = packed[0];
       for (const shape of body.shapes) {
+        if (shape.kind === "circle") {
+          discs.push([...shape.center, shape.radius, body.slot, color]);
+          continue;
+        }
         for (const edge of shapeEdges(shape)) edges.push(...edge, body.slot, color);
         if (shape.kind === "edges") continue;
         const points = shapePoints(shape);
@@ -101,51 +143,43 @@ export class BodyShapes {
         }
       }
     }
-    this.fillCount = fills.length / 4;
-    this.edgeCount = edges.length / 6;
-    gl.bindBuffer(gl.ARRAY_BUFFER, this.fillBuffer);
-    gl.bufferData(gl.ARRAY_BUFFER, packWithColor(fills, 4), gl.STATIC_DRAW);
-    gl.bindBuffer(gl.ARRAY_BUFFER, this.edgeBuffer);
-    gl.bufferData(gl.ARRAY_BUFFER, forCorners(packWithColor(edges, 6), 6), gl.STATIC_DRAW);
+    // The inside of a large disc is below the outlines of smaller ones.
+    discs.sort((a, b) => b[2] - a[2]);
+    this.fills.set(fills, false);
+    this.edges.set(edges, true);
+    this.discs.set(discs.flat(), true);
   }
 
   /** @param {import("./view.js").Viewport} viewport */
   draw(viewport) {
-    const { gl, programs } = this;
+    const { gl, programs, fills, edges, discs } = this;
+    const width = WIDTH * lineWeight(viewport) * viewport.ratio;
     gl.activeTexture(gl.TEXTURE0);
     gl.bindTexture(gl.TEXTURE_2D, this.texture);
-    if (this.fillCount > 0) {
+    if (fills.count > 0) {
       useProgram(gl, programs.fill, viewport);
       gl.uniform1f(programs.fill.uniform("u_opacity"), FILL_OPACITY);
-      gl.bindVertexArray(this.fillArray);
-      gl.drawArrays(gl.TRIANGLES, 0, this.fillCount);
+      gl.bindVertexArray(fills.array);
+      gl.drawArrays(gl.TRIANGLES, 0, fills.count);
     }
-    if (this.edgeCount > 0) {
+    if (discs.count > 0) {
+      useProgram(gl, programs.discs, viewport);
+      gl.uniform1f(programs.discs.uniform("u_opacity"), FILL_OPACITY);
+      gl.uniform1f(programs.discs.uniform("u_width"), width);
+      gl.uniform1f(programs.discs.uniform("u_scale"), viewport.camera.zoom * viewport.ratio);
+      this.quads.draw(discs.array, 0, discs.count);
+    }
+    if (edges.count > 0) {
       useProgram(gl, programs.edges, viewport);
-      gl.uniform1f(programs.edges.uniform("u_width"), WIDTH * lineWeight(viewport) * viewport.ratio);
-      this.quads.draw(this.edgeArray, 0, this.edgeCount);
+      gl.uniform1f(programs.edges.uniform("u_width"), width);
+      this.quads.draw(edges.array, 0, edges.count);
     }
   }
 
   dispose() {
-    const { gl } = this;
-    gl.deleteTexture(this.texture);
-    gl.deleteBuffer(this.fillBuffer);
-    gl.deleteBuffer(this.edgeBuffer);
-    gl.deleteVertexArray(this.fillArray);
-    gl.deleteVertexArray(this.edgeArray);
+    this.gl.deleteTexture(this.texture);
+    this.fills.dispose();
+    this.edges.dispose();
+    this.discs.dispose();
   }
-}
-
-/**
- * Returns records of floats whose last word is a colour of four bytes.
- *
- * @param {number[]} values
- * @param {number} size  words of a record
- */
-function packWithColor(values, size) {
-  const floats = new Float32Array(values);
-  const words = new Uint32Array(floats.buffer);
-  for (let i = size - 1; i < values.length; i += size) words[i] = values[i];
-  return floats;
 }

@@ -2,7 +2,7 @@ import { sortIntoCells, visibleRanges } from "./edge_cells.js";
 import { addAttributes, createProgram } from "./gl.js";
 import { readable } from "./palette.js";
 import { forCorners } from "./quads.js";
-import { edgesFragment, edgesVertex, flatFragment, thinVertex } from "./shaders.js";
+import { edgesFragment, edgesVertex, flatFragment, flatVertex } from "./shaders.js";
 import { lineWeight, useProgram } from "./view.js";
 
 /** Width of the edges of a layer [CSS pixels]. */
@@ -25,7 +25,7 @@ export class EdgeProgram {
   /** @param {WebGL2RenderingContext} gl */
   constructor(gl) {
     this.wide = createProgram(gl, edgesVertex, edgesFragment, ["a_segment"]);
-    this.thin = createProgram(gl, thinVertex, flatFragment, ["a_point"]);
+    this.thin = createProgram(gl, flatVertex, flatFragment, ["a_point"]);
   }
 }
 

@@ -94,11 +94,11 @@ export function addAttributes(gl, array, buffer, stride, attributes) {
 }
 
 /**
- * Returns a texture of four floats for each texel, without filtering.
+ * Returns a texture without filtering, which is bound.
  *
  * @param {WebGL2RenderingContext} gl
  */
-export function createFloatTexture(gl) {
+export function createNearestTexture(gl) {
   const texture = gl.createTexture();
   gl.bindTexture(gl.TEXTURE_2D, texture);
   for (const name of [gl.TEXTURE_MIN_FILTER, gl.TEXTURE_MAG_FILTER]) {

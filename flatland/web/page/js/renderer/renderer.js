@@ -1,3 +1,4 @@
+import { Backdrop } from "./backdrop.js";
 import { BodyPrograms } from "./body_shapes.js";
 import { EdgeBatch, createColoredEdgeProgram } from "./edge_batch.js";
 import { EdgeProgram } from "./edge_layers.js";
@@ -44,6 +45,7 @@ export class Renderer {
     };
     this.batch = new EdgeBatch(gl, this.programs.coloredEdges, this.programs.quads);
     this.labels = new TextLabels(gl, this.programs.quads);
+    this.backdrop = new Backdrop(gl);
     /** @type {Map<WorldState, WorldGraphics>} */
     this.graphics = new Map();
     gl.enable(gl.BLEND);
@@ -67,24 +69,23 @@ export class Renderer {
       if (kept.has(world)) continue;
       graphics.dispose();
       this.graphics.delete(world);
+      this.backdrop.forget();
     }
   }
 
   /** @param {Scene} scene */
   draw(scene) {
     const { gl, palette } = this;
-    const { canvas } = gl;
     gl.disable(gl.SCISSOR_TEST);
-    gl.clearColor(...(scene.isGrid ? palette.gaps : palette.background), 1);
-    gl.clear(gl.COLOR_BUFFER_BIT);
-    gl.viewport(0, 0, canvas.width, canvas.height);
-    if (scene.isGrid) gl.enable(gl.SCISSOR_TEST);
-    gl.clearColor(...palette.background, 1);
+    if (scene.isGrid) {
+      gl.clearColor(...palette.gaps, 1);
+      gl.clear(gl.COLOR_BUFFER_BIT);
+      gl.enable(gl.SCISSOR_TEST);
+    }
     for (const { world, viewport } of scene.views) {
       const { left, bottom, width, height } = viewport;
       gl.viewport(left, bottom, width, height);
       gl.scissor(left, bottom, width, height);
-      if (scene.isGrid) gl.clear(gl.COLOR_BUFFER_BIT);
       this.drawWorld(world, viewport, scene);
     }
     gl.bindVertexArray(null);
@@ -95,16 +96,15 @@ export class Renderer {
    * @param {Viewport} viewport
    * @param {Scene} scene
    */
-  drawWorld(world, viewport, { displays, selected, overlay, isGrid }) {
+  drawWorld(world, viewport, scene) {
     const { batch, labels, palette } = this;
+    const { displays, selected, overlay, isGrid } = scene;
     let graphics = this.graphics.get(world);
     if (!graphics) this.graphics.set(world, (graphics = new WorldGraphics(this.gl, this.programs)));
     graphics.update(world, palette);
     labels.begin(viewport.ratio);
-    addGrid(batch, viewport, palette);
-    batch.flush(viewport);
-    if (displays.scans) graphics.scans.drawAreas(viewport, palette, selected);
-    if (displays.layers) graphics.layers.draw(viewport, world, palette);
+    viewport = this.drawGround(world, graphics.layers, viewport, scene);
+    if (displays.scans) graphics.scans.drawAreas(viewport, world, palette, selected);
     if (displays.trails) graphics.trails.draw(viewport, world.trails);
     if (displays.models) {
       graphics.bodies.draw(viewport);
@@ -112,12 +112,43 @@ export class Renderer {
       addShapelessModels(batch, viewport, world, palette);
     }
     batch.flush(viewport);
-    if (displays.scans) graphics.scans.drawPoints(viewport, palette);
+    if (displays.scans) graphics.scans.drawPoints(viewport, world, palette);
     const places = new LabelPlaces();
     if (displays.names && !isGrid) addNames(labels, places, viewport, world);
     if (displays.frames) addFrames(batch, labels, places, viewport, world, palette);
     overlay?.(batch, labels, viewport, palette);
     batch.flush(viewport);
     labels.draw(viewport, palette);
+  }
+
+  /**
+   * Draws the background, the grid and the layers.
+   *
+   * @param {WorldState} world
+   * @param {import("./edge_layers.js").EdgeLayers} layers
+   * @param {Viewport} viewport
+   * @param {Scene} scene
+   * @returns {Viewport} the viewport for the rest of the world
+   */
+  drawGround(world, layers, viewport, { displays, isGrid }) {
+    const { gl, batch, palette } = this;
+    /** @param {Viewport} view */
+    const paint = (view) => {
+      gl.clearColor(...palette.background, 1);
+      gl.clear(gl.COLOR_BUFFER_BIT);
+      addGrid(batch, view, palette);
+      batch.flush(view);
+      if (displays.layers) layers.draw(view, world, palette);
+    };
+    if (isGrid) {
+      paint(viewport);
+      return viewport;
+    }
+    const shown = displays.layers ? world.layers.map((layer) => Number(layer.visible)) : [];
+    return this.backdrop.draw(
+      viewport,
+      [world.index, world.layersVersion, palette.dark, shown].join(),
+      paint,
+    );
   }
 }

@@ -1,41 +1,40 @@
-import { NO_HIT } from "../protocol.js";
-import {
-  FLOAT_TEXTURE_WIDTH,
-  addAttributes,
-  createFloatTexture,
-  createProgram,
-  uploadFloatTexture,
-} from "./gl.js";
-import { colorFragment, scanAreaVertex, scanPointsFragment, scanPointsVertex } from "./shaders.js";
+import { createProgram } from "./gl.js";
+import { PointBuffer } from "./point_buffer.js";
+import { flatFragment, flatVertex, pointsFragment, pointsVertex } from "./shaders.js";
 import { lineWeight, useProgram } from "./view.js";
 
 /** Diameter of a point [CSS pixels]. */
 const POINT_SIZE = 3.2;
+/** Distance of the drawn points of a scan, as a share of their diameter; they cover those between. */
+const SPACING = 0.35;
+/** Change of the scale of the view from which the points to draw are selected again. */
+const SCALE_STEP = 1.25;
 const AREA_OPACITY = 0.09;
 /** Number of lasers up to which the areas of all scans are drawn, not only of the selected model. */
 const MAX_AREAS = 8;
+/** Number of colours. */
+const COLORS = 8;
 
 /**
  * @typedef {import("../world_state.js").LaserState} LaserState
- *
- * @typedef {object} Span  beams of a laser in the buffers
- * @property {LaserState} laser
- * @property {number} start  index of the first vertex, which is the laser itself
- * @property {number} count
+ * @typedef {import("../world_state.js").Model} Model
+ * @typedef {import("../world_state.js").WorldState} WorldState
+ * @typedef {import("./palette.js").Palette} Palette
+ * @typedef {import("./view.js").Viewport} Viewport
  */
 
 /** Programs that draw scans; shared by all worlds. */
 export class ScanPrograms {
   /** @param {WebGL2RenderingContext} gl */
   constructor(gl) {
-    this.points = createProgram(gl, scanPointsVertex, scanPointsFragment, ["a_beam", "a_range"]);
-    this.areas = createProgram(gl, scanAreaVertex, colorFragment, ["a_beam", "a_range"]);
+    this.points = createProgram(gl, pointsVertex, pointsFragment, ["a_point"]);
+    this.areas = createProgram(gl, flatVertex, flatFragment, ["a_point"]);
   }
 }
 
 /**
- * The latest scans of a world. All ranges are in one buffer; the poses and angles of the lasers are
- * in a texture, and the graphics processor computes the end points.
+ * The points and the areas of the latest scans of a world. They are computed when scans arrive, which
+ * is less often than they are drawn.
  */
 export class ScanClouds {
   /**
@@ -45,121 +44,179 @@ export class ScanClouds {
   constructor(gl, programs) {
     this.gl = gl;
     this.programs = programs;
-    this.texture = createFloatTexture(gl);
-    this.beamBuffer = gl.createBuffer();
-    this.rangeBuffer = gl.createBuffer();
-    this.array = gl.createVertexArray();
-    addAttributes(gl, this.array, this.beamBuffer, 8, [{ location: 0, size: 2 }]);
-    addAttributes(gl, this.array, this.rangeBuffer, 2, [{ location: 1, size: 1, type: gl.UNSIGNED_SHORT }]);
-    /** @type {Span[]} */
-    this.spans = [];
-    this.layout = "";
-    this.ranges = new Uint16Array(1);
-    this.lasers = new Float32Array(0);
-    this.version = -1;
-  }
-
-  /** @param {import("../world_state.js").WorldState} world */
-  update(world) {
-    if (this.version === world.scansVersion) return;
-    this.version = world.scansVersion;
-    const { gl } = this;
-    const present = [...world.lasers.values()].filter((laser) => laser.ranges !== null);
-    const layout = present.map(({ info, ranges }) => `${info.id}:${ranges?.length}`).join();
-    if (layout !== this.layout) this.arrange(present, layout);
-    let index = 0;
-    for (const span of this.spans) {
-      span.laser = present[index];
-      const { info, model, pose, ranges } = span.laser;
-      if (ranges) this.ranges.set(ranges, span.start + 1);
-      this.lasers.set([...pose, info.range_max], 8 * index);
-      this.lasers.set([info.angle_min, info.angle_increment, span.count, model.index % 8], 8 * index + 4);
-      index++;
-    }
-    if (index === 0) return;
-    gl.bindBuffer(gl.ARRAY_BUFFER, this.rangeBuffer);
-    gl.bufferData(gl.ARRAY_BUFFER, this.ranges, gl.STREAM_DRAW);
-    uploadFloatTexture(gl, this.texture, this.lasers);
+    this.points = new PointBuffer(gl);
+    this.areas = new PointBuffer(gl);
+    /** Cosine and sine of the angle of each beam.
+     * @type {WeakMap<import("../protocol.js").LaserInfo, Float32Array>} */
+    this.directions = new WeakMap();
+    this.ends = new Float32Array(0);
+    this.pointsVersion = -1;
+    this.areasVersion = -1;
+    this.spacing = 0;
+    /** @type {Model | null} */
+    this.selected = null;
   }
 
   /**
-   * Assigns parts of the buffers to lasers.
+   * @param {Viewport} viewport
+   * @param {WorldState} world
+   * @param {Palette} palette
+   * @param {Model | null} selected
+   */
+  drawAreas(viewport, world, palette, selected) {
+    if (this.areasVersion !== world.scansVersion || this.selected !== selected) {
+      this.areasVersion = world.scansVersion;
+      this.selected = selected;
+      this.setAreas(lasersWithScans(world), selected);
+    }
+    const { gl, programs } = this;
+    useProgram(gl, programs.areas, viewport);
+    this.areas.draw(gl.TRIANGLE_FAN, programs.areas, palette, AREA_OPACITY);
+  }
+
+  /**
+   * @param {Viewport} viewport
+   * @param {WorldState} world
+   * @param {Palette} palette
+   */
+  drawPoints(viewport, world, palette) {
+    const size = POINT_SIZE * lineWeight(viewport);
+    const spacing = (SPACING * size) / viewport.camera.zoom;
+    const isScaled = spacing > SCALE_STEP * this.spacing || SCALE_STEP * spacing < this.spacing;
+    if (this.pointsVersion !== world.scansVersion || isScaled) {
+      this.pointsVersion = world.scansVersion;
+      this.spacing = spacing;
+      this.setPoints(lasersWithScans(world), spacing);
+    }
+    const { gl, programs } = this;
+    useProgram(gl, programs.points, viewport);
+    gl.uniform1f(programs.points.uniform("u_pointSize"), size * viewport.ratio);
+    this.points.draw(gl.POINTS, programs.points, palette, 1);
+  }
+
+  /**
+   * Collects the points that beams have hit.
    *
    * @param {LaserState[]} lasers
-   * @param {string} layout
+   * @param {number} spacing  least distance of consecutive points of a scan [m]
    */
-  arrange(lasers, layout) {
-    const { gl } = this;
-    this.layout = layout;
-    this.spans = [];
-    let start = 0;
-    for (const laser of lasers) {
-      const count = laser.ranges?.length ?? 0;
-      this.spans.push({ laser, start, count });
-      start += count + 1;
+  setPoints(lasers, spacing) {
+    const { points } = this;
+    points.begin(lasers.reduce((sum, { ranges }) => sum + (ranges?.length ?? 0), 0));
+    for (let color = 0; color < COLORS; color++) {
+      for (const laser of lasers) {
+        if (laser.model.index % COLORS === color) this.addPoints(laser, spacing * spacing);
+      }
+      points.endSpan(color);
     }
-    // The vertices of a laser begin with the centre of its area, which is not a point: no hit.
-    const beams = new Float32Array(2 * start);
-    this.spans.forEach((span, index) => {
-      for (let i = 0; i <= span.count; i++) beams.set([index, i - 1], 2 * (span.start + i));
-    });
-    this.ranges = new Uint16Array(start).fill(NO_HIT);
-    const rows = Math.max(1, Math.ceil((2 * lasers.length) / FLOAT_TEXTURE_WIDTH));
-    this.lasers = new Float32Array(4 * FLOAT_TEXTURE_WIDTH * rows);
-    gl.bindBuffer(gl.ARRAY_BUFFER, this.beamBuffer);
-    gl.bufferData(gl.ARRAY_BUFFER, beams, gl.STATIC_DRAW);
+    points.upload();
   }
 
   /**
-   * @param {import("./view.js").Viewport} viewport
-   * @param {import("./palette.js").Palette} palette
-   * @param {import("../world_state.js").Model | null} selected
+   * @param {LaserState} laser
+   * @param {number} least  square of the least distance of consecutive points [m²]
    */
-  drawAreas(viewport, palette, selected) {
-    const all = this.spans.length <= MAX_AREAS;
-    const shown = this.spans.filter((span) => span.count > 1 && (all || span.laser.model === selected));
-    if (shown.length === 0) return;
-    const { gl } = this;
-    const program = this.programs.areas;
-    this.prepare(program, viewport, palette);
-    gl.uniform1f(program.uniform("u_opacity"), AREA_OPACITY);
-    gl.bindVertexArray(this.array);
-    for (const { start, count } of shown) gl.drawArrays(gl.TRIANGLE_FAN, start, count + 1);
+  addPoints(laser, least) {
+    const { ranges } = laser;
+    if (!ranges) return;
+    const ends = this.endPoints(laser, ranges);
+    const maximum = laser.info.range_max;
+    let [lastX, lastY] = [Infinity, Infinity];
+    for (let i = 0; i < ranges.length; i++) {
+      if (!isHit(ranges[i], maximum)) continue;
+      const x = ends[2 * i];
+      const y = ends[2 * i + 1];
+      if ((x - lastX) ** 2 + (y - lastY) ** 2 < least) continue;
+      this.points.add(x, y);
+      lastX = x;
+      lastY = y;
+    }
   }
 
   /**
-   * @param {import("./view.js").Viewport} viewport
-   * @param {import("./palette.js").Palette} palette
+   * Sets the areas that the lasers have seen, as fans around the lasers.
+   *
+   * @param {LaserState[]} lasers
+   * @param {Model | null} selected
    */
-  drawPoints(viewport, palette) {
-    const last = this.spans.at(-1);
-    if (!last) return;
-    const { gl } = this;
-    const program = this.programs.points;
-    this.prepare(program, viewport, palette);
-    gl.uniform1f(program.uniform("u_pointSize"), POINT_SIZE * lineWeight(viewport) * viewport.ratio);
-    gl.bindVertexArray(this.array);
-    gl.drawArrays(gl.POINTS, 0, last.start + last.count + 1);
+  setAreas(lasers, selected) {
+    const { areas } = this;
+    const wide = lasers.filter(({ ranges }) => ranges && ranges.length > 1);
+    const shown = wide.length <= MAX_AREAS ? wide : wide.filter(({ model }) => model === selected);
+    areas.begin(shown.reduce((sum, { ranges }) => sum + 1 + (ranges?.length ?? 0), 0));
+    for (const laser of shown) {
+      const { model, pose, ranges } = laser;
+      if (!ranges) continue;
+      const ends = this.endPoints(laser, ranges);
+      areas.add(pose[0], pose[1]);
+      for (let i = 0; i < ranges.length; i++) areas.add(ends[2 * i], ends[2 * i + 1]);
+      areas.endSpan(model.index % COLORS);
+    }
+    areas.upload();
   }
 
   /**
-   * @param {import("./gl.js").Program} program
-   * @param {import("./view.js").Viewport} viewport
-   * @param {import("./palette.js").Palette} palette
+   * Returns where the beams of a scan end: at a hit, or at the largest range.
+   *
+   * @param {LaserState} laser
+   * @param {Float32Array} ranges
+   * @returns {Float32Array} two coordinates for each beam [m], valid until the next call
    */
-  prepare(program, viewport, palette) {
-    const { gl } = this;
-    gl.activeTexture(gl.TEXTURE0);
-    gl.bindTexture(gl.TEXTURE_2D, this.texture);
-    useProgram(gl, program, viewport);
-    gl.uniform3fv(program.uniform("u_palette"), palette.series.flat());
+  endPoints({ info, pose }, ranges) {
+    if (this.ends.length < 2 * ranges.length) this.ends = new Float32Array(2 * ranges.length);
+    const { ends } = this;
+    const [x, y, heading] = pose;
+    const c = Math.cos(heading);
+    const s = Math.sin(heading);
+    const maximum = info.range_max;
+    const directions = this.directionsOf(info, ranges.length);
+    for (let i = 0; i < ranges.length; i++) {
+      // -inf stands for a hit that is too close.
+      const range = isHit(ranges[i], maximum) ? Math.max(ranges[i], 0) : maximum;
+      const dx = range * directions[2 * i];
+      const dy = range * directions[2 * i + 1];
+      ends[2 * i] = x + c * dx - s * dy;
+      ends[2 * i + 1] = y + s * dx + c * dy;
+    }
+    return ends;
+  }
+
+  /**
+   * Returns the directions of the beams in the frame of the laser.
+   *
+   * @param {import("../protocol.js").LaserInfo} info
+   * @param {number} count
+   */
+  directionsOf(info, count) {
+    let directions = this.directions.get(info);
+    if (directions?.length === 2 * count) return directions;
+    directions = new Float32Array(2 * count);
+    for (let i = 0; i < count; i++) {
+      const angle = info.angle_min + i * info.angle_increment;
+      directions[2 * i] = Math.cos(angle);
+      directions[2 * i + 1] = Math.sin(angle);
+    }
+    this.directions.set(info, directions);
+    return directions;
   }
 
   dispose() {
-    const { gl } = this;
-    gl.deleteTexture(this.texture);
-    gl.deleteBuffer(this.beamBuffer);
-    gl.deleteBuffer(this.rangeBuffer);
-    gl.deleteVertexArray(this.array);
+    this.points.dispose();
+    this.areas.dispose();
   }
+}
+
+/**
+ * Returns whether a beam has hit something; without a hit, its range is the largest one, inf or NaN.
+ *
+ * @param {number} range  [m]
+ * @param {number} maximum  largest range of the laser [m]
+ */
+function isHit(range, maximum) {
+  return range < maximum;
+}
+
+/** @param {WorldState} world */
+function lasersWithScans(world) {
+  return [...world.lasers.values()].filter((laser) => laser.ranges !== null);
 }

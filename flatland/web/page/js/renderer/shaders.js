@@ -69,7 +69,7 @@ uniform vec4 u_color;
 out vec4 color;
 void main() { color = u_color * coverage(); }`;
 
-export const thinVertex = `${HEAD}${VIEW}
+export const flatVertex = `${HEAD}${VIEW}
 in vec2 a_point;
 void main() { gl_Position = toClip(toPixels(a_point)); }`;
 
@@ -111,6 +111,39 @@ void main() {
   gl_Position = toClip(capsule(a, b, u_width));
 }`;
 
+export const bodyDiscsVertex = `${HEAD}${VIEW}${BODY}
+in vec3 a_disc;    // centre, radius [m]
+in vec4 a_color;
+in float a_slot;
+uniform float u_width;
+uniform float u_scale;   // [pixels per metre]
+flat out vec4 v_color;
+flat out float v_radius;
+out vec2 v_local;
+void main() {
+  vec4 pose = bodyPose(a_slot);
+  v_color = vec4(a_color.rgb, 1.0) * (a_color.a * pose.w);
+  v_radius = a_disc.z * u_scale;
+  vec2 corner = 2.0 * vec2(float(gl_VertexID & 1), float((gl_VertexID >> 1) & 1)) - 1.0;
+  v_local = corner * (v_radius + 0.5 * u_width + 1.0);
+  gl_Position = toClip(toPixels(ofBody(pose, a_disc.xy)) + v_local);
+}`;
+
+export const bodyDiscsFragment = `${HEAD}
+flat in vec4 v_color;
+flat in float v_radius;
+in vec2 v_local;
+uniform float u_width;
+uniform float u_opacity;   // of the inside
+out vec4 color;
+void main() {
+  float d = length(v_local) - v_radius;
+  float line = clamp(0.5 * u_width - abs(d) + 0.5, 0.0, 1.0);
+  // A disc of a few pixels is opaque, to be seen from far away.
+  float fill = clamp(0.5 - d, 0.0, 1.0) * mix(1.0, u_opacity, clamp((v_radius - 2.0) / 6.0, 0.0, 1.0));
+  color = v_color * max(line, fill);
+}`;
+
 export const bodyFillVertex = `${HEAD}${VIEW}${BODY}
 in vec2 a_point;
 in vec4 a_color;
@@ -128,76 +161,60 @@ flat in vec4 v_color;
 out vec4 color;
 void main() { color = v_color; }`;
 
-/** Lasers: two texels each; (x, y, heading, largest range), (first angle, increment, count, colour). */
-const SCAN = `
-uniform sampler2D u_lasers;
-uniform vec3 u_palette[8];
-vec4 laserTexel(float laser, int k) {
-  int i = 2 * int(laser) + k;
-  return texelFetch(u_lasers, ivec2(i & 255, i >> 8), 0);
-}
-// Ranges are fractions of the largest one, from 0 to 65534; 65535 stands for no hit.
-bool isHit(float fraction) { return fraction < 65534.5; }
-vec2 beamEnd(vec4 pose, vec4 beams, float beam, float fraction) {
-  float range = min(fraction / 65534.0, 1.0) * pose.w;
-  float angle = pose.z + beams.x + beam * beams.y;
-  return pose.xy + range * vec2(cos(angle), sin(angle));
-}
-`;
-
-export const scanPointsVertex = `${HEAD}${VIEW}${SCAN}
-in vec2 a_beam;    // laser, beam
-in float a_range;
+export const pointsVertex = `${HEAD}${VIEW}
+in vec2 a_point;
 uniform float u_pointSize;
-flat out vec3 v_color;
 void main() {
-  vec4 pose = laserTexel(a_beam.x, 0), beams = laserTexel(a_beam.x, 1);
-  v_color = u_palette[int(beams.w)];
   gl_PointSize = u_pointSize;
-  gl_Position = isHit(a_range) ? toClip(toPixels(beamEnd(pose, beams, a_beam.y, a_range))) : vec4(2.0, 2.0, 2.0, 1.0);
+  gl_Position = toClip(toPixels(a_point));
 }`;
 
-export const scanPointsFragment = `${HEAD}
-flat in vec3 v_color;
+export const pointsFragment = `${HEAD}
 uniform float u_pointSize;
+uniform vec4 u_color;
 out vec4 color;
 void main() {
   float d = length(gl_PointCoord - 0.5) * u_pointSize;
-  color = vec4(v_color, 1.0) * clamp(0.5 * u_pointSize - d + 0.5, 0.0, 1.0);
-}`;
-
-/** A fan of triangles; beam -1 is its centre, the laser. */
-export const scanAreaVertex = `${HEAD}${VIEW}${SCAN}
-in vec2 a_beam;
-in float a_range;
-uniform float u_opacity;
-flat out vec4 v_color;
-void main() {
-  vec4 pose = laserTexel(a_beam.x, 0), beams = laserTexel(a_beam.x, 1);
-  v_color = vec4(u_palette[int(beams.w)], 1.0) * u_opacity;
-  gl_Position = toClip(toPixels(a_beam.y < 0.0 ? pose.xy : beamEnd(pose, beams, a_beam.y, a_range)));
+  color = u_color * clamp(0.5 * u_pointSize - d + 0.5, 0.0, 1.0);
 }`;
 
 export const textVertex = `${HEAD}${VIEW}
 in vec2 a_anchor;   // [m]
 in vec4 a_box;      // offset and size [pixels]
-in vec4 a_texels;   // offset and size in the atlas [texels]
-uniform vec2 u_atlasSize;
+in vec2 a_texel;    // offset in the atlas [texels]
+uniform float u_atlasSize;
 out vec2 v_texel;
 void main() {
   vec2 corner = vec2(float((gl_VertexID >> 1) & 1), float(gl_VertexID & 1));
-  v_texel = (a_texels.xy + corner * a_texels.zw) / u_atlasSize;
+  v_texel = (a_texel + corner * a_box.zw) / u_atlasSize;
   vec2 anchor = floor(toPixels(a_anchor) + 0.5 * u_size) - 0.5 * u_size;
   gl_Position = toClip(anchor + vec2(a_box.x + corner.x * a_box.z, -(a_box.y + corner.y * a_box.w)));
 }`;
 
 export const textFragment = `${HEAD}
 in vec2 v_texel;
-uniform sampler2D u_atlas;   // red: glyph, green: halo
-uniform vec3 u_color;
-uniform vec2 u_channels;     // weights of glyph and halo
+uniform sampler2D u_atlas;   // red: letters, green: halo
+uniform vec3 u_ink;
+uniform vec3 u_halo;
 out vec4 color;
 void main() {
-  vec4 texel = texture(u_atlas, v_texel);
-  color = vec4(u_color, 1.0) * max(u_channels.x * texel.r, u_channels.y * texel.g);
+  vec2 texel = texture(u_atlas, v_texel).rg;
+  float halo = 0.8 * max(texel.r, texel.g) * (1.0 - texel.r);
+  color = vec4(u_ink * texel.r + u_halo * halo, texel.r + halo);
 }`;
+
+/** A triangle that contains the whole viewport. */
+export const copyVertex = `${HEAD}
+uniform vec4 u_part;   // offset and size of the copied part, as shares of the texture
+out vec2 v_texel;
+void main() {
+  vec2 corner = 2.0 * vec2(float(gl_VertexID & 1), float(gl_VertexID >> 1));
+  v_texel = u_part.xy + corner * u_part.zw;
+  gl_Position = vec4(2.0 * corner - 1.0, 0.0, 1.0);
+}`;
+
+export const copyFragment = `${HEAD}
+in vec2 v_texel;
+uniform sampler2D u_texture;
+out vec4 color;
+void main() { color = texture(u_texture, v_texel); }`;

@@ -1,18 +1,18 @@
-import { addAttributes, createProgram } from "./gl.js";
+import { addAttributes, createNearestTexture, createProgram } from "./gl.js";
 import { forCorners } from "./quads.js";
 import { textFragment, textVertex } from "./shaders.js";
 import { useProgram } from "./view.js";
 
 const FONT_SIZE = 12.5;
-const ATLAS_SIZE = 1024;
-/** Words of a glyph: anchor, box, texels. */
-const GLYPH_WORDS = 10;
-/** Space around a glyph for its halo [CSS pixels]. */
+const ATLAS_SIZE = 2048;
+/** Words of a label: anchor, box, texel. */
+const LABEL_WORDS = 8;
+/** Space around a text for its halo [CSS pixels]. */
 const HALO = 2;
 
-/** @typedef {{x: number, y: number, width: number, height: number, advance: number}} Glyph */
+/** @typedef {{x: number, y: number, width: number, height: number}} Sprite  [texels] */
 
-/** Text at points of the world. Glyphs are drawn once into an atlas; a frame is two draw calls. */
+/** Text at points of the world. A text is drawn once into an atlas; a frame is one draw call. */
 export class TextLabels {
   /**
    * @param {WebGL2RenderingContext} gl
@@ -21,25 +21,29 @@ export class TextLabels {
   constructor(gl, quads) {
     this.gl = gl;
     this.quads = quads;
-    this.program = createProgram(gl, textVertex, textFragment, ["a_anchor", "a_box", "a_texels"]);
-    this.texture = gl.createTexture();
+    this.program = createProgram(gl, textVertex, textFragment, ["a_anchor", "a_box", "a_texel"]);
+    this.texture = createNearestTexture(gl);
+    gl.texStorage2D(gl.TEXTURE_2D, 1, gl.RGBA8, ATLAS_SIZE, ATLAS_SIZE);
     this.buffer = gl.createBuffer();
     this.array = gl.createVertexArray();
-    addAttributes(gl, this.array, this.buffer, 4 * GLYPH_WORDS, [
+    addAttributes(gl, this.array, this.buffer, 4 * LABEL_WORDS, [
       { location: 0, size: 2 },
       { location: 1, size: 4, offset: 8 },
-      { location: 2, size: 4, offset: 24 },
+      { location: 2, size: 2, offset: 24 },
     ]);
     quads.attach(this.array);
     const canvas = document.createElement("canvas");
     canvas.width = canvas.height = ATLAS_SIZE;
-    this.context = /** @type {CanvasRenderingContext2D} */ (canvas.getContext("2d"));
-    /** @type {Map<string, Glyph>} */
-    this.glyphs = new Map();
+    const options = { willReadFrequently: true };
+    this.context = /** @type {CanvasRenderingContext2D} */ (canvas.getContext("2d", options));
+    /** @type {Map<string, Sprite>} */
+    this.sprites = new Map();
     this.ratio = 0;
     this.penX = 0;
     this.penY = 0;
-    this.isChanged = false;
+    this.isFull = false;
+    /** Rows of the atlas that the texture does not contain yet. */
+    this.changed = { from: ATLAS_SIZE, to: 0 };
     /** @type {number[]} */
     this.words = [];
   }
@@ -51,41 +55,48 @@ export class TextLabels {
    */
   begin(ratio) {
     this.words.length = 0;
-    if (this.ratio === ratio) return;
+    if (this.ratio === ratio && !this.isFull) return;
     this.ratio = ratio;
-    this.glyphs.clear();
+    this.isFull = false;
+    this.sprites.clear();
     this.penX = this.penY = 0;
     this.context.clearRect(0, 0, ATLAS_SIZE, ATLAS_SIZE);
     this.context.font = `500 ${FONT_SIZE * ratio}px system-ui, sans-serif`;
     this.context.textBaseline = "middle";
     this.context.lineJoin = "round";
     this.context.lineWidth = 3 * ratio;
-    this.isChanged = true;
+    this.context.globalCompositeOperation = "lighter";
   }
 
-  /** @param {string} character */
-  glyph(character) {
-    const known = this.glyphs.get(character);
+  /**
+   * Returns the picture of a text.
+   *
+   * @param {string} text
+   * @returns {Sprite | null} null if the atlas is full; it is emptied before the next frame
+   */
+  sprite(text) {
+    const known = this.sprites.get(text);
     if (known) return known;
-    const { context, ratio } = this;
-    const advance = context.measureText(character).width;
-    const width = Math.ceil(advance + 2 * HALO * ratio);
+    const { context, ratio, changed } = this;
     const height = Math.ceil(FONT_SIZE * 1.6 * ratio);
+    const full = Math.ceil(context.measureText(text).width + 2 * HALO * ratio);
+    const width = Math.min(full, ATLAS_SIZE);
     if (this.penX + width > ATLAS_SIZE) {
       this.penX = 0;
-      this.penY += height + 1;
+      this.penY += height;
     }
-    if (this.penY + height > ATLAS_SIZE) return null;
-    const [x, y] = [this.penX, this.penY];
-    context.globalCompositeOperation = "lighter";
+    this.isFull = this.penY + height > ATLAS_SIZE;
+    if (this.isFull) return null;
+    const made = { x: this.penX, y: this.penY, width, height };
+    const [x, y] = [made.x + HALO * ratio, made.y + height / 2];
     context.strokeStyle = "#0f0";
-    context.strokeText(character, x + HALO * ratio, y + height / 2);
+    context.strokeText(text, x, y);
     context.fillStyle = "#f00";
-    context.fillText(character, x + HALO * ratio, y + height / 2);
-    this.penX += width + 1;
-    this.isChanged = true;
-    const made = { x, y, width, height, advance };
-    this.glyphs.set(character, made);
+    context.fillText(text, x, y);
+    this.penX += width;
+    changed.from = Math.min(changed.from, made.y);
+    changed.to = Math.max(changed.to, made.y + height);
+    this.sprites.set(text, made);
     return made;
   }
 
@@ -95,9 +106,7 @@ export class TextLabels {
    * @param {string} text
    */
   width(text) {
-    let sum = 0;
-    for (const character of text) sum += this.glyph(character)?.advance ?? 0;
-    return sum / this.ratio;
+    return (this.sprite(text)?.width ?? 0) / this.ratio - 2 * HALO;
   }
 
   /**
@@ -109,28 +118,12 @@ export class TextLabels {
    * @param {number} dy  distance of the centre from the point, positive: below [CSS pixels]
    */
   add(text, x, y, dy) {
-    const glyphs = [...text].map((character) => this.glyph(character) ?? this.glyphs.get("?"));
-    const total = glyphs.reduce((sum, glyph) => sum + (glyph?.advance ?? 0), 0);
-    let left = Math.round(-total / 2 - HALO * this.ratio);
-    let exact = left;
-    for (const glyph of glyphs) {
-      if (!glyph) continue;
-      const top = Math.round(dy * this.ratio - glyph.height / 2);
-      left = Math.round(exact);
-      this.words.push(
-        x,
-        y,
-        left,
-        top,
-        glyph.width,
-        glyph.height,
-        glyph.x,
-        glyph.y,
-        glyph.width,
-        glyph.height,
-      );
-      exact += glyph.advance;
-    }
+    const sprite = this.sprite(text);
+    if (!sprite) return;
+    const { width, height } = sprite;
+    const left = Math.round(-width / 2);
+    const top = Math.round(dy * this.ratio - height / 2);
+    this.words.push(x, y, left, top, width, height, sprite.x, sprite.y);
   }
 
   /**
@@ -144,24 +137,24 @@ export class TextLabels {
     const { gl, program } = this;
     gl.activeTexture(gl.TEXTURE0);
     gl.bindTexture(gl.TEXTURE_2D, this.texture);
-    if (this.isChanged) {
-      this.isChanged = false;
-      gl.texImage2D(gl.TEXTURE_2D, 0, gl.RGBA, gl.RGBA, gl.UNSIGNED_BYTE, this.context.canvas);
-      gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MIN_FILTER, gl.LINEAR);
-      gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MAG_FILTER, gl.LINEAR);
-    }
+    this.upload();
     gl.bindBuffer(gl.ARRAY_BUFFER, this.buffer);
-    const glyphs = forCorners(new Float32Array(this.words), GLYPH_WORDS);
-    gl.bufferData(gl.ARRAY_BUFFER, glyphs, gl.STREAM_DRAW);
+    const labels = forCorners(new Float32Array(this.words), LABEL_WORDS);
+    gl.bufferData(gl.ARRAY_BUFFER, labels, gl.STREAM_DRAW);
     useProgram(gl, program, viewport);
-    gl.uniform2f(program.uniform("u_atlasSize"), ATLAS_SIZE, ATLAS_SIZE);
-    const count = this.words.length / GLYPH_WORDS;
-    // All halos first, so that none covers a neighbouring glyph.
-    gl.uniform3fv(program.uniform("u_color"), palette.background);
-    gl.uniform2f(program.uniform("u_channels"), 0.8, 0.8);
-    this.quads.draw(this.array, 0, count);
-    gl.uniform3fv(program.uniform("u_color"), palette.ink);
-    gl.uniform2f(program.uniform("u_channels"), 1, 0);
-    this.quads.draw(this.array, 0, count);
+    gl.uniform1f(program.uniform("u_atlasSize"), ATLAS_SIZE);
+    gl.uniform3fv(program.uniform("u_ink"), palette.ink);
+    gl.uniform3fv(program.uniform("u_halo"), palette.background);
+    this.quads.draw(this.array, 0, this.words.length / LABEL_WORDS);
+  }
+
+  /** Copies changed rows of the atlas to the texture. */
+  upload() {
+    const { gl, context, changed } = this;
+    const rows = changed.to - changed.from;
+    if (rows <= 0) return;
+    const image = context.getImageData(0, changed.from, ATLAS_SIZE, rows);
+    gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, changed.from, gl.RGBA, gl.UNSIGNED_BYTE, image);
+    this.changed = { from: ATLAS_SIZE, to: 0 };
   }
 }

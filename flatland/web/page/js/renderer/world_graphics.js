@@ -34,7 +34,6 @@ export class WorldGraphics {
   update(world, palette) {
     this.layers.update(world);
     this.bodies.update(world, palette);
-    this.scans.update(world);
     this.trails.update(world.trails, palette);
   }
 

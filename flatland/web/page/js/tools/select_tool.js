@@ -1,7 +1,7 @@
 import { fixed } from "../format.js";
 import { modelAt, modelRadius } from "../hit.js";
 import { packColor } from "../renderer/edge_batch.js";
-import { addArrow, addModelAt } from "../renderer/marks.js";
+import { addArrow, addModelAt } from "../renderer/outlines.js";
 import { ModelDrag } from "./model_drag.js";
 
 /**

@@ -1,6 +1,6 @@
 import { composePoses } from "../geometry.js";
 import { packColor } from "../renderer/edge_batch.js";
-import { addArrow, addOutline } from "../renderer/marks.js";
+import { addArrow, addOutline } from "../renderer/outlines.js";
 
 /**
  * @typedef {import("./tool_box.js").Spot} Spot
@@ -49,15 +49,20 @@ export class SpawnTool {
   get hint() {
     if (!this.plan) return "";
     const name = this.plan.nextName();
-    if (this.phase === "position") return `${name}: click to set the position, Escape to cancel`;
-    return `${name}: click to set the heading, Escape to cancel`;
+    return `${name}: click or Enter sets the ${this.phase}, Escape cancels`;
   }
 
-  /** @param {Plan} plan */
+  /**
+   * Shows the outline in the centre of the view, where it is without a mouse.
+   *
+   * @param {Plan} plan
+   */
   begin(plan) {
+    const { x, y } = this.stage.camera;
     this.plan = plan;
-    this.pose = null;
+    this.pose = [x, y, 0];
     this.phase = "position";
+    this.stage.invalidate();
   }
 
   /** @param {Spot} spot */
