@@ -78,6 +78,7 @@ PARAMETERS: dict[str, dict[str, Any]] = {
     "Imu": {"body": "base"},
     "Tween": {"body": "base", "delta": [0.5, 0.2, 0.1]},
     "RandomWall": {"layer": "2d", "robot_name": "robot", "num_of_walls": 5, "wall_wall_dist": 0.1},
+    "Pedestrians": {"groups": [{"name": "visitor", "count": 10}]},
     "DummyModelPlugin": {
         "dummy_param_float": 0.123456,
         "dummy_param_string": "dummy_test_123456",
@@ -93,6 +94,7 @@ NOTES = {
     "ModelTfPublisher": "4 bodies, 3 joints",
     "Bumper": "in contact with a post",
     "BoolSensor": "in contact with a post",
+    "Pedestrians": "10 people",
 }
 
 

@@ -376,3 +376,23 @@ class PeopleStates:
 @dataclass(frozen=True, slots=True, eq=False)
 class TrackedPeople(PeopleStates):
     """The states of people, as in `people_msgs/People`."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PeopleMarkers(PeopleStates):
+    """The states of people with what RViz needs to display them.
+
+    Attributes:
+        ids: Number of each person below 2^31, which a later person may get after a removal.
+        group_names: Names of all groups, also of those without people.
+        colors: (r, g, b, a) of each group, each in [0, 1].
+        radii: Radius of the people of each group [m].
+        removed: Numbers of the last value that are not used any more; None if that value is not
+            known.
+    """
+
+    ids: tuple[int, ...]
+    group_names: tuple[str, ...]
+    colors: tuple[tuple[float, ...], ...]
+    radii: tuple[float, ...]
+    removed: tuple[int, ...] | None

@@ -119,6 +119,17 @@ def picture_options(options: argparse.Namespace) -> dict[str, Any]:
     }
 
 
+def add_step_size(parser: argparse.ArgumentParser) -> None:
+    """Adds the option `--step-size`."""
+    parser.add_argument(
+        "--step-size",
+        type=positive,
+        default=0.005,
+        metavar="SECONDS",
+        help="simulated time of one step (default: 0.005)",
+    )
+
+
 def load(options: argparse.Namespace, seed: int | None, **more: Any) -> World:
     """Loads the world of the options of `file_arguments`.
 

@@ -19,7 +19,6 @@ import numpy as np
 
 from flatland.cli.arguments import Commands, add_command, count, positive
 from flatland.errors import FlatlandError
-from flatland.worldgen import generate
 
 _EXAMPLES = (
     "flatland new robot rover",
@@ -165,6 +164,8 @@ def create_random(kind: str, name: str, folder: Path, **arguments: Any) -> Path:
     _check_name("world", name)
     target = folder / name
     _check_target(target)
+    from flatland.worldgen import generate  # not at the start of all commands
+
     try:
         generate(kind, **arguments).write(target)
     except ValueError as error:

@@ -16,6 +16,7 @@ import yaml
 from flatland.cli.arguments import (
     Commands,
     add_command,
+    add_step_size,
     count,
     file_arguments,
     load,
@@ -67,13 +68,7 @@ def add(commands: Commands) -> None:
         help="simulated time",
     )
     parser.add_argument("--seed", type=count, help="seed of all noise (default: random, printed)")
-    parser.add_argument(
-        "--step-size",
-        type=positive,
-        default=0.005,
-        metavar="SECONDS",
-        help="simulated time of one step (default: 0.005)",
-    )
+    add_step_size(parser)
     parser.add_argument(
         "--command",
         type=_command,

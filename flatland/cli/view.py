@@ -6,11 +6,19 @@ import argparse
 import math
 import os
 import threading
-import webbrowser
 from typing import TYPE_CHECKING
 
-from flatland.cli.arguments import Commands, add_command, count, file_arguments, load, positive
+from flatland.cli.arguments import (
+    Commands,
+    add_command,
+    add_step_size,
+    count,
+    file_arguments,
+    load,
+    positive,
+)
 from flatland.cli.progress import StopSignals
+from flatland.defaults import WEB_HOST, WEB_PORT
 from flatland.errors import FlatlandError
 from flatland.simulation import Simulation
 
@@ -40,12 +48,15 @@ def add(commands: Commands) -> None:
     )
     parser.add_argument(
         "--host",
-        default="127.0.0.1",
+        default=WEB_HOST,
         metavar="ADDRESS",
-        help="address to listen on; 0.0.0.0 for all of this machine (default: 127.0.0.1)",
+        help=f"address to listen on; 0.0.0.0 for all of this machine (default: {WEB_HOST})",
     )
     parser.add_argument(
-        "--port", type=_port, default=8000, help="TCP port, 0 for any free one (default: 8000)"
+        "--port",
+        type=_port,
+        default=WEB_PORT,
+        help=f"TCP port, 0 for any free one (default: {WEB_PORT})",
     )
     parser.add_argument(
         "--token",
@@ -64,13 +75,7 @@ def add(commands: Commands) -> None:
     )
     parser.add_argument("--paused", action="store_true", help="begin with a paused world")
     parser.add_argument("--seed", type=count, help="seed of all noise (default: random)")
-    parser.add_argument(
-        "--step-size",
-        type=positive,
-        default=0.005,
-        metavar="SECONDS",
-        help="simulated time of one step (default: 0.005)",
-    )
+    add_step_size(parser)
     parser.add_argument(
         "--duration",
         type=positive,
@@ -102,7 +107,7 @@ def _run(options: argparse.Namespace) -> int:
             viewer.add_world(world, simulation=simulation)
             print(f"{options.path} is shown at {viewer.url}", flush=True)
             if not options.no_browser and _has_display():
-                threading.Thread(target=webbrowser.open, args=[viewer.url], daemon=True).start()
+                threading.Thread(target=_open_browser, args=[viewer.url], daemon=True).start()
             ended = threading.Event()
             watch = threading.Thread(target=_stop_at_signal, args=[stop, simulation, ended])
             watch.start()
@@ -135,6 +140,12 @@ def _stop_at_signal(stop: StopSignals, simulation: Simulation, ended: threading.
         if stop.signal:
             simulation.stop()
             return
+
+
+def _open_browser(url: str) -> None:
+    import webbrowser  # not at the start of all commands
+
+    webbrowser.open(url)
 
 
 def _has_display() -> bool:

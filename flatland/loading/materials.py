@@ -25,9 +25,9 @@ def read_material(reader: YamlReader) -> Material | None:
         YamlError: The entry is not a map, a share is not from 0 to 1, `transmission` + `specular`
             is above 1, or a key is unknown.
     """
-    if "material" not in reader:
+    entry = reader.optional_subnode("material", "map")
+    if entry.is_null:
         return None
-    entry = reader.subnode("material", "map")
     default = Material()
     reflectance, transmission, specular = (
         entry.get(key, "float", value, minimum=0, maximum=1)

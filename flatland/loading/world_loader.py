@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import logging
 import os
 from collections.abc import Iterable
@@ -223,33 +224,27 @@ def _load_layer(world: World, reader: YamlReader, simplify_map: int) -> None:
     if not is_registered:
         return
     bits = world.collision_filter.category_bits(names)
+    make_layer = functools.partial(
+        Layer,
+        world.physics,
+        names,
+        bits,
+        color,
+        properties.plain() or {},
+        material=material,
+        class_name=class_name,
+        map_topic=map_topic,
+    )
     if layer_map is None:
-        layer = Layer(
-            world.physics,
-            names,
-            bits,
-            color,
-            properties.plain() or {},
-            material=material,
-            class_name=class_name,
-            map_topic=map_topic,
-        )
+        layer = make_layer()
     else:
         try:
-            layer = Layer(
-                world.physics,
-                names,
-                bits,
-                color,
-                properties.plain() or {},
-                material=material,
-                class_name=class_name,
+            layer = make_layer(
                 origin=layer_map.origin,
                 edges=layer_map.edges,
                 exact_edge_count=layer_map.exact_edge_count,
                 unknown_map_keys=layer_map.unknown_keys,
                 map_path=layer_map.path,
-                map_topic=map_topic,
             )
             layer.grid = grid
         except ValueError as error:  # finite, but outside the range of the physics

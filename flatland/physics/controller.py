@@ -132,6 +132,10 @@ class DriveController(Controller):
             self.id, ids, holonomic, at_center, max_force, max_torque, grip, radius
         )
 
+    def release_brakes(self) -> None:
+        """Makes the brakes hold the pose at the next step, for a body that was moved."""
+        self._core.release_brakes(self.id)
+
     @property
     def traction_state(self) -> tuple[float, bool, tuple[float, float, float]]:
         """Part of the limits that the last step required, and the pose that the brakes hold.

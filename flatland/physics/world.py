@@ -9,13 +9,12 @@ from typing import NamedTuple
 from flatland import _core
 from flatland.geometry import DoubleArray, FloatArray
 from flatland.physics.body import PhysicsBody
-from flatland.physics.contact import ContactEvent, ContactInfo, to_events, to_infos
+from flatland.physics.contact_queries import ContactQueries
 from flatland.physics.controller import RollingWheel, WheelsController
 from flatland.physics.fixture import PhysicsFixture
 from flatland.physics.joint import PhysicsJoint
 from flatland.physics.plan import StepPlan
 from flatland.physics.queries import PhysicsQueries
-from flatland.physics.touches import Touches
 
 PreSolveHook = Callable[[_core.PreSolveContact, _core.OldManifold], object]
 
@@ -55,7 +54,7 @@ def to_report(ids: tuple[list[int], list[int]] | None) -> StepReport | None:
     return None if ids is None else StepReport(tuple(ids[0]), tuple(ids[1]))
 
 
-class PhysicsWorld(PhysicsQueries):
+class PhysicsWorld(ContactQueries, PhysicsQueries):
     """A Box2D world without gravity; owns its bodies, fixtures, joints and contacts.
 
     Worlds are independent: different threads may step different worlds at the same time.
@@ -402,79 +401,3 @@ class PhysicsWorld(PhysicsQueries):
     def joint(self, joint_id: int) -> PhysicsJoint:
         """Returns the handle of a joint by its id, without checking that the joint exists."""
         return PhysicsJoint(self, joint_id)
-
-    # -- contacts --------------------------------------------------------------------------
-
-    @property
-    def record_contacts(self) -> bool:
-        """Whether steps record contact events; settable."""
-        return self._core.record_contacts
-
-    @record_contacts.setter
-    def record_contacts(self, record: bool) -> None:
-        self._core.record_contacts = record
-
-    def take_contact_events(self) -> list[ContactEvent]:
-        """Returns the contact events since the last call, in order.
-
-        Raises:
-            StaleHandleError: The world is closed.
-            WorldLockedError: The world is stepping.
-        """
-        columns = self._core.take_contact_rows()
-        return [] if columns is None else to_events(columns)
-
-    def record_contacts_of(self, body_id: int, kinds: int) -> None:
-        """Records the contact events of one body, besides those of others.
-
-        Args:
-            body_id: The body.
-            kinds: 1 for `begin`, 2 for `end`, 4 for `post_solve`, or a sum of them; 0 for none.
-        """
-        self._core.record_body_contacts(body_id, kinds)
-
-    def record_contacts_of_all(self, kinds: int) -> None:
-        """Records the contact events of some kinds of all bodies; see `record_contacts_of`."""
-        self._core.record_all_contacts(kinds)
-
-    def own_bodies(self, bodies: Iterable[PhysicsBody], are_owned: bool) -> None:
-        """Sets whether bodies belong to a model or a layer; others are ignored by `Touches`."""
-        self._core.own_bodies([body.id for body in bodies], are_owned)
-
-    def collect_touches(
-        self,
-        bodies: Iterable[PhysicsBody],
-        *,
-        exclude: Iterable[PhysicsBody] = (),
-        sensors: bool = True,
-        own: bool = True,
-    ) -> Touches:
-        """Collects the contacts of bodies with bodies of models and layers.
-
-        Args:
-            bodies: The bodies.
-            exclude: Bodies whose contacts are ignored.
-            sensors: Whether to collect contacts with sensors, which have no effect on bodies.
-            own: Whether to collect contacts between two of the bodies.
-
-        Returns:
-            The contacts, also those that exist already.
-
-        Raises:
-            StaleHandleError: A body was destroyed.
-            WorldLockedError: The world is stepping.
-        """
-        touches = self._core.add_touches(
-            [body.id for body in bodies], [body.id for body in exclude], sensors, own
-        )
-        return Touches(self, touches)
-
-    def contacts(self) -> list[ContactInfo]:
-        """Returns the contacts of all fixtures that currently touch.
-
-        Raises:
-            StaleHandleError: The world is closed.
-            WorldLockedError: The world is stepping.
-        """
-        columns = self._core.touching_rows()
-        return [] if columns is None else to_infos(columns)

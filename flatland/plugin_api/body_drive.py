@@ -99,6 +99,8 @@ class BodyDrive(ModelPlugin):
     def model_moved(self, previous: Mapping[str, Pose], keep_odometry: bool) -> None:
         """Keeps the odometry, or displaces it along with the model."""
         self._odometer.move(previous[self.body.name], keep_odometry)
+        if self.traction is not None:
+            self._controller.release_brakes()
 
     def state(self) -> object:
         """Returns the state of the controller and of the odometry."""

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import logging
 import math
-import time
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 from flatland.geometry import IDENTITY, DoubleArray, Pose, Vector2, compose, invert, rotate
@@ -17,6 +15,7 @@ from flatland.plugin_api.after_step import (
     read_after_step,
 )
 from flatland.plugin_api.noise import GaussianNoise
+from flatland.plugin_api.occasional_warning import OccasionalWarning
 from flatland.plugin_api.odometry_drift import OdometryDrift
 from flatland.plugin_api.parameters import (
     planar_diagonal,
@@ -37,11 +36,8 @@ if TYPE_CHECKING:
     from flatland.plugin_api.ports import Command, Output
     from flatland.timekeeper import Timekeeper
 
-_LOG = logging.getLogger("flatland")
-
 C = TypeVar("C", Twist, AckermannCommand)
 
-WARNING_PERIOD = 1.0  # s of wall time between two warnings of one drive, at least
 # m/s, rad/s; beyond the speed of any robot, and small enough for the range of the physics.
 MAX_COMMAND = 1e6
 
@@ -56,7 +52,7 @@ class CommandGuard(Generic[C]):
             owner: Name of the drive for the log, such as `plugin "drive" of model "robot"`.
         """
         self._owner = owner
-        self._last_warning = -math.inf
+        self._warning = OccasionalWarning()
 
     @classmethod
     def of(cls, plugin: ModelPlugin) -> CommandGuard[C]:
@@ -67,14 +63,11 @@ class CommandGuard(Generic[C]):
         """Returns whether a command is valid; otherwise logs a warning, at most one a second."""
         if all(abs(getattr(command, name)) <= MAX_COMMAND for name in command.__slots__):
             return True
-        now = time.monotonic()
-        if now - self._last_warning >= WARNING_PERIOD:
-            self._last_warning = now
-            _LOG.warning(
-                "%s: %s is not finite or out of range, the previous command remains in effect",
-                self._owner,
-                command,
-            )
+        self._warning.log(
+            "%s: %s is not finite or out of range, the previous command remains in effect",
+            self._owner,
+            command,
+        )
         return False
 
 

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from flatland.config.hints import did_you_mean
-from flatland.geometry import IDENTITY, DoubleArray, Pose
+from flatland.geometry import IDENTITY, DoubleArray, Pose, Vector2
 
 if TYPE_CHECKING:
     from flatland.config.reader import YamlReader
@@ -98,6 +98,34 @@ def read_finite(config: YamlReader, key: str, default: float) -> float:
         YamlError: The value is not a number, infinite or NaN.
     """
     return config.get(key, "float", default, finite=True)
+
+
+def read_positive(config: YamlReader, key: str, *default: float) -> float:
+    """Reads a number above 0.
+
+    Args:
+        config: Parameters of the plugin.
+        key: Name of the parameter.
+        default: The default; without one, the parameter is required.
+
+    Raises:
+        YamlError: The value is not a number, not finite or not above 0.
+    """
+    number: float = config.get(key, "float", *default, finite=True)
+    if number <= 0.0:
+        raise config.invalid(key, f"must be greater than 0, got {number}")
+    return number
+
+
+def read_point(config: YamlReader, key: str) -> Vector2:
+    """Reads a point (x, y) in the frame of a body [m], by default its origin.
+
+    Raises:
+        YamlError: The value is not a point, or a number is not finite or beyond `MAX_COORDINATE`.
+    """
+    return config.get(
+        key, "vector", (0.0, 0.0), finite=True, minimum=-MAX_COORDINATE, maximum=MAX_COORDINATE
+    )
 
 
 def read_pose(config: YamlReader, key: str, default: Pose = IDENTITY) -> Pose:

@@ -48,9 +48,12 @@ class FlatlandPlugin:
         rng: Generator seeded from the seed of the world and the names of model, plugin and type.
             For the noise of an output, use `noise_stream`.
         ros: Access to ROS topics, services and parameters, None without ROS.
+        recorded_methods: Names of the methods that may be called by `World.call_plugin`, so that
+            recordings repeat the calls.
     """
 
     base_class_type: ClassVar[str] = ""
+    recorded_methods: ClassVar[frozenset[str]] = frozenset()
     outside_state: ClassVar[dict[str, Callable[[], object]]] = {"ros": lambda: None}
 
     name: str
@@ -444,12 +447,9 @@ class WorldPlugin(FlatlandPlugin):
 
     Attributes:
         world_config: Reader of the whole world file.
-        recorded_methods: Names of the methods that may be called by `World.call_plugin`, so that
-            recordings repeat the calls.
     """
 
     base_class_type = "flatland::WorldPlugin"
-    recorded_methods: ClassVar[frozenset[str]] = frozenset()
 
     world_config: YamlReader
 

@@ -14,7 +14,7 @@ from flatland.plugin_api.parameters import at_key
 
 if TYPE_CHECKING:
     from flatland.config.reader import YamlReader
-    from flatland.geometry import FloatArray
+    from flatland.geometry import DoubleArray, FloatArray
     from flatland.world import World
 
 MAX_BEAMS = 1_000_000
@@ -67,15 +67,25 @@ class BeamAngles:
         angles = self.minimum + self.increment * np.arange(self.count, dtype=np.float64)
         if upside_down:
             angles = -angles
-        ends = length * np.stack([np.cos(angles), np.sin(angles)], axis=1)
-        points = np.ascontiguousarray(ends, dtype=np.float32)
-        points.flags.writeable = False
-        return points
+        return end_points(angles, length)
 
     @functools.lru_cache(maxsize=16)  # noqa: B019 - shared by all robots of one kind
     def fan(self, length: float, upside_down: bool) -> BeamFan:
         """Returns the beams of a length [m] prepared for scans, sensor frame."""
         return BeamFan(self.end_points(length, upside_down))
+
+
+def end_points(angles: DoubleArray, length: float) -> FloatArray:
+    """Returns the ends of beams, sensor frame, shape (n, 2), read-only.
+
+    Args:
+        angles: Angles of the beams [rad].
+        length: Length of the beams [m].
+    """
+    ends = length * np.stack([np.cos(angles), np.sin(angles)], axis=1)
+    points = np.ascontiguousarray(ends, dtype=np.float32)
+    points.flags.writeable = False
+    return points
 
 
 def read_range(config: YamlReader) -> float:

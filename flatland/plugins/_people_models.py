@@ -57,7 +57,7 @@ def model_text(
                     "footprints": [foot],
                 }
             )
-    return json.dumps({"bodies": bodies})
+    return json.dumps({"class": "person", "bodies": bodies})
 
 
 def parties_of(places: DoubleArray, size: int) -> list[list[int]]:

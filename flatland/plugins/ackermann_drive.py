@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from flatland.plugin_api.body_drive import BodyDrive
 from flatland.plugin_api.drive import CommandGuard
 from flatland.plugin_api.dynamics_limits import DynamicsLimits
-from flatland.plugin_api.parameters import at_key, read_body
+from flatland.plugin_api.parameters import at_key, read_body, read_point, read_positive
 from flatland.plugin_api.traction import read_traction
 from flatland.plugin_api.wheel_joint import WheelJoint, is_off
 from flatland.values import AckermannCommand, Twist
@@ -59,12 +59,8 @@ class CarGeometry:
             YamlError: A parameter is missing or invalid.
         """
         if not any(key in config for key in _JOINTS):
-            wheelbase = config.get("wheelbase", "float", finite=True)
-            if wheelbase <= 0.0:
-                raise at_key(config, "wheelbase").error(
-                    f'Invalid "wheelbase", must be greater than 0, got {wheelbase}'
-                )
-            return cls(wheelbase, 0.0, config.get("rear_axle", "vector", (0.0, 0.0), finite=True))
+            wheelbase = read_positive(config, "wheelbase")
+            return cls(wheelbase, 0.0, read_point(config, "rear_axle"))
         wheels = [WheelJoint(config, key, model) for key in _JOINTS]
         for wheel, key in zip(wheels, _JOINTS, strict=True):
             kind = "revolute" if key.startswith("front") else "weld"

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import logging
 import math
 from typing import TYPE_CHECKING, Any
 
@@ -10,7 +9,14 @@ from flatland.errors import WorldError
 from flatland.geometry import compose, invert
 from flatland.physics.fixture import ALL_BITS
 from flatland.plugin_api.after_step import AFTER
-from flatland.plugin_api.parameters import at_key, read_body_or_first, read_rate
+from flatland.plugin_api.occasional_warning import OccasionalWarning
+from flatland.plugin_api.parameters import (
+    MAX_COORDINATE,
+    at_key,
+    read_body_or_first,
+    read_point,
+    read_rate,
+)
 from flatland.plugin_api.plugin import ModelPlugin
 from flatland.plugin_api.schedule import when_due
 from flatland.plugin_api.update_timer import UpdateTimer
@@ -21,11 +27,9 @@ if TYPE_CHECKING:
     from flatland.config.reader import YamlReader
     from flatland.entities.body import Body
     from flatland.entities.model import Model
-    from flatland.geometry import Pose, Vector2
+    from flatland.geometry import Pose
     from flatland.physics import PhysicsJoint
     from flatland.timekeeper import Timekeeper
-
-_LOG = logging.getLogger("flatland")
 
 TYPES = ("hinge", "weld")
 
@@ -40,21 +44,24 @@ class Hitch(ModelPlugin):
     are the same for Python programs. A connection ends if one of the models is moved or deleted.
     """
 
+    recorded_methods = frozenset(["connect", "release"])
+
     def on_initialize(self, config: YamlReader) -> None:
         """Reads the parameters and declares the ports."""
         self._body = read_body_or_first(config, self.model, "body")
-        self._origin: Vector2 = config.get("origin", "vector", (0.0, 0.0), finite=True)
+        self._origin = read_point(config, "origin")
         self._type: str = config.get("joint", "string", TYPES[0])
         if self._type not in TYPES:
             raise at_key(config, "joint").error(
                 f'Invalid "joint", must be one of: {", ".join(TYPES)}, got {self._type}'
             )
-        self._reach: float = config.get("reach", "float", 0.1, minimum=0, finite=True)
+        self._reach: float = config.get("reach", "float", 0.1, minimum=0, maximum=MAX_COORDINATE)
         self._max_angle: float = config.get("max_angle", "float", 0.0, minimum=0, maximum=math.pi)
         if self._max_angle and self._type == "weld":
             raise at_key(config, "max_angle").error('"max_angle" requires "joint: hinge"')
         self._names = config.get_list("models", "string", [])
         self._collides: bool = config.get("collide", "bool", False)
+        self._warning = OccasionalWarning()
         self._joint: PhysicsJoint | None = None
         self._other: Model | None = None
         self._timer = UpdateTimer(read_rate(config, default=_DEFAULT_RATE))
@@ -82,61 +89,68 @@ class Hitch(ModelPlugin):
     def _obey(self) -> None:
         """Carries out the last command once; logs a warning if that is not possible."""
         is_start = self._handled < 0
-        problem = self._carry_out()
-        if problem and not is_start:
-            _LOG.warning("%s", problem)
-
-    def _carry_out(self) -> str:
-        """Carries out the last command once, and returns why that is not possible."""
         if self._handled == self._command.received:
-            return ""
-        self._handled = self._command.received
+            return
         if not self._command.value:
-            self.detach()
-            return ""
+            self.release()
+            return
         try:
-            self.attach()
+            self.connect()
         except WorldError as error:
-            return str(error)
-        return ""
+            if not is_start:
+                self._warning.log("%s", error)
 
     def _serve(self, request: Any) -> Any:
         """Handles a call of the service; called between two steps."""
         from std_srvs.srv import SetBoolResponse
 
-        before = self.hitched
-        self._command.set(bool(request.data))  # which recordings contain
-        problem = self._carry_out()
-        if problem:
-            return SetBoolResponse(success=False, message=problem)
-        now = self.hitched if request.data else before
-        done = "hitched" if request.data else "released"
-        return SetBoolResponse(success=True, message=f"{done}: {now.name if now else 'nothing'}")
+        done, other = "released", self.hitched
+        try:
+            if request.data:
+                done, other = "hitched", self.attach()
+            else:
+                self.detach()
+        except WorldError as error:
+            return SetBoolResponse(success=False, message=str(error))
+        name = "nothing" if other is None else other.name
+        return SetBoolResponse(success=True, message=f"{done}: {name}")
 
     @property
     def hitched(self) -> Model | None:
         """The model that is connected; None if there is none."""
         return self._other if self._joint is not None and self._joint.alive else None
 
-    def attach(self, name: str | None = None) -> Model:
-        """Connects a model; keeps an existing connection.
+    def attach(self, name: str | None = None) -> Model | None:
+        """Connects a model between two steps; keeps an existing connection.
 
         Args:
             name: Name of the model; None for the nearest one within reach.
 
         Returns:
-            The connected model.
+            The connected model; None if a hook calls this: it is then connected after the step.
 
         Raises:
             WorldError: No model, or not the one of this name, is within reach, or its angle is
                 beyond `max_angle`.
         """
+        self.world.call_plugin(self, "connect", {"name": name})
+        return self.hitched
+
+    def detach(self) -> None:
+        """Releases the connected model between two steps; without one, it has no effect."""
+        self.world.call_plugin(self, "release", {})
+
+    # -- methods that recordings repeat ----------------------------------------------------
+
+    def connect(self, name: str | None = None) -> None:
+        """Connects a model at once; see `attach`."""
+        self._handled = self._command.received
         connected = self.hitched
         if connected is not None:
             if name in (None, connected.name):
-                return connected
+                return
             raise WorldError(f'{self._who()} is already connected to "{connected.name}"')
-        self.detach()
+        self._disconnect()
         nearest = min(self._within_reach(name), default=None, key=lambda found: found[0])
         if nearest is None:
             what = "no model" if name is None else f'model "{name}"'
@@ -146,10 +160,13 @@ class Hitch(ModelPlugin):
         self._joint = self._connect(body)
         self._other = model
         model.followers.append(self)
-        return model
 
-    def detach(self) -> None:
-        """Releases the connected model; without one, it has no effect."""
+    def release(self) -> None:
+        """Releases the connected model at once; see `detach`."""
+        self._handled = self._command.received
+        self._disconnect()
+
+    def _disconnect(self) -> None:
         if self._joint is not None and self._joint.alive:
             self._joint.destroy()
         if self._other is not None and self in self._other.followers:
@@ -234,11 +251,11 @@ class Hitch(ModelPlugin):
     def model_moved(self, previous: Mapping[str, Pose], keep_odometry: bool) -> None:
         """Releases the connected model: this model or the other one was moved."""
         del previous, keep_odometry
-        self.detach()
+        self._disconnect()
 
     def on_shutdown(self) -> None:
         """Releases the connected model."""
-        self.detach()
+        self._disconnect()
 
     def state(self) -> object:
         """Returns the name of the connected model and the number of commands carried out."""

@@ -7,7 +7,13 @@ from typing import TYPE_CHECKING
 
 from flatland.plugin_api.body_drive import BodyDrive
 from flatland.plugin_api.dynamics_limits import DynamicsLimits
-from flatland.plugin_api.parameters import at_key, read_body, read_finite, read_not_negative
+from flatland.plugin_api.parameters import (
+    at_key,
+    read_body,
+    read_finite,
+    read_not_negative,
+    read_positive,
+)
 from flatland.plugin_api.traction import read_traction
 from flatland.plugin_api.wheels import GroundWheel, mecanum_wheels, three_wheels
 
@@ -93,18 +99,11 @@ def _read_wheels(config: YamlReader) -> tuple[GroundWheel, ...]:
     if layout == "none":
         return ()
     if layout == "mecanum":
-        return mecanum_wheels(_read_length(config, "wheelbase"), _read_length(config, "track"))
+        return mecanum_wheels(read_positive(config, "wheelbase"), read_positive(config, "track"))
     if layout == "three_wheel":
         return three_wheels(
-            _read_length(config, "wheel_distance"), read_finite(config, "wheel_angle", math.pi / 3)
+            read_positive(config, "wheel_distance"), read_finite(config, "wheel_angle", math.pi / 3)
         )
     raise at_key(config, "layout").error(
         f'Invalid "layout", must be one of: {", ".join(_LAYOUTS)}, got {layout}'
     )
-
-
-def _read_length(config: YamlReader, key: str) -> float:
-    length: float = config.get(key, "float", finite=True)
-    if length <= 0.0:
-        raise at_key(config, key).error(f'Invalid "{key}", must be greater than 0, got {length}')
-    return length

@@ -14,6 +14,7 @@ from flatland.plugin_api.parameters import (
     at_key,
     read_body_or_first,
     read_not_negative,
+    read_positive,
 )
 from flatland.plugin_api.plugin import ModelPlugin
 from flatland.plugin_api.schedule import when_due
@@ -47,7 +48,9 @@ class PathFollower(ModelPlugin):
         heading = _read_choice(config, "heading", HEADINGS)
         frame = _read_choice(config, "frame", FRAMES)
         origin = self._body.pose if frame == "start" else IDENTITY
-        waypoints = [compose(origin, each) for each in _read_waypoints(config, heading)]
+        mode = _read_choice(config, "mode", MODES)
+        linear, angular = _read_limits(config, ""), _read_limits(config, "angular_")
+        wait: float = config.get("wait", "float", 0.0, minimum=0, finite=True)
         self._start_command: Command[bool] | None = None
         self._is_started: bool = config.get("start", "bool", True)
         self._starts = 0
@@ -58,12 +61,12 @@ class PathFollower(ModelPlugin):
             raise at_key(config, "start").error('"start: false" requires a "start_topic"')
         self._controller = self.control(
             self._body.control_path(
-                waypoints,
-                mode=_read_choice(config, "mode", MODES),
+                [compose(origin, each) for each in _read_waypoints(config, heading)],
+                mode=mode,
                 faces_forward=heading == "forward",
-                linear=_read_limits(config, ""),
-                angular=_read_limits(config, "angular_"),
-                wait=config.get("wait", "float", 0.0, minimum=0, finite=True),
+                linear=linear,
+                angular=angular,
+                wait=wait,
                 key=_draw_key(self.rng),
             )
         )
@@ -137,10 +140,7 @@ def _read_choice(config: YamlReader, key: str, choices: tuple[str, ...]) -> str:
 
 def _read_limits(config: YamlReader, prefix: str) -> SpeedLimits:
     """Reads the limits of speed, acceleration and deceleration of the translation or rotation."""
-    key = f"{prefix}speed"
-    speed: float = config.get(key, "float", 1.0, finite=True)
-    if speed <= 0.0:
-        raise at_key(config, key).error(f'Invalid "{key}", must be greater than 0, got {speed}')
+    speed = read_positive(config, f"{prefix}speed", 1.0)
     acceleration = read_not_negative(config, f"{prefix}acceleration", 0.0)
     deceleration = read_not_negative(config, f"{prefix}deceleration", acceleration)
     return (

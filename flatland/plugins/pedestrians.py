@@ -2,46 +2,40 @@
 
 from __future__ import annotations
 
-import dataclasses
 import importlib.util
 import math
 from collections.abc import Iterable, Sequence
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from flatland.errors import WorldError
 from flatland.geometry import DoubleArray, Vector2
-from flatland.physics import Crowd
 from flatland.plugin_api.after_step import AFTER, BEFORE, NeverDue
-from flatland.plugin_api.parameters import at_key, read_rate
+from flatland.plugin_api.parameters import read_rate
 from flatland.plugin_api.plugin import WorldPlugin
 from flatland.plugin_api.schedule import when_due
 from flatland.plugin_api.update_timer import UpdateTimer
 from flatland.plugins._people_config import (
     BODY_TYPES,
-    MODELS,
-    ORCA,
-    SOCIAL_FORCE,
     read_choice,
     read_groups,
     read_legs,
-    read_numbers,
     read_positive,
 )
+from flatland.plugins._people_crowd import create_crowd, read_bits
+from flatland.plugins._people_markers import MarkerSource, fields_of
 from flatland.plugins._people_models import BODY, LEGS, model_text, parties_of, preferred_speeds
-from flatland.values import People, PeopleStates, TrackedPeople
+from flatland.plugins._people_places import PeoplePlaces
+from flatland.plugins._people_services import PeopleServices
+from flatland.values import People, PeopleMarkers, PeopleStates, TrackedPeople
 
 if TYPE_CHECKING:
     from flatland.config.reader import YamlReader
     from flatland.entities.model import Model
     from flatland.plugin_api.ports import Output
-    from flatland.plugins._people_config import Group, Stop
+    from flatland.plugins._people_config import Group
     from flatland.timekeeper import Timekeeper
-
-_CLEARANCE: Final = 0.02  # between a person on a way and the wall, at least [m]
-_WANDER_RADIUS: Final = 0.7  # distance at which a random place is reached [m]
-_MOST_DRAWS: Final = 6  # of free places, each twice as many as before
 
 
 class Pedestrians(WorldPlugin):
@@ -63,69 +57,30 @@ class Pedestrians(WorldPlugin):
         self._body_type = read_choice(config, "body_type", BODY_TYPES)
         self._mass = read_positive(config, "mass", 75.0)
         self._awareness = config.get("robot_awareness", "float", 1.0, minimum=0, maximum=1)
-        self._bits = self._read_bits(config)
+        bits = read_bits(config, self.world, self._layers, self._legs, self._body_type)
         self._frame_id: str = config.get("world_frame_id", "string", "map")
-        self._crowd = self.control(self._create_crowd(config))
+        self._crowd = self.control(
+            create_crowd(
+                config,
+                self.world,
+                self._groups,
+                self._legs,
+                bits=bits,
+                is_dynamic=self._body_type == "dynamic",
+                key=self._draw_key(),
+            )
+        )
+        self._places = PeoplePlaces(self._crowd, self.world, bits, self.rng)
         self._names: dict[int, tuple[str, str]] = {}  # of person and group by id of the body
         self._numbers = {group.name: 0 for group in self._groups}
-        self._routes: dict[str, tuple[int, list[int]]] = {}
         self._open_ports(config)
         for group in self._groups:
             try:
-                self._routes[group.name] = self._add_route(group)
+                self._places.add_route(group)
                 if group.count:
-                    self._spawn(group, self._free_places(group, group.count))
+                    self._spawn(group, self._places.find_free(group, group.count))
             except WorldError as error:
                 raise group.reader.error(f'group "{group.name}": {error.message}') from error
-
-    # -- parameters ------------------------------------------------------------------------
-
-    def _read_bits(self, config: YamlReader) -> int:
-        """Returns the bits of all layers in which people are."""
-        layers = self.world.collision_filter
-        legs = [] if self._legs is None else self._legs.layers
-        for key, names in (("layers", self._layers), ("legs", legs)):
-            unknown = layers.unknown(names)
-            if unknown:
-                raise at_key(config, key).error(
-                    f'Invalid "{key}", {{{",".join(unknown)}}} layer(s) does not exist'
-                )
-        body_bits = layers.category_bits(self._layers) if self._layers else 0
-        leg_bits = layers.category_bits(legs) if legs else 0
-        if body_bits & leg_bits:
-            raise at_key(config, "legs").error(
-                'Invalid "legs", bodies and legs must not be in the same layer: lasers would '
-                "detect the bodies instead of the legs"
-            )
-        if self._body_type == "dynamic" and not body_bits:
-            raise at_key(config, "body_type").error(
-                'Invalid "body_type", dynamic people with legs require "layers", in which their '
-                "bodies collide"
-            )
-        return body_bits | leg_bits
-
-    def _create_crowd(self, config: YamlReader) -> Crowd:
-        model = read_choice(config, "model", MODELS)
-        rate = read_positive(config, "update_rate", 20.0)
-        numbers = read_numbers(config, "social_force", SOCIAL_FORCE) | read_numbers(
-            config, "orca", ORCA
-        )
-        numbers["sight"] = read_positive(config, "sight", 4.0)
-        numbers["fluctuation"] = config.get("fluctuation", "float", 0.1, finite=True, minimum=0)
-        numbers["cell"] = read_positive(config, "cell", 0.1)
-        numbers["clearance"] = max(group.radius for group in self._groups) + _CLEARANCE
-        if self._legs is not None:
-            numbers["leg_radius"] = self._legs.radius
-            numbers["leg_spacing"] = self._legs.spacing
-        return Crowd.create(
-            self.world.physics,
-            is_orca=model == "orca",
-            is_dynamic=self._body_type == "dynamic",
-            bits=self._bits,
-            interval=max(1, round(1.0 / (rate * self.world.timekeeper.step_size))),
-            key=self._draw_key(),
-            numbers=numbers,
-        )
 
     def _draw_key(self) -> int:
         return int(self.rng.integers(0, 1 << 64, dtype=np.uint64))
@@ -135,7 +90,9 @@ class Pedestrians(WorldPlugin):
         self._timer = UpdateTimer(read_rate(config, "pub_rate", 10.0))
         self._people = self.output(topic, People)
         self._states = self.output(f"{topic}/states", PeopleStates)
-        outputs: list[Output[Any]] = [self._people, self._states]
+        self._markers = self.output(f"{topic}/markers", PeopleMarkers)
+        self._marker_source = MarkerSource(self._groups)
+        outputs: list[Output[Any]] = [self._people, self._states, self._markers]
         self._tracked: Output[TrackedPeople] | None = None
         if self.ros is not None and importlib.util.find_spec("people_msgs") is not None:
             self._tracked = self.output(f"{topic}/tracked", TrackedPeople)
@@ -143,94 +100,7 @@ class Pedestrians(WorldPlugin):
         self.call_when_due(BEFORE, NeverDue())
         self.call_when_due(AFTER, self._timer, outputs=outputs)
         if self.ros is not None:
-            for name, definition, handler in (
-                ("spawn", "SpawnPeople", self._serve_spawn),
-                ("remove", "RemovePeople", self._serve_remove),
-                ("direct", "DirectPeople", self._serve_direct),
-            ):
-                self.ros.advertise_service(f"{name}_{topic}", definition, handler)
-
-    # -- routes and places -----------------------------------------------------------------
-
-    def _add_route(self, group: Group) -> tuple[int, list[int]]:
-        """Adds the waypoints of a group; returns the route and the waypoints."""
-        if group.stops:
-            waypoints = [self._add_stop(stop) for stop in group.stops]
-        else:
-            waypoints = self._add_random_places(group)
-        route = self._crowd.add_route(
-            waypoints, group.order, stop_interval=group.stop_interval, stop=group.stop_time
-        )
-        return route, waypoints
-
-    def _add_stop(self, stop: Stop) -> int:
-        waypoint = self._crowd.add_waypoint(
-            stop.low,
-            stop.high,
-            stop.radius,
-            wait=stop.wait,
-            is_queue=stop.is_queue,
-            spacing=stop.spacing,
-        )
-        if not self._crowd.reach(waypoint):
-            raise stop.reader.error("A waypoint is not in the free space: no person fits there")
-        return waypoint
-
-    def _add_random_places(self, group: Group) -> list[int]:
-        """Adds the places between which the people of a group wander."""
-        candidates = self._sample(group, 2 * group.places, None)[:, :2]
-        # Those in the largest part of the free space, as seen from one of the candidates.
-        best: list[Vector2] = []
-        for x, y in candidates[: group.places].tolist():
-            start = self._crowd.add_waypoint((x, y), (x, y), _WANDER_RADIUS, spacing=0.0)
-            found = [place for place in map(_pair, candidates) if self._has_way(start, place)]
-            if len(found) > len(best):
-                best = found
-            if len(best) > group.places:
-                break
-        if len(best) < 2:
-            raise WorldError("there are no two free places with a way between them")
-        return [
-            self._crowd.add_waypoint(place, place, _WANDER_RADIUS) for place in best[: group.places]
-        ]
-
-    def _has_way(self, waypoint: int, place: Vector2) -> bool:
-        return self._crowd.way(waypoint, place) != (0.0, 0.0)
-
-    def _free_places(self, group: Group, count: int) -> DoubleArray:
-        """Returns free places from which there is a way to the first waypoint of a group.
-
-        Raises:
-            WorldError: There are too few.
-        """
-        waypoint = self._routes[group.name][1][0]
-        wanted = count
-        for _ in range(_MOST_DRAWS):
-            places = self._sample(group, wanted, count)
-            with_way = [place for place in places if self._has_way(waypoint, _pair(place))]
-            if len(with_way) >= count:
-                return np.array(with_way[:count]).reshape(-1, 3)
-            wanted *= 2
-        raise WorldError(f"found only {len(with_way)} of {count} free places with a way")
-
-    def _sample(self, group: Group, count: int, least: int | None) -> DoubleArray:
-        """Samples free poses of people; fewer if there are not enough, but at least `least`."""
-        layers = [
-            name
-            for layer in self.world.layers
-            if layer.category_bits & self._bits
-            for name in layer.names
-        ]
-        radius, area = group.radius, group.area
-        while True:
-            try:
-                return self.world.sample_free(
-                    count, radius, 2.0 * _CLEARANCE, self.rng, layers=layers, bounds=area
-                )
-            except WorldError:
-                if count <= (least or 2):
-                    raise
-                count = max(least or 2, count // 2)
+            PeopleServices(self).advertise(self.ros, topic)
 
     # -- people ----------------------------------------------------------------------------
 
@@ -292,8 +162,8 @@ class Pedestrians(WorldPlugin):
         """
         self._direct(names, "resume", None)
 
-    def send(self, names: Iterable[str], goal: Vector2) -> None:
-        """Makes people walk to a place [m], and stand there until `resume`.
+    def send(self, names: Iterable[str] | None, goal: Vector2) -> None:
+        """Makes people walk to a place [m], and stand there until `resume`; None for everybody.
 
         Raises:
             WorldError: There is no person of a name, or nobody fits at the place.
@@ -318,7 +188,7 @@ class Pedestrians(WorldPlugin):
                 raise ValueError(f"count must be from 0 to 10000, got {count}")
             if count == 0:
                 return []
-            return self._spawn(chosen, self._free_places(chosen, count))
+            return self._spawn(chosen, self._places.find_free(chosen, count))
         return self._spawn(chosen, np.array(poses, dtype=np.float64).reshape(-1, 3))
 
     def remove_people(self, names: list[str] | None) -> None:
@@ -338,9 +208,9 @@ class Pedestrians(WorldPlugin):
         place = (goal[0], goal[1])
         if not (math.isfinite(place[0]) and math.isfinite(place[1])):
             raise ValueError(f"the goal must be finite [m], got {place}")
-        waypoint = self._crowd.add_waypoint(place, place, 0.3, spacing=0.0)
+        waypoint = self._places.add_goal(place)
         for model in models:
-            if not self._has_way(waypoint, model.pose[:2]):
+            if not self._places.has_way(waypoint, model.pose[:2]):
                 raise WorldError(
                     f'there is no way for "{model.name}" to the goal ({goal[0]:g}, {goal[1]:g})'
                 )
@@ -385,12 +255,10 @@ class Pedestrians(WorldPlugin):
         speeds = preferred_speeds(group, count, self.rng)
         aware = self.rng.random(count) < self._awareness
         phases = self.rng.random(count)
-        route, waypoints = self._routes[group.name]
-        first_legs = self._first_legs(group, len(parties), len(waypoints))
         models = self._spawn_models(text, names, poses)
         self._numbers[group.name] += count
-        for party, first_leg in zip(parties, first_legs, strict=True):
-            party_number = self._crowd.add_party(route, first_leg)
+        for party in parties:
+            party_number = self._places.add_party(group)
             for i in party:
                 model = models[i]
                 self._names[_body(model).id] = (model.name, group.name)
@@ -421,12 +289,6 @@ class Pedestrians(WorldPlugin):
             raise
         return models
 
-    def _first_legs(self, group: Group, parties: int, waypoints: int) -> list[int]:
-        if group.order != "random":
-            return [0] * parties
-        legs: list[int] = self.rng.integers(0, waypoints, parties).tolist()
-        return legs
-
     # -- steps -----------------------------------------------------------------------------
 
     @when_due
@@ -444,11 +306,10 @@ class Pedestrians(WorldPlugin):
             self._people.emit(People(states.stamp, states.frame_id, states.names, states.poses))
         if self._states.wanted:
             self._states.emit(states)
+        if self._markers.wanted:
+            self._markers.emit(self._marker_source.make(states, list(self._existing())))
         if self._tracked is not None and self._tracked.wanted:
-            fields = {
-                field.name: getattr(states, field.name) for field in dataclasses.fields(states)
-            }
-            self._tracked.emit(TrackedPeople(**fields))
+            self._tracked.emit(TrackedPeople(**fields_of(states)))
 
     def _read_people(self, stamp: int) -> PeopleStates:
         people = [person for person in self._crowd.people if person.body_id in self._names]
@@ -474,45 +335,9 @@ class Pedestrians(WorldPlugin):
         """Returns the state of the crowd, and the numbers of the next people."""
         return (self._crowd.state, sorted(self._numbers.items()))
 
-    # -- services --------------------------------------------------------------------------
-
-    def _serve_spawn(self, request: Any) -> Any:
-        poses = [(pose.x, pose.y, pose.theta) for pose in request.poses]
-        try:
-            names = self.spawn(request.group or None, request.count, poses or None)
-        except (WorldError, ValueError) as error:
-            return False, str(error), []
-        return True, "", names
-
-    def _serve_remove(self, request: Any) -> Any:
-        try:
-            self.remove(request.names or None)
-        except WorldError as error:
-            return False, str(error)
-        return True, ""
-
-    def _serve_direct(self, request: Any) -> Any:
-        names = request.names or None
-        try:
-            if request.action == request.STOP:
-                self.stop(names)
-            elif request.action == request.RESUME:
-                self.resume(names)
-            elif request.action == request.SEND:
-                self._direct(names, "send", (request.goal.x, request.goal.y))
-            else:
-                return False, f"action must be from 0 to 2, got {request.action}"
-        except (WorldError, ValueError) as error:
-            return False, str(error)
-        return True, ""
-
 
 def _body(model: Model) -> Any:
     body = model.find_body(BODY)
     if body is None:
         raise WorldError(f'model "{model.name}" is not a person')
     return body.physics
-
-
-def _pair(place: DoubleArray) -> Vector2:
-    return (float(place[0]), float(place[1]))

@@ -241,6 +241,8 @@ class TricycleDrive(ModelPlugin):
     def model_moved(self, previous: Mapping[str, Pose], keep_odometry: bool) -> None:
         """Keeps the odometry, or displaces it along with the model."""
         self._odometer.move(previous[self.body.name], keep_odometry)
+        if self.traction is not None:
+            self._controller.release_brakes()
 
     def state(self) -> object:
         """Returns the state of the front wheel and of the odometry."""

@@ -7,7 +7,14 @@ from typing import TYPE_CHECKING
 
 from flatland.physics import RollingWheel
 from flatland.plugin_api.after_step import AFTER
-from flatland.plugin_api.parameters import at_key, find_body, read_body_or_first, read_rate
+from flatland.plugin_api.parameters import (
+    at_key,
+    find_body,
+    read_body_or_first,
+    read_finite,
+    read_point,
+    read_rate,
+)
 from flatland.plugin_api.plugin import ModelPlugin
 from flatland.plugin_api.schedule import when_due
 from flatland.plugin_api.update_timer import UpdateTimer
@@ -22,6 +29,7 @@ if TYPE_CHECKING:
     from flatland.timekeeper import Timekeeper
 
 _MOST_TICKS = 1_000_000_000
+_SMALLEST_RADIUS = 1e-6  # m; angles remain finite
 
 
 class WheelStates(ModelPlugin):
@@ -53,20 +61,16 @@ class WheelStates(ModelPlugin):
 
     def _read_wheel(self, entry: YamlReader, default: Body) -> RollingWheel:
         name = entry.get("body", "string", default.name)
-        radius: float = entry.get("radius", "float", finite=True)
-        if radius <= 0.0:
-            raise at_key(entry, "radius").error(
-                f'Invalid "radius", must be greater than 0, got {radius}'
-            )
-        free: float = entry.get("roller_angle", "float", math.pi / 2, finite=True)
+        radius = entry.get("radius", "float", finite=True, minimum=_SMALLEST_RADIUS)
+        free = read_finite(entry, "roller_angle", math.pi / 2)
         if abs(math.sin(free)) < 1e-6:
             raise at_key(entry, "roller_angle").error(
                 f'Invalid "roller_angle", the wheel must not move freely where it rolls, got {free}'
             )
         return RollingWheel(
             find_body(entry, "body", self.model, name),
-            entry.get("position", "vector", (0.0, 0.0), finite=True),
-            entry.get("heading", "float", 0.0, finite=True),
+            read_point(entry, "position"),
+            read_finite(entry, "heading", 0.0),
             radius,
             # Exactly 0 for a wheel that slides sideways.
             0.0 if free == math.pi / 2 else 1.0 / math.tan(free),

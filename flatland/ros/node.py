@@ -19,12 +19,9 @@ from flatland.ros.parameters import NodeParameters, ParameterError, read_paramet
 from flatland.ros.shutdown import ShutdownWatchdog
 
 if TYPE_CHECKING:
-    from flatland.ros.browser_viewer import BrowserViewer
-    from flatland.ros.message_recorder import MessageRecorder
     from flatland.ros.parameter_server import ParameterServer
     from flatland.ros.transport.registrar import Registrar
-    from flatland.simulation import RunResult, Simulation
-    from flatland.world import World
+    from flatland.simulation import Simulation
 
 _LOG = logging.getLogger("flatland")
 
@@ -235,177 +232,14 @@ class ServerNode:
         # Other nodes have a valid time while the following modules are imported, which takes as
         # long as everything before. The import would delay the registration.
         self._registrar.flush(_REGISTRATION_TIMEOUT)
-        from flatland.ros.bridge import Bridge
-        from flatland.ros.deferred_topics import DeferredTopics
-        from flatland.ros.frame_monitor import FrameMonitor
-        from flatland.ros.hook_watchdog import HookWatchdog
-        from flatland.ros.operations import Operations
-        from flatland.ros.services import Services
-        from flatland.ros.transport.master_watch import MasterWatch
-        from flatland.simulation import Simulation
+        from flatland.ros.served_world import ServedWorld
 
-        master_watch = MasterWatch(self._registrar, self._replace)
-        bridge = Bridge(self._registrar, clock)
-        world = _load(parameters, bridge)
-        message_recorder = _start_recordings(parameters, world)
-        self._fault_reports.world = world
-        hook_watchdog = HookWatchdog(world)
-        simulation = Simulation(
-            world,
-            parameters.update_rate,
-            max_lag=parameters.max_lag,
-            lockstep=parameters.lockstep,
-            report=lambda report: _LOG.debug("%s", report),
-        )
-        self._simulation = simulation
-        if self._stopping.is_set():
-            simulation.stop()
-        debug_rate = parameters.viz_pub_rate if parameters.show_viz else None
-        deferred_topics = DeferredTopics(
-            self._registrar,
-            simulation,
-            debug_rate=debug_rate,
-            move_keeps_odometry=parameters.move_keeps_odometry,
-        )
-        browser_viewer: BrowserViewer | None = None
-        frame_monitor = FrameMonitor(self._registrar, simulation, bridge.subscribed)
-        try:
-            _publish_map(self._registrar, world, parameters)
-            operations = Operations(
-                self._registrar,
-                simulation,
-                clock,
-                parameters.if_blocked,
-                move_keeps_odometry=parameters.move_keeps_odometry,
-            )
-            Services(
-                self._registrar,
-                simulation,
-                clock,
-                operations,
-                parameters.if_blocked,
-                move_keeps_odometry=parameters.move_keeps_odometry,
-                model_states_rate=parameters.model_states_rate,
-            )
-            if parameters.web is not None:
-                from flatland.ros.browser_viewer import BrowserViewer
-
-                browser_viewer = BrowserViewer(
-                    self._registrar, simulation, operations, parameters.web
-                )
-            if parameters.initialpose_model:
-                from flatland.ros.initial_pose import InitialPose
-
-                InitialPose(
-                    self._registrar, simulation, parameters.initialpose_model, parameters.if_blocked
-                )
-            if parameters.benchmark_duration is None:
-                simulation.run()
-            else:
-                result = simulation.run(parameters.benchmark_duration)
-                if not simulation.stopped:
-                    _log_benchmark(result)
-        finally:
-            master_watch.close()
-            hook_watchdog.close()
-            if browser_viewer is not None:
-                browser_viewer.close()
-            deferred_topics.close()
-            frame_monitor.close()
-            # Plugins are closed before their topics, so that `on_shutdown` can publish; rospy then
-            # unregisters all topics at once.
-            bridge.close()
-            world.close()
-            if message_recorder is not None:
-                message_recorder.close()
-            clock.close()
-
-
-def _start_recordings(parameters: NodeParameters, world: World) -> MessageRecorder | None:
-    """Starts the recordings that the parameters name.
-
-    Returns:
-        The recorder of messages, None if there is none.
-
-    Raises:
-        FlatlandError: A file cannot be created; the world is closed.
-    """
-    recorder: MessageRecorder | None = None
-    try:
-        if parameters.record:
-            world.record(parameters.record)
-            _LOG.info('recording the run to "%s"', parameters.record)
-        if parameters.record_mcap:
-            from flatland.ros.message_recorder import create_mcap_recorder
-
-            recorder = create_mcap_recorder(parameters.record_mcap, ends_on_error=True)
-            recorder.observe(world)
-            _LOG.info('recording messages to "%s"', parameters.record_mcap)
-    except OSError as error:
-        world.close()
-        text = f'cannot create "{parameters.record_mcap}": {error.strerror}'
-        raise FlatlandError(text) from error
-    except FlatlandError:
-        world.close()
-        raise
-    return recorder
-
-
-def _load(parameters: NodeParameters, bridge: Any) -> World:
-    from flatland.ros.parameter_server import yaml_parameter
-    from flatland.world import World
-
-    start = time.perf_counter()
-    world = World.from_yaml(
-        parameters.world_path,
-        seed=parameters.seed,
-        params=yaml_parameter,
-        simplify_map=parameters.simplify_map,
-        step_size=parameters.step_size,
-        observers=[bridge],
-        plugin_timeout=parameters.plugin_timeout,
-        plugin_errors="disable",
-        on_invalid_body="remove",
-        model_path=parameters.model_path,
-    )
-    _LOG.info(
-        'loaded "%s" in %.2f s: %d layers, %d models',
-        world.path,
-        time.perf_counter() - start,
-        len(world.layers),
-        len(world.models),
-    )
-    return world
-
-
-def _publish_map(registrar: Registrar, world: World, parameters: NodeParameters) -> None:
-    """Publishes the layer that the parameters or the world file name as a map, if any.
-
-    Raises:
-        ParameterError: The layer of the parameter does not exist.
-        FlatlandError: The layer cannot be published.
-    """
-    layer = parameters.publish_map or ("" if parameters.publish_map is None else world.map_layer)
-    if not layer:
-        return
-    from flatland.ros.map_topics import MapTopics
-
-    names = [name for each in world.layers for name in each.names]
-    if layer not in names:
-        raise ParameterError(
-            'Invalid parameter "~publish_map": it must be the name of a layer '
-            f"({', '.join(names) or 'none'}), got {layer!r}"
-        )
-    MapTopics(registrar, world, layer, parameters.map_frame, parameters.map_resolution)
-
-
-def _log_benchmark(result: RunResult) -> None:
-    _LOG.info(
-        "benchmark: %d iterations in %.3f s of wall time, %.1f iterations a second",
-        result.steps,
-        result.wall_time,
-        result.steps_per_second,
-    )
+        with ServedWorld(parameters, self._registrar, clock, self._replace) as served:
+            self._fault_reports.world = served.world
+            self._simulation = served.simulation
+            if self._stopping.is_set():
+                served.simulation.stop()
+            served.run()
 
 
 def _check_time_of_other_nodes(use_sim_time: bool, others: bool) -> None:

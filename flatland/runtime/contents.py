@@ -6,16 +6,15 @@ import os
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, TypeVar, cast
 
-import numpy as np
-
 from flatland.config.reader import ReadYaml, YamlReader
 from flatland.errors import WorldError
-from flatland.geometry import DoubleArray
 from flatland.loading.model_source import ModelSpec
+from flatland.plugin_api.plugin import ModelPlugin
 from flatland.runtime.appearance import Appearance
+from flatland.runtime.free_places import FreePlaces
 from flatland.runtime.layer_maps import LayerMaps
 from flatland.runtime.many_models import ManyModels, plain_pose
-from flatland.runtime.placement import IfBlocked, Models, check_if_blocked
+from flatland.runtime.placement import IfBlocked, check_if_blocked
 from flatland.runtime.saved_states import SavedStates
 from flatland.runtime.state_hash import state_hash
 
@@ -29,7 +28,7 @@ if TYPE_CHECKING:
     from flatland.entities.layer import Layer
     from flatland.entities.model import Model
     from flatland.physics import PhysicsWorld
-    from flatland.plugin_api.plugin import WorldPlugin
+    from flatland.plugin_api.plugin import FlatlandPlugin, WorldPlugin
     from flatland.plugin_api.port_registry import PortRegistry
     from flatland.plugin_api.ports import CommandTopic, Output
     from flatland.runtime.change_log import ChangeLog
@@ -48,7 +47,7 @@ if TYPE_CHECKING:
 R = TypeVar("R")
 
 
-class Contents(ManyModels, LayerMaps, Appearance, SavedStates):
+class Contents(ManyModels, LayerMaps, Appearance, FreePlaces, SavedStates):
     """Everything that is in a world; the base class of `World`, which creates and steps it.
 
     Changes that a plugin's hook requests take effect after the step.
@@ -235,16 +234,21 @@ class Contents(ManyModels, LayerMaps, Appearance, SavedStates):
         self._change("delete_model", {"name": name}, lambda: self._models.delete(name))
 
     def call_plugin(
-        self, plugin: WorldPlugin | str, method: str, arguments: Mapping[str, object]
+        self,
+        plugin: FlatlandPlugin | str,
+        method: str,
+        arguments: Mapping[str, object],
+        model: str = "",
     ) -> Any:
-        """Calls a method of a world plugin between two steps, as a change of the world.
+        """Calls a method of a plugin between two steps, as a change of the world.
 
         Recordings contain the call with its arguments, so that a replay repeats it.
 
         Args:
             plugin: The plugin or its name.
-            method: One of `WorldPlugin.recorded_methods` of its class.
+            method: One of `FlatlandPlugin.recorded_methods` of its class.
             arguments: Arguments of the method by name: values that a recording can contain.
+            model: Name of the model if `plugin` is the name of a model plugin.
 
         Returns:
             What the method returns; None if a hook calls this: it is then called after the step.
@@ -252,14 +256,21 @@ class Contents(ManyModels, LayerMaps, Appearance, SavedStates):
         Raises:
             WorldError: The plugin or the method does not exist.
         """
+        if isinstance(plugin, ModelPlugin):
+            model = plugin.model.name
         name = plugin if isinstance(plugin, str) else plugin.name
-        found = next((one for one in self.plugins if plugin in (one, one.name)), None)
+        plugins: Iterable[FlatlandPlugin] = self.plugins
+        if model:
+            owner = self._models.by_name.get(model)
+            plugins = () if owner is None else owner.plugins
+        found = next((one for one in plugins if plugin in (one, one.name)), None)
         if found is None or method not in type(found).recorded_methods:
-            raise WorldError(f'world plugin "{name}" with the method {method} does not exist')
+            what = f'plugin "{name}" of model "{model}"' if model else f'world plugin "{name}"'
+            raise WorldError(f"{what} with the method {method} does not exist")
         call = getattr(found, method)
         return self._change(
             "call_plugin",
-            {"plugin": name, "method": method, "arguments": dict(arguments)},
+            {"plugin": name, "method": method, "arguments": dict(arguments), "model": model},
             lambda: call(**arguments),
         )
 
@@ -413,90 +424,6 @@ class Contents(ManyModels, LayerMaps, Appearance, SavedStates):
             return state_hash(self.seed, self.timekeeper, self.physics, self.models, self.plugins)
 
         return self._read(read)
-
-    # -- free places -----------------------------------------------------------------------
-
-    def is_free(
-        self,
-        pose: Sequence[float],
-        radius: float | None = None,
-        *,
-        model: str | Model | None = None,
-        layers: str | Iterable[str] = "all",
-        clearance: float = 0.0,
-        ignore: Models = (),
-    ) -> bool:
-        """Returns whether a disc or a model does not overlap anything at a pose.
-
-        It can overlap the edges of walls and the solid footprints of models that it would collide
-        with. Overlaps of up to 5 mm are ignored. Walls are edges without an interior: the interior
-        of a solid obstacle of a map image is free, too, unless an edge is touched.
-
-        Args:
-            pose: (x, y) or (x, y, theta) of the centre of the disc, or of the first body of the
-                model, in the world frame [m, rad].
-            radius: Radius of the disc [m]; either this or `model` is required.
-            model: A model of the world, or its name; its bodies keep their poses relative to each
-                other, and it does not overlap itself.
-            layers: Names of the layers that the disc collides with; the footprints of a model have
-                their own layers.
-            clearance: Distance to keep from everything that can be overlapped [m].
-            ignore: Models, or their names, that may be overlapped.
-
-        Raises:
-            WorldError: A model or layer does not exist, or the world is closed.
-            ValueError: A number is out of range, or not exactly one of radius and model is given.
-        """
-        return self._read(
-            lambda: self._placement.is_free(pose, radius, model, layers, clearance, ignore)
-        )
-
-    def sample_free(
-        self,
-        n: int,
-        radius: float,
-        clearance: float = 0.0,
-        rng: np.random.Generator | int | None = None,
-        *,
-        connected_to: Sequence[float] | None = None,
-        layers: str | Iterable[str] = "all",
-        bounds: Sequence[float] | None = None,
-        ignore: Models = (),
-    ) -> DoubleArray:
-        """Samples random free poses, for example to spawn robots at.
-
-        The poses are within the bounds of the walls, at least `clearance` away from walls, models
-        and each other. The interior of solid obstacles and of closed rooms is free space, too;
-        with `connected_to`, only places that the disc can reach are sampled.
-
-        Args:
-            n: Number of poses.
-            radius: Radius of the discs [m].
-            clearance: Distance that the discs keep [m].
-            rng: Generator or seed; the same seed results in the same poses. None for a generator
-                that derives from the seed of the world.
-            connected_to: A point (x, y) in the world frame [m]. From there, a path of a disc leads
-                to each pose without touching a wall; models do not block paths. A passage that is
-                wider than the disc by less than a cell of the planning grid (at most 5 cm for maps
-                of less than 200 m by 200 m) may be treated as closed.
-            layers: Names of the layers that the discs collide with.
-            bounds: (x_min, y_min, x_max, y_max) of the area of the samples and of the paths, in the
-                world frame [m]; None for the bounds of the walls.
-            ignore: Models, or their names, that may be overlapped.
-
-        Returns:
-            (x, y, theta) of each pose [m, rad], theta from -pi to pi, shape (n, 3).
-
-        Raises:
-            WorldError: There are too few free places, the disc does not fit at `connected_to`, no
-                wall bounds the area, a model or layer does not exist, or the world is closed.
-            ValueError: A number is out of range.
-        """
-        return self._read(
-            lambda: self._placement.sample_free(
-                n, radius, clearance, rng, connected_to, layers, bounds, ignore
-            )
-        )
 
     def _read(self, action: Callable[[], R]) -> R:
         self.check_open()

@@ -244,6 +244,8 @@ class Simulation:
         monitor = RateMonitor(self.world, self._clock)
         try:
             with self.world.requests.serving(self._wake.set):
+                if self.world.requests.actions:  # queued before, without a call of `_wake.set`
+                    self._wake.set()
                 self._loop(start, elapsed, duration_ns, monitor)
         finally:
             monitor.reset()

@@ -19,6 +19,14 @@ NUMBER_LIMITS = {
         {".nan": "nan", ".inf": "inf", "-1": "-1.0"},
     ),
     ">= 0": ("must not be negative or NaN", {".nan": "nan", "-1": "-1.0"}),
+    "finite, >= 1e-06": (
+        "must be finite and at least 1e-06",
+        {".nan": "nan", ".inf": "inf", "0": "0.0"},
+    ),
+    "0 to 1e8": (
+        "must be from 0 to 100000000",
+        {".nan": "nan", ".inf": "inf", "-1": "-1.0", "1e9": "1000000000.0"},
+    ),
     "0 to 1": ("must be from 0 to 1", {".nan": "nan", "-0.1": "-0.1", "1.1": "1.1"}),
     "1 to 1000": ("must be from 1 to 1000", {"0": "0", "-5": "-5", "1001": "1001"}),
     "coordinate": (

@@ -14,6 +14,7 @@ from dataclasses import dataclass, field
 from typing import Any, Final
 
 import numpy as np
+from controller_calls import ControllerCalls
 
 from flatland.errors import PhysicsError, StaleHandleError, WorldLockedError
 from flatland.physics import (
@@ -26,7 +27,6 @@ from flatland.physics import (
     RunEnd,
     ScanRequest,
     StepRun,
-    easings,
     scan_all,
 )
 from flatland.physics.boundaries import boundary_edges, boundary_loops
@@ -66,7 +66,7 @@ class Objects:
         self.joints = {joint: ids for joint, ids in self.joints.items() if body not in ids}
 
 
-class RandomCalls:
+class RandomCalls(ControllerCalls):
     """A random sequence of calls, determined by its seed."""
 
     def __init__(self, seed: int) -> None:
@@ -332,23 +332,6 @@ class RandomCalls:
 
     def do_set_velocity(self) -> None:
         self.body().set_velocity(*self.triple())
-
-    def do_control_velocity(self) -> None:
-        controller = self.body().control_velocity(
-            (0.0, abs(self.number(0.0, 3.0)), 1.0), holonomic=self.rng.random() < 0.5
-        )
-        controller.set_target(*self.triple())
-        if self.rng.random() < 0.2:
-            controller.advance(0.01)
-
-    def do_control_tween(self) -> None:
-        mode = self.rng.choice(["yoyo", "loop", "once", "trigger", "none"])
-        easing = self.rng.choice(easings())
-        duration = self.number(0.01, 2.0)
-        controller = self.body().control_tween(
-            self.triple(), duration=duration, mode=mode, easing=easing
-        )
-        controller.schedule(1, automatic=True, holds=self.rng.random() < 0.7)
 
     def do_run(self) -> None:
         plan = self.world.plan

@@ -12,6 +12,8 @@ import pytest
 import yaml
 
 import flatland
+from flatland.plugin_api.manifest import INCLUDED_PACKAGE
+from flatland.plugin_api.registry import PluginRegistry
 
 
 @pytest.fixture(scope="module")
@@ -51,6 +53,16 @@ def test_the_first_page_links_all_pages(docs):
     table = first.split("## All pages", 1)[1]
     for page in docs.glob("*.md"):
         assert page.name == "README.md" or f"({page.name})" in table, page
+
+
+def test_the_table_of_plugins_is_complete(docs, checkout):
+    table = (docs / "plugins.md").read_text().split("\n## ", 1)[0]
+    rows = "".join(line.split("|")[1] for line in table.splitlines() if line.startswith("|"))
+    for full in PluginRegistry().classes:
+        package, name = full.split("::")
+        assert package != INCLUDED_PACKAGE or re.search(rf"\b{name}\b", rows), name
+    for name in re.findall(r"\(../(worlds/\S+)\)", table):
+        assert (checkout / name).exists()
 
 
 def test_the_reference_contains_all_public_names(docs):

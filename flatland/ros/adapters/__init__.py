@@ -29,6 +29,7 @@ _BUILT_IN: dict[type[Any], str] = {
     values.Range: "range",
     values.SemanticScan: "semantic_scan",
     values.People: "people",
+    values.PeopleMarkers: "people_markers",
     values.PeopleStates: "people_states",
     values.TrackedPeople: "tracked_people",
     values.Transform: "transform",

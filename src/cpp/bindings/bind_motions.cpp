@@ -139,6 +139,8 @@ void bind_traction(WorldClass& world) {
       },
       py::arg("controller"), py::arg("bodies"), py::arg("is_holonomic"), py::arg("acts_at_center"),
       py::arg("max_force"), py::arg("max_torque"), py::arg("grip"), py::arg("radius"));
+  world.def("release_brakes",
+            [](World& self, Id id) { changed_traction(self, id).is_braked = false; });
   world.def("traction_state", [](World& self, Id id) {
     const Traction& traction = changed_traction(self, id);
     return py::make_tuple(traction.load, traction.is_braked, to_python(traction.brake_pose));

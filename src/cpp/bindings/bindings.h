@@ -24,7 +24,11 @@ void bind_motions(WorldClass& world);
 void bind_contacts(pybind11::module_& module, WorldClass& world);
 void bind_raycast(WorldClass& world);
 void bind_range_finder(pybind11::module_& module);
-void bind_steps(pybind11::module_& module, WorldClass& world);
+void bind_controllers(pybind11::module_& module, WorldClass& world);
+void bind_steps(WorldClass& world);
+void bind_paced_run(WorldClass& world);
+void bind_run_worlds(pybind11::module_& module);
+void bind_touches(WorldClass& world);
 void bind_overlap(WorldClass& world);
 void bind_map_edges(pybind11::module_& module);
 

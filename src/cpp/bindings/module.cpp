@@ -18,7 +18,11 @@ PYBIND11_MODULE(_core, module) {
   flatland::bind_contacts(module, world);
   flatland::bind_raycast(world);
   flatland::bind_range_finder(module);
-  flatland::bind_steps(module, world);
+  flatland::bind_controllers(module, world);
+  flatland::bind_steps(world);
+  flatland::bind_paced_run(world);
+  flatland::bind_run_worlds(module);
+  flatland::bind_touches(world);
   flatland::bind_overlap(world);
   flatland::bind_map_edges(module);
 }

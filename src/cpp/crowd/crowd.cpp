@@ -104,7 +104,7 @@ Vec Crowd::way_from(World& world, std::uint32_t waypoint, Vec place) {
   read_surroundings(world);
   const FlowField* field = field_of(waypoint);
   return field == nullptr ? unit(waypoints_[waypoint].place.nearest(place) - place, {1.0, 0.0})
-                          : field->direction(place);
+                          : field->direction(place, surroundings_.walls());
 }
 
 std::vector<double> Crowd::state() const {
@@ -115,7 +115,7 @@ std::vector<double> Crowd::state() const {
     add({static_cast<double>(p.number), static_cast<double>(p.party), p.radius, p.speed,
          static_cast<double>(p.is_aware), static_cast<double>(p.is_stopped),
          static_cast<double>(p.sent_to), static_cast<double>(p.stop_until),
-         static_cast<double>(p.draws), p.delay, static_cast<double>(p.yields_to),
+         static_cast<double>(p.draws), p.delay, p.lost, static_cast<double>(p.yields_to),
          static_cast<double>(p.yield_until), p.velocity.x, p.velocity.y, p.heading, p.phase,
          p.acceleration.x, p.acceleration.y});
   }
@@ -129,6 +129,9 @@ std::vector<double> Crowd::state() const {
     add({static_cast<double>(queue.size())});
     numbers.insert(numbers.end(), queue.begin(), queue.end());
   }
+  for (const Signal& signal : signals_) {
+    add({static_cast<double>(signal.direction), static_cast<double>(signal.opposed_since)});
+  }
   return numbers;
 }
 
@@ -139,6 +142,8 @@ void Crowd::read_surroundings(const World& world) {
   for (auto& field : fields_) field.reset();
   const Walls& walls = surroundings_.walls();
   grid_.reset();
+  gates_ = std::make_shared<const std::vector<Gate>>();
+  signals_.clear();
   if (walls.empty()) return;
   Vec low = walls.low();
   Vec high = walls.high();
@@ -149,6 +154,8 @@ void Crowd::read_surroundings(const World& world) {
   const Vec margin{1.0, 1.0};  // m, to walk around a wall at the border
   grid_ = std::make_shared<const FreeGrid>(walls, low - margin, high + margin, settings_.cell,
                                            settings_.clearance);
+  gates_ = std::make_shared<const std::vector<Gate>>(find_gates(*grid_, walls));
+  signals_.resize(gates_->size());
 }
 
 void Crowd::read_people(World& world) {
@@ -187,7 +194,7 @@ Vec Crowd::way_to(std::uint32_t waypoint, Vec p) {
   if (square(straight) < close * close && surroundings_.walls().is_clear(p, p + straight)) {
     return unit(straight);
   }
-  return field->direction(p);
+  return field->direction(p, surroundings_.walls());
 }
 
 double Crowd::draw(std::uint64_t& draws, std::uint64_t stream, Span span) {

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "crowd/flow_field.h"
+#include "crowd/gates.h"
 #include "crowd/half_planes.h"
 #include "crowd/people.h"
 #include "crowd/surroundings.h"
@@ -62,7 +63,8 @@ class Crowd {
  private:
   struct Choice {
     Vec velocity;
-    Vec direction;  // of the way, also of somebody who stands
+    Vec direction;         // of the way, also of somebody who stands
+    bool is_held = false;  // at a door, while others come out
   };
 
   // Who gives way: those who walk to those with a higher priority, those who are idle at a waypoint
@@ -84,6 +86,21 @@ class Crowd {
   void leave(Party& party, std::uint32_t waypoint, std::int64_t step);
   void count_guests();
   bool has_arrived(const Person& person, std::uint32_t waypoint) const;
+
+  // right_of_way.cpp: who passes a door first, and on which side people pass each other.
+  struct Approach {
+    std::size_t person = 0;
+    std::size_t gate = 0;
+    int direction = 0;  // index, see Demand
+    bool is_inside = false;
+  };
+
+  void keep_doors_clear(std::vector<Choice>& choices, std::int64_t step, double dt);
+  bool approaches(std::size_t i, const Choice& choice, std::size_t gate, Approach& approach);
+  Choice step_aside(const Person& person, const Choice& choice, const Approach& approach) const;
+  bool comes_towards(const Person& person, Vec way, std::size_t j, const Choice& choice,
+                     double& ahead) const;
+  void keep_right(std::vector<Choice>& choices) const;
 
   // giving_way.cpp: who makes room for whom.
   bool precedes(const Person& a, const Person& b) const;
@@ -115,6 +132,8 @@ class Crowd {
   std::shared_ptr<const FreeGrid> grid_;  // null without walls, or if it is to be created
   bool has_grid_ = false;
   std::vector<std::shared_ptr<const FlowField>> fields_;  // by waypoint, null if not needed yet
+  std::shared_ptr<const std::vector<Gate>> gates_ = std::make_shared<const std::vector<Gate>>();
+  std::vector<Signal> signals_;  // of the gates
 
   // Of one update.
   std::vector<std::uint32_t> guests_;  // people who stand at each waypoint

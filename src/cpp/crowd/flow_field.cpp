@@ -139,7 +139,7 @@ FlowField::FlowField(const FreeGrid& grid, const Place& place)
   }
 }
 
-Vec FlowField::direction(Vec p) const {
+Vec FlowField::direction(Vec p, const Walls& walls) const {
   const double x = (p.x - low_.x) / cell_ - 0.5;
   const double y = (p.y - low_.y) / cell_ - 0.5;
   constexpr double kMargin = 8.0;  // cells
@@ -170,7 +170,7 @@ Vec FlowField::direction(Vec p) const {
       const Direction d = at(c, r);
       if (d.x == 0 && d.y == 0) continue;
       const Vec offset{static_cast<double>(c) - x, static_cast<double>(r) - y};
-      if (square(offset) < nearest) {
+      if (square(offset) < nearest && walls.is_clear(p, p + cell_ * offset)) {
         nearest = square(offset);
         target = offset;
       }

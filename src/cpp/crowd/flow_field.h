@@ -50,8 +50,9 @@ class FlowField {
 
   // Number of cells from which there is a way.
   std::size_t reached() const { return reached_; }
-  // Returns the unit vector of the way from a point; 0 if there is none.
-  Vec direction(Vec p) const;
+  // Returns the unit vector of the way from a point; 0 if there is none. From a point at which the
+  // disc does not fit, it leads to the nearest cell with a way that no wall hides.
+  Vec direction(Vec p, const Walls& walls) const;
 
  private:
   struct Direction {

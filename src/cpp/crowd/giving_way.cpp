@@ -16,7 +16,9 @@ namespace {
 
 constexpr double kSlow = 0.2;       // progress of blocked people, of the preferred speed, at most
 constexpr double kPatience = 0.5;   // time without progress after which people ask for room [s]
-constexpr double kMostDelay = 1.0;  // s
+constexpr double kStuck = 2.0;      // the same, for room of those who walk [s]
+constexpr double kMostDelay = 3.0;  // s
+constexpr double kRecovery = 4.0;   // progress that makes up for a second without it [s]
 constexpr double kHold = 1.5;       // time for which people make room [s]
 constexpr double kReach = 0.4;      // gap to those who are asked, at most [m]
 constexpr double kMargin = 0.1;     // of the lane that is to be free [m]
@@ -36,7 +38,7 @@ Crowd::Stance Crowd::stance_of(const Person& person, const Choice& choice) const
   if (person.is_stopped || person.stop_until != 0) return Stance::kFixed;
   const auto& queue = queues_[target_of(person)];
   if (std::find(queue.begin(), queue.end(), person.number) != queue.end()) return Stance::kFixed;
-  return square(choice.velocity) > 0.0 ? Stance::kWalking : Stance::kIdle;
+  return square(choice.velocity) > 0.0 && !choice.is_held ? Stance::kWalking : Stance::kIdle;
 }
 
 void Crowd::give_way(std::vector<Choice>& choices, std::int64_t step, double dt, double period) {
@@ -48,7 +50,9 @@ void Crowd::give_way(std::vector<Choice>& choices, std::int64_t step, double dt,
     const bool is_walking = stances[i] == Stance::kWalking;
     const bool is_slow =
         is_walking && dot(person.velocity, choices[i].direction) < kSlow * person.speed;
-    person.delay = std::min(std::max(person.delay + (is_slow ? period : -period), 0.0), kMostDelay);
+    person.delay = std::min(std::max(person.delay + (is_slow ? period : -kRecovery * period), 0.0),
+                            kMostDelay);
+    if (is_slow || choices[i].is_held) person.lost += period;
     if (is_walking && person.delay > kPatience) blocked.push_back(i);
   }
   std::sort(blocked.begin(), blocked.end(),
@@ -98,7 +102,7 @@ void Crowd::ask_for_room(std::size_t root, const std::vector<Choice>& choices,
       Person& other = people_[j];
       if (is_asked[j] || stances[j] == Stance::kFixed) continue;
       const bool is_walking = stances[j] == Stance::kWalking;
-      if (is_walking && !precedes(first, other)) continue;
+      if (is_walking && (first.delay < kStuck || !precedes(first, other))) continue;
       const Vec offset = other.position - person.position;
       const double reach = person.radius + other.radius;
       if (dot(offset, way) <= 0.0 || std::fabs(cross(way, offset)) > reach + kMargin) continue;
@@ -107,7 +111,8 @@ void Crowd::ask_for_room(std::size_t root, const std::vector<Choice>& choices,
       is_asked[j] = true;
       asking.push_back(j);
       const double cosine = dot(choices[j].direction, way_to(target, other.position));
-      if (is_walking && cosine > kSameWay) continue;  // this one waits for the same people
+      // This one waits for the same people.
+      if ((is_walking || choices[j].is_held) && cosine > kSameWay) continue;
       other.yields_to = first.number;
       other.yield_until = until;
     }

@@ -18,6 +18,7 @@ constexpr std::uint64_t kFluctuations = std::uint64_t{3} << 40U;  // a stream of
 
 constexpr double kSkin = 2e-4;              // gap that single precision may use up [m]
 constexpr double kParting = 0.5;            // most speed at which overlaps are resolved [m/s]
+constexpr double kRounding = 1e-6;          // of velocities [m/s]
 constexpr double kWallSight = 1.0;          // distance at which walls are considered [m]
 constexpr double kNegligible = 0.01;        // acceleration [m/s²]
 constexpr double kMostSpeed = 1.3;          // as a multiple of the preferred speed
@@ -186,7 +187,16 @@ Vec Crowd::without_contact(std::size_t i, Vec velocity, double period) {
     const Vec moved = j < decided_ ? chosen_[j] : Vec{};
     planes_.push_back({away, closing_offset(gap, period) + dot(moved, away)});
   }
-  return nearest_point(planes_, hard, fastest, velocity);
+  const auto violation_of = [this](Vec v) {
+    double most = 0.0;
+    for (const HalfPlane& plane : planes_) {
+      most = std::max(most, plane.offset - dot(plane.normal, v));
+    }
+    return most;
+  };
+  const Vec nearest = nearest_point(planes_, hard, fastest, velocity);
+  // Half-planes that are almost parallel can have a solution that rounding hides.
+  return violation_of(nearest) <= violation_of({}) + kRounding ? nearest : Vec{};
 }
 
 void Crowd::update(World& world, std::int64_t step, double dt) {
@@ -200,6 +210,8 @@ void Crowd::update(World& world, std::int64_t step, double dt) {
   for (std::size_t i = 0; i < people_.size(); ++i) {
     choices[i] = choose(people_[i], step, dt, period);
   }
+  keep_doors_clear(choices, step, dt);
+  keep_right(choices);
   give_way(choices, step, dt, period);
   for (std::size_t i = 0; i < people_.size(); ++i) {
     const Person& person = people_[i];

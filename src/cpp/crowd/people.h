@@ -60,7 +60,8 @@ struct Person {
   std::uint32_t sent_to = kNone;    // waypoint instead of that of the route
   std::int64_t stop_until = 0;      // step
   std::uint64_t draws = 0;          // of random numbers
-  double delay = 0.0;               // time without progress [s]
+  double delay = 0.0;               // time without progress, as far as it is not made up [s]
+  double lost = 0.0;                // time without progress since the last waypoint [s]
   std::uint32_t yields_to = kNone;  // number of the person for whom this one makes room
   std::int64_t yield_until = 0;     // step
   Vec position, velocity;           // at the last update

@@ -14,7 +14,10 @@ constexpr std::uint64_t kStops = std::uint64_t{1} << 40U;
 constexpr std::uint64_t kParties = std::uint64_t{2} << 40U;
 
 constexpr double kPi = 3.141592653589793;
-constexpr double kRoom = 0.5;      // area that each person needs at a waypoint [m²]
+constexpr double kRoom = 0.5;  // area that each person needs at a waypoint [m²]
+constexpr double kGiveUp =
+    8.0;  // time without progress after which people who wander turn away [s]
+constexpr double kCrowded = 4.0;   // distance at which a crowded place is reached, at most [m]
 constexpr double kArrival = 0.7;   // time constant of the approach to a point in a queue [s]
 constexpr double kPatience = 0.1;  // distance to that point at which people stand still [m]
 constexpr double kCounter = 0.3;   // distance to the head of a queue at which it is reached [m]
@@ -46,10 +49,19 @@ void Crowd::count_guests() {
 }
 
 bool Crowd::has_arrived(const Person& person, std::uint32_t waypoint) const {
-  Place place = waypoints_[waypoint].place;
-  place.radius = std::max(place.radius, room_for(place, guests_[waypoint] + 1));
-  return place.contains(person.position) &&
-         surroundings_.walls().is_clear(person.position, place.nearest(person.position));
+  const Place& place = waypoints_[waypoint].place;
+  const Vec nearest = place.nearest(person.position);
+  const double distance = length(nearest - person.position);
+  double reach = std::max(place.radius, room_for(place, guests_[waypoint] + 1));
+  // In a crowd, those who are nearer to the place need room as well.
+  if (distance > reach && distance < kCrowded && person.delay > 0.0) {
+    const auto is_nearer = [&](const Person& other) {
+      return square(place.nearest(other.position) - other.position) < distance * distance;
+    };
+    const auto nearer = std::count_if(people_.begin(), people_.end(), is_nearer);
+    reach = std::max(reach, room_for(place, static_cast<std::uint32_t>(nearer) + 1));
+  }
+  return distance <= reach && surroundings_.walls().is_clear(person.position, nearest);
 }
 
 Crowd::Choice Crowd::approach(const Person& person, std::uint32_t waypoint) {
@@ -71,8 +83,9 @@ void Crowd::arrive(Party& party, std::uint32_t waypoint, std::int64_t step, doub
 void Crowd::leave(Party& party, std::uint32_t waypoint, std::int64_t step) {
   party.is_waiting = false;
   party.since = step;
-  for (const Person& person : people_) {
+  for (Person& person : people_) {
     if (&parties_[person.party] != &party) continue;
+    person.lost = 0.0;
     auto& queue = queues_[waypoint];
     queue.erase(std::remove(queue.begin(), queue.end(), person.number), queue.end());
   }
@@ -162,6 +175,10 @@ Crowd::Choice Crowd::choose(Person& person, std::int64_t step, double dt, double
       person.stop_until = step + steps(draw(person.draws, stream, route.stop), dt);
       return {{}, facing};
     }
+  }
+  // Whoever wanders and makes no progress walks to another place instead.
+  if (route.order == Route::Order::kRandom && person.lost > kGiveUp) {
+    leave(party, route.waypoints[party.leg], step);
   }
   const std::uint32_t waypoint = route.waypoints[party.leg];
   if (party.is_done) {

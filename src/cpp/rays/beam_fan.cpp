@@ -66,6 +66,11 @@ BeamFan::~BeamFan() = default;
 MirroredFan::MirroredFan(const float* ends, std::size_t count) : fan(ends, count), place(count) {
   // No ray has a length of zero, so that the order contains all of them.
   for (std::size_t i = 0; i < count; ++i) place[fan.order()[i]] = static_cast<std::uint32_t>(i);
+  is_reversed = true;
+  for (std::size_t i = 1; i < count; ++i) {
+    is_reversed =
+        is_reversed && (place[i] + 1 == place[i - 1] || place[i] + 1 == place[i - 1] + count);
+  }
 }
 
 const MirroredFan& BeamFan::mirrored() const {

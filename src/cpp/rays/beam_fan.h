@@ -78,6 +78,8 @@ struct MirroredFan {
   BeamFan fan;
   // For each sorted ray of the original fan, its place among those of this one.
   std::vector<std::uint32_t> place;
+  // Whether the order is the opposite one, up to a rotation: no rays have the same direction.
+  bool is_reversed;
 };
 
 // The most recently used fans, so that the rays of a laser are sorted only once. Thread-safe.

@@ -6,7 +6,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstring>
 
 #include "rays/instruction_set.h"
 #include "rays/simd.h"
@@ -15,7 +14,6 @@
 #endif
 
 namespace flatland {
-namespace {
 
 static_assert(AlignedFloats::kBlock % simd::kWidth == 0, "a block consists of whole vectors");
 
@@ -28,30 +26,17 @@ struct Interval {
 struct HitView {
   const float* nearest;  // null if there are no limits
   float* fixture;
+  float* brightness;
   const std::uint16_t* number;  // of the material of a fixture, by its slot
   std::size_t count;            // of these numbers; fixtures with other slots have no material
-  const std::uint32_t* pass_limit;
+  const Optics* optics;         // of materials, by their numbers
+  bool uses_materials;
   const std::uint32_t* words;
   std::uint32_t leg, excluded;
   std::uint16_t preferred;
-  float least_distance;  // [m]; hits are not nearer
-};
-
-std::uint32_t slot_of(const b2Fixture& fixture) {
-  return static_cast<std::uint32_t>(const_cast<b2Fixture&>(fixture).GetUserData().pointer);
-}
-
-// A node or leaf that remains to be drawn.
-struct StackEntry {
-  float distance;
-  Interval rays;
-  std::uint32_t child;
-};
-
-// Rays that may hit each of eight objects, and lower bounds of the distances of the objects.
-struct Candidates {
-  std::int32_t begin[simd::kWidth], end[simd::kWidth];
-  float distance[simd::kWidth];
+  // Hits are inside of this half-plane in the current frame, relative to the origin of the rays.
+  b2Vec2 front;
+  float front_distance;
 };
 
 // The rays of a scan and their hits, for the inner loops. Arrays have whole blocks.
@@ -77,6 +62,38 @@ struct ScanFrame {
   RayMasks masks;
 };
 
+// A SolidTree for the inner loops.
+struct SolidView {
+  const SolidGroup* loose;
+  std::size_t loose_count;
+  const EdgeTree::Node* nodes;  // null if all solids are loose
+  const SolidGroup* groups;
+};
+
+namespace {
+
+std::uint32_t slot_of(const b2Fixture& fixture) {
+  return static_cast<std::uint32_t>(const_cast<b2Fixture&>(fixture).GetUserData().pointer);
+}
+
+// A node or leaf that remains to be drawn.
+struct StackEntry {
+  float distance;
+  Interval rays;
+  std::uint32_t child;
+};
+
+// The objects of a set of up to eight that rays may hit, the rays, and lower bounds of the
+// distances of the objects.
+struct Candidates {
+  std::uint32_t set;
+  std::int32_t begin[simd::kWidth], end[simd::kWidth];
+  float distance[simd::kWidth];
+};
+
+const Optics kPlain;
+constexpr std::uint16_t kNoMaterial[EdgeTree::kFanOut] = {};
+
 // A box is assumed to surround the origin of the rays if its distance is at most this fraction of
 // its size. Also the margin [diamond angle] by which an object must span less than a half circle.
 constexpr float kNearTolerance = 1e-3F;
@@ -85,6 +102,10 @@ constexpr float kNearTolerance = 1e-3F;
 // square root of a difference of large numbers.
 constexpr float kBoxRounding = 1.0F - 1e-5F;
 constexpr float kCircleRounding = 1.0F - 1e-3F;
+// By how much a box is enlarged for the rays of a bundle because of rounding, as a part of its
+// largest coordinate.
+constexpr float kBundleTolerance = 1e-5F;
+constexpr auto kBundle = static_cast<std::int32_t>(RayBundle::kMaxInAnyOrder);
 // Up to this number of vectors of rays, drawing all edges of a leaf costs less than finding the
 // rays that each edge covers.
 constexpr std::int32_t kFewVectors = 3;
@@ -122,10 +143,8 @@ struct Functions {
   decltype(&baseline::set_frame) set_frame;
   decltype(&baseline::draw_tree) draw_tree;
   decltype(&baseline::draw_solids) draw_solids;
-  decltype(&baseline::draw_solid_tree) draw_solid_tree;
   decltype(&baseline::find_in_tree) find_in_tree;
   decltype(&baseline::find_in_solids) find_in_solids;
-  decltype(&baseline::find_in_solid_tree) find_in_solid_tree;
 };
 
 const Functions& functions() {
@@ -133,140 +152,159 @@ const Functions& functions() {
 #if defined(__x86_64__)
     switch (instruction_set()) {
       case InstructionSet::kAvx512:
-        return Functions{avx512::set_frame,         avx512::draw_tree,    avx512::draw_solids,
-                         avx512::draw_solid_tree,   avx512::find_in_tree, avx512::find_in_solids,
-                         avx512::find_in_solid_tree};
+        return Functions{avx512::set_frame, avx512::draw_tree, avx512::draw_solids,
+                         avx512::find_in_tree, avx512::find_in_solids};
       case InstructionSet::kAvx2:
-        return Functions{avx2::set_frame,         avx2::draw_tree,    avx2::draw_solids,
-                         avx2::draw_solid_tree,   avx2::find_in_tree, avx2::find_in_solids,
-                         avx2::find_in_solid_tree};
+        return Functions{avx2::set_frame, avx2::draw_tree, avx2::draw_solids, avx2::find_in_tree,
+                         avx2::find_in_solids};
       case InstructionSet::kBaseline:
         break;
     }
 #endif
-    return Functions{baseline::set_frame,         baseline::draw_tree,    baseline::draw_solids,
-                     baseline::draw_solid_tree,   baseline::find_in_tree, baseline::find_in_solids,
-                     baseline::find_in_solid_tree};
+    return Functions{baseline::set_frame, baseline::draw_tree, baseline::draw_solids,
+                     baseline::find_in_tree, baseline::find_in_solids};
   }();
   return kSelected;
-}
-
-ScanView view_of(const BeamFan& fan, Interval drawn, const b2Transform& pose, ScanBuffer& buffer) {
-  // A bit less than the reciprocal, so that rounding does not matter.
-  const float fraction_per_metre = (1.0F - 1e-6F) / fan.max_length();
-  return {fan.x(),
-          fan.y(),
-          fan.first_in_cell(),
-          fan.cell_bits(),
-          static_cast<std::int32_t>(fan.count()),
-          drawn,
-          buffer.d_x.data(),
-          buffer.d_y.data(),
-          buffer.fraction.data(),
-          fraction_per_metre,
-          pose};
-}
-
-HitView hits_of(const HitRules& rules, ScanBuffer& buffer, bool has_nearest, float least_distance) {
-  const Materials& materials = *rules.materials;
-  return {has_nearest ? buffer.nearest.data() : nullptr,
-          buffer.fixture.data(),
-          materials.numbers().data(),
-          materials.numbers().size(),
-          materials.pass_limits().data(),
-          rules.words,
-          rules.leg,
-          rules.excluded,
-          rules.preferred,
-          least_distance};
 }
 
 // Bound of the difference between the diamond angle of a ray in the frame of a body and in the fan.
 // It is caused by the rounding of coordinates and is largest for short rays far from the origin of
 // the world.
-float angle_margin(const BeamFan& fan, const b2Transform& pose, const b2Transform& body) {
-  const float coordinates = pose.p.Length() + body.p.Length() + fan.max_length();
+float angle_margin(const RayBundle& rays, const b2Transform& pose, const b2Transform& body) {
+  const float coordinates = pose.p.Length() + body.p.Length() + rays.max_length;
   constexpr float kFullCircle = 4.0F;
-  return std::min(4e-6F + 1e-6F * coordinates / fan.min_length(), kFullCircle);
-}
-
-ScanFrame world_frame(const BeamFan& fan, const b2Transform& pose, RayMasks masks) {
-  b2Transform world;
-  world.SetIdentity();
-  return {pose.p, pose.q.c, -pose.q.s, angle_margin(fan, pose, world), masks};
+  return std::min(4e-6F + 1e-6F * coordinates / rays.min_length, kFullCircle);
 }
 
 }  // namespace
 
-DepthScan::DepthScan(const BeamFan& fan, const b2Transform& pose, ScanBuffer& buffer,
+DepthScan::DepthScan(const RayBundle& rays, const b2Transform& pose, ScanBuffer& buffer,
                      const HitRules* rules)
-    : fan_(fan),
+    : rays_(rays),
       pose_(pose),
       buffer_(buffer),
       rules_(rules),
-      last_(static_cast<std::int32_t>(fan.count())) {
-  buffer.d_x.resize(fan.count());
-  buffer.d_y.resize(fan.count());
+      last_(static_cast<std::int32_t>(rays.count)) {
+  buffer.d_x.resize(rays.count);
+  buffer.d_y.resize(rays.count);
   // Whole vectors are read from the start of any run of rays on.
-  buffer.fraction.resize(fan.count() + AlignedFloats::kBlock);
+  buffer.fraction.resize(rays.count + AlignedFloats::kBlock);
   std::fill_n(buffer.fraction.data(), buffer.fraction.size(), kMissFraction);
   if (rules == nullptr) return;
-  buffer.fixture.resize(fan.count());
-  std::memset(buffer.fixture.data(), 0xFF, buffer.fixture.size() * sizeof(float));
+  buffer.fixture.resize(rays.count);
+  buffer.brightness.resize(rays.count);
+  std::fill_n(buffer.brightness.data(), buffer.brightness.size(), 0.0F);
+}
+
+DepthScan::DepthScan(const RayBundle& rays, std::size_t first, std::size_t last,
+                     const HalfPlane& inside, const b2Transform& pose, ScanBuffer& buffer,
+                     const HitRules& rules)
+    : rays_(rays),
+      pose_(pose),
+      buffer_(buffer),
+      rules_(&rules),
+      has_nearest_(true),
+      inside_(inside),
+      first_(static_cast<std::int32_t>(first)),
+      last_(static_cast<std::int32_t>(last)) {
+  for (AlignedFloats* array : {&buffer.d_x, &buffer.d_y, &buffer.fraction, &buffer.nearest,
+                               &buffer.fixture, &buffer.brightness}) {
+    if (array->size() < rays.count) array->resize(rays.count);
+  }
+  // Hits of the other rays in the same vectors are not nearer than -1.
+  constexpr std::size_t kBlock = AlignedFloats::kBlock;
+  const auto clear = [&](std::size_t begin, std::size_t end) {
+    begin = begin / kBlock * kBlock;
+    std::fill(buffer.fraction.data() + begin, buffer.fraction.data() + AlignedFloats::rounded(end),
+              -1.0F);
+  };
+  clear(first, std::min(last, rays.count));
+  if (last > rays.count) clear(0, last - rays.count);
 }
 
 float* DepthScan::limit_nearest() {
   has_nearest_ = true;
-  buffer_.nearest.resize(fan_.count());
+  buffer_.nearest.resize(rays_.count);
   std::fill_n(buffer_.nearest.data(), buffer_.nearest.size(), 0.0F);
   return buffer_.nearest.data();
 }
 
-void DepthScan::draw(const EdgeTree& tree, const b2Transform& body, RayMasks masks) {
-  if (tree.nodes().empty() || !masks.pass(tree.category_bits()) || fan_.count() == 0) return;
-  const ScanView view = view_of(fan_, {first_, last_}, pose_, buffer_);
-  const b2Rot to_sensor = b2MulT(pose_.q, body.q);
-  const ScanFrame frame{b2MulT(body.q, pose_.p - body.p), to_sensor.c, to_sensor.s,
-                        angle_margin(fan_, pose_, body), masks};
+ScanView DepthScan::view() const {
+  // A bit less than the reciprocal, so that rounding does not matter.
+  const float fraction_per_metre = (1.0F - 1e-6F) / rays_.max_length;
+  return {rays_.x,
+          rays_.y,
+          rays_.first_in_cell,
+          rays_.cell_bits,
+          static_cast<std::int32_t>(rays_.count),
+          {first_, last_},
+          buffer_.d_x.data(),
+          buffer_.d_y.data(),
+          buffer_.fraction.data(),
+          fraction_per_metre,
+          pose_};
+}
+
+HitView DepthScan::hits(const b2Rot& body) const {
+  const Materials* materials = rules_->materials;
+  const bool uses_materials = materials != nullptr;
+  return {has_nearest_ ? buffer_.nearest.data() : nullptr,
+          buffer_.fixture.data(),
+          buffer_.brightness.data(),
+          uses_materials ? materials->numbers().data() : nullptr,
+          uses_materials ? materials->numbers().size() : 0,
+          uses_materials ? materials->optics().data() : &kPlain,
+          uses_materials,
+          rules_->words,
+          rules_->leg,
+          rules_->excluded,
+          rules_->preferred,
+          b2MulT(body, inside_.normal),
+          inside_.offset};
+}
+
+void DepthScan::set_frame(const ScanView& view, const ScanFrame& frame, const b2Transform& body) {
   const bool is_same =
       has_frame_ && frame_.p == body.p && frame_.q.s == body.q.s && frame_.q.c == body.q.c;
   if (!is_same) functions().set_frame(view, frame, body);
   frame_ = body;
   has_frame_ = true;
+}
+
+ScanFrame DepthScan::world_frame(const ScanView& view, RayMasks masks) {
+  b2Transform world;
+  world.SetIdentity();
+  const ScanFrame frame{pose_.p, pose_.q.c, -pose_.q.s, angle_margin(rays_, pose_, world), masks};
+  if (rays_.first_in_cell == nullptr) set_frame(view, frame, world);
+  return frame;
+}
+
+void DepthScan::draw(const EdgeTree& tree, const b2Transform& body, RayMasks masks) {
+  if (tree.nodes().empty() || !masks.pass(tree.category_bits()) || is_empty()) return;
+  const b2Rot to_sensor = b2MulT(pose_.q, body.q);
+  const ScanFrame frame{b2MulT(body.q, pose_.p - body.p), to_sensor.c, to_sensor.s,
+                        angle_margin(rays_, pose_, body), masks};
+  const ScanView view = this->view();
+  set_frame(view, frame, body);
   if (rules_ == nullptr) {
     functions().draw_tree(view, frame, tree.nodes().data(), tree.leaves().data());
   } else {
-    functions().find_in_tree(view, frame, hits_of(*rules_, buffer_, has_nearest_, least_distance_),
-                             tree.nodes().data(), tree.leaves().data(),
+    functions().find_in_tree(view, frame, hits(body.q), tree.nodes().data(), tree.leaves().data(),
                              tree.leaf_fixtures().data());
   }
 }
 
-void DepthScan::draw(const std::vector<b2Fixture*>& solids, RayMasks masks) {
-  if (solids.empty() || fan_.count() == 0) return;
-  const ScanView view = view_of(fan_, {first_, last_}, pose_, buffer_);
-  const ScanFrame frame = world_frame(fan_, pose_, masks);
-  if (rules_ == nullptr) {
-    functions().draw_solids(view, frame, solids.data(), solids.size());
-  } else {
-    functions().find_in_solids(view, frame,
-                               hits_of(*rules_, buffer_, has_nearest_, least_distance_),
-                               solids.data(), solids.size());
-  }
-}
-
 void DepthScan::draw(const SolidTree& tree, RayMasks masks) {
-  draw(tree.loose(), masks);
-  if (tree.is_empty() || fan_.count() == 0) return;
-  const ScanView view = view_of(fan_, {first_, last_}, pose_, buffer_);
-  const ScanFrame frame = world_frame(fan_, pose_, masks);
-  const std::vector<b2Fixture*>& solids = tree.solids();
+  if (tree.is_empty() || is_empty()) return;
+  const ScanView view = this->view();
+  const ScanFrame frame = world_frame(view, masks);
+  const SolidView solids{tree.loose().data(), tree.loose().size(),
+                         tree.nodes().empty() ? nullptr : tree.nodes().data(),
+                         tree.groups().data()};
   if (rules_ == nullptr) {
-    functions().draw_solid_tree(view, frame, tree.nodes().data(), solids.data(), solids.size());
+    functions().draw_solids(view, frame, solids);
   } else {
-    functions().find_in_solid_tree(view, frame,
-                                   hits_of(*rules_, buffer_, has_nearest_, least_distance_),
-                                   tree.nodes().data(), solids.data(), solids.size());
+    functions().find_in_solids(view, frame, hits(b2Rot(0.0F)), solids);
   }
 }
 

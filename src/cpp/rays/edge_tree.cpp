@@ -120,7 +120,8 @@ class EdgeTreeBuilder {
   std::uint32_t make_leaf(Range range) {
     EdgeTree::Leaf leaf;
     EdgeTree::LeafFixtures fixtures;
-    leaf.count = static_cast<std::uint32_t>(range.size());
+    leaf.count = static_cast<std::uint16_t>(range.size());
+    leaf.common_bits = 0xFFFF;
     for (std::size_t i = 0; i < kFanOut; ++i) {
       const TreeEdge& edge = edges_[std::min(range.begin + i, range.end - 1)];
       b2Vec2 normal(edge.y2 - edge.y1, -(edge.x2 - edge.x1));
@@ -133,8 +134,12 @@ class EdgeTreeBuilder {
       leaf.normal_y[i] = normal.y;
       leaf.category_bits[i] = edge.category_bits;
       leaf.coincident_bits[i] = edge.coincident_bits;
+      leaf.common_bits = static_cast<std::uint16_t>(leaf.common_bits & edge.category_bits);
       fixtures.fixture[i] = edge.fixture;
       fixtures.coincident[i] = edge.coincident_fixture;
+      fixtures.material[i] = edge.material;
+      fixtures.has_materials = fixtures.has_materials || edge.material != 0;
+      fixtures.has_coincident = fixtures.has_coincident || edge.coincident_bits != 0;
     }
     tree_.leaves_.push_back(leaf);
     tree_.leaf_fixtures_.push_back(fixtures);

@@ -36,12 +36,17 @@ class EdgeTree {
     float x1[kFanOut], y1[kFanOut], x2[kFanOut], y2[kFanOut];
     float normal_x[kFanOut], normal_y[kFanOut];  // computed like in Box2D
     std::uint16_t category_bits[kFanOut], coincident_bits[kFanOut];
-    std::uint32_t count;
+    std::uint16_t count;
+    std::uint16_t common_bits;  // categories that all edges have
   };
 
-  // Slots of the fixtures of a leaf, apart from it because most scans do not need them.
+  // Slots of the fixtures of a leaf, and the numbers of their materials, apart from it because most
+  // scans do not need them.
   struct LeafFixtures {
     std::uint32_t fixture[kFanOut], coincident[kFanOut];
+    std::uint16_t material[kFanOut];
+    bool has_materials = false;
+    bool has_coincident = false;
   };
 
   // Up to 8 children, each a node or a leaf, with their bounding boxes.

@@ -39,26 +39,28 @@ std::uint16_t Materials::number(const Material& material) {
   }
   const auto transmission = static_cast<double>(material.transmission);
   const auto specular = static_cast<double>(material.specular);
-  std::uint32_t pass_limit = kOpaque;
+  Optics optics;
+  optics.reflectance = std::abs(material.reflectance);  // not -0, whose sign has a meaning
   if (transmission >= 1.0) {
-    pass_limit = kInvisible;
+    optics.pass_limit = Optics::kInvisible;
   } else if (transmission > 0.0) {
     const double limit = std::round(transmission * kWords);
-    pass_limit = static_cast<std::uint32_t>(std::clamp(limit, 1.0, kWords - 2.0));
+    optics.pass_limit = static_cast<std::uint32_t>(std::clamp(limit, 1.0, kWords - 2.0));
   }
-  std::uint64_t mirror_limit = 0;
+  bool is_partial = optics.pass_limit != Optics::kOpaque;
   if (specular > 0.0) {
     // Single precision: shares that are meant to add up to 1 do so only approximately.
     constexpr double kAll = 1.0 - 1e-6;
     const double share = transmission + specular;
-    mirror_limit = static_cast<std::uint64_t>(share >= kAll ? kWords : share * kWords);
+    const double limit = share >= kAll ? kWords : std::max(std::floor(share * kWords), 1.0);
+    optics.last_reflected = static_cast<std::uint32_t>(limit - 1.0);
+    optics.is_mirror = true;
     has_mirrors_ = true;
+    is_partial = is_partial || limit < kWords;
   }
-  const bool is_partial = mirror_limit > 0 && mirror_limit < static_cast<std::uint64_t>(kWords);
-  if (is_partial || (pass_limit != kOpaque && pass_limit != kInvisible)) needs_words_ = true;
+  if (is_partial && optics.pass_limit != Optics::kInvisible) needs_words_ = true;
   entries_.push_back(material);
-  pass_limits_.push_back(pass_limit);
-  mirror_limits_.push_back(mirror_limit);
+  optics_.push_back(optics);
   return static_cast<std::uint16_t>(entries_.size() - 1);
 }
 

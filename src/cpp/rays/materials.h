@@ -30,13 +30,23 @@ struct Material {
   float specular = 0.0F;      // beams that are reflected as by a mirror
 };
 
-// The materials of the fixtures of a world that have one, by the slots of their ids.
-class Materials {
- public:
-  // Limits of random words.
+// A material as rays meet it: limits of random words.
+struct Optics {
   static constexpr std::uint32_t kOpaque = 0;
   static constexpr std::uint32_t kInvisible = 0xFFFFFFFFU;
 
+  // A beam passes if its random word is below this limit: kOpaque for no beam, kInvisible for all.
+  std::uint32_t pass_limit = kOpaque;
+  // A beam that does not pass is reflected as by a mirror if its random word is at most this one
+  // and the material is a mirror.
+  std::uint32_t last_reflected = 0;
+  bool is_mirror = false;
+  float reflectance = Material().reflectance;
+};
+
+// The materials of the fixtures of a world that have one, by the slots of their ids.
+class Materials {
+ public:
   bool is_empty() const { return count_ == 0; }
   // Whether a material is in use, or was since there were no materials, that reflects beams.
   bool has_mirrors() const { return has_mirrors_; }
@@ -53,21 +63,16 @@ class Materials {
   }
   // The material with a number; 0 is that of fixtures without one.
   const Material& at(std::uint16_t number) const { return entries_[number]; }
-  // A beam passes if its random word is below this limit: kOpaque for no beam, kInvisible for all.
-  std::uint32_t pass_limit(std::uint32_t slot) const { return pass_limits_[number_of(slot)]; }
-  // A beam that does not pass is reflected as by a mirror if its random word is below this limit.
-  std::uint64_t mirror_limit(std::uint32_t slot) const { return mirror_limits_[number_of(slot)]; }
 
-  // The numbers by slot, and the limits of passing beams by number.
+  // The numbers by slot, and what they stand for by number.
   const std::vector<std::uint16_t>& numbers() const { return numbers_; }
-  const std::vector<std::uint32_t>& pass_limits() const { return pass_limits_; }
+  const std::vector<Optics>& optics() const { return optics_; }
 
  private:
   std::uint16_t number(const Material& material);
 
   std::vector<Material> entries_{Material{}};
-  std::vector<std::uint32_t> pass_limits_{kOpaque};
-  std::vector<std::uint64_t> mirror_limits_{0};
+  std::vector<Optics> optics_{Optics{}};
   std::vector<std::uint16_t> numbers_;
   std::size_t count_ = 0;
   bool has_mirrors_ = false;

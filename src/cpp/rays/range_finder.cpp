@@ -16,10 +16,6 @@
 namespace flatland {
 namespace {
 
-constexpr float kReflective = 255.0F;
-// Intensities do not depend on the range below this one [m].
-constexpr float kReferenceRange = 1.0F;
-
 // Replaces the first range by the shortest one; NaN if all are misses.
 void keep_nearest(float* ranges, std::size_t count) {
   float nearest = std::numeric_limits<float>::quiet_NaN();
@@ -67,20 +63,26 @@ void RangeFinder::scan(const SceneView& scene, const b2Transform& pose, const No
   float* ranges = memory.ranges.data();
   if (parameters_.is_cone) keep_nearest(ranges, beams());
 
-  bool* is_hit = needs_hits ? memory.is_hit.get() : nullptr;
+  const bool may_replace = parameters_.noise && parameters_.noise->replaces_hits();
+  const bool* is_hit = needs_hits && may_replace ? memory.is_hit.get() : nullptr;
   if (parameters_.noise) {
-    parameters_.noise->apply(ranges, readings(), key, parameters_.limits, is_hit);
+    parameters_.noise->apply(ranges, readings(), key, parameters_.limits,
+                             is_hit == nullptr ? nullptr : memory.is_hit.get());
   } else {
-    if (is_hit != nullptr) std::fill_n(is_hit, beams(), true);
     apply_limits(ranges, readings(), parameters_.limits);
   }
   std::copy_n(ranges, readings(), out.ranges);
-  for (std::size_t i = 0; out.intensities != nullptr && i < beams(); ++i) {
-    if (!is_traced) out.intensities[i] = memory.reflects[i] ? kReflective : 0.0F;
+  if (out.intensities != nullptr && !is_traced) {
+    for (std::size_t i = 0; i < beams(); ++i) {
+      out.intensities[i] = memory.reflects[i] ? kFullIntensity : 0.0F;
+    }
+  }
+  for (std::size_t i = 0; out.intensities != nullptr && is_hit != nullptr && i < beams(); ++i) {
     if (!is_hit[i]) out.intensities[i] = 0.0F;
   }
   for (std::size_t i = 0; out.hits != nullptr && i < beams(); ++i) {
-    if (!is_hit[i] || !std::isfinite(ranges[i])) out.hits->labels[i] = 0;
+    const bool is_measured = is_hit == nullptr || is_hit[i];
+    if (!is_measured || !std::isfinite(ranges[i])) out.hits->labels[i] = 0;
   }
 }
 
@@ -98,27 +100,19 @@ void RangeFinder::scan_plain(const SceneView& scene, const b2Transform& pose, co
 void RangeFinder::scan_traced(const SceneView& scene, const b2Transform& pose, const NoiseKey& key,
                               const Readings& out, ScanMemory& memory) const {
   const TraceRules rules{parameters_.mask, parameters_.reflect_mask, key,
-                         sees_materials(scene.scene()), out.intensities != nullptr};
-  RayEnds& ends = memory.ends;
-  trace(scene, *fan_, pose, rules, memory.buffer, memory.trace, ends);
-  // Whole vectors are read.
-  ends.fraction.resize(AlignedFloats::rounded(fan_->count()) + AlignedFloats::kBlock,
-                       kMissFraction);
-  write_ranges(ends.fraction.data(), memory.ranges.data());
-  if (out.intensities != nullptr) write_intensities(ends, out.intensities);
-  if (out.hits != nullptr) write_labels(scene.scene(), ends, *out.hits);
+                         sees_materials(scene.scene())};
+  trace(scene, *fan_, pose, rules, memory.trace);
+  write_ranges(memory.trace.ends.fraction.data(), memory.ranges.data());
+  if (out.intensities != nullptr) write_intensities(memory.trace, out.intensities);
+  if (out.hits != nullptr) write_labels(scene.scene(), memory.trace.ends, *out.hits);
 }
 
-void RangeFinder::write_intensities(RayEnds& ends, float* intensities) const {
-  float* brightness = ends.brightness.data();
-  const float* fraction = ends.fraction.data();
+void RangeFinder::write_intensities(TraceMemory& trace, float* intensities) const {
+  float* brightness = trace.ends.brightness.data();
   const std::size_t count = fan_->count();
-  for (std::size_t i = 0; i < count; ++i) {
-    const float range = std::max(fraction[i] * parameters_.length, kReferenceRange);
-    brightness[i] = kReflective * brightness[i] / (range * range);
-  }
+  to_intensities(trace.ends.fraction.data(), fan_->length(), count, parameters_.length, brightness);
   for (std::size_t i = 0; parameters_.reflect_mask != 0 && i < count; ++i) {
-    if (ends.is_preferred[i] != 0) brightness[i] = kReflective;
+    if (trace.is_preferred[i] != 0) brightness[i] = kFullIntensity;
   }
   for (const BeamFan::Run& run : fan_->runs()) {
     std::copy_n(brightness + run.sorted, run.count, intensities + run.original);
@@ -128,7 +122,8 @@ void RangeFinder::write_intensities(RayEnds& ends, float* intensities) const {
   for (std::size_t i = 0; i < count; ++i) intensities[fan_->order()[i]] = brightness[i];
 }
 
-void RangeFinder::write_labels(const RayScene& scene, const RayEnds& ends, HitTable& hits) const {
+void RangeFinder::write_labels(const RayScene& scene, const ScanBuffer& ends,
+                               HitTable& hits) const {
   std::fill_n(hits.labels, beams(), 0U);
   hits.entries.clear();
   std::map<std::pair<Id, std::uint16_t>, std::uint32_t> label_of;
@@ -137,8 +132,8 @@ void RangeFinder::write_labels(const RayScene& scene, const RayEnds& ends, HitTa
   for (std::size_t i = 0; i < fan_->count(); ++i) {
     if (!(ends.fraction[i] <= 1.0F)) continue;
     // Consecutive rays often hit the same fixture.
-    if (ends.fixture[i] != last_slot) {
-      last_slot = ends.fixture[i];
+    if (ends.slots()[i] != last_slot) {
+      last_slot = ends.slots()[i];
       const b2Fixture* fixture = scene.fixture_at(last_slot);
       const Id body = id_of(fixture->GetBody());
       const std::uint16_t bits = fixture->GetFilterData().categoryBits;

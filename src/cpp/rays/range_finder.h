@@ -26,7 +26,6 @@ struct ScanMemory {
   std::unique_ptr<bool[]> reflects, is_hit;
   std::size_t flags = 0;  // size of the arrays above
   TraceMemory trace;
-  RayEnds ends;
 };
 
 // What the beams of a scan hit: the bodies with the categories of their fixtures.
@@ -95,8 +94,8 @@ class RangeFinder {
   void scan_traced(const SceneView& scene, const b2Transform& pose, const NoiseKey& key,
                    const Readings& out, ScanMemory& memory) const;
   // Replaces the brightnesses by intensities.
-  void write_intensities(RayEnds& ends, float* intensities) const;
-  void write_labels(const RayScene& scene, const RayEnds& ends, HitTable& hits) const;
+  void write_intensities(TraceMemory& trace, float* intensities) const;
+  void write_labels(const RayScene& scene, const ScanBuffer& ends, HitTable& hits) const;
 
   std::shared_ptr<const BeamFan> fan_;
   Parameters parameters_;

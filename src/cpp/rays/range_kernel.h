@@ -36,6 +36,21 @@ void scale(const float* fractions, std::size_t count, float length, float* range
   }
 }
 
+// Intensities from the brightnesses of rays; see `to_intensities`.
+void dim(const float* fractions, const float* lengths, std::size_t count, float max_range,
+         float* brightness) {
+  const Lanes::Floats zero = Lanes::broadcast(0.0F);
+  const Lanes::Floats one = Lanes::broadcast(1.0F);
+  const Lanes::Floats full = Lanes::broadcast(kFullIntensity);
+  for (std::size_t i = 0; i < count; i += Lanes::kWidth) {
+    const Lanes::Floats fraction = Lanes::load(fractions + i);
+    const Lanes::Floats range = Lanes::max(fraction * max_range, one);
+    const Lanes::Floats area = range * range * Lanes::load(lengths + i);
+    const Lanes::Floats intensity = Lanes::min(full * Lanes::load(brightness + i) / area, full);
+    Lanes::store(brightness + i, Lanes::select(Lanes::less_equal(fraction, one), intensity, zero));
+  }
+}
+
 // Adds normal noise to exact ranges, and applies the limits. Beams are numbered in groups of 64:
 // the four words of a counter belong to four beams of a group, 16 beams apart.
 void add_normal_noise(float* ranges, std::size_t count, const NoiseKey& key, float deviation,

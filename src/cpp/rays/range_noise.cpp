@@ -70,6 +70,7 @@ struct Functions {
   decltype(&baseline::add_normal_noise) add_normal_noise;
   decltype(&baseline::draw_beams) draw_beams;
   decltype(&baseline::draw_words) draw_words;
+  decltype(&baseline::dim) dim;
 };
 
 const Functions& functions() {
@@ -77,17 +78,17 @@ const Functions& functions() {
 #if defined(__x86_64__)
     switch (instruction_set()) {
       case InstructionSet::kAvx512:
-        return Functions{avx512::limit, avx512::scale, avx512::add_normal_noise, avx512::draw_beams,
-                         avx512::draw_words};
+        return Functions{avx512::limit,      avx512::scale,      avx512::add_normal_noise,
+                         avx512::draw_beams, avx512::draw_words, avx512::dim};
       case InstructionSet::kAvx2:
-        return Functions{avx2::limit, avx2::scale, avx2::add_normal_noise, avx2::draw_beams,
-                         avx2::draw_words};
+        return Functions{avx2::limit,      avx2::scale,      avx2::add_normal_noise,
+                         avx2::draw_beams, avx2::draw_words, avx2::dim};
       case InstructionSet::kBaseline:
         break;
     }
 #endif
-    return Functions{baseline::limit, baseline::scale, baseline::add_normal_noise,
-                     baseline::draw_beams, baseline::draw_words};
+    return Functions{baseline::limit,      baseline::scale,      baseline::add_normal_noise,
+                     baseline::draw_beams, baseline::draw_words, baseline::dim};
   }();
   return kSelected;
 }
@@ -266,6 +267,11 @@ void apply_limits(float* ranges, std::size_t count, const RangeLimits& limits) {
 
 void draw_words(const NoiseKey& key, std::size_t count, std::uint32_t* words) {
   functions().draw_words(key, count, words);
+}
+
+void to_intensities(const float* fractions, const float* lengths, std::size_t count,
+                    float max_range, float* brightness) {
+  functions().dim(fractions, lengths, count, max_range, brightness);
 }
 
 void to_ranges(const float* fractions, std::size_t count, float length, float* ranges) {

@@ -50,6 +50,9 @@ class RangeNoise {
   // The greatest exact range for which the model is defined [m].
   float max_range() const { return max_range_; }
 
+  // Whether readings may be other than measurements of what the beams hit.
+  bool replaces_hits() const { return kind_ == Kind::kBeam; }
+
   // Changes exact ranges, NaN for a miss, to measured ones, and applies the limits. `is_hit`,
   // unless null, becomes false for each reading that is not a measurement of what the beam hit.
   // Arrays have whole blocks (see AlignedFloats) for `count` beams.
@@ -81,5 +84,14 @@ void draw_words(const NoiseKey& key, std::size_t count, std::uint32_t* words);
 // Ranges of consecutive rays [m], NaN for a miss, from their fractions of a length [m]. Writes
 // whole vectors of up to 16 ranges.
 void to_ranges(const float* fractions, std::size_t count, float length, float* ranges);
+
+// The greatest intensity.
+inline constexpr float kFullIntensity = 255.0F;
+
+// Replaces the brightnesses of rays, which are proportional to their lengths, by the intensities of
+// the hits: divides them by the square of the range, a fraction of `max_range` [m], if it is
+// greater than 1 m. Writes 0 for a miss. Arrays have whole blocks.
+void to_intensities(const float* fractions, const float* lengths, std::size_t count,
+                    float max_range, float* brightness);
 
 }  // namespace flatland

@@ -13,6 +13,7 @@
 #include "rays/beam_fan.h"
 #include "rays/edge_tree.h"
 #include "rays/materials.h"
+#include "rays/scan_memory.h"
 #include "world/slot_map.h"
 
 class b2Body;
@@ -54,6 +55,7 @@ class RayScene {
   const std::vector<b2Fixture*>& solids() const { return solids_; }
   const std::vector<EdgeGroup>& edge_groups();
   FanCache& fans() { return fans_; }
+  ScanMemoryPool& memories() { return memories_; }
   const Materials& materials() const { return materials_; }
   // The fixture whose id has a slot; null if it was destroyed.
   const b2Fixture* fixture_at(std::uint32_t slot) const {
@@ -82,6 +84,7 @@ class RayScene {
   bool is_grouped_ = true;
   std::mutex groups_mutex_;
   FanCache fans_;
+  ScanMemoryPool memories_;
 };
 
 }  // namespace flatland

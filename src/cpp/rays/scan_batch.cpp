@@ -26,8 +26,7 @@ void scan_all(const std::vector<ScanJob>& jobs, ThreadPool& pool, std::size_t nu
   for (std::size_t i = 0; i < jobs.size(); ++i) {
     std::unique_ptr<SceneView>& view = views[jobs[i].scene];
     if (view == nullptr) {
-      view = std::make_unique<SceneView>(*jobs[i].scene);
-      view->prepare(scans[jobs[i].scene]);
+      view = std::make_unique<SceneView>(*jobs[i].scene, scans[jobs[i].scene]);
     }
     view_of[i] = view.get();
   }
@@ -36,12 +35,14 @@ void scan_all(const std::vector<ScanJob>& jobs, ThreadPool& pool, std::size_t nu
   const std::size_t per_job = num_threads == 1 ? jobs.size() : (has_many ? kScansPerJob : 1);
   const std::size_t parts = per_job == 0 ? 0 : (jobs.size() + per_job - 1) / per_job;
   pool.parallel_for(parts, num_threads, [&](std::size_t part) {
-    ScanMemory memory;
+    ScanMemoryPool& memories = jobs[part * per_job].scene->memories();
+    std::unique_ptr<ScanMemory> memory = memories.take();
     const std::size_t end = std::min(jobs.size(), (part + 1) * per_job);
     for (std::size_t i = part * per_job; i < end; ++i) {
       const ScanJob& job = jobs[i];
-      job.finder->scan(*view_of[i], job.pose, job.key, job.out, memory);
+      job.finder->scan(*view_of[i], job.pose, job.key, job.out, *memory);
     }
+    memories.give_back(std::move(memory));
   });
 }
 

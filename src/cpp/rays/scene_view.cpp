@@ -15,19 +15,16 @@ constexpr std::size_t kManyScans = 4;
 
 }  // namespace
 
-void SceneView::prepare(std::size_t scans) {
-  if (scans >= kManyScans && solids_.size() >= kManySolids) tree_ = SolidTree(solids_);
-}
+SceneView::SceneView(RayScene& scene, std::size_t scans)
+    : scene_(scene),
+      edges_(scene.edge_groups()),
+      solids_(scene.solids(), scans >= kManyScans && scene.solids().size() >= kManySolids) {}
 
 void SceneView::draw(DepthScan& scan, RayMasks masks) const {
   for (const EdgeGroup& edges : edges_) {
     scan.draw(*edges.tree, edges.bodies.front()->GetTransform(), masks);
   }
-  if (tree_.is_empty()) {
-    scan.draw(solids_, masks);
-  } else {
-    scan.draw(tree_, masks);
-  }
+  scan.draw(solids_, masks);
 }
 
 void find_reflections(DepthScan& scan, const SceneView& scene, const BeamFan& fan, RayMasks masks,

@@ -1,6 +1,7 @@
 // What the rays of a scan can hit.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <vector>
 
@@ -15,21 +16,17 @@ inline constexpr std::uint16_t kAnyCategory = 0xFFFF;
 // The fixtures of a world while it does not change. Several threads may use a view at a time.
 class SceneView {
  public:
-  explicit SceneView(RayScene& scene)
-      : scene_(scene), edges_(scene.edge_groups()), solids_(scene.solids()) {}
+  // A view for this number of scans, which may be worth a tree of circles and polygons.
+  explicit SceneView(RayScene& scene, std::size_t scans = 1);
 
   const RayScene& scene() const { return scene_; }
-
-  // Prepares for this number of scans, which may be worth a tree of circles and polygons.
-  void prepare(std::size_t scans);
 
   void draw(DepthScan& scan, RayMasks masks) const;
 
  private:
   const RayScene& scene_;
   const std::vector<EdgeGroup>& edges_;
-  const std::vector<b2Fixture*>& solids_;
-  SolidTree tree_;
+  SolidTree solids_;
 };
 
 // Marks the rays with a reflecting fixture at the distance of the nearest hit: casts the rays of a

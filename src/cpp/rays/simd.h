@@ -23,7 +23,13 @@ using Ints = std::int32_t __attribute__((vector_size(32), aligned(4), may_alias)
 FLATLAND_INLINE Floats load(const float* p) { return *reinterpret_cast<const Floats*>(p); }
 FLATLAND_INLINE void store(float* p, Floats v) { *reinterpret_cast<Floats*>(p) = v; }
 FLATLAND_INLINE void store(std::int32_t* p, Ints v) { *reinterpret_cast<Ints*>(p) = v; }
+FLATLAND_INLINE void store(std::uint32_t* p, Ints v) { *reinterpret_cast<Ints*>(p) = v; }
 FLATLAND_INLINE Ints load(const std::int32_t* p) { return *reinterpret_cast<const Ints*>(p); }
+FLATLAND_INLINE Ints load(const std::uint32_t* p) { return *reinterpret_cast<const Ints*>(p); }
+FLATLAND_INLINE Ints load(const std::uint16_t* p) {
+  using Halves = std::uint16_t __attribute__((vector_size(16), aligned(2), may_alias));
+  return __builtin_convertvector(*reinterpret_cast<const Halves*>(p), Ints);
+}
 FLATLAND_INLINE Floats broadcast(float x) { return Floats{x, x, x, x, x, x, x, x}; }
 
 FLATLAND_INLINE Floats min(Floats a, Floats b) { return a < b ? a : b; }

@@ -55,16 +55,30 @@ Part merged(const Part* parts, std::size_t count, std::uint32_t child) {
   return all;
 }
 
+// Sets a box of a node or group.
+template <typename Boxes>
+void enlarge(const b2AABB& box, std::size_t i, Boxes& out) {
+  out.min_x[i] = box.lowerBound.x - b2_aabbExtension;
+  out.min_y[i] = box.lowerBound.y - b2_aabbExtension;
+  out.max_x[i] = box.upperBound.x + b2_aabbExtension;
+  out.max_y[i] = box.upperBound.y + b2_aabbExtension;
+}
+
+std::vector<SolidGroup> groups_of(const std::vector<b2Fixture*>& solids) {
+  std::vector<SolidGroup> groups;
+  groups.reserve((solids.size() + kFanOut - 1) / kFanOut);
+  for (std::size_t first = 0; first < solids.size(); first += kFanOut) {
+    groups.emplace_back(&solids[first], std::min(kFanOut, solids.size() - first));
+  }
+  return groups;
+}
+
 EdgeTree::Node node_of(const Part* parts, std::size_t count) {
   EdgeTree::Node node;
   node.count = static_cast<std::uint32_t>(count);
   for (std::size_t i = 0; i < kFanOut; ++i) {
     const Part& part = parts[std::min(i, count - 1)];
-    // Enlarged like the boxes of single solids; see DepthScan.
-    node.min_x[i] = part.box.lowerBound.x - b2_aabbExtension;
-    node.min_y[i] = part.box.lowerBound.y - b2_aabbExtension;
-    node.max_x[i] = part.box.upperBound.x + b2_aabbExtension;
-    node.max_y[i] = part.box.upperBound.y + b2_aabbExtension;
+    enlarge(part.box, i, node);
     node.child[i] = part.child;
     node.category_bits[i] = i < count ? part.category_bits : std::uint16_t{0};
   }
@@ -73,33 +87,50 @@ EdgeTree::Node node_of(const Part* parts, std::size_t count) {
 
 }  // namespace
 
-SolidTree::SolidTree(const std::vector<b2Fixture*>& solids) {
+SolidGroup::SolidGroup(b2Fixture* const* fixtures, std::size_t size)
+    : count(static_cast<std::uint32_t>(size)) {
+  for (std::size_t i = 0; i < kFanOut; ++i) {
+    solids[i] = fixtures[std::min(i, size - 1)];
+    enlarge(solids[i]->GetAABB(0), i, *this);
+  }
+}
+
+SolidTree::SolidTree(const std::vector<b2Fixture*>& solids, bool has_nodes) {
+  if (!has_nodes) {
+    loose_ = groups_of(solids);
+    return;
+  }
+  std::vector<b2Fixture*> finite, loose;
   b2AABB bounds{b2Vec2_zero, b2Vec2_zero};
   for (b2Fixture* solid : solids) {
     const b2AABB& box = solid->GetAABB(0);
     if (!is_finite(box)) {
-      loose_.push_back(solid);
+      loose.push_back(solid);
       continue;
     }
-    if (solids_.empty()) bounds = box;
+    if (finite.empty()) bounds = box;
     bounds.Combine(box);
-    solids_.push_back(solid);
+    finite.push_back(solid);
   }
-  if (solids_.empty()) return;
+  loose_ = groups_of(loose);
+  if (!finite.empty()) build(std::move(finite), bounds);
+}
+
+void SolidTree::build(std::vector<b2Fixture*> solids, const b2AABB& bounds) {
   // The index makes the order, and hence everything computed from it, unique.
   std::vector<std::pair<std::uint32_t, std::uint32_t>> order;
-  order.reserve(solids_.size());
-  for (std::uint32_t i = 0; i < solids_.size(); ++i) {
-    order.emplace_back(place_of(solids_[i]->GetAABB(0), bounds), i);
+  order.reserve(solids.size());
+  for (std::uint32_t i = 0; i < solids.size(); ++i) {
+    order.emplace_back(place_of(solids[i]->GetAABB(0), bounds), i);
   }
   std::sort(order.begin(), order.end());
   std::vector<b2Fixture*> sorted(order.size());
   std::vector<Part> level(order.size());
   for (std::size_t i = 0; i < order.size(); ++i) {
-    sorted[i] = solids_[order[i].second];
+    sorted[i] = solids[order[i].second];
     level[i] = {sorted[i]->GetAABB(0), 0, sorted[i]->GetFilterData().categoryBits};
   }
-  solids_ = std::move(sorted);
+  groups_ = groups_of(sorted);
 
   // Leaves, then levels of nodes up to the root, which becomes the first node.
   std::vector<EdgeTree::Node> reversed;

@@ -5,6 +5,7 @@
 #include <tuple>
 #include <utility>
 
+#include "crowd/crowd.h"
 #include "world/bodies.h"
 #include "world/world.h"
 
@@ -14,6 +15,13 @@ namespace {
 constexpr std::uint64_t bit(std::size_t clock) { return std::uint64_t{1} << clock; }
 
 }  // namespace
+
+StepPlan::StepPlan() = default;
+StepPlan::StepPlan(const StepPlan& other) = default;
+StepPlan::StepPlan(StepPlan&& other) noexcept = default;
+StepPlan& StepPlan::operator=(const StepPlan& other) = default;
+StepPlan& StepPlan::operator=(StepPlan&& other) noexcept = default;
+StepPlan::~StepPlan() = default;
 
 std::uint32_t StepPlan::add_clock(Phase phase, const RateClock& clock) {
   if (clocks_.size() >= kMostClocks) throw std::invalid_argument("there are too many clocks");
@@ -45,6 +53,8 @@ void StepPlan::remove_body(Id body) {
   });
   for (const Id id : removed) remove_controller(id);
 }
+
+crowd::Crowd* StepPlan::find_crowd(Id id) { return crowds_.find(id); }
 
 Id StepPlan::add_crowd(const crowd::Settings& settings) {
   is_sorted_ = false;

@@ -9,7 +9,6 @@
 #include <cstdint>
 #include <vector>
 
-#include "crowd/crowd.h"
 #include "world/controllers.h"
 #include "world/rate_clock.h"
 #include "world/slot_map.h"
@@ -18,6 +17,11 @@
 namespace flatland {
 
 class World;
+
+namespace crowd {
+class Crowd;
+struct Settings;
+}  // namespace crowd
 
 // Before the physics step, at the time of step k, or after it, at that of step k + 1.
 enum class Phase : std::uint8_t { kBefore = 0, kAfter = 1 };
@@ -48,6 +52,14 @@ class StepPlan {
   static constexpr std::size_t kMostClocks = 62;
   static constexpr std::int64_t kEnd = INT64_MAX;  // after all plugins
 
+  // Defined where Crowd is complete, so that its headers are not included here.
+  StepPlan();
+  StepPlan(const StepPlan& other);
+  StepPlan(StepPlan&& other) noexcept;
+  StepPlan& operator=(const StepPlan& other);
+  StepPlan& operator=(StepPlan&& other) noexcept;
+  ~StepPlan();
+
   bool empty() const {
     return clocks_.empty() && controllers_.size() == 0 && records_.size() == 0 &&
            crowds_.size() == 0;
@@ -70,7 +82,7 @@ class StepPlan {
 
   Id add_crowd(const crowd::Settings& settings);
   // Null if it does not exist.
-  crowd::Crowd* find_crowd(Id id) { return crowds_.find(id); }
+  crowd::Crowd* find_crowd(Id id);
   void remove_crowd(Id id);
 
   // Throws std::invalid_argument for an unknown clock.

@@ -14,6 +14,7 @@ from nav_msgs.msg import Odometry
 from std_msgs.msg import Bool
 from std_srvs.srv import Empty
 from visualization_msgs.msg import MarkerArray
+from waiting import wait_until
 
 from flatland.msg import DebugTopicList
 from flatland.srv import SetRate
@@ -216,7 +217,8 @@ def test_model_name_is_the_namespace_and_can_be_numbered(
         screen.click(*picture.at(x, -3))
         screen.click(*picture.at(x, -3))
         spawned(f"robot_model{count}")
-    assert {"/robot_model1/scan", "/robot_model2/scan"} <= ros.registered()["publishers"]
+    scans = {"/robot_model1/scan", "/robot_model2/scan"}
+    wait_until("their topics", lambda: scans <= ros.registered()["publishers"])
     # Each laser has a different colour.
     screenshot(
         lambda picture: len(picture.places(LIGHT_BLUE)) > 30 and len(picture.places(RED)) > 30,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +18,10 @@ ENDS = "[{name: base, anchor: [0, 0]}, {name: wheel, anchor: [0, 0]}]"
 MODEL = 'model "robot"'
 
 ENABLED = Key("enabled", "true", "bool")
+MATERIAL_KEYS = tuple(
+    Key(name, "0.5", "float", limit="0 to 1")
+    for name in ("reflectance", "transmission", "specular")
+)
 WORLD_SECTIONS = [
     Section(
         "world",
@@ -47,6 +52,8 @@ WORLD_SECTIONS = [
             Key("name", "2d", "string or strings", required=True),
             Key("map", "map.yaml"),
             Key("color", "[1, 1, 1, 1]", "color", limit="finite"),
+            Key("class", "wall"),
+            Key("material", "{}", "map"),
             Key("properties", "{}", "map"),
         ),
         indent=4,
@@ -54,6 +61,15 @@ WORLD_SECTIONS = [
         location='"layers" index=0',
         label="index=0",
         label_location='"layers"',
+    ),
+    Section(
+        "layer material",
+        "properties: {}\nlayers:\n  - name: 2d\n    material:\n",
+        MATERIAL_KEYS,
+        indent=6,
+        location='"layers" index=0 "material"',
+        label='"material"',
+        label_location='"layers" index=0',
     ),
     Section(
         "model entry",
@@ -123,6 +139,7 @@ FOOTPRINT_KEYS = (
     Key("sensor", "false", "bool"),
     Key("collision", "true", "bool"),
     Key("layers", "[2d]", "names"),
+    Key("material", "{}", "map"),
 )
 FOOTPRINT: dict[str, Any] = {
     "before": "bodies:\n  - name: base\n    footprints:\n",
@@ -155,6 +172,7 @@ BODY_SECTIONS = [
             Key("bodies", f"[{{name: base, footprints: {CIRCLE}}}]", "list", required=True),
             Key("joints", "[]", "list"),
             Key("plugins", "[]", "list"),
+            Key("class", "chair"),
         ),
         location=MODEL,
         label_location=MODEL,
@@ -170,6 +188,7 @@ BODY_SECTIONS = [
             COLOR,
             Key("linear_damping", "0", "float", limit="finite, >= 0"),
             Key("angular_damping", "0", "float", limit="finite, >= 0"),
+            Key("class", "chair"),
             ENABLED,
         ),
         indent=4,
@@ -306,6 +325,13 @@ LIMITS = tuple(
     Key(f"{name}_limit", "1", "float", limit=">= 0")
     for name in ("velocity", "acceleration", "deceleration")
 )
+FORCE_KEYS = (
+    Key("mode", "force", is_independent=False),
+    Key("max_force", "1", "float", required=True, limit=">= 0"),
+    Key("max_torque", "1", "float", required=True, limit=">= 0"),
+    Key("friction", "1", "float", limit=">= 0"),
+    Key("grip_radius", "1", "float", limit="finite, >= 0"),
+)
 PLUGIN_SECTIONS = [
     plugin(
         "Laser",
@@ -348,6 +374,7 @@ PLUGIN_SECTIONS = [
         Key("enable_odom_pub", "true", "bool"),
         Key("enable_twist_pub", "true", "bool"),
     ),
+    plugin("DiffDrive", *FORCE_KEYS, more="    body: base\n"),
     plugin("DiffDrive", *LIMITS, more="    body: base\n", inner="linear_dynamics"),
     plugin("DiffDrive", *LIMITS, more="    body: base\n", inner="angular_dynamics"),
     plugin(
@@ -360,6 +387,88 @@ PLUGIN_SECTIONS = [
         Key("max_angular_velocity", "0", "float", limit=">= 0"),
         Key("max_steer_acceleration", "0", "float", limit=">= 0"),
         bodies=THREE_WHEELS,
+    ),
+    plugin(
+        "AckermannDrive",
+        BODY,
+        Key("max_steer_angle", "0.5", "float", required=True, limit="finite"),
+        Key("wheelbase", "1", "float", required=True, limit="finite"),
+        Key("rear_axle", "[0, 0]", "vector", limit="coordinate"),
+        Key("command", "steering"),
+        Key("twist_pub", "twist"),
+    ),
+    plugin(
+        "OmniDrive",
+        BODY,
+        Key("layout", "mecanum", is_independent=False),
+        Key("wheelbase", "1", "float", required=True, limit="finite"),
+        Key("track", "1", "float", required=True, limit="finite"),
+        Key("max_wheel_speed", "0", "float", limit=">= 0"),
+        Key("max_wheel_acceleration", "0", "float", limit=">= 0"),
+    ),
+    plugin(
+        "OmniDrive",
+        BODY,
+        Key("layout", "three_wheel", is_independent=False),
+        Key("wheel_distance", "1", "float", required=True, limit="finite"),
+        Key("wheel_angle", "1", "float", limit="finite"),
+    ),
+    plugin(
+        "PathFollower",
+        Key("body", "base"),
+        Key("waypoints", "[[1, 0]]", "list", required=True),
+        Key("frame", "world"),
+        Key("heading", "forward"),
+        Key("mode", "once"),
+        Key("speed", "1", "float", limit="finite"),
+        Key("acceleration", "1", "float", limit=">= 0"),
+        Key("deceleration", "1", "float", limit=">= 0"),
+        Key("angular_speed", "1", "float", limit="finite"),
+        Key("angular_acceleration", "1", "float", limit=">= 0"),
+        Key("angular_deceleration", "1", "float", limit=">= 0"),
+        Key("wait", "1", "float", limit="finite, >= 0"),
+        Key("start", "true", "bool"),
+        Key("start_topic", "go"),
+    ),
+    plugin(
+        "WheelStates",
+        Key("body", "base"),
+        Key("wheels", "[{name: left, radius: 0.1}]", "list", required=True),
+        Key("topic", "joint_states"),
+        Key("ticks_per_turn", "0", "int"),
+        RATE,
+    ),
+    replace(
+        plugin(
+            "WheelStates",
+            Key("name", "left", required=True),
+            Key("radius", "0.1", "float", required=True, limit="finite, >= 1e-06"),
+            Key("body", "base"),
+            Key("position", "[0, 0]", "vector", limit="coordinate"),
+            Key("heading", "0", "float", limit="finite"),
+            Key("roller_angle", "1", "float", limit="finite"),
+            inner="wheels",
+        ),
+        is_item=True,
+        indent=8,
+        location=f'{MODEL} plugin "p" "wheels" index=0',
+        label="index=0",
+        label_location=f'{MODEL} plugin "p" "wheels"',
+    ),
+    plugin(
+        "Hitch",
+        Key("body", "base"),
+        Key("origin", "[0, 0]", "vector", limit="coordinate"),
+        Key("joint", "hinge"),
+        Key("reach", "0.1", "float", limit="0 to 1e8"),
+        Key("max_angle", "1", "float"),
+        Key("models", "[]", "names"),
+        Key("collide", "false", "bool"),
+        Key("start", "false", "bool"),
+        Key("topic", "hitch"),
+        Key("state_topic", "hitched"),
+        RATE,
+        Key("service", '""'),
     ),
     plugin(
         "ModelTfPublisher",

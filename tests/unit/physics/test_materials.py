@@ -259,30 +259,43 @@ def test_reflections_equal_those_of_single_rays(seed: int) -> None:
 
     world, sensor = clutter(seed, draw)
     angles = np.linspace(-math.pi, math.pi, 721)
-    scan = finder(angles).scan_labels(sensor, 1, 1)
+    scan = finder(angles).scan(sensor, 1, 1)
+    assert scan.intensities is not None
     different = 0
     reflected = 0
-    for angle, got in zip(angles, scan.ranges, strict=True):
-        end = np.array([LENGTH * math.cos(angle), LENGTH * math.sin(angle)])
-        hit = world.ray_cast((0, 0), end)
+    for angle, got, intensity in zip(angles, scan.ranges, scan.intensities, strict=True):
+        direction = np.array([math.cos(angle), math.sin(angle)])
+        hit = world.ray_cast((0, 0), tuple(LENGTH * direction))
         assert hit is not None
         expected = hit.fraction * LENGTH
         if hit.fixture.material is not None:
             reflected += 1
-            direction = end / LENGTH
-            normal = np.array(hit.normal)
-            out = direction - 2 * direction.dot(normal) * normal
-            start = np.array(hit.point) + 1e-4 * out
-            second = world.ray_cast(start, start + (LENGTH - expected) * out)
+            direction = direction - 2 * direction.dot(hit.normal) * np.array(hit.normal)
+            start = np.array(hit.point) + 1e-4 * direction
+            hit = world.ray_cast(start, start + (LENGTH - expected) * direction)
             expected = (
-                math.nan
-                if second is None
-                else expected + 1e-4 + second.fraction * (LENGTH - expected)
+                math.nan if hit is None else expected + 1e-4 + hit.fraction * (LENGTH - expected)
             )
-        if not (abs(got - expected) < 2e-3 or (math.isnan(got) and math.isnan(expected))):
-            different += 1  # a beam that grazes an outline
+        if hit is None:
+            is_same = math.isnan(got) and intensity == 0
+        else:
+            scale = 255 * 0.5 / max(expected, 1) ** 2
+            cosine = abs(direction.dot(hit.normal))
+            is_same = abs(got - expected) < 2e-3 and abs(intensity / scale - cosine) < 0.02
+        different += not is_same  # a beam that grazes an outline
     assert reflected > 100
     assert different <= 6
+
+
+def test_a_mirror_hides_what_is_directly_behind_it() -> None:
+    world, sensor = room()
+    add_edge(world, [3, -8, 3, 8], MIRROR)
+    expected = finder(FRONT).scan(sensor, 1, 1).ranges
+    assert np.isfinite(expected).sum() > 500
+    for x in (3.001, 3.1):
+        add_edge(world, [x, -8, x, 8], None)
+    add_box(world, (3.8, 1, 0.2), None)
+    np.testing.assert_array_equal(finder(FRONT).scan(sensor, 1, 1).ranges, expected)
 
 
 # -- intensities ------------------------------------------------------------------------------
@@ -296,6 +309,16 @@ def test_intensities_are_those_of_a_lambert_surface() -> None:
     assert scan.intensities == pytest.approx(
         255 * 0.8 * np.cos(FRONT) / (8 / np.cos(FRONT)) ** 2, rel=1e-4
     )
+
+
+def test_a_reflectance_of_minus_0_is_black() -> None:
+    world, sensor = room()
+    add_edge(world, [3, -8, 3, 8], Material(reflectance=-0.0))
+    add_edge(world, [-3, -8, -3, 8], MIRROR)
+    scan = finder(FRONT).scan(sensor, 1, 1)
+    assert scan.ranges == pytest.approx(3 / np.cos(FRONT), rel=1e-5)
+    assert scan.intensities is not None
+    assert (scan.intensities == 0).all()
 
 
 def test_intensities_of_images_and_of_fixtures_without_material() -> None:

@@ -413,7 +413,7 @@ class TestInvalidCommands:
         self, plugin_world: Any, caplog: pytest.LogCaptureFixture, monkeypatch: Any
     ) -> None:
         now = [100.0]
-        monkeypatch.setattr("flatland.plugin_api.drive.time.monotonic", lambda: now[0])
+        monkeypatch.setattr("flatland.plugin_api.occasional_warning.time.monotonic", lambda: now[0])
         world = plugin_world(drive())
 
         def warnings_of_ten_invalid_commands() -> int:

@@ -148,6 +148,14 @@ class TestResistance:
         expected = (10.0 * 200 * 201 / 2 + 40.0 * 200) * DT**2 / MASS
         assert displacement(50.0) == pytest.approx(expected, rel=1e-3)
 
+    def test_brakes_do_not_undo_a_small_move(self, robot: Any) -> None:
+        world = robot(diff("max_force: 4000, max_torque: 500"))
+        world.step(10)
+        for pose in ((0.006, 0.005, 0.004), (0.006, 0.005, 0.001)):
+            world.move_model("robot", pose)
+            world.step(100)
+            assert world.model("robot").pose == pytest.approx(pose, abs=1e-7)
+
     def test_a_robot_that_is_pushed_by_another(self, plugin_world: Any) -> None:
         """The stronger robot pushes the braked one with the difference of the forces."""
         plugins = diff("max_force: 90, max_torque: 50, friction: .inf")

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import logging
 import math
+from pathlib import Path
 from typing import Any
 
 import pytest
 
 import flatland
+from flatland.recording import Replay
 
 BODIES = """
 - name: base
@@ -109,8 +111,9 @@ class TestChoice:
     ) -> None:
         world = tow("reach: 0.1", x=-1.3)
         with caplog.at_level(logging.WARNING):
-            world.command("/hitch").set(True)
-            world.step(10)
+            for _ in range(3):  # a joystick repeats commands
+                world.command("/hitch").set(True)
+                world.step(10)
         messages = [r.getMessage() for r in caplog.records]
         assert messages == [
             'Flatland World: plugin "hitch" of model "robot": no model is within 0.1 m'
@@ -217,6 +220,34 @@ class TestEnds:
         assert hitch(world).hitched is None
         assert world.physics.object_counts().joints == 0
         assert world.model("trailer").followers == []
+
+    def test_recordings_contain_connections_that_end_before_the_next_step(
+        self, plugin_world: Any, tmp_path: Path
+    ) -> None:
+        path = tmp_path / "run.flog"
+        with plugin_world(plugins("start: true"), bodies=BODIES) as world:
+            world.record(path)
+            world.spawn_model("\n" + TRAILER, "trailer", pose=(-1.2, 0.0, 0.0))
+            hitch(world).detach()  # instead of the connection at the start
+            world.step()
+            assert hitch(world).hitched is None
+            hitch(world).attach()
+            world.move_model("robot", (2.0, 0.0, 0.0))
+            world.command("/cmd_vel").set(flatland.Twist(0.5))
+            world.step(20)
+            with pytest.raises(flatland.WorldError, match="within"):
+                hitch(world).attach("trailer")
+            world.move_model("robot", (0.0, 0.0, 0.0))
+            world.call_plugin("hitch", "connect", {"name": "trailer"}, "robot")
+            world.step(20)
+            assert hitch(world).hitched is world.model("trailer")
+            for name, model in (("hitch", ""), ("hitch", "trailer"), ("drive", "robot")):
+                with pytest.raises(flatland.WorldError, match="does not exist"):
+                    world.call_plugin(name, "connect", {}, model)
+        replay = Replay(path)
+        replay.run()
+        replay.close()
+        assert (replay.difference, replay.last_step) == (None, 41)
 
 
 @pytest.mark.parametrize(

@@ -1,4 +1,4 @@
-"""The worlds with paths, drives, forces and trailers: repeatable, copied, recorded and changed."""
+"""The worlds with paths, drives, forces, trailers and sensors: repeated, copied and changed."""
 
 from __future__ import annotations
 
@@ -39,7 +39,17 @@ def trailers(world: World, part: int) -> None:
         world.command("/trailer1/hitch").set(False)
 
 
-WORLDS = {"traffic": traffic, "drives": drives, "pushing": pushing, "trailers": trailers}
+def sensors(world: World, part: int) -> None:
+    world.command("/cmd_vel").set(Twist(0.4, 0.0, 0.5 - part))
+
+
+WORLDS = {
+    "traffic": traffic,
+    "drives": drives,
+    "pushing": pushing,
+    "trailers": trailers,
+    "sensors": sensors,
+}
 STEPS = 300
 
 
@@ -113,7 +123,14 @@ def test_models_are_moved_deleted_and_spawned_again(load: Load) -> None:
     world = from_yaml()
     run(world, command)
     for model in list(world.models):
-        world.move_model(model.name, (4.0, 4.0, 0.5), "allow")
+        # As a drag does: a paused world, several moves, and a step on request while it is paused.
+        world.pause()
+        for x in (2.0, 3.0, 4.0):
+            world.move_model(model.name, (x, 4.0, 0.5), "allow")
+            world.step(10)
+            assert model.pose == pytest.approx((x, 4.0, 0.5))
+        world.step(1, while_paused=True)
+        world.resume()
         world.step(20)
         bounds = 30.0
         assert all(math.dist(other.pose[:2], (0, 0)) < bounds for other in world.models)
@@ -136,14 +153,19 @@ def test_steps_need_no_hooks(load: Load) -> None:
 def test_trailers_follow_on_the_circles_of_the_closed_form(checkout: Path) -> None:
     """In a steady turn, an axle at the distance l behind a hook at c behind another axle has the
 
-    radius of the circle R1 with R1^2 = R0^2 + c^2 - l^2.
+    radius of the circle R1 with R1^2 = R0^2 + c^2 - l^2, and the angle atan(c / R0) + atan(l / R1).
     """
     with World.from_yaml(checkout / "worlds" / "trailers" / "world.yaml", seed=1) as world:
         world.command("/cmd_vel").set(Twist(1.0, 0.0, 0.2))
         world.step(6000)
         squared = (1.0 / 0.2) ** 2
+        heading = world.model("tractor").pose[2]
         for name, offset in (("trailer1", 0.75), ("trailer2", 0.85), ("trailer3", 0.85)):
+            angle = math.atan(offset / math.sqrt(squared))
             squared += offset**2 - 1.5**2
+            angle += math.atan(1.5 / math.sqrt(squared))
+            before, heading = heading, world.model(name).pose[2]
+            assert math.remainder(before - heading, math.tau) == pytest.approx(angle, rel=0.01)
             vx, vy, omega = world.model(name).bodies[0].velocity
             assert omega == pytest.approx(0.2, rel=0.02)
             assert math.hypot(vx, vy) / omega == pytest.approx(math.sqrt(squared), rel=0.01)

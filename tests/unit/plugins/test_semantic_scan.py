@@ -78,6 +78,18 @@ def test_defaults_of_classes(scan_world: Any, files: Any) -> None:
     assert [label.class_name for label in labels(output.latest)[1:]] == ["plant", "p2"]
 
 
+def test_people_are_persons(scan_world: Any) -> None:
+    people = (
+        "- {type: Pedestrians, name: people, "
+        "groups: [{name: guest, count: 0, area: [-5, -5, 5, 5]}]}"
+    )
+    world = scan_world(world_plugins=people)
+    world.plugins[0].spawn(poses=[(2.0, 0.0, 0.0)])
+    output = world.output("/semantic_scan")
+    world.step()
+    assert labels(output.latest)[1] == SemanticLabel("guest_0", "body", ("all",), "person")
+
+
 def test_classes_by_patterns_of_names(scan_world: Any) -> None:
     world = scan_world(", classes: {'chair*/leg': thin, 'chair1': red, 'chair*': other}")
     world.spawn_model("chair.model.yaml", "chair1", pose=(2, 0, 0))

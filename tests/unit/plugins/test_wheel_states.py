@@ -164,7 +164,8 @@ def test_message() -> None:
     [
         ("wheels: []", 'Invalid "wheels", must not be empty'),
         ("topic: x", "wheels"),
-        ("wheels: [{name: a, radius: 0}]", 'Invalid "radius", must be greater than 0, got 0.0'),
+        ("wheels: [{name: a, radius: 0}]", "must be finite and at least 1e-06, got 0.0"),
+        ("wheels: [{name: a, radius: 1.0e-300}]", "must be finite and at least 1e-06, got 1e-300"),
         ("wheels: [{name: a}]", "radius"),
         ("wheels: [{name: a, radius: 1}, {name: a, radius: 1}]", 'name "a" exists twice'),
         ("wheels: [{name: a, radius: 1, body: b}]", 'Body with name "b" does not exist'),

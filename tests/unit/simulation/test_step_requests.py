@@ -51,6 +51,13 @@ def test_in_lockstep_time_passes_only_on_request(world: flatland.World) -> None:
         assert simulation.post(lambda: world.time).result(TIMEOUT) == 0.26
 
 
+def test_requests_before_the_start_are_served_in_lockstep(world: flatland.World) -> None:
+    simulation = Simulation(world, lockstep=True)
+    done = world.post(lambda: world.time)
+    with running(simulation):
+        assert done.result(TIMEOUT) == 0
+
+
 def test_a_paused_world_is_stepped_and_stays_paused(world: flatland.World) -> None:
     for lockstep, rate in ((True, 200.0), (False, 200.0), (False, 0.0), (False, 1e-3)):
         simulation = Simulation(world, rate, lockstep=lockstep)

@@ -1,0 +1,139 @@
+"""Waypoints of people, and free places from which there is a way to them."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from flatland.errors import WorldError
+from flatland.geometry import DoubleArray, Vector2
+
+if TYPE_CHECKING:
+    from flatland.physics import Crowd
+    from flatland.plugins._people_config import Group, Stop
+
+CLEARANCE: Final = 0.02  # between a person on a way and the wall, at least [m]
+_WANDER_RADIUS: Final = 0.7  # distance at which a random place is reached [m]
+_MOST_DRAWS: Final = 6  # of free places, each twice as many as before
+
+
+class PeoplePlaces:
+    """Adds the waypoints of groups to a crowd, and finds free places for people."""
+
+    def __init__(self, crowd: Crowd, world: Any, bits: int, rng: np.random.Generator) -> None:
+        """Creates places without routes.
+
+        Args:
+            crowd: The crowd.
+            world: The world of the plugin.
+            bits: Bits of the layers in which people are.
+            rng: Generator of all random places.
+        """
+        self._crowd = crowd
+        self._world = world
+        self._bits = bits
+        self._rng = rng
+        self._routes: dict[str, tuple[int, list[int]]] = {}
+
+    def add_route(self, group: Group) -> None:
+        """Adds the waypoints of a group and its route.
+
+        Raises:
+            YamlError: A waypoint is not in the free space.
+            WorldError: There are no random places with a way between them.
+        """
+        if group.stops:
+            waypoints = [self._add_stop(stop) for stop in group.stops]
+        else:
+            waypoints = self._add_random_places(group)
+        route = self._crowd.add_route(
+            waypoints, group.order, stop_interval=group.stop_interval, stop=group.stop_time
+        )
+        self._routes[group.name] = (route, waypoints)
+
+    def add_party(self, group: Group) -> int:
+        """Adds a party at the start of the route of a group, and returns its number."""
+        route, waypoints = self._routes[group.name]
+        first = int(self._rng.integers(len(waypoints))) if group.order == "random" else 0
+        return self._crowd.add_party(route, first)
+
+    def add_goal(self, place: Vector2) -> int:
+        """Adds a temporary waypoint at a place [m]."""
+        return self._crowd.add_waypoint(place, place, 0.3, spacing=0.0)
+
+    def has_way(self, waypoint: int, place: Vector2) -> bool:
+        """Returns whether there is a way from a place [m] to a waypoint."""
+        return self._crowd.way(waypoint, place) != (0.0, 0.0)
+
+    def find_free(self, group: Group, count: int) -> DoubleArray:
+        """Returns free poses from which there is a way to the first waypoint of a group.
+
+        Returns:
+            Poses (x, y, theta) [m, rad], shape (count, 3).
+
+        Raises:
+            WorldError: There are too few.
+        """
+        waypoint = self._routes[group.name][1][0]
+        wanted = count
+        for _ in range(_MOST_DRAWS):
+            places = self._sample(group, wanted, count)
+            with_way = [place for place in places if self.has_way(waypoint, _pair(place))]
+            if len(with_way) >= count:
+                return np.array(with_way[:count]).reshape(-1, 3)
+            wanted *= 2
+        raise WorldError(f"found only {len(with_way)} of {count} free places with a way")
+
+    def _add_stop(self, stop: Stop) -> int:
+        waypoint = self._crowd.add_waypoint(
+            stop.low,
+            stop.high,
+            stop.radius,
+            wait=stop.wait,
+            is_queue=stop.is_queue,
+            spacing=stop.spacing,
+        )
+        if not self._crowd.reach(waypoint):
+            raise stop.reader.error("A waypoint is not in the free space: no person fits there")
+        return waypoint
+
+    def _add_random_places(self, group: Group) -> list[int]:
+        """Adds the places between which the people of a group wander."""
+        candidates = self._sample(group, 2 * group.places, None)[:, :2]
+        # Those in the largest part of the free space, as seen from one of the candidates.
+        best: list[Vector2] = []
+        for x, y in candidates[: group.places].tolist():
+            start = self._crowd.add_waypoint((x, y), (x, y), _WANDER_RADIUS, spacing=0.0)
+            found = [place for place in map(_pair, candidates) if self.has_way(start, place)]
+            if len(found) > len(best):
+                best = found
+            if len(best) > group.places:
+                break
+        if len(best) < 2:
+            raise WorldError("there are no two free places with a way between them")
+        return [
+            self._crowd.add_waypoint(place, place, _WANDER_RADIUS) for place in best[: group.places]
+        ]
+
+    def _sample(self, group: Group, count: int, least: int | None) -> DoubleArray:
+        """Samples free poses of people; fewer if there are not enough, but at least `least`."""
+        inside = [layer for layer in self._world.layers if layer.category_bits & self._bits]
+        layers = [name for layer in inside for name in layer.names]
+        radius, area = group.radius, group.area
+        if area is None and not any(len(layer.edges) for layer in inside):
+            raise WorldError('"area" is required, because the layers have no walls')
+        while True:
+            try:
+                poses: DoubleArray = self._world.sample_free(
+                    count, radius, 2.0 * CLEARANCE, self._rng, layers=layers, bounds=area
+                )
+                return poses
+            except WorldError:
+                if count <= (least or 2):
+                    raise
+                count = max(least or 2, count // 2)
+
+
+def _pair(place: DoubleArray) -> Vector2:
+    return (float(place[0]), float(place[1]))

@@ -1,0 +1,228 @@
+"""Requests, states, outputs and parameters of the plugin Pedestrians."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+from rooms_with_people import CALM, ONE, load, people_of
+
+from flatland.errors import PluginError, WorldError
+from tests.unit.conftest import WorldFiles
+
+CROWD = (
+    "[{name: a, count: 6, stops: {every: 10, time: [1, 2]}},"
+    " {name: b, count: 4, together: 2, waypoints: [{at: [2, 2], wait: [1, 2]}, {at: [8, 4]}],"
+    " order: random}, {name: c, count: 2, waypoints: [{at: [5, 3], queue: true, wait: [1, 2]},"
+    " {at: [8, 2]}]}]"
+)
+FULL = "layers: [body], legs: {layers: [2d]}, "
+
+
+@pytest.mark.parametrize("options", [FULL, FULL + "model: orca, ", FULL + "body_type: dynamic, "])
+def test_runs_with_one_seed_are_equal(files: WorldFiles, options: str) -> None:
+    hashes = []
+    for seed, listens in ((1, False), (1, True), (2, False)):
+        world = load(files, CROWD, options, seed=seed)
+        if listens:
+            world.output("/people")
+            world.output("/people/states")
+        world.step(700)
+        if listens:
+            for _ in range(300):
+                world.step()
+        else:
+            world.step(300)
+        hashes.append(world.state_hash())
+    assert hashes[0] == hashes[1] != hashes[2]
+
+
+@pytest.mark.parametrize("options", [FULL, FULL + "body_type: dynamic, "])
+def test_snapshots_clones_and_resets_repeat_the_run(files: WorldFiles, options: str) -> None:
+    world = load(files, CROWD, options)
+    start = world.state_hash()
+    world.step(333)
+    snapshot = world.snapshot()
+    with world.clone() as clone:
+        world.step(700)
+        later = world.state_hash()
+        clone.step(700)
+        assert clone.state_hash() == later
+        assert people_of(clone).people.names == people_of(world).people.names
+    people_of(world).spawn("a", 1)
+    people_of(world).remove(["b_0"])
+    world.step(50)
+    world.restore(snapshot)
+    assert "b_0" in people_of(world).people.names
+    world.step(700)
+    assert world.state_hash() == later
+    world.reset()
+    assert world.state_hash() == start
+
+
+def test_reseeding_decides_all_further_random_numbers(files: WorldFiles) -> None:
+    world = load(files, CROWD, FULL)
+    world.step(100)
+    snapshot = world.snapshot()
+    hashes = []
+    for seed in (1, 1, 2):
+        world.restore(snapshot)
+        people_of(world).reseed(np.random.default_rng(seed))
+        people_of(world).spawn("a", 2)
+        world.step(300)
+        hashes.append(world.state_hash())
+    assert hashes[0] == hashes[1] != hashes[2]
+
+
+def test_a_recording_repeats_spawned_and_directed_people(files: WorldFiles, tmp_path: Any) -> None:
+    from flatland.recording import Replay
+
+    world = load(files, CROWD, FULL)
+    recorder = world.record(tmp_path / "run.log")
+    try:
+        people = people_of(world)
+        world.step(100)
+        names = people.spawn("b", 2)
+        people.send(names[:1], (8.0, 3.0))
+        people.stop(["a_1"])
+        world.step(100)
+        people.remove(["a_0", names[1]])
+        people.resume()
+        world.move_model("a_2", (5.0, 4.0, 0.0))
+        world.delete_model("a_3")
+        world.step(250)
+    finally:
+        recorder.close()
+    replay = Replay(tmp_path / "run.log")
+    assert replay.run() is None
+    assert people_of(replay.world).people.names == people_of(world).people.names
+    replay.close()
+
+
+def test_people_are_sent_stopped_and_resumed(files: WorldFiles) -> None:
+    world = load(files, ONE % "[8, 2]", CALM)
+    people = people_of(world)
+    [name] = people.spawn(poses=[(2.0, 2.0, 0.0)])
+    people.send([name], (2.0, 4.0))
+    world.step(1000)
+    assert people.people.poses[0, :2] == pytest.approx((2.0, 4.0), abs=0.35)
+    assert people.people.standing[0]
+    people.resume()
+    world.step(200)
+    assert not people.people.standing[0]
+    people.stop()
+    world.step(600)
+    before = people.people.poses[0, :2]
+    world.step(200)
+    assert people.people.poses[0, :2] == pytest.approx(before, abs=0.01)
+
+
+def test_pause_drag_and_deletion_of_people(files: WorldFiles) -> None:
+    world = load(files, CROWD, FULL)
+    people = people_of(world)
+    world.step(100)
+    before = world.state_hash()
+    world.pause()
+    world.step(100)
+    assert world.state_hash() == before
+    world.resume()
+    world.move_model("a_0", (3.0, 3.0, 0.0), if_blocked="allow")
+    world.step(10)
+    index = people.people.names.index("a_0")
+    assert people.people.poses[index, :2] == pytest.approx((3.0, 3.0), abs=0.3)
+    world.delete_model("a_0")
+    world.step(10)
+    assert "a_0" not in people.people.names
+    people.remove()
+    world.step(10)
+    assert people.people.names == ()
+    assert people.spawn("a", 2) == ["a_6", "a_7"]
+
+
+def test_the_outputs_carry_the_people(files: WorldFiles) -> None:
+    world = load(files, CROWD, "pub_rate: 5, ")
+    output, states = world.output("/people"), world.output("/people/states")
+    times: list[int] = []
+    output.subscribe(lambda value: times.append(value.stamp))
+    world.step(200)
+    assert times == [200_000_000 * k for k in range(1, 6)]
+    assert output.latest is not None
+    assert states.latest is not None
+    assert output.latest.poses.shape == (12, 3)
+    assert states.latest.groups == ("a",) * 6 + ("b",) * 4 + ("c",) * 2
+    assert states.latest.velocities.shape == (12, 3)
+
+
+def test_failed_requests_change_nothing(files: WorldFiles) -> None:
+    world = load(files, CROWD)
+    people = people_of(world)
+    before = [model.name for model in world.models]
+    for request, text in (
+        (lambda: people.spawn("x"), 'group "x" does not exist; groups: a, b, c'),
+        (lambda: people.spawn("a", 5000), "free places"),
+        (lambda: people.remove(["a_0", "nobody"]), 'there is no person "nobody"'),
+        (lambda: people.send(["a_0"], (100.0, 100.0)), "there is no way for"),
+        (lambda: people.spawn("a", poses=[(2, 2, 0), (math.nan, 0, 0)]), "finite"),
+    ):
+        with pytest.raises((WorldError, ValueError), match=text):
+            request()
+    assert [model.name for model in world.models] == before
+    with pytest.raises(WorldError, match="does not exist"):
+        world.call_plugin(people, "on_shutdown", {})
+
+
+@pytest.mark.parametrize(
+    ("groups", "options", "text"),
+    [
+        ("[]", "", 'Invalid "groups", must be a list of at least one group'),
+        ("[{name: a}]", "", "count"),
+        ("[{name: a, count: 1}, {name: a, count: 1}]", "", 'Group with name "a" already exists'),
+        ("[{name: a, count: -1}]", "", "from 0 to 10000"),
+        ("[{name: a, count: 1, radius: 0}]", "", 'Invalid "radius", must be finite and greater'),
+        ("[{name: a, count: 1, order: loop}]", "", 'Invalid "order", must be wander'),
+        ("[{name: a, count: 1, area: [2, 2, 1, 3]}]", "", 'Invalid "area"'),
+        ("[{name: a, count: 1, waypoints: [{radius: 1}]}]", "", "A waypoint requires either at"),
+        (
+            "[{name: a, count: 1, waypoints: [{at: [1.0, 1.0], radius: 0.1}]}]",
+            "",
+            "A waypoint is not in the free space",
+        ),
+        ("[{name: a, count: 1, waypoints: [{at: [2, 2], wait: [3, 1]}]}]", "", 'Invalid "wait"'),
+        ("[{name: a, count: 900}]", "", 'group "a": found only'),
+        ("[{name: a, count: 1, colour: 1}]", "", "colour"),
+        ("[{name: a, count: 1}]", "model: sfm, ", 'must be one of: social_force, orca, got "sfm"'),
+        ("[{name: a, count: 1}]", "robot_awareness: 2, ", "from 0 to 1"),
+        ("[{name: a, count: 1}]", "layers: [x], ", "layer(s) does not exist"),
+        ("[{name: a, count: 1}]", "social_force: {mass: 1}, ", "mass"),
+        ("[{name: a, count: 1}]", "orca: {horizon: 0}, ", 'Invalid "horizon"'),
+        (
+            "[{name: a, count: 1}]",
+            "layers: [2d], legs: {layers: [2d]}, ",
+            "bodies and legs must not be in the same layer",
+        ),
+        (
+            "[{name: a, count: 1}]",
+            "body_type: dynamic, legs: {layers: [2d]}, ",
+            'dynamic people with legs require "layers"',
+        ),
+    ],
+)
+def test_invalid_parameters_are_reported_with_their_place(
+    files: WorldFiles, groups: str, options: str, text: str
+) -> None:
+    with pytest.raises(PluginError) as error:
+        load(files, groups, options)
+    assert text in str(error.value)
+    assert "world.yaml" in str(error.value)
+
+
+def test_people_without_walls_require_an_area(files: WorldFiles) -> None:
+    text = (
+        "properties: {}\nlayers: [{name: 2d}]\n"
+        "plugins: [{name: people, type: Pedestrians, groups: [{name: a, count: 2%s}]}]"
+    )
+    with pytest.raises(PluginError, match='group "a": "area" is required, because the layers'):
+        files.load(text % "")
+    assert len(files.load(text % ", area: [0, 0, 9, 9]").models) == 2
