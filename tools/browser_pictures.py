@@ -91,15 +91,22 @@ def _capture_desktop(browser: Chromium, url: str, path: Path) -> None:
     page.open(f"{url}{_ROBOT_VIEW}&show=trails")
     browser.click("#plots-toggle")
     _choose_series(browser, ("/odometry/filtered/twist/0", "/odometry/filtered/twist/2"))
-    browser.evaluate("document.activeElement.blur()")
-    _drive(browser, "w", 2.0)
-    _drive(browser, "wa", 0.5)
+    browser.driver.execute_script(
+        "const list = document.querySelector('#plot-window'); list.value = '10';"
+        "list.dispatchEvent(new Event('change')); document.activeElement.blur();"
+    )
+    time.sleep(2.0)  # of the plots
+    # A slalom between the walls of the corridor.
     browser.key_down("w")
-    browser.key_down("d")
-    time.sleep(0.6)
+    time.sleep(1.2)
+    for key, seconds in (("a", 0.4), ("d", 0.9)):
+        _drive(browser, key, seconds)
+        time.sleep(0.4)
+    browser.key_down("a")
+    time.sleep(0.5)
     _save(browser, path)
+    browser.key_up("a")
     browser.key_up("w")
-    browser.key_up("d")
 
 
 def _choose_series(browser: Chromium, wanted: Sequence[str]) -> None:
@@ -243,7 +250,7 @@ def _record(browser: Chromium, url: str, simulation: Simulation, path: Path) -> 
     recording.click(page.screen(*page.pose("robot")[:2]))
     _drive_recorded(browser, recording, "w", 2.2)
     _drive_recorded(browser, recording, "wa", 0.6)
-    recording.drag(page.screen(*page.pose("box_1")[:2]), page.screen(0.9, -5.0))
+    recording.drag(page.screen(*page.pose("box_1")[:2]), page.screen(1.7, -4.8))
     recording.wait(0.5)
     recording.click("#spawn")
     recording.wait(0.3)

@@ -25,7 +25,7 @@ from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle, Polygon
 
-from flatland import Body, LaserScan, Odometry, SemanticScan, Twist, World, worldgen
+from flatland import Body, JointState, LaserScan, Odometry, SemanticScan, Twist, World, worldgen
 from flatland.drawing import save
 from flatland.geometry import circle_points, compose, transform_points
 
@@ -196,6 +196,37 @@ def draw_drives(path: Path) -> None:
     _save(figure, path)
 
 
+def draw_wheel_states(path: Path) -> None:
+    """Plots the speeds of the wheels of a car in a curve, and an angle with ticks."""
+    figure, (speeds, angle) = plt.subplots(1, 2, figsize=(12, 4.2), dpi=100)
+    for axis, robot, command in (
+        (speeds, "car", Twist(linear_x=1.5, angular_z=0.5)),
+        (angle, "mecanum", Twist(linear_x=0.02)),
+    ):
+        states: list[JointState] = []
+        exact: list[float] = []
+        with load_world("drives") as world:
+            plugin = world.model(robot).plugin("wheels")
+            world.output(f"/{robot}/joint_states").subscribe(states.append)
+            world.command(f"/{robot}/cmd_vel").set(command)
+            for _ in range(600 if robot == "car" else 100):
+                world.step()
+                exact.append(plugin.angles[0])
+        times = np.array([state.stamp for state in states]) / 1e9
+        if robot == "car":
+            axis.plot(times, [state.velocities for state in states], label=states[0].names)
+            axis.set(ylabel="speeds of the wheels of the car [rad/s]")
+        else:
+            axis.plot(0.005 * np.arange(1, len(exact) + 1), exact, color="0.6", label="exact")
+            measured = [state.positions[0] for state in states]
+            axis.plot(times, measured, ".", color="tab:red", label="encoder, 1024 ticks per turn")
+            axis.set(ylabel="angle of a slow wheel [rad]")
+        axis.set(xlabel="simulated time [s]")
+        axis.grid(alpha=0.3)
+        axis.legend()
+    _save(figure, path)
+
+
 def draw_forces(path: Path) -> None:
     """Draws two robots that push each other, and the speeds of all models."""
     figure, (plan, speed) = plt.subplots(1, 2, figsize=(12, 4.2), dpi=100, width_ratios=(5, 4))
@@ -302,12 +333,6 @@ def _points(world: World, scan: LaserScan | SemanticScan) -> npt.NDArray[np.floa
     angles = scan.angle_min + scan.angle_increment * np.arange(len(scan.ranges))
     ends = scan.ranges[:, None] * np.stack([np.cos(angles), np.sin(angles)], axis=1)
     return transform_points(world.model("robot").body("base").pose, ends.astype(np.float64))
-
-
-def _save(figure: Figure, path: Path) -> None:
-    figure.tight_layout()
-    figure.savefig(path, metadata={"Software": None})
-    plt.close(figure)
 
 
 def draw_materials(world: World, path: Path) -> None:
@@ -429,6 +454,7 @@ def main(arguments: list[str]) -> int:
             draw(world, folder / f"{name}.png")
     draw_paths(folder / "paths.png")
     draw_drives(folder / "drives.png")
+    draw_wheel_states(folder / "wheel_states.png")
     draw_forces(folder / "forces.png")
     draw_trailers(folder / "trailers.png")
     return 0

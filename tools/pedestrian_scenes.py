@@ -254,17 +254,28 @@ class Overlaps:
         edges = np.concatenate([layer.world_edges for layer in world.layers])
         self._start, self._along = edges[:, :2], edges[:, 2:] - edges[:, :2]
         self._size = np.maximum(np.sum(self._along**2, axis=1), 1e-12)
+        self._near: dict[tuple[int, int], npt.NDArray[np.int64]] = {}  # edges by square metre
         self.walls = -math.inf
         self.others = -math.inf
+
+    def _gaps(self, place: Doubles, edges: npt.NDArray[np.int64] | slice) -> Doubles:
+        """Returns the distances of some edges from a place [m]."""
+        offset = place - self._start[edges]
+        t = np.clip(np.sum(offset * self._along[edges], axis=1) / self._size[edges], 0.0, 1.0)
+        gaps: Doubles = np.hypot(*(offset - t[:, np.newaxis] * self._along[edges]).T)
+        return gaps
 
     def look(self) -> None:
         """Compares the current positions."""
         places = people_of(self._world).poses[:, :2]
         for place in places:
-            offset = place - self._start
-            t = np.clip(np.sum(offset * self._along, axis=1) / self._size, 0.0, 1.0)
-            gaps = np.hypot(*(offset - t[:, np.newaxis] * self._along).T)
-            self.walls = max(self.walls, self._radius - float(gaps.min()))
+            cell = (math.floor(place[0]), math.floor(place[1]))
+            if cell not in self._near:
+                reach = 0.5 * math.sqrt(2.0) + 1.0
+                center = np.array(cell) + 0.5
+                self._near[cell] = np.flatnonzero(self._gaps(center, slice(None)) < reach)
+            gaps = self._gaps(place, self._near[cell])
+            self.walls = max(self.walls, self._radius - float(gaps.min(initial=1.0)))
         between = np.hypot(*(places[:, np.newaxis] - places).transpose(2, 0, 1))
         between[np.diag_indices(len(places))] = math.inf
         self.others = max(self.others, 2 * self._radius - float(between.min()))
