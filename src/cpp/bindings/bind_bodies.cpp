@@ -6,6 +6,7 @@
 #include <tuple>
 
 #include "bindings/bindings.h"
+#include "bindings/tuples.h"
 #include "world/bodies.h"
 #include "world/motions.h"
 
@@ -14,15 +15,9 @@ namespace py = pybind11;
 namespace flatland {
 namespace {
 
-using PyTriple = std::tuple<double, double, double>;
-using PyPair = std::tuple<double, double>;
-
 struct SavedMotions {
   std::vector<SavedMotion> motions;
 };
-
-PyTriple to_python(const Triple& t) { return {t[0], t[1], t[2]}; }
-PyPair to_python(const b2Vec2& v) { return {static_cast<double>(v.x), static_cast<double>(v.y)}; }
 
 b2BodyType body_type(const std::string& name) {
   if (name == "static") return b2_staticBody;

@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "bindings/bindings.h"
+#include "bindings/tuples.h"
 #include "world/joints.h"
 
 namespace py = pybind11;
@@ -11,29 +12,26 @@ namespace py = pybind11;
 namespace flatland {
 namespace {
 
-using Point = std::pair<double, double>;
-
-JointBodies joint_bodies(Id body_a, Id body_b, const Point& anchor_a, const Point& anchor_b,
+JointBodies joint_bodies(Id body_a, Id body_b, const PyPair& anchor_a, const PyPair& anchor_b,
                          bool collide_connected) {
-  return {body_a,         body_b,          anchor_a.first,   anchor_a.second,
-          anchor_b.first, anchor_b.second, collide_connected};
+  const auto [x_a, y_a] = anchor_a;
+  const auto [x_b, y_b] = anchor_b;
+  return {body_a, body_b, x_a, y_a, x_b, y_b, collide_connected};
 }
-
-Point to_python(const b2Vec2& v) { return {static_cast<double>(v.x), static_cast<double>(v.y)}; }
 
 }  // namespace
 
 void bind_joints(WorldClass& world) {
   world.def("create_revolute_joint",
-            [](World& self, Id body_a, Id body_b, const Point& anchor_a, const Point& anchor_b,
+            [](World& self, Id body_a, Id body_b, const PyPair& anchor_a, const PyPair& anchor_b,
                const std::optional<AngleLimits>& limits, bool collide_connected) {
               return create_revolute_joint(
                   self, joint_bodies(body_a, body_b, anchor_a, anchor_b, collide_connected),
                   limits);
             });
-  world.def("create_weld_joint", [](World& self, Id body_a, Id body_b, const Point& anchor_a,
-                                    const Point& anchor_b, double reference_angle, double frequency,
-                                    double damping, bool collide_connected) {
+  world.def("create_weld_joint", [](World& self, Id body_a, Id body_b, const PyPair& anchor_a,
+                                    const PyPair& anchor_b, double reference_angle,
+                                    double frequency, double damping, bool collide_connected) {
     return create_weld_joint(self,
                              joint_bodies(body_a, body_b, anchor_a, anchor_b, collide_connected),
                              reference_angle, frequency, damping);

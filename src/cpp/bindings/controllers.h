@@ -5,13 +5,13 @@
 #include <utility>
 
 #include "bindings/bindings.h"
+#include "bindings/tuples.h"
 #include "world/controllers.h"
 #include "world/errors.h"
 
 namespace flatland {
 
 using Limits = std::tuple<double, double, double>;
-using PyTriple = std::tuple<double, double, double>;
 
 inline double checked_limit(double limit) {
   if (!(limit >= 0.0)) {
@@ -45,11 +45,6 @@ inline Id add_controller(World& world, Id body, Motion motion) {
   controller.body = body;
   controller.motion = std::move(motion);
   return world.plan().add_controller(controller);
-}
-
-inline PyTriple to_python(const Triple& t) { return {t[0], t[1], t[2]}; }
-inline Triple from_python(const PyTriple& t) {
-  return {std::get<0>(t), std::get<1>(t), std::get<2>(t)};
 }
 
 }  // namespace flatland

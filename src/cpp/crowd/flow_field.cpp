@@ -10,7 +10,6 @@
 namespace flatland::crowd {
 namespace {
 
-constexpr double kMostCells = 4e6;
 constexpr double kClearance = 0.4;     // beyond which walls do not slow down [m]
 constexpr double kMostSlowness = 4.0;  // next to a wall
 constexpr float kNever = std::numeric_limits<float>::infinity();
@@ -93,8 +92,7 @@ Vec Place::nearest(Vec p) const {
 
 FreeGrid::FreeGrid(const Walls& walls, Vec low, Vec high, double cell, double radius) : low_(low) {
   const Vec size = high - low;
-  cell_ = std::max(
-      {cell, std::sqrt(size.x * size.y / kMostCells), std::max(size.x, size.y) / kMostCells});
+  cell_ = cell_size(size, cell);
   columns_ = static_cast<std::int64_t>(size.x / cell_) + 1;
   rows_ = static_cast<std::int64_t>(size.y / cell_) + 1;
   slowness_.resize(static_cast<std::size_t>(columns_ * rows_));

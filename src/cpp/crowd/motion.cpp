@@ -3,6 +3,7 @@
 #include <cmath>
 #include <numeric>
 
+#include "angles.h"
 #include "crowd/crowd.h"
 #include "crowd/gait.h"
 #include "crowd/orca.h"
@@ -13,7 +14,6 @@
 namespace flatland::crowd {
 namespace {
 
-constexpr double kTurn = 6.283185307179586;
 constexpr std::uint64_t kFluctuations = std::uint64_t{3} << 40U;  // a stream of random numbers
 
 constexpr double kSkin = 2e-4;              // gap that single precision may use up [m]
@@ -26,7 +26,7 @@ constexpr double kMostAcceleration = 20.0;  // of dynamic bodies [m/s²]
 constexpr double kTurning = 0.2;            // time constant of the heading [s]
 constexpr double kStanding = 0.05;          // speed below which the heading remains [m/s]
 
-double normalized(double angle) { return std::remainder(angle, kTurn); }
+double normalized(double angle) { return std::remainder(angle, kTwoPi); }
 
 double most_speed(const Person& person) { return std::max(kMostSpeed * person.speed, 0.5); }
 

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstdint>
 
+#include "angles.h"
 #include "crowd/vec.h"
 
 namespace flatland::crowd {
@@ -27,7 +28,7 @@ inline double uniform(std::uint64_t key, std::uint64_t stream, std::uint64_t cou
 // values of the counter.
 inline Vec normal(std::uint64_t key, std::uint64_t stream, std::uint64_t counter) {
   const double radius = std::sqrt(-2.0 * std::log(1.0 - uniform(key, stream, counter)));
-  const double angle = 6.283185307179586 * uniform(key, stream, counter + 1);
+  const double angle = kTwoPi * uniform(key, stream, counter + 1);
   return radius * Vec{std::cos(angle), std::sin(angle)};
 }
 

@@ -11,7 +11,7 @@
 namespace flatland::crowd {
 namespace {
 
-constexpr double kReach = 4.0;       // distance at which people approach a door [m]
+constexpr double kApproach = 4.0;    // distance at which people approach a door [m]
 constexpr double kAhead = 0.5;       // cosine of the angle between their way and the door, at least
 constexpr double kThrough = 0.3;     // cosine of the angle between the way and the axis, at least
 constexpr double kThreshold = 0.35;  // space on both sides that belongs to the passage [m]
@@ -24,7 +24,7 @@ constexpr double kView = 3.0;      // distance at which people keep right [m]
 constexpr double kLeft = 0.8;      // of the way, within which others come towards a person [m]
 constexpr double kRight = 1.5;     // the same on the other side [m]
 constexpr double kOpposed = -0.5;  // cosine of the angle between opposite ways, at most
-constexpr double kTurn = 0.5;      // tangent of the greatest angle by which people turn right
+constexpr double kMostTurn = 0.5;  // tangent of the greatest angle by which people turn right
 
 }  // namespace
 
@@ -32,7 +32,7 @@ bool Crowd::approaches(std::size_t i, const Choice& choice, std::size_t gate, Ap
   const Person& person = people_[i];
   const Gate& g = (*gates_)[gate];
   const Vec offset = person.position - g.center;
-  if (square(offset) > kReach * kReach) return false;
+  if (square(offset) > kApproach * kApproach) return false;
   // The way at the center, because that next to a door post may lead anywhere.
   const double cosine = dot(way_to(target_of(person), g.center), g.axis);
   if (std::fabs(cosine) < kThrough) return false;
@@ -72,9 +72,9 @@ void Crowd::keep_doors_clear(std::vector<Choice>& choices, std::int64_t step, do
     if (stance_of(people_[i], choices[i]) != Stance::kWalking) continue;
     const double x = people_[i].position.x;
     const auto first =
-        std::lower_bound(gates.begin(), gates.end(), x - kReach,
+        std::lower_bound(gates.begin(), gates.end(), x - kApproach,
                          [](const Gate& gate, double least) { return gate.center.x < least; });
-    for (auto gate = first; gate != gates.end() && gate->center.x <= x + kReach; ++gate) {
+    for (auto gate = first; gate != gates.end() && gate->center.x <= x + kApproach; ++gate) {
       Approach approach;
       const auto index = static_cast<std::size_t>(gate - gates.begin());
       if (!approaches(i, choices[i], index, approach)) continue;
@@ -124,7 +124,7 @@ void Crowd::keep_right(std::vector<Choice>& choices) const {
       if (comes_towards(people_[i], way, j, choices[j], ahead)) nearest = std::min(nearest, ahead);
     }
     if (nearest == kView) continue;
-    const double turn = kTurn * std::sqrt(1.0 - nearest / kView);
+    const double turn = kMostTurn * std::sqrt(1.0 - nearest / kView);
     turned[i] = people_[i].speed * unit(way - turn * left_of(way));
   }
   for (std::size_t i = 0; i < people_.size(); ++i) choices[i].velocity = turned[i];

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <cstdint>
 
+#include "angles.h"
 #include "crowd/crowd.h"
 #include "crowd/random.h"
 
@@ -13,14 +14,12 @@ namespace {
 constexpr std::uint64_t kStops = std::uint64_t{1} << 40U;
 constexpr std::uint64_t kParties = std::uint64_t{2} << 40U;
 
-constexpr double kPi = 3.141592653589793;
-constexpr double kRoom = 0.5;  // area that each person needs at a waypoint [m²]
-constexpr double kGiveUp =
-    8.0;  // time without progress after which people who wander turn away [s]
-constexpr double kCrowded = 4.0;   // distance at which a crowded place is reached, at most [m]
-constexpr double kArrival = 0.7;   // time constant of the approach to a point in a queue [s]
-constexpr double kPatience = 0.1;  // distance to that point at which people stand still [m]
-constexpr double kCounter = 0.3;   // distance to the head of a queue at which it is reached [m]
+constexpr double kRoom = 0.5;       // area that each person needs at a waypoint [m²]
+constexpr double kGiveUp = 8.0;     // time without progress after which wanderers turn away [s]
+constexpr double kCrowded = 4.0;    // distance at which a crowded place is reached, at most [m]
+constexpr double kArrival = 0.7;    // time constant of the approach to a point in a queue [s]
+constexpr double kNearPoint = 0.1;  // distance to that point at which people stand still [m]
+constexpr double kCounter = 0.3;    // distance to the head of a queue at which it is reached [m]
 
 // The distance from a place within which there is room for `count` people.
 double room_for(const Place& place, std::uint32_t count) {
@@ -149,7 +148,7 @@ Crowd::Choice Crowd::queue_up(Person& person, Party& party, std::uint32_t waypoi
   }
   const Vec remaining = goal - person.position;
   const Vec way = unit(waypoints_[waypoint].place.nearest(person.position) - person.position);
-  if (length(remaining) < kPatience) return {{}, way};
+  if (length(remaining) < kNearPoint) return {{}, way};
   return {limited((1.0 / kArrival) * remaining, person.speed), way};
 }
 

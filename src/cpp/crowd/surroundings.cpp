@@ -10,13 +10,13 @@
 #include <limits>
 #include <utility>
 
+#include "angles.h"
 #include "world/contacts.h"
 
 namespace flatland::crowd {
 namespace {
 
 constexpr int kCircleCorners = 24;  // of the polygon around a static circle
-constexpr double kTurn = 6.283185307179586;
 
 Vec to_vec(b2Vec2 v) { return {static_cast<double>(v.x), static_cast<double>(v.y)}; }
 
@@ -104,10 +104,9 @@ void Surroundings::add_segments(const b2Body& body, std::vector<Segment>& segmen
     } else if (f->GetType() == b2Shape::e_circle) {
       const auto& circle = static_cast<const b2CircleShape&>(*f->GetShape());
       const Vec center = in_world(body, circle.m_p);
-      const double radius =
-          static_cast<double>(circle.m_radius) / std::cos(0.5 * kTurn / kCircleCorners);
+      const double radius = static_cast<double>(circle.m_radius) / std::cos(kPi / kCircleCorners);
       for (int i = 0; i < kCircleCorners; ++i) {
-        const double angle = kTurn * i / kCircleCorners;
+        const double angle = kTwoPi * i / kCircleCorners;
         corners.push_back(center + radius * Vec{std::cos(angle), std::sin(angle)});
       }
     }

@@ -8,8 +8,7 @@
 namespace flatland::crowd {
 namespace {
 
-constexpr double kCell = 0.5;       // m
-constexpr double kMostCells = 4e6;  // beyond which cells are larger
+constexpr double kCell = 0.5;  // m
 
 bool crosses(const Segment& segment, Vec from, Vec to) {
   const Vec along = to - from;
@@ -28,6 +27,12 @@ Vec nearest_on(const Segment& segment, Vec p) {
   return segment.a + t * along;
 }
 
+double cell_size(Vec area, double wanted) {
+  constexpr double kMostCells = 4e6;
+  return std::max(
+      {wanted, std::sqrt(area.x * area.y / kMostCells), std::max(area.x, area.y) / kMostCells});
+}
+
 Walls::Walls(std::vector<Segment> segments) : segments_(std::move(segments)) {
   if (segments_.empty()) return;
   low_ = high_ = segments_[0].a;
@@ -38,8 +43,7 @@ Walls::Walls(std::vector<Segment> segments) : segments_(std::move(segments)) {
     }
   }
   const Vec size = high_ - low_;
-  cell_ = std::max(
-      {kCell, std::sqrt(size.x * size.y / kMostCells), std::max(size.x, size.y) / kMostCells});
+  cell_ = cell_size(size, kCell);
   columns_ = static_cast<std::int64_t>(size.x / cell_) + 1;
   rows_ = static_cast<std::int64_t>(size.y / cell_) + 1;
   // Two passes: the number of segments in each cell, then the segments themselves.

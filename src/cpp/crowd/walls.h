@@ -21,6 +21,10 @@ struct NearPoint {
   double distance = 0.0;
 };
 
+// The size of the cells of a grid over an area: the wanted size, or more if there would be more
+// than four million cells.
+double cell_size(Vec area, double wanted);
+
 // Immutable, so that copies of a crowd share it.
 class Walls {
  public:

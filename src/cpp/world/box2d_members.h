@@ -1,7 +1,7 @@
-// Private members of Box2D 2.4 for the exact copy of a world. Box2D has no public access to them;
-// an explicit template instantiation may name them, so the compiler checks names and types.
+// Private members of Box2D 2.4. Box2D has no public access to them; an explicit template
+// instantiation may name them, so the compiler checks names and types.
 //
-// `get<Tag>(object)` returns a reference to the member. Include this file in one source file only.
+// `get<Tag>(object)` returns a reference to the member. Only for source files.
 #pragma once
 
 #include <box2d/b2_body.h>
@@ -41,6 +41,9 @@ FLATLAND_EXPOSE(b2Body, b2Body*, m_next, BodyNext);
 FLATLAND_EXPOSE(b2Body, b2Fixture*, m_fixtureList, BodyFixtures);
 FLATLAND_EXPOSE(b2Body, b2JointEdge*, m_jointList, BodyJoints);
 FLATLAND_EXPOSE(b2Body, b2ContactEdge*, m_contactList, BodyContacts);
+FLATLAND_EXPOSE(b2Body, b2Transform, m_xf, BodyTransform);
+FLATLAND_EXPOSE(b2Body, b2Sweep, m_sweep, BodySweep);
+FLATLAND_EXPOSE(b2Body, float, m_sleepTime, BodySleepTime);
 
 FLATLAND_EXPOSE(b2Fixture, b2Fixture*, m_next, FixtureNext);
 FLATLAND_EXPOSE(b2Fixture, b2Body*, m_body, FixtureBody);

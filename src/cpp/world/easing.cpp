@@ -5,13 +5,14 @@
 
 #include <stdexcept>
 
+#include "angles.h"
+
 namespace flatland {
 namespace {
 
 using Family = Easing::Family;
 using Shape = Easing::Shape;
 
-constexpr double kTau = 6.283185307179586;
 constexpr double kOvershoot = 1.70158;
 constexpr double kInOutOvershoot = kOvershoot * 1.525;
 constexpr double kPeriod = 0.3;
@@ -47,7 +48,7 @@ double exponential(double p) { return exp2(10.0 * (p - 1.0)); }
 double back(double p, double overshoot) { return p * p * ((overshoot + 1.0) * p - overshoot); }
 
 double elastic(double p, double period) {
-  const double phase = (p - 1.0 - period / 4.0) * kTau / period;
+  const double phase = (p - 1.0 - period / 4.0) * kTwoPi / period;
   return -exponential(p) * sin(phase);
 }
 

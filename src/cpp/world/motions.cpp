@@ -1,34 +1,15 @@
 #include "world/motions.h"
 
+#include "world/box2d_members.h"
+
 namespace flatland {
 namespace {
 
-// Box2D derives the sweep of a body from its transform, with rounding, and has no access to it. An
-// explicit template instantiation may name private members.
-template <typename Member, Member member>
-struct Expose {
-  friend Member expose(Member) { return member; }
-};
-
-template struct Expose<b2Transform b2Body::*, &b2Body::m_xf>;
-template struct Expose<b2Sweep b2Body::*, &b2Body::m_sweep>;
-
-b2Transform b2Body::*expose(b2Transform b2Body::*);
-b2Sweep b2Body::*expose(b2Sweep b2Body::*);
-
-constexpr b2Transform b2Body::*kTransform = nullptr;
-constexpr b2Sweep b2Body::*kSweep = nullptr;
-
-// A tag, because b2Body has several members of type float.
-struct SleepTime {
-  using Pointer = float b2Body::*;
-  friend Pointer expose(SleepTime);
-};
-template <float b2Body::*pointer>
-struct ExposeSleepTime {
-  friend float b2Body::*expose(SleepTime) { return pointer; }
-};
-template struct ExposeSleepTime<&b2Body::m_sleepTime>;
+// Box2D derives the sweep of a body from its transform, with rounding, and has no access to it.
+using members::BodySleepTime;
+using members::BodySweep;
+using members::BodyTransform;
+using members::get;
 
 bool is_moved(const b2Body& body, const SavedMotion& motion) {
   const b2Vec2& position = body.GetPosition();
@@ -43,9 +24,9 @@ std::vector<SavedMotion> saved_motions(const World& world) {
   std::vector<SavedMotion> motions;
   motions.reserve(static_cast<std::size_t>(world.engine().GetBodyCount()));
   for (const b2Body* body = world.engine().GetBodyList(); body != nullptr; body = body->GetNext()) {
-    motions.push_back({id_of(body), body->*expose(kTransform), body->*expose(kSweep),
+    motions.push_back({id_of(body), get<BodyTransform>(*body), get<BodySweep>(*body),
                        body->GetLinearVelocity(), body->GetAngularVelocity(),
-                       body->*expose(SleepTime{}), body->IsAwake()});
+                       get<BodySleepTime>(*body), body->IsAwake()});
   }
   return motions;
 }
@@ -56,13 +37,13 @@ void restore_motions(World& world, const std::vector<SavedMotion>& motions) {
     if (!world.has_body(motion.body)) continue;
     b2Body* body = world.change_body(motion.body);
     if (is_moved(*body, motion)) body->SetTransform(motion.transform.p, motion.sweep.a);
-    body->*expose(kTransform) = motion.transform;
-    body->*expose(kSweep) = motion.sweep;
+    get<BodyTransform>(*body) = motion.transform;
+    get<BodySweep>(*body) = motion.sweep;
     // A change of the velocity wakes the body; sleep sets it to 0, as it was.
     body->SetLinearVelocity(motion.linear_velocity);
     body->SetAngularVelocity(motion.angular_velocity);
     body->SetAwake(motion.awake);
-    body->*expose(SleepTime{}) = motion.sleep_time;
+    get<BodySleepTime>(*body) = motion.sleep_time;
   }
 }
 

@@ -2,12 +2,11 @@
 
 #include <cmath>
 
+#include "angles.h"
 #include "world/bodies.h"
 
 namespace flatland {
 namespace {
-
-constexpr double kTwoPi = 6.283185307179586476925286766559;
 
 double shortest_turn(double from, double to) { return std::remainder(to - from, kTwoPi); }
 

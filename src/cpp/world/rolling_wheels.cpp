@@ -3,13 +3,12 @@
 #include <cmath>
 #include <cstddef>
 
+#include "angles.h"
 #include "world/bodies.h"
 #include "world/world.h"
 
 namespace flatland {
 namespace {
-
-constexpr double kTwoPi = 6.283185307179586476925286766559;
 
 // Returns how far a wheel rolls for a displacement or a velocity (dx, dy) of its centre.
 double rolled(const Wheel& wheel, double dx, double dy, double yaw) {
