@@ -1,7 +1,5 @@
 """Captures the images and the recording of the viewer in the browser in README.md and docs/.
 
-Usage: browser_pictures.py [FOLDER]   (default: docs/images; existing images are overwritten)
-
 Requires the environment of setup.bash, with tests/support on PYTHONPATH.
 The page runs in a headless Chromium, which is operated as by a user. The recording is made in
 lockstep, because screenshots take longer than its frames. It contains a mouse pointer, which
@@ -21,6 +19,7 @@ from typing import Any
 
 import numpy as np
 from chromium import PHONE, Chromium, line, missing_programs
+from picture_folder import picture_folder
 from PIL import Image, ImageDraw
 from viewer_page import ViewerPage
 
@@ -49,12 +48,11 @@ _ROBOT_VIEW = "#x=1.5&y=-4.2&zoom=62&select=robot"
 
 def main(arguments: list[str]) -> int:
     """Captures all images."""
+    folder = picture_folder(str(__doc__), arguments)
     missing = missing_programs()
     if missing:
         print(f"not installed: {', '.join(missing)} (make setup-dev installs them)")
         return 1
-    folder = Path(arguments[0]) if arguments else _CHECKOUT / "docs" / "images"
-    folder.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory() as downloads, Chromium(Path(downloads)) as browser:
         with _office(_FURNITURE, lockstep=True) as (url, simulation):
             _record(browser, url, simulation, folder / "browser.webp")

@@ -1,7 +1,5 @@
 """Draws the images of README.md and docs/*.md that require neither ROS nor a display.
 
-Usage: draw_pictures.py [FOLDER]   (default: docs/images; existing images are overwritten)
-
 The images are the same in every run.
 """
 
@@ -24,6 +22,7 @@ from matplotlib.collections import LineCollection
 from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle, Polygon
+from picture_folder import picture_folder
 
 from flatland import Body, JointState, LaserScan, Odometry, SemanticScan, Twist, World, worldgen
 from flatland.drawing import save
@@ -435,8 +434,7 @@ def draw_pose_publisher(world: World, path: Path) -> None:
 
 def main(arguments: list[str]) -> int:
     """Draws all images into a folder."""
-    folder = Path(arguments[0]) if arguments else _CHECKOUT / "docs" / "images"
-    folder.mkdir(parents=True, exist_ok=True)
+    folder = picture_folder(str(__doc__), arguments)
     with office() as world:
         save(world, folder / "office.png")
         save(world, folder / "corridor.png", view=(-5.5, -7.8, 6.0, -3.0), names=True)

@@ -1,7 +1,5 @@
 """Captures the images of the viewer and of RViz in README.md and docs/, on a virtual screen.
 
-Usage: show_pictures.py [FOLDER]   (default: docs/images; existing images are overwritten)
-
 Requires the environment of setup.bash. The ROS master is started by this program. navigation.png is
 captured only if amcl and move_base are on ROS_PACKAGE_PATH, see examples/navigation/README.md.
 """
@@ -23,6 +21,7 @@ from typing import Any
 import cv2
 import numpy as np
 from draw_pictures import FURNITURE
+from picture_folder import picture_folder
 from virtual_screen import Image, VirtualScreen, missing_programs
 
 _CHECKOUT = Path(__file__).resolve().parent.parent
@@ -46,12 +45,11 @@ _DRAWING_TIME = 1.5  # time in which RViz draws a change [s]
 
 def main(arguments: list[str]) -> int:
     """Captures all images."""
+    folder = picture_folder(str(__doc__), arguments)
     missing = missing_programs()
     if missing:
         print(f"not installed: {', '.join(missing)} (make setup-dev installs them)")
         return 1
-    folder = Path(arguments[0]) if arguments else _CHECKOUT / "docs" / "images"
-    folder.mkdir(parents=True, exist_ok=True)
     screen = VirtualScreen(*_SIZE)
     try:
         _capture_navigation(screen, folder / "navigation.png")

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final, cast
 
 from flatland.config.hints import choice
 from flatland.geometry import Bounds
-from flatland.plugin_api.parameters import MAX_COORDINATE, at_key
+from flatland.plugin_api.parameters import MAX_COORDINATE, at_key, read_positive
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -251,20 +250,6 @@ def read_numbers(
             numbers[name] = entry.get(name, "float", default, finite=True, minimum=least)
     entry.ensure_accessed_all()
     return numbers
-
-
-def read_positive(config: YamlReader, key: str, *default: float) -> float:
-    """Reads a finite number above 0; required if no default is given.
-
-    Raises:
-        YamlError: The value is invalid.
-    """
-    number: float = config.get(key, "float", *default)
-    if not (math.isfinite(number) and number > 0.0):
-        raise at_key(config, key).error(
-            f'Invalid "{key}", must be finite and greater than 0, got {number}'
-        )
-    return number
 
 
 def read_span(config: YamlReader, key: str, *default: Span) -> Span:

@@ -5,14 +5,13 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from flatland.physics import Crowd
-from flatland.plugin_api.parameters import at_key
+from flatland.plugin_api.parameters import at_key, read_positive
 from flatland.plugins._people_config import (
     MODELS,
     ORCA,
     SOCIAL_FORCE,
     read_choice,
     read_numbers,
-    read_positive,
 )
 from flatland.plugins._people_places import CLEARANCE
 

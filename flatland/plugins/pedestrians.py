@@ -12,7 +12,7 @@ import numpy as np
 from flatland.errors import WorldError
 from flatland.geometry import DoubleArray, Vector2
 from flatland.plugin_api.after_step import AFTER, BEFORE, NeverDue
-from flatland.plugin_api.parameters import read_rate
+from flatland.plugin_api.parameters import read_positive, read_rate
 from flatland.plugin_api.plugin import WorldPlugin
 from flatland.plugin_api.schedule import when_due
 from flatland.plugin_api.update_timer import UpdateTimer
@@ -21,7 +21,6 @@ from flatland.plugins._people_config import (
     read_choice,
     read_groups,
     read_legs,
-    read_positive,
 )
 from flatland.plugins._people_crowd import create_crowd, read_bits
 from flatland.plugins._people_markers import MarkerSource, fields_of

@@ -10,23 +10,25 @@ import signal
 import sys
 from typing import Final
 
+from flatland.viewer.restarts import STOP_SIGNALS, run_with_restarts, stop_signals_blocked
+
 _LOG = logging.getLogger("flatland")
 NODE_NAME: Final = "flatland_viz"
 SIMULATOR_NODE_NAME: Final = "flatland_server"
 _USE_SIM_TIME: Final = "/use_sim_time"
-_STOP_SIGNALS: Final = (signal.SIGINT, signal.SIGTERM)
 
 
 def main() -> int:
-    """Runs the viewer.
+    """Runs the viewer, and starts it again if RViz crashes.
 
     Returns:
         The exit code: 0 after the window was closed or a stop signal was received, 1 if the
         viewer cannot start. The reason is then in the log.
     """
-    # Exit silently on a stop signal during start-up, for example when the simulator fails.
-    for number in _STOP_SIGNALS:
-        signal.signal(number, lambda *_: sys.exit(0))
+    return run_with_restarts(_run)
+
+
+def _run() -> int:
     import rosgraph
     import rospy
 
@@ -40,8 +42,9 @@ def main() -> int:
         uri = rosgraph.get_master_uri()
         print(f"flatland_viz: no ROS master at {uri}: start the simulator first", file=sys.stderr)
         return 1
-    # Anonymous, so that several viewers can run. RViz reads the simulated time, rospy does not.
-    rospy.init_node(NODE_NAME, anonymous=True, disable_signals=True, disable_rostime=True)
+    with stop_signals_blocked():
+        # Anonymous, so that several viewers can run. RViz reads the simulated time, rospy does not.
+        rospy.init_node(NODE_NAME, anonymous=True, disable_signals=True, disable_rostime=True)
     from flatland.ros.logs import log_to_ros
 
     log_to_ros()
@@ -54,7 +57,7 @@ def main() -> int:
         # RViz reads the parameter only once, at its start, and server.launch may run later.
         rospy.set_param(_USE_SIM_TIME, True)
         _LOG.info("set %s to true, as server.launch does", _USE_SIM_TIME)
-    return _run()
+    return _show_window()
 
 
 def _startup_error() -> str:
@@ -100,33 +103,34 @@ def _display_error() -> str:
     return "" if has_glx else f"the display {name} has no OpenGL (GLX extension)"
 
 
-def _run() -> int:
-    import rospy
-    from PyQt5.QtCore import QTimer
-    from PyQt5.QtWidgets import QApplication
+def _show_window() -> int:
+    # A signal must not interrupt the initialization of RViz, which installs its own handlers. They
+    # must not run in another thread either, where the signal would be lost.
+    with stop_signals_blocked():
+        import rospy
+        from PyQt5.QtCore import QTimer
+        from PyQt5.QtWidgets import QApplication
 
-    from flatland.viewer.ros_link import RosLink
-    from flatland.viewer.simulator_client import SimulatorClient
-    from flatland.viewer.window import ViewerWindow
+        from flatland.viewer.ros_link import RosLink
+        from flatland.viewer.simulator_client import SimulatorClient
+        from flatland.viewer.window import ViewerWindow
 
-    # A signal must not interrupt the initialization of RViz, which installs its own handlers.
-    signal.pthread_sigmask(signal.SIG_BLOCK, _STOP_SIGNALS)
-    app = QApplication(["flatland"])
-    link = RosLink(SimulatorClient(rospy.resolve_name(SIMULATOR_NODE_NAME)))
-    window = ViewerWindow(link)
-    # Python runs signal handlers between bytecodes: the timer of the status bar ensures that
-    # Python code runs regularly.
-    for number in _STOP_SIGNALS:
-        signal.signal(number, lambda *_: app.quit())
-    rospy.on_shutdown(app.quit)
-    window.show()
-    link.start()
-    # Unblock the signals inside the event loop: `quit` has no effect before it runs.
-    QTimer.singleShot(0, _unblock_stop_signals)
-    app.exec_()
+        app = QApplication(["flatland"])
+        link = RosLink(SimulatorClient(rospy.resolve_name(SIMULATOR_NODE_NAME)))
+        window = ViewerWindow(link)
+        # Python runs signal handlers between bytecodes: the timer of the status bar ensures that
+        # Python code runs regularly.
+        for number in STOP_SIGNALS:
+            signal.signal(number, lambda *_: app.quit())
+        rospy.on_shutdown(app.quit)
+        window.show()
+        link.start()
+        # Unblocked inside the event loop: `quit` has no effect before it runs.
+        QTimer.singleShot(0, _unblock_stop_signals)
+        app.exec_()
     link.close()
     return 0
 
 
 def _unblock_stop_signals() -> None:
-    signal.pthread_sigmask(signal.SIG_UNBLOCK, _STOP_SIGNALS)
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, STOP_SIGNALS)

@@ -118,6 +118,12 @@ class Process:
                 self._changed.wait(min(left, 0.5))
         pytest.fail(f"no line with {pattern!r} in:\n{self.output}")
 
+    @property
+    def children(self) -> list[int]:
+        """Process ids of the children of the program."""
+        pid = self._popen.pid
+        return list(map(int, Path(f"/proc/{pid}/task/{pid}/children").read_text().split()))
+
     def send(self, number: signal.Signals) -> None:
         """Sends a signal."""
         self._popen.send_signal(number)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import os
 import re
 import signal
 from collections.abc import Callable, Iterator
@@ -155,6 +156,35 @@ def test_viewer_exits_on_a_signal_during_start(on_screen: Any, number: signal.Si
     viewer.send(number)
     assert viewer.wait() == 0
     assert "Traceback" not in viewer.output
+
+
+def test_a_signal_is_not_lost_while_rviz_starts(
+    on_screen: Any, ros: Any, eventually: Callable[..., Any]
+) -> None:
+    del ros
+    before = set(rosnode.get_node_names())
+    viewer = on_screen.program("rosrun", "flatland", "flatland_viz")
+    # RViz has a node and signal handlers of its own, which a thread of the viewer could run.
+    eventually(
+        "node of RViz",
+        lambda: any("/rviz_" in name for name in set(rosnode.get_node_names()) - before),
+        poll_period=0.005,
+    )
+    viewer.send(signal.SIGINT)
+    assert viewer.wait() == 0
+
+
+def test_viewer_starts_again_after_a_crash(
+    on_screen: Any, ros: Any, running_room: Any, screenshot: Callable[..., Any]
+) -> None:
+    viewer = on_screen.program("rosrun", "flatland", "flatland_viz")
+    screenshot(lambda picture: len(picture.places(BLUE)) > 10)
+    (crashed,) = viewer.children
+    os.kill(crashed, signal.SIGSEGV)
+    viewer.wait_for_line(r"RViz or OpenGL has crashed \(SIGSEGV\); the viewer starts again")
+    screenshot(lambda picture: viewer.children != [crashed] and len(picture.places(BLUE)) > 10)
+    assert viewer.stop() == 0
+    assert running_room.running
 
 
 def test_viewer_exits_silently_if_the_simulator_fails(on_screen: Any) -> None:

@@ -1,0 +1,90 @@
+"""Runs the viewer in a child process, and starts it again after a crash.
+
+RViz and OpenGL run inside the viewer, and a crash of them cannot be handled in its process.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import os
+import signal
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Final
+
+STOP_SIGNALS: Final = (signal.SIGINT, signal.SIGTERM)
+_CRASHES: Final = frozenset(
+    {signal.SIGABRT, signal.SIGBUS, signal.SIGFPE, signal.SIGILL, signal.SIGSEGV}
+)
+_MAX_STARTS: Final = 4
+_PR_SET_PDEATHSIG: Final = 1  # of prctl(2)
+
+
+@contextmanager
+def stop_signals_blocked() -> Iterator[None]:
+    """Delays stop signals of this thread, and blocks them in threads that it starts meanwhile."""
+    signal.pthread_sigmask(signal.SIG_BLOCK, STOP_SIGNALS)
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, STOP_SIGNALS)
+
+
+def run_with_restarts(run: Callable[[], int]) -> int:
+    """Runs a function in a child process, and again if the process crashes.
+
+    Stop signals are forwarded to the child, where they raise `SystemExit` unless the function has
+    installed other handlers. The child ends with this process. To be called before other threads
+    are started.
+
+    Args:
+        run: Returns an exit code.
+
+    Returns:
+        In the child, the exit code of the function. In this process, that of the child, or 128 and
+        the number of the signal that ended it.
+    """
+    child = 0
+    is_stopped = False
+
+    def forward(number: int, _frame: object) -> None:
+        nonlocal is_stopped
+        is_stopped = True
+        os.kill(child, number)
+
+    parent = os.getpid()
+    for number in STOP_SIGNALS:
+        signal.signal(number, forward)
+    for start in range(1, _MAX_STARTS + 1):
+        with stop_signals_blocked():
+            sys.stdout.flush()
+            sys.stderr.flush()
+            child = os.fork()
+            if child == 0:
+                for number in STOP_SIGNALS:
+                    signal.signal(number, lambda *_: sys.exit(0))
+                _end_with(parent)
+        if child == 0:
+            return run()
+        _, status = os.waitpid(child, 0)
+        code = os.waitstatus_to_exitcode(status)
+        if is_stopped or -code not in _CRASHES or start == _MAX_STARTS:
+            break
+        print(
+            f"flatland_viz: RViz or OpenGL has crashed ({signal.Signals(-code).name}); the viewer "
+            "starts again",
+            file=sys.stderr,
+        )
+    return code if code >= 0 else 128 - code
+
+
+def _end_with(parent: int) -> None:
+    """Ends this process when its parent ends, in a process group of its own.
+
+    The terminal and roslaunch send signals to the group of the parent, which forwards them.
+    """
+    os.setsid()
+    ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGTERM)
+    if os.getppid() != parent:
+        os._exit(0)
