@@ -23,8 +23,9 @@ run: setup  ## run the simulator: make run [WORLD=world.yaml] [ARGS="show_viz:=f
 	@tools/run.sh "$(WORLD)" $(ARGS)
 
 .PHONY: test
-test: setup-dev  ## run all tests, in two processes: make test [ARGS="-k laser"]
-	@. ./setup.bash && pytest --numprocesses 2 --dist loadgroup --no-loadscope-reorder $(ARGS)
+test: setup-dev  ## run all tests, in three processes: make test [ARGS="-k laser"]
+# More processes than processors of a small machine, because many tests wait for programs.
+	@. ./setup.bash && pytest --numprocesses 3 --dist loadgroup --no-loadscope-reorder $(ARGS)
 
 .PHONY: test-learning
 test-learning: setup-dev  ## install PyTorch and Ray in build/learning, test examples/learning and examples/sweep

@@ -180,7 +180,7 @@ def test_failed_requests_change_nothing(files: WorldFiles) -> None:
         ("[{name: a}]", "", "count"),
         ("[{name: a, count: 1}, {name: a, count: 1}]", "", 'Group with name "a" already exists'),
         ("[{name: a, count: -1}]", "", "from 0 to 10000"),
-        ("[{name: a, count: 1, radius: 0}]", "", 'Invalid "radius", must be finite and greater'),
+        ("[{name: a, count: 1, radius: 0}]", "", 'Invalid "radius", must be greater than 0, got 0'),
         ("[{name: a, count: 1, order: loop}]", "", 'Invalid "order", must be wander'),
         ("[{name: a, count: 1, area: [2, 2, 1, 3]}]", "", 'Invalid "area"'),
         ("[{name: a, count: 1, waypoints: [{radius: 1}]}]", "", "A waypoint requires either at"),
