@@ -49,6 +49,12 @@ struct EdgeKernel : BoxKernel<kFindsFixtures> {
       const int i = __builtin_ctz(set);
       const Floats side_a = d_x * edges.a_y[i] - d_y * edges.a_x[i];
       const Floats side_b = d_x * edges.b_y[i] - d_y * edges.b_x[i];
+      const Mask is_crossed = Lanes::both(Lanes::less_equal(Lanes::min(side_a, side_b), zero),
+                                          Lanes::less_equal(zero, Lanes::max(side_a, side_b)));
+      if constexpr (kFindsFixtures) {
+        // After a reflection, most edges of a leaf are beside the few remaining rays.
+        if (!Lanes::any(is_crossed)) continue;
+      }
       const Floats denominator = leaf.normal_x[i] * d_x + leaf.normal_y[i] * d_y;
       Floats fraction = edges.numerator[i] / denominator;
       if constexpr (kIsEdgeOn) {
@@ -57,8 +63,6 @@ struct EdgeKernel : BoxKernel<kFindsFixtures> {
         const Floats at_b = (d_x * edges.b_x[i] + d_y * edges.b_y[i]) / dd;
         fraction = Lanes::min(Lanes::max(fraction, Lanes::min(at_a, at_b)), Lanes::max(at_a, at_b));
       }
-      const Mask is_crossed = Lanes::both(Lanes::less_equal(Lanes::min(side_a, side_b), zero),
-                                          Lanes::less_equal(zero, Lanes::max(side_a, side_b)));
       // A fraction of NaN is a miss.
       const Mask is_ahead =
           Lanes::both(Lanes::not_equal(denominator, zero), Lanes::less_equal(least, fraction));
