@@ -8,6 +8,7 @@ import logging
 import os
 import signal
 import sys
+from collections.abc import Callable
 from typing import Final
 
 from flatland.viewer.restarts import STOP_SIGNALS, run_with_restarts, stop_signals_blocked
@@ -28,7 +29,7 @@ def main() -> int:
     return run_with_restarts(_run)
 
 
-def _run() -> int:
+def _run(disable_restarts: Callable[[], None]) -> int:
     import rosgraph
     import rospy
 
@@ -57,7 +58,7 @@ def _run() -> int:
         # RViz reads the parameter only once, at its start, and server.launch may run later.
         rospy.set_param(_USE_SIM_TIME, True)
         _LOG.info("set %s to true, as server.launch does", _USE_SIM_TIME)
-    return _show_window()
+    return _show_window(disable_restarts)
 
 
 def _startup_error() -> str:
@@ -103,7 +104,7 @@ def _display_error() -> str:
     return "" if has_glx else f"the display {name} has no OpenGL (GLX extension)"
 
 
-def _show_window() -> int:
+def _show_window(disable_restarts: Callable[[], None]) -> int:
     # A signal must not interrupt the initialization of RViz, which installs its own handlers. They
     # must not run in another thread either, where the signal would be lost.
     with stop_signals_blocked():
@@ -128,6 +129,7 @@ def _show_window() -> int:
         # Unblocked inside the event loop: `quit` has no effect before it runs.
         QTimer.singleShot(0, _unblock_stop_signals)
         app.exec_()
+        disable_restarts()
     link.close()
     return 0
 

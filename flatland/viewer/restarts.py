@@ -6,11 +6,12 @@ RViz and OpenGL run inside the viewer, and a crash of them cannot be handled in 
 from __future__ import annotations
 
 import ctypes
+import mmap
 import os
 import signal
 import sys
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from typing import Final
 
 STOP_SIGNALS: Final = (signal.SIGINT, signal.SIGTERM)
@@ -31,7 +32,7 @@ def stop_signals_blocked() -> Iterator[None]:
         signal.pthread_sigmask(signal.SIG_UNBLOCK, STOP_SIGNALS)
 
 
-def run_with_restarts(run: Callable[[], int]) -> int:
+def run_with_restarts(run: Callable[[Callable[[], None]], int]) -> int:
     """Runs a function in a child process, and again if the process crashes.
 
     Stop signals are forwarded to the child, where they raise `SystemExit` unless the function has
@@ -39,7 +40,8 @@ def run_with_restarts(run: Callable[[], int]) -> int:
     are started.
 
     Args:
-        run: Returns an exit code.
+        run: Returns an exit code. Its argument is a function that disables restarts, to be called
+            before the end.
 
     Returns:
         In the child, the exit code of the function. In this process, that of the child, or 128 and
@@ -47,17 +49,23 @@ def run_with_restarts(run: Callable[[], int]) -> int:
     """
     child = 0
     is_stopped = False
+    disabled = mmap.mmap(-1, 1)  # shared with the child; not 0 if restarts are disabled
 
     def forward(number: int, _frame: object) -> None:
         nonlocal is_stopped
         is_stopped = True
-        os.kill(child, number)
+        if child != 0:
+            with suppress(ProcessLookupError):  # It has just ended.
+                os.kill(child, number)
 
     parent = os.getpid()
     for number in STOP_SIGNALS:
         signal.signal(number, forward)
+    code = 0
     for start in range(1, _MAX_STARTS + 1):
         with stop_signals_blocked():
+            if is_stopped:
+                break
             sys.stdout.flush()
             sys.stderr.flush()
             child = os.fork()
@@ -66,10 +74,11 @@ def run_with_restarts(run: Callable[[], int]) -> int:
                     signal.signal(number, lambda *_: sys.exit(0))
                 _end_with(parent)
         if child == 0:
-            return run()
+            return run(lambda: disabled.__setitem__(0, 1))
         _, status = os.waitpid(child, 0)
+        child = 0
         code = os.waitstatus_to_exitcode(status)
-        if is_stopped or -code not in _CRASHES or start == _MAX_STARTS:
+        if is_stopped or disabled[0] or -code not in _CRASHES or start == _MAX_STARTS:
             break
         print(
             f"flatland_viz: RViz or OpenGL has crashed ({signal.Signals(-code).name}); the viewer "

@@ -19,7 +19,7 @@ from flatland.viewer.restarts import run_with_restarts
 
 starts = Path(sys.argv[1])
 
-def run():
+def run(disable_restarts):
     with starts.open("a") as file:
         print(os.getpid(), file=file)
     count = len(starts.read_text().split())
@@ -122,6 +122,12 @@ def test_a_stop_signal_ends_the_child(programs, tmp_path, number):
 def test_a_crash_on_a_stop_signal_is_the_end(programs, tmp_path):
     crash = "signal.signal(15, lambda *_: os.abort())"
     program = start(programs, tmp_path, f"{crash}; os.kill(os.getppid(), 15); time.sleep(1000)")
+    assert program.end() == (128 + signal.SIGABRT, "")
+    assert len(program.children()) == 1
+
+
+def test_a_crash_at_the_end_is_not_followed_by_a_restart(programs, tmp_path):
+    program = start(programs, tmp_path, "disable_restarts(); os.abort()")
     assert program.end() == (128 + signal.SIGABRT, "")
     assert len(program.children()) == 1
 
