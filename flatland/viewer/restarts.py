@@ -45,7 +45,8 @@ def run_with_restarts(run: Callable[[Callable[[], None]], int]) -> int:
 
     Returns:
         In the child, the exit code of the function. In this process, that of the child, or 128 and
-        the number of the signal that ended it.
+        the number of the signal that ended it; 0 if it crashed after a stop signal or with restarts
+        disabled.
     """
     child = 0
     is_stopped = False
@@ -78,13 +79,19 @@ def run_with_restarts(run: Callable[[Callable[[], None]], int]) -> int:
         _, status = os.waitpid(child, 0)
         child = 0
         code = os.waitstatus_to_exitcode(status)
-        if is_stopped or disabled[0] or -code not in _CRASHES or start == _MAX_STARTS:
+        if -code not in _CRASHES:
             break
-        print(
-            f"flatland_viz: RViz or OpenGL has crashed ({signal.Signals(-code).name}); the viewer "
-            "starts again",
-            file=sys.stderr,
-        )
+        is_last = is_stopped or disabled[0] != 0
+        if is_last:
+            consequence = " while the viewer was closed"
+        elif start < _MAX_STARTS:
+            consequence = "; the viewer starts again"
+        else:
+            consequence = f" {_MAX_STARTS} times"
+        name = signal.Signals(-code).name
+        print(f"flatland_viz: RViz or OpenGL has crashed ({name}){consequence}", file=sys.stderr)
+        if is_last:
+            return 0
     return code if code >= 0 else 128 - code
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import importlib.util
 import json
 import shutil
@@ -99,13 +100,21 @@ class Viewer:
 
     def __init__(self, launcher: Any, screen: Any, folder: Path) -> None:
         script = Path(__file__).parent / "inspected_viewer.py"
-        path = str(folder / "viewer")
+        self._path = str(folder / "viewer")
+        self._starts = 0
         self.screen = screen
-        self.process = launcher.program(sys.executable, str(script), path)
-        self.process.wait_for_line("the window is up")
+        self.process = launcher.program(sys.executable, str(script), self._path)
+        self._connect()
+
+    def _connect(self) -> None:
+        self._starts += 1
+        wait_until(
+            f"start {self._starts} of the viewer",
+            lambda: self.process.output.count("the window is up") >= self._starts,
+        )
         connection = socket.socket(socket.AF_UNIX)
         connection.settimeout(TIMEOUT)
-        connection.connect(path)
+        connection.connect(self._path)
         self._stream = connection.makefile("rw")
         connection.close()
 
@@ -115,8 +124,13 @@ class Viewer:
 
     def widgets(self, name: str) -> list[dict[str, Any]]:
         """Returns the visible widgets with a name or a class."""
-        print(name, file=self._stream, flush=True)
-        return list(json.loads(self._stream.readline()))
+        with contextlib.suppress(OSError):
+            print(name, file=self._stream, flush=True)
+            if line := self._stream.readline():
+                return list(json.loads(line))
+        # RViz has crashed, and the viewer starts again.
+        self._connect()
+        return self.widgets(name)
 
     def widget(self, name: str) -> dict[str, Any]:
         """Waits for the only widget of a name or class."""

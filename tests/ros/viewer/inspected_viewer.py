@@ -11,6 +11,7 @@ import json
 import socket
 import sys
 import threading
+from pathlib import Path
 from typing import Any
 
 from PyQt5.QtCore import QObject, QPoint, pyqtSignal
@@ -31,6 +32,8 @@ class Inspector(QObject):
 
     def listen(self) -> None:
         with socket.socket(socket.AF_UNIX) as server:
+            # The viewer may have been started again after a crash.
+            Path(sys.argv[1]).unlink(missing_ok=True)
             server.bind(sys.argv[1])
             server.listen()
             print("the window is up", flush=True)
