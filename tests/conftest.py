@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import os
 from pathlib import Path
 
@@ -28,16 +29,21 @@ _MARKED_FOLDERS = {"ros": "ros", "ros/viewer": "viewer", "build": "build", "web"
 _GROUPED_FOLDERS = ("build", "ros/viewer")
 
 
+@functools.cache
+def _marks_of(path: Path) -> list[pytest.MarkDecorator]:
+    """Returns the marks of the tests of a file."""
+    folders = [folder for folder in _MARKED_FOLDERS if _TESTS / folder in path.parents]
+    marks = [getattr(pytest.mark, _MARKED_FOLDERS[folder]) for folder in folders]
+    group = next((f for f in _GROUPED_FOLDERS if _TESTS / f in path.parents), None)
+    return [*marks, pytest.mark.xdist_group(group or str(path.relative_to(_TESTS)))]
+
+
 @pytest.hookimpl(tryfirst=True)  # before pytest-xdist reads the groups
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Marks all tests by their folder, and assigns those that share fixtures to one process."""
     for item in items:
-        for folder, marker in _MARKED_FOLDERS.items():
-            if _TESTS / folder in item.path.parents:
-                item.add_marker(marker)
-        folder = next((f for f in _GROUPED_FOLDERS if _TESTS / f in item.path.parents), None)
-        group = folder or str(item.path.relative_to(_TESTS))
-        item.add_marker(pytest.mark.xdist_group(group))
+        for mark in _marks_of(item.path):
+            item.add_marker(mark)
 
 
 @pytest.fixture(scope="session")
