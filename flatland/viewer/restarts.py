@@ -62,11 +62,10 @@ def run_with_restarts(run: Callable[[Callable[[], None]], int]) -> int:
     parent = os.getpid()
     for number in STOP_SIGNALS:
         signal.signal(number, forward)
-    code = 0
     for start in range(1, _MAX_STARTS + 1):
         with stop_signals_blocked():
             if is_stopped:
-                break
+                return 0
             sys.stdout.flush()
             sys.stderr.flush()
             child = os.fork()
