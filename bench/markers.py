@@ -25,6 +25,6 @@ def rows(_unit: float) -> list[Row]:
     def build() -> None:
         markers = LayerMarkers(layer)
         for message in (markers.lines(0), markers.walls(0)):
-            message.serialize(BytesIO())
+            BytesIO().write(message.packed)
 
     return [Row(f"markers of a layer of {EDGES} edges", best_of(build, 1.0, 3), "s", 1.0)]

@@ -7,11 +7,11 @@ from io import BytesIO
 from typing import Any
 
 import numpy as np
-from tf2_msgs.msg import TFMessage
 from visualization_msgs.msg import MarkerArray
 
 import flatland
-from flatland.ros.adapters import find_adapter, transform
+from flatland.node.values import Transforms
+from flatland.ros.adapters import find_adapter
 from flatland.ros.markers.model_markers import ModelMarkers
 
 from scenes import BEAMS, RANGE, benchmark_world_path  # isort: skip
@@ -37,18 +37,13 @@ def rows(_unit: float) -> list[Row]:
         _row("odometry", *_of_value(odometry), 0.25),
         _row("twist with covariance", *_of_value(twist), 0.25),
         _row("scan of 1081 beams", *_of_value(scan), 0.35),
-        _row(
-            f"/tf with {TRANSFORMS} transforms",
-            lambda: transform.serialize_all(transforms),
-            lambda: _by_rospy(TFMessage([transform.to_message(each) for each in transforms])),
-            0.25,
-        ),
+        _row(f"/tf with {TRANSFORMS} transforms", *_of_value(Transforms(transforms)), 0.25),
         _markers_row(),
     ]
 
 
 def _of_value(value: Any) -> tuple[Callable[[], object], Callable[[], object]]:
-    """Returns functions that serialize a value directly, and by a Python message."""
+    """Returns functions that serialize a value directly, and create and serialize a message."""
     adapter = find_adapter(type(value))
     assert adapter is not None
     serialize, to_message = adapter.serialize, adapter.to_message
@@ -61,7 +56,7 @@ def _markers_row() -> Row:
     with flatland.World.from_yaml(benchmark_world_path(), seed=1) as world:
         model = world.models[0]
         markers, body = ModelMarkers(model), model.bodies[0]
-        message = MarkerArray(markers.message(0).markers)
+        message = MarkerArray().deserialize(markers.message(0).packed)
         time_ns = 0
 
         def update() -> bytes:

@@ -7,8 +7,7 @@ import math
 import numpy as np
 
 import flatland
-from flatland.physics import PhysicsWorld
-from flatland.physics.boundaries import boundary_edges
+from flatland.physics import PhysicsWorld, boundary_edges
 from flatland.plugins.laser import Laser
 
 from scenes import (  # isort: skip

@@ -147,13 +147,17 @@ def services(count: int, folder: Path) -> Iterator[Sample]:
         import rospy
         from geometry_msgs.msg import Pose2D
 
-        from flatland.srv import DeleteModel, MoveModel, SpawnModel
+        from flatland.srv import DeleteModel, MoveModel, SpawnModel, WaitUntilReady
 
         server = ros.server(world_path=OFFICE, update_rate=0, seed=1)
         rospy.init_node("soak", disable_signals=True, disable_rostime=True)
         kinds = {"spawn_model": SpawnModel, "move_model": MoveModel, "delete_model": DeleteModel}
         for name in kinds:
             rospy.wait_for_service(name, 60.0)
+        # The node opens topics, with threads, after the first step.
+        rospy.wait_for_service("wait_until_ready", 60.0)
+        ready = rospy.ServiceProxy("wait_until_ready", WaitUntilReady)([], 60.0)
+        assert ready.success, ready.message
         spawn, move, delete = (
             rospy.ServiceProxy(name, kind, persistent=True) for name, kind in kinds.items()
         )

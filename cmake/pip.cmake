@@ -4,6 +4,11 @@ include(${CMAKE_CURRENT_LIST_DIR}/messages.cmake)
 
 set(FLATLAND_CORE_INSTALL_DIR ${SKBUILD_PLATLIB_DIR}/flatland)
 
+if(FLATLAND_BOX2D_SOURCE)
+  install(FILES ${FLATLAND_BOX2D_SOURCE}/LICENSE
+          DESTINATION ${SKBUILD_METADATA_DIR}/licenses/box2d COMPONENT flatland)
+endif()
+
 foreach(package flatland flatland_msgs)
   flatland_generate_messages(${package} ${PROJECT_BINARY_DIR}/messages/${package})
   foreach(kind msg srv)

@@ -78,10 +78,12 @@ autodoc_type_aliases = {
         "Kind",
         "NodeKind",
         "Params",
+        "Phase",
         "Pose",
         "SkippedHandler",
         "SpeedLimits",
         "Triple",
+        "UpdateFunction",
         "Vector2",
     )
 }
@@ -102,8 +104,8 @@ nitpick_ignore_regex = [
     (r"py:(class|exc)", r"(gymnasium|pathlib|pettingzoo)\..*"),
     # Of Gymnasium.
     (r"py:exc", r"(ClosedEnvironmentError|DependencyNotInstalled|InvalidAction|ResetNeeded)"),
-    # Names that flatland.gym imports only for type checkers, or that are not described.
-    (r"py:class", r"(FleetEnv|Laser|Touches)"),
+    # Names that are imported only for type checkers, or are not described.
+    (r"py:class", r"(FleetEnv|Laser|PluginWorld|Touches|Update)"),
     (r"py:class", r"flatland\._core\..*"),
     # Type variables.
     (r"py:(class|obj)", r"(flatland\.[a-z_.]+\.)?[CDHRT]"),
@@ -184,6 +186,15 @@ def _shorten(text: str | None) -> str | None:
     return re.sub(r"TypeAliasForwardRef\('(\w+)'\)", r"\1", text)
 
 
+def keep_colons(
+    app: Sphinx, kind: str, name: str, documented: Any, options: Any, lines: list[str]
+) -> None:
+    """Keeps the first line of a property, where napoleon takes text before a colon for a type."""
+    del app, name, documented, options
+    if kind == "property":
+        lines.insert(0, "\\ ")
+
+
 def show_attribute_types(
     app: Sphinx, kind: str, name: str, documented: Any, options: Any, lines: list[str]
 ) -> None:
@@ -226,4 +237,5 @@ def setup(app: Sphinx) -> None:
     app.connect("doctree-read", link_folders)
     app.connect("missing-reference", link_name)
     app.connect("autodoc-process-signature", show_signature)
+    app.connect("autodoc-process-docstring", keep_colons, priority=400)  # before napoleon
     app.connect("autodoc-process-docstring", show_attribute_types, priority=600)  # after napoleon

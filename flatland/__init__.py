@@ -14,113 +14,65 @@ from flatland.version import VERSION
 check_requirements()  # Otherwise, a missing package results in a traceback without a remedy.
 
 if TYPE_CHECKING:
-    from flatland.config.reader import YamlReader
-    from flatland.drawing import draw
-    from flatland.entities.body import Body
-    from flatland.entities.contact import Contact, ContactImpulse, ModelContact, MutableContact
-    from flatland.entities.joint import Joint
-    from flatland.entities.layer import Layer
-    from flatland.entities.model import Model
+    # "X as X" exports X for type checkers.
+    from flatland.config.reader import YamlReader as YamlReader  # noqa: I001 - several per line
+    from flatland.drawing import draw as draw
+    from flatland.entities.body import Body as Body
+    from flatland.entities.contact import (
+        Contact as Contact,
+        ContactImpulse as ContactImpulse,
+        ModelContact as ModelContact,
+        MutableContact as MutableContact,
+    )
+    from flatland.entities.joint import Joint as Joint
+    from flatland.entities.layer import Layer as Layer
+    from flatland.entities.model import Model as Model
     from flatland.errors import (
-        BatchError,
-        FlatlandError,
-        MapFileError,
-        PhysicsError,
-        Place,
-        PluginError,
-        StaleHandleError,
-        WorldError,
-        WorldLockedError,
-        YamlError,
+        BatchError as BatchError,
+        FlatlandError as FlatlandError,
+        MapFileError as MapFileError,
+        PhysicsError as PhysicsError,
+        Place as Place,
+        PluginError as PluginError,
+        StaleHandleError as StaleHandleError,
+        WorldError as WorldError,
+        WorldLockedError as WorldLockedError,
+        YamlError as YamlError,
     )
-    from flatland.loading.model_source import ModelSpec
-    from flatland.maps.occupancy_grid import OccupancyGrid
-    from flatland.physics.material import Material
-    from flatland.plugin_api.dynamics_limits import DynamicsLimits
-    from flatland.plugin_api.plugin import ModelPlugin, WorldPlugin
-    from flatland.plugin_api.ports import Command, Output
-    from flatland.plugin_api.schedule import when_due
-    from flatland.plugin_api.update_timer import UpdateTimer
-    from flatland.runtime.model_states import ModelStates
-    from flatland.runtime.observer import WorldObserver
-    from flatland.runtime.snapshot import WorldSnapshot
-    from flatland.timekeeper import Timekeeper
+    from flatland.loading.model_source import ModelSpec as ModelSpec
+    from flatland.physics import Material as Material
+    from flatland.plugin_api.dynamics_limits import DynamicsLimits as DynamicsLimits
+    from flatland.plugin_api.plugin import ModelPlugin as ModelPlugin, WorldPlugin as WorldPlugin
+    from flatland.plugin_api.ports import Command as Command, Output as Output
+    from flatland.plugin_api.update_timer import UpdateTimer as UpdateTimer
+    from flatland.plugin_api.updates import when_due as when_due
+    from flatland.runtime.model_states import ModelStates as ModelStates
+    from flatland.runtime.observer import WorldObserver as WorldObserver
+    from flatland.runtime.snapshot import WorldSnapshot as WorldSnapshot
+    from flatland.timekeeper import Timekeeper as Timekeeper
     from flatland.values import (
-        AckermannCommand,
-        Collision,
-        Collisions,
-        Imu,
-        JointState,
-        LaserScan,
-        NavSatFix,
-        Odometry,
-        PoseStamped,
-        Range,
-        SemanticLabel,
-        SemanticScan,
-        Transform,
-        Twist,
-        TwistWithCovariance,
+        AckermannCommand as AckermannCommand,
+        Collision as Collision,
+        Collisions as Collisions,
+        Imu as Imu,
+        JointState as JointState,
+        LaserScan as LaserScan,
+        NavSatFix as NavSatFix,
+        OccupancyGrid as OccupancyGrid,
+        Odometry as Odometry,
+        PoseStamped as PoseStamped,
+        Range as Range,
+        SemanticLabel as SemanticLabel,
+        SemanticScan as SemanticScan,
+        Transform as Transform,
+        Twist as Twist,
+        TwistWithCovariance as TwistWithCovariance,
     )
-    from flatland.world import World
+    from flatland.world import World as World
 
     load_world = World.from_yaml
 
 __version__ = VERSION
-
-__all__ = [
-    "AckermannCommand",
-    "BatchError",
-    "Body",
-    "Collision",
-    "Collisions",
-    "Command",
-    "Contact",
-    "ContactImpulse",
-    "DynamicsLimits",
-    "FlatlandError",
-    "Imu",
-    "Joint",
-    "JointState",
-    "LaserScan",
-    "Layer",
-    "MapFileError",
-    "Material",
-    "Model",
-    "ModelContact",
-    "ModelPlugin",
-    "ModelSpec",
-    "ModelStates",
-    "MutableContact",
-    "NavSatFix",
-    "OccupancyGrid",
-    "Odometry",
-    "Output",
-    "PhysicsError",
-    "Place",
-    "PluginError",
-    "PoseStamped",
-    "Range",
-    "SemanticLabel",
-    "SemanticScan",
-    "StaleHandleError",
-    "Timekeeper",
-    "Transform",
-    "Twist",
-    "TwistWithCovariance",
-    "UpdateTimer",
-    "World",
-    "WorldError",
-    "WorldLockedError",
-    "WorldObserver",
-    "WorldPlugin",
-    "WorldSnapshot",
-    "YamlError",
-    "YamlReader",
-    "draw",
-    "load_world",
-    "when_due",
-]
 
 # Imported when they are first used: the ROS node publishes its time before it needs any of them.
 _MODULES = {
@@ -140,7 +92,7 @@ _MODULES = {
     "LaserScan": "flatland.values",
     "Layer": "flatland.entities.layer",
     "MapFileError": "flatland.errors",
-    "Material": "flatland.physics.material",
+    "Material": "flatland.physics",
     "Model": "flatland.entities.model",
     "ModelContact": "flatland.entities.contact",
     "ModelPlugin": "flatland.plugin_api.plugin",
@@ -148,7 +100,7 @@ _MODULES = {
     "ModelStates": "flatland.runtime.model_states",
     "MutableContact": "flatland.entities.contact",
     "NavSatFix": "flatland.values",
-    "OccupancyGrid": "flatland.maps.occupancy_grid",
+    "OccupancyGrid": "flatland.values",
     "Odometry": "flatland.values",
     "Output": "flatland.plugin_api.ports",
     "PhysicsError": "flatland.errors",
@@ -173,8 +125,9 @@ _MODULES = {
     "YamlError": "flatland.errors",
     "YamlReader": "flatland.config.reader",
     "draw": "flatland.drawing",
-    "when_due": "flatland.plugin_api.schedule",
+    "when_due": "flatland.plugin_api.updates",
 }
+__all__ = sorted([*_MODULES, "load_world"])
 
 
 def __getattr__(name: str) -> Any:

@@ -77,7 +77,7 @@ class YamlError(FlatlandError):
 
 
 class UnreadableFileError(YamlError):
-    """A YAML file does not exist or cannot be read."""
+    """A YAML file does not exist, cannot be read, or is an image or a data file."""
 
 
 class PluginError(FlatlandError):

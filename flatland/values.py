@@ -108,6 +108,25 @@ class LaserScan:
         )
 
 
+GridCells = npt.NDArray[np.int8]
+
+
+@dataclass(frozen=True, eq=False)
+class OccupancyGrid:
+    """A grid of occupancy values, as in `nav_msgs/OccupancyGrid`.
+
+    Attributes:
+        origin: Pose of the lower left corner of the grid in the world frame [m, m, rad].
+        resolution: Size of a cell [m].
+        cells: Occupancy from 0 (free) to 100 (occupied), -1 if unknown; shape (rows, columns),
+            the row at the bottom of the map first.
+    """
+
+    origin: Pose
+    resolution: float
+    cells: GridCells
+
+
 @dataclass(frozen=True, slots=True)
 class Range:
     """A reading of a range sensor with a cone, as in `sensor_msgs/Range`.

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import os
+from collections import Counter
 from pathlib import Path
 
 import pytest
@@ -27,6 +28,20 @@ _MARKED_FOLDERS = {"ros": "ros", "ros/viewer": "viewer", "build": "build", "web"
 # Folders whose tests run in one process, since they share a workspace or a screen. The tests of
 # each other file run in one process.
 _GROUPED_FOLDERS = ("build", "ros/viewer")
+_LISTED_GROUPS = 10
+# Folders with groups that take long; they start first, so that none is left alone at the end.
+_SLOW_FOLDERS = ("build", "ros/viewer", "web", "examples", "ros")
+
+
+def _group_of(path: str) -> str:
+    """Returns the group of a file, whose path starts in the folder of the tests."""
+    return next((folder for folder in _GROUPED_FOLDERS if path.startswith(f"{folder}/")), path)
+
+
+def _rank(path: str) -> int:
+    """Returns the position of a file among the slow folders, beyond them for all others."""
+    ranks = (rank for rank, folder in enumerate(_SLOW_FOLDERS) if path.startswith(f"{folder}/"))
+    return next(ranks, len(_SLOW_FOLDERS))
 
 
 @functools.cache
@@ -34,16 +49,41 @@ def _marks_of(path: Path) -> list[pytest.MarkDecorator]:
     """Returns the marks of the tests of a file."""
     folders = [folder for folder in _MARKED_FOLDERS if _TESTS / folder in path.parents]
     marks = [getattr(pytest.mark, _MARKED_FOLDERS[folder]) for folder in folders]
-    group = next((f for f in _GROUPED_FOLDERS if _TESTS / f in path.parents), None)
-    return [*marks, pytest.mark.xdist_group(group or str(path.relative_to(_TESTS)))]
+    return [*marks, pytest.mark.xdist_group(_group_of(path.relative_to(_TESTS).as_posix()))]
 
 
 @pytest.hookimpl(tryfirst=True)  # before pytest-xdist reads the groups
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Marks all tests by their folder, and assigns those that share fixtures to one process."""
+    items.sort(key=lambda item: _rank(item.path.relative_to(_TESTS).as_posix()))
     for item in items:
         for mark in _marks_of(item.path):
             item.add_marker(mark)
+
+
+class SlowestGroups:
+    """Prints the groups of tests that took longest, with the time of their fixtures."""
+
+    def __init__(self) -> None:
+        self._times: Counter[str] = Counter()
+
+    def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
+        """Adds the time of a test, or of its fixtures, to its group."""
+        path = report.location[0].replace(os.sep, "/").removeprefix("tests/")
+        self._times[_group_of(path)] += report.duration
+
+    def pytest_terminal_summary(self, terminalreporter: pytest.TerminalReporter) -> None:
+        """Prints the groups."""
+        if len(self._times) > 1:
+            terminalreporter.section(f"slowest {_LISTED_GROUPS} groups")
+            for group, seconds in self._times.most_common(_LISTED_GROUPS):
+                terminalreporter.write_line(f"{seconds:7.1f} s  {group}")
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Adds the list of groups to the process that prints the results."""
+    if not hasattr(config, "workerinput"):
+        config.pluginmanager.register(SlowestGroups())
 
 
 @pytest.fixture(scope="session")

@@ -15,12 +15,19 @@ if [[ -n $world ]]; then
   fi
   arguments+=("world_path:=$(realpath "$world")")
 fi
-if [[ -z ${DISPLAY:-} && " $* " != *" show_viz:="* ]]; then
+# Why the Qt viewer cannot run. The bindings of Debian 13 cannot be imported.
+reason=''
+if [[ -z ${DISPLAY:-} ]]; then
+  reason="DISPLAY is not set"
+elif ! "$VIRTUAL_ENV/bin/python" -c 'import rviz.librviz_sip' 2>/dev/null; then
+  reason="RViz has no Python bindings here"
+fi
+if [[ $reason && " $* " != *" show_viz:="* ]]; then
   arguments+=("show_viz:=false")
   if [[ " $* " == *" web:="* ]]; then
-    echo "flatland: DISPLAY is not set, running without the Qt viewer (show_viz:=false)"
+    echo "flatland: $reason, running without the Qt viewer (show_viz:=false)"
   else
-    echo "flatland: DISPLAY is not set, running with the viewer for the browser (show_viz:=false web:=true)"
+    echo "flatland: $reason, running with the viewer for the browser (show_viz:=false web:=true)"
     arguments+=("web:=true")
   fi
 fi

@@ -10,9 +10,10 @@ venv=$root/build/learning/venv
 python=$root/.venv/bin/python
 
 # matplotlib and numpy are those of Debian.
+numpy=$("$python" -c 'import numpy; print(numpy.__version__)')
 requires=$(for extra in gym learning ray test; do
   requirements "$python" project optional-dependencies "$extra"
-done | grep -v '^flatland-sim\|^matplotlib' && echo 'numpy<2')
+done | grep -v '^flatland-sim\|^matplotlib' && echo "numpy==$numpy")
 make_environment "PyTorch and Ray" "$venv" "$requires"
 
 . ./setup.bash

@@ -12,7 +12,8 @@ from typing import Any
 
 import yaml
 
-from flatland.loading.world_loader import SIMPLIFICATIONS
+from flatland.loading.model_check import is_model_file, load_model_alone
+from flatland.loading.world_source import SIMPLIFICATIONS
 from flatland.world import World
 
 Commands = Any  # argparse._SubParsersAction, which is not public
@@ -145,6 +146,19 @@ def load(options: argparse.Namespace, seed: int | None, **more: Any) -> World:
         simplify_map=options.simplify_map,
         **more,
     )
+
+
+def load_world_or_model(options: argparse.Namespace, seed: int | None) -> World:
+    """Loads the world or, into an empty world, the model of the options of `file_arguments`.
+
+    Args:
+        options: The options.
+        seed: Seed of all random numbers, None to draw one.
+    """
+    params = dict(options.param)
+    if is_model_file(options.path, params):
+        return load_model_alone(World, options.path, params, seed=seed)
+    return load(options, seed)
 
 
 # -- types of values -----------------------------------------------------------------------

@@ -14,10 +14,12 @@ from pathlib import Path
 
 from flatland.cli.arguments import Commands, add_command, file_arguments
 from flatland.cli.contents import counted, print_contents
+from flatland.cli.suspicious import warn_about_world
 from flatland.config.collecting_reader import ErrorCollector
 from flatland.errors import FlatlandError, Place
 from flatland.loading.model_check import is_model_file, load_model_alone
 from flatland.loading.world_loader import load_world
+from flatland.loading.world_source import WorldSource
 from flatland.world import World
 
 _EXAMPLES = (
@@ -76,10 +78,12 @@ def add(commands: Commands) -> None:
         summary="list all problems of a world or model",
         description="Loads a world or model with all of its files and prints every problem as "
         "FILE:LINE: error: TEXT, or the contents if there is none. A model is loaded into an empty "
-        "world with the layers that the model names. The exit code is 1 if there are problems.",
+        "world with the layers that the model names. The exit code is 1 if there are errors, and "
+        "with --strict also if there are warnings.",
         examples=_EXAMPLES,
     )
     parser.add_argument("--json", action="store_true", help="print the problems as JSON")
+    parser.add_argument("--strict", action="store_true", help="exit with 1 also for warnings")
     parser.set_defaults(run=_check)
 
 
@@ -95,31 +99,28 @@ def _check(options: argparse.Namespace) -> int:
                 world = load_model_alone(World, options.path, params, collector.read)
             else:
                 # A fixed seed: nothing random is printed, and no log line about a drawn seed.
-                world = load_world(
-                    World,
+                source = WorldSource(
                     options.path,
                     params=params,
                     simplify_map=options.simplify_map,
-                    seed=0,
-                    step_size=0.005,
-                    observers=(),
-                    plugin_timeout=None,
-                    plugin_errors="raise",
-                    on_invalid_body="raise",
                     read=collector.read,
                 )
+                world = load_world(World, source, seed=0)
         except FlatlandError as error:
             collector.add(error)
         except Exception:
             if not collector.errors:
                 raise
             # Otherwise the result of values in place of the invalid ones.
+        if world is not None and not collector.errors:
+            warn_about_world(world, params)
     problems[:0] = [
         Problem.make("error", error.message, error.place or root, error.hint)
         for error in collector.errors
     ]
     _print(options, is_model, problems, world)
-    return 1 if problems else 0
+    fatal = ("error", "warning") if options.strict else ("error",)
+    return 1 if any(problem.severity in fatal for problem in problems) else 0
 
 
 def _print(
@@ -165,9 +166,8 @@ def _is_model_file(path: Path, params: dict[str, object]) -> bool:
 
 
 def _shown(path: str) -> str:
-    """Returns a path as it is printed: relative within the current folder."""
-    folder = os.path.join(os.getcwd(), "")  # noqa: PTH109, PTH118
-    return path.removeprefix(folder)
+    """Returns a path as it is printed: relative to the current folder, if that is shorter."""
+    return min(os.path.relpath(path), path, key=len)
 
 
 @contextmanager
@@ -182,9 +182,13 @@ def _collected_warnings(collector: ErrorCollector, root: Place) -> Iterator[list
 
     class Handler(logging.Handler):
         def emit(self, record: logging.LogRecord) -> None:
-            place = getattr(record, "place", None) or collector.place or root
+            place = getattr(record, "place", None)
+            if place is None and collector.has_error_here:
+                return  # It may result from a value in place of an invalid one.
+            place = place or collector.place or root
             severity = "error" if record.levelno >= logging.ERROR else "warning"
-            problem = Problem.make(severity, record.getMessage(), place)
+            hint = getattr(record, "hint", "")
+            problem = Problem.make(severity, record.getMessage(), place, hint)
             if problem not in problems:
                 problems.append(problem)
 

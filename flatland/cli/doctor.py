@@ -29,19 +29,15 @@ _MASTER_TIMEOUT = 2.0  # s
 _SETUP = "make setup in a clone of flatland"
 _APT = "apt-get install "
 
-# (module, name in the list, what installs it, what it is for)
-_REQUIRED = (
-    ("numpy", "numpy", _APT + "python3-numpy", ""),
-    ("yaml", "PyYAML", _APT + "python3-yaml", ""),
-    ("lupa", "lupa", f"{_APT}python3-lupa, or pip install lupa", ""),
-)
+# (module, what it is for); what installs it stands in flatland/requirements.py
 _OPTIONAL = (
-    ("PIL", "Pillow", _APT + "python3-pil", "8-bit grey map images"),
-    ("cv2", "OpenCV", _APT + "python3-opencv", "other map images, flatland run --video"),
-    ("matplotlib", "matplotlib", _APT + "python3-matplotlib", "flatland show"),
-    ("tqdm", "tqdm", _APT + "python3-tqdm", "progress bar of flatland run"),
-    ("argcomplete", "argcomplete", _APT + "python3-argcomplete", "completion in the shell"),
-    ("aiohttp", "aiohttp", _APT + "python3-aiohttp", "viewer in the browser"),
+    ("matplotlib", "flatland show, World.draw"),
+    ("cv2", "flatland run --video, map_to_lines.py"),
+    ("gymnasium", "flatland.gym"),
+    ("pettingzoo", "flatland.gym with several robots"),
+    ("tqdm", "progress bar of flatland run"),
+    ("argcomplete", "completion in the shell"),
+    ("aiohttp", "viewer in the browser"),
 )
 _ROS = (
     ("rospy", "rospy", _APT + "python3-rospy", "ROS node"),
@@ -57,7 +53,7 @@ _ROS = (
     ("visualization_msgs", "visualization_msgs", _APT + "python3-visualization-msgs", "ROS node"),
     ("flatland.msg", "messages of flatland", _SETUP, "ROS node"),
     ("rosbag", "rosbag", _APT + "python3-rosbag", "flatland run --bag"),
-    ("mcap_ros1", "mcap-ros1-support", "pip install mcap mcap-ros1-support", "MCAP files"),
+    ("mcap_ros1", "mcap-ros1-support", 'pip install "flatland-sim[mcap]"', "MCAP files"),
     ("PyQt5", "PyQt5", _APT + "python3-pyqt5", "Qt viewer"),
     ("rviz", "RViz for Python", _APT + "python3-rviz", "Qt viewer"),
 )
@@ -174,50 +170,84 @@ def report(*, as_json: bool = False) -> int:
 
 def check_all() -> Iterator[Finding]:
     """Yields the results of all checks."""
-    yield from _check_python()
-    yield from _check_modules("simulation", _REQUIRED, required=True)
-    yield _check_extension()
-    yield from _check_modules("tools", _OPTIONAL)
+    requirements = _load_requirements()
+    way = requirements.installation()
+    yield from _check_python(way)
+    required = [(module, "") for module in requirements.REQUIRED]
+    yield from _check_modules("simulation", _rows(requirements, required), required=True)
+    yield _check_extension(requirements.install_command("flatland._core"))
+    yield from _check_modules("tools", _rows(requirements, _OPTIONAL))
+    if way == requirements.WHEEL:
+        detail = "not required by a wheel; the ROS node and the Qt viewer need Debian and ROS"
+        yield Finding("ROS", "ROS", "info", detail)
+        return
     yield from _check_modules("ROS", _ROS)
     yield from _check_programs()
     yield _check_master()
     yield from _check_display()
 
 
+def _load_requirements() -> Any:
+    """Returns flatland/requirements.py, also if flatland cannot be imported."""
+    path = Path(__file__).parents[1] / "requirements.py"
+    spec = importlib.util.spec_from_file_location("_flatland_requirements", path)
+    assert spec is not None  # noqa: S101 - the file has the ending of a module
+    assert spec.loader is not None  # noqa: S101
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[spec.name] = module  # for its dataclasses
+    spec.loader.exec_module(module)
+    return module
+
+
+def _rows(requirements: Any, modules: Sequence[tuple[str, str]]) -> list[tuple[str, str, str, str]]:
+    """Adds the names of the packages and what installs them."""
+    return [
+        (module, requirements.PACKAGES[module].name, requirements.install_command(module), purpose)
+        for module, purpose in modules
+    ]
+
+
 # -- Python --------------------------------------------------------------------------------
 
 
-def _check_python() -> Iterator[Finding]:
-    version = ".".join(map(str, sys.version_info[:3]))
-    is_recent = sys.version_info >= _PYTHON
-    yield Finding(
-        "Python",
-        "version",
-        "ok" if is_recent else "missing",
-        f"{version} ({sys.executable})",
-        "" if is_recent else "Python 3.11 or later is required: " + _APT + "python3",
-    )
+def _check_python(way: str) -> Iterator[Finding]:
+    version = ".".join(map(str, sys.version_info[:3])) + f" ({sys.executable})"
+    if sys.version_info >= _PYTHON:
+        yield Finding("Python", "version", "ok", version)
+    else:
+        remedy = "Python 3.11 or later is required: " + _APT + "python3"
+        yield Finding("Python", "version", "missing", version, remedy)
     in_venv = sys.prefix != sys.base_prefix
     yield Finding(
         "Python", "virtual environment", "info", sys.prefix if in_venv else "none is active"
     )
+    yield Finding("Python", "installation", "info", way)
     spec = _find_spec("flatland")
     folder = str(Path(spec.origin).parent) if spec and spec.origin else ""
-    yield Finding(
-        "Python",
-        "flatland",
-        "ok" if folder else "missing",
-        folder or "not importable",
-        "" if folder else f"{_SETUP}, then . ./setup.bash",
-    )
+    remedy = f"{_SETUP}, then . ./setup.bash"
+    yield _found("Python", "flatland", folder, "missing", "not importable", remedy)
+    reason = "not on PATH; python3 -m flatland is the same"
+    remedy = ". ./setup.bash, or activate the virtual environment"
     program = shutil.which("flatland")
-    yield Finding(
-        "Python",
-        "command flatland",
-        "ok" if program else "absent",
-        program or "not on PATH; python3 -m flatland is the same",
-        "" if program else ". ./setup.bash, or activate the virtual environment",
-    )
+    yield _found("Python", "command flatland", program, "absent", reason, remedy)
+
+
+def _found(
+    section: str, name: str, detail: str | None, status: str, reason: str, remedy: str
+) -> Finding:
+    """Returns the result of a check for something that is there if there is a detail about it.
+
+    Args:
+        section: See `Finding`.
+        name: See `Finding`.
+        detail: Version or path, None or empty if it is not there.
+        status: Status if it is not there.
+        reason: Detail if it is not there.
+        remedy: What installs it.
+    """
+    if detail:
+        return Finding(section, name, "ok", detail)
+    return Finding(section, name, status, reason, remedy)
 
 
 def _find_spec(module: str) -> Any:
@@ -273,16 +303,16 @@ def _import(modules: Sequence[str]) -> dict[str, tuple[bool, str]]:
     return results
 
 
-def _check_extension() -> Finding:
+def _check_extension(remedy: str) -> Finding:
     name = "extension and Box2D"
     spec = _find_spec("flatland._core")
     if spec is None:
         detail = "flatland._core is not built for this Python"
-        return Finding("simulation", name, "missing", detail, _SETUP)
+        return Finding("simulation", name, "missing", detail, remedy)
     done = _run_python("from flatland.physics import BOX2D_VERSION; print(BOX2D_VERSION)")
     if done.returncode:
         detail = f"import fails: {_last_line(done.stderr)}"
-        return Finding("simulation", name, "missing", detail, f"{_APT}libbox2d2, {_SETUP}")
+        return Finding("simulation", name, "missing", detail, f"{_APT}libbox2d2, {remedy}")
     return Finding("simulation", name, "ok", f"Box2D {_last_line(done.stdout)} ({spec.origin})")
 
 
@@ -291,19 +321,13 @@ def _check_extension() -> Finding:
 
 def _check_programs() -> Iterator[Finding]:
     for program, remedy in _PROGRAMS:
-        path = shutil.which(program)
-        status = "ok" if path else "absent"
-        yield Finding("ROS", program, status, path or "not on PATH", "" if path else remedy)
+        yield _found("ROS", program, shutil.which(program), "absent", "not on PATH", remedy)
     if shutil.which("rospack"):
         done = _run(["rospack", "find", "flatland"])
-        found = done.returncode == 0
-        yield Finding(
-            "ROS",
-            "ROS package flatland",
-            "ok" if found else "absent",
-            _last_line(done.stdout) if found else "not found in ROS_PACKAGE_PATH",
-            "" if found else ". ./setup.bash, or the setup.bash of the catkin workspace",
-        )
+        folder = "" if done.returncode else _last_line(done.stdout)
+        reason = "not found in ROS_PACKAGE_PATH"
+        remedy = ". ./setup.bash, or the setup.bash of the catkin workspace"
+        yield _found("ROS", "ROS package flatland", folder, "absent", reason, remedy)
 
 
 def _check_master() -> Finding:
@@ -341,21 +365,16 @@ def _check_display() -> Iterator[Finding]:
         yield Finding("display", "display", "absent", f"{where}: {reason}", remedy)
         return
     yield Finding("display", "display", "ok", f"{where}, {lines[0]} pixels")
-    has_opengl = len(lines) > 1 and bool(lines[1])
-    yield Finding(
-        "display",
-        "OpenGL",
-        "ok" if has_opengl else "absent",
-        lines[1] if has_opengl else "no context can be created (for: Qt viewer and RViz)",
-        "" if has_opengl else _APT + "libgl1-mesa-dri",
-    )
+    version = lines[1] if len(lines) > 1 else ""
+    reason = "no context can be created (for: Qt viewer and RViz)"
+    yield _found("display", "OpenGL", version, "absent", reason, _APT + "libgl1-mesa-dri")
 
 
 # -- programs ------------------------------------------------------------------------------
 
 
 def _run_python(code: str, *arguments: str) -> subprocess.CompletedProcess[str]:
-    # -P: the current folder and that of this file do not hide modules.
+    # -P: modules of the current folder and of the folder of this file do not hide others.
     environment = dict(os.environ)
     spec = _find_spec("flatland")
     if spec is not None and spec.origin:

@@ -11,15 +11,16 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from flatland.cli.arguments import Commands, add_command, file_arguments, load
+from flatland.cli.arguments import Commands, add_command, file_arguments, load_world_or_model
 from flatland.entities.body import Body
 from flatland.entities.collision_filter import ALL_LAYERS
 from flatland.entities.layer import Layer
 from flatland.entities.model import Model
 from flatland.geometry import bounds_of
-from flatland.loading.model_check import is_model_file, load_model_alone
+from flatland.node.services import SERVICES
 from flatland.plugin_api.plugin import FlatlandPlugin
 from flatland.plugin_api.update_timer import UpdateTimer
+from flatland.plugin_api.updates import STEP_HOOKS
 from flatland.world import World
 
 _EXAMPLES = (
@@ -27,16 +28,6 @@ _EXAMPLES = (
     "flatland info worlds/office/diff_robot.model.yaml",
     "flatland info worlds/office/world.yaml --json",
 )
-# The services of the node, see flatland.ros.services; plugins may add others.
-NODE_SERVICES = {
-    "spawn_model": "flatland/SpawnModel",
-    "delete_model": "flatland/DeleteModel",
-    "move_model": "flatland/MoveModel",
-    "set_rate": "flatland/SetRate",
-    "pause": "std_srvs/Empty",
-    "resume": "std_srvs/Empty",
-    "toggle_pause": "std_srvs/Empty",
-}
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,8 +58,8 @@ def add(commands: Commands) -> None:
         "info",
         parents=[file_arguments("FILE", "world or model file")],
         summary="describe the layers, models, topics, frames and services of a world",
-        description="Loads a world or model, steps it once and prints its layers, models, bodies "
-        "with their masses, topics, coordinate frames and services.",
+        description="Loads a world or model and prints its layers, models, bodies with their "
+        "masses, topics, coordinate frames and services. It is stepped to find the frames.",
         examples=_EXAMPLES,
     )
     parser.add_argument("--json", action="store_true", help="print JSON")
@@ -76,15 +67,10 @@ def add(commands: Commands) -> None:
 
 
 def _info(options: argparse.Namespace) -> int:
-    params = dict(options.param)
-    if is_model_file(options.path, params):
-        world = load_model_alone(World, options.path, params)
-    else:
-        world = load(options, seed=0)
-    with world:
-        world.step()  # in which most plugins send their first transforms
+    with load_world_or_model(options, seed=0) as world:
         contents = describe_world(world, str(options.path))
-        world.step(_steps_to_first_updates(world))
+        # In the first step, most plugins send their first transforms.
+        world.step(1 + _steps_to_first_updates(world))
         contents["frames"] = _describe_frames(world)
     if options.json:
         print(json.dumps(contents, indent=2))
@@ -100,7 +86,7 @@ def describe_world(world: World, path: str) -> dict[str, Any]:
     """Returns the contents of a world as values of JSON.
 
     Args:
-        world: A world that was stepped, so that its frames are known.
+        world: The world. Its frames are known if it was stepped.
         path: The world file, as given.
     """
     return {
@@ -110,7 +96,7 @@ def describe_world(world: World, path: str) -> dict[str, Any]:
         "world_plugins": [_plugin(plugin) for plugin in world.plugins],
         "topics": [dataclasses.asdict(topic) for topic in topics(world)],
         "frames": _describe_frames(world),
-        "services": [{"name": name, "type": kind} for name, kind in NODE_SERVICES.items()],
+        "services": [{"name": service.name, "type": service.type} for service in SERVICES],
     }
 
 
@@ -135,7 +121,7 @@ def _layer(layer: Layer) -> dict[str, Any]:
         "names": list(layer.names),
         "edges": len(layer.edges),
         "exact_edges": layer.exact_edge_count,
-        "bounds": None if bounds is None else [round(number, 3) for number in bounds],
+        "bounds": None if bounds is None else [_rounded(number, 3) for number in bounds],
     }
 
 
@@ -144,7 +130,7 @@ def _model(world: World, model: Model) -> dict[str, Any]:
         "name": model.name,
         "namespace": model.namespace,
         "file": model.path,
-        "pose": [round(number, 4) for number in model.pose],
+        "pose": [_rounded(number, 4) for number in model.pose],
         "mass": _number(sum(body.mass for body in model.bodies)),
         "bodies": [_body(world, body) for body in model.bodies],
         "joints": [
@@ -160,11 +146,7 @@ def _body(world: World, body: Body) -> dict[str, Any]:
     known = world.collision_filter
     for fixture in body.fixtures:
         bits = fixture.category_bits
-        layers += (
-            ["all"]
-            if bits == ALL_LAYERS
-            else [name for name in known.names if bits >> known.layer_id(name) & 1]
-        )
+        layers += ["all"] if bits == ALL_LAYERS else known.names_of(bits)
     return {
         "name": body.name,
         "type": body.type,
@@ -177,6 +159,10 @@ def _body(world: World, body: Body) -> dict[str, Any]:
 
 def _plugin(plugin: FlatlandPlugin) -> dict[str, Any]:
     return {"name": plugin.name, "type": plugin.type, "rate": _rate(plugin)}
+
+
+def _rounded(value: float, decimals: int) -> float:
+    return round(value, decimals) + 0.0  # Without the sign of -0.
 
 
 def _number(value: float) -> float:
@@ -227,12 +213,17 @@ def _message_type(value_type: type[Any]) -> str:
 
 
 def _rate(plugin: FlatlandPlugin) -> float | None:
-    """Returns the rate of the timer of a plugin [Hz]; None if it has none, or several."""
+    """Returns the rate of the updates of a plugin [Hz]; None if it has none, or several."""
     timers = [value for value in vars(plugin).values() if isinstance(value, UpdateTimer)]
-    if len(timers) != 1:
+    # Hooks are called in every step and may check a timer.
+    hooks = [getattr(plugin, hook) for hook in STEP_HOOKS.values()]
+    timers += [update.timer for update in plugin.updates if update.function not in hooks]
+    rates = {timer.rate for timer in timers}
+    limited = rates - {math.inf}
+    if not rates or len(limited) > 1:
         return None
     in_each_step = 1e9 / plugin.world.timekeeper.step_size_ns
-    return min(timers[0].rate, in_each_step)
+    return min(*limited, in_each_step) if limited else in_each_step
 
 
 # -- text ----------------------------------------------------------------------------------

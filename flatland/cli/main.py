@@ -29,11 +29,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Runs the command.
 
     Args:
-        arguments: Arguments without the name of the command; None for those of the process.
+        arguments: Arguments without the name of the command; None for the arguments of the
+            process.
 
     Returns:
         The exit code: 0 for success, 1 for an error of a file or of the system, which is printed,
-        or for problems that `flatland check` or `flatland doctor` found; 130 after Ctrl-C, or 141
+        or for errors that `flatland check` or `flatland doctor` found; 130 after Ctrl-C, or 141
         if the reader closed the output, as in `flatland check world.yaml | head -1`.
 
     Raises:
@@ -90,7 +91,7 @@ def make_parser() -> argparse.ArgumentParser:
 
 
 def _complete(parser: argparse.ArgumentParser) -> None:
-    """Answers a request of the shell for completions, and ends the process, if this is one."""
+    """Prints completions and ends the process, if the shell requests completions."""
     if "_ARGCOMPLETE" not in os.environ:
         return
     try:

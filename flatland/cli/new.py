@@ -5,17 +5,15 @@ from __future__ import annotations
 import argparse
 import importlib.resources
 import keyword
-import os
 import re
 import secrets
 import sys
-import tempfile
-from collections.abc import Iterator
 from importlib.resources.abc import Traversable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from flatland.cli.arguments import Commands, add_command, count, positive
 from flatland.errors import FlatlandError
@@ -132,16 +130,13 @@ def create(kind: str, name: str, folder: Path) -> Path:
     _check_name(kind, name)
     target = folder / (f"{name}.model.yaml" if kind == "robot" else name)
     _check_target(target)
-    # In a temporary folder first, so that nothing incomplete is left behind.
-    with tempfile.TemporaryDirectory(dir=folder, prefix=".flatland-new-") as temporary:
-        content = Path(temporary) / "content"
-        content.mkdir()
-        _write_templates(kind, name, content)
-        if kind == "world":
-            _write_templates("robot", "robot", content)
-            _write_map(content / "map.pgm")
-        source = content / target.name if kind == "robot" else content
-        os.rename(source, target)  # noqa: PTH104
+    # Imported late, because most commands do not create files.
+    from flatland.worldgen.new_files import expand, grey_image, write_new
+
+    files = expand(*_templates(kind, name))
+    if kind == "world":
+        files |= expand(*_templates("robot", "robot")) | {"map.pgm": grey_image(_map())}
+    write_new(target, files, target.name if kind == "robot" else "")
     return target
 
 
@@ -164,7 +159,7 @@ def create_random(kind: str, name: str, folder: Path, **arguments: Any) -> Path:
     _check_name("world", name)
     target = folder / name
     _check_target(target)
-    from flatland.worldgen import generate  # not at the start of all commands
+    from flatland.worldgen import generate  # Late, as in `create`.
 
     try:
         generate(kind, **arguments).write(target)
@@ -207,29 +202,15 @@ def _check_name(kind: str, name: str) -> None:
         )
 
 
-def _write_templates(kind: str, name: str, folder: Path) -> None:
-    root = importlib.resources.files(_TEMPLATES[kind]) / "templates" / kind
+def _templates(kind: str, name: str) -> tuple[Traversable, dict[str, str]]:
+    """Returns the folder of templates of a kind, and the values in them."""
     class_name = "".join(part.capitalize() for part in name.split("_"))
-    for parts, template in _files(root):
-        path = folder.joinpath(*(part.replace("__name__", name) for part in parts))
-        path = path.with_name(path.name.removesuffix(".in"))
-        path.parent.mkdir(parents=True, exist_ok=True)
-        text = template.read_text(encoding="utf-8")
-        text = text.replace("@name@", name).replace("@Name@", class_name)
-        path.write_text(text, encoding="utf-8")
+    folder = importlib.resources.files(_TEMPLATES[kind]) / "templates" / kind
+    return folder, {"name": name, "Name": class_name}
 
 
-def _files(folder: Traversable, *parents: str) -> Iterator[tuple[tuple[str, ...], Traversable]]:
-    """Iterates over all templates below a folder, with the parts of their paths."""
-    for entry in sorted(folder.iterdir(), key=lambda entry: entry.name):
-        if entry.is_dir():
-            yield from _files(entry, *parents, entry.name)
-        elif entry.name.endswith(".in"):
-            yield (*parents, entry.name), entry
-
-
-def _write_map(path: Path) -> None:
-    """Draws a room with a partition and two pillars as a grey image (PGM)."""
+def _map() -> npt.NDArray[np.uint8]:
+    """Returns the grey values of a room with a partition and two pillars."""
     width, height = (round(side * _PIXELS_PER_METRE) for side in _ROOM)
     image = np.zeros((height, width), np.uint8)  # black is occupied
 
@@ -244,4 +225,4 @@ def _write_map(path: Path) -> None:
     fill(5.0, 2.0, 5.2, _ROOM[1], 0)  # the partition leaves a passage of 1.8 m
     fill(2.8, 3.6, 3.2, 4.0, 0)
     fill(6.4, 2.4, 6.8, 2.8, 0)
-    path.write_bytes(b"P5\n%d %d\n255\n" % (width, height) + image.tobytes())
+    return image

@@ -7,10 +7,10 @@ import os
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from flatland.cli.contents import counted
-from flatland.errors import FlatlandError
+from flatland.extras import missing
 
 if TYPE_CHECKING:
     from flatland.ros.message_recorder import MessageRecorder
@@ -93,22 +93,18 @@ class Recordings:
 
 
 def _create_bag(path: Path) -> MessageRecorder:
-    try:
-        from flatland.ros.bag import BagRecorder
-    except ImportError as error:
-        raise FlatlandError(
-            f"bags need the messages of ROS and rosbag ({error}): "
-            "apt-get install python3-rosbag python3-tf2-msgs python3-nav-msgs python3-sensor-msgs"
-        ) from error
-    return BagRecorder(path)
+    recorder: MessageRecorder = _message_recorder("bags need").record_bag(path)
+    return recorder
 
 
 def _create_mcap(path: Path) -> MessageRecorder:
+    recorder: MessageRecorder = _message_recorder("MCAP files need").record_mcap(path)
+    return recorder
+
+
+def _message_recorder(need: str) -> Any:
     try:
-        from flatland.ros.message_recorder import create_mcap_recorder
+        from flatland.ros import message_recorder
     except ImportError as error:
-        raise FlatlandError(
-            f"MCAP files need the messages of ROS ({error}): "
-            "apt-get install python3-tf2-msgs python3-nav-msgs python3-sensor-msgs"
-        ) from error
-    return create_mcap_recorder(path)
+        raise missing("tf2_msgs", need, error) from error
+    return message_recorder

@@ -9,7 +9,7 @@ import time
 from collections.abc import Iterator, Mapping
 from contextlib import ExitStack
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import yaml
 
@@ -30,9 +30,6 @@ from flatland.cli.progress import StopSignals, progress_bar
 from flatland.drawing import VIDEO_FORMATS, FrameRenderer, VideoFile, check_matplotlib, check_opencv
 from flatland.errors import FlatlandError
 from flatland.world import World
-
-if TYPE_CHECKING:
-    pass
 
 _EXAMPLES = (
     "flatland run worlds/office/world.yaml --duration 60",

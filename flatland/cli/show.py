@@ -1,4 +1,4 @@
-"""`flatland show`: draws a picture of a world."""
+"""`flatland show`: draws a picture of a world or model."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from flatland.cli.arguments import (
     add_command,
     count,
     file_arguments,
-    load,
+    load_world_or_model,
     picture_arguments,
     picture_options,
 )
@@ -19,6 +19,7 @@ from flatland.drawing import PICTURE_FORMATS, check_matplotlib, save
 _EXAMPLES = (
     "flatland show worlds/office/world.yaml -o office.png",
     "flatland show worlds/office/world.yaml -o corridor.pdf --view -6 -8 6 -3 --names",
+    "flatland show worlds/office/diff_robot.model.yaml -o robot.png",
     "flatland show worlds/office/world.yaml -o later.png --steps 400 --seed 1 --size 1200x800",
 )
 
@@ -28,9 +29,9 @@ def add(commands: Commands) -> None:
     parser = add_command(
         commands,
         "show",
-        parents=[file_arguments("WORLD", "world file"), picture_arguments()],
-        summary="draw a picture of a world",
-        description="Loads a world, optionally steps it, and draws a picture of it.",
+        parents=[file_arguments("FILE", "world or model file"), picture_arguments()],
+        summary="draw a picture of a world or model",
+        description="Loads a world or model, optionally steps it, and draws a picture of it.",
         examples=_EXAMPLES,
     )
     parser.add_argument(
@@ -59,10 +60,14 @@ def _picture_path(text: str) -> Path:
 
 def _show(options: argparse.Namespace) -> int:
     check_matplotlib()  # before loading and stepping, which may take long
-    with load(options, options.seed) as world:
+    with load_world_or_model(options, options.seed) as world:
         world.step(options.steps)
         try:
             save(world, options.output, **picture_options(options))
         except ValueError as error:
             options.parser.error(str(error))
+        for layer in world.layers:
+            is_drawn = options.layer is None or not set(options.layer).isdisjoint(layer.names)
+            if is_drawn and len(layer.edges) and not layer.color[3]:
+                print(f'layer "{layer.name}" is drawn faintly, because the alpha of its color is 0')
     return 0

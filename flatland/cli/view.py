@@ -19,7 +19,6 @@ from flatland.cli.arguments import (
 )
 from flatland.cli.progress import StopSignals
 from flatland.defaults import WEB_HOST, WEB_PORT
-from flatland.errors import FlatlandError
 from flatland.simulation import Simulation
 
 if TYPE_CHECKING:
@@ -30,7 +29,7 @@ _EXAMPLES = (
     "flatland view worlds/office/world.yaml --host 0.0.0.0 --read-only",
     "flatland view worlds/office/world.yaml --port 0 --no-browser --rate 400 --duration 10",
 )
-_CHECK_PERIOD = 0.1  # s between two looks for a signal
+_CHECK_PERIOD = 0.1  # s between two checks for a signal
 
 
 def add(commands: Commands) -> None:
@@ -61,9 +60,9 @@ def add(commands: Commands) -> None:
     parser.add_argument(
         "--token",
         type=_token,
-        help="what browsers have to know (default: none for this machine, else random)",
+        help="secret that browsers must send (default: none for this machine, else random)",
     )
-    parser.add_argument("--read-only", action="store_true", help="allow browsers only to look")
+    parser.add_argument("--read-only", action="store_true", help="browsers cannot change the world")
     parser.add_argument(
         "--no-browser", action="store_true", help="do not open a browser if there is a display"
     )
@@ -120,12 +119,8 @@ def _run(options: argparse.Namespace) -> int:
 
 
 def _create_viewer(options: argparse.Namespace) -> WebViewer:
-    try:
-        from flatland.web import WebViewer
-    except ImportError as error:
-        raise FlatlandError(
-            f"the viewer needs aiohttp ({error}): apt-get install python3-aiohttp"
-        ) from error
+    from flatland.web import WebViewer
+
     return WebViewer(
         options.host,
         options.port,
@@ -143,7 +138,7 @@ def _stop_at_signal(stop: StopSignals, simulation: Simulation, ended: threading.
 
 
 def _open_browser(url: str) -> None:
-    import webbrowser  # not at the start of all commands
+    import webbrowser  # Late, because most commands open no browser.
 
     webbrowser.open(url)
 

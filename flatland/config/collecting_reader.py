@@ -2,19 +2,24 @@
 
 from __future__ import annotations
 
-import os
+import logging
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
 from typing import Any, Self, TypeVar, Unpack
 
 from flatland.config import hints
 from flatland.config.convert import TUPLE_SIZES, Key, Kind, Limits, NodeKind
+from flatland.config.inputs import Inputs
 from flatland.config.node import ListNode, MapNode, Node, NullNode
-from flatland.config.preprocessor import Params, preprocess_file
+from flatland.config.preprocessor import preprocess_file
 from flatland.config.reader import REQUIRED, YamlReader
 from flatland.errors import FlatlandError, Place, YamlError
 
 R = TypeVar("R")
+
+_LOG = logging.getLogger("flatland")
+
+_ITEM_KEYS = {"name", "type"}  # of most maps that are items of a list
 
 
 class FollowUpError(YamlError):
@@ -35,27 +40,30 @@ class ErrorCollector:
         self.errors: list[FlatlandError] = []
         self.found = 0
         self.place: Place | None = None
+        self._found_before = 0
         self._seen: set[tuple[Place | None, str]] = set()
         self._model = ""
-        self._stand_ins = 0
+        self._stand_ins: list[str] = []
         # By id; the nodes are kept because the id of a deleted object can be reused.
         self._unusable: dict[int, Node] = {}
         self._bad_spots: set[_Spot] = set()
 
-    def read(self, path: str | os.PathLike[str], params: Params = None) -> CollectingReader:
+    def read(self, path: str, inputs: Inputs) -> CollectingReader:
         """Loads a file; its reader and all readers of its entries collect errors.
 
         Raises:
             YamlError: The file cannot be read or is not valid YAML.
         """
-        return CollectingReader(preprocess_file(os.fspath(path), params, self._keep)).into(self)
+        return CollectingReader(preprocess_file(path, inputs, self._keep)).into(self)
 
     def add(self, error: FlatlandError) -> None:
-        """Adds an error, unless it results from others or was added for another model."""
+        """Adds an error, unless the error is a follow-up or was added for another model."""
         if isinstance(error, FollowUpError) or isinstance(error.__cause__, FollowUpError):
             return
         self.found += 1
         for part in error.parts():
+            for stand_in in self._stand_ins:
+                part.message = part.message.replace(stand_in, "?")
             text = part.message
             if self._model:  # models of one file have the same errors
                 text = text.replace(f'"{self._model}"', '""')
@@ -68,12 +76,19 @@ class ErrorCollector:
     def at(self, place: Place | None) -> Iterator[None]:
         """Sets `place` for a block, which an error ends; the error is added."""
         outer, self.place = self.place, place
+        found_before, self._found_before = self._found_before, self.found
         try:
             yield
         except FlatlandError as error:
             self.add(error)
         finally:
             self.place = outer
+            self._found_before = found_before
+
+    @property
+    def has_error_here(self) -> bool:
+        """Whether the entry that is being loaded has an error."""
+        return self.found > self._found_before
 
     @contextmanager
     def model(self, name: str) -> Iterator[None]:
@@ -96,7 +111,7 @@ class ErrorCollector:
         """Makes readers return the default or a stand-in in place of the value of an error.
 
         Returns:
-            Whether this was not so before.
+            Whether readers returned the value itself before.
         """
         is_new = not self.is_unusable(error.node) or (
             error.spot is not None and error.spot not in self._bad_spots
@@ -108,9 +123,9 @@ class ErrorCollector:
         return is_new and (error.node is not None or error.spot is not None)
 
     def new_name(self) -> str:
-        """Returns a name in place of a missing one."""
-        self._stand_ins += 1
-        return f"(unknown {self._stand_ins})"
+        """Returns a name in place of a missing one; a question mark in the texts of errors."""
+        self._stand_ins.append(f"(unknown {len(self._stand_ins) + 1})")
+        return self._stand_ins[-1]
 
     def _keep(self, error: YamlError, node: Node) -> None:
         self.add(error)
@@ -216,15 +231,22 @@ class CollectingReader(YamlReader):
         collector = self._collector
         return (
             self._is_stand_in
-            or collector.is_unusable(self._find_quietly(key))
+            or collector.is_unusable(self._subject(key))
             or collector.is_bad(self._spot(key))
         )
+
+    def _subject(self, key: Key) -> Node | None:
+        """Returns the node of an entry; this node, if it can have no entries; otherwise None."""
+        node = self._node
+        entry = self._find_quietly(key)
+        has_entries = isinstance(node, NullNode | (MapNode if isinstance(key, str) else ListNode))
+        return entry if entry is not None or has_entries else node
 
     def _spot(self, key: Key) -> _Spot:
         return (self.place, self.location, self.name, key)
 
     def _handle(self, error: YamlError, key: Key) -> None:
-        located = _about(error, self._find_quietly(key), self._spot(key))
+        located = _about(error, self._subject(key), self._spot(key))
         if self._raises:
             raise located
         self._collector.add(located)
@@ -248,11 +270,11 @@ class CollectingReader(YamlReader):
         return (number,) * TUPLE_SIZES.get(str(kind), 2)
 
     def subnode(self, key: Key, kind: NodeKind = "any") -> Self:
-        """Returns a reader of a required entry; see `TreeReader.subnode`."""
+        """Returns a reader of a required entry; see `YamlReader.subnode`."""
         return self._sub(key, kind, lambda reader: reader.subnode(key, kind))
 
     def optional_subnode(self, key: Key, kind: NodeKind = "any") -> Self:
-        """Returns a reader of an optional entry; see `TreeReader.optional_subnode`."""
+        """Returns a reader of an optional entry; see `YamlReader.optional_subnode`."""
         return self._sub(key, kind, lambda reader: reader.optional_subnode(key, kind))
 
     def _sub(self, key: Key, kind: NodeKind, open_: Callable[[YamlReader], YamlReader]) -> Self:
@@ -263,6 +285,10 @@ class CollectingReader(YamlReader):
             except YamlError as error:
                 self._handle(error, key)
         self._bad_keys.add(key)
+        item = self._find_quietly(key)
+        if kind == "list" and isinstance(item, MapNode) and item.entries.keys() & _ITEM_KEYS:
+            # The dash of the only item is missing; other entries may refer to this item.
+            return self._reader(ListNode(item.source, item.line, [item]), key)
         source, line = self._node.source, self._node.line
         nodes: dict[NodeKind, Node] = {
             "list": ListNode(source, line),
@@ -270,6 +296,11 @@ class CollectingReader(YamlReader):
             "any": NullNode(source, line),
         }
         return self._reader(nodes[kind], key).into(self._collector, stand_in=True)
+
+    @property
+    def is_complete(self) -> bool:
+        """Whether no required entry that was read is missing or invalid."""
+        return not (self._is_stand_in or self._bad_keys)
 
     def ensure_accessed_all(self) -> None:
         """Adds an error for each key of the map that has not been read."""
@@ -288,20 +319,25 @@ class CollectingReader(YamlReader):
     # -- errors of the caller --------------------------------------------------------------
 
     def error(self, message: str, hint: str = "") -> YamlError:
-        """Returns an error about the node; see `TreeReader.error`."""
+        """Returns an error about the node; see `YamlReader.error`."""
         error = super().error(message, hint)
         is_follow_up = self._is_stand_in or bool(self._bad_keys)
         return FollowUpError(error.message) if is_follow_up else _about(error, self._node)
 
     def invalid(self, key: Key, why: str) -> YamlError:
-        """Returns an error about the value of an entry; see `TreeReader.invalid`."""
+        """Returns an error about the value of an entry; see `YamlReader.invalid`."""
         error = self._strict().invalid(key, why)
         is_follow_up = self._is_stand_in or key in self._bad_keys
         node = self._find_quietly(key) or self._node
         return FollowUpError(error.message) if is_follow_up else _about(error, node)
 
+    def warn(self, key: Key, what: str) -> None:
+        """Logs a warning about the value of an entry."""
+        place = self._reader(self._find_quietly(key) or self._node, key).place
+        _LOG.warning('"%s" is %s', key, what, extra={"place": place})
+
     def report(self, error: FlatlandError) -> None:
-        """Adds an error, or raises it within `attempt`."""
+        """Adds an error; within `attempt`, raises the error."""
         if self._raises and not isinstance(error, FollowUpError):
             raise error
         self._collector.add(error)
@@ -318,7 +354,7 @@ class CollectingReader(YamlReader):
         """Returns the result of an action, which is repeated after each error about a value.
 
         Readers raise errors in the action, so that code that catches some of them works as usual.
-        When the action is repeated, they return the default or a stand-in for the value.
+        When the action is repeated, the readers return the default or a stand-in for the value.
         """
         collector = self._collector
         before = collector.found

@@ -6,7 +6,6 @@ rejects the redefinition of an anchor, which YAML allows, and it takes three tim
 
 from __future__ import annotations
 
-import logging
 import re
 from bisect import bisect_left
 from typing import NoReturn
@@ -14,10 +13,9 @@ from typing import NoReturn
 import yaml
 
 from flatland.config import hints
+from flatland.config.inputs import Inputs
 from flatland.config.node import MAX_NESTING, ListNode, MapNode, Node, NullNode, ScalarNode, Source
 from flatland.errors import YamlError
-
-_LOG = logging.getLogger("flatland")
 
 _Loader: type = getattr(yaml, "CBaseLoader", yaml.BaseLoader)
 _NULLS = frozenset(("", "~", "null", "Null", "NULL"))
@@ -29,12 +27,20 @@ _UNDECODABLE = range(0xDC80, 0xDD00)  # the surrogates for the bytes 0x80 to 0xf
 _BLANK = re.compile(r"^(?:[ \t]*+[-?:](?=[ \t]))*+[ \t]++(?=#|\r?$)", re.MULTILINE)
 
 
-def malformed(source: Source, line: int, column: int, why: str) -> YamlError:
-    """Returns the error of a text that is not valid YAML."""
+def malformed(source: Source, line: int, column: int, why: str, text: str = "") -> YamlError:
+    """Returns the error of a text that is not valid YAML.
+
+    Args:
+        source: Origin of the text.
+        line: Line number of the problem, from 1.
+        column: Column number of the problem, from 1.
+        why: Description of the problem.
+        text: The text, for the hint.
+    """
     return YamlError(
         f'Malformatted file, path="{source.path}", line {line} col {column}, {why}',
         place=source.place(line, column),
-        hint=hints.malformed(why),
+        hint=hints.malformed(why, text),
     )
 
 
@@ -47,23 +53,25 @@ def end_position(text: str) -> tuple[int, int]:
 class Composer:
     """Builds the tree of each document of a text, without recursion."""
 
-    def __init__(self, text: str, source: Source) -> None:
+    def __init__(self, text: str, source: Source, inputs: Inputs) -> None:
         """Prepares the composition of a text.
 
         Args:
             text: YAML text. Characters that YAML does not allow, and the surrogates that represent
                 undecodable bytes, are accepted in comments only.
             source: Origin of the text.
+            inputs: Logs warnings.
         """
         self._text = text
         self._source = source
+        self._inputs = inputs
         self._invalid_indices = [match.start() for match in _NOT_YAML_TEXT.finditer(text)]
         self._roots: list[Node] = []
         self._anchors: dict[str, Node] = {}
         self._open: list[ListNode | MapNode] = []
         # The pending key of each open node; None for a list, and in a map before a key.
         self._keys: list[str | None] = []
-        # Number of levels in each list and map by the id of the node, with those of aliases.
+        # Number of levels in each list and map by the id of the node, including levels of aliases.
         self._heights: dict[int, int] = {}
 
     def compose(self) -> list[Node]:
@@ -82,7 +90,7 @@ class Composer:
             mark = error.problem_mark or error.context_mark
             line, column = (mark.line + 1, mark.column + 1) if mark else (1, 1)
             why = error.problem or error.context or "invalid YAML"
-            raise malformed(self._source, line, column, why) from error
+            raise malformed(self._source, line, column, why, self._text) from error
         except yaml.YAMLError as error:
             raise malformed(self._source, 1, 1, str(error)) from error
         return self._roots
@@ -180,14 +188,10 @@ class Composer:
         line = _start(event)[0]
         first = parent.key_lines.setdefault(key, line)
         if key in parent.entries:
-            place = self._source.place(line)
-            _LOG.warning(
-                'Duplicate key "%s" ignored, the value in line %d is used%s',
-                key,
-                first,
-                place.suffix,
-                extra={"place": place},
-            )
+            text = 'Duplicate key "%s" ignored, the value in line %d is used'
+            is_item = len(self._open) > 1 and isinstance(self._open[-2], ListNode)
+            hint = hints.duplicate_key(key) if is_item and line > first else ""
+            self._inputs.warn(self._source.place(line), text, key, first, hint=hint)
         return key
 
     def _fail_at(self, event: yaml.Event, why: str) -> NoReturn:

@@ -120,7 +120,7 @@ def to_bool(text: str) -> bool:
     """Converts `true/false`, `yes/no`, `on/off`, `y/n` in lower, Capitalised or UPPER case.
 
     Raises:
-        ValueError: The text is none of these words.
+        ValueError: The text is not one of these words.
     """
     if text in _TRUE:
         return True
@@ -161,8 +161,8 @@ def unmet_limit(
         maximum: See `Limits`.
 
     Returns:
-        The requirement in words, such as `must be finite and at least 1`, if the value violates it;
-        otherwise an empty string.
+        The violated requirement in words, such as `must be finite and at least 1`; empty for a
+        valid value.
     """
     if all(
         (not finite or math.isfinite(number))

@@ -7,83 +7,75 @@ written in that map.
 
 from __future__ import annotations
 
-import errno
-import stat
-from pathlib import Path
-from typing import BinaryIO
+from typing import Final
 
 from flatland.config.composer import Composer, end_position, malformed
+from flatland.config.files import foreign_kind
 from flatland.config.hints import similar_file
-from flatland.config.inputs import cached_file, check_allowed, note_file
+from flatland.config.inputs import Inputs
 from flatland.config.node import Node, Source
-from flatland.errors import Place, UnreadableFileError
+from flatland.errors import Place, UnreadableFileError, YamlError
 
-_MAX_FILE_BYTES = 64 * 1024 * 1024
+TEXT_NAME: Final = "<text>"
+"""Name of a YAML text in error messages, and `Model.path` of its model."""
 
 
-def load_documents(path: str) -> list[Node]:
+def is_yaml_text(yaml_path: str) -> bool:
+    """Returns whether an argument is YAML text: text begins with a line break or with `{`."""
+    return yaml_path[:1] in ("\n", "\r", "{") and yaml_path != ""
+
+
+def load_documents(path: str, inputs: Inputs) -> list[Node]:
     """Loads all documents of a file.
 
     Args:
         path: The file, encoded in UTF-8, or in UTF-16 with a byte order mark.
+        inputs: Reads the file.
 
     Returns:
         The root of each document; an empty list for a file that contains only comments.
 
     Raises:
-        YamlError: The file does not exist, cannot be read, or is not valid YAML.
+        UnreadableFileError: The file does not exist, cannot be read, or is an image or a data file.
+        YamlError: The file is not valid YAML.
     """
+    ahead = inputs.documents_ahead(path)
+    if ahead is not None:
+        inputs.note_file(path)
+        return ahead
     source = Source.of_file(path)
-    return parse_documents(_decode(_read(path), source), source)
+    content = _read(path, inputs)
+    try:
+        return parse_documents(_decode(content, source), source, inputs)
+    except YamlError as error:
+        kind = foreign_kind(content)
+        if kind is None:
+            raise
+        name = {"image": "an image", "data": "a data file of line segments"}[kind]
+        hint = f"this is {name}; a YAML file is expected here"
+        raise UnreadableFileError(error.message, place=error.place, hint=hint) from error
 
 
-def parse_documents(text: str, source: Source) -> list[Node]:
+def parse_documents(text: str, source: Source, inputs: Inputs) -> list[Node]:
     """Parses all documents of a text.
 
     Characters that YAML does not allow, and the surrogates that represent undecodable bytes, are
     accepted in comments only. If a key occurs several times in a map, its first value is used.
 
+    Args:
+        text: The text.
+        source: Origin of the text.
+        inputs: Logs warnings.
+
     Raises:
         YamlError: The text is not valid YAML.
     """
-    return Composer(text.removeprefix("\ufeff"), source).compose()
+    return Composer(text.removeprefix("\ufeff"), source, inputs).compose()
 
 
-def open_regular(path: str) -> BinaryIO:
-    """Opens a regular file for reading bytes.
-
-    Other kinds of files are refused: reading a pipe can block, and a device may be endless.
-
-    Raises:
-        OSError: The file does not exist, is not a regular file, or cannot be read.
-    """
-    check_allowed(path)
+def _read(path: str, inputs: Inputs) -> bytes:
     try:
-        is_regular = stat.S_ISREG(Path(path).stat().st_mode)
-    except ValueError as error:  # a null character in the path
-        raise FileNotFoundError(errno.ENOENT, str(error), path) from error
-    if not is_regular:
-        raise OSError(errno.EINVAL, "it is not a regular file", path)
-    note_file(path)
-    return Path(path).open("rb")
-
-
-def read_regular(path: str) -> bytes:
-    """Reads a regular file of at most 64 MiB.
-
-    Raises:
-        OSError: The file does not exist, is not a regular file, is too large, or cannot be read.
-    """
-    with open_regular(path) as file:
-        content = file.read(_MAX_FILE_BYTES + 1)
-    if len(content) > _MAX_FILE_BYTES:
-        raise OSError(errno.EFBIG, "it is larger than 64 MiB", path)
-    return content
-
-
-def _read(path: str) -> bytes:
-    try:
-        return cached_file(path, read_regular)
+        return inputs.read(path)
     except (FileNotFoundError, NotADirectoryError):
         raise UnreadableFileError(
             f'File does not exist, path="{path}"', place=Place(path), hint=similar_file(path)

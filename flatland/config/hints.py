@@ -3,13 +3,23 @@
 from __future__ import annotations
 
 import difflib
+import os
 import re
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from itertools import islice
 from pathlib import Path
 
+from flatland.config.files import IMAGE_SUFFIXES
+
 _MIN_SIMILARITY = 0.6
+# A word that is more similar than this is a typing mistake. Otherwise, several words may be meant:
+# those that are less similar than the best one by at most the margin.
+_TYPO_SIMILARITY = 0.85
+_MARGIN = 0.15
+_MAX_SUGGESTIONS = 4
+_MAX_SHOWN = 40  # characters of a value
 _MAX_FILES = 1000  # of a folder, compared with the name of a missing file
+_CONFLICT_MARKER = re.compile(r"^(<{7}|={7}|>{7})(?: .*)?$", re.MULTILINE)
 
 _UNKNOWN_KEYS = {
     "mass": "the mass results from the density [kg/m²] and the area of the footprints",
@@ -41,6 +51,13 @@ _MISSING_KEYS = {
 }
 _SIZES = {"pose": "[x, y, theta] in m and rad", "color": "[r, g, b, a], each from 0 to 1"}
 _SIZES |= {"origin": _SIZES["pose"], "anchor": "[x, y] in m", "center": "[x, y] in m"}
+_ITEMS = {
+    "layers": "a layer is written as {name: walls, map: map.yaml}",
+    "models": "a model is written as {name: robot, model: robot.model.yaml}",
+    "bodies": "a body is written as {name: base, footprints: []}",
+    "footprints": "a footprint is written as {type: circle, radius: 0.2, density: 1}",
+    "plugins": "a plugin is written as {type: DiffDrive, name: drive, body: base}",
+}
 _VALUES = {
     "fixed": "weld",
     "rigid": "weld",
@@ -55,16 +72,37 @@ _VALUES = {
 }
 
 
-def did_you_mean(word: str, candidates: Iterable[str]) -> str:
-    """Returns a question with the candidate that is most similar to a word; empty if none is."""
-    similar = _most_similar(word, candidates)
-    return "" if similar is None else f'did you mean "{similar}"?'
+def did_you_mean(word: str, candidates: Iterable[str], kind: str = "") -> str:
+    """Returns a question with the candidates that are similar to a word.
+
+    Args:
+        word: The word that is not one of the candidates.
+        candidates: The words that are accepted.
+        kind: What the candidates are, such as `bodies of the model`; all of them are listed if
+            none is similar. Empty for no list.
+    """
+    candidates = list(candidates)
+    similar = _similar(word, candidates)
+    if similar:
+        return _question(similar)
+    return f"{kind}: {', '.join(candidates) or 'none'}" if kind else ""
 
 
-def _most_similar(word: str, candidates: Iterable[str]) -> str | None:
+def _question(names: Iterable[str]) -> str:
+    quoted = " or ".join(f'"{name}"' for name in names)
+    return f"did you mean {quoted}?" if quoted else ""
+
+
+def _similar(word: str, candidates: Iterable[str]) -> list[str]:
+    """Returns the candidates that are similar to a word, the most similar one first."""
     by_lower = {candidate.lower(): candidate for candidate in candidates}
-    found = difflib.get_close_matches(word.lower(), by_lower, 1, _MIN_SIMILARITY)
-    return by_lower[found[0]] if found else None
+    lower = word.lower()
+    found = difflib.get_close_matches(lower, by_lower, _MAX_SUGGESTIONS, _MIN_SIMILARITY)
+    if not found:
+        return []
+    ratios = [difflib.SequenceMatcher(None, name, lower).ratio() for name in found]
+    least = ratios[0] - (_MARGIN if ratios[0] < _TYPO_SIMILARITY else 0.0)
+    return [by_lower[name] for name, ratio in zip(found, ratios, strict=True) if ratio >= least]
 
 
 def unknown_key(key: str, known: Iterable[str]) -> str:
@@ -90,15 +128,40 @@ def missing_key(key: str, unread: dict[str, int]) -> str:
         key: The key.
         unread: Lines of the keys of the map that have not been read.
     """
-    similar = _most_similar(key, unread)
-    if similar is not None:
-        return f'"{similar}" in line {unread[similar]} may be a misspelling of "{key}"'
+    similar = _similar(key, unread)
+    if similar:
+        return f'"{similar[0]}" in line {unread[similar[0]]} may be a misspelling of "{key}"'
     return _MISSING_KEYS.get(key, "")
 
 
 def wrong_size(key: str) -> str:
     """Returns a hint for a list with a wrong number of items."""
     return _SIZES.get(key.strip('"'), "")
+
+
+def not_a_list(key: str, location: str, text: str | None) -> str:
+    """Returns a hint for an entry that should be a list.
+
+    Args:
+        key: Key of the entry, as in error messages.
+        location: Location of the entry in error messages.
+        text: The value; None for a map.
+    """
+    if text is None:
+        return 'each item of a list starts with a dash and a space, "- "'
+    # Lists of maps are written in several lines; the layers of a footprint are names.
+    is_plain = key.strip('"') not in _ITEMS or (key == '"layers"' and location)
+    bracketed = f"a list is written in brackets: [{text}]" if len(text) <= _MAX_SHOWN else ""
+    return wrong_size(key) or (bracketed if is_plain else "")
+
+
+def not_a_map(location: str) -> str:
+    """Returns a hint for an entry that should be a map.
+
+    Args:
+        location: Location of the entry in error messages; ends with the key of the list.
+    """
+    return _ITEMS.get(location.rpartition(" ")[2].strip('"'), "")
 
 
 def choice(value: str, choices: Iterable[str]) -> str:
@@ -131,23 +194,56 @@ def conversion(text: str, kind: str) -> str:
     return ""
 
 
-def similar_file(path: str) -> str:
-    """Returns a hint for a file that does not exist: a similar name, or a missing folder."""
+def is_yaml_name(file: Path) -> bool:
+    """Returns whether a name can be that of a YAML file: it has no extension of an image."""
+    return file.suffix.lower() not in IMAGE_SUFFIXES
+
+
+def similar_file(path: str, accepts: Callable[[Path], bool] = is_yaml_name) -> str:
+    """Returns a hint for a file that does not exist: a similar name, or a missing folder.
+
+    Args:
+        path: The file.
+        accepts: Returns whether a file of the folder is a useful suggestion.
+    """
     file = Path(path)
     try:
         if file.exists():
             return ""
+        slashed = Path(os.path.normpath(path.replace("\\", "/")))
+        if "\\" in path:
+            found = f': "{slashed}"' if slashed.exists() else ""
+            return f"the parts of a path are separated by /, not by \\{found}"
         if not file.parent.is_dir():
             return f'the folder "{file.parent}" does not exist'
-        # The simulation may be waiting for this, and the folder may be large.
-        names = (entry.name for entry in islice(file.parent.iterdir(), _MAX_FILES))
-        return did_you_mean(file.name, names)
+        # The simulation may wait for this function, and the folder may be large.
+        files = islice(file.parent.iterdir(), _MAX_FILES)
+        # The extension, which many files share, would make all names similar.
+        names: dict[str, list[str]] = {}
+        for entry in files:
+            names.setdefault(entry.stem, []).append(entry.name)
+        similar = [name for stem in _similar(file.stem, names) for name in sorted(names[stem])]
+        return _question(name for name in similar if accepts(file.parent / name))
     except (OSError, ValueError):
         return ""
 
 
-def malformed(why: str) -> str:
-    """Returns a hint for a text that is not valid YAML."""
+def duplicate_key(key: str) -> str:
+    """Returns a hint for a key that occurs again in a later line of an item of a list."""
+    return 'the next item of a list starts with a dash, "- "' if key in ("name", "type") else ""
+
+
+def malformed(why: str, text: str) -> str:
+    """Returns a hint for a text that is not valid YAML.
+
+    Args:
+        why: Description of the problem.
+        text: The text.
+    """
+    marker = _CONFLICT_MARKER.search(text)
+    if marker:
+        line = text.count("\n", 0, marker.start()) + 1
+        return f"line {line} is a conflict marker of a merge, {marker[1]}; resolve the conflict"
     if "cannot start any token" in why:
         return "indent with spaces, not with tabs, and quote values that start with @, ` or %"
     if "mapping values are not allowed" in why:

@@ -54,7 +54,7 @@ def evaluate(expression: str, param: Callable[[str], object], seed: int = 0) -> 
     Args:
         expression: Lua code; without a `return `, it is the expression of the value.
         param: Function that returns the value of a ROS parameter: a number, a string or a bool;
-            None if it is not set.
+            None for a parameter that is not set.
         seed: Seed of `math.random`, at least 0.
 
     Raises:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -29,11 +30,19 @@ class Source:
         return cls(path, str(Path.cwd() / Path(path).parent))
 
     def resolve(self, path: str) -> str:
-        """Returns an absolute path: `~` is the home folder, a relative path starts in `folder`."""
+        """Returns an absolute path: `~` is the home folder, a relative path starts in `folder`.
+
+        Parts `..` are removed, unless a symbolic link before them leads elsewhere.
+        """
         try:
-            return str(self.folder / Path(path).expanduser())
+            full = self.folder / Path(path).expanduser()
         except RuntimeError:  # `~name` of an unknown user
-            return str(self.folder / Path(path))
+            full = self.folder / Path(path)
+        if ".." in full.parts:
+            plain = os.path.normpath(full)
+            if os.path.realpath(plain) == os.path.realpath(full):
+                return plain
+        return str(full)
 
     def place(self, line: int | None, column: int | None = None) -> Place:
         """Returns a position in the text.

@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-import logging
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 from flatland.config.documents import load_documents, parse_documents
-from flatland.config.hints import similar_file
-from flatland.config.inputs import check_allowed, is_cached_file, look_up_param, next_seed
+from flatland.config.hints import is_yaml_name, similar_file
+from flatland.config.inputs import Inputs
 from flatland.config.lua import EvalError, evaluate
-from flatland.config.node import MAX_NESTING, ListNode, Node, NullNode, ScalarNode, Source
+from flatland.config.node import MAX_NESTING, ListNode, MapNode, Node, NullNode, ScalarNode, Source
 from flatland.errors import YamlError
 
-_LOG = logging.getLogger("flatland")
 _EVAL = "$eval"
 _INCLUDE = "$include"
 _INCLUDE_ALL = "$[include]"
@@ -24,20 +22,17 @@ _TOTAL_TIME_LIMIT = 1.0
 _QUICK = 0.01  # s
 _MAX_SHOWN = 500  # characters of an expression or a Lua message in an error message
 
-ParamLookup = Callable[[str], object]
-Params = Mapping[str, object] | ParamLookup | None
 ExpansionErrorHandler = Callable[[YamlError, Node], None]
 
 
 def preprocess_file(
-    path: str, params: Params = None, on_error: ExpansionErrorHandler | None = None
+    path: str, inputs: Inputs, on_error: ExpansionErrorHandler | None = None
 ) -> Node:
     """Loads a file and preprocesses its first document.
 
     Args:
         path: The file.
-        params: Source of the values of `param(NAME)`: a mapping, or a function that returns None
-            for an unknown name.
+        inputs: Reads the file, the files that it includes, and parameters.
         on_error: Called with the error of each scalar that cannot be expanded, and with the scalar,
             which then stays as it is; None to raise the first error.
 
@@ -47,47 +42,73 @@ def preprocess_file(
     Raises:
         YamlError: The file cannot be read, is not valid YAML, or cannot be preprocessed.
     """
-    root = _first(load_documents(path), Source.of_file(path))
-    return _Preprocessor(params, on_error).expand(root, ((_identity(path), path),), 0)
+    root = _first(load_documents(path, inputs), Source.of_file(path), inputs)
+    return _Preprocessor(inputs, on_error).expand(root, ((_identity(path), path),), 0)
 
 
-def preprocess_text(text: str, base_dir: str, params: Params = None, name: str = "") -> Node:
+def preprocess_text(text: str, base_dir: str, inputs: Inputs, name: str = "") -> Node:
     """Parses a text and preprocesses its first document.
 
     Args:
         text: The YAML text.
         base_dir: Folder that relative paths start from.
-        params: As for `preprocess_file`.
+        inputs: Reads the files that the text includes, and parameters.
         name: Name of the text in error messages, in place of a file.
 
     Raises:
         YamlError: The text is not valid YAML, or cannot be preprocessed.
     """
     source = Source(name, str(Path.cwd() / base_dir))
-    root = _first(parse_documents(text, source), source)
-    return _Preprocessor(params).expand(root, (), 0)
+    documents = inputs.documents_ahead(text)
+    if documents is None:
+        documents = parse_documents(text, source, inputs)
+    root = _first(documents, source, inputs)
+    return _Preprocessor(inputs).expand(root, (), 0)
+
+
+def included_files(documents: list[Node]) -> Iterator[str]:
+    """Returns the absolute paths of the files that a file includes, existing or not.
+
+    Args:
+        documents: The documents of the file before preprocessing.
+    """
+    waiting = list(documents)
+    seen: set[int] = set()  # an alias is the node of its anchor
+    while waiting:
+        node = waiting.pop()
+        if id(node) in seen:
+            continue
+        seen.add(id(node))
+        if isinstance(node, ListNode):
+            waiting += node.items
+        elif isinstance(node, MapNode):
+            waiting += node.entries.values()
+        elif isinstance(node, ScalarNode):
+            for marker in (_INCLUDE, _INCLUDE_ALL):
+                if node.text.startswith(marker):
+                    yield node.source.resolve(node.text[len(marker) :].strip())
 
 
 def _identity(path: str) -> str:
     return str(Path(path).resolve())
 
 
-def _first(documents: list[Node], source: Source) -> Node:
+def _first(documents: list[Node], source: Source, inputs: Inputs) -> Node:
     if not documents:
         return NullNode(source, 1)
     if len(documents) > 1:
         second = source.place(documents[1].line)
-        _LOG.warning(
-            "Only the first of %d YAML documents is used%s",
-            len(documents),
-            second.suffix,
-            extra={"place": second},
-        )
+        inputs.warn(second, "Only the first of %d YAML documents is used", len(documents))
     return documents[0]
 
 
 def _shorten(text: str) -> str:
     return text if len(text) <= _MAX_SHOWN else text[:_MAX_SHOWN] + "..."
+
+
+def _is_other_yaml(file: Path, node: Node) -> bool:
+    """Returns whether a file can be included by a node."""
+    return is_yaml_name(file) and file.absolute() != Path(node.source.path).absolute()
 
 
 _Chain = tuple[tuple[str, str], ...]
@@ -97,8 +118,8 @@ _Chain = tuple[tuple[str, str], ...]
 class _Preprocessor:
     """Expands one file with all files that it includes."""
 
-    def __init__(self, params: Params, on_error: ExpansionErrorHandler | None = None) -> None:
-        self._params = params
+    def __init__(self, inputs: Inputs, on_error: ExpansionErrorHandler | None = None) -> None:
+        self._inputs = inputs
         self._on_error = on_error
         self._includes = 0
         self._spent = 0.0  # s of processor time, by expressions that are not quick
@@ -159,7 +180,7 @@ class _Preprocessor:
         expression = node.text[len(_EVAL) :].strip(" \t\r\n\f\v")
         start = time.thread_time()
         try:
-            result = evaluate(expression, self._param, next_seed())
+            result = evaluate(expression, self._inputs.param, self._inputs.next_seed())
             spent = time.thread_time() - start
             if spent > _QUICK:
                 self._spent += spent
@@ -172,35 +193,23 @@ class _Preprocessor:
             raise self._error(node, message) from error
         place = node.source.place(node.line)
         for name in result.unset:
-            _LOG.warning("%s is not set%s", name, place.suffix, extra={"place": place})
+            self._inputs.warn(place, "%s is not set", name)
         return result.text
-
-    def _param(self, name: str) -> object:
-        return look_up_param(name, self._look_up)
-
-    def _look_up(self, name: str) -> object:
-        if isinstance(self._params, Mapping):
-            return self._params.get(name)
-        return None if self._params is None else self._params(name)
 
     def _include(self, node: ScalarNode, marker: str, chain: _Chain, depth: int) -> list[Node]:
         written = node.text[len(marker) :].strip()
         path = node.source.resolve(written)
         try:
-            check_allowed(path)
-        except OSError as error:
+            exists = self._inputs.exists(path)
+        except PermissionError as error:
             raise self._error(
                 node, f'Failed to read file, path="{path}", {error.strerror}'
             ) from error
-        try:
-            exists = bool(written) and (is_cached_file(path) or Path(path).exists())
-        except (OSError, ValueError):
-            exists = False
-        if not exists:
+        if not (written and exists):
             raise self._error(
                 node,
                 f"File specified in {marker} does not exist, path={path}, include={written}",
-                similar_file(path) if written else "",
+                similar_file(path, lambda file: _is_other_yaml(file, node)) if written else "",
             )
         self._includes += 1
         if self._includes > _MAX_INCLUDES:
@@ -210,11 +219,11 @@ class _Preprocessor:
             files = " -> ".join([*(shown for _, shown in chain), path])
             raise self._error(node, f"File includes itself, {files}")
         try:
-            documents = load_documents(path)
+            documents = load_documents(path, self._inputs)
         except YamlError as error:
             raise self._error(node, error.message, error.hint) from error
         if marker == _INCLUDE:
-            documents = [_first(documents, Source.of_file(path))]
+            documents = [_first(documents, Source.of_file(path), self._inputs)]
         chain = (*chain, (identity, path))
         return [self.expand(document, chain, depth) for document in documents]
 

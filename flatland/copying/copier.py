@@ -1,21 +1,22 @@
-"""Copies of all objects of a world, which refer to each other like their originals."""
+"""Copies of objects, which refer to each other like their originals."""
 
 from __future__ import annotations
 
-import types
 from collections import deque
-from collections.abc import Callable, Iterable
-from contextlib import suppress
+from collections.abc import Callable
 from typing import Any, TypeVar
 
-from flatland.copying.classes import kind_of
-from flatland.copying.kind import Kind
+from flatland.copying.kinds import Kind, kind_of
 
 T = TypeVar("T")
 
 
 class Copier:
-    """Copies objects with everything that they refer to; each object is copied once."""
+    """Copies objects with everything that they refer to; each object is copied once.
+
+    Attributes:
+        memo: The copies so far by the id of the original, as for `__deepcopy__`.
+    """
 
     def __init__(self, kinds: dict[type[Any], Kind]) -> None:
         """Creates a copier.
@@ -23,41 +24,59 @@ class Copier:
         Args:
             kinds: The kinds of classes found so far; it is extended.
         """
+        self.memo: dict[int, Any] = {}
         self._kinds = kinds
-        # The original is kept alive, because the id of a deleted object can be reused.
-        self._copies: dict[int, tuple[object, Any]] = {}
-        self._pending: deque[Callable[[], object]] = deque()
-        self._last: list[Callable[[], object]] = []
+        # Kept alive, because the id of a deleted object can be used again.
+        self._originals: list[object] = []
+        # Copies without contents. They are not completed by recursion, which would overflow for
+        # long chains.
+        self._pending: deque[tuple[Kind, Any, Any]] = deque()
+        self._containers: list[Callable[[], None]] = []
+        self._states: list[Callable[[], None]] = []
 
     def add(self, original: object, copy: T) -> T:
         """Registers the copy of an object and returns it."""
-        self._copies[id(original)] = (original, copy)
+        self.memo[id(original)] = copy
+        self._originals.append(original)
         return copy
 
     def find(self, original: object) -> Any:
         """Returns the copy of an object, None if it has not been copied."""
-        found = self._copies.get(id(original))
-        return None if found is None else found[1]
+        return self.memo.get(id(original))
 
-    def copy(self, obj: Any) -> Any:
-        """Returns the copy of an object, which may still be incomplete.
+    def __call__(self, obj: Any) -> Any:
+        """Returns the copy of an object, which may be incomplete until `finish`.
 
         Raises:
-            UncopyableError: It cannot be copied.
+            UncopyableError: The object cannot be copied.
         """
-        kind = self._kind(obj)
-        if kind.is_immutable and id(obj) not in self._copies:
+        kind = self._kinds.get(type(obj)) or self._new_kind(obj)
+        if kind.is_immutable:
             return obj
-        found = self._copies.get(id(obj))
-        return kind.copy(obj, self) if found is None else found[1]
+        memo = self.memo
+        if id(obj) in memo:
+            return memo[id(obj)]
+        made = kind.make(obj, self)
+        # To make the parts of a tuple or the like may have made a copy of the tuple.
+        if id(obj) in memo:
+            return memo[id(obj)]
+        self.add(obj, made)
+        if made is not obj:
+            self._pending.append((kind, obj, made))
+        return made
 
-    def later(self, action: Callable[[], object]) -> None:
-        """Schedules a function that completes a copy; recursion would overflow for long chains."""
-        self._pending.append(action)
+    def fill(self, original: object, made: object) -> None:
+        """Completes an object that exists already as the copy of another one."""
+        kind = self._kinds.get(type(original)) or self._new_kind(original)
+        self._pending.append((kind, original, made))
 
-    def at_end(self, action: Callable[[], object]) -> None:
-        """Schedules a function for when all copies have their attributes."""
-        self._last.append(action)
+    def complete(self) -> None:
+        """Completes the copies so far, except for hashed containers."""
+        while self._pending:
+            kind, obj, made = self._pending.popleft()
+            rest = kind.fill(obj, made, self)
+            if rest is not None:
+                (self._states if kind.is_last else self._containers).append(rest)
 
     def finish(self) -> None:
         """Completes all copies.
@@ -65,44 +84,15 @@ class Copier:
         Raises:
             UncopyableError: An object cannot be copied.
         """
-        while self._pending or self._last:
-            while self._pending:
-                self._pending.popleft()()
-            last, self._last = self._last, []
-            for action in last:
+        while self._pending or self._containers or self._states:
+            self.complete()
+            # An object is given its state when the containers in it are complete.
+            rest, self._containers = self._containers, []
+            if not rest:
+                rest, self._states = self._states, []
+            for action in rest:
                 action()
 
-    def has_state(self, objects: Iterable[object]) -> bool:
-        """Returns whether some objects are or refer to more than immutable objects and functions.
-
-        Other functions are followed, but not the contents of other objects.
-        """
-        pending, seen = list(objects), set[int]()
-        while pending:
-            obj = pending.pop()
-            if id(obj) in seen or (self._kind(obj).is_immutable and id(obj) not in self._copies):
-                continue
-            seen.add(id(obj))
-            if isinstance(obj, types.FunctionType):
-                pending += [
-                    *(obj.__closure__ or ()),
-                    *(obj.__defaults__ or ()),
-                    *(obj.__kwdefaults__ or {}).values(),
-                ]
-            elif isinstance(obj, types.BuiltinFunctionType):
-                pending.append(obj.__self__)
-            elif isinstance(obj, types.CellType):
-                with suppress(ValueError):  # not assigned yet
-                    pending.append(obj.cell_contents)
-            elif type(obj) is tuple:
-                pending += obj
-            else:
-                return True
-        return False
-
-    def _kind(self, obj: object) -> Kind:
-        cls = type(obj)
-        kind = self._kinds.get(cls)
-        if kind is None:
-            kind = self._kinds[cls] = kind_of(obj)
+    def _new_kind(self, obj: object) -> Kind:
+        kind = self._kinds[type(obj)] = kind_of(obj)
         return kind

@@ -1,89 +1,67 @@
-"""Records of the contents of all objects of a world, to be written back into the same objects."""
+"""The contents of objects, saved to be written back into the same objects."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from typing import Any
 
-from flatland.copying.classes import kind_of
-from flatland.copying.kind import Kind
-
-Write = Callable[[Any, Any], None]
-Entry = tuple[Write, Any, Any]
+from flatland.copying.kinds import Kind, kind_of
 
 
-class Recorder:
-    """Saves the contents of objects and of all objects that they refer to.
+class SavedObjects:
+    """The contents of objects and of all objects that they refer to.
 
-    The identity of the objects is kept: references to them, including those of closures, remain
-    valid after the contents were written back.
+    The identity of the objects is kept: references to them, also from closures, remain valid
+    after the contents were written back, which can be done many times.
 
     Attributes:
         outside: The objects found that connect a plugin to the outside of the world.
     """
 
-    def __init__(self, kinds: dict[type[Any], Kind], excluded: Iterable[object] = ()) -> None:
-        """Creates a recorder.
+    def __init__(
+        self,
+        objects: Iterable[object],
+        kinds: dict[type[Any], Kind],
+        excluded: Iterable[object] = (),
+    ) -> None:
+        """Saves objects.
 
         Args:
+            objects: The objects.
             kinds: The kinds of classes found so far; it is extended.
             excluded: Objects that are not saved.
-        """
-        self.outside: list[object] = []
-        self._kinds = kinds
-        self._excluded = tuple(excluded)
-        self._seen = set(map(id, self._excluded))
-        self._pending: list[object] = []
-        self._written: list[Entry] = []
-        self._last: list[Entry] = []
-
-    def follow(self, objects: Iterable[object]) -> None:
-        """Saves further objects, which saved objects must keep alive."""
-        self._pending.extend(objects)
-
-    def add(self, write: Write, obj: Any, content: Any) -> None:
-        """Adds the content of an object, and the function that writes it back."""
-        self._written.append((write, obj, content))
-
-    def add_last(self, write: Write, obj: Any, content: Any) -> None:
-        """Adds content that is written back after all other content."""
-        self._last.append((write, obj, content))
-
-    def record(self, objects: Iterable[object]) -> StateRecord:
-        """Saves objects and everything that they refer to.
 
         Raises:
             UncopyableError: An object has a state that cannot be read.
         """
-        kinds, seen, pending = self._kinds, self._seen, self._pending
-        pending.extend(objects)
+        self.outside: list[object] = []
+        entries: list[tuple[Kind, Any, Any]] = []
+        last: list[tuple[Kind, Any, Any]] = []
+        kept: list[object] = []
+        excluded = tuple(excluded)
+        seen, pending = set(map(id, excluded)), list(objects)
         while pending:
             obj = pending.pop()
-            cls = type(obj)
-            kind = kinds.get(cls)
+            kind = kinds.get(type(obj))
             if kind is None:
                 if id(obj) in seen:
                     continue
-                kind = kinds[cls] = kind_of(obj)
+                kind = kinds[type(obj)] = kind_of(obj)
             if kind.is_immutable or id(obj) in seen:
                 continue
             seen.add(id(obj))
-            kind.record(obj, self)
-        return StateRecord(self._written, self._last)
-
-
-class StateRecord:
-    """Contents of objects; they can be written back many times."""
-
-    def __init__(self, entries: list[Entry], last: list[Entry]) -> None:
-        """Creates a record.
-
-        Args:
-            entries: Functions that write a content back, with the object and the content.
-            last: Calls of `__setstate__`, performed after all contents were written back.
-        """
-        self._entries = entries
-        self._last = last
+            if kind.is_outside:
+                self.outside.append(obj)
+                continue
+            content, parts = kind.take(obj)
+            pending.extend(parts)
+            if kind.is_last:
+                last.append((kind, obj, content))
+            elif kind.is_written:
+                entries.append((kind, obj, content))
+            else:
+                kept.append(obj)  # An id must not be used again while others are saved.
+        self._entries, self._last = entries, last
 
     def write_back(self) -> Exception | None:
         """Writes the contents back.
@@ -91,12 +69,12 @@ class StateRecord:
         Returns:
             The first exception of a `__setstate__`, None if there was none.
         """
-        for write, obj, content in self._entries:
-            write(obj, content)
+        for kind, obj, content in self._entries:
+            kind.put(obj, content)
         first: Exception | None = None
-        for write, obj, content in self._last:
+        for kind, obj, content in self._last:
             try:
-                write(obj, content)
+                kind.put(obj, content)
             except Exception as error:
                 first = first or error
         return first

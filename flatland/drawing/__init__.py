@@ -1,13 +1,14 @@
 """Images of a world with matplotlib, without ROS.
 
-`capture` copies what is drawn out of a world, `layout` maps the world to pixels, `painter` draws
-with matplotlib, and `render` provides the public functions. `frames` and `video` write videos.
+`flatland.scene` describes what is drawn, `layout` maps the world to pixels, `painter` draws with
+matplotlib, and `render` provides the public functions. `frames` and `video` write videos.
 """
 
 from flatland.drawing.frames import FrameRenderer
 from flatland.drawing.layout import Layout
 from flatland.drawing.render import (
     PICTURE_FORMATS,
+    DrawOptions,
     check_matplotlib,
     draw,
     draw_png,
@@ -19,6 +20,7 @@ from flatland.drawing.video import VIDEO_FORMATS, VideoFile, check_opencv
 __all__ = [
     "PICTURE_FORMATS",
     "VIDEO_FORMATS",
+    "DrawOptions",
     "FrameRenderer",
     "Layout",
     "VideoFile",

@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Unpack
 
 import numpy as np
 import numpy.typing as npt
 
-from flatland.drawing.capture import Scene, capture_scene
 from flatland.drawing.layout import Layout
-from flatland.drawing.render import MATPLOTLIB_LOCK, checked_layers, lay_out
+from flatland.drawing.render import MATPLOTLIB_LOCK, DrawOptions, Picture, lay_out
 from flatland.runtime.observer import WorldObserver
+from flatland.scene.world_scene import Scene, describe_world
 
 if TYPE_CHECKING:
     from flatland.world import World
@@ -24,18 +23,7 @@ class FrameRenderer(WorldObserver):
     change are drawn again. The view is that of the first picture.
     """
 
-    def __init__(
-        self,
-        world: World,
-        *,
-        size: tuple[int, int] | None = None,
-        dpi: float = 100.0,
-        view: Sequence[float] | None = None,
-        layers: Iterable[str] | None = None,
-        scans: bool = True,
-        names: bool = False,
-        axes: bool = True,
-    ) -> None:
+    def __init__(self, world: World, **options: Unpack[DrawOptions]) -> None:
         """Determines the view; see `draw` for the arguments.
 
         The width and height of pictures are rounded down to even numbers, as video codecs require.
@@ -45,11 +33,12 @@ class FrameRenderer(WorldObserver):
             ValueError: `size`, `dpi`, `view` or `layers` is invalid.
         """
         self._world = world
-        self._layers = checked_layers(layers)
-        self._dpi, self._scans, self._names = dpi, scans, names
-        _, layout = lay_out(world, size, dpi, view, self._layers, scans, axes)
+        picture = self._picture = Picture(**options)
+        _, layout = lay_out(world, picture)
         columns, rows = (side // 2 * 2 for side in layout.size)
-        self._layout = Layout.make((max(columns, 2), max(rows, 2)), dpi, layout.view, axes)
+        self._layout = Layout.make(
+            (max(columns, 2), max(rows, 2)), picture.dpi, layout.view, picture.axes
+        )
         self._figure: Any = None
         self._background: Any = None
         world.add_observer(self)
@@ -73,16 +62,16 @@ class FrameRenderer(WorldObserver):
 
         with MATPLOTLIB_LOCK:
             if self._background is None:
-                walls = capture_scene(self._world, self._layers, scans=False).layers
-                scene = Scene(walls, [], [], [])
-                self._figure = paint(scene, self._layout, self._dpi, names=False)
+                walls = describe_world(self._world, self._picture.layers, scans=False).layers
+                scene = Scene(walls, [], [])
+                self._figure = paint(scene, self._layout, self._picture.dpi, names=False)
                 self._figure.canvas.draw()
                 self._background = self._figure.canvas.copy_from_bbox(self._figure.bbox)
             canvas, axes = self._figure.canvas, self._figure.axes[0]
             canvas.restore_region(self._background)
             fixed = set(axes.get_children())
-            scene = capture_scene(self._world, (), self._scans)
-            paint_models(axes, scene, self._layout, self._dpi, self._names)
+            scene = describe_world(self._world, (), self._picture.scans)
+            paint_models(axes, scene, self._layout, self._picture.dpi, self._picture.names)
             moving = [artist for artist in axes.get_children() if artist not in fixed]
             for artist in sorted(moving, key=lambda artist: artist.get_zorder()):
                 axes.draw_artist(artist)

@@ -7,8 +7,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
-from flatland.drawing.capture import Scene
+from flatland.drawing.footprints import scene_bounds
 from flatland.geometry import Bounds
+from flatland.scene.world_scene import Scene
 
 _MAX_SIDE: Final = 20_000  # pixels; the limit of matplotlib is 65 536
 _DEFAULT_AREA: Final = (13.0, 9.0)  # inches; largest view of an image without an explicit size
@@ -83,7 +84,7 @@ class Layout:
 
 def default_view(scene: Scene) -> Bounds:
     """Returns a view that contains the whole scene, with some padding."""
-    bounds = scene.bounds()
+    bounds = scene_bounds(scene)
     if bounds is None:
         return _EMPTY_VIEW
     x_min, y_min, x_max, y_max = bounds

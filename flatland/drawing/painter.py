@@ -10,9 +10,12 @@ from matplotlib.collections import Collection, LineCollection, PolyCollection
 from matplotlib.figure import Figure
 from matplotlib.patheffects import withStroke
 
-from flatland.drawing.capture import ScanDrawing, Scene
+from flatland.drawing.footprints import Footprints, footprints_of
 from flatland.entities.body import Color
-from flatland.geometry import DoubleArray, Pose, transform_points
+from flatland.geometry import DoubleArray, Pose, circle_points, transform_points
+from flatland.scene.description import ModelDescription
+from flatland.scene.scans import LaserDescription
+from flatland.scene.world_scene import Scene
 
 if TYPE_CHECKING:
     from flatland.drawing.layout import Layout
@@ -22,8 +25,10 @@ _SCAN_COLORS: Final = ("#e0392b", "#0f8b8d", "#8e44ad", "#d68910", "#2471a3", "#
 _FILL_OPACITY: Final = 0.6  # of a footprint, multiplied by the opacity of its colour
 _HEADING_LENGTH: Final = 0.4  # of the heading triangle, as a fraction of the model's width
 _MAX_LUMINANCE: Final = 0.5  # of a colour that is visible on the floor
+_FAINT: Final = 0.25  # opacity of walls whose colour is fully transparent
 _WALL_WIDTH: Final = 1.44  # points: 2 pixels at 100 dpi, so that straight walls are crisp
-_MIN_MODEL_SIZE: Final = 0.08  # inches; a smaller model is drawn as a triangle of this size
+_MIN_MODEL_SIZE: Final = 0.08  # inches; a smaller model is drawn as a dot of this size
+_DOT_POINTS: Final = 16
 
 # z-orders, from bottom to top; the grid is below all of them.
 _SCANS, _WALLS, _HITS, _MODELS, _JOINTS, _HEADINGS, _NAMES = range(1, 8)
@@ -71,20 +76,24 @@ def paint_models(axes: Any, scene: Scene, layout: Layout, dpi: float, names: boo
         dpi: See `paint`.
         names: See `paint`.
     """
-    for i, scan in enumerate(scene.scans):
-        _paint_scan(axes, scan, _SCAN_COLORS[i % len(_SCAN_COLORS)])
-    _paint_footprints(axes, scene)
-    _paint_joints(axes, scene)
-    _paint_headings(axes, scene, min_size=_MIN_MODEL_SIZE * dpi / layout.scale)
+    for i, laser in enumerate(scene.lasers):
+        _paint_scan(axes, laser, _SCAN_COLORS[i % len(_SCAN_COLORS)])
+    models = [footprints_of(model) for model in scene.models]
+    _paint_footprints(axes, models)
+    _paint_joints(axes, scene.models)
+    _paint_headings(axes, models, min_size=_MIN_MODEL_SIZE * dpi / layout.scale)
     if names:
-        _paint_names(axes, scene)
+        _paint_names(axes, models)
 
 
 def _paint_walls(axes: Any, scene: Scene) -> None:
-    for layer in scene.layers:
+    # Walls of an alpha of 0 are drawn faintly, below the others, since a picture without them would
+    # often be empty.
+    for layer in sorted(scene.layers, key=lambda layer: layer.color[3] > 0):
+        r, g, b, a = _visible(layer.color)
         lines = LineCollection(
-            layer.edges,
-            colors=[_visible(layer.color)],
+            layer.world_edges().reshape(-1, 2, 2),
+            colors=[(r, g, b, a or _FAINT)],
             linewidths=_WALL_WIDTH,
             capstyle="projecting",
         )
@@ -132,11 +141,13 @@ def _paint_axes(axes: Any, visible: bool) -> None:
         axis.set_visible(visible)  # ticks, labels and grid
 
 
-def _paint_scan(axes: Any, scan: ScanDrawing, color: str) -> None:
-    area = PolyCollection([scan.area], facecolors=color, alpha=0.07, linewidths=0)
+def _paint_scan(axes: Any, laser: LaserDescription, color: str) -> None:
+    ends = laser.ends()
+    corners = np.concatenate([[laser.scan.pose[:2]], ends])
+    area = PolyCollection([corners], facecolors=color, alpha=0.07, linewidths=0)
     _add(axes, area, _SCANS)
     axes.plot(
-        *scan.hits.T,
+        *ends[laser.hits()].T,
         linestyle="none",
         marker="o",
         markersize=2.4,
@@ -146,8 +157,8 @@ def _paint_scan(axes: Any, scan: ScanDrawing, color: str) -> None:
     )
 
 
-def _paint_footprints(axes: Any, scene: Scene) -> None:
-    outlines = [outline for model in scene.models for outline in model.outlines]
+def _paint_footprints(axes: Any, models: list[Footprints]) -> None:
+    outlines = [outline for model in models for outline in model.outlines]
     for is_sensor in (False, True):
         selected = [outline for outline in outlines if outline.is_sensor == is_sensor]
         footprints = PolyCollection(
@@ -160,29 +171,60 @@ def _paint_footprints(axes: Any, scene: Scene) -> None:
         _add(axes, footprints, _MODELS)
 
 
-def _paint_joints(axes: Any, scene: Scene) -> None:
-    if not scene.joints:
+def _paint_joints(axes: Any, models: list[ModelDescription]) -> None:
+    lines, anchors, colors = [], [], []
+    for model in models:
+        for joint in model.joints:
+            pose_a, pose_b = (model.bodies[index].pose for index in joint.bodies)
+            origin_a, anchor_a, origin_b, anchor_b = joint.points(pose_a, pose_b)
+            lines.append([origin_a, anchor_a, anchor_b, origin_b])
+            anchors += [anchor_a, anchor_b]
+            colors.append(_visible(joint.color))
+    if not lines:
         return
-    colors = [_visible(joint.color) for joint in scene.joints]
-    points = [joint.points for joint in scene.joints]
-    _add(axes, LineCollection(points, colors=colors, linewidths=1.0), _JOINTS)
-    anchors = np.concatenate([joint[1:3] for joint in points])
+    _add(axes, LineCollection(lines, colors=colors, linewidths=1.0), _JOINTS)
     axes.scatter(
-        *anchors.T, s=6, c=np.repeat(np.array(colors), 2, axis=0), linewidths=0, zorder=_JOINTS
+        *np.transpose(anchors),
+        s=6,
+        c=np.repeat(np.array(colors), 2, axis=0),
+        linewidths=0,
+        zorder=_JOINTS,
     )
 
 
-def _paint_headings(axes: Any, scene: Scene, min_size: float) -> None:
+def _paint_headings(axes: Any, models: list[Footprints], min_size: float) -> None:
     arrows, colors = [], []
-    for model in scene.models:
-        bounds = model.bounds()
+    tiny = []
+    for model in models:
+        bounds = model.bounds
         if model.center is None or bounds is None:
             continue
-        is_tiny = max(bounds[2] - bounds[0], bounds[3] - bounds[1]) < min_size
-        length = min_size if is_tiny else _HEADING_LENGTH * model.width
-        arrows.append(_arrow(model.center, length))
+        if max(bounds[2] - bounds[0], bounds[3] - bounds[1]) < min_size:
+            tiny.append(model)
+            continue
+        arrows.append(_arrow(model.center, _HEADING_LENGTH * model.width))
         colors.append(_stroke(model.color))
     _add(axes, PolyCollection(arrows, facecolors=colors, linewidths=0), _HEADINGS)
+    _paint_dots(axes, tiny, min_size / 2)
+
+
+def _paint_dots(axes: Any, models: list[Footprints], radius: float) -> None:
+    """Draws a dot for each model that is too small to be seen, with a line towards its heading.
+
+    A triangle in place of the dot would hide the model and its colour.
+    """
+    dots, lines, colors = [], [], []
+    for model in models:
+        if model.center is not None:
+            x, y, _ = model.center
+            dots.append(circle_points((x, y), radius, _DOT_POINTS))
+            lines.append(transform_points(model.center, radius * np.array([(1, 0), (2, 0)])))
+            colors.append(model.color)
+    strokes = [_stroke(color) for color in colors]
+    faces = [_visible(color) for color in colors]
+    circles = PolyCollection(dots, facecolors=faces, edgecolors=strokes, linewidths=0.9)
+    _add(axes, circles, _MODELS)
+    _add(axes, LineCollection(lines, colors=strokes, linewidths=1.2), _HEADINGS)
 
 
 def _arrow(pose: Pose, length: float) -> DoubleArray:
@@ -191,9 +233,9 @@ def _arrow(pose: Pose, length: float) -> DoubleArray:
     return transform_points(pose, length * np.array([(0.6, 0.0), (-0.4, 0.3), (-0.4, -0.3)]))
 
 
-def _paint_names(axes: Any, scene: Scene) -> None:
-    for model in scene.models:
-        bounds = model.bounds()
+def _paint_names(axes: Any, models: list[Footprints]) -> None:
+    for model in models:
+        bounds = model.bounds
         if bounds is None:
             continue
         axes.annotate(

@@ -10,15 +10,17 @@ import math
 import os
 import threading
 from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, TypedDict, Unpack
 
 import numpy as np
 import numpy.typing as npt
 
-from flatland.drawing.capture import Scene, capture_scene
 from flatland.drawing.layout import Layout, checked_view, default_view
 from flatland.errors import FlatlandError
+from flatland.extras import missing
+from flatland.scene.world_scene import Scene, describe_world
 
 if TYPE_CHECKING:
     from flatland.world import World
@@ -30,16 +32,52 @@ NOTEBOOK_DPI: Final = 72.0  # an image of at most 936 x 648 pixels
 MATPLOTLIB_LOCK = threading.Lock()
 
 
+class DrawOptions(TypedDict, total=False):
+    """The options of a picture, as keyword arguments; `Picture` has the defaults.
+
+    Attributes:
+        size: (width, height) of the image [pixels]; None fits the view into 13 x 9 inches.
+        dpi: Pixels per inch; scales lines and text.
+        view: (x_min, y_min, x_max, y_max) of the area to show, world frame [m]; None shows all
+            walls and models. The area is extended to the aspect ratio of the image, so that the
+            scale is the same along x and y.
+        layers: Names of the layers to draw, None for all. Models are always drawn.
+        scans: Whether to draw laser scans.
+        names: Whether to write the name of each model above it.
+        axes: Whether to draw axes in metres; without axes, the view fills the whole image.
+    """
+
+    size: tuple[int, int] | None
+    dpi: float
+    view: Sequence[float] | None
+    layers: Iterable[str] | None
+    scans: bool
+    names: bool
+    axes: bool
+
+
+@dataclass(slots=True)
+class Picture:
+    """What to draw; see `DrawOptions`."""
+
+    size: tuple[int, int] | None = None
+    dpi: float = 100.0
+    view: Sequence[float] | None = None
+    layers: Iterable[str] | None = None
+    scans: bool = True
+    names: bool = False
+    axes: bool = True
+
+    def __post_init__(self) -> None:
+        if isinstance(self.layers, str):
+            raise ValueError(f"layers must be a list of names, got {self.layers!r}")
+        if self.layers is not None:
+            self.layers = list(self.layers)
+
+
 def draw(
     world: World,
-    *,
-    size: tuple[int, int] | None = None,
-    dpi: float = 100.0,
-    view: Sequence[float] | None = None,
-    layers: Iterable[str] | None = None,
-    scans: bool = True,
-    names: bool = False,
-    axes: bool = True,
+    **options: Unpack[DrawOptions],
 ) -> npt.NDArray[np.uint8]:
     """Draws the current state of a world.
 
@@ -53,15 +91,7 @@ def draw(
 
     Args:
         world: The world to draw.
-        size: (width, height) of the image [pixels]; None fits the view into 13 x 9 inches.
-        dpi: Pixels per inch; scales lines and text.
-        view: (x_min, y_min, x_max, y_max) of the area to show, world frame [m]; None shows all
-            walls and models. The area is extended to the aspect ratio of the image, so that the
-            scale is the same along x and y.
-        layers: Names of the layers to draw, None for all. Models are always drawn.
-        scans: Whether to draw laser scans.
-        names: Whether to write the name of each model above it.
-        axes: Whether to draw axes in metres; without axes, the view fills the whole image.
+        **options: The members of `DrawOptions`.
 
     Returns:
         RGB image, top row first, shape (height, width, 3).
@@ -70,16 +100,7 @@ def draw(
         FlatlandError: The world is closed, a layer does not exist, or matplotlib is missing.
         ValueError: `size`, `dpi`, `view` or `layers` is invalid.
     """
-    figure = make_figure(
-        world,
-        size=size,
-        dpi=dpi,
-        view=view,
-        layers=layers,
-        scans=scans,
-        names=names,
-        axes=axes,
-    )
+    figure = make_figure(world, **options)
     with MATPLOTLIB_LOCK:
         figure.canvas.draw()
         pixels = np.asarray(figure.canvas.buffer_rgba())
@@ -88,14 +109,7 @@ def draw(
 
 def make_figure(
     world: World,
-    *,
-    size: tuple[int, int] | None = None,
-    dpi: float = 100.0,
-    view: Sequence[float] | None = None,
-    layers: Iterable[str] | None = None,
-    scans: bool = True,
-    names: bool = False,
-    axes: bool = True,
+    **options: Unpack[DrawOptions],
 ) -> Any:
     """Draws a world into a matplotlib figure that can be extended and saved.
 
@@ -103,13 +117,7 @@ def make_figure(
 
     Args:
         world: The world to draw.
-        size: See `draw`.
-        dpi: See `draw`.
-        view: See `draw`.
-        layers: See `draw`.
-        scans: See `draw`.
-        names: See `draw`.
-        axes: See `draw`.
+        **options: See `draw`.
 
     Returns:
         A `matplotlib.figure.Figure` on an Agg canvas, not registered with pyplot.
@@ -118,24 +126,18 @@ def make_figure(
         FlatlandError: The world is closed, a layer does not exist, or matplotlib is missing.
         ValueError: `size`, `dpi`, `view` or `layers` is invalid.
     """
-    scene, layout = lay_out(world, size, dpi, view, checked_layers(layers), scans, axes)
+    picture = Picture(**options)
+    scene, layout = lay_out(world, picture)
     from flatland.drawing.painter import paint
 
     with MATPLOTLIB_LOCK:
-        return paint(scene, layout, dpi, names)
+        return paint(scene, layout, picture.dpi, picture.names)
 
 
 def save(
     world: World,
     path: str | os.PathLike[str],
-    *,
-    size: tuple[int, int] | None = None,
-    dpi: float = 100.0,
-    view: Sequence[float] | None = None,
-    layers: Iterable[str] | None = None,
-    scans: bool = True,
-    names: bool = False,
-    axes: bool = True,
+    **options: Unpack[DrawOptions],
 ) -> None:
     """Draws a world to a file, overwriting an existing one.
 
@@ -143,13 +145,7 @@ def save(
         world: The world to draw.
         path: File name with one of the extensions in `PICTURE_FORMATS`; PDF and SVG are vector
             graphics.
-        size: See `draw`.
-        dpi: See `draw`.
-        view: See `draw`.
-        layers: See `draw`.
-        scans: See `draw`.
-        names: See `draw`.
-        axes: See `draw`.
+        **options: See `draw`.
 
     Raises:
         FlatlandError: The world is closed, a layer does not exist, or matplotlib is missing.
@@ -159,16 +155,7 @@ def save(
     suffix = Path(path).suffix.lower()
     if suffix not in PICTURE_FORMATS:
         raise ValueError(f"path must end with one of {', '.join(PICTURE_FORMATS)}, got {path!r}")
-    figure = make_figure(
-        world,
-        size=size,
-        dpi=dpi,
-        view=view,
-        layers=layers,
-        scans=scans,
-        names=names,
-        axes=axes,
-    )
+    figure = make_figure(world, **options)
     with MATPLOTLIB_LOCK:
         if suffix == ".png":
             figure.canvas.print_png(path)
@@ -176,47 +163,24 @@ def save(
             figure.savefig(path, format=suffix[1:])
 
 
-def lay_out(
-    world: World,
-    size: tuple[int, int] | None,
-    dpi: float,
-    view: Sequence[float] | None,
-    layers: Sequence[str] | None,
-    scans: bool,
-    axes: bool,
-) -> tuple[Scene, Layout]:
-    """Returns the contents and the layout of an image of the current state; see `draw`.
+def lay_out(world: World, picture: Picture) -> tuple[Scene, Layout]:
+    """Returns the contents and the layout of an image of the current state.
 
     Args:
         world: The world to draw.
-        size: See `draw`.
-        dpi: See `draw`.
-        view: See `draw`.
-        layers: Result of `checked_layers`.
-        scans: See `draw`.
-        axes: See `draw`.
+        picture: What to draw.
 
     Raises:
         FlatlandError: The world is closed, a layer does not exist, or matplotlib is missing.
-        ValueError: `size`, `dpi` or `view` is invalid.
+        ValueError: `size`, `dpi`, `view` or `layers` is invalid.
     """
     check_matplotlib()
+    dpi, view = picture.dpi, picture.view
     if not (math.isfinite(dpi) and 10 <= dpi <= 2400):
         raise ValueError(f"dpi must be from 10 to 2400, got {dpi}")
     bounds = None if view is None else checked_view(view)
-    scene = world.between_steps(lambda: capture_scene(world, layers, scans))
-    return scene, Layout.make(size, dpi, bounds or default_view(scene), axes)
-
-
-def checked_layers(layers: Iterable[str] | None) -> list[str] | None:
-    """Returns the names of layers, an argument of `draw`, as a list; None for None.
-
-    Raises:
-        ValueError: The argument is a single name.
-    """
-    if isinstance(layers, str):
-        raise ValueError(f"layers must be a list of names, got {layers!r}")
-    return None if layers is None else list(layers)
+    scene = world.between_steps(lambda: describe_world(world, picture.layers, picture.scans))
+    return scene, Layout.make(picture.size, dpi, bounds or default_view(scene), picture.axes)
 
 
 def draw_png(world: World) -> bytes | None:
@@ -247,7 +211,4 @@ def check_matplotlib() -> None:
     try:
         import flatland.drawing.painter  # noqa: F401
     except ImportError as error:
-        raise FlatlandError(
-            f"drawing needs matplotlib ({error}): "
-            "apt-get install python3-matplotlib, or pip install matplotlib"
-        ) from error
+        raise missing("matplotlib", "drawing needs", error) from error

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib
 import logging
 import os
 from pathlib import Path
@@ -11,7 +10,7 @@ from typing import Any, Final
 import numpy as np
 import numpy.typing as npt
 
-from flatland.errors import FlatlandError
+from flatland.extras import require
 
 _LOG = logging.getLogger("flatland")
 
@@ -21,20 +20,12 @@ _CODECS: Final = ("avc1", "mp4v")
 
 
 def check_opencv() -> Any:
-    """Checks that OpenCV can be imported.
-
-    Returns:
-        The module `cv2`.
+    """Returns the module `cv2`.
 
     Raises:
         FlatlandError: OpenCV is missing or broken.
     """
-    try:
-        return importlib.import_module("cv2")
-    except ImportError as error:
-        raise FlatlandError(
-            f"videos need OpenCV ({error}): apt-get install python3-opencv"
-        ) from error
+    return require("cv2", "videos need")
 
 
 class VideoFile:

@@ -11,11 +11,29 @@ ALL_LAYERS = 0xFFFF
 
 
 class CollisionFilter:
-    """Assigns one of the 16 category bits of Box2D to each layer name."""
+    """Assigns one of the 16 category bits of Box2D to each layer name.
+
+    Attributes:
+        is_complete: Whether all names are registered. Otherwise, if errors of the layers were
+            collected, names that are not registered are accepted, and have no bits.
+    """
 
     def __init__(self) -> None:
         """Creates a filter without names."""
         self._ids: dict[str, int] = {}
+        self.is_complete = True
+
+    def __getstate__(self) -> tuple[str, ...]:
+        """Returns the part of the state of the world that a snapshot saves."""
+        return tuple(self._ids)
+
+    def __setstate__(self, names: tuple[str, ...]) -> None:
+        """Restores a saved state."""
+        self._ids = {name: number for number, name in enumerate(names)}
+
+    def clear(self) -> None:
+        """Removes all names."""
+        self._ids.clear()
 
     @property
     def names(self) -> list[str]:
@@ -54,10 +72,14 @@ class CollisionFilter:
         """Returns the id of a layer name, -1 if no layer has the name."""
         return self._ids.get(name, -1)
 
+    def names_of(self, category_bits: int) -> list[str]:
+        """Returns the names of some category bits, in order of their ids."""
+        return [name for name, number in self._ids.items() if category_bits >> number & 1]
+
     def unknown(self, names: Iterable[str]) -> list[str]:
         """Returns the names that no layer has; the single name `all` is always accepted."""
         names = list(names)
-        if names == ["all"]:
+        if names == ["all"] or not self.is_complete:
             return []
         return [name for name in names if name not in self._ids]
 
@@ -79,5 +101,5 @@ class CollisionFilter:
             raise YamlError(f"{{{','.join(unknown)}}} layer(s) does not exist")
         bits = 0
         for name in names:
-            bits |= 1 << self._ids[name]
+            bits |= 1 << self._ids[name] if name in self._ids else 0
         return bits

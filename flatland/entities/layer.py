@@ -12,7 +12,7 @@ from flatland.geometry import DoubleArray, FloatArray, Pose, transform_points
 from flatland.physics import Material, PhysicsWorld
 
 if TYPE_CHECKING:
-    from flatland.maps.occupancy_grid import OccupancyGrid
+    from flatland.values import OccupancyGrid
 
 WALL_FRICTION = 0.2  # default of Box2D fixtures
 
@@ -27,7 +27,7 @@ class Layer(Entity):
         color: Color for drawings as (r, g, b, a), each in [0, 1].
         properties: Entry `properties` of the world file, used for drawings.
         body: Static body at the origin of the layer.
-        material: Material of all walls, including those that are added; None for plain walls.
+        material: Material of all walls, including added ones; None for plain walls.
         class_name: Class of objects that the walls belong to, for labels of sensors.
         exact_edge_count: Number of edges of the map before simplification.
         unknown_map_keys: Keys of the map file that flatland does not use, sorted.

@@ -14,7 +14,7 @@ from flatland.graph_names import clean_name
 if TYPE_CHECKING:
     from flatland.physics import Touches
     from flatland.plugin_api.plugin import ModelPlugin
-    from flatland.world import World
+    from flatland.plugin_api.plugin_world import PluginWorld
 
 
 class Model(Entity):
@@ -32,12 +32,12 @@ class Model(Entity):
             `class` of the model file, by default the name of the file without extensions, or the
             name of the model if it was spawned from a text.
         followers: Plugins of other models whose `model_moved` is also called for this model, such
-            as those that are connected to it.
+            as a hitch that is connected to it.
         displacement: Offset (dx, dy) of the actual pose from the requested pose after the last
             spawn or move [m]; (0, 0) unless `if_blocked` was `nearest`.
     """
 
-    def __init__(self, world: World, name: str, namespace: str, path: str) -> None:
+    def __init__(self, world: PluginWorld, name: str, namespace: str, path: str) -> None:
         """Creates a model without bodies; `ModelLoader` adds them."""
         self.world = world
         self.name = name
@@ -55,7 +55,7 @@ class Model(Entity):
         contents = f"bodies: {len(self.bodies)}, plugins: {len(self.plugins)}"
         try:
             x, y, theta = self.pose
-        except (FlatlandError, IndexError):  # It was deleted, or is not complete yet.
+        except (FlatlandError, IndexError):  # The model was deleted, or is incomplete.
             return f"<Model {self.name!r}, {contents}>"
         return f"<Model {self.name!r} at ({x:.3f}, {y:.3f}, {theta:.3f}), {contents}>"
 
@@ -117,7 +117,7 @@ class Model(Entity):
         return f"{namespace}_{frame_id}" if namespace else frame_id
 
     def watch_contacts(self, *, sensors: bool = False) -> Touches:
-        """Watches whether the model touches anything else, at hardly any cost.
+        """Watches whether the model touches anything else, at low cost.
 
         Args:
             sensors: Whether to count contacts with sensors, which have no effect on bodies.

@@ -5,9 +5,10 @@ Importing this package registers `flatland/Navigate-v0` and `flatland/Corridor-v
 environments.
 """
 
-from flatland.gym.extras import check_gymnasium
+from flatland.extras import require
 
-check_gymnasium()  # Otherwise, a missing package results in a traceback without a remedy.
+# Otherwise, a missing package results in a traceback without a remedy.
+require("gymnasium", "flatland.gym requires")
 
 from flatland.gym.actions import VelocityAction
 from flatland.gym.agents import Agent

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Agent:
-    """What an environment controls and reads.
+    """The objects that an environment controls and reads for one robot.
 
     Attributes:
         world: World of the model.
@@ -37,8 +37,8 @@ class Agent:
         radius: Radius of the smallest disc around the origin of the first body that contains all
             solid footprints of the model [m].
         bits: Category bits of the solid footprints.
-        max_speed: Limit of the forward speed of the drive [m/s], 0 for none.
-        max_yaw_rate: Limit of the yaw rate of the drive [rad/s], 0 for none.
+        max_speed: Limit of the forward speed of the drive [m/s], 0 for no limit.
+        max_yaw_rate: Limit of the yaw rate of the drive [rad/s], 0 for no limit.
     """
 
     world: World
@@ -145,7 +145,7 @@ def check_alike(agents: Iterable[Agent]) -> None:
     """Checks that all agents have the same number of beams and the same laser range.
 
     Raises:
-        WorldError: They differ.
+        WorldError: The lasers differ.
     """
     lasers = [agent.laser for agent in agents]
     kinds = {(laser.angles.count, float(np.float32(laser.range))) for laser in lasers}

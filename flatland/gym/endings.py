@@ -69,7 +69,7 @@ class Strayed(Ending):
             distance: Distance beyond which the episode terminates [m].
 
         Raises:
-            ValueError: It is not positive.
+            ValueError: `distance` is not positive.
         """
         if not distance > 0:
             raise ValueError(f"distance must be positive [m], got {distance}")

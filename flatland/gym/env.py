@@ -6,17 +6,12 @@ import os
 from typing import Any
 
 import gymnasium
-import numpy as np
-import numpy.typing as npt
-from gymnasium.error import ClosedEnvironmentError, ResetNeeded
+from gymnasium.error import ResetNeeded
 
 from flatland.geometry import FloatArray
 from flatland.gym.actions import checked_actions
-from flatland.gym.episodes import Episodes
-from flatland.gym.live_view import EpisodeView, check_live_view
-from flatland.gym.rendering import checked_render_mode, draw_goals
 from flatland.gym.settings import Settings
-from flatland.gym.start import StartState
+from flatland.gym.stage import RENDER_MODES, Image, Stage
 from flatland.gym.tasks import Occupied
 
 
@@ -31,7 +26,7 @@ class FlatlandEnv(gymnasium.Env[Any, FloatArray]):
     """
 
     metadata: dict[str, Any] = {  # noqa: RUF012 - as in the base class
-        "render_modes": ["rgb_array", "human"],
+        "render_modes": list(RENDER_MODES),
         "render_fps": 10,
     }
 
@@ -59,30 +54,28 @@ class FlatlandEnv(gymnasium.Env[Any, FloatArray]):
             TypeError: An argument is unknown or has the wrong type.
             ValueError: An argument is out of range.
         """
-        self.render_mode = checked_render_mode(render_mode, self.metadata)
-        if render_mode == "human":
-            check_live_view(web_port)
         settings = Settings.from_arguments({"world": world, **arguments})
-        self.metadata = {**self.metadata, "render_fps": round(1 / settings.dt) or 1}
-        self.world = settings.load()
-        try:
-            agent = settings.find_agent(self.world)
-            self._episodes = Episodes([agent], settings)
-            self._start = StartState(self.world)
-        except BaseException:
-            self.world.close()
-            raise
-        self.observation_space = self._episodes.layout.space
         action_space: Any = settings.action.space
+        self._stage = Stage(
+            settings,
+            [settings.world_name],
+            lambda world: [settings.find_agent(world)],
+            render_mode=render_mode,
+            web_port=web_port,
+            metadata=self.metadata,
+        )
+        self.render_mode = render_mode
+        self.metadata = self._stage.metadata
+        self.world = self._stage.worlds[0]
+        self._episodes = self._stage.episodes
+        self.observation_space = self._episodes.layout.space
         self.action_space = action_space
-        self._live_view = EpisodeView([self.world], [settings.world_name], settings.dt, web_port)
         self._running = False
 
     @property
     def goal(self) -> tuple[float, float]:
         """The goal of the episode in the world frame [m]."""
-        x, y = self._episodes.situation.goals[0].tolist()
-        return (x, y)
+        return self._stage.goals[0][0]
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -91,8 +84,8 @@ class FlatlandEnv(gymnasium.Env[Any, FloatArray]):
 
         Args:
             seed: Seed of the random numbers of this episode and the next ones.
-            options: `start`, a pose, and `goal`, a place in the world frame, instead of those of
-                the task.
+            options: `start`, a pose, and `goal`, a place, in the world frame; the task chooses what
+                is not given.
 
         Returns:
             The first observation and its info.
@@ -103,13 +96,13 @@ class FlatlandEnv(gymnasium.Env[Any, FloatArray]):
             ValueError: An option is unknown or invalid.
         """
         super().reset(seed=seed)
-        self._check_open()
+        self._stage.check_open()
         self._running = False
-        self._start.restore(self.np_random)
+        self._stage.restore(0, self.np_random)
         self._episodes.begin(0, self.np_random, Occupied(), options or {})
         self._episodes.look()
         self._running = True
-        self._show()
+        self._stage.show()
         return self._observation(), self._episodes.info(0)
 
     def step(self, action: FloatArray) -> tuple[Any, float, bool, bool, dict[str, Any]]:
@@ -126,7 +119,7 @@ class FlatlandEnv(gymnasium.Env[Any, FloatArray]):
             ResetNeeded: There was no reset, or the episode has ended.
             InvalidAction: The action has the wrong shape, or is NaN.
         """
-        self._check_open()
+        self._stage.check_open()
         if not self._running:
             raise ResetNeeded("call reset() before step(): no episode has begun, or it has ended")
         actions = checked_actions(action, None)
@@ -135,36 +128,21 @@ class FlatlandEnv(gymnasium.Env[Any, FloatArray]):
         rewards, terminated, truncated = self._episodes.judge()
         ended = bool(terminated[0]), bool(truncated[0])
         self._running = not any(ended)
-        self._show()
+        self._stage.show()
         return self._observation(), float(rewards[0]), *ended, self._episodes.info(0)
 
-    def render(self) -> npt.NDArray[np.uint8] | None:
+    def render(self) -> Image | None:
         """Returns an image for `rgb_array`; shows the world in the browser for `human`.
 
         Raises:
             ClosedEnvironmentError: The environment is closed.
             FlatlandError: The viewer cannot listen on its port, or matplotlib is missing.
         """
-        self._check_open()
-        radius = self._episodes.task.goal_radius
-        if self.render_mode == "rgb_array":
-            return draw_goals(self.world, [self.goal], radius)
-        if self.render_mode == "human":
-            self._live_view.show([[self.goal]], radius)
-        return None
+        return self._stage.image()
 
     def close(self) -> None:
         """Closes the world and its view; further calls have no effect."""
-        self._live_view.close()
-        self.world.close()
-
-    def _show(self) -> None:
-        if self.render_mode == "human":
-            self.render()
+        self._stage.close()
 
     def _observation(self) -> Any:
         return self._episodes.layout.present(self._episodes.observations[0])
-
-    def _check_open(self) -> None:
-        if self.world.closed:
-            raise ClosedEnvironmentError("the environment is closed")

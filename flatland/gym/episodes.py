@@ -37,11 +37,11 @@ class Episodes:
     """
 
     def __init__(self, agents: Sequence[Agent], settings: Settings, num_threads: int = 1) -> None:
-        """Prepares the episodes; the state of the worlds is that of the start of each episode.
+        """Prepares the episodes; the worlds are in the state at the start of each episode.
 
         Args:
             agents: The agents, each in a world of its own or all in the same.
-            settings: What is observed, rewarded and so on.
+            settings: The task, the observation, the action and the reward.
             num_threads: Number of threads that step and scan, 0 for one per core.
 
         Raises:
@@ -52,7 +52,7 @@ class Episodes:
         self.agents = tuple(agents)
         self._settings = settings
         self._num_threads = num_threads
-        self.task = copy.copy(settings.task)  # It is prepared for these worlds.
+        self.task = copy.copy(settings.task)  # The copy is prepared for these worlds.
         self.task.prepare(first)
         beams = first.laser.angles.count
         self.layout = settings.observation.layout(beams)

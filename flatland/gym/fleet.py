@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import os
-from typing import Any
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
 from gymnasium import spaces
-from gymnasium.error import ClosedEnvironmentError, InvalidAction, ResetNeeded
+from gymnasium.error import InvalidAction, ResetNeeded
 from gymnasium.utils import seeding
 from pettingzoo import ParallelEnv
 
@@ -16,14 +17,14 @@ from flatland.entities.body import Body
 from flatland.geometry import FloatArray
 from flatland.gym.actions import checked_actions
 from flatland.gym.agents import Agent, check_alike
-from flatland.gym.episodes import Episodes
-from flatland.gym.live_view import EpisodeView, check_live_view
-from flatland.gym.rendering import checked_render_mode, draw_goals
 from flatland.gym.settings import Settings
-from flatland.gym.start import StartState
+from flatland.gym.stage import RENDER_MODES, Image, Stage
 from flatland.gym.tasks import Occupied
 from flatland.gym.worlds import ROBOT, included_folder
 from flatland.values import Twist
+
+if TYPE_CHECKING:
+    from flatland.world import World
 
 Steps = tuple[
     dict[str, Any], dict[str, float], dict[str, bool], dict[str, bool], dict[str, dict[str, Any]]
@@ -43,7 +44,7 @@ class FleetEnv(ParallelEnv[str, Any, FloatArray]):  # type: ignore[misc, unused-
 
     metadata: dict[str, Any] = {  # noqa: RUF012 - the base class has no ClassVar
         "name": "flatland/Fleet-v0",
-        "render_modes": ["rgb_array", "human"],
+        "render_modes": list(RENDER_MODES),
         "render_fps": 10,
         "is_parallelizable": True,
     }
@@ -66,7 +67,7 @@ class FleetEnv(ParallelEnv[str, Any, FloatArray]):  # type: ignore[misc, unused-
             robot: Model file of the robots; None for the included one.
             render_mode: `rgb_array`, `human` or None.
             web_port: Port of the viewer of the render mode `human`, see `FlatlandEnv`.
-            **arguments: See `Settings`; `agent` and `command` are those of each robot.
+            **arguments: See `Settings`, except for `agent` and `command`.
 
         Raises:
             DependencyNotInstalled: `human` requires aiohttp.
@@ -74,9 +75,6 @@ class FleetEnv(ParallelEnv[str, Any, FloatArray]):  # type: ignore[misc, unused-
             TypeError: An argument is unknown or has the wrong type.
             ValueError: An argument is out of range.
         """
-        self.render_mode = checked_render_mode(render_mode, self.metadata)
-        if render_mode == "human":
-            check_live_view(web_port)
         if isinstance(num_robots, bool) or not isinstance(num_robots, int) or num_robots < 1:
             raise ValueError(f"num_robots must be an integer of at least 1, got {num_robots!r}")
         for name in ("agent", "command"):
@@ -86,17 +84,21 @@ class FleetEnv(ParallelEnv[str, Any, FloatArray]):  # type: ignore[misc, unused-
         self.possible_agents = [f"robot_{i}" for i in range(num_robots)]
         self.agents: list[str] = []
         self._row_of = {name: row for row, name in enumerate(self.possible_agents)}
-        self.world = settings.load()
-        try:
-            self._agents = self._spawn(robot, settings)
-            self._episodes = Episodes(self._agents, settings)
-            self._start = StartState(self.world)
-        except BaseException:
-            self.world.close()
-            raise
-        self._observation_space = self._episodes.layout.space
         self._action_spaces = dict.fromkeys(self.possible_agents, settings.action.space)
-        self._live_view = EpisodeView([self.world], [settings.world_name], settings.dt, web_port)
+        self._stage = Stage(
+            settings,
+            [settings.world_name],
+            lambda world: self._spawn(world, robot, settings),
+            render_mode=render_mode,
+            web_port=web_port,
+            metadata=self.metadata,
+        )
+        self.render_mode = render_mode
+        self.metadata = self._stage.metadata
+        self.world = self._stage.worlds[0]
+        self._episodes = self._stage.episodes
+        self._agents = self._episodes.agents
+        self._observation_space = self._episodes.layout.space
         self._rng: np.random.Generator | None = None
 
     def observation_space(self, agent: str) -> spaces.Space[Any]:  # noqa: ARG002
@@ -110,8 +112,7 @@ class FleetEnv(ParallelEnv[str, Any, FloatArray]):  # type: ignore[misc, unused-
     @property
     def goals(self) -> dict[str, tuple[float, float]]:
         """The goals of all robots in the world frame [m]."""
-        goals = self._episodes.situation.goals.tolist()
-        return {name: (x, y) for name, (x, y) in zip(self.possible_agents, goals, strict=True)}
+        return dict(zip(self.possible_agents, self._stage.goals[0], strict=True))
 
     def reset(
         self,
@@ -131,11 +132,11 @@ class FleetEnv(ParallelEnv[str, Any, FloatArray]):  # type: ignore[misc, unused-
             ClosedEnvironmentError: The environment is closed.
             WorldError: There is no room for all robots and goals.
         """
-        self._check_open()
+        self._stage.check_open()
         if seed is not None or self._rng is None:
             self._rng, _ = seeding.np_random(seed)
         self.agents = []
-        self._start.restore(self._rng)
+        self._stage.restore(0, self._rng)
         occupied = Occupied()
         for row, agent in enumerate(self._agents):
             occupied.unplaced = _bodies(self._agents[row + 1 :])
@@ -145,7 +146,7 @@ class FleetEnv(ParallelEnv[str, Any, FloatArray]):  # type: ignore[misc, unused-
             agent.command.set(Twist())
         self._episodes.look()
         self.agents = list(self.possible_agents)
-        self._show()
+        self._stage.show()
         return self._observations(self.agents), self._infos(self.agents)
 
     def step(self, actions: dict[str, FloatArray]) -> Steps:
@@ -164,7 +165,7 @@ class FleetEnv(ParallelEnv[str, Any, FloatArray]):  # type: ignore[misc, unused-
             InvalidAction: An action is missing, has the wrong shape, is NaN, or is of a robot that
                 does not exist or whose episode has ended.
         """
-        self._check_open()
+        self._stage.check_open()
         if not self.agents:
             raise ResetNeeded("call reset() before step(): no episode has begun, or all have ended")
         live = list(self.agents)
@@ -183,7 +184,7 @@ class FleetEnv(ParallelEnv[str, Any, FloatArray]):  # type: ignore[misc, unused-
             if ended[self._row_of[name]]:
                 self._agents[self._row_of[name]].command.set(Twist())
         self.agents = [name for name in live if not ended[self._row_of[name]]]
-        self._show()
+        self._stage.show()
         return (
             self._observations(live),
             {name: float(rewards[self._row_of[name]]) for name in live},
@@ -200,35 +201,29 @@ class FleetEnv(ParallelEnv[str, Any, FloatArray]):  # type: ignore[misc, unused-
         s = self._episodes.situation
         return np.concatenate([s.poses, s.velocities, s.goals], axis=1).astype(np.float32).ravel()
 
-    def render(self) -> npt.NDArray[np.uint8] | None:
+    def render(self) -> Image | None:
         """Returns an image for `rgb_array`; shows the world in the browser for `human`.
 
         Raises:
             ClosedEnvironmentError: The environment is closed.
             FlatlandError: The viewer cannot listen on its port, or matplotlib is missing.
         """
-        self._check_open()
-        radius = self._episodes.task.goal_radius
-        goals = list(self.goals.values())
-        if self.render_mode == "rgb_array":
-            return draw_goals(self.world, goals, radius)
-        if self.render_mode == "human":
-            self._live_view.show([goals], radius)
-        return None
+        return self._stage.image()
 
     def close(self) -> None:
         """Closes the world and its view; further calls have no effect."""
-        self._live_view.close()
-        self.world.close()
+        self._stage.close()
 
-    def _spawn(self, robot: str | os.PathLike[str] | None, settings: Settings) -> list[Agent]:
+    def _spawn(
+        self, world: World, robot: str | os.PathLike[str] | None, settings: Settings
+    ) -> list[Agent]:
         """Adds the robots at free places."""
         path = included_folder() / ROBOT if robot is None else robot
         agents: list[Agent] = []
         for name in self.possible_agents:
             # This pose is never simulated: each reset places all robots.
-            self.world.spawn_model(path, name, name, if_blocked="allow")
-            agents.append(settings.find_agent(self.world, name))
+            world.spawn_model(path, name, name, if_blocked="allow")
+            agents.append(settings.find_agent(world, name))
         check_alike(agents)
         return agents
 
@@ -239,14 +234,6 @@ class FleetEnv(ParallelEnv[str, Any, FloatArray]):  # type: ignore[misc, unused-
     def _infos(self, names: list[str]) -> dict[str, dict[str, Any]]:
         return {name: self._episodes.info(self._row_of[name]) for name in names}
 
-    def _show(self) -> None:
-        if self.render_mode == "human":
-            self.render()
 
-    def _check_open(self) -> None:
-        if self.world.closed:
-            raise ClosedEnvironmentError("the environment is closed")
-
-
-def _bodies(agents: list[Agent]) -> list[Body]:
+def _bodies(agents: Sequence[Agent]) -> list[Body]:
     return [body for agent in agents for body in agent.model.bodies]

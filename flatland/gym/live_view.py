@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.util
 import math
 import os
 import sys
@@ -17,6 +16,7 @@ from gymnasium.error import DependencyNotInstalled
 
 from flatland.defaults import WEB_PORT
 from flatland.errors import FlatlandError
+from flatland.extras import MissingPackageError, require
 from flatland.geometry import Vector2
 
 if TYPE_CHECKING:
@@ -41,11 +41,10 @@ def check_live_view(port: int | None) -> None:
         DependencyNotInstalled: aiohttp is missing.
         ValueError: The port is invalid.
     """
-    if importlib.util.find_spec("aiohttp") is None:
-        raise DependencyNotInstalled(
-            'render_mode "human" requires aiohttp, which is not installed: '
-            "apt-get install python3-aiohttp, or pip install aiohttp"
-        )
+    try:
+        require("aiohttp", 'render_mode "human" requires')
+    except MissingPackageError as error:
+        raise DependencyNotInstalled(str(error)) from error
     _find_port(port)
 
 
@@ -53,7 +52,7 @@ def _find_port(port: int | None) -> int | None:
     """Returns the port of an argument or of the environment variable, None if neither is given.
 
     Raises:
-        ValueError: It is invalid.
+        ValueError: The port is invalid.
     """
     if port is not None:
         if isinstance(port, bool) or not isinstance(port, int) or not 0 <= port <= _MAX_PORT:
@@ -70,7 +69,7 @@ def _find_port(port: int | None) -> int | None:
 class SharedViewer:
     """A viewer of several users in this process, which is open while they show worlds.
 
-    Clients can only look, because the actions of agents alone determine an episode.
+    The viewer is read-only, because the actions of agents alone determine an episode.
     """
 
     def __init__(self) -> None:
@@ -88,8 +87,9 @@ class SharedViewer:
         Args:
             worlds: The worlds.
             names: Their names for users.
-            port: Port of the viewer if it is opened, 0 for any free one. None for that of the
-                environment variable or, if that is not set, a default or any free one.
+            port: Port of a viewer that this call opens, 0 for any free one. None for the port of
+                the environment variable or, if the variable is not set, a default or any free
+                port.
 
         Returns:
             The viewer, and the handles of the worlds for `remove`.
@@ -104,23 +104,29 @@ class SharedViewer:
             if self._viewer is None:
                 self._viewer = _open_viewer(port)
             viewer = self._viewer
-            handles = [
-                viewer.add_world(world, name) for world, name in zip(worlds, names, strict=True)
-            ]
-            self._shown += len(handles)
+            handles: list[WorldHandle] = []
+            try:
+                for world, name in zip(worlds, names, strict=True):
+                    handles.append(viewer.add_world(world, name))
+                    self._shown += 1
+            except BaseException:
+                self._remove(viewer, handles)
+                raise
             return viewer, handles
 
     def remove(self, viewer: WebViewer, handles: Sequence[WorldHandle]) -> None:
         """Removes worlds; the viewer is closed with the last one."""
         with self._lock:
-            if viewer is not self._viewer or self._process != os.getpid():
-                return
-            for handle in handles:
-                viewer.remove_world(handle)
-            self._shown -= len(handles)
-            if self._shown == 0:
-                viewer.close()
-                self._viewer = None
+            if viewer is self._viewer and self._process == os.getpid():
+                self._remove(viewer, handles)
+
+    def _remove(self, viewer: WebViewer, handles: Sequence[WorldHandle]) -> None:
+        for handle in handles:
+            viewer.remove_world(handle)
+        self._shown -= len(handles)
+        if self._shown == 0:
+            viewer.close()
+            self._viewer = None
 
 
 SHARED: Final = SharedViewer()
@@ -136,7 +142,6 @@ class EpisodeView:
         names: Sequence[str],
         dt: float,
         port: int | None,
-        viewer: SharedViewer = SHARED,
     ) -> None:
         """Prepares the view, which opens with the first call of `show`.
 
@@ -145,13 +150,11 @@ class EpisodeView:
             names: Their names for users.
             dt: Simulated time of a step of the environment [s].
             port: See `SharedViewer.add`.
-            viewer: The viewer.
         """
         self._worlds = worlds
         self._names = names
         self._dt = dt
         self._port = port
-        self._shared = viewer
         self._opened: tuple[WebViewer, list[WorldHandle]] | None = None
         self._goals: list[Sequence[Vector2]] = [()] * len(worlds)
         self._due = 0.0
@@ -167,7 +170,7 @@ class EpisodeView:
             FlatlandError: The viewer cannot listen on its port.
         """
         if self._opened is None:
-            self._opened = self._shared.add(self._worlds, self._names, self._port)
+            self._opened = SHARED.add(self._worlds, self._names, self._port)
             self._due = time.monotonic()
         viewer, handles = self._opened
         for number, (handle, places) in enumerate(zip(handles, goals, strict=True)):
@@ -181,7 +184,7 @@ class EpisodeView:
     def close(self) -> None:
         """Ends the view; further calls have no effect."""
         if self._opened is not None:
-            self._shared.remove(*self._opened)
+            SHARED.remove(*self._opened)
             self._opened = None
 
 
@@ -196,9 +199,8 @@ def _open_viewer(port: int | None) -> WebViewer:
     wanted = _find_port(port)
     viewer = WebViewer(port=WEB_PORT if wanted is None else wanted, read_only=True)
     try:
-        viewer.start()
+        viewer.start()  # A viewer that does not start leaves nothing behind.
     except FlatlandError:
-        viewer.close()
         if wanted is not None:
             raise
         viewer = WebViewer(port=0, read_only=True)  # Another program uses the default.

@@ -100,8 +100,8 @@ class Scan(ObservationPart):
 class Goal(ObservationPart):
     """The goal in the frame of the robot: distance, cosine and sine of the bearing.
 
-    The distance is divided by `scale` and at most 1. The bearing of a goal at the very position of
-    the robot is (0, 0).
+    The distance is divided by `scale` and at most 1. If the robot is exactly at the goal, the
+    bearing is (0, 0).
     """
 
     name = "goal"
@@ -113,7 +113,7 @@ class Goal(ObservationPart):
             scale: Distance that is observed as 1 [m].
 
         Raises:
-            ValueError: It is not positive.
+            ValueError: `scale` is not positive.
         """
         if not scale > 0:
             raise ValueError(f"scale must be positive [m], got {scale}")
@@ -177,7 +177,7 @@ class Observation:
         """Creates the observation.
 
         Args:
-            parts: The parts; none for `Scan`, `Goal` and `Velocity`.
+            parts: The parts; `Scan`, `Goal` and `Velocity` if none are given.
             as_dict: Whether observations are dictionaries.
 
         Raises:

@@ -9,7 +9,7 @@ import gymnasium
 from gymnasium.envs.registration import VectorizeMode
 from gymnasium.error import NameNotFound, UnsupportedMode
 
-from flatland.gym.extras import check_pettingzoo
+from flatland.extras import require
 
 if TYPE_CHECKING:
     from flatland.gym.fleet import FleetEnv
@@ -47,7 +47,7 @@ def make_vec(name: str, num_envs: int = 1, **arguments: Any) -> FlatlandVectorEn
         **arguments: See `FlatlandVectorEnv` and `Settings`.
 
     Raises:
-        gymnasium.error.Error: The name is unknown, or that of an environment with several robots.
+        gymnasium.error.Error: The name is unknown, or the environment has several robots.
         FlatlandError: A file is missing or invalid, or the model cannot be an agent.
         TypeError: An argument is unknown or has the wrong type.
         ValueError: An argument is out of range.
@@ -79,7 +79,7 @@ def make_parallel(name: str = "flatland/Fleet-v0", **arguments: Any) -> FleetEnv
     """
     if name not in PARALLEL:
         raise NameNotFound(f'environment "{name}" does not exist; known: {", ".join(PARALLEL)}')
-    check_pettingzoo()
+    require("pettingzoo", "environments with several robots require")
     from flatland.gym.fleet import FleetEnv
 
     return FleetEnv(**{**PARALLEL[name], **arguments})

@@ -86,7 +86,7 @@ class Contact(Reward):
 
 
 class Step(Reward):
-    """1 for each step; scaled by a negative number, it favours short paths."""
+    """1 for each step; to be scaled by a negative number, which favours short paths."""
 
     def compute(self, situation: Situation) -> DoubleArray:
         """Returns 1 for all agents."""
@@ -115,7 +115,7 @@ class Proximity(Reward):
             distance: Distance from the sensor beyond which obstacles do not count [m].
 
         Raises:
-            ValueError: It is not positive.
+            ValueError: `distance` is not positive.
         """
         if not distance > 0:
             raise ValueError(f"distance must be positive [m], got {distance}")

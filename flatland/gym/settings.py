@@ -19,7 +19,7 @@ from flatland.gym.worlds import find_world
 from flatland.world import World
 
 if TYPE_CHECKING:
-    from flatland.config.preprocessor import Params
+    from flatland.config.inputs import Params
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -86,7 +86,7 @@ class Settings:
 
     @property
     def world_name(self) -> str:
-        """The name of the file for users, or that of the folder of a file `world.yaml`."""
+        """The name of the world for users: of its file, or of the folder of a file `world.yaml`."""
         path = Path(self.world)
         return path.parent.name if path.name == "world.yaml" and path.parent.name else path.stem
 

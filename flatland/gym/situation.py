@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import numpy.typing as npt
 
@@ -13,8 +15,8 @@ Rows = npt.NDArray[np.intp]
 class Situation:
     """The state of n agents after a step of the environment; row i of each array is agent i.
 
-    Observations, rewards and endings are functions of it, of all rows at once. The value of a row
-    must not depend on other rows.
+    Observations, rewards and endings are functions of all rows of a situation at once. The value of
+    a row must not depend on other rows.
 
     Attributes:
         poses: (x, y, theta) of each agent in the world frame [m, rad], shape (n, 3).
@@ -38,27 +40,6 @@ class Situation:
         high: Velocity command of the action (1, 1) [m/s, rad/s], shape (2,).
         steps: Number of steps since the start of the episode, shape (n,).
     """
-
-    __slots__ = (
-        "actions",
-        "arrived",
-        "collided",
-        "distance",
-        "goal_ahead",
-        "goal_left",
-        "goals",
-        "high",
-        "low",
-        "max_range",
-        "poses",
-        "previous_actions",
-        "previous_distance",
-        "ranges",
-        "speed",
-        "steps",
-        "velocities",
-        "yaw_rate",
-    )
 
     def __init__(
         self, n: int, beams: int, max_range: float, low: DoubleArray, high: DoubleArray
@@ -98,19 +79,22 @@ class Situation:
     def take(self, rows: Rows) -> Situation:
         """Returns a copy of some rows."""
         part = Situation(0, 0, self.max_range, self.low, self.high)
-        for name in self.__slots__:
-            if name not in ("max_range", "low", "high"):
-                setattr(part, name, getattr(self, name)[rows])
+        for name, values in self._rows().items():
+            setattr(part, name, values[rows])
         return part
 
     def put(self, rows: Rows, part: Situation) -> None:
-        """Replaces some rows by those of `part`, the inverse of `take`."""
-        for name in self.__slots__:
-            if name not in ("max_range", "low", "high"):
-                getattr(self, name)[rows] = getattr(part, name)
+        """Replaces some rows by the rows of `part`, the inverse of `take`."""
+        for name, values in self._rows().items():
+            values[rows] = getattr(part, name)
+
+    def _rows(self) -> dict[str, npt.NDArray[Any]]:
+        """Returns the arrays with one row per agent by name."""
+        shared = ("max_range", "low", "high")
+        return {name: values for name, values in vars(self).items() if name not in shared}
 
     def locate(self, goal_radius: float) -> None:
-        """Computes what follows from the poses, velocities and goals.
+        """Computes the quantities that follow from the poses, velocities and goals.
 
         Args:
             goal_radius: Distance to the goal at which the agent has arrived [m].

@@ -68,7 +68,7 @@ class RandomGoal(Task):
     """A random start and a random goal, both free and within reach of each other.
 
     The start is uniform over the free space that the agent can reach from its place in the world
-    file; the goal is uniform over the part of it that has the right distance from the start.
+    file; the goal is uniform over the part of this space at the right distance from the start.
 
     There is a path to the goal that leaves the rectangle around start and goal by at most a margin.
     This excludes goals behind a wall whose door is far away, which require a planner with a map.
@@ -95,7 +95,7 @@ class RandomGoal(Task):
             goal_radius: Distance to the goal at which an agent has arrived [m].
             margin: Distance by which a path may leave the rectangle around start and goal [m]; None
                 for any path.
-            origin: A place from which all others can be reached [m]; None for that of the agent.
+            origin: A place from which all others can be reached [m]; None for the agent's place.
 
         Raises:
             ValueError: A number is out of range.
@@ -135,7 +135,7 @@ class RandomGoal(Task):
     def draw(
         self, agent: Agent, rng: np.random.Generator, occupied: Occupied
     ) -> tuple[Pose, Vector2]:
-        """Draws both; a start without any goal at the right distance is drawn again."""
+        """Draws start and goal; a start without any goal at the right distance is drawn again."""
         places = self.places
         for last in (False, False, False, True):
             start = random_pose(places.draw(agent, rng, ignored=occupied.unplaced), rng)

@@ -7,24 +7,18 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
-from gymnasium.error import ClosedEnvironmentError, ResetNeeded
+from gymnasium.error import ResetNeeded
 from gymnasium.utils import seeding
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
-from flatland.geometry import BoolArray, DoubleArray, Vector2
+from flatland.geometry import BoolArray, DoubleArray
 from flatland.gym.actions import checked_actions
 from flatland.gym.env import FlatlandEnv
-from flatland.gym.episodes import Episodes
-from flatland.gym.live_view import EpisodeView, check_live_view
-from flatland.gym.rendering import checked_render_mode, draw_goals
 from flatland.gym.settings import Settings
 from flatland.gym.situation import Rows
-from flatland.gym.start import StartState, clone_worlds
+from flatland.gym.stage import Image, Stage
 from flatland.gym.tasks import Occupied
-
-Image = npt.NDArray[np.uint8]
 
 
 class FlatlandVectorEnv(VectorEnv[Any, Any, Any]):
@@ -68,35 +62,29 @@ class FlatlandVectorEnv(VectorEnv[Any, Any, Any]):
         """
         super().__init__()
         self.autoreset_mode = AutoresetMode(autoreset_mode)
-        self.render_mode = checked_render_mode(render_mode, FlatlandEnv.metadata)
-        if render_mode == "human":
-            check_live_view(web_port)
         if isinstance(num_envs, bool) or not isinstance(num_envs, int) or num_envs < 1:
             raise ValueError(f"num_envs must be an integer of at least 1, got {num_envs!r}")
         if isinstance(num_threads, bool) or not isinstance(num_threads, int) or num_threads < 0:
             raise ValueError(f"num_threads must be an integer of at least 0, got {num_threads!r}")
         settings = Settings.from_arguments({"world": world, **arguments})
-        self.metadata = {
-            **FlatlandEnv.metadata,
-            "render_fps": round(1 / settings.dt) or 1,
-            "autoreset_mode": self.autoreset_mode,
-        }
+        self.single_action_space = settings.action.space
+        self.action_space = batch_space(self.single_action_space, num_envs)
+        self._stage = Stage(
+            settings,
+            [f"{settings.world_name} {number}" for number in range(num_envs)],
+            lambda world: [settings.find_agent(world)],
+            render_mode=render_mode,
+            web_port=web_port,
+            metadata={**FlatlandEnv.metadata, "autoreset_mode": self.autoreset_mode},
+            num_threads=num_threads,
+        )
+        self.render_mode = render_mode
+        self.metadata = self._stage.metadata
         self.num_envs = num_envs
         self.copy = copy
-        self._worlds = clone_worlds(settings, num_envs)
-        names = [f"{settings.world_name} {number}" for number in range(num_envs)]
-        self._live_view = EpisodeView(self._worlds, names, settings.dt, web_port)
-        try:
-            agents = [settings.find_agent(world) for world in self._worlds]
-            self._episodes = Episodes(agents, settings, num_threads)
-            self._starts = [StartState(agent.world) for agent in agents]
-        except BaseException:
-            self.close()
-            raise
+        self._episodes = self._stage.episodes
         self.single_observation_space = self._episodes.layout.space
-        self.single_action_space = settings.action.space
         self.observation_space = batch_space(self.single_observation_space, num_envs)
-        self.action_space = batch_space(self.single_action_space, num_envs)
         self._rngs: list[np.random.Generator | None] = [None] * num_envs
         self._seeds: list[int | None] = [None] * num_envs
         self._has_begun = np.zeros(num_envs, np.bool_)
@@ -118,7 +106,7 @@ class FlatlandVectorEnv(VectorEnv[Any, Any, Any]):
         seed: int | Sequence[int | None] | None = None,
         options: dict[str, Any] | None = None,
     ) -> tuple[Any, dict[str, Any]]:
-        """Begins an episode in all environments, or in those of `options["reset_mask"]`.
+        """Begins an episode in all environments, or in the selection `options["reset_mask"]`.
 
         Args:
             seed: Seed of the first environment, which is increased by one for each of the others,
@@ -135,7 +123,7 @@ class FlatlandVectorEnv(VectorEnv[Any, Any, Any]):
             TypeError: The mask is not an array of bools.
             ValueError: An option or the number of seeds is invalid.
         """
-        self._check_open()
+        self._stage.check_open()
         given = dict(options or {})
         mask = _checked_mask(given.pop("reset_mask", None), self.num_envs)
         rows = np.flatnonzero(mask)
@@ -145,7 +133,7 @@ class FlatlandVectorEnv(VectorEnv[Any, Any, Any]):
                 self._rngs[row], self._seeds[row] = seeding.np_random(seeds[row])
         self._begin(rows, given)
         self._episodes.look(None if len(rows) == self.num_envs else rows)
-        self._show()
+        self._stage.show()
         return self._present(), self._infos(mask)
 
     def step(self, actions: Any) -> tuple[Any, DoubleArray, BoolArray, BoolArray, dict[str, Any]]:
@@ -163,7 +151,7 @@ class FlatlandVectorEnv(VectorEnv[Any, Any, Any]):
             ResetNeeded: There was no reset, or, without autoreset, an episode has ended.
             InvalidAction: The actions have the wrong shape, or are NaN.
         """
-        self._check_open()
+        self._stage.check_open()
         if not self._has_begun.all():
             raise ResetNeeded("call reset() before step(): no episode has begun")
         if self.autoreset_mode is AutoresetMode.DISABLED and self._has_ended.any():
@@ -193,7 +181,7 @@ class FlatlandVectorEnv(VectorEnv[Any, Any, Any]):
         else:
             self._has_ended = ended
         infos.update(self._infos(np.ones(self.num_envs, np.bool_)))
-        self._show()
+        self._stage.show()
         return self._present(), rewards, terminated, truncated, infos
 
     def render(self) -> tuple[Image, ...] | None:
@@ -203,28 +191,12 @@ class FlatlandVectorEnv(VectorEnv[Any, Any, Any]):
             ClosedEnvironmentError: The environments are closed.
             FlatlandError: The viewer cannot listen on its port, or matplotlib is missing.
         """
-        self._check_open()
-        if self.render_mode is None:
-            return None
-        goals: list[list[Vector2]] = [[(x, y)] for x, y in self._episodes.situation.goals.tolist()]
-        radius = self._episodes.task.goal_radius
-        if self.render_mode == "human":
-            self._live_view.show(goals, radius)
-            return None
-        return tuple(
-            draw_goals(world, places, radius)
-            for world, places in zip(self._worlds, goals, strict=True)
-        )
+        images = self._stage.render()
+        return None if images is None else tuple(images)
 
     def close_extras(self, **kwargs: Any) -> None:  # noqa: ARG002 - as in the base class
         """Closes all worlds and their views."""
-        self._live_view.close()
-        for world in self._worlds:
-            world.close()
-
-    def _show(self) -> None:
-        if self.render_mode == "human":
-            self.render()
+        self._stage.close()
 
     def _rng(self, row: int) -> np.random.Generator:
         rng = self._rngs[row]
@@ -237,7 +209,7 @@ class FlatlandVectorEnv(VectorEnv[Any, Any, Any]):
         for row in rows.tolist():
             self._has_begun[row] = False
             rng = self._rng(row)
-            self._starts[row].restore(rng)
+            self._stage.restore(row, rng)
             self._episodes.begin(row, rng, Occupied(), options)
             self._has_begun[row], self._has_ended[row] = True, False
 
@@ -267,10 +239,6 @@ class FlatlandVectorEnv(VectorEnv[Any, Any, Any]):
 
     def _present(self) -> Any:
         return self._episodes.layout.present(self._episodes.observations, copy=self.copy)
-
-    def _check_open(self) -> None:
-        if self.closed:
-            raise ClosedEnvironmentError("the environments are closed")
 
 
 def _checked_mask(mask: object, n: int) -> BoolArray:

@@ -1,4 +1,4 @@
-"""Materials and classes in the entries of layers, models, bodies and footprints."""
+"""Colours, materials and classes in the entries of layers, models, bodies and footprints."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 from flatland.physics import Material
 
 if TYPE_CHECKING:
+    from flatland.config.convert import Color
     from flatland.config.reader import YamlReader
 
 SHARE_TOLERANCE = 1e-9  # by which the sum of the shares may exceed 1
@@ -49,9 +50,22 @@ def read_class(reader: YamlReader, default: str) -> str:
     """Reads the optional entry `class` of a layer, a model or a body: a label for perception.
 
     Raises:
-        YamlError: The value is not a string, or it is empty.
+        YamlError: The value is not a string, or is empty.
     """
     name: str = reader.get("class", "string", default)
     if not name and "class" in reader:
         reader.report(reader.invalid("class", "must not be empty"))
     return name
+
+
+def read_color(reader: YamlReader, default: Color) -> Color:
+    """Reads the optional entry `color` of a layer, a body or a joint.
+
+    Raises:
+        YamlError: The value is not a list of four finite numbers.
+    """
+    color: Color = reader.get("color", "color", default, finite=True)
+    if not all(0 <= part <= 1 for part in color):
+        shown = ", ".join(f"{part:g}" for part in color)
+        reader.warn("color", f"[{shown}], but each of [r, g, b, a] is from 0 to 1")
+    return color

@@ -2,22 +2,22 @@
 
 from __future__ import annotations
 
-import logging
 from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from flatland.config.preprocessor import Params
-from flatland.config.reader import ReadYaml, YamlReader
+from flatland.config.inputs import Inputs, Params
+from flatland.config.reader import ReadYaml, read_yaml
 from flatland.entities.collision_filter import MAX_LAYERS, CollisionFilter
 from flatland.errors import Place, YamlError
+from flatland.loading.world_source import WorldSource
 
 if TYPE_CHECKING:
     from flatland.world import World
 
 
 def is_model_file(path: Path, params: Params) -> bool:
-    """Returns whether a file is a model file, not a world file.
+    """Returns whether a file is a model file, by its keys or, if these are unknown, by its name.
 
     Warnings about the file are not logged, because they are logged when the file is loaded.
 
@@ -28,20 +28,16 @@ def is_model_file(path: Path, params: Params) -> bool:
     Raises:
         YamlError: The file cannot be read, is not valid YAML, or cannot be preprocessed.
     """
-    log = logging.getLogger("flatland")
-    was_disabled, log.disabled = log.disabled, True
-    try:
-        reader = YamlReader.from_file(path, params)
-    finally:
-        log.disabled = was_disabled
-    return "bodies" in reader and "layers" not in reader and "properties" not in reader
+    kind = read_yaml(str(path.absolute()), Inputs(params, logs=False)).file_kind
+    return kind == "model" or (kind is None and path.name.endswith(".model.yaml"))
 
 
 def load_model_alone(
     world_class: type[World],
     path: Path,
     params: Params,
-    read: ReadYaml = YamlReader.from_file,
+    read: ReadYaml = read_yaml,
+    seed: int | None = 0,
 ) -> World:
     """Creates a world that contains one model and no layers.
 
@@ -53,14 +49,17 @@ def load_model_alone(
         path: The model file; the name of the model is the file name up to the first dot.
         params: Source of the values of `param()` in YAML files.
         read: Loads the file.
+        seed: Seed of all random numbers, None to draw one.
 
     Raises:
         FlatlandError: The file is invalid; the world is closed.
     """
-    world = world_class(seed=0, params=params)
-    world.read_yaml = read
+    world = world_class(
+        seed=seed,
+        source=WorldSource(params=params, read=read),
+        collision_filter=_LayersOnDemand(path),
+    )
     try:
-        world.collision_filter = _LayersOnDemand(path)
         world.spawn_model(path, path.name.split(".")[0] or "model")
     except BaseException as error:
         # Not `close`: an exception of a plugin must not replace this one.

@@ -6,6 +6,7 @@ import logging
 from collections.abc import Callable, Sequence
 from typing import Any, TypeVar
 
+from flatland.config.collecting_reader import FollowUpError
 from flatland.config.hints import choice, did_you_mean
 from flatland.config.reader import YamlReader
 from flatland.entities.body import Body
@@ -14,7 +15,7 @@ from flatland.entities.joint import Joint
 from flatland.entities.model import Model
 from flatland.errors import PhysicsError
 from flatland.geometry import IDENTITY, Pose, compose
-from flatland.loading.materials import read_class, read_material
+from flatland.loading.materials import read_class, read_color, read_material
 from flatland.physics import PhysicsJoint, PhysicsWorld
 
 _LOG = logging.getLogger("flatland")
@@ -60,16 +61,20 @@ class ModelLoader:
         Raises:
             YamlError: The file is invalid.
         """
+        self._reader.require_kind("model")
         self._model.class_name = read_class(self._reader, self._model.class_name)
         bodies = self._reader.subnode("bodies", "list")
+        invalid = len(bodies)
         for entry in bodies.items():
             with entry.collect_errors():
                 self._load_body(entry, pose)
+                invalid -= 1
         if not self._model.bodies:
-            raise bodies.error(
+            text = (
                 f'Invalid "bodies" in "{self._model.name}" model, must be a list of bodies of at '
                 "least size 1"
             )
+            raise FollowUpError(text) if invalid else bodies.error(text)
         for entry in self._reader.optional_subnode("joints", "list").items():
             with entry.collect_errors():
                 self._load_joint(entry)
@@ -86,42 +91,36 @@ class ModelLoader:
             name = entry.get("name", "string")
             if not _is_enabled(entry, f'{self._place} plugin "{name}"'):
                 continue
-            if name in names:
-                entry.report(
-                    entry.error(
-                        f'Invalid "plugins" in "{self._model.name}" model, plugin with name '
-                        f'"{name}" already exists'
-                    )
-                )
+            self._check_new(entry, "plugins", "plugin", name, name if name in names else None)
             names.add(name)
             entries.append(entry)
         self._reader.ensure_accessed_all()
         return entries
+
+    def _check_new(
+        self, reader: YamlReader, key: str, kind: str, name: str, existing: object
+    ) -> None:
+        """Reports an error if there is an existing object of a name; None for no such object."""
+        if existing is not None:
+            reader.report(
+                reader.error(
+                    f'Invalid "{key}" in "{self._model.name}" model, {kind} with name "{name}" '
+                    "already exists"
+                )
+            )
 
     def _load_body(self, entry: YamlReader, model_pose: Pose) -> None:
         name = entry.get("name", "string")
         reader = entry.with_location(self._place, f'body "{name}"')
         if not _is_enabled(reader, f'{self._place} body "{name}"'):
             return
-        if self._model.find_body(name) is not None:
-            reader.report(
-                reader.error(
-                    f'Invalid "bodies" in "{self._model.name}" model, body with name "{name}" '
-                    "already exists"
-                )
-            )
+        self._check_new(reader, "bodies", "body", name, self._model.find_body(name))
         pose = reader.get("pose", "pose", IDENTITY, finite=True)
         body_type = reader.get("type", "string", "dynamic")
-        if body_type not in BODY_TYPES:
-            reader.report(
-                reader.error(
-                    f'Invalid "type" in {self._place} body "{name}", must be one of: '
-                    f"{', '.join(BODY_TYPES)}",
-                    choice(body_type, BODY_TYPES),
-                )
-            )
+        problem = f'Invalid "type" in {self._place} body "{name}", must be one of'
+        if not _check_choice(reader, body_type, BODY_TYPES, problem):
             body_type = "dynamic"
-        color = reader.get("color", "color", BODY_COLOR, finite=True)
+        color = read_color(reader, BODY_COLOR)
         linear_damping = reader.get("linear_damping", "float", 0.0, finite=True, minimum=0)
         angular_damping = reader.get("angular_damping", "float", 0.0, finite=True, minimum=0)
         class_name = read_class(reader, self._model.class_name)
@@ -144,14 +143,8 @@ class ModelLoader:
     def _load_footprint(self, body: Body, reader: YamlReader) -> None:
         place = f"{reader.location} {reader.name}"
         kind = reader.get("type", "string")
-        if kind not in FOOTPRINT_TYPES:
-            reader.report(
-                reader.error(
-                    f'Invalid footprint "type" in {place}, support footprints are: '
-                    f"{', '.join(FOOTPRINT_TYPES)}",
-                    choice(kind, FOOTPRINT_TYPES),
-                )
-            )
+        problem = f'Invalid footprint "type" in {place}, support footprints are'
+        is_known = _check_choice(reader, kind, FOOTPRINT_TYPES, problem)
         layers = reader.get_list("layers", "string", ["all"])
         unknown = self._layers.unknown(layers)
         if unknown:
@@ -159,7 +152,7 @@ class ModelLoader:
                 reader.error(
                     f'Invalid footprint "layers" in {place}, {{{",".join(unknown)}}} layer(s) does '
                     "not exist",
-                    _layer_hint(unknown, self._layers),
+                    did_you_mean(unknown[0], self._layers.names, "layers of the world"),
                 )
             )
             layers = [name for name in layers if name not in unknown]
@@ -173,10 +166,12 @@ class ModelLoader:
             "mask_bits": category_bits if reader.get("collision", "bool", True) else 0,
         }
         material = read_material(reader)
-        if kind not in FOOTPRINT_TYPES:
-            return  # reported above
+        if not is_known:
+            return
         if kind == "circle":
             radius = reader.get("radius", "float", finite=True, minimum=0)
+            if radius == 0:
+                reader.warn("radius", "0, so that the circle is a point")
             center = reader.get("center", "vector", (0.0, 0.0), finite=True)
             reader.ensure_accessed_all()
             fixture = _create(reader, body.create_circle, center, radius, **properties)
@@ -193,23 +188,11 @@ class ModelLoader:
         place = f'{self._place} joint "{name}"'
         if not _is_enabled(reader, place):
             return
-        if self._model.find_joint(name) is not None:
-            reader.report(
-                reader.error(
-                    f'Invalid "joints" in "{self._model.name}" model, joint with name "{name}" '
-                    "already exists"
-                )
-            )
+        self._check_new(reader, "joints", "joint", name, self._model.find_joint(name))
         kind = reader.get("type", "string")
-        if kind not in JOINT_TYPES:
-            reader.report(
-                reader.error(
-                    f'Invalid joint "type" in {place}, supported joints are: '
-                    f"{', '.join(JOINT_TYPES)}",
-                    choice(kind, JOINT_TYPES),
-                )
-            )
-        color = reader.get("color", "color", BODY_COLOR, finite=True)
+        problem = f'Invalid joint "type" in {place}, supported joints are'
+        is_known = _check_choice(reader, kind, JOINT_TYPES, problem)
+        color = read_color(reader, BODY_COLOR)
         collide_connected = reader.get("collide_connected", "bool", False)
         ends = reader.subnode("bodies", "list")
         if len(ends) != 2:
@@ -224,7 +207,11 @@ class ModelLoader:
                 end.report(
                     end.error(
                         f'Cannot find body with name "{body_name}" in {end.location} {end.name}',
-                        did_you_mean(body_name, (other.name for other in self._model.bodies)),
+                        did_you_mean(
+                            body_name,
+                            (other.name for other in self._model.bodies),
+                            "bodies of the model",
+                        ),
                     )
                 )
             else:
@@ -240,13 +227,21 @@ class ModelLoader:
             options["reference_angle"] = reader.get("angle", "float", 0.0, finite=True)
             options["frequency"] = reader.get("frequency", "float", 0.0, finite=True, minimum=0)
             options["damping"] = reader.get("damping", "float", 0.0, finite=True, minimum=0)
-        if kind not in JOINT_TYPES:
-            return  # reported above
+        if not is_known:
+            return
         reader.ensure_accessed_all()
         if len(bodies) != 2:
             return  # reported above
         joint = _create(reader, create, bodies[0], bodies[1], anchors[0], anchors[1], **options)
         self._model.joints.append(Joint(joint, name, (bodies[0], bodies[1]), color))
+
+
+def _check_choice(reader: YamlReader, value: str, choices: Sequence[str], problem: str) -> bool:
+    """Returns whether a value is one of several; if it is not, reports an error."""
+    if value in choices:
+        return True
+    reader.report(reader.error(f"{problem}: {', '.join(choices)}", choice(value, choices)))
+    return False
 
 
 def _read_limits(reader: YamlReader) -> tuple[float, float] | None:
@@ -262,11 +257,6 @@ def _read_limits(reader: YamlReader) -> tuple[float, float] | None:
         )
         return None
     return (lower, upper)
-
-
-def _layer_hint(unknown: Sequence[str], layers: CollisionFilter) -> str:
-    similar = did_you_mean(unknown[0], layers.names)
-    return similar or f"layers of the world: {', '.join(layers.names) or 'none'}"
 
 
 def _is_enabled(reader: YamlReader, place: str) -> bool:

@@ -4,16 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING
 
-from flatland.config.inputs import only_files_in
+from flatland.config.documents import TEXT_NAME, is_yaml_text
 from flatland.config.reader import YamlReader
 
 if TYPE_CHECKING:
-    from flatland.world import World
-
-TEXT_NAME: Final = "<text>"
-"""Name of a YAML text in error messages, and `Model.path` of its model."""
+    from flatland.loading.world_source import WorldSource
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,24 +30,19 @@ class ModelSpec:
     pose: Sequence[float] = (0.0, 0.0, 0.0)
 
 
-def is_yaml_text(yaml_path: str) -> bool:
-    """Returns whether a path is YAML text instead: it begins with a line break or with `{`."""
-    return yaml_path[:1] in ("\n", "\r", "{") and yaml_path != ""
-
-
 class ModelSources:
     """Reads the sources of the models of one request.
 
     Each source is parsed once, unless its expressions (`$eval`) may differ from model to model.
     """
 
-    def __init__(self, world: World) -> None:
+    def __init__(self, source: WorldSource) -> None:
         """Creates a reader without sources.
 
         Args:
-            world: The world of the models.
+            source: Source of the world of the models.
         """
-        self._world = world
+        self._source = source
         self._known: dict[str, tuple[str, YamlReader]] = {}
 
     def read(self, yaml_path: str) -> tuple[str, YamlReader]:
@@ -75,17 +67,13 @@ class ModelSources:
         return path, reader.unread()
 
     def _load(self, yaml_path: str) -> tuple[str, YamlReader]:
-        world = self._world
-        inputs = world.inputs
-        before = inputs.expression_count
-        with inputs.collecting(), only_files_in(world.model_path):
-            if is_yaml_text(yaml_path):
-                folder = world.resolve_path("")
-                reader = YamlReader.from_string(yaml_path, world.params, folder, TEXT_NAME)
-                loaded = TEXT_NAME, reader
-            else:
-                path = world.resolve_path(yaml_path)
-                loaded = path, world.read_yaml(path, world.params)
-        if inputs.expression_count == before:
+        source = self._source
+        before = source.inputs.expression_count
+        if is_yaml_text(yaml_path):
+            loaded = TEXT_NAME, source.read_text(yaml_path, TEXT_NAME)
+        else:
+            path = source.resolve(yaml_path)
+            loaded = path, source.read(path)
+        if source.inputs.expression_count == before:
             self._known[yaml_path] = loaded
         return loaded

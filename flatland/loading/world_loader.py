@@ -4,126 +4,124 @@ from __future__ import annotations
 
 import functools
 import logging
-import os
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from contextlib import suppress
-from pathlib import Path
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any, Protocol, TypeVar
 
-from flatland.config.inputs import Inputs, real_folders
-from flatland.config.node import Source
-from flatland.config.preprocessor import Params
-from flatland.config.reader import ReadYaml, YamlReader
+import numpy as np
+
+from flatland.config.file_kinds import unreadable_file
+from flatland.config.reader import YamlReader, read_yaml
 from flatland.entities.layer import Layer
 from flatland.errors import Place, UnreadableFileError, WorldError, YamlError
 from flatland.geometry import IDENTITY
 from flatland.graph_names import resolve_topic
-from flatland.loading.materials import read_class, read_material
+from flatland.loading.materials import read_class, read_color, read_material
+from flatland.loading.world_source import WorldSource
 from flatland.maps.grid_map import grid_map
-from flatland.maps.map_file import LayerMap, load_map
+from flatland.maps.map_file import LayerMap
 from flatland.plugin_api.missing_plugins import (
     MissingPluginsError,
     PluginEntry,
-    missing_plugins_error,
     read_entries,
 )
 from flatland.plugin_api.noise import checked_seed
+from flatland.plugin_api.plugin_world import JobOwner, PluginWorld
 
 if TYPE_CHECKING:
-    from flatland.maps.occupancy_grid import OccupancyGrid
-    from flatland.runtime.body_monitor import InvalidBodyPolicy
-    from flatland.runtime.faults import FaultPolicy
-    from flatland.runtime.observer import WorldObserver
-    from flatland.world import World
+    from flatland.plugin_api.registry import PluginRegistry
 
 _LOG = logging.getLogger("flatland")
 
 TOPIC_SCHEME = "topic://"
 """Begin of the map of a layer that is received from a topic."""
+_MIN_KEPT = 0.99  # share of the length of all walls, below which a warning is logged
+MAX_MAGNITUDE = 1e9
+"""Largest absolute value of a coordinate [m] or an angle [rad] of the physics."""
 LAYER_COLOR = (1.0, 1.0, 1.0, 1.0)
-SIMPLIFICATIONS = (0, 1, 2)
 MAX_ITERATIONS = 1000
 """Largest number of velocity or position iterations; more only slow down the simulation."""
 
 
+class PluginLoader(JobOwner, Protocol):
+    """Starts the plugins of a world."""
+
+    registry: PluginRegistry
+
+    def require_plugins(self, entries: Iterable[YamlReader], model: str | None) -> list[YamlReader]:
+        """Checks that a plugin class exists for each enabled entry of a `plugins` list."""
+
+    def start_world_plugin(self, entry: YamlReader, world_config: YamlReader) -> None:
+        """Starts a world plugin."""
+
+
+class LoadedWorld(PluginWorld, Protocol):
+    """The part of `flatland.World` that its file determines."""
+
+    source: WorldSource
+    seed: int
+    velocity_iterations: int
+    position_iterations: int
+    change_count: int
+
+    @property
+    def plugin_host(self) -> PluginLoader:
+        """Starts the plugins."""
+
+    def add_layer(self, layer: Layer) -> None:
+        """Adds a layer whose names are registered."""
+
+    def resolve_path(self, path: str) -> str:
+        """Returns the absolute path of a model or map file."""
+
+    def __exit__(self, *error: object) -> None:
+        """Closes the world; exceptions of the block take precedence over exceptions of plugins."""
+
+
+W = TypeVar("W", bound=LoadedWorld)
+
+
 def load_world(
-    world_class: type[World],
-    path: str | os.PathLike[str],
-    *,
-    seed: int | None,
-    params: Params,
-    simplify_map: int,
-    step_size: float,
-    observers: Iterable[WorldObserver],
-    plugin_timeout: float | None,
-    plugin_errors: FaultPolicy,
-    on_invalid_body: InvalidBodyPolicy,
-    model_path: Iterable[str | os.PathLike[str]] | None = None,
-    read: ReadYaml = YamlReader.from_file,
-) -> World:
-    """Creates a world of the given class from a file; see `World.from_yaml` for the arguments.
+    make_world: Callable[..., W], source: WorldSource, *, seed: int | None, **options: Any
+) -> W:
+    """Creates a world from its file.
 
-    With a function `read` whose readers collect errors (`flatland.config.collecting_reader`), the
-    world contains the valid parts of the files.
+    If the readers of the source collect errors (`flatland.config.collecting_reader`), the world
+    contains the valid parts of the files.
+
+    Args:
+        make_world: Class of the world.
+        source: The world file.
+        seed: Seed of all random numbers, at least 0; None draws a seed and logs it.
+        **options: Further arguments of the constructor of the class.
+
+    Raises:
+        FlatlandError: A file is invalid; nothing is left behind.
+        ValueError: An argument is out of range.
     """
-    if simplify_map not in SIMPLIFICATIONS:
-        raise ValueError(f"simplify_map must be 0, 1 or 2, got {simplify_map!r}")
-    folders = real_folders(model_path)
     seed = checked_seed(seed)
-    inputs = Inputs(seed, simplify_map)
-    with inputs.collecting(caching=True):
-        world = _create_world(
-            world_class,
-            path,
-            inputs,
+    with source.inputs.loading():
+        source.inputs.set_seed(seed)
+        reader = source.read(source.path)
+        reader.require_kind("world")
+        velocity_iterations, position_iterations, map_layer = _read_properties(reader)
+        world = make_world(
+            source=source,
             seed=seed,
-            params=params,
-            step_size=step_size,
-            observers=observers,
-            plugin_timeout=plugin_timeout,
-            plugin_errors=plugin_errors,
-            on_invalid_body=on_invalid_body,
-            read=read,
+            velocity_iterations=velocity_iterations,
+            position_iterations=position_iterations,
+            **options,
         )
-    world.model_path = folders  # The models of the world file are not restricted.
-    # A recording can start as long as these are unchanged.
-    world.change_count = 0
-    inputs.commands_received = world.ports.commands_received()
+        try:
+            _load_contents(world, reader, map_layer)
+        except BaseException as error:
+            # Not `close`: an exception of a plugin must not replace this one.
+            world.__exit__(type(error), error, error.__traceback__)
+            raise
     return world
 
 
-def _create_world(
-    world_class: type[World],
-    path: str | os.PathLike[str],
-    inputs: Inputs,
-    *,
-    params: Params,
-    read: ReadYaml,
-    **options: Any,
-) -> World:
-    file = Path(Source("", str(Path.cwd())).resolve(os.fspath(path)))
-    reader = read(file, params)
-    velocity_iterations, position_iterations, map_layer = _read_properties(reader)
-    world = world_class(
-        params=params,
-        velocity_iterations=velocity_iterations,
-        position_iterations=position_iterations,
-        base_dir=file.parent,
-        **options,
-    )
-    world.path = str(file)
-    world.inputs = inputs
-    world.read_yaml = read
-    try:
-        _load_contents(world, reader, map_layer)
-    except BaseException as error:
-        # Not `close`: an exception of a plugin must not replace this one.
-        world.__exit__(type(error), error, error.__traceback__)
-        raise
-    return world
-
-
-def reload_world(world: World, seed: int) -> None:
+def reload_world(world: LoadedWorld, seed: int) -> None:
     """Loads the layers, models and plugins of a world again, which is empty.
 
     Files and parameters that were read when the world was loaded are not read again.
@@ -136,15 +134,14 @@ def reload_world(world: World, seed: int) -> None:
         FlatlandError: With this seed, an expression results in an invalid value, or a plugin fails;
             the world is incomplete.
     """
-    inputs = Inputs(seed, world.inputs.simplify_map, cache=world.inputs.cache)
-    world.seed, world.inputs = seed, inputs
-    with inputs.collecting(caching=True):
-        reader = world.read_yaml(world.path, world.params)
+    source = world.source
+    world.seed = seed
+    with source.inputs.loading():
+        source.inputs.set_seed(seed)
+        reader = source.read(source.path)
         properties = _read_properties(reader)
         world.velocity_iterations, world.position_iterations, map_layer = properties
         _load_contents(world, reader, map_layer)
-    world.change_count = 0
-    inputs.commands_received = world.ports.commands_received()
 
 
 def _read_properties(reader: YamlReader) -> tuple[int, int, str]:
@@ -157,10 +154,13 @@ def _read_properties(reader: YamlReader) -> tuple[int, int, str]:
     return velocity_iterations, position_iterations, map_layer
 
 
-def _load_contents(world: World, reader: YamlReader, map_layer: str) -> None:
-    for entry in reader.subnode("layers", "list").items():
+def _load_contents(world: LoadedWorld, reader: YamlReader, map_layer: str) -> None:
+    layers = list(reader.subnode("layers", "list").items())
+    for entry in layers:
         with entry.collect_errors():
-            _load_layer(world, entry, world.inputs.simplify_map)
+            _load_layer(world, entry)
+    # Otherwise, a name in another file may be that of an invalid layer.
+    world.collision_filter.is_complete = all(entry.is_complete for entry in (reader, *layers))
     if map_layer and not any(map_layer in layer.names for layer in world.layers):
         names = ", ".join(layer.name for layer in world.layers) or "none"
         properties = reader.subnode("properties", "map")
@@ -170,7 +170,7 @@ def _load_contents(world: World, reader: YamlReader, map_layer: str) -> None:
             )
         )
         map_layer = ""  # only if errors are collected
-    world.map_layer = map_layer
+    world.source.map_layer = map_layer
     try:
         _load_models(world, reader)
         # Unknown keys are reported before world plugins are started.
@@ -178,25 +178,30 @@ def _load_contents(world: World, reader: YamlReader, map_layer: str) -> None:
         reader.ensure_accessed_all()
         world_plugins = world.plugin_host.require_plugins(world_plugins, None)
     except MissingPluginsError as error:
-        # The error lists the missing plugins of one model; report those of the whole world.
+        # The error lists the missing plugins of one model; report all that the world misses.
         raise _all_missing_plugins(world, reader) or error from None
     for entry in world_plugins:
         with entry.collect_errors():
             _load_world_plugin(world, entry, reader)
+    # Otherwise part of the first step, which would take too long for a loop in real time.
+    world.physics.find_new_contacts()
+    # A recording can start as long as these are unchanged.
+    world.change_count = 0
+    world.source.commands_received = world.ports.commands_received()
 
 
 def _read_iterations(properties: YamlReader, key: str) -> int:
     return properties.get(key, "int", 10, minimum=1, maximum=MAX_ITERATIONS)
 
 
-def _load_layer(world: World, reader: YamlReader, simplify_map: int) -> None:
+def _load_layer(world: LoadedWorld, reader: YamlReader) -> None:
     name_node = reader.subnode("name")
     if name_node.is_list:
         names = reader.get_list("name", "string", min_size=1)
     else:
         names = [reader.get("name", "string")]
     map_path = reader.get("map", "string", "")
-    color = reader.get("color", "color", LAYER_COLOR, finite=True)
+    color = read_color(reader, LAYER_COLOR)
     properties = reader.optional_subnode("properties", "map")
     material = read_material(reader)
     class_name = read_class(reader, names[0])
@@ -208,7 +213,7 @@ def _load_layer(world: World, reader: YamlReader, simplify_map: int) -> None:
     layer_map, map_topic, grid = None, "", None
     if map_path.startswith(TOPIC_SCHEME):
         map_topic = _map_topic(reader, map_path)
-        grid = cast("OccupancyGrid | None", world.inputs.cache.grids.get(names[0]))
+        grid = world.source.grids.get(names[0])
         if grid is None:
             _LOG.warning(
                 'Layer "%s" is empty until a map is received from topic "%s" or given to '
@@ -217,11 +222,14 @@ def _load_layer(world: World, reader: YamlReader, simplify_map: int) -> None:
                 map_topic,
             )
         else:
-            layer_map = grid_map(grid, simplify_map)
+            layer_map = grid_map(grid, world.source.simplify_map)
     elif map_path:
         with reader.collect_errors():
-            layer_map = _load_map(world, reader, map_path, names[0], simplify_map)
-    if not is_registered:
+            layer_map = _load_map(world.source, reader, map_path, names[0])
+    if not is_registered:  # only if errors are collected
+        for name in world.collision_filter.unknown(names):
+            with suppress(YamlError):
+                world.collision_filter.register([name])
         return
     bits = world.collision_filter.category_bits(names)
     make_layer = functools.partial(
@@ -252,14 +260,33 @@ def _load_layer(world: World, reader: YamlReader, simplify_map: int) -> None:
                 f'Invalid map in layer "{names[0]}", {error} [{layer_map.path}]',
                 place=Place(layer_map.path),
             ) from error
+    if layer_map is not None and layer_map.path:
+        _warn_about_short_edges(world.source, layer, layer_map)
     world.add_layer(layer)
+
+
+def _warn_about_short_edges(source: WorldSource, layer: Layer, layer_map: LayerMap) -> None:
+    """Logs if a considerable part of the walls is missing, because edges are too short."""
+    lengths = [
+        np.hypot(edges[:, 2] - edges[:, 0], edges[:, 3] - edges[:, 1]).sum()
+        for edges in (layer.edges.astype(np.float64), layer_map.edges.astype(np.float64))
+    ]
+    if lengths[0] < _MIN_KEPT * lengths[1]:
+        source.inputs.warn(
+            layer_map.scale_place,
+            'Layer "%s": %d of %d edges are missing, because they are too short for the physics; '
+            "the unit of the map may be wrong",
+            layer.name,
+            len(layer_map.edges) - len(layer.edges),
+            len(layer_map.edges),
+        )
 
 
 def _map_topic(reader: YamlReader, map_path: str) -> str:
     """Returns the topic of a map `topic://NAME`.
 
     Raises:
-        YamlError: It is not a legal name, if errors are not collected.
+        YamlError: The name is invalid, if errors are not collected.
     """
     topic = map_path.removeprefix(TOPIC_SCHEME)
     try:
@@ -269,39 +296,42 @@ def _map_topic(reader: YamlReader, map_path: str) -> str:
         return "/map"  # only if errors are collected
 
 
-def _register_layer(world: World, reader: YamlReader, names: list[str]) -> None:
+def _register_layer(world: LoadedWorld, reader: YamlReader, names: list[str]) -> None:
     try:
         world.collision_filter.register(names)
     except YamlError as error:
         raise reader.error(error.message) from None
 
 
-def _load_map(
-    world: World, reader: YamlReader, map_path: str, layer_name: str, simplify_map: int
-) -> LayerMap:
+def _load_map(source: WorldSource, reader: YamlReader, map_path: str, layer_name: str) -> LayerMap:
     try:
-        return load_map(
-            world.resolve_path(map_path),
-            layer_name,
-            simplify=simplify_map,
-            params=world.params,
-            read=world.read_yaml,
-        )
+        return source.load_map(map_path, layer_name)
     except UnreadableFileError as error:
-        raise reader.subnode("map").error(error.message, error.hint) from error
+        hint = unreadable_file(source.resolve(map_path), "map")
+        raise reader.subnode("map").error(_without_place(error), hint) from error
 
 
-def _load_models(world: World, reader: YamlReader) -> None:
+def _without_place(error: YamlError) -> str:
+    """Returns the message of an error for another place."""
+    return error.message.removesuffix(error.place.suffix if error.place else "")
+
+
+def _load_models(world: LoadedWorld, reader: YamlReader) -> None:
     names: set[str] = set()
     for entry in reader.optional_subnode("models", "list").items():
         with entry.collect_errors():
             _load_model(world, entry, names)
 
 
-def _load_model(world: World, entry: YamlReader, names: set[str]) -> None:
+def _load_model(world: LoadedWorld, entry: YamlReader, names: set[str]) -> None:
     name = entry.get("name", "string")
     model_reader = entry.with_location(f'model "{name}"')
     pose = model_reader.get("pose", "pose", IDENTITY, finite=True)
+    if max(map(abs, pose)) > MAX_MAGNITUDE:
+        model_reader.report(
+            model_reader.invalid("pose", f"must be within +-{MAX_MAGNITUDE:g}, got {list(pose)}")
+        )
+        pose = IDENTITY  # only if errors are collected
     namespace = model_reader.get("namespace", "string", "")
     path = model_reader.get("model", "string")
     model_reader.ensure_accessed_all()
@@ -319,10 +349,11 @@ def _load_model(world: World, entry: YamlReader, names: set[str]) -> None:
                     world.spawn_model(path, name, "", pose)
         except UnreadableFileError as error:
             located = model_reader.subnode("model")
-            raise located.error(error.message, error.hint) from error
+            hint = unreadable_file(world.resolve_path(path), "model")
+            raise located.error(_without_place(error), hint) from error
 
 
-def _all_missing_plugins(world: World, reader: YamlReader) -> MissingPluginsError | None:
+def _all_missing_plugins(world: LoadedWorld, reader: YamlReader) -> MissingPluginsError | None:
     """Returns one error for all missing plugins of a world, except those in invalid files."""
     lists: dict[str, YamlReader] = {}  # plugins by model file, which many models may share
     entries: list[PluginEntry] = []
@@ -330,15 +361,15 @@ def _all_missing_plugins(world: World, reader: YamlReader) -> MissingPluginsErro
         with suppress(YamlError):
             name, path = model.get("name", "string"), model.get("model", "string")
             if path not in lists:
-                file = YamlReader.from_file(world.resolve_path(path), world.params)
+                file = read_yaml(world.resolve_path(path), world.source.inputs)
                 lists[path] = file.optional_subnode("plugins", "list")
             entries += read_entries(lists[path].items(), name)
     with suppress(YamlError):
         entries += read_entries(reader.optional_subnode("plugins", "list").items(), None)
-    return missing_plugins_error(world.plugin_host.registry, entries)
+    return world.plugin_host.registry.missing_plugins_error(entries)
 
 
-def _load_world_plugin(world: World, entry: YamlReader, world_config: YamlReader) -> None:
+def _load_world_plugin(world: LoadedWorld, entry: YamlReader, world_config: YamlReader) -> None:
     name = entry.get("name", "string")
     if not entry.get("enabled", "bool", True):
         _LOG.info('world plugin "%s" is disabled', name)

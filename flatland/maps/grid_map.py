@@ -7,14 +7,14 @@ from typing import Final
 
 import numpy as np
 
-from flatland.errors import MapFileError
+from flatland.errors import MapFileError, Place
 from flatland.geometry import finite_pose
 from flatland.maps.map_file import LayerMap
 from flatland.maps.map_image import image_edges
-from flatland.maps.occupancy_grid import OccupancyGrid
+from flatland.values import OccupancyGrid
 
 OCCUPIED_FROM: Final = 65
-"""Least occupancy of a wall, that of map files with `occupied_thresh: 0.65`."""
+"""Least occupancy of a wall, as in map files with `occupied_thresh: 0.65`."""
 
 
 def grid_map(grid: OccupancyGrid, simplify: int) -> LayerMap:
@@ -45,4 +45,4 @@ def grid_map(grid: OccupancyGrid, simplify: int) -> LayerMap:
         edges, exact_edge_count = image_edges(mask, grid.resolution, simplify)
     except ValueError as error:
         raise MapFileError(f"invalid grid, {error}") from error
-    return LayerMap(origin, edges, exact_edge_count, "", ())
+    return LayerMap(origin, edges, exact_edge_count, "", (), Place(""))

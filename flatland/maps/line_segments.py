@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from flatland.config.documents import read_regular
+from flatland.config.files import read_regular
 from flatland.errors import MapFileError, Place
 
 _COLUMNS = 4

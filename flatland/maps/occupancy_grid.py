@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
@@ -10,11 +9,13 @@ import numpy.typing as npt
 
 from flatland.config.reader import YamlReader
 from flatland.errors import WorldError
-from flatland.geometry import DoubleArray, Pose
-from flatland.maps.map_image import read_grey_image
+from flatland.geometry import DoubleArray
+from flatland.maps.grey_image import read_grey_image
+from flatland.maps.unreadable_image import why_unreadable
+from flatland.values import GridCells, OccupancyGrid
 
 if TYPE_CHECKING:
-    from flatland.config.preprocessor import Params
+    from flatland.config.inputs import Params
     from flatland.entities.layer import Layer
 
 FREE: Final = 0
@@ -23,24 +24,6 @@ UNKNOWN: Final = -1
 DEFAULT_FREE_THRESH: Final = 0.196  # the default of map_server
 MAX_CELLS: Final = 2**28  # of a grid of line segments; 256 MiB
 _MODES: Final = ("trinary", "scale", "raw")
-
-GridCells = npt.NDArray[np.int8]
-
-
-@dataclass(frozen=True, eq=False)
-class OccupancyGrid:
-    """A grid of occupancy values, as in `nav_msgs/OccupancyGrid`.
-
-    Attributes:
-        origin: Pose of the lower left corner of the grid in the world frame [m, m, rad].
-        resolution: Size of a cell [m].
-        cells: Occupancy from 0 (free) to 100 (occupied), -1 if unknown; shape (rows, columns),
-            the row at the bottom of the map first.
-    """
-
-    origin: Pose
-    resolution: float
-    cells: GridCells
 
 
 class ImageGrid:
@@ -77,7 +60,9 @@ class ImageGrid:
         try:
             image = read_grey_image(self._path)
         except OSError as error:
-            raise self._image.error(f'Failed to load "{self._path}"') from error
+            raise self._image.error(
+                f'Failed to load "{self._path}"', why_unreadable(self._path, error)
+            ) from error
         cells = self._values()[image[::-1]]
         return OccupancyGrid(self._origin, self._resolution, cells)
 
@@ -129,7 +114,7 @@ class EdgeGrid:
         """Draws the edges."""
         cells = np.full(self._shape, FREE, np.int8)
         columns, rows = _cells_of_edges(self._edges / self._resolution - np.tile(self._low, 2))
-        # Rounding may put a point at the border of the grid just outside it.
+        # Rounding may put a point at the border of the grid just outside the grid.
         height, width = self._shape
         cells[np.clip(rows, 0, height - 1), np.clip(columns, 0, width - 1)] = OCCUPIED
         x, y = (float(low) * self._resolution for low in self._low)

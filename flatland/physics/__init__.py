@@ -1,74 +1,97 @@
 """Handles of Box2D objects: the physics world, its bodies, fixtures, joints and contacts.
 
-This package is the only interface between flatland and the physics of its C++ extension. A handle
-consists of a world and an id; the world owns the object. Once the object is destroyed or the world
-is closed, every use of the handle raises `StaleHandleError`. While a world is stepping or creating
-edges, every use of it in another thread raises `WorldLockedError`. A change waits until other
-threads have finished casting rays.
+This package is the only interface between flatland and the physics of its C++ extension, whose
+classes of handles it exports. A handle consists of a world and an id; the world owns the object.
+Once the object is destroyed or the world is closed, every use of the handle raises
+`StaleHandleError`. While a world is stepping or creating edges, every use of it in another thread
+raises `WorldLockedError`. A change waits until other threads have finished casting rays.
 
 Lengths are in metres, angles in radians, times in seconds and masses in kilograms. All numbers must
 be finite and within +-1e9. Box2D computes in single precision.
 """
 
-from flatland._core import BOX2D_VERSION, OldManifold, PreSolveContact
-from flatland.geometry import Pose
-from flatland.physics.body import PhysicsBody
-from flatland.physics.contact import ContactEvent, ContactInfo
-from flatland.physics.controller import (
+from flatland._core import (
+    BOX2D_VERSION,
     AckermannController,
+    BeamFan,
+    ContactEvent,
+    ContactInfo,
     Controller,
+    Crowd,
     DriveController,
+    Handle,
+    JobQueue,
+    OldManifold,
     OmniController,
     PathController,
-    RollingWheel,
+    PhysicsBody,
+    PhysicsFixture,
+    PhysicsJoint,
+    PreSolveContact,
+    RangeFinder,
+    RangeNoise,
+    Touches,
     TricycleController,
     TweenController,
     VelocityController,
     WheelsController,
+    boundary_edges,
+    boundary_loops,
+    connected_regions,
+    dilated,
+    distances_to_off,
     ease,
     easings,
+    run_worlds,
+    scan_all,
+    simplified_loop,
 )
-from flatland.physics.crowd import Crowd, PersonState, RouteOrder
-from flatland.physics.fixture import PhysicsFixture
-from flatland.physics.joint import PhysicsJoint
-from flatland.physics.material import Material
-from flatland.physics.plan import (
-    END_OF_ORDER,
+from flatland.geometry import Pose
+from flatland.physics.values import (
+    ALL_BITS,
+    Clock,
+    LabelledScan,
+    Material,
+    Member,
+    ObjectCounts,
+    PathState,
+    PersonState,
+    RayHit,
+    RollingWheel,
+    Run,
     RunEnd,
     RunResult,
-    StepPlan,
-    StepRun,
-    WorkTimes,
-    run_worlds,
-)
-from flatland.physics.queries import RayHit
-from flatland.physics.range_finder import (
-    BeamFan,
-    LabelledScan,
-    RangeFinder,
-    RangeNoise,
     Scan,
     ScanRequest,
-    scan_all,
+    SpeedLimits,
+    StepReport,
+    Touch,
+    WorkTimes,
+    to_report,
 )
-from flatland.physics.touches import Touch, Touches
-from flatland.physics.world import PhysicsWorld, StepReport, to_report
+from flatland.physics.world import PhysicsWorld
 
 __all__ = [
+    "ALL_BITS",
     "BOX2D_VERSION",
-    "END_OF_ORDER",
     "AckermannController",
     "BeamFan",
+    "Clock",
     "ContactEvent",
     "ContactInfo",
     "Controller",
     "Crowd",
     "DriveController",
+    "Handle",
+    "JobQueue",
     "LabelledScan",
     "Material",
+    "Member",
+    "ObjectCounts",
     "OldManifold",
     "OmniController",
     "PathController",
+    "PathState",
     "PersonState",
     "PhysicsBody",
     "PhysicsFixture",
@@ -80,14 +103,13 @@ __all__ = [
     "RangeNoise",
     "RayHit",
     "RollingWheel",
-    "RouteOrder",
+    "Run",
     "RunEnd",
     "RunResult",
     "Scan",
     "ScanRequest",
-    "StepPlan",
+    "SpeedLimits",
     "StepReport",
-    "StepRun",
     "Touch",
     "Touches",
     "TricycleController",
@@ -95,9 +117,15 @@ __all__ = [
     "VelocityController",
     "WheelsController",
     "WorkTimes",
+    "boundary_edges",
+    "boundary_loops",
+    "connected_regions",
+    "dilated",
+    "distances_to_off",
     "ease",
     "easings",
     "run_worlds",
     "scan_all",
+    "simplified_loop",
     "to_report",
 ]

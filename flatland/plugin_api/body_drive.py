@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from typing import TYPE_CHECKING
 
 from flatland.plugin_api.drive import Odometer, open_twist_command
+from flatland.plugin_api.dynamics_limits import DynamicsLimits
 from flatland.plugin_api.plugin import ModelPlugin
-from flatland.plugin_api.schedule import when_due
 from flatland.values import Twist, TwistWithCovariance
 
 if TYPE_CHECKING:
@@ -18,27 +19,68 @@ if TYPE_CHECKING:
     from flatland.physics import DriveController
     from flatland.plugin_api.ports import Command, Output
     from flatland.plugin_api.traction import Traction
-    from flatland.plugin_api.update_timer import UpdateTimer
     from flatland.timekeeper import Timekeeper
 
 
 class BodyDrive(ModelPlugin):
     """Drives a body by a controller of the core, and emits where it is and how it moves.
 
-    A subclass creates the controller, calls `open_reports` and `open_twist`, and passes commands
-    to the controller in `set_target`.
+    A subclass calls `read_limits`, creates the controller, which moves the body in each step, calls
+    `apply_limits`, `open_reports` and `open_twist`, and passes commands to the controller in
+    `set_target`.
 
     Attributes:
         body: The driven body.
         traction: Limits of the forces in mode `force`; None in mode `velocity`.
-        timer: Timer of the updates.
     """
 
     body: Body
     traction: Traction | None
-    timer: UpdateTimer
     _controller: DriveController
+    _limits: tuple[DynamicsLimits, DynamicsLimits]  # linear, angular
+    _odometer: Odometer
+    _twist: Output[TwistWithCovariance] | None
     _moves_sideways = False
+
+    def read_limits(self, config: YamlReader) -> None:
+        """Reads `linear_dynamics` and `angular_dynamics`; for `on_initialize`.
+
+        Raises:
+            YamlError: A limit is invalid.
+        """
+        linear, angular = (
+            DynamicsLimits.from_config(config.optional_subnode(key, "map"))
+            for key in ("linear_dynamics", "angular_dynamics")
+        )
+        self._limits = linear, angular
+
+    @property
+    def linear_dynamics(self) -> DynamicsLimits:
+        """Limits of the linear velocity of the drive; settable."""
+        return self._limits[0]
+
+    @linear_dynamics.setter
+    def linear_dynamics(self, limits: DynamicsLimits) -> None:
+        self._limits = limits, self._limits[1]
+        self.apply_limits()
+
+    @property
+    def angular_dynamics(self) -> DynamicsLimits:
+        """Limits of the yaw rate, or of the steering; settable."""
+        return self._limits[1]
+
+    @angular_dynamics.setter
+    def angular_dynamics(self, limits: DynamicsLimits) -> None:
+        self._limits = self._limits[0], limits
+        self.apply_limits()
+
+    def apply_limits(self) -> None:
+        """Passes the limits to the controller."""
+        self._set_limits(*self._limits)
+
+    @abstractmethod
+    def _set_limits(self, linear: DynamicsLimits, angular: DynamicsLimits) -> None:
+        """Sets the limits of the controller."""
 
     def open_reports(self, config: YamlReader, center: Vector2 = (0.0, 0.0)) -> None:
         """Declares the outputs and arranges for the updates; for `on_initialize`.
@@ -62,11 +104,11 @@ class BodyDrive(ModelPlugin):
         )
         self.world_frame_id = self._odometer.world_frame_id
         twist_topic = config.get("twist_pub", "string", "twist")
-        self._twist: Output[TwistWithCovariance] | None = None
+        self._twist = None
         if config.get("enable_twist_pub", "bool", True):
             self._twist = self.output(twist_topic, TwistWithCovariance)
         outputs = () if self._twist is None else (self._twist,)
-        self.timer = self._odometer.schedule(config, self._publish_now, outputs)
+        self._odometer.publish_at_rate(config, self._publish, outputs)
 
     def open_twist(self, config: YamlReader) -> Command[Twist]:
         """Declares the command of a velocity; for `on_initialize`.
@@ -87,15 +129,6 @@ class BodyDrive(ModelPlugin):
         """Passes the command to the controller."""
         raise NotImplementedError
 
-    @when_due
-    def before_physics_step(self, timekeeper: Timekeeper) -> None:
-        """Moves the body, then reports where it is and how it moves now."""
-        self.set_target()
-        # In every step; otherwise friction and contacts would slow the robot down.
-        self._controller.advance(timekeeper.step_size)
-        if self.timer.check_update(timekeeper):
-            self._publish_now(timekeeper)
-
     def model_moved(self, previous: Mapping[str, Pose], keep_odometry: bool) -> None:
         """Keeps the odometry, or displaces it along with the model."""
         self._odometer.move(previous[self.body.name], keep_odometry)
@@ -111,7 +144,7 @@ class BodyDrive(ModelPlugin):
         """Returns what changes in the controller, apart from the traction."""
         raise NotImplementedError
 
-    def _publish_now(self, timekeeper: Timekeeper) -> None:
+    def _publish(self, timekeeper: Timekeeper) -> None:
         twist = self._twist
         odometer = self._odometer
         odometer.begin_update()

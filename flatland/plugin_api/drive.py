@@ -6,34 +6,26 @@ import math
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 from flatland.geometry import IDENTITY, DoubleArray, Pose, Vector2, compose, invert, rotate
-from flatland.plugin_api.after_step import (
-    AFTER,
-    BEFORE,
-    NeverDue,
-    StepHook,
-    call_after_step,
-    read_after_step,
-)
 from flatland.plugin_api.noise import GaussianNoise
 from flatland.plugin_api.occasional_warning import OccasionalWarning
 from flatland.plugin_api.odometry_drift import OdometryDrift
 from flatland.plugin_api.parameters import (
     planar_diagonal,
     read_covariance,
+    read_phase,
     read_rate,
     read_variances,
 )
-from flatland.plugin_api.schedule import when_due
-from flatland.plugin_api.update_timer import UpdateTimer
 from flatland.values import AckermannCommand, Odometry, Twist
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Iterable, Sequence
 
     from flatland.config.reader import YamlReader
     from flatland.entities.body import Body
     from flatland.plugin_api.plugin import ModelPlugin
     from flatland.plugin_api.ports import Command, Output
+    from flatland.plugin_api.updates import UpdateFunction
     from flatland.timekeeper import Timekeeper
 
 C = TypeVar("C", Twist, AckermannCommand)
@@ -135,7 +127,7 @@ class Odometer:
         self.sends_transform: bool = config.get("enable_odom_tf_pub", "bool", sends_transform)
         pose_variances = read_variances(config, "odom_pose_noise")
         twist_variances = read_variances(config, "odom_twist_noise")
-        # A covariance of the file is emitted as it is; that of the drift is added to the default.
+        # A covariance of the file is emitted unchanged; the drift adds to the default covariance.
         self._adds_pose_covariance = "odom_pose_covariance" not in config
         self._adds_twist_covariance = "odom_twist_covariance" not in config
         self._pose_covariance = read_covariance(
@@ -165,69 +157,54 @@ class Odometer:
             stream = plugin.noise_stream("odometry drift")
             self._is_exact = False
             self._drift = OdometryDrift((a1, a2, a3, a4), stream, body.pose, center)
-        self._publish: StepHook | None = None  # after the step, at the updates of `_timer`
-        self._timer = UpdateTimer()
         self._truth: Output[Odometry] | None = None
         self._odometry: Output[Odometry] | None = None
         if publish:
             self._truth = plugin.output(truth_topic, Odometry)
             self._odometry = plugin.output(odometry_topic, Odometry)
 
-    def schedule(
-        self, config: YamlReader, publish: StepHook, outputs: Iterable[Output[Any]] = ()
-    ) -> UpdateTimer:
-        """Reads `pub_rate` and `after_step`, and arranges for what happens in each step.
+    def publish_at_rate(
+        self, config: YamlReader, publish: UpdateFunction, outputs: Iterable[Output[Any]] = ()
+    ) -> None:
+        """Reads `pub_rate` and `after_step`, and declares the updates.
 
         Args:
             config: Parameters of the drive.
-            publish: Publishes the current state with the current time.
+            publish: Publishes the current state.
             outputs: What it emits besides the ground truth and the odometry.
-
-        Returns:
-            The timer of the updates in `before_physics_step`.
 
         Raises:
             YamlError: A parameter is invalid.
         """
-        timer = UpdateTimer(read_rate(config, "pub_rate"))
+        rate = read_rate(config, "pub_rate")
+        phase = read_phase(config, rate)
         plugin = self._plugin
-        own = (output for output in (self._truth, self._odometry) if output is not None)
-        emitted = (*own, *outputs)
-        if read_after_step(config) and timer.rate > 0:
-            self._publish, self._timer = publish, timer
-            timer = NeverDue(timer.rate)
-            plugin.call_when_due(BEFORE, timer)
+        if self.sends_transform:
+            frames = (self.frame_id, self.child_frame_id)
+            plugin.declare_transform(*frames, switch="enable_odom_tf_pub: false")
         if self._drift is not None:
             # In each step, so that the drift depends neither on the rate nor on subscribers.
-            call_after_step(plugin, self._drift_and_publish)
-            plugin.call_when_due(BEFORE, timer)
-            return timer
-        hook, publishing = BEFORE, timer
-        if self._publish is not None:
-            call_after_step(plugin, self._publish_after_step)
-            hook, publishing = AFTER, self._timer
-        plugin.call_when_due(
-            hook,
-            publishing,
-            outputs=emitted,
+            plugin.on_update(self._advance_drift, phase="after")
+            plugin.on_update(publish, rate, phase=phase)
+            return
+        own = (output for output in (self._truth, self._odometry) if output is not None)
+        plugin.on_update(
+            publish,
+            rate,
+            phase=phase,
+            outputs=(*own, *outputs),
             transforms=self.sends_transform,
             bodies=[self._body],
             skipped=self._skip,
         )
-        return timer
 
-    @when_due
-    def _publish_after_step(self, timekeeper: Timekeeper) -> None:
-        if self._publish is not None and self._timer.check_update(timekeeper):
-            self._publish(timekeeper)
-
-    def _drift_and_publish(self, timekeeper: Timekeeper) -> None:
+    def _advance_drift(self, timekeeper: Timekeeper) -> None:
+        del timekeeper
         if self._drift is not None:
             self._drift.advance(self._body.pose)
-        self._publish_after_step(timekeeper)
 
-    def _skip(self, count: int, stamp: int, poses: tuple[Pose, ...]) -> None:
-        """Accounts for skipped updates; see `FlatlandPlugin.call_when_due`."""
+    def _skip(self, count: int, stamp: int, poses: Sequence[Pose]) -> None:
+        """Accounts for skipped updates; see `FlatlandPlugin.on_update`."""
         for noise in self._active_noise:
             noise.begin_update(count)
         if self.sends_transform:
@@ -246,7 +223,7 @@ class Odometer:
             noise.begin_update()
 
     def move(self, previous: Pose, keep: bool) -> None:
-        """Takes over that the model was moved.
+        """Adapts the odometry to a move of the model by a request.
 
         Args:
             previous: Pose of the body before the move, in the world frame [m, rad].
@@ -286,7 +263,7 @@ class Odometer:
         Args:
             pose: As for `measure`.
             velocity: As for `measure`.
-            yaw: Heading of the body in the frame of the result, 0 for that of the body [rad].
+            yaw: Heading of the body in the frame of the result, 0 for the frame of the body [rad].
         """
         drift = self._drift
         if drift is None or not self._adds_twist_covariance:

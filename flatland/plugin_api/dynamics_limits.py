@@ -9,7 +9,7 @@ from flatland.plugin_api.parameters import read_not_negative
 
 if TYPE_CHECKING:
     from flatland.config.reader import YamlReader
-    from flatland.physics.controller import SpeedLimits
+    from flatland.physics import SpeedLimits
 
 
 class DynamicsLimits:

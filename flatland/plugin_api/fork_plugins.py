@@ -21,7 +21,7 @@ _STEERED: Final = "use AckermannDrive"
 _DIFFERENTIAL: Final = "use DiffDrive"
 _RADIATION: Final = "flatland has no model of radiation; write a Python plugin"
 
-_ALTERNATIVES: Final = {
+ALTERNATIVES: Final = {
     "PedsimMovement": _PEDESTRIANS,
     "VehicleMovement": _PEDESTRIANS,
     "PosePub": "use PosePublisher, which publishes the true pose of a body",
@@ -44,12 +44,7 @@ _ALTERNATIVES: Final = {
     "RadiationSourceWorld": _RADIATION,
     "RadiationSensor": _RADIATION,
 }
-_BY_NAME: Final = {name.lower(): text for name, text in _ALTERNATIVES.items()}
-
-
-def fork_plugin_names() -> list[str]:
-    """Returns the names of the plugins of forks that are known."""
-    return list(_ALTERNATIVES)
+_BY_NAME: Final = {name.lower(): text for name, text in ALTERNATIVES.items()}
 
 
 def alternative_to(type_name: str) -> str:

@@ -21,7 +21,6 @@ from flatland.plugin_api.package_exports import PYTHON_TAG, Export, package_expo
 
 if TYPE_CHECKING:
     from flatland.config.reader import YamlReader
-    from flatland.plugin_api.registry import PluginRegistry
 
 # Plugins for tests of manifests, which are no useful suggestions.
 _UNLISTED = {f"{INCLUDED_PACKAGE}::Dummy{kind}Plugin" for kind in ("Model", "World")}
@@ -33,19 +32,19 @@ _MAX_SUGGESTIONS = 3
 class MissingPluginsError(PluginError):
     """Raised if some plugins of a model or world are declared by no manifest."""
 
-    def __init__(self, message: str, missing: Sequence[PluginError] = ()) -> None:
+    def __init__(self, message: str, missing: Sequence[PluginError]) -> None:
         """Initializes the error.
 
         Args:
             message: Text about all missing plugins.
-            missing: An error for each of them.
+            missing: An error for each of them, at least one.
         """
-        super().__init__(message, place=missing[0].place if missing else None)
+        super().__init__(message, place=missing[0].place)
         self._missing = missing
 
     def parts(self) -> Sequence[FlatlandError]:
         """Returns an error for each missing plugin."""
-        return self._missing or (self,)
+        return self._missing
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,42 +81,6 @@ def read_entries(entries: Iterable[YamlReader], model: str | None) -> list[Plugi
     ]
 
 
-def missing_plugins_error(
-    registry: PluginRegistry, entries: Sequence[PluginEntry]
-) -> MissingPluginsError | None:
-    """Returns one error about all entries whose plugin is declared by no manifest.
-
-    The lines of a model file occur once, with the names of all models that are loaded from it.
-
-    Args:
-        registry: Registry of the known plugins.
-        entries: Entries of any models and of the world.
-
-    Returns:
-        The error, or None if a plugin exists for each entry.
-    """
-    missing_types = set(registry.find_missing(entry.type_name for entry in entries))
-    if not missing_types:
-        return None
-    hints = registry.hints()
-    advice = hints.advise(missing_types)
-    models: dict[tuple[str, str, Place], list[str | None]] = {}
-    for entry in entries:
-        if entry.type_name in missing_types:
-            models.setdefault((entry.name, entry.type_name, entry.place), []).append(entry.model)
-    missing = []
-    for (name, type_name, place), owners in models.items():
-        kind = "World" if owners[0] is None else "Model"
-        text = f'{kind} Plugin "{name}" type "{type_name}"'
-        if owners[0] is not None:
-            text += " model " + ", ".join(f'"{owner}"' for owner in owners)
-        text += f": {hints.describe(type_name)}"
-        missing.append(PluginError(text + place.suffix, place=place, hint=_HINT))
-    if len(missing) == 1:
-        return MissingPluginsError(f"{text}; {advice}{place.suffix}", missing)
-    return MissingPluginsError("\n".join([*(error.message for error in missing), advice]), missing)
-
-
 class LookupHints:
     """Error texts about plugins that are declared by no manifest."""
 
@@ -146,13 +109,13 @@ class LookupHints:
     def describe(self, type_name: str) -> str:
         """Returns a text about one `type:` of a YAML file.
 
-        It contains similar known names, the packages that export a C++ plugin of that name, and
-        what to use instead of a plugin of a known fork of the reference.
+        The text contains similar known names, the packages that export a C++ plugin of that name,
+        and what to use instead of a plugin of a known fork of the reference.
         """
         name = lookup_name(type_name)
         text = f'no plugin "{name}"'
         similar = [
-            f'"{known.removeprefix(f"{INCLUDED_PACKAGE}::")}"'
+            f'"{_short(known)}"'
             for known in self._by_similarity([type_name])[:_MAX_SUGGESTIONS]
             if _similarity(known, type_name) >= _MIN_SIMILARITY
         ]
@@ -171,12 +134,37 @@ class LookupHints:
         text = (
             f"C++ plugins cannot be loaded, {PORTING_GUIDE} explains how to port them to Python; "
             '"enabled: false" in the entry of a plugin skips it; '
-            f"known plugins: {', '.join(self._by_similarity(type_names))}"
+            f"known plugins: {', '.join(map(_short, self._by_similarity(type_names)))}"
         )
         if self._problems:
             errors = "; ".join(problem.message for problem in self._problems)
             text += f"; manifests with errors: {errors}"
         return text
+
+    def error(self, entries: Iterable[PluginEntry]) -> MissingPluginsError:
+        """Returns one error about several entries whose plugins are missing.
+
+        The lines of a model file occur once, with the names of all models that are loaded from it.
+
+        Args:
+            entries: Entries of any models and of the world, at least one.
+        """
+        models: dict[tuple[str, str, Place], list[str | None]] = {}
+        for entry in entries:
+            models.setdefault((entry.name, entry.type_name, entry.place), []).append(entry.model)
+        missing = []
+        for (name, type_name, place), owners in models.items():
+            kind = "World" if owners[0] is None else "Model"
+            text = f'{kind} Plugin "{name}" type "{type_name}"'
+            if owners[0] is not None:
+                text += " model " + ", ".join(f'"{owner}"' for owner in owners)
+            text += f": {self.describe(type_name)}"
+            missing.append(PluginError(text + place.suffix, place=place, hint=_HINT))
+        advice = self.advise({type_name for _, type_name, _ in models})
+        if len(missing) == 1:
+            return MissingPluginsError(f"{text}; {advice}{place.suffix}", missing)
+        texts = [*(error.message for error in missing), advice]
+        return MissingPluginsError("\n".join(texts), missing)
 
     def _by_similarity(self, type_names: Collection[str]) -> list[str]:
         """Returns the known names, the most similar to any of the given names first."""
@@ -184,6 +172,11 @@ class LookupHints:
             self._known,
             key=lambda name: (-max(_similarity(name, other) for other in type_names), name),
         )
+
+
+def _short(name: str) -> str:
+    """Returns a look-up name as it is usually written in files: included plugins have no prefix."""
+    return name.removeprefix(f"{INCLUDED_PACKAGE}::")
 
 
 def _similarity(name: str, other: str) -> float:

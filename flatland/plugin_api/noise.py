@@ -30,7 +30,7 @@ class NoiseStream:
     """Random numbers of one output, a function of the seed and of the number of updates due.
 
     The generator is counter-based (Philox): each update owns a range of counters. The numbers of an
-    update are therefore the same whether or not those of earlier updates were drawn, and depend
+    update are therefore the same whether or not earlier updates drew numbers, and depend
     neither on the subscribers of an output nor on the time at which they connect.
 
     Attributes:

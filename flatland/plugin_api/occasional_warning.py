@@ -13,7 +13,7 @@ WARNING_PERIOD: Final = 1.0  # s of wall time between two warnings, at least
 
 
 class OccasionalWarning:
-    """Logs warnings of one source, and omits those that follow another one too soon."""
+    """Logs warnings of one source, and omits a warning that follows another one too soon."""
 
     def __init__(self) -> None:
         """Creates a source that has logged nothing."""

@@ -44,8 +44,8 @@ class OdometryDrift:
     """The estimate of the pose of a body by odometry with errors that accumulate.
 
     A segment ends when d / `SEGMENT_LENGTH` + |phi| / `SEGMENT_ANGLE`, summed over its steps, is 1.
-    The errors are those of the center of the motion, a point of the body that moves along its x
-    axis; the rest of the body follows rigidly. A sideways motion, such as that of a body that is
+    The errors apply to the center of the motion, a point of the body that moves along its x
+    axis; the rest of the body follows rigidly. A sideways motion, such as of a body that is
     pushed, is measured exactly and counts as part of the distance.
 
     Attributes:
@@ -137,7 +137,7 @@ class OdometryDrift:
         return compose(self._estimate, (-self._center[0], -self._center[1], 0.0))
 
     def move(self, previous: Pose, pose: Pose, keep: bool) -> None:
-        """Takes over a displacement that is not a motion, such as by `World.move_model`.
+        """Applies a displacement that is not a motion, such as by `World.move_model`.
 
         Args:
             previous: Pose of the origin of the body before it, in the world frame [m, rad].
@@ -191,12 +191,12 @@ class OdometryDrift:
 
         Args:
             velocity: The true velocity as for `measure`.
-            yaw: Heading of the body in the frame of the result, 0 for that of the body [rad].
+            yaw: Heading of the body in the frame of the result, 0 for the frame of the body [rad].
         """
         forward, sideways, omega = self._velocity_of_center(velocity)
         variances = self._variances(math.hypot(forward, sideways), omega)
         cx, cy = self._center
-        # The change of the velocity of the origin with that of the center, and with the yaw rate.
+        # Derivatives of the velocity of the origin: by the velocity of the center, by the yaw rate.
         by_forward = (*rotate((1.0, 0.0), yaw), 0.0)
         by_omega = (*rotate((cy, -cx), yaw), 1.0)
         jacobian = np.array([by_forward, by_omega]).T

@@ -11,13 +11,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from flatland.config.hints import did_you_mean
+from flatland.config.hints import choice, did_you_mean
 from flatland.geometry import IDENTITY, DoubleArray, Pose, Vector2
 
 if TYPE_CHECKING:
     from flatland.config.reader import YamlReader
     from flatland.entities.body import Body
     from flatland.entities.model import Model
+    from flatland.plugin_api.updates import Phase
 
 Triple = tuple[float, float, float]
 
@@ -37,11 +38,9 @@ def find_body(config: YamlReader, key: str, model: Model, name: str) -> Body:
     """
     body = model.find_body(name)
     if body is None:
-        names = (other.name for other in model.bodies)
+        hint = did_you_mean(name, (other.name for other in model.bodies), "bodies of the model")
         entry = at_key(config, key)
-        entry.report(
-            entry.error(f'Body with name "{name}" does not exist', did_you_mean(name, names))
-        )
+        entry.report(entry.error(f'Body with name "{name}" does not exist', hint))
         return model.bodies[0]  # only if errors are collected
     return body
 
@@ -64,6 +63,25 @@ def read_body_or_first(config: YamlReader, model: Model, key: str) -> Body:
     return find_body(config, key, model, config.get(key, "string", model.bodies[0].name))
 
 
+def read_choice(config: YamlReader, key: str, choices: Sequence[str], default: str = "") -> str:
+    """Reads one of several words.
+
+    Args:
+        config: Parameters of the plugin.
+        key: Name of the parameter.
+        choices: The words.
+        default: The default, the first word if it is empty.
+
+    Raises:
+        YamlError: The value is none of the words.
+    """
+    value: str = config.get(key, "string", default or choices[0])
+    if value not in choices:
+        text = f'Invalid "{key}", must be one of: {", ".join(choices)}, got {value}'
+        raise at_key(config, key).error(text, choice(value, choices))
+    return value
+
+
 def read_bodies(config: YamlReader, model: Model, key: str) -> list[Body]:
     """Reads an optional list of names of bodies and returns the bodies.
 
@@ -71,6 +89,25 @@ def read_bodies(config: YamlReader, model: Model, key: str) -> list[Body]:
         YamlError: A body does not exist.
     """
     return [find_body(config, key, model, name) for name in config.get_list(key, "string", [])]
+
+
+def read_phase(config: YamlReader, rate: float) -> Phase:
+    """Reads `after_step`: whether to publish the state after a step, instead of that before it.
+
+    By default, plugins that publish before the physics step publish the state at time t, when the
+    node has published the time t already. With `after_step: true`, they publish the state at time
+    t + dt after the step. The times at which updates are due are the same, except that the state at
+    time 0, which no step precedes, is published only if the rate is 0, that is, if it is the only
+    update.
+
+    Args:
+        config: Parameters of the plugin.
+        rate: Rate of its updates [Hz].
+
+    Raises:
+        YamlError: The value is not a boolean.
+    """
+    return "after" if config.get("after_step", "bool", False) and rate > 0 else "before"
 
 
 def read_rate(config: YamlReader, key: str = "update_rate", default: float = math.inf) -> float:

@@ -6,32 +6,40 @@ A plugin declares its ports and hooks and does not depend on ROS. See `docs/writ
 from __future__ import annotations
 
 import builtins
+import math
 import zlib
 from typing import TYPE_CHECKING, Any, ClassVar, TypeVar
 
 import numpy as np
 
 from flatland.entities.contact import Contact, ContactImpulse, ModelContact, MutableContact
-from flatland.errors import PluginError
+from flatland.errors import Place, PluginError
 from flatland.graph_names import resolve_topic
 from flatland.plugin_api.noise import NoiseStream
 from flatland.plugin_api.ports import Command, Output
-from flatland.plugin_api.schedule import HookSchedule, SkippedHandler
+from flatland.plugin_api.update_timer import UpdateTimer
+from flatland.plugin_api.updates import (
+    STEP_HOOKS,
+    Phase,
+    SkippedHandler,
+    Update,
+    UpdateFunction,
+    is_called_when_due,
+)
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Mapping
+    from collections.abc import Callable, Iterable, Mapping, Sequence
 
     from flatland.config.reader import YamlReader
     from flatland.entities.body import Body
     from flatland.entities.model import Model
     from flatland.geometry import Pose
-    from flatland.physics import Controller, OldManifold, Touches
-    from flatland.plugin_api.update_timer import UpdateTimer
+    from flatland.physics import Controller, Crowd, OldManifold, Touches
+    from flatland.plugin_api.plugin_world import PluginWorld
     from flatland.timekeeper import Timekeeper
-    from flatland.world import World
 
 T = TypeVar("T")
-C = TypeVar("C", bound="Controller")
+C = TypeVar("C", bound="Controller | Crowd")
 
 
 class FlatlandPlugin:
@@ -58,7 +66,7 @@ class FlatlandPlugin:
 
     name: str
     type: str
-    world: World
+    world: PluginWorld
     namespace: str
     rng: np.random.Generator
     ros: Any
@@ -67,14 +75,18 @@ class FlatlandPlugin:
     _outputs: list[Output[Any]]
     _commands: list[Command[Any]]
     _noise_streams: list[NoiseStream]
+    _place = Place("")  # of the entry in the file
     _sent: set[tuple[str, str]]
-    _schedules: dict[str, HookSchedule]
-    _controllers: list[Controller]
+    _declared: set[tuple[str, str]]
+    _jobs: list[Update | Controller | Crowd]
     _touch_collectors: list[Touches]
+    _is_initialized: bool
     _detached: bool
     _label: str
 
-    def _attach(self, world: World, owner: str, name: str, type_name: str, namespace: str) -> None:
+    def _attach(
+        self, world: PluginWorld, owner: str, name: str, type_name: str, namespace: str
+    ) -> None:
         """Attaches the plugin to a world; called once, before `on_initialize`.
 
         Args:
@@ -95,8 +107,9 @@ class FlatlandPlugin:
         self._commands = []
         self._noise_streams = []
         self._sent = set()
-        self._schedules = {}
-        self._controllers = []
+        self._declared = set()
+        self._jobs = []
+        self._is_initialized = False
         self._touch_collectors = []
         self._detached = False
         self._label = describe(self)
@@ -113,8 +126,9 @@ class FlatlandPlugin:
         for touches in self._touch_collectors:
             if touches.alive:
                 touches.remove()
-        self.world.transform_buffer.forget(self, self._sent)
+        self.world.transform_buffer.forget(self, self._sent | self._declared)
         self._sent.clear()
+        self._declared.clear()
 
     def output(self, topic: str, value_type: builtins.type[T]) -> Output[T]:
         """Declares a stream of values.
@@ -157,6 +171,24 @@ class FlatlandPlugin:
         self._commands.append(command)
         return command
 
+    def read_yaml(self, path: str) -> YamlReader:
+        """Reads a YAML file as one of the files of the world.
+
+        Recordings list the file, so that a replay finds out whether it has changed. If it is read
+        while the world is loaded, `World.reset` uses the same content. The file may contain
+        `$include` and `$eval`; `param()` returns the parameters of the world.
+
+        Args:
+            path: Absolute path, such as the result of `YamlReader.resolve_path`; or one relative to
+                the folder of the world file.
+
+        Raises:
+            YamlError: The file cannot be read, is not valid YAML, cannot be preprocessed, or is
+                outside the folders of `World.model_path`.
+        """
+        source = self.world.source
+        return source.read(source.resolve(path))
+
     def noise_stream(self, output: str) -> NoiseStream:
         """Returns a stream of random numbers for the noise of one output.
 
@@ -192,6 +224,72 @@ class FlatlandPlugin:
             stream.updates = word >> 2
             stream.begin_update()
 
+    def on_update(
+        self,
+        function: UpdateFunction,
+        rate: float | UpdateTimer = math.inf,
+        *,
+        phase: Phase = "after",
+        outputs: Iterable[Output[Any]] | None = None,
+        transforms: bool = False,
+        bodies: Iterable[Body] = (),
+        skipped: SkippedHandler | None = None,
+        touches: Touches | None = None,
+        at_touches: bool = False,
+        prepare: Callable[[Sequence[Any]], object] | None = None,
+    ) -> Update:
+        """Declares a function that is called when an update is due; for `on_initialize`.
+
+        The core performs all other steps, many at a time, without Python code. The jobs of a
+        plugin, its updates and controllers, are performed in the order in which they were declared.
+        The function is always called for the first update due, and for others only if one of its
+        outputs is wanted.
+
+        Args:
+            function: Called as `function(timekeeper)`.
+            rate: Update rate [Hz]; infinity means every step, 0 only time 0. Or a timer of this
+                rate.
+            phase: `before` the physics step, at time t, or `after` it, at time t + dt.
+            outputs: The outputs to which the function emits; it is not called while none of them is
+                wanted. None to call it in any case.
+            transforms: Whether to call it also while an observer wants transforms.
+            bodies: Bodies whose poses `skipped` needs.
+            skipped: Accounts for updates that were due without a call of the function. It is called
+                as `skipped(count, stamp, poses)` with the number of updates, the simulated time of
+                the last one [ns], and the poses of `bodies` at that time, world frame [m, rad],
+                before the next call of the function and before the state of the plugin or
+                the transforms are read, and must not emit anything.
+            touches: Contacts whose `clear` is called at updates without a call of the function.
+            at_touches: Whether to call the function also in steps in which there are contacts in
+                `touches`; for the phase `after`.
+            prepare: Called as `prepare(plugins)` before the functions of several plugins with the
+                same `prepare`, if nothing else happens between them. `prepare` must not move
+                bodies. If `prepare` raises, each function is called without the preparation.
+
+        Returns:
+            The declaration, whose `outputs` may be changed later.
+
+        Raises:
+            ValueError: The phase is unknown, or the rate is negative or NaN.
+            PluginError: `on_initialize` has returned.
+        """
+        self._check_initializing("on_update")
+        timer = rate if isinstance(rate, UpdateTimer) else UpdateTimer(rate)
+        update = Update(
+            function,
+            timer,
+            phase,
+            outputs=outputs,
+            transforms=transforms,
+            bodies=bodies,
+            skipped=skipped,
+            touches=touches,
+            at_touches=at_touches,
+            prepare=prepare,
+        )
+        self._jobs.append(update)
+        return update
+
     def call_when_due(
         self,
         hook: str,
@@ -201,59 +299,69 @@ class FlatlandPlugin:
         transforms: bool = False,
         bodies: Iterable[Body] = (),
         skipped: SkippedHandler | None = None,
-        touches: Touches | None = None,
-        calls_at_touches: bool = False,
     ) -> None:
         """Restricts the calls of a hook to steps in which an update is due; for `on_initialize`.
 
-        Further calls may change only `outputs`.
-
-        The core performs the other steps, many at a time, without Python code. The hook must be
-        marked by `flatland.when_due`, and checks the timer itself. It is always called for the
-        first due update, and for others only if one of its outputs is wanted.
+        The hook must be marked by `flatland.when_due`, and may check the timer itself. Otherwise,
+        it is called in every step.
 
         Args:
             hook: `before_physics_step` or `after_physics_step`.
             timer: Timer of the updates.
-            outputs: The outputs to which the hook emits; the hook is not called while none of them
-                is wanted. None to call the hook in any case.
-            transforms: Whether to call the hook also while an observer wants transforms.
-            bodies: Bodies whose poses `skipped` needs.
-            skipped: Accounts for updates that were due without a call of the hook. It is called as
-                `skipped(count, stamp, poses)` with the number of updates, the simulated time of the
-                last one [ns], and the poses of `bodies` at that time, world frame [m, rad]. It is
-                called before the next call of the hook and before the state of the plugin or the
-                transforms are read, and must not emit anything.
-            touches: Contacts whose `clear` is called at updates without a call of the hook.
-            calls_at_touches: Whether to call the hook also after steps in which there are contacts
-                in `touches`; for `after_physics_step`.
+            outputs: As for `on_update`.
+            transforms: As for `on_update`.
+            bodies: As for `on_update`.
+            skipped: As for `on_update`.
 
         Raises:
             ValueError: The hook is unknown.
         """
-        if hook not in ("before_physics_step", "after_physics_step"):
+        phases = {name: phase for phase, name in STEP_HOOKS.items()}
+        if hook not in phases:
             raise ValueError(f"hook must be before_physics_step or after_physics_step, got {hook}")
-        self._schedules[hook] = HookSchedule(
-            timer,
-            None if outputs is None else tuple(outputs),
-            transforms,
-            tuple(bodies),
-            skipped,
-            touches,
-            calls_at_touches,
-        )
-        self.world.plugin_host.schedule.change()
+        function = getattr(self, hook)
+        if is_called_when_due(function):
+            self._jobs = [job for job in self._jobs if getattr(job, "function", None) != function]
+            self.on_update(
+                function,
+                timer,
+                phase=phases[hook],
+                outputs=outputs,
+                transforms=transforms,
+                bodies=bodies,
+                skipped=skipped,
+            )
+
+    @property
+    def updates(self) -> list[Update]:
+        """What the plugin has declared by `on_update`, and its hooks of steps, in order."""
+        return [job for job in self._jobs if isinstance(job, Update)]
+
+    def _declare_hooks(self) -> None:
+        """Declares the hooks of steps that are overridden as updates in every step."""
+        declared = [update.function for update in self.updates]
+        for phase, hook in STEP_HOOKS.items():
+            function = getattr(self, hook)
+            if overrides(self, hook) and function not in declared:
+                self.on_update(function, phase=phase)
+        self._is_initialized = True
 
     def control(self, controller: C) -> C:
-        """Assigns a controller to the plugin and returns it; for `on_initialize`.
+        """Assigns a controller or a crowd to the plugin and returns it; for `on_initialize`.
 
-        The core carries it out in each step at the place of `before_physics_step` of the plugin if
-        that hook is marked by `when_due` and restricted by `call_when_due`; otherwise the hook is
-        called in each step and calls `Controller.advance`. It is removed with the plugin.
+        The core carries it out in each step at the place of the plugin in the order of hooks, in
+        the order in which the plugin declares its jobs. It is removed with the plugin.
+
+        Raises:
+            PluginError: `on_initialize` has returned.
         """
-        controller.schedule(0, automatic=False)
-        self._controllers.append(controller)
+        self._check_initializing("control")
+        self._jobs.append(controller)
         return controller
+
+    def _check_initializing(self, method: str) -> None:
+        if self._is_initialized:
+            raise PluginError(f"{self._label}: {method} must be called in on_initialize")
 
     def collect_touches(
         self,
@@ -278,7 +386,7 @@ class FlatlandPlugin:
 
         For `Command.on_change`, to pass the value to a controller.
         """
-        self.world.plugin_host.schedule.set_later(self, function)
+        self.world.plugin_host.jobs.set_later(self, function)
 
     def _uncounted_stream(self, output: str) -> NoiseStream:
         """Returns a noise stream whose number of updates is left to `state`."""
@@ -300,6 +408,25 @@ class FlatlandPlugin:
             return resolve_topic(topic, self.namespace)
         except ValueError as error:
             raise PluginError(str(error)) from None
+
+    def declare_transform(
+        self, parent: str, child: str, *, pose: Pose | None = None, switch: str = ""
+    ) -> None:
+        """Declares a transform that the plugin is going to send; for `on_initialize`.
+
+        A warning about a frame with two parents is then logged when the model is loaded, not in
+        the step in which the frame is sent first, and `flatland check` prints it.
+
+        Args:
+            parent: Frame id of the parent.
+            child: Frame id of the child.
+            pose: Pose of the child in the parent [m, rad] if it is constant; otherwise None.
+            switch: Entry of the plugin that disables the transform, such as `broadcast_tf: false`,
+                for the warning.
+        """
+        if (parent, child) not in self._declared:
+            self._declared.add((parent, child))
+            self.world.transform_buffer.declare(self, (parent, child), pose, switch)
 
     def send_transform(
         self, parent: str, child: str, x: float, y: float, yaw: float, roll: float = 0.0
@@ -331,7 +458,7 @@ class FlatlandPlugin:
     ) -> None:
         """Adds a transform of an earlier step that was not wanted, for `World.transforms`.
 
-        For the function `skipped` of `call_when_due`. Transforms that were never sent are ignored.
+        For the function `skipped` of `on_update`. Transforms that were never sent are ignored.
 
         Args:
             stamp: Simulated time of the transform [ns].
@@ -397,7 +524,7 @@ class ModelPlugin(FlatlandPlugin):
     Attributes:
         model: The model.
         all_contacts: Whether the contact hooks receive the contacts of all models instead of only
-            those of this model.
+            the contacts of this model.
         world_frame_id: Name of the world frame in what the plugin emits, empty if there is none.
     """
 
@@ -459,3 +586,10 @@ def describe(plugin: FlatlandPlugin) -> str:
     if isinstance(plugin, ModelPlugin):
         return f'Model Plugin "{plugin.name}" type "{plugin.type}" model "{plugin.model.name}"'
     return f'World Plugin "{plugin.name}" type "{plugin.type}"'
+
+
+def overrides(plugin: FlatlandPlugin, hook: str) -> bool:
+    """Returns whether a plugin's class, or the plugin itself, overrides a hook."""
+    if hook in vars(plugin):
+        return True
+    return getattr(type(plugin), hook) is not getattr(FlatlandPlugin, hook)

@@ -18,13 +18,13 @@ class PortObserver(Protocol):
     """Receives notifications of ports; implemented by `flatland.runtime.observer.Observers`."""
 
     def output_opened(self, output: Output[Any]) -> None:
-        """Called before an output is added; raising refuses it."""
+        """Called before an output is added; an exception refuses the port."""
 
     def output_closed(self, output: Output[Any]) -> None:
         """Called after an output has been removed."""
 
     def command_opened(self, command: Command[Any]) -> None:
-        """Called before a command is added; raising refuses it."""
+        """Called before a command is added; an exception refuses the port."""
 
     def command_closed(self, command: Command[Any]) -> None:
         """Called after a command has been removed."""
@@ -68,8 +68,8 @@ class PortRegistry:
     def keeping(self) -> Iterator[None]:
         """Keeps ports that are closed and opened again in the block, with their subscribers.
 
-        A port that is opened is the one of the same topic and type that was closed, with its
-        initial values. Observers are notified only of ports that are still closed at the end.
+        Opening a port returns the closed port of the same topic and type, reset to its initial
+        values. Observers are notified only of ports that are still closed at the end.
         """
         kept = self._kept = _KeptPorts()
         try:
@@ -212,7 +212,7 @@ class PortRegistry:
         """Returns the output of a resolved topic.
 
         Raises:
-            WorldError: The output does not exist; the text lists the existing ones.
+            WorldError: The output does not exist; the text lists all outputs.
         """
         try:
             return self._outputs[global_name(topic)]
@@ -225,7 +225,7 @@ class PortRegistry:
         """Returns all commands of a resolved topic as one.
 
         Raises:
-            WorldError: The command does not exist; the text lists the existing ones.
+            WorldError: The command does not exist; the text lists all commands.
         """
         try:
             return CommandTopic(self._commands[global_name(topic)])

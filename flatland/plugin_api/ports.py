@@ -185,8 +185,8 @@ class Command(Generic[T]):
         name: str,
         value_type: type[T],
         default: T,
-        accept: Callable[[T], bool] | None = None,
-        owner: str = "",
+        accept: Callable[[T], bool] | None,
+        owner: str,
     ) -> None:
         """Creates a command that holds its default.
 

@@ -18,7 +18,7 @@ from pathlib import Path
 
 from flatland.errors import PLUGIN_FAULTS, PluginError
 from flatland.plugin_api.manifest import PluginClass, listed_manifests, lookup_name, read_manifest
-from flatland.plugin_api.missing_plugins import LookupHints
+from flatland.plugin_api.missing_plugins import LookupHints, MissingPluginsError, PluginEntry
 from flatland.plugin_api.package_exports import (
     PYTHON_TAG,
     are_settled,
@@ -77,8 +77,9 @@ def _entry_points() -> Sequence[importlib.metadata.EntryPoint]:
 class PluginRegistry:
     """The plugin classes declared by manifests.
 
-    The included manifest is read at the first look-up, the others when a name is not in it. They
-    are read again when a name is not found and a manifest or package has changed since.
+    The included manifest is read at the first look-up, and the other manifests when a name is not
+    in the included one. All are read again when a name is not found and a manifest or package has
+    changed since.
     """
 
     def __init__(self) -> None:
@@ -100,7 +101,7 @@ class PluginRegistry:
             PluginError: The plugin is declared by no manifest.
         """
         if self.find_missing([type_name]):
-            hints = self.hints()
+            hints = self._hints()
             raise PluginError(f"{hints.describe(type_name)}; {hints.advise([type_name])}")
         return self._classes.get(lookup_name(type_name)) or self._classes[type_name]
 
@@ -113,8 +114,21 @@ class PluginRegistry:
             self._read_others()
         return [name for name in missing if not self._is_known(name)]
 
-    def hints(self) -> LookupHints:
-        """Returns the error texts for names that `find_missing` returned."""
+    def missing_plugins_error(self, entries: Sequence[PluginEntry]) -> MissingPluginsError | None:
+        """Returns one error about all entries whose plugin is declared by no manifest.
+
+        Args:
+            entries: Entries of any models and of the world.
+
+        Returns:
+            The error, or None if a plugin exists for each entry.
+        """
+        missing = set(self.find_missing(entry.type_name for entry in entries))
+        if not missing:
+            return None
+        return self._hints().error(entry for entry in entries if entry.type_name in missing)
+
+    def _hints(self) -> LookupHints:
         return LookupHints(self._classes, self._problems)
 
     def create(self, type_name: str, base: type[FlatlandPlugin]) -> FlatlandPlugin:

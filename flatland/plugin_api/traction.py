@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
-from flatland.plugin_api.parameters import at_key, read_not_negative
+from flatland.plugin_api.parameters import at_key, read_choice, read_not_negative
 
 if TYPE_CHECKING:
     from flatland.config.reader import YamlReader
@@ -48,7 +48,7 @@ def read_traction(
     needs_torque: bool = False,
     at_center: bool = False,
 ) -> Traction | None:
-    """Reads `mode` and the limits of forces, and sets those of a controller.
+    """Reads `mode` and the limits of forces, and sets the limits of a controller.
 
     Args:
         config: Parameters of the drive.
@@ -56,7 +56,7 @@ def read_traction(
         controller: Controller of the drive.
         holonomic: Whether the motors push in all directions.
         needs_torque: Whether `max_torque` is required.
-        at_center: Whether the forces act at the centre of mass, as those of a car, whose axles
+        at_center: Whether the forces act at the centre of mass, as for a car, whose axles
             share the load, or at the origin of the body.
 
     Returns:
@@ -65,11 +65,7 @@ def read_traction(
     Raises:
         YamlError: A parameter is invalid, or the body cannot be moved by forces.
     """
-    mode: str = config.get("mode", "string", "velocity")
-    if mode not in _MODES:
-        raise at_key(config, "mode").error(
-            f'Invalid "mode", must be one of: {", ".join(_MODES)}, got {mode}'
-        )
+    mode = read_choice(config, "mode", _MODES, "velocity")
     if mode == "velocity":
         for key in _KEYS:
             if key in config:
@@ -103,7 +99,7 @@ def read_traction(
 
 
 def connected_bodies(body: Body) -> list[Body]:
-    """Returns a body of a model and those that joints of the model connect to it, directly or not.
+    """Returns a body of a model and all bodies that joints connect to it, directly or not.
 
     Args:
         body: The body; first in the result.

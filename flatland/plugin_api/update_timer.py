@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import math
 from fractions import Fraction
-from typing import Literal
+from typing import TYPE_CHECKING, Final
 
 from flatland.timekeeper import NANOSECONDS, Timekeeper
 
-UpdateClock = tuple[Literal["periodic", "always", "at_start", "never"], int, int]
-"""Kind, half step and cycle, see `flatland.physics.StepPlan.add_clock`."""
+if TYPE_CHECKING:
+    from flatland.physics import Clock
+
+_LARGEST_CYCLE: Final = 1 << 126
 
 
 class UpdateTimer:
@@ -44,26 +46,25 @@ class UpdateTimer:
             self._per_nanosecond = exact.numerator
             self._cycle = NANOSECONDS * exact.denominator
 
-    def clock(self, step_size_ns: int) -> UpdateClock | None:
-        """Returns the clock of the core that agrees with this timer.
+    def clock(self, step_size_ns: int) -> Clock:
+        """Returns the clock of the core that agrees with this timer, see `flatland.physics.Clock`.
+
+        A subclass that overrides `check_update` alone has a clock that is due in every step.
 
         Args:
-            step_size_ns: Simulated time of a step [ns]; all times are multiples of it.
-
-        Returns:
-            The clock; None if its numbers do not fit into 63 bits.
+            step_size_ns: Simulated time of a step [ns].
         """
-        if self._always:
-            return ("always", 0, 0)
-        if self._per_nanosecond == 0:
-            return ("at_start", 0, 0)
-        # phase < 2 * step * weight in `check_update`, without the common divisor of all terms.
-        half_step, cycle = step_size_ns * self._per_nanosecond, 2 * self._cycle
-        divisor = math.gcd(half_step, cycle)
-        half_step, cycle = half_step // divisor, cycle // divisor
-        if 2 * half_step >= cycle:
-            return ("always", 0, 0)
-        return ("periodic", half_step, cycle) if cycle < 1 << 63 else None
+        if self._always or type(self).check_update is not UpdateTimer.check_update:
+            return (1, 1)
+        weight, cycle = self._per_nanosecond, 2 * self._cycle
+        if weight == 0:
+            return (1, _LARGEST_CYCLE)  # due at time 0 only
+        divisor = math.gcd(weight, cycle)
+        weight, cycle = weight // divisor, cycle // divisor
+        if 2 * step_size_ns * weight >= cycle:
+            return (1, 1)
+        # With a longer cycle, the next update after time 0 is beyond the range of times.
+        return (weight, min(cycle, _LARGEST_CYCLE))
 
     def check_update(self, timekeeper: Timekeeper) -> bool:
         """Returns whether an update is due at the current time.
@@ -78,7 +79,7 @@ class UpdateTimer:
             return False
         weight = self._per_nanosecond
         if weight == 0:
-            return now == 0
+            return 2 * now < timekeeper.step_size_ns
         # fmod(t + dt / 2, period) < dt, all of it times 2 / period * cycle.
         step = timekeeper.step_size_ns
         phase = (2 * now + step) * weight % (2 * self._cycle)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final
 
+from flatland.config.hints import did_you_mean
 from flatland.plugin_api.parameters import at_key
 
 if TYPE_CHECKING:
@@ -38,7 +39,9 @@ class WheelJoint:
         self._place = at_key(config, key)
         joint = model.find_joint(name)
         if joint is None:
-            raise self.error(f'Joint with name "{name}" does not exist')
+            names = (other.name for other in model.joints)
+            hint = did_you_mean(name, names, "joints of the model")
+            raise self._place.error(f'Joint with name "{name}" does not exist', hint)
         self.joint: Joint = joint
 
     def error(self, text: str) -> Exception:
@@ -51,7 +54,7 @@ class WheelJoint:
             raise self.error(text)
 
     def body_anchor(self, body: Body) -> Vector2:
-        """Returns the anchor on the body; raises if the one on the wheel is not at its origin."""
+        """Returns the anchor on the body; raises if the anchor on the wheel is not the origin."""
         (ax, ay), (bx, by) = self.joint.anchors.tolist()
         if self.joint.bodies[0] is body:
             anchor, wheel_anchor = (ax, ay), (bx, by)
@@ -65,7 +68,7 @@ class WheelJoint:
 
     def steering_sign(self, body: Body) -> float:
         """Returns the sign of the angle of the joint if the wheel turns counter-clockwise."""
-        # The angle of a joint is that of its body B relative to its body A.
+        # The angle of a joint is the angle of its body B relative to its body A.
         return 1.0 if self.joint.bodies[0] is body else -1.0
 
 

@@ -9,13 +9,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from flatland.config.hints import did_you_mean
 from flatland.physics import BeamFan
-from flatland.plugin_api.parameters import at_key
+from flatland.plugin_api.parameters import at_key, read_choice
 
 if TYPE_CHECKING:
     from flatland.config.reader import YamlReader
     from flatland.geometry import DoubleArray, FloatArray
-    from flatland.world import World
+    from flatland.plugin_api.plugin_world import PluginWorld
 
 MAX_BEAMS = 1_000_000
 MAX_RANGE = 1e6  # m; the spacing of single-precision numbers is 6 cm there
@@ -133,15 +134,10 @@ def read_no_hit(config: YamlReader, length: float, default: str = "nan") -> floa
         YamlError: The value is not one of the names.
     """
     values = {"nan": math.nan, "inf": math.inf, "range": length}
-    name = config.get("no_hit", "string", default)
-    if name not in values:
-        raise at_key(config, "no_hit").error(
-            f'Invalid "no_hit", must be one of: {", ".join(values)}, got {name}'
-        )
-    return values[name]
+    return values[read_choice(config, "no_hit", list(values), default)]
 
 
-def read_layers(config: YamlReader, world: World) -> int:
+def read_layers(config: YamlReader, world: PluginWorld) -> int:
     """Reads the names of the detected layers, and returns their category bits.
 
     Raises:
@@ -151,5 +147,7 @@ def read_layers(config: YamlReader, world: World) -> int:
     collision_filter = world.collision_filter
     unknown = collision_filter.unknown(layers)
     if unknown:
-        raise at_key(config, "layers").error(f"Cannot find layer(s): {{{','.join(unknown)}}}")
+        hint = did_you_mean(unknown[0], collision_filter.names, "layers of the world")
+        text = f"Cannot find layer(s): {{{','.join(unknown)}}}"
+        raise at_key(config, "layers").error(text, hint)
     return collision_filter.category_bits(layers)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Final, cast
+from typing import TYPE_CHECKING, Final, Literal, cast
 
 from flatland.config.hints import choice
 from flatland.geometry import Bounds
@@ -13,10 +13,10 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from flatland.config.reader import YamlReader
-    from flatland.physics import RouteOrder
 
 Color = tuple[float, float, float, float]
 Span = tuple[float, float]
+RouteOrder = Literal["loop", "back_and_forth", "random", "once"]
 
 MODELS: Final = ("social_force", "orca")
 BODY_TYPES: Final = ("kinematic", "dynamic")
@@ -48,7 +48,7 @@ class Legs:
     """The legs of all people.
 
     Attributes:
-        layers: Layers in which lasers see the legs.
+        layers: Layers in which lasers detect the legs.
         radius: Radius of a leg [m].
         spacing: Distance of the centers of both legs of a person who stands [m].
     """
@@ -63,8 +63,8 @@ class Stop:
     """A place on the route of a group.
 
     Attributes:
-        low: Corner of the area with the least coordinates [m]; the place itself for a point.
-        high: The opposite corner [m].
+        low: Corner of the area with the least coordinates [m], or the point.
+        high: The opposite corner [m], or the point.
         radius: Distance at which the place is reached [m].
         wait: Shortest and longest time to wait there [s].
         is_queue: Whether people queue there.
@@ -86,7 +86,7 @@ class Group:
     """People with the same parameters.
 
     Attributes:
-        name: Name of the group; those of its people are this with a number.
+        name: Name of the group. The name of a person is this name with a number.
         count: Number of people at the start.
         together: Number of people who walk together.
         speed: Mean and standard deviation of the preferred speeds [m/s].
@@ -286,18 +286,3 @@ def read_area(config: YamlReader, key: str) -> Bounds | None:
             f'Invalid "{key}", must be [x_min, y_min, x_max, y_max] of an area, got {corners}'
         )
     return (x_min, y_min, x_max, y_max)
-
-
-def read_choice(config: YamlReader, key: str, allowed: tuple[str, ...]) -> str:
-    """Reads one of several words; the first one is the default.
-
-    Raises:
-        YamlError: The value is another one.
-    """
-    value: str = config.get(key, "string", allowed[0])
-    if value not in allowed:
-        raise at_key(config, key).error(
-            f'Invalid "{key}", must be one of: {", ".join(allowed)}, got "{value}"',
-            choice(value, allowed),
-        )
-    return value

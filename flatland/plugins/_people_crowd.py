@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from flatland.physics import Crowd
-from flatland.plugin_api.parameters import at_key, read_positive
+from flatland.config.hints import did_you_mean
+from flatland.plugin_api.parameters import at_key, read_choice, read_positive
 from flatland.plugins._people_config import (
     MODELS,
     ORCA,
     SOCIAL_FORCE,
-    read_choice,
     read_numbers,
 )
 from flatland.plugins._people_places import CLEARANCE
@@ -19,6 +18,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from flatland.config.reader import YamlReader
+    from flatland.physics import Crowd
     from flatland.plugins._people_config import Group, Legs
 
 
@@ -43,7 +43,8 @@ def read_bits(
         unknown = known.unknown(names)
         if unknown:
             raise at_key(config, key).error(
-                f'Invalid "{key}", {{{",".join(unknown)}}} layer(s) does not exist'
+                f'Invalid "{key}", {{{",".join(unknown)}}} layer(s) does not exist',
+                did_you_mean(unknown[0], known.names, "layers of the world"),
             )
     body_bits: int = known.category_bits(layers) if layers else 0
     leg_bits: int = known.category_bits(leg_layers) if leg_layers else 0
@@ -96,8 +97,7 @@ def create_crowd(
     if legs is not None:
         numbers["leg_radius"] = legs.radius
         numbers["leg_spacing"] = legs.spacing
-    return Crowd.create(
-        world.physics,
+    crowd: Crowd = world.physics.add_crowd(
         is_orca=model == "orca",
         is_dynamic=is_dynamic,
         bits=bits,
@@ -105,3 +105,4 @@ def create_crowd(
         key=key,
         numbers=numbers,
     )
+    return crowd

@@ -13,18 +13,18 @@ if TYPE_CHECKING:
 
 
 def fields_of(states: PeopleStates) -> dict[str, Any]:
-    """Returns the fields of states by name, for a value of a derived class."""
+    """Returns the fields of states by name, as arguments of a derived class."""
     return {field.name: getattr(states, field.name) for field in dataclasses.fields(states)}
 
 
 class MarkerSource:
-    """Adds the appearance of groups to states, and what has been removed since the last ones."""
+    """Converts states to markers: adds the appearance of groups, and who was removed."""
 
-    # What has been sent is not a part of the simulation.
+    # The markers that were emitted are not part of the simulation.
     outside_state: ClassVar[dict[str, Callable[[], object]]] = {"_last": lambda: None}
 
     def __init__(self, groups: Sequence[Group]) -> None:
-        """Creates a source that has sent nothing."""
+        """Creates a source without previous markers."""
         self._names = tuple(group.name for group in groups)
         self._colors = tuple(tuple(group.color) for group in groups)
         self._radii = tuple(group.radius for group in groups)

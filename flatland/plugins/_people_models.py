@@ -43,7 +43,7 @@ def model_text(
             "radius": legs.radius,
             "density": 1.0,
             "layers": legs.layers,
-            # A kinematic leg would push with any force on behalf of a body that can be pushed.
+            # A kinematic leg that collides would make a person immovable whose body can be pushed.
             "collision": body_type == "kinematic",
         }
         for name, side in zip(LEGS, (0.5, -0.5), strict=True):
@@ -83,7 +83,7 @@ def parties_of(places: DoubleArray, size: int) -> list[list[int]]:
 
 
 def preferred_speeds(group: Group, count: int, rng: np.random.Generator) -> DoubleArray:
-    """Draws preferred speeds from a normal distribution without its outer tails.
+    """Draws preferred speeds from a normal distribution, clipped at both ends.
 
     Returns:
         Speeds within three standard deviations of the mean, and of at least 0.1 m/s, shape

@@ -10,12 +10,14 @@ from flatland.errors import WorldError
 from flatland.geometry import DoubleArray, Vector2
 
 if TYPE_CHECKING:
-    from flatland.physics import Crowd
+    from collections.abc import Sequence
+
+    from flatland.physics import Crowd, Member
     from flatland.plugins._people_config import Group, Stop
 
-CLEARANCE: Final = 0.02  # between a person on a way and the wall, at least [m]
+CLEARANCE: Final = 0.02  # least gap between a person on a way and a wall [m]
 _WANDER_RADIUS: Final = 0.7  # distance at which a random place is reached [m]
-_MOST_DRAWS: Final = 6  # of free places, each twice as many as before
+_MOST_DRAWS: Final = 6  # number of attempts to find free places, each with twice as many places
 
 
 class PeoplePlaces:
@@ -52,15 +54,11 @@ class PeoplePlaces:
         )
         self._routes[group.name] = (route, waypoints)
 
-    def add_party(self, group: Group) -> int:
-        """Adds a party at the start of the route of a group, and returns its number."""
+    def add_party(self, group: Group, members: Sequence[Member]) -> None:
+        """Adds a party of people at the start of the route of a group."""
         route, waypoints = self._routes[group.name]
         first = int(self._rng.integers(len(waypoints))) if group.order == "random" else 0
-        return self._crowd.add_party(route, first)
-
-    def add_goal(self, place: Vector2) -> int:
-        """Adds a temporary waypoint at a place [m]."""
-        return self._crowd.add_waypoint(place, place, 0.3, spacing=0.0)
+        self._crowd.add_party(route, first, members)
 
     def has_way(self, waypoint: int, place: Vector2) -> bool:
         """Returns whether there is a way from a place [m] to a waypoint."""
@@ -73,9 +71,11 @@ class PeoplePlaces:
             Poses (x, y, theta) [m, rad], shape (count, 3).
 
         Raises:
-            WorldError: There are too few.
+            WorldError: There are too few free places with a way.
         """
         waypoint = self._routes[group.name][1][0]
+        if not count:
+            return np.empty((0, 3))
         wanted = count
         for _ in range(_MOST_DRAWS):
             places = self._sample(group, wanted, count)
@@ -101,10 +101,11 @@ class PeoplePlaces:
     def _add_random_places(self, group: Group) -> list[int]:
         """Adds the places between which the people of a group wander."""
         candidates = self._sample(group, 2 * group.places, None)[:, :2]
-        # Those in the largest part of the free space, as seen from one of the candidates.
+        # The places have a way to one of the candidates: to the first one with enough such places,
+        # otherwise to the candidate with the most such places.
         best: list[Vector2] = []
         for x, y in candidates[: group.places].tolist():
-            start = self._crowd.add_waypoint((x, y), (x, y), _WANDER_RADIUS, spacing=0.0)
+            start = self._crowd.add_waypoint((x, y), (x, y), _WANDER_RADIUS, temporary=True)
             found = [place for place in map(_pair, candidates) if self.has_way(start, place)]
             if len(found) > len(best):
                 best = found
@@ -117,7 +118,7 @@ class PeoplePlaces:
         ]
 
     def _sample(self, group: Group, count: int, least: int | None) -> DoubleArray:
-        """Samples free poses of people; fewer if there are not enough, but at least `least`."""
+        """Samples `count` free poses, or at least `least` if there is too little space."""
         inside = [layer for layer in self._world.layers if layer.category_bits & self._bits]
         layers = [name for layer in inside for name in layer.names]
         radius, area = group.radius, group.area

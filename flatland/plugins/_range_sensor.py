@@ -1,30 +1,30 @@
-"""What range finders with a single kind of reading have in common."""
+"""What range finders have in common."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from flatland.plugin_api.after_step import update_after_step
-from flatland.plugin_api.parameters import read_body, read_rate
+from flatland.plugin_api.parameters import read_body, read_phase, read_rate
 from flatland.plugin_api.plugin import ModelPlugin
-from flatland.plugin_api.schedule import when_due
-from flatland.plugin_api.update_timer import UpdateTimer
 from flatland.plugins._beams import read_range, read_range_min
 from flatland.plugins._range_noise import read_range_noise
 
 if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
     from flatland.config.reader import YamlReader
     from flatland.geometry import Pose
-    from flatland.physics import RangeNoise
+    from flatland.physics import RangeFinder, RangeNoise, Scan
     from flatland.plugin_api.ports import Output
+    from flatland.plugin_api.updates import Update
     from flatland.timekeeper import Timekeeper
 
 
 class RangeSensor(ModelPlugin):
     """Emits readings at a rate while they are wanted, and the transform of the sensor.
 
-    `on_initialize` of a subclass calls `_read_mounting`, sets `origin`, and calls `_read_updates`
-    and `_start` in this order.
+    `on_initialize` of a subclass calls `_read_mounting`, sets `origin`, calls `_read_updates`, sets
+    `_finder`, and calls `_start`, in this order.
 
     Attributes:
         body: The body on which the sensor is mounted.
@@ -32,9 +32,12 @@ class RangeSensor(ModelPlugin):
         range_min: Shortest range that is measured [m]; a shorter one is reported as -inf.
         origin: (x, y, theta) of the sensor in the body frame.
         frame_id: Frame of the sensor.
+        sends_transform: Whether the transform from the body to this frame is sent.
     """
 
     origin: Pose
+    _finder: RangeFinder
+    _roll = 0.0  # of the sensor in the body frame [rad]
 
     def _read_mounting(self, config: YamlReader) -> None:
         """Reads the body and the limits of the range."""
@@ -42,7 +45,7 @@ class RangeSensor(ModelPlugin):
         self.range = read_range(config)
         self.range_min = read_range_min(config, self.range)
 
-    def _read_updates(self, config: YamlReader, stream: str) -> tuple[str, RangeNoise | None]:
+    def _read_updates(self, config: YamlReader, stream: str) -> RangeNoise | None:
         """Reads the rate, the noise and the frames.
 
         Args:
@@ -50,27 +53,44 @@ class RangeSensor(ModelPlugin):
             stream: Name of the stream of random numbers.
 
         Returns:
-            The hook in which updates are due, and the noise of ranges.
+            The noise of ranges.
         """
-        self._timer = UpdateTimer(read_rate(config))
-        hook = update_after_step(self, config, self._timer)
+        self._rate = read_rate(config)
+        self._phase = read_phase(config, self._rate)
         noise = read_range_noise(config, self.range)
         self._noise = self.noise_stream(stream)
-        self._sends_transform: bool = config.get("broadcast_tf", "bool", True)
+        self.sends_transform: bool = config.get("broadcast_tf", "bool", True)
         self._body_frame_id = self.model.frame(self.body.name)
         self.frame_id = self.model.frame(config.get("frame", "string", self.name))
-        return hook, noise
+        return noise
 
-    def _start(self, hook: str, output: Output[Any]) -> None:
-        """Begins to emit readings in a hook."""
+    def _start(
+        self, output: Output[Any], prepare: Callable[[Sequence[Any]], object] | None = None
+    ) -> Update:
+        """Begins to emit readings, and returns the update; see `on_update` for `prepare`."""
         self._output = output
-        self.call_when_due(
-            hook,
-            self._timer,
+        if self.sends_transform:
+            self.declare_transform(
+                self._body_frame_id, self.frame_id, pose=self.origin, switch="broadcast_tf: false"
+            )
+        return self.on_update(
+            self._publish,
+            self._rate,
+            phase=self._phase,
             outputs=[output],
-            transforms=self._sends_transform,
+            transforms=self.sends_transform,
             skipped=self._skip,
+            prepare=prepare,
         )
+
+    @property
+    def _is_wanted(self) -> bool:
+        """Whether to emit a reading."""
+        return self._output.wanted
+
+    def _scan(self) -> Scan:
+        """Casts the rays from the current pose, with the current random numbers."""
+        return self._finder.scan(self.body, self._noise.key, self._noise.updates)
 
     def _measure(self, stamp: int) -> object:
         """Returns a reading with the current random numbers.
@@ -80,20 +100,19 @@ class RangeSensor(ModelPlugin):
         """
         raise NotImplementedError
 
-    @when_due
-    def before_physics_step(self, timekeeper: Timekeeper) -> None:
-        """Sends the transform and emits a reading, if it is wanted, when an update is due."""
-        if not self._timer.check_update(timekeeper):
-            return
+    def _publish(self, timekeeper: Timekeeper) -> None:
+        """Sends the transform and emits a reading, if it is wanted."""
         self._noise.begin_update()
-        if self._sends_transform:
-            self.send_transform(self._body_frame_id, self.frame_id, *self.origin)
-        if self._output.wanted:
+        if self.sends_transform:
+            self.send_transform(self._body_frame_id, self.frame_id, *self.origin, roll=self._roll)
+        if self._is_wanted:
             self._output.emit(self._measure(timekeeper.sim_time_ns))
 
-    def _skip(self, count: int, stamp: int, poses: tuple[Pose, ...]) -> None:
-        """Accounts for skipped updates; see `FlatlandPlugin.call_when_due`."""
+    def _skip(self, count: int, stamp: int, poses: Sequence[Pose]) -> None:
+        """Accounts for skipped updates; see `FlatlandPlugin.on_update`."""
         del poses
         self._noise.begin_update(count)
-        if self._sends_transform:
-            self.send_past_transform(stamp, self._body_frame_id, self.frame_id, *self.origin)
+        if self.sends_transform:
+            self.send_past_transform(
+                stamp, self._body_frame_id, self.frame_id, *self.origin, roll=self._roll
+            )

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from flatland.plugin_api.body_drive import BodyDrive
 from flatland.plugin_api.drive import CommandGuard
 from flatland.plugin_api.dynamics_limits import DynamicsLimits
-from flatland.plugin_api.parameters import at_key, read_body, read_point, read_positive
+from flatland.plugin_api.parameters import at_key, read_body, read_choice, read_point, read_positive
 from flatland.plugin_api.traction import read_traction
 from flatland.plugin_api.wheel_joint import WheelJoint, is_off
 from flatland.values import AckermannCommand, Twist
@@ -92,8 +92,6 @@ class AckermannDrive(BodyDrive):
 
     Attributes:
         geometry: Positions of the wheels.
-        linear_dynamics: Limits of the speed.
-        angular_dynamics: Limits of the steering angle.
         max_steer_angle: Largest steering angle [rad].
     """
 
@@ -113,12 +111,7 @@ class AckermannDrive(BodyDrive):
                 f'Invalid "max_steer_angle", must be above 0 and at most {_LARGEST_ANGLE:.3f}, '
                 f"got {self.max_steer_angle}"
             )
-        self.linear_dynamics = DynamicsLimits.from_config(
-            config.optional_subnode("linear_dynamics", "map")
-        )
-        self.angular_dynamics = DynamicsLimits.from_config(
-            config.optional_subnode("angular_dynamics", "map")
-        )
+        self.read_limits(config)
         self.geometry = CarGeometry.from_config(config, self.model, self.body)
         kind = self._read_command_type(config)
         self._controller = self.control(
@@ -130,7 +123,7 @@ class AckermannDrive(BodyDrive):
                 takes_twist=kind == "twist",
             )
         )
-        self._set_limits(self.linear_dynamics, self.angular_dynamics)
+        self.apply_limits()
         self.traction = read_traction(config, self.body, self._controller, at_center=True)
         self.open_reports(config, self.geometry.rear_center)
         self._twist_command: Command[Twist] | None = None
@@ -144,11 +137,7 @@ class AckermannDrive(BodyDrive):
             self._twist_command = self.open_twist(config)
 
     def _read_command_type(self, config: YamlReader) -> str:
-        kind: str = config.get("command", "string", "twist")
-        if kind not in _COMMANDS:
-            raise at_key(config, "command").error(
-                f'Invalid "command", must be one of: {", ".join(_COMMANDS)}, got {kind}'
-            )
+        kind = read_choice(config, "command", _COMMANDS)
         if kind == "ackermann" and self.ros is not None and not _has_messages():
             raise at_key(config, "command").error(
                 'Invalid "command", ackermann requires the ROS package ackermann_msgs, which is '

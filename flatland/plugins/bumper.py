@@ -6,11 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from flatland.plugin_api.after_step import AFTER
 from flatland.plugin_api.parameters import read_bodies, read_rate
 from flatland.plugin_api.plugin import ModelPlugin
-from flatland.plugin_api.schedule import when_due
-from flatland.plugin_api.update_timer import UpdateTimer
 from flatland.values import Collision, Collisions
 
 if TYPE_CHECKING:
@@ -28,34 +25,27 @@ class Bumper(ModelPlugin):
     def on_initialize(self, config: YamlReader) -> None:
         """Reads the parameters."""
         self._frame_id: str = config.get("world_frame_id", "string", "map")
-        self._publish_all: bool = config.get("publish_all_collisions", "bool", True)
-        self._timer = UpdateTimer(read_rate(config))
+        publish_all: bool = config.get("publish_all_collisions", "bool", True)
+        rate = read_rate(config)
         self._touches = self.collect_touches(
             self.model.bodies, exclude=read_bodies(config, self.model, "exclude")
         )
         self._output = self.output(config.get("topic", "string", "collisions"), Collisions)
-        self.call_when_due(
-            AFTER,
-            self._timer,
+        # At the update rate, and in each step with contacts if `publish_all_collisions` is set.
+        self.on_update(
+            self._publish,
+            rate,
             outputs=[self._output],
             touches=self._touches,
-            calls_at_touches=self._publish_all,
+            at_touches=publish_all,
         )
 
-    @when_due
-    def after_physics_step(self, timekeeper: Timekeeper) -> None:
-        """Emits all records at the update rate, or always if `publish_all_collisions` is set."""
-        if not self._output.wanted:
-            return
-        touches = self._touches.read()
-        if (self._publish_all and touches) or self._timer.check_update(timekeeper):
-            self._output.emit(
-                Collisions(
-                    timekeeper.sim_time_ns,
-                    self._frame_id,
-                    tuple(self._collision(touch, timekeeper.step_size) for touch in touches),
-                )
-            )
+    def _publish(self, timekeeper: Timekeeper) -> None:
+        """Emits all contacts."""
+        if self._output.wanted:
+            dt = timekeeper.step_size
+            collisions = tuple(self._collision(touch, dt) for touch in self._touches.read())
+            self._output.emit(Collisions(timekeeper.sim_time_ns, self._frame_id, collisions))
 
     def state(self) -> object:
         """Returns the bodies of all current contacts."""

@@ -5,23 +5,19 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from flatland.plugin_api.body_drive import BodyDrive
-from flatland.plugin_api.dynamics_limits import DynamicsLimits
 from flatland.plugin_api.parameters import read_body
 from flatland.plugin_api.traction import read_traction
 
 if TYPE_CHECKING:
     from flatland.config.reader import YamlReader
     from flatland.physics import VelocityController
+    from flatland.plugin_api.dynamics_limits import DynamicsLimits
 
 
 class DiffDrive(BodyDrive):
     """Moves the origin of a body with the commanded linear and angular velocity.
 
     The core sets the velocity in each step (`flatland.physics.VelocityController`).
-
-    Attributes:
-        linear_dynamics: Limits of the linear velocity; settable, not to be modified.
-        angular_dynamics: Limits of the angular velocity; settable, not to be modified.
     """
 
     _controller: VelocityController
@@ -34,38 +30,14 @@ class DiffDrive(BodyDrive):
             PluginError: A topic is not a legal name.
         """
         self.body = read_body(config, self.model)
-        self._limits = tuple(
-            DynamicsLimits.from_config(config.optional_subnode(key, "map"))
-            for key in ("linear_dynamics", "angular_dynamics")
-        )
+        self.read_limits(config)
         self._controller = self.control(self.body.control_velocity(holonomic=False))
-        self._set_limits()
+        self.apply_limits()
         self.traction = read_traction(config, self.body, self._controller, needs_torque=True)
         self.open_reports(config)
         self._command = self.open_twist(config)
 
-    @property
-    def linear_dynamics(self) -> DynamicsLimits:
-        """Limits of the linear velocity; settable, not to be modified."""
-        return self._limits[0]
-
-    @linear_dynamics.setter
-    def linear_dynamics(self, limits: DynamicsLimits) -> None:
-        self._limits = (limits, self._limits[1])
-        self._set_limits()
-
-    @property
-    def angular_dynamics(self) -> DynamicsLimits:
-        """Limits of the angular velocity; settable, not to be modified."""
-        return self._limits[1]
-
-    @angular_dynamics.setter
-    def angular_dynamics(self, limits: DynamicsLimits) -> None:
-        self._limits = (self._limits[0], limits)
-        self._set_limits()
-
-    def _set_limits(self) -> None:
-        linear, angular = self._limits
+    def _set_limits(self, linear: DynamicsLimits, angular: DynamicsLimits) -> None:
         self._controller.set_limits(linear.as_tuple(), angular.as_tuple())
 
     def set_target(self) -> None:

@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING
 from flatland.geometry import compose
 from flatland.plugin_api.parameters import at_key, read_body, read_finite, read_pose, read_rate
 from flatland.plugin_api.plugin import ModelPlugin
-from flatland.plugin_api.schedule import when_due
-from flatland.plugin_api.update_timer import UpdateTimer
 from flatland.plugins._geodesy import TangentPlane
 from flatland.values import NavSatFix
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from flatland.config.reader import YamlReader
     from flatland.geometry import Pose
     from flatland.timekeeper import Timekeeper
@@ -27,7 +27,7 @@ class Gps(ModelPlugin):
         """Reads the parameters."""
         self._body = read_body(config, self.model)
         self._origin = read_pose(config, "origin")
-        self._timer = UpdateTimer(read_rate(config, default=_DEFAULT_RATE))
+        rate = read_rate(config, default=_DEFAULT_RATE)
         self._broadcast_tf: bool = config.get("broadcast_tf", "bool", True)
         self._frame_id = self.model.frame(config.get("frame", "string", self.name))
         latitude = read_finite(config, "ref_lat", 0.0)
@@ -37,19 +37,22 @@ class Gps(ModelPlugin):
             )
         self._plane = TangentPlane(latitude, read_finite(config, "ref_lon", 0.0))
         self._output = self.output(config.get("topic", "string", "gps/fix"), NavSatFix)
-        self.call_when_due(
-            "before_physics_step",
-            self._timer,
+        if self._broadcast_tf:
+            parent = self.model.frame(self._body.name)
+            self.declare_transform(
+                parent, self._frame_id, pose=self._origin, switch="broadcast_tf: false"
+            )
+        self.on_update(
+            self._publish,
+            rate,
+            phase="before",
             outputs=[self._output],
             transforms=self._broadcast_tf,
             skipped=self._skip,
         )
 
-    @when_due
-    def before_physics_step(self, timekeeper: Timekeeper) -> None:
-        """Emits the position and sends the transform if an update is due."""
-        if not self._timer.check_update(timekeeper):
-            return
+    def _publish(self, timekeeper: Timekeeper) -> None:
+        """Emits the position and sends the transform."""
         if self._output.wanted:
             stamp = timekeeper.sim_time_ns
             self._output.emit(NavSatFix(stamp, self._frame_id, *self.compute_position(), 0.0))
@@ -57,7 +60,7 @@ class Gps(ModelPlugin):
             parent = self.model.frame(self._body.name)
             self.send_transform(parent, self._frame_id, *self._origin)
 
-    def _skip(self, count: int, stamp: int, poses: tuple[Pose, ...]) -> None:
+    def _skip(self, count: int, stamp: int, poses: Sequence[Pose]) -> None:
         del count, poses
         if self._broadcast_tf:
             parent = self.model.frame(self._body.name)

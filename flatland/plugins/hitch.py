@@ -7,19 +7,17 @@ from typing import TYPE_CHECKING, Any
 
 from flatland.errors import WorldError
 from flatland.geometry import compose, invert
-from flatland.physics.fixture import ALL_BITS
-from flatland.plugin_api.after_step import AFTER
+from flatland.physics import ALL_BITS
 from flatland.plugin_api.occasional_warning import OccasionalWarning
 from flatland.plugin_api.parameters import (
     MAX_COORDINATE,
     at_key,
     read_body_or_first,
+    read_choice,
     read_point,
     read_rate,
 )
 from flatland.plugin_api.plugin import ModelPlugin
-from flatland.plugin_api.schedule import when_due
-from flatland.plugin_api.update_timer import UpdateTimer
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
@@ -50,11 +48,7 @@ class Hitch(ModelPlugin):
         """Reads the parameters and declares the ports."""
         self._body = read_body_or_first(config, self.model, "body")
         self._origin = read_point(config, "origin")
-        self._type: str = config.get("joint", "string", TYPES[0])
-        if self._type not in TYPES:
-            raise at_key(config, "joint").error(
-                f'Invalid "joint", must be one of: {", ".join(TYPES)}, got {self._type}'
-            )
+        self._type = read_choice(config, "joint", TYPES)
         self._reach: float = config.get("reach", "float", 0.1, minimum=0, maximum=MAX_COORDINATE)
         self._max_angle: float = config.get("max_angle", "float", 0.0, minimum=0, maximum=math.pi)
         if self._max_angle and self._type == "weld":
@@ -64,7 +58,7 @@ class Hitch(ModelPlugin):
         self._warning = OccasionalWarning()
         self._joint: PhysicsJoint | None = None
         self._other: Model | None = None
-        self._timer = UpdateTimer(read_rate(config, default=_DEFAULT_RATE))
+        rate = read_rate(config, default=_DEFAULT_RATE)
         self._output = self.output(config.get("state_topic", "string", "hitched"), bool)
         is_hitched = config.get("start", "bool", False)
         topic = config.get("topic", "string", "hitch")
@@ -74,7 +68,7 @@ class Hitch(ModelPlugin):
         if is_hitched:
             # Before the first step, when all models of the world file exist.
             self._command_changed()
-        self.call_when_due(AFTER, self._timer, outputs=[self._output])
+        self.on_update(self._publish, rate, outputs=[self._output])
         service = config.get("service", "string", "set_hitch")
         if self.ros is not None and service:
             from std_srvs.srv import SetBool
@@ -130,7 +124,7 @@ class Hitch(ModelPlugin):
             The connected model; None if a hook calls this: it is then connected after the step.
 
         Raises:
-            WorldError: No model, or not the one of this name, is within reach, or its angle is
+            WorldError: No model, or no model of this name, is within reach, or its angle is
                 beyond `max_angle`.
         """
         self.world.call_plugin(self, "connect", {"name": name})
@@ -242,10 +236,10 @@ class Hitch(ModelPlugin):
 
     # -- hooks -----------------------------------------------------------------------------
 
-    @when_due
-    def after_physics_step(self, timekeeper: Timekeeper) -> None:
-        """Emits whether a model is connected, if an update is due."""
-        if self._timer.check_update(timekeeper) and self._output.wanted:
+    def _publish(self, timekeeper: Timekeeper) -> None:
+        """Emits whether a model is connected."""
+        del timekeeper
+        if self._output.wanted:
             self._output.emit(self.hitched is not None)
 
     def model_moved(self, previous: Mapping[str, Pose], keep_odometry: bool) -> None:

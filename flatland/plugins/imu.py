@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from flatland.geometry import Vector2, rotate
+from flatland.geometry import IDENTITY, Vector2, rotate
 from flatland.plugin_api.noise import GaussianNoise
 from flatland.plugin_api.parameters import (
     at_key,
@@ -14,8 +14,6 @@ from flatland.plugin_api.parameters import (
     read_variances,
 )
 from flatland.plugin_api.plugin import ModelPlugin
-from flatland.plugin_api.schedule import when_due
-from flatland.plugin_api.update_timer import UpdateTimer
 from flatland.timekeeper import NANOSECONDS
 from flatland.values import Imu as ImuValue
 
@@ -36,7 +34,7 @@ class Imu(ModelPlugin):
         self._frame_id = self.model.frame(config.get("imu_frame_id", "string", "imu"))
         self._parent_frame_id = self.model.frame(self._body.name)
         self._broadcast_tf: bool = config.get("broadcast_tf", "bool", True)
-        self._timer = UpdateTimer(_read_update_rate(config))
+        rate = _read_update_rate(config)
 
         yaw_variances = read_variances(config, "orientation_noise")
         rate_variances = read_variances(config, "angular_velocity_noise")
@@ -60,13 +58,15 @@ class Imu(ModelPlugin):
         # Stamp and velocity at the last update due, emitted or not, so that the first message after
         # a subscription is correct too.
         self._last: tuple[int, Pose] | None = None
-        self.call_when_due("after_physics_step", self._timer)
+        # The sensor may use the frame of its body; TF does not allow a frame to be its own parent.
+        self._broadcast_tf = self._broadcast_tf and self._frame_id != self._parent_frame_id
+        if self._broadcast_tf:
+            frames = (self._parent_frame_id, self._frame_id)
+            self.declare_transform(*frames, pose=IDENTITY, switch="broadcast_tf: false")
+        self.on_update(self._publish, rate)
 
-    @when_due
-    def after_physics_step(self, timekeeper: Timekeeper) -> None:
-        """Emits the measurements and sends the transform if an update is due."""
-        if not self._timer.check_update(timekeeper):
-            return
+    def _publish(self, timekeeper: Timekeeper) -> None:
+        """Emits the measurements and sends the transform."""
         self._noise.begin_update()
         stamp, velocity = timekeeper.sim_time_ns, self._body.velocity
         truth_wanted = self._ground_truth is not None and self._ground_truth.wanted
@@ -81,8 +81,7 @@ class Imu(ModelPlugin):
             if self._filtered is not None and filtered_wanted:
                 self._filtered.emit(self._with_noise(truth))
         self._last = (stamp, velocity)
-        # The sensor may use the frame of its body; TF does not allow a frame to be its own parent.
-        if self._broadcast_tf and self._frame_id != self._parent_frame_id:
+        if self._broadcast_tf:
             self.send_transform(self._parent_frame_id, self._frame_id, 0.0, 0.0, 0.0)
 
     def state(self) -> object:

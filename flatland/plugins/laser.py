@@ -10,32 +10,25 @@ import numpy as np
 
 from flatland.geometry import FloatArray, Pose, compose
 from flatland.physics import RangeFinder, Scan, ScanRequest, scan_all
-from flatland.plugin_api.after_step import update_after_step
-from flatland.plugin_api.parameters import read_body, read_pose, read_rate
-from flatland.plugin_api.plugin import ModelPlugin
-from flatland.plugin_api.schedule import HookBatch, in_batches, when_due
-from flatland.plugin_api.update_timer import UpdateTimer
+from flatland.plugin_api.parameters import read_pose
 from flatland.plugins._beams import (
     BeamAngles,
     read_layers,
     read_no_hit,
-    read_range,
-    read_range_min,
 )
-from flatland.plugins._range_noise import read_range_noise
+from flatland.plugins._range_sensor import RangeSensor
 from flatland.values import LaserScan
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from flatland.config.reader import YamlReader
-    from flatland.plugin_api.noise import NoiseStream
     from flatland.timekeeper import Timekeeper
 
 REFLECTANCE_LAYER = "reflectance"
 
 
-class Laser(ModelPlugin):
+class Laser(RangeSensor):
     """Measures the distance to the nearest fixture along each of its beams.
 
     Attributes:
@@ -47,11 +40,12 @@ class Laser(ModelPlugin):
         time_increment: Reported time between beams [s].
         origin: (x, y, theta) of the sensor in the body frame.
         intensities: Intensities of the last scan computed, shape (n,), float32: 255 for a beam
-            whose nearest hit is in the layer `reflectance`; in a world with materials, those of
-            `flatland.physics.Scan` for other hits; else 0. Shape (0,) in a world with neither.
+            whose nearest hit is in the layer `reflectance`; in a world with materials, the
+            intensities of `flatland.physics.Scan` for other hits; else 0. Shape (0,) in a world
+            without the layer and without materials.
         beam_ends: End point of each beam in the sensor frame [m], shape (n, 2), read-only.
         last_scan: Pose of the sensor in the world frame and ranges [m], shape (n,), of the last
-            scan computed; None before the first one. The ranges are those of the emitted scan.
+            scan computed; None before the first one. The ranges are equal to the emitted ones.
     """
 
     # The ranges may be in an array of the caller of `compute_scans`, which belongs to no state.
@@ -64,31 +58,24 @@ class Laser(ModelPlugin):
             YamlError: A parameter is invalid.
             PluginError: The topic is not a legal name.
         """
-        self.body = read_body(config, self.model)
-        self.range = read_range(config)
+        self._read_mounting(config)
         self.angles = BeamAngles.from_config(config.subnode("angle", "map"))
         self.origin = read_pose(config, "origin")
-        self.timer = UpdateTimer(read_rate(config))
-        hook = update_after_step(self, config, self.timer)
-        self._always_publish: bool = config.get("always_publish", "bool", False)
-        self.range_min = read_range_min(config, self.range)
         self.scan_time, self.time_increment = self._read_times(config)
-        noise = read_range_noise(config, self.range)
-        self._noise = self.noise_stream("scan")
+        noise = self._read_updates(config, "scan")
         # Calls of `compute_ranges` have random numbers of their own, so that they do not change the
         # scans that are emitted.
         self._computed = self._uncounted_stream("compute_ranges")
         self._has_noise = noise is not None
         no_hit = read_no_hit(config, self.range)
         self._mask = read_layers(config, self.world)
-        self._sends_transform: bool = config.get("broadcast_tf", "bool", True)
         upside_down: bool = config.get("upside_down", "bool", False)
         self._roll = math.pi if upside_down else 0.0
         self.beam_ends = self.angles.end_points(self.range, upside_down)
         self.last_scan: tuple[Pose, FloatArray] | None = None
         reflectance = self.world.collision_filter.layer_id(REFLECTANCE_LAYER)
         self.intensities: FloatArray = _no_intensities()
-        self._cast: Scan | None = None
+        self._cast: Scan | None = None  # by `cast_scans`, for the update that follows
         self._finder = RangeFinder(
             self.angles.fan(self.range, upside_down),
             self.range,
@@ -99,11 +86,9 @@ class Laser(ModelPlugin):
             no_hit=no_hit,
             noise=noise,
         )
-        self._body_frame_id = self.model.frame(self.body.name)
-        self.frame_id = self.model.frame(config.get("frame", "string", self.name))
-        self._scan = self.output(config.get("topic", "string", "scan"), LaserScan)
-        self._hook = hook
-        self._schedule()
+        output = self.output(config.get("topic", "string", "scan"), LaserScan)
+        self._update = self._start(output, cast_scans)
+        self.always_publish = config.get("always_publish", "bool", False)
 
     @property
     def always_publish(self) -> bool:
@@ -113,25 +98,7 @@ class Laser(ModelPlugin):
     @always_publish.setter
     def always_publish(self, value: bool) -> None:
         self._always_publish = value
-        self._schedule()
-
-    def _schedule(self) -> None:
-        self.call_when_due(
-            self._hook,
-            self.timer,
-            outputs=None if self._always_publish else [self._scan],
-            transforms=self._sends_transform,
-            skipped=self._skip,
-        )
-
-    def _skip(self, count: int, stamp: int, poses: tuple[Pose, ...]) -> None:
-        """Accounts for skipped updates; see `FlatlandPlugin.call_when_due`."""
-        del poses
-        self._noise.begin_update(count)
-        if self._sends_transform:
-            self.send_past_transform(
-                stamp, self._body_frame_id, self.frame_id, *self.origin, roll=self._roll
-            )
+        self._update.outputs = None if value else (self._output,)
 
     def _read_times(self, config: YamlReader) -> tuple[float, float]:
         scan_time, time_increment = (
@@ -148,54 +115,30 @@ class Laser(ModelPlugin):
             )
         return scan_time, time_increment
 
-    @when_due
-    def before_physics_step(self, timekeeper: Timekeeper) -> None:
-        """Sends the transform and emits a scan, if it is wanted, when an update is due."""
-        if self.begin_update(timekeeper):
-            cast_scans((self,))
-            self.emit_scan(timekeeper)
+    def _publish(self, timekeeper: Timekeeper) -> None:
+        try:
+            super()._publish(timekeeper)
+        finally:
+            self._cast = None
 
-    # The three parts of `before_physics_step`, of which `cast_scans` serves several lasers at once.
-
-    def begin_update(self, timekeeper: Timekeeper) -> bool:
-        """Begins an update if one is due: sends the transform.
-
-        To be called once in each step.
-
-        Returns:
-            Whether a scan is to be cast and emitted.
-        """
-        if not self.timer.check_update(timekeeper):
-            return False
-        self._noise.begin_update()
-        if self._sends_transform:
-            self.send_transform(self._body_frame_id, self.frame_id, *self.origin, roll=self._roll)
-        return self._scan.wanted or self.always_publish
-
-    def emit_scan(self, timekeeper: Timekeeper) -> None:
-        """Emits the scan that `cast_scans` has cast in this update.
-
-        Raises:
-            RuntimeError: No scan was cast since the last call.
-        """
-        scan, self._cast = self._cast, None
+    def _measure(self, stamp: int) -> LaserScan:
+        scan = self._cast
         if scan is None:
-            raise RuntimeError("no scan was cast in this update")
+            scan = self._scan()
+        self._keep(scan)
         angles = self.angles
-        self._scan.emit(
-            LaserScan(
-                stamp=timekeeper.sim_time_ns,
-                frame_id=self.frame_id,
-                angle_min=angles.minimum,
-                angle_max=angles.maximum,
-                angle_increment=angles.increment,
-                time_increment=self.time_increment,
-                scan_time=self.scan_time,
-                range_min=self.range_min,
-                range_max=self.range,
-                ranges=scan.ranges,
-                intensities=_no_intensities() if scan.intensities is None else scan.intensities,
-            )
+        return LaserScan(
+            stamp=stamp,
+            frame_id=self.frame_id,
+            angle_min=angles.minimum,
+            angle_max=angles.maximum,
+            angle_increment=angles.increment,
+            time_increment=self.time_increment,
+            scan_time=self.scan_time,
+            range_min=self.range_min,
+            range_max=self.range,
+            ranges=scan.ranges,
+            intensities=self.intensities,
         )
 
     def compute_ranges(self) -> FloatArray:
@@ -218,8 +161,9 @@ class Laser(ModelPlugin):
         """Whether scans depend on the number of the update: noise, or materials of the world."""
         return self._has_noise or self.world.physics.has_materials
 
-    def _request(self, stream: NoiseStream) -> ScanRequest:
-        return ScanRequest(self._finder, self.body, stream.key, stream.updates)
+    @property
+    def _is_wanted(self) -> bool:
+        return self._output.wanted or self._always_publish
 
     def _keep(self, scan: Scan) -> None:
         """Sets the attributes that describe the last scan."""
@@ -269,7 +213,8 @@ def compute_scans(
     for laser, is_random in zip(lasers, are_random, strict=True):
         if is_random:
             laser._computed.begin_update()
-        requests.append(laser._request(laser._computed))
+        stream = laser._computed
+        requests.append(ScanRequest(laser._finder, laser.body, stream.key, stream.updates))
     try:
         scans = _perform(requests, out, num_threads)
     except BaseException:
@@ -281,28 +226,26 @@ def compute_scans(
     return [scan.ranges for scan in scans]
 
 
-def cast_scans(lasers: Sequence[Laser], num_threads: int = 0) -> None:
-    """Casts the scans of lasers whose `begin_update` has returned True, in one call of the core.
+def cast_scans(lasers: Sequence[Laser]) -> None:
+    """Casts the scans of the next update of several lasers in one call of the core.
 
-    Each laser emits its scan by `Laser.emit_scan`. The scans are the same as if each laser was cast
-    alone. If an error is raised, no scan was cast.
+    The scans are the same as if each laser cast its own in its update.
 
     Args:
         lasers: The lasers, of one or of several worlds, which must not be stepping.
-        num_threads: Maximum number of threads; 0 for all processors that are available.
 
     Raises:
         ValueError: The pose of a body is not finite.
         StaleHandleError: The body of a laser was destroyed, or its world is closed.
         WorldLockedError: A world is stepping.
     """
-    scans = _perform([laser._request(laser._noise) for laser in lasers], None, num_threads)
-    for laser, scan in zip(lasers, scans, strict=True):
+    wanted = [laser for laser in lasers if laser._is_wanted]
+    requests = [
+        ScanRequest(laser._finder, laser.body, laser._noise.key, laser._noise.updates + 1)
+        for laser in wanted
+    ]
+    for laser, scan in zip(wanted, _perform(requests, None, 0), strict=True):
         laser._cast = scan
-        laser._keep(scan)
-
-
-in_batches(Laser.before_physics_step, HookBatch("begin_update", cast_scans, "emit_scan"))
 
 
 def _perform(

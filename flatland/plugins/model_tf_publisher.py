@@ -5,11 +5,8 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from flatland.plugin_api.after_step import update_after_step
-from flatland.plugin_api.parameters import read_bodies, read_body_or_first, read_rate
+from flatland.plugin_api.parameters import read_bodies, read_body_or_first, read_phase, read_rate
 from flatland.plugin_api.plugin import ModelPlugin
-from flatland.plugin_api.schedule import when_due
-from flatland.plugin_api.update_timer import UpdateTimer
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -32,8 +29,8 @@ class ModelTfPublisher(ModelPlugin):
         """
         self.reference = read_body_or_first(config, self.model, "reference")
         excluded = read_bodies(config, self.model, "exclude")
-        self.timer = UpdateTimer(read_rate(config))
-        hook = update_after_step(self, config, self.timer)
+        rate = read_rate(config)
+        phase = read_phase(config, rate)
         self._sends_world: bool = config.get("publish_tf_world", "bool", False)
         self.world_frame_id = config.get("world_frame_id", "string", "map")
         self._reference_frame_id = self.model.frame(self.reference.name)
@@ -42,26 +39,31 @@ class ModelTfPublisher(ModelPlugin):
             for body in self.model.bodies
             if body is not self.reference and body not in excluded
         ]
-        self.call_when_due(
-            hook,
-            self.timer,
+        for body, frame_id in self._others:
+            switch = f"exclude: [{body.name}]"
+            self.declare_transform(self._reference_frame_id, frame_id, switch=switch)
+        if self._sends_world:
+            frames = (self.world_frame_id, self._reference_frame_id)
+            self.declare_transform(*frames, switch="publish_tf_world: false")
+        self.on_update(
+            self._publish,
+            rate,
+            phase=phase,
             outputs=(),
             transforms=True,
             bodies=[self.reference, *(body for body, _ in self._others)],
             skipped=self._skip,
         )
 
-    @when_due
-    def before_physics_step(self, timekeeper: Timekeeper) -> None:
-        """Sends the transforms if an update is due."""
-        if not self.timer.check_update(timekeeper):
-            return
+    def _publish(self, timekeeper: Timekeeper) -> None:
+        """Sends the transforms."""
+        del timekeeper
         poses = [body.pose for body, _ in self._others]
         for transform in self._transforms(self.reference.pose, poses):
             self.send_transform(*transform)
 
-    def _skip(self, count: int, stamp: int, poses: tuple[Pose, ...]) -> None:
-        """Takes over skipped updates; see `FlatlandPlugin.call_when_due`."""
+    def _skip(self, count: int, stamp: int, poses: Sequence[Pose]) -> None:
+        """Accounts for skipped updates; see `FlatlandPlugin.on_update`."""
         del count
         for transform in self._transforms(poses[0], poses[1:]):
             self.send_past_transform(stamp, *transform)

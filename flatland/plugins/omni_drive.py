@@ -6,10 +6,10 @@ import math
 from typing import TYPE_CHECKING
 
 from flatland.plugin_api.body_drive import BodyDrive
-from flatland.plugin_api.dynamics_limits import DynamicsLimits
 from flatland.plugin_api.parameters import (
     at_key,
     read_body,
+    read_choice,
     read_finite,
     read_not_negative,
     read_positive,
@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from flatland.config.reader import YamlReader
     from flatland.geometry import Pose
     from flatland.physics import OmniController
+    from flatland.plugin_api.dynamics_limits import DynamicsLimits
 
 _LAYOUTS = ("none", "mecanum", "three_wheel")
 
@@ -45,10 +46,7 @@ class OmniDrive(BodyDrive):
             PluginError: A topic is not a legal name.
         """
         self.body = read_body(config, self.model)
-        linear, angular = (
-            DynamicsLimits.from_config(config.optional_subnode(key, "map"))
-            for key in ("linear_dynamics", "angular_dynamics")
-        )
+        self.read_limits(config)
         self.wheels = _read_wheels(config)
         speed, acceleration = (
             self._read_wheel_limit(config, f"max_wheel_{quantity}")
@@ -58,12 +56,15 @@ class OmniDrive(BodyDrive):
         self._controller = self.control(
             self.body.control_omni(rows, wheel_speed=speed, wheel_acceleration=acceleration)
         )
-        self._controller.set_limits(linear.as_tuple(), angular.as_tuple())
+        self.apply_limits()
         self.traction = read_traction(
             config, self.body, self._controller, holonomic=True, needs_torque=True
         )
         self.open_reports(config)
         self._command = self.open_twist(config)
+
+    def _set_limits(self, linear: DynamicsLimits, angular: DynamicsLimits) -> None:
+        self._controller.set_limits(linear.as_tuple(), angular.as_tuple())
 
     def _read_wheel_limit(self, config: YamlReader, key: str) -> float:
         limit = read_not_negative(config, key, 0.0)
@@ -95,15 +96,11 @@ class OmniDrive(BodyDrive):
 
 
 def _read_wheels(config: YamlReader) -> tuple[GroundWheel, ...]:
-    layout: str = config.get("layout", "string", "none")
+    layout = read_choice(config, "layout", _LAYOUTS, "none")
     if layout == "none":
         return ()
     if layout == "mecanum":
         return mecanum_wheels(read_positive(config, "wheelbase"), read_positive(config, "track"))
-    if layout == "three_wheel":
-        return three_wheels(
-            read_positive(config, "wheel_distance"), read_finite(config, "wheel_angle", math.pi / 3)
-        )
-    raise at_key(config, "layout").error(
-        f'Invalid "layout", must be one of: {", ".join(_LAYOUTS)}, got {layout}'
+    return three_wheels(
+        read_positive(config, "wheel_distance"), read_finite(config, "wheel_angle", math.pi / 3)
     )

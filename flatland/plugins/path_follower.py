@@ -8,24 +8,22 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from flatland.geometry import IDENTITY, Pose, compose
-from flatland.plugin_api.after_step import AFTER, BEFORE, NeverDue
 from flatland.plugin_api.parameters import (
     MAX_COORDINATE,
     at_key,
     read_body_or_first,
+    read_choice,
     read_not_negative,
     read_positive,
 )
 from flatland.plugin_api.plugin import ModelPlugin
-from flatland.plugin_api.schedule import when_due
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from flatland.config.reader import YamlReader
-    from flatland.physics.controller import SpeedLimits
+    from flatland.physics import SpeedLimits
     from flatland.plugin_api.ports import Command
-    from flatland.timekeeper import Timekeeper
 
 MODES = ("loop", "once", "there_and_back", "random")
 FRAMES = ("start", "world")
@@ -45,10 +43,10 @@ class PathFollower(ModelPlugin):
     def on_initialize(self, config: YamlReader) -> None:
         """Reads the parameters; the path starts at the current pose of the body."""
         self._body = read_body_or_first(config, self.model, "body")
-        heading = _read_choice(config, "heading", HEADINGS)
-        frame = _read_choice(config, "frame", FRAMES)
+        heading = read_choice(config, "heading", HEADINGS)
+        frame = read_choice(config, "frame", FRAMES)
         origin = self._body.pose if frame == "start" else IDENTITY
-        mode = _read_choice(config, "mode", MODES)
+        mode = read_choice(config, "mode", MODES)
         linear, angular = _read_limits(config, ""), _read_limits(config, "angular_")
         wait: float = config.get("wait", "float", 0.0, minimum=0, finite=True)
         self._start_command: Command[bool] | None = None
@@ -73,8 +71,6 @@ class PathFollower(ModelPlugin):
         self._controller.set_start(self._is_started, 0)
         if self._start_command is not None:
             self._start_command.on_change = self._start_changed
-        for hook in (BEFORE, AFTER):
-            self.call_when_due(hook, NeverDue())
 
     def _start_changed(self) -> None:
         self.set_before_step(self._set_start)
@@ -91,28 +87,17 @@ class PathFollower(ModelPlugin):
     @property
     def waypoint(self) -> int:
         """Number of the last waypoint that was reached; 0 is the initial pose of the body."""
-        return self._controller.state[0]
+        return self._controller.state.waypoint
 
     @property
     def is_moving(self) -> bool:
         """Whether the body is on its way to a waypoint, or waits to leave for it."""
-        return self._controller.state[2]
+        return self._controller.state.is_moving
 
     def reseed(self, rng: np.random.Generator) -> None:
         """Continues the random numbers from states that are drawn from a generator."""
         super().reseed(rng)
         self._controller.set_key(_draw_key(self.rng))
-
-    @when_due
-    def before_physics_step(self, timekeeper: Timekeeper) -> None:
-        """Advances the motion by one step."""
-        self._controller.advance(timekeeper.step_size)
-
-    @when_due
-    def after_physics_step(self, timekeeper: Timekeeper) -> None:
-        """Moves the body to its pose on the path."""
-        del timekeeper
-        self._controller.hold()
 
     def model_moved(self, previous: Mapping[str, Pose], keep_odometry: bool) -> None:
         """Continues to the same waypoint from the new pose."""
@@ -126,16 +111,6 @@ class PathFollower(ModelPlugin):
 
 def _draw_key(rng: np.random.Generator) -> int:
     return int(rng.integers(0, 2**64, dtype=np.uint64))
-
-
-def _read_choice(config: YamlReader, key: str, choices: tuple[str, ...]) -> str:
-    """Reads one of several words, by default the first one."""
-    choice: str = config.get(key, "string", choices[0])
-    if choice not in choices:
-        raise at_key(config, key).error(
-            f'Invalid "{key}", must be one of: {", ".join(choices)}, got {choice}'
-        )
-    return choice
 
 
 def _read_limits(config: YamlReader, prefix: str) -> SpeedLimits:

@@ -3,22 +3,21 @@
 from __future__ import annotations
 
 import importlib.util
+import itertools
 import math
 from collections.abc import Iterable, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
 from flatland.errors import WorldError
 from flatland.geometry import DoubleArray, Vector2
-from flatland.plugin_api.after_step import AFTER, BEFORE, NeverDue
-from flatland.plugin_api.parameters import read_positive, read_rate
+from flatland.loading.model_source import ModelSpec
+from flatland.physics import Member
+from flatland.plugin_api.parameters import read_choice, read_positive, read_rate
 from flatland.plugin_api.plugin import WorldPlugin
-from flatland.plugin_api.schedule import when_due
-from flatland.plugin_api.update_timer import UpdateTimer
 from flatland.plugins._people_config import (
     BODY_TYPES,
-    read_choice,
     read_groups,
     read_legs,
 )
@@ -26,7 +25,6 @@ from flatland.plugins._people_crowd import create_crowd, read_bits
 from flatland.plugins._people_markers import MarkerSource, fields_of
 from flatland.plugins._people_models import BODY, LEGS, model_text, parties_of, preferred_speeds
 from flatland.plugins._people_places import PeoplePlaces
-from flatland.plugins._people_services import PeopleServices
 from flatland.values import People, PeopleMarkers, PeopleStates, TrackedPeople
 
 if TYPE_CHECKING:
@@ -35,6 +33,9 @@ if TYPE_CHECKING:
     from flatland.plugin_api.ports import Output
     from flatland.plugins._people_config import Group
     from flatland.timekeeper import Timekeeper
+
+
+_GOAL_RADIUS: Final = 0.3  # distance at which the goal of `send` is reached [m]
 
 
 class Pedestrians(WorldPlugin):
@@ -86,7 +87,7 @@ class Pedestrians(WorldPlugin):
 
     def _open_ports(self, config: YamlReader) -> None:
         topic = config.get("topic", "string", "people")
-        self._timer = UpdateTimer(read_rate(config, "pub_rate", 10.0))
+        rate = read_rate(config, "pub_rate", 10.0)
         self._people = self.output(topic, People)
         self._states = self.output(f"{topic}/states", PeopleStates)
         self._markers = self.output(f"{topic}/markers", PeopleMarkers)
@@ -96,10 +97,11 @@ class Pedestrians(WorldPlugin):
         if self.ros is not None and importlib.util.find_spec("people_msgs") is not None:
             self._tracked = self.output(f"{topic}/tracked", TrackedPeople)
             outputs.append(self._tracked)
-        self.call_when_due(BEFORE, NeverDue())
-        self.call_when_due(AFTER, self._timer, outputs=outputs)
+        self.on_update(self._publish, rate, outputs=outputs)
         if self.ros is not None:
-            PeopleServices(self).advertise(self.ros, topic)
+            self.ros.advertise_service(f"spawn_{topic}", "SpawnPeople", self._serve_spawn)
+            self.ros.advertise_service(f"remove_{topic}", "RemovePeople", self._serve_remove)
+            self.ros.advertise_service(f"direct_{topic}", "DirectPeople", self._serve_direct)
 
     # -- people ----------------------------------------------------------------------------
 
@@ -146,7 +148,7 @@ class Pedestrians(WorldPlugin):
         self.world.call_plugin(self, "remove_people", {"names": listed})
 
     def stop(self, names: Iterable[str] | None = None) -> None:
-        """Makes people stand still until `resume`; None for everybody.
+        """Makes people stand still until `resume` is called; None for everybody.
 
         Raises:
             WorldError: There is no person of a name.
@@ -162,7 +164,7 @@ class Pedestrians(WorldPlugin):
         self._direct(names, "resume", None)
 
     def send(self, names: Iterable[str] | None, goal: Vector2) -> None:
-        """Makes people walk to a place [m], and stand there until `resume`; None for everybody.
+        """Makes people walk to a place [m] and stand there until `resume`; None for everybody.
 
         Raises:
             WorldError: There is no person of a name, or nobody fits at the place.
@@ -182,13 +184,17 @@ class Pedestrians(WorldPlugin):
     ) -> list[str]:
         """Carries out `spawn`."""
         chosen = self._find_group(group)
-        if poses is None:
+        generator = self.rng.bit_generator
+        before = generator.state
+        try:
+            if poses is not None:
+                return self._spawn(chosen, np.array(poses, dtype=np.float64).reshape(-1, 3))
             if not 0 <= count <= 10000:
                 raise ValueError(f"count must be from 0 to 10000, got {count}")
-            if count == 0:
-                return []
             return self._spawn(chosen, self._places.find_free(chosen, count))
-        return self._spawn(chosen, np.array(poses, dtype=np.float64).reshape(-1, 3))
+        except BaseException:
+            generator.state = before
+            raise
 
     def remove_people(self, names: list[str] | None) -> None:
         """Carries out `remove`."""
@@ -207,14 +213,12 @@ class Pedestrians(WorldPlugin):
         place = (goal[0], goal[1])
         if not (math.isfinite(place[0]) and math.isfinite(place[1])):
             raise ValueError(f"the goal must be finite [m], got {place}")
-        waypoint = self._places.add_goal(place)
-        for model in models:
-            if not self._places.has_way(waypoint, model.pose[:2]):
-                raise WorldError(
-                    f'there is no way for "{model.name}" to the goal ({goal[0]:g}, {goal[1]:g})'
-                )
-        for model in models:
-            self._crowd.send(_body(model), waypoint)
+        stranded = self._crowd.send([_body(model) for model in models], place, _GOAL_RADIUS)
+        if stranded is not None:
+            name, _ = self._names[stranded]
+            raise WorldError(
+                f'there is no way for "{name}" to the goal ({place[0]:g}, {place[1]:g})'
+            )
 
     def _find_group(self, name: str | None) -> Group:
         for group in self._groups:
@@ -236,70 +240,92 @@ class Pedestrians(WorldPlugin):
         return [models[name] for name in names]
 
     def _existing(self) -> dict[int, tuple[str, str]]:
-        """Returns the names of people and their groups, without those who were deleted."""
-        return {
-            person.body_id: self._names[person.body_id]
-            for person in self._crowd.people
-            if person.body_id in self._names
-        }
+        """Returns the names of people and of their groups by the id of the body."""
+        return {person.body_id: self._names[person.body_id] for person in self._crowd.people}
 
     def _spawn(self, group: Group, poses: DoubleArray) -> list[str]:
-        """Creates people of a group at poses (x, y, theta), shape (n, 3)."""
-        self._names = self._existing()
+        """Creates people of a group at poses (x, y, theta), shape (n, 3): all of them, or none."""
         count = len(poses)
-        number = self._numbers[group.name]
-        names = [f"{group.name}_{number + i}" for i in range(count)]
+        if not count:
+            return []
         text = model_text(group, self._legs, self._layers, self._body_type, self._mass)
         parties = parties_of(poses[:, :2], group.together)
         speeds = preferred_speeds(group, count, self.rng)
         aware = self.rng.random(count) < self._awareness
         phases = self.rng.random(count)
-        models = self._spawn_models(text, names, poses)
-        self._numbers[group.name] += count
+        numbers = self._unused_numbers(group, count)
+        names = [f"{group.name}_{number}" for number in numbers]
+        models = self.world.spawn_models(
+            [ModelSpec(text, name, "", pose) for name, pose in zip(names, poses, strict=True)],
+            if_blocked="allow",
+        )
+        if models is None:
+            raise WorldError("people cannot be spawned by a hook")
+        self._numbers[group.name] = numbers[-1] + 1
+        self._names = self._existing() | {
+            _body(model).id: (model.name, group.name) for model in models
+        }
         for party in parties:
-            party_number = self._places.add_party(group)
+            members = []
             for i in party:
-                model = models[i]
-                self._names[_body(model).id] = (model.name, group.name)
-                legs = [leg for leg in map(model.find_body, LEGS) if leg is not None]
-                self._crowd.add_person(
-                    _body(model),
-                    [leg.physics for leg in legs],
-                    party_number,
-                    radius=group.radius,
-                    speed=float(speeds[party[0]]) if group.together > 1 else float(speeds[i]),
-                    is_aware=bool(aware[i]),
-                    phase=float(phases[i]),
+                speed = speeds[party[0]] if group.together > 1 else speeds[i]
+                legs = [leg.physics for leg in map(models[i].find_body, LEGS) if leg is not None]
+                members.append(
+                    Member(
+                        _body(models[i]),
+                        legs,
+                        radius=group.radius,
+                        speed=float(speed),
+                        is_aware=bool(aware[i]),
+                        phase=float(phases[i]),
+                    )
                 )
+            self._places.add_party(group, members)
         return names
 
-    def _spawn_models(self, text: str, names: list[str], poses: DoubleArray) -> list[Model]:
-        """Adds the models of people: all of them, or none."""
-        models: list[Model] = []
+    def _unused_numbers(self, group: Group, count: int) -> list[int]:
+        """Returns the next numbers of a group that are in the name of no model."""
+        used = {model.name for model in self.world.models}
+        numbers = itertools.count(self._numbers[group.name])
+        unused = (number for number in numbers if f"{group.name}_{number}" not in used)
+        return list(itertools.islice(unused, count))
+
+    # -- services --------------------------------------------------------------------------
+
+    def _serve_spawn(self, request: Any) -> Any:
+        poses = [(pose.x, pose.y, pose.theta) for pose in request.poses]
         try:
-            for name, pose in zip(names, poses.tolist(), strict=True):
-                model = self.world.spawn_model(text, name, "", pose, "allow")
-                if model is None:
-                    raise WorldError("people cannot be spawned by a hook")
-                models.append(model)
-        except BaseException:
-            for model in models:
-                self.world.delete_model(model.name)
-            raise
-        return models
+            names = self.spawn(request.group or None, request.count, poses or None)
+        except (WorldError, ValueError) as error:
+            return False, str(error), []
+        return True, "", names
+
+    def _serve_remove(self, request: Any) -> Any:
+        try:
+            self.remove(request.names or None)
+        except WorldError as error:
+            return False, str(error)
+        return True, ""
+
+    def _serve_direct(self, request: Any) -> Any:
+        names = request.names or None
+        try:
+            if request.action == request.STOP:
+                self.stop(names)
+            elif request.action == request.RESUME:
+                self.resume(names)
+            elif request.action == request.SEND:
+                self.send(names, (request.goal.x, request.goal.y))
+            else:
+                return False, f"action must be from 0 to 2, got {request.action}"
+        except (WorldError, ValueError) as error:
+            return False, str(error)
+        return True, ""
 
     # -- steps -----------------------------------------------------------------------------
 
-    @when_due
-    def before_physics_step(self, timekeeper: Timekeeper) -> None:
-        """Moves the people; the core does this without a call."""
-        self._crowd.advance(timekeeper.step_size)
-
-    @when_due
-    def after_physics_step(self, timekeeper: Timekeeper) -> None:
-        """Emits the people at the rate of publication."""
-        if not self._timer.check_update(timekeeper):
-            return
+    def _publish(self, timekeeper: Timekeeper) -> None:
+        """Emits the people."""
         states = self._read_people(timekeeper.sim_time_ns)
         if self._people.wanted:
             self._people.emit(People(states.stamp, states.frame_id, states.names, states.poses))
@@ -311,7 +337,7 @@ class Pedestrians(WorldPlugin):
             self._tracked.emit(TrackedPeople(**fields_of(states)))
 
     def _read_people(self, stamp: int) -> PeopleStates:
-        people = [person for person in self._crowd.people if person.body_id in self._names]
+        people = self._crowd.people
         rows = np.array([person[1:7] for person in people]).reshape(-1, 6)
         rows[:, 2] = np.remainder(rows[:, 2] + math.pi, 2.0 * math.pi) - math.pi
         names = [self._names[person.body_id] for person in people]

@@ -6,11 +6,15 @@ import math
 from typing import TYPE_CHECKING, Any, Final
 
 from flatland.geometry import compose
-from flatland.plugin_api.after_step import update_after_step
-from flatland.plugin_api.parameters import at_key, read_body_or_first, read_pose, read_rate
+from flatland.plugin_api.parameters import (
+    at_key,
+    read_body_or_first,
+    read_choice,
+    read_phase,
+    read_pose,
+    read_rate,
+)
 from flatland.plugin_api.plugin import ModelPlugin
-from flatland.plugin_api.schedule import when_due
-from flatland.plugin_api.update_timer import UpdateTimer
 from flatland.values import Odometry, PoseStamped
 
 if TYPE_CHECKING:
@@ -41,15 +45,11 @@ class PosePublisher(ModelPlugin):
         """
         self.body = read_body_or_first(config, self.model, "body")
         self.origin = read_pose(config, "origin")
-        self._timer = UpdateTimer(read_rate(config))
-        hook = update_after_step(self, config, self._timer)
+        rate = read_rate(config)
+        phase = read_phase(config, rate)
         self.world_frame_id = config.get("frame_id", "string", "map")
         child = config.get("child_frame_id", "string", self.body.name)
-        message = config.get("message", "string", "pose")
-        if message not in MESSAGES:
-            raise at_key(config, "message").error(
-                f'Invalid "message", must be one of: {", ".join(MESSAGES)}, got {message}'
-            )
+        message = read_choice(config, "message", MESSAGES, "pose")
         if message == "pose" and "child_frame_id" in config:
             raise at_key(config, "child_frame_id").error(
                 'Invalid "child_frame_id", only used with "message: odometry"'
@@ -62,12 +62,11 @@ class PosePublisher(ModelPlugin):
             self._measure, self._output = self.pose_at, self.output(topic, PoseStamped)
         else:
             self._measure, self._output = self.odometry_at, self.output(topic, Odometry)
-        self.call_when_due(hook, self._timer, outputs=[self._output])
+        self.on_update(self._publish, rate, phase=phase, outputs=[self._output])
 
-    @when_due
-    def before_physics_step(self, timekeeper: Timekeeper) -> None:
-        """Emits the pose if an update is due."""
-        if self._timer.check_update(timekeeper) and self._output.wanted:
+    def _publish(self, timekeeper: Timekeeper) -> None:
+        """Emits the pose."""
+        if self._output.wanted:
             self._output.emit(self._measure(timekeeper.sim_time_ns))
 
     def pose_at(self, stamp: int) -> PoseStamped:

@@ -1,4 +1,4 @@
-"""A range finder that knows what its beams hit: labels for learning perception."""
+"""A range finder that labels what its beams hit, for learning perception."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ class SemanticScan(RangeSensor):
         self.angles = BeamAngles.from_config(config.subnode("angle", "map"))
         self.origin = read_pose(config, "origin")
         self.classes = self._read_classes(config)
-        hook, noise = self._read_updates(config, "semantic_scan")
+        noise = self._read_updates(config, "semantic_scan")
         self._finder = RangeFinder(
             self.angles.fan(self.range, False),
             self.range,
@@ -51,7 +51,7 @@ class SemanticScan(RangeSensor):
             noise=noise,
         )
         topic = config.get("topic", "string", "semantic_scan")
-        self._start(hook, self.output(topic, values.SemanticScan))
+        self._start(self.output(topic, values.SemanticScan))
 
     @staticmethod
     def _read_classes(config: YamlReader) -> dict[str, str]:
@@ -101,5 +101,4 @@ class SemanticScan(RangeSensor):
     def _layers(self, category_bits: int) -> tuple[str, ...]:
         if category_bits == ALL_LAYERS:
             return ("all",)
-        names = self.world.collision_filter.names
-        return tuple(name for i, name in enumerate(names) if category_bits >> i & 1)
+        return tuple(self.world.collision_filter.names_of(category_bits))

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from flatland.physics import RangeFinder
-from flatland.plugin_api.parameters import at_key, read_pose
+from flatland.plugin_api.parameters import at_key, read_choice, read_pose
 from flatland.plugins._beams import MAX_BEAMS, end_points, read_layers, read_no_hit
 from flatland.plugins._range_sensor import RangeSensor
 from flatland.values import Range
@@ -41,15 +41,10 @@ class Sonar(RangeSensor):
         """
         self._read_mounting(config)
         self.field_of_view = self._read_field_of_view(config)
-        self.radiation_type = config.get("radiation_type", "string", RADIATION_TYPES[0])
-        if self.radiation_type not in RADIATION_TYPES:
-            raise at_key(config, "radiation_type").error(
-                f'Invalid "radiation_type", must be one of: {", ".join(RADIATION_TYPES)}, '
-                f"got {self.radiation_type}"
-            )
+        self.radiation_type = read_choice(config, "radiation_type", RADIATION_TYPES)
         self.origin = read_pose(config, "origin")
         self.beam_ends = self._read_rays(config)
-        hook, noise = self._read_updates(config, "range")
+        noise = self._read_updates(config, "range")
         self._finder = RangeFinder(
             self.beam_ends,
             self.range,
@@ -61,7 +56,7 @@ class Sonar(RangeSensor):
             uses_materials=self.radiation_type == "infrared",
             is_cone=True,
         )
-        self._start(hook, self.output(config.get("topic", "string", "range"), Range))
+        self._start(self.output(config.get("topic", "string", "range"), Range))
 
     @staticmethod
     def _read_field_of_view(config: YamlReader) -> float:
@@ -90,7 +85,7 @@ class Sonar(RangeSensor):
         return end_points(angles, self.range)
 
     def _measure(self, stamp: int) -> Range:
-        scan = self._finder.scan(self.body, self._noise.key, self._noise.updates)
+        scan = self._scan()
         return Range(
             stamp=stamp,
             frame_id=self.frame_id,

@@ -5,16 +5,14 @@ from __future__ import annotations
 import logging
 from typing import TYPE_CHECKING
 
-from flatland.plugin_api.after_step import AFTER, BEFORE, NeverDue
+from flatland.config.hints import did_you_mean
 from flatland.plugin_api.parameters import at_key, read_body, read_finite, read_pose
 from flatland.plugin_api.plugin import ModelPlugin
-from flatland.plugin_api.schedule import when_due
 from flatland.plugins._easing import EASINGS
 
 if TYPE_CHECKING:
     from flatland.config.reader import YamlReader
     from flatland.plugin_api.ports import Command
-    from flatland.timekeeper import Timekeeper
 
 _LOG = logging.getLogger("flatland")
 
@@ -39,10 +37,12 @@ class Tween(ModelPlugin):
             )
         self._mode: str = config.get("mode", "string", "yoyo")
         if self._mode not in MODES:
-            raise at_key(config, "mode").error(f"Mode {self._mode} does not exist")
+            hint = did_you_mean(self._mode, MODES, "modes")
+            raise at_key(config, "mode").error(f"Mode {self._mode} does not exist", hint)
         easing = config.get("easing", "string", "linear")
         if easing not in EASINGS:
-            raise at_key(config, "easing").error(f"Easing {easing} does not exist")
+            hint = did_you_mean(easing, EASINGS, "easings")
+            raise at_key(config, "easing").error(f"Easing {easing} does not exist", hint)
         self._trigger = self._read_trigger(config)
         self._controller = self.control(
             self._body.control_tween(
@@ -51,8 +51,6 @@ class Tween(ModelPlugin):
         )
         if self._trigger is not None:
             self._trigger.on_change = self._trigger_changed
-        for hook in (BEFORE, AFTER):
-            self.call_when_due(hook, NeverDue())
 
     def _read_trigger(self, config: YamlReader) -> Command[bool] | None:
         topic = config.get("trigger_topic", "string", "")
@@ -79,18 +77,6 @@ class Tween(ModelPlugin):
     def _set_trigger(self) -> None:
         if self._trigger is not None:
             self._controller.set_trigger(self._trigger.value)
-
-    @when_due
-    def before_physics_step(self, timekeeper: Timekeeper) -> None:
-        """Advances the motion by one step."""
-        self._set_trigger()
-        self._controller.advance(timekeeper.step_size)
-
-    @when_due
-    def after_physics_step(self, timekeeper: Timekeeper) -> None:
-        """Reverts the effect of the physics step on the body."""
-        del timekeeper
-        self._controller.hold()
 
     def state(self) -> object:
         """Returns the progress along the path, and whether the motion is forward."""

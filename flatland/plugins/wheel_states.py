@@ -6,7 +6,6 @@ import math
 from typing import TYPE_CHECKING
 
 from flatland.physics import RollingWheel
-from flatland.plugin_api.after_step import AFTER
 from flatland.plugin_api.parameters import (
     at_key,
     find_body,
@@ -16,8 +15,6 @@ from flatland.plugin_api.parameters import (
     read_rate,
 )
 from flatland.plugin_api.plugin import ModelPlugin
-from flatland.plugin_api.schedule import when_due
-from flatland.plugin_api.update_timer import UpdateTimer
 from flatland.values import JointState
 
 if TYPE_CHECKING:
@@ -41,7 +38,7 @@ class WheelStates(ModelPlugin):
     def on_initialize(self, config: YamlReader) -> None:
         """Reads the parameters."""
         body = read_body_or_first(config, self.model, "body")
-        self._timer = UpdateTimer(read_rate(config))
+        rate = read_rate(config)
         self._ticks = config.get("ticks_per_turn", "int", 0, minimum=0, maximum=_MOST_TICKS)
         names: list[str] = []
         wheels: list[RollingWheel] = []
@@ -57,7 +54,7 @@ class WheelStates(ModelPlugin):
         self._names = tuple(names)
         self._controller = self.control(self.model.world.physics.measure_wheels(wheels))
         self._output = self.output(config.get("topic", "string", "joint_states"), JointState)
-        self.call_when_due(AFTER, self._timer, outputs=[self._output])
+        self.on_update(self._publish, rate, outputs=[self._output])
 
     def _read_wheel(self, entry: YamlReader, default: Body) -> RollingWheel:
         name = entry.get("body", "string", default.name)
@@ -86,18 +83,16 @@ class WheelStates(ModelPlugin):
         """Speeds of the wheels [rad/s]."""
         return tuple(speed for _, speed in self._controller.states)
 
-    @when_due
-    def after_physics_step(self, timekeeper: Timekeeper) -> None:
-        """Emits the angles and speeds if an update is due."""
-        self._controller.measure()
-        if self._timer.check_update(timekeeper) and self._output.wanted:
+    def _publish(self, timekeeper: Timekeeper) -> None:
+        """Emits the angles and speeds."""
+        if self._output.wanted:
             positions = tuple(self._encoded(angle) for angle in self.angles)
             self._output.emit(
                 JointState(timekeeper.sim_time_ns, self._names, positions, self.speeds)
             )
 
     def _encoded(self, angle: float) -> float:
-        """Returns an angle as an encoder measures it: that of the last tick that was passed."""
+        """Returns an angle as an encoder measures it: the angle of the last tick passed."""
         if not self._ticks:
             return angle
         return math.floor(angle / math.tau * self._ticks) * math.tau / self._ticks

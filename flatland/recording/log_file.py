@@ -88,7 +88,7 @@ class LogWriter:
             while rest:
                 rest = rest[os.write(self._file, rest) :]
         except OSError as error:
-            with suppress(OSError):  # not a regular file
+            with suppress(OSError):  # raised if this is not a regular file
                 os.ftruncate(self._file, size)
             raise RecordingError(f'cannot write "{self.path}": {error.strerror}') from error
 
@@ -181,7 +181,7 @@ def encode_value(value: Any) -> Any:
             of its module, or a tuple, list or dictionary with string keys of such values.
 
     Raises:
-        TypeError: The value, or one inside it, has another type.
+        TypeError: The value, or a value inside it, has another type.
     """
     match value:
         case None | bool() | int() | float() | str():
@@ -217,7 +217,7 @@ def decode_value(value: Any) -> Any:
         return _decode(value)
     except RecordingError:
         raise
-    except Exception as error:  # also of the constructors of dataclasses
+    except Exception as error:  # also raised by constructors of dataclasses
         raise RecordingError(f"a value cannot be read: {type(error).__name__}: {error}") from error
 
 

@@ -49,7 +49,7 @@ class Recorder(WorldObserver):
         if (
             timekeeper.sim_time_ns
             or world.change_count
-            or world.ports.commands_received() != world.inputs.commands_received
+            or world.ports.commands_received() != world.source.commands_received
         ):
             raise WorldError(
                 "a recording must start before the first step, command and request of a world"
@@ -57,7 +57,7 @@ class Recorder(WorldObserver):
         self._world = world
         self._timekeeper = timekeeper
         self._depth = 0
-        self._step = 0  # of the recording; the time may be set back
+        self._step = 0  # number of recorded steps; the time may be set back
         self._known_files: set[str] = set()
         self._known_params: dict[str, object] = {}
         self._checksums: list[int] = []
@@ -72,7 +72,7 @@ class Recorder(WorldObserver):
                     "world": world.path,
                     "seed": world.seed,
                     "step_size_ns": timekeeper.step_size_ns,
-                    "simplify_map": world.inputs.simplify_map,
+                    "simplify_map": world.source.simplify_map,
                     "plugin_errors": world.plugin_errors,
                     "on_invalid_body": world.on_invalid_body,
                     "model_path": world.model_path,
@@ -100,7 +100,7 @@ class Recorder(WorldObserver):
 
     @contextmanager
     def change(self, kind: str, arguments: Mapping[str, object]) -> Iterator[None]:
-        """Records a request and its outcome; requests of plugins within it are not recorded."""
+        """Records a request and its outcome, but not the requests of plugins in the block."""
         if self._depth or self._writer is None:
             yield
             return
@@ -127,7 +127,7 @@ class Recorder(WorldObserver):
             self._depth -= 1
 
     def _command_set(self, command: Command[Any], value: Any) -> None:
-        # What hooks, and plugins within a request, set is repeated by the same plugins.
+        # Values set by hooks, and by plugins within a request, are repeated by the same plugins.
         if self._depth or self._world.requests.in_hook or self._writer is None:
             return
         try:
@@ -194,7 +194,7 @@ class Recorder(WorldObserver):
 
     def _new_inputs(self) -> Record:
         """Returns the digests of files and the parameters that were read since the last call."""
-        inputs = self._world.inputs
+        inputs = self._world.source.inputs
         files = [path for path in inputs.files if path not in self._known_files]
         params = {
             name: encode_value(value)
@@ -212,7 +212,7 @@ def checksum(physics: PhysicsWorld) -> int:
 
 
 def digests(paths: Iterable[str]) -> dict[str, str | None]:
-    """Returns the SHA-256 digest of each file in hexadecimal digits; None if it is not readable."""
+    """Returns the SHA-256 digest of each file in hexadecimal; None for an unreadable file."""
     result: dict[str, str | None] = {}
     for path in paths:
         try:

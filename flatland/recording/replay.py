@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Iterable, Mapping
-from contextlib import AbstractContextManager, nullcontext
+from contextlib import AbstractContextManager, ExitStack, nullcontext
 from dataclasses import dataclass
 from typing import Any, Final
 
@@ -24,8 +24,9 @@ class Difference:
     """The first point at which a repeated run differs from its recording.
 
     Attributes:
-        step: The first step that differs; 0 for the loaded world. If the states of all bodies are
-            equal, but not those of plugins, the last step of the second in which that happened.
+        step: The first step that differs; 0 for the loaded world. If the states of plugins differ,
+            but not the states of bodies, the last step of the simulated second with the
+            difference.
         text: What differs.
     """
 
@@ -40,7 +41,7 @@ class Replay:
         recording: The recording.
         world: The world of the repeated run.
         last_step: The last step of the recording.
-        difference: The first difference that was found, None for none.
+        difference: The first difference that was found; None if there is none.
         step: Number of steps so far.
     """
 
@@ -68,6 +69,18 @@ class Replay:
             self._check_files(self.recording.records)
         self._params: dict[str, Any] = {}
         self._set_params(header)
+        self.last_step: int = max((r["step"] for r in self.recording.records[1:]), default=0)
+        self.difference: Difference | None = None
+        self.step = 0
+        self._snapshots: dict[int, WorldSnapshot] = {}  # by their numbers in the recording
+        self._on_step: Callable[[int], object] | None = None
+        # Checksums of the steps since the last comparison, and hashes of the steps with a recorded
+        # hash. Both are taken at the same point of a step as by the recorder, before requests of
+        # hooks are carried out.
+        self._checksums: list[int] = []
+        self._hash_steps = {r["step"] for r in self.recording.records[1:] if r["kind"] == "state"}
+        self._hashes: dict[int, str] = {}
+        self._first_checksum_step = 1
         self.world = World.from_yaml(
             header["world"],
             seed=header["seed"],
@@ -78,21 +91,14 @@ class Replay:
             plugin_errors=header["plugin_errors"],
             on_invalid_body=header["on_invalid_body"],
         )
-        folders = header.get("model_path")
-        self.world.model_path = None if folders is None else tuple(folders)
-        self.last_step: int = max((r["step"] for r in self.recording.records[1:]), default=0)
-        self.difference: Difference | None = None
-        self.step = 0
-        self._snapshots: dict[int, WorldSnapshot] = {}  # by their numbers in the recording
-        self._on_step: Callable[[int], object] | None = None
-        # Of the steps since the last comparison, and of the steps with a recorded hash: taken at
-        # the same point of a step as by the recorder, before requests of hooks are carried out.
-        self._checksums: list[int] = []
-        self._hash_steps = {r["step"] for r in self.recording.records[1:] if r["kind"] == "state"}
-        self._hashes: dict[int, str] = {}
-        self.world.log_changes(self)
-        self._first_checksum_step = 1
-        self._compare(header["state"], "the loaded world differs")
+        with ExitStack() as undo:
+            undo.enter_context(self.world)
+            # Not an argument of `from_yaml`: these folders need not exist.
+            folders = header.get("model_path")
+            self.world.source.inputs.folders = None if folders is None else tuple(folders)
+            self.world.log_changes(self)
+            self._compare(header["state"], "the loaded world differs")
+            undo.pop_all()
 
     @staticmethod
     def _check_files(records: list[Record]) -> None:
@@ -113,7 +119,7 @@ class Replay:
             on_step: Called with the number of steps after each step.
 
         Returns:
-            The first difference, None for none.
+            The first difference; None if there is none.
 
         Raises:
             FlatlandError: The recording refers to something that does not exist.
@@ -135,12 +141,12 @@ class Replay:
     # -- the log of the repeated run -------------------------------------------------------
 
     def change(self, kind: str, arguments: Mapping[str, object]) -> AbstractContextManager[None]:
-        """Does nothing: the changes of the repeated run come from the recording."""
+        """Has no effect: the changes of the repeated run come from the recording."""
         del kind, arguments
         return nullcontext()
 
     def repeated(self) -> AbstractContextManager[None]:
-        """Does nothing."""
+        """Has no effect."""
         return nullcontext()
 
     def step_done(self) -> None:
@@ -153,7 +159,7 @@ class Replay:
             self._on_step(self.step)
 
     def world_closing(self) -> None:
-        """Does nothing: a replay has no file to complete."""
+        """Has no effect: a replay has no file to complete."""
 
     # -- records ---------------------------------------------------------------------------
 

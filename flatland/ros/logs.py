@@ -30,9 +30,9 @@ def log_to_ros() -> None:
     """Forwards the log of flatland to rospy; must be called after `rospy.init_node`.
 
     rospy calls the master for each message, as long as a parameter of `/rosout` is not set. A
-    master that does not respond would block the thread that logs, for example the one that steps
-    the world. The call also registers the node again after another one has taken its name. The
-    parameter is therefore read once.
+    master that does not respond would block the thread that logs, for example the thread that
+    steps the world. The call also registers the node again after another one has taken its name.
+    The parameter is therefore read once.
     """
     get_param_server_cache().set(_TOPICS_PARAMETER, rospy.get_param(_TOPICS_PARAMETER, False))
     logger = logging.getLogger("flatland")

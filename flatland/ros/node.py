@@ -10,13 +10,20 @@ import threading
 import time
 from collections.abc import Sequence
 from concurrent.futures import Future, wait
+from contextlib import closing
 from typing import TYPE_CHECKING, Any, Final
 
 from flatland.errors import FlatlandError
-from flatland.ros.fault_reports import FaultReports
-from flatland.ros.message_types import MESSAGE_PACKAGES, OWN_PACKAGE, select_package
-from flatland.ros.parameters import NodeParameters, ParameterError, read_parameters
-from flatland.ros.shutdown import ShutdownWatchdog
+from flatland.node.fault_reports import FaultReports
+from flatland.node.parameters import (
+    MESSAGE_PACKAGES,
+    OWN_PACKAGE,
+    NodeParameters,
+    ParameterError,
+    read_parameters,
+)
+from flatland.node.shutdown import ShutdownWatchdog
+from flatland.ros.message_types import select_package
 
 if TYPE_CHECKING:
     from flatland.ros.parameter_server import ParameterServer
@@ -30,7 +37,7 @@ _MASTER_POLL_PERIOD: Final = 0.2  # s between two attempts to reach the ROS mast
 _MASTER_WARNING_TIMEOUT: Final = 1.0  # s without a ROS master until a warning is logged
 _SWITCH_INTERVAL: Final = 0.0002  # s for which a thread keeps the GIL while others wait for it
 _REGISTRATION_TIMEOUT: Final = 0.1  # s, for the registration of `/clock`
-_UNREGISTER_TIMEOUT: Final = 0.5  # s
+_UNREGISTER_TIMEOUT: Final = 2.0  # s
 _STOP_POLL_PERIOD: Final = 0.05  # s between two checks for a stop request without a master
 _SHUTDOWN_POLL_PERIOD: Final = 0.002  # s
 # The reason that the ROS master gives to a node whose name another node has taken.
@@ -41,7 +48,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Runs the node.
 
     Args:
-        arguments: Arguments of the command line; None for those of the process.
+        arguments: Arguments of the command line; None for the arguments of the process.
 
     Returns:
         The exit code: 0 after a requested stop or a complete benchmark, 1 after a failure, whose
@@ -78,7 +85,7 @@ class ServerNode:
         self._registrar: Registrar | None = None
         self._watchdog: ShutdownWatchdog | None = None
         self._replaced = False  # whether another node has the name of this one
-        self._fault_reports = FaultReports()
+        self._fault_reports = FaultReports(_is_fault_of_client)
 
     def run(self) -> int:
         """Runs until a stop is requested, and returns the exit code."""
@@ -218,28 +225,43 @@ class ServerNode:
             raise ParameterError(
                 f'Invalid parameter "~msgs_package": "{package}" is not installed, {error}'
             ) from error
-        from flatland.ros.clock import NodeClock, SimulatedClock, WallClock
+        from flatland.node.clock import NodeClock, SimulatedClock, WallClock
         from flatland.ros.transport.registrar import Registrar
+        from flatland.ros.transport.ros_transport import RosTransport
 
         _check_time_of_other_nodes(parameters.use_sim_time, server.use_sim_time is True)
         self._registrar = Registrar()
         self._registrar.keep_parameters(server.found())
+        transport = RosTransport(self._registrar)
         clock: NodeClock
         if parameters.use_sim_time:
-            clock = SimulatedClock(self._registrar, parameters.clock_rate)
+            clock = SimulatedClock(transport, parameters.clock_rate)
         else:
             clock = WallClock()
         # Other nodes have a valid time while the following modules are imported, which takes as
         # long as everything before. The import would delay the registration.
         self._registrar.flush(_REGISTRATION_TIMEOUT)
-        from flatland.ros.served_world import ServedWorld
+        from flatland.node.served_world import ServedWorld
+        from flatland.ros.transport.master_watch import MasterWatch
 
-        with ServedWorld(parameters, self._registrar, clock, self._replace) as served:
+        with (
+            closing(MasterWatch(self._registrar, self._replace)) as master_watch,
+            closing(ServedWorld(parameters, transport, clock)) as served,
+        ):
             self._fault_reports.world = served.world
             self._simulation = served.simulation
             if self._stopping.is_set():
                 served.simulation.stop()
             served.run()
+            # Before the topics, so that no topic is registered again.
+            master_watch.close()
+
+
+def _is_fault_of_client(error_type: type[BaseException]) -> bool:
+    """Returns whether rospy ends the thread of a client that sends an invalid request."""
+    from rospy.exceptions import TransportException
+
+    return issubclass(error_type, TransportException)
 
 
 def _check_time_of_other_nodes(use_sim_time: bool, others: bool) -> None:

@@ -46,8 +46,3 @@ class ParameterServer:
         if self.use_sim_time is not None:
             found[USE_SIM_TIME] = self.use_sim_time
         return found
-
-
-def yaml_parameter(name: str) -> object:
-    """Returns the value of `param()` in YAML files; relative names are in the node's namespace."""
-    return rospy.get_param(name, None)

@@ -3,22 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from contextlib import ExitStack
 from typing import TYPE_CHECKING
 
 from flatland.physics import run_worlds
 
 if TYPE_CHECKING:
+    from flatland.physics import Run
+    from flatland.runtime.stepping import StepRun
     from flatland.world import World
 
 
 def step_worlds(worlds: Sequence[World], n: int = 1, num_threads: int = 0) -> None:
     """Steps each of several worlds n times; the same as `for world in worlds: world.step(n)`.
 
-    Steps in which no hook is due are performed in the core, with the worlds in parallel and
-    without the GIL; the results do not depend on the number of threads. Worlds that are observed,
-    recorded or paused, and those with hooks that are called in every step, are stepped one after
-    the other.
+    The core performs the steps of all worlds in parallel and without the GIL; code of plugins and
+    observers is called in between, one world after the other. The results do not depend on the
+    number of threads.
 
     Args:
         worlds: The worlds, each at most once.
@@ -36,17 +36,21 @@ def step_worlds(worlds: Sequence[World], n: int = 1, num_threads: int = 0) -> No
     if len({id(world) for world in worlds}) != len(worlds):
         raise ValueError("each world must be given at most once")
     batch = _Batch(worlds, n)
-    while batch.left:
-        batch.run(num_threads)
+    try:
+        while batch.left:
+            batch.perform(num_threads)
+    finally:
+        batch.end()
     if batch.errors:
         raise batch.errors[min(batch.errors)]
 
 
 class _Batch:
-    """Steps that remain to be performed.
+    """The steps of several worlds, whose runs advance together.
 
     Attributes:
-        left: Steps by the index of the world, in the order in which worlds are locked.
+        left: Steps that remain to be begun or completed, by the index of the world, in the order in
+            which worlds are locked.
         errors: What the worlds raised, by index.
     """
 
@@ -56,40 +60,40 @@ class _Batch:
         order = sorted(range(len(worlds)), key=lambda index: id(worlds[index]))
         self.left = dict.fromkeys(order, n) if n > 0 else {}
         self.errors: dict[int, BaseException] = {}
+        self._runs: dict[int, StepRun] = {}
 
-    def run(self, num_threads: int) -> None:
-        """Performs steps in the core as far as possible, and then those that call hooks."""
-        with ExitStack() as locks:
-            runs = {}
-            for index in list(self.left):
-                try:
-                    run = self._worlds[index].stepping.begin_batch(self.left[index], locks)
-                except Exception as error:
-                    self._fail(index, error)
-                    continue
-                if run is not None:
-                    runs[index] = run
-            results = run_worlds(list(runs.values()), num_threads)
-            for (index, run), result in zip(runs.items(), results, strict=True):
-                try:
-                    made = self._worlds[index].stepping.end_batch(run, result)
-                except Exception as error:
-                    self._fail(index, error)
-                else:
-                    self._take(index, made)
-        for index in [index for index in self.left if index not in runs]:
-            try:
-                self._worlds[index].step(self.left[index])
-            except Exception as error:
-                self._fail(index, error)
+    def perform(self, num_threads: int) -> None:
+        """Performs a run of each world."""
+        waiting: dict[int, Run] = {}
+        for index, left in list(self.left.items()):
+            self._runs[index] = self._worlds[index].stepping.run(left)
+            self._advance(index, None, waiting)
+        while waiting:
+            indices, runs = (
+                list(waiting),
+                [(self._worlds[index].physics, run) for index, run in waiting.items()],
+            )
+            waiting = {}
+            for index, result in zip(indices, run_worlds(runs, num_threads), strict=True):
+                self._advance(index, result, waiting)
+
+    def _advance(self, index: int, result: object, waiting: dict[int, Run]) -> None:
+        """Continues the run of a world with what the core returned or raised."""
+        run = self._runs[index]
+        try:
+            if isinstance(result, Exception):
+                waiting[index] = run.throw(result)
             else:
+                waiting[index] = run.send(result)  # type: ignore[arg-type]  # None at the start
+        except StopIteration as end:
+            self.left[index] -= end.value
+            if not self.left[index]:
                 del self.left[index]
-
-    def _take(self, index: int, made: int) -> None:
-        self.left[index] -= made
-        if not self.left[index]:
+        except Exception as error:
+            self.errors[index] = error
             del self.left[index]
 
-    def _fail(self, index: int, error: Exception) -> None:
-        self.errors[index] = error
-        del self.left[index]
+    def end(self) -> None:
+        """Releases the worlds, after an interrupt by the user."""
+        for run in self._runs.values():
+            run.close()

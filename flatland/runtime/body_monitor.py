@@ -1,4 +1,4 @@
-"""Reacts to the bodies that a physics step reports: jammed ones, and ones that are not finite."""
+"""Handles the bodies that a physics step reports: jammed bodies and bodies that are not finite."""
 
 from __future__ import annotations
 
@@ -87,11 +87,11 @@ class BodyMonitor(WorldObserver):
             self._invalid(report.invalid)
 
     def model_moved(self, model: Model) -> None:
-        """Forgets the jam of a model."""
+        """Removes the record of a jam of the model."""
         self._jams.pop(model, None)
 
     def model_removed(self, model: Model) -> None:
-        """Forgets the jam of a model."""
+        """Removes the record of a jam of the model."""
         self._jams.pop(model, None)
 
     def _model_of(self, body_id: int) -> Model | None:

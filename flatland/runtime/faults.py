@@ -54,7 +54,7 @@ class Faults:
         self._last_log: dict[Hashable, float] = {}
 
     def add(self, source: Hashable, what: str, error: BaseException) -> None:
-        """Takes an exception; to be called while it is handled.
+        """Records or logs an exception; to be called while the exception is handled.
 
         Args:
             source: Identifies the source, for the limit of the log.
@@ -71,7 +71,7 @@ class Faults:
             _LOG.error("%s raised", what, exc_info=error)
 
     def add_in_hook(self, plugin: Hashable, hook: str, name: str, error: BaseException) -> bool:
-        """Takes an exception of a plugin's hook; to be called while it is handled.
+        """Records or logs an exception of a hook; to be called while the exception is handled.
 
         Args:
             plugin: The plugin.
@@ -96,7 +96,7 @@ class Faults:
     def add_of_subscriber(
         self, output: Output[Any], callback: Callable[[Any], None], error: BaseException
     ) -> None:
-        """Takes an exception of a subscriber of an output; to be called while it is handled."""
+        """Records or logs an exception of a subscriber; to be called while it is handled."""
         name = getattr(callback, "__qualname__", None) or repr(callback)
         self.add(callback, f'subscriber {name} of output "{output.topic}"', error)
 

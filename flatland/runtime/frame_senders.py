@@ -1,59 +1,97 @@
-"""The senders of coordinate frames, to detect frames with two parents."""
+"""The senders of coordinate frames, to detect frames with two parents or two poses."""
 
 from __future__ import annotations
 
 import logging
-from typing import TypeAlias
+from typing import TYPE_CHECKING, TypeAlias
 
 from flatland.plugin_api.plugin import FlatlandPlugin, describe
+
+if TYPE_CHECKING:
+    from flatland.geometry import Pose
 
 _LOG = logging.getLogger("flatland")
 
 FramePair: TypeAlias = tuple[str, str]
+_Sender: TypeAlias = tuple[str, FlatlandPlugin, "Pose | None", str]
+"""Parent, plugin, pose in the parent if it is constant, and the entry that disables the sender."""
 
 
 class FrameSenders:
     """The plugins that send each child frame.
 
-    A frame has one parent in a TF tree. With two, its position changes with each message.
+    A frame has one parent and one pose in a TF tree. With two, its position changes with each
+    message.
     """
 
     def __init__(self) -> None:
         """Creates an empty table."""
-        self._senders: dict[str, list[tuple[str, FlatlandPlugin]]] = {}
+        self._senders: dict[str, list[_Sender]] = {}
         self._warned: set[tuple[str, frozenset[str]]] = set()
 
-    def add(self, plugin: FlatlandPlugin, frames: FramePair) -> None:
-        """Adds a pair of frames that a plugin sends for the first time.
+    def add(
+        self, plugin: FlatlandPlugin, frames: FramePair, pose: Pose | None = None, switch: str = ""
+    ) -> None:
+        """Adds a pair of frames that a plugin declares, or sends for the first time.
 
         Logs one warning for each child frame and pair of parents of different plugins.
 
         Args:
             plugin: The sender.
             frames: (parent, child).
+            pose: Pose of the child in the parent [m, rad]; None if it changes or is unknown.
+            switch: Entry of the plugin that disables the transform, empty if it is unknown.
         """
         parent, child = frames
         senders = self._senders.setdefault(child, [])
-        for other_parent, other in senders:
-            conflict = (child, frozenset((parent, other_parent)))
-            if other is plugin or other_parent == parent or conflict in self._warned:
-                continue
-            self._warned.add(conflict)
-            _LOG.warning(
-                'TF frame "%s" has two parents, "%s" from %s and "%s" from %s; give the frames '
-                "different names, or disable one of the senders",
-                child,
-                other_parent,
-                describe(other),
-                parent,
-                describe(plugin),
-            )
-        senders.append((parent, plugin))
+        if any(sender[:2] == (parent, plugin) for sender in senders):
+            return
+        new = (parent, plugin, pose, switch)
+        for other in senders:
+            conflict = (child, frozenset((parent, other[0])))
+            if conflict not in self._warned and _are_in_conflict(other, new):
+                self._warned.add(conflict)
+                _warn(child, other, new)
+        senders.append(new)
 
     def remove(self, plugin: FlatlandPlugin, frames: FramePair) -> None:
         """Removes a pair of frames that was added."""
         parent, child = frames
-        senders = self._senders[child]
-        senders.remove((parent, plugin))
-        if not senders:
+        senders = [each for each in self._senders[child] if each[:2] != (parent, plugin)]
+        if senders:
+            self._senders[child] = senders
+        else:
             del self._senders[child]
+
+
+def _are_in_conflict(first: _Sender, second: _Sender) -> bool:
+    if first[1] is second[1]:
+        return False  # A plugin may change the parent of a frame.
+    if first[0] != second[0]:
+        return True
+    if first[2] is not None and second[2] is not None:
+        return first[2] != second[2]
+    # Plugins of one model, such as two drives of a body, send the same pose.
+    first_model, second_model = (getattr(each[1], "model", None) for each in (first, second))
+    return first_model is not second_model
+
+
+def _warn(child: str, first: _Sender, second: _Sender) -> None:
+    origins = [describe(each[1]) + each[1]._place.suffix for each in (first, second)]
+    if first[0] == second[0]:
+        problem = f'is sent with two poses in "{first[0]}", by {origins[0]} and by {origins[1]}'
+        remedy = "give the frames different names or the models different namespaces"
+    else:
+        problem = f'has two parents, "{first[0]}" from {origins[0]} and "{second[0]}" from '
+        problem += origins[1]
+        remedy = "give the frames different names"
+    switches = [f'"{each[3]}" of "{each[1].name}"' for each in (first, second) if each[3]]
+    keys = f" ({' or '.join(dict.fromkeys(switches))})" if switches else ""
+    _LOG.warning(
+        'TF frame "%s" %s; %s, or disable one of the senders%s',
+        child,
+        problem,
+        remedy,
+        keys,
+        extra={"place": second[1]._place},
+    )

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib
 import math
 from collections.abc import Callable
 from typing import Final
@@ -12,6 +11,7 @@ import numpy.typing as npt
 
 from flatland.errors import WorldError
 from flatland.geometry import BoolArray, Bounds, DoubleArray
+from flatland.physics import connected_regions, distances_to_off
 
 IntArray = npt.NDArray[np.int64]
 
@@ -84,7 +84,7 @@ class FreeSpace:
         return self._candidates[np.isin(self._regions[self._candidates], reached)]
 
     def largest_region(self) -> IntArray:
-        """Returns the cells, as `cells` does, of the connected region with the most of them."""
+        """Returns the cells of the largest connected region, as `cells` does."""
         regions = self._regions[self._candidates]
         sizes = np.bincount(regions[regions > 0], minlength=1)
         largest = sizes.argmax() if sizes.any() else -1
@@ -117,12 +117,11 @@ class FreeSpace:
         """
         corners = np.array((start, goal))
         low = np.floor((corners.min(axis=0) - margin - self._origin) / self._cell).astype(int)
-        high = np.ceil((corners.max(axis=0) + margin - self._origin) / self._cell).astype(int)
+        high = np.floor((corners.max(axis=0) + margin - self._origin) / self._cell).astype(int) + 1
         first_column, first_row = np.maximum(low, 0).tolist()
         grid = self._regions.reshape(self._rows, self._columns)
         window = grid[first_row : int(high[1]), first_column : int(high[0])] > 0
-        cv2 = importlib.import_module("cv2")
-        regions = cv2.connectedComponents(window.view(np.uint8), connectivity=8)[1]
+        regions = connected_regions(window, diagonally=True)
         ends = []
         for x, y in (start, goal):
             cell = self.cell_at(x, y)
@@ -174,10 +173,7 @@ class FreeSpace:
         cells = np.minimum(points.astype(np.int64), np.array([shape[1], shape[0]]) - 1)
         empty = np.ones(shape, np.uint8)
         empty[cells[:, 1], cells[:, 0]] = 0
-        if not len(cells):
-            return np.full(self._rows * self._columns, math.inf)
-        cv2 = importlib.import_module("cv2")
-        distances = cv2.distanceTransform(empty, cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
+        distances = distances_to_off(empty)
         inner = distances[margin : margin + self._rows, margin : margin + self._columns]
         result: DoubleArray = inner.ravel() * np.float32(self._cell)
         return result
@@ -192,10 +188,8 @@ class FreeSpace:
         passable = distances >= least + self._cell
         undecided = np.flatnonzero((distances >= least - self._cell) & ~passable)
         passable[undecided] = self._fits(self._centers(undecided), least)
-        cv2 = importlib.import_module("cv2")
-        grid = passable.view(np.uint8).reshape(self._rows, self._columns)
-        regions: npt.NDArray[np.int32] = cv2.connectedComponents(grid, connectivity=8)[1].ravel()
-        return regions
+        grid = passable.reshape(self._rows, self._columns)
+        return connected_regions(grid, diagonally=True).ravel()
 
     def _regions_around(self, point: DoubleArray) -> npt.NDArray[np.int32]:
         where = f"connected_to ({point[0]:g}, {point[1]:g})"

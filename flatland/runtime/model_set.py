@@ -2,78 +2,300 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import os
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from flatland.entities.model import Model
-from flatland.errors import WorldError, YamlError
+from flatland.errors import BatchError, FlatlandError, WorldError, YamlError
 from flatland.geometry import Pose, finite_pose
 from flatland.graph_names import is_legal_namespace
 from flatland.loading.model_loader import ModelLoader
 from flatland.loading.model_source import ModelSources, ModelSpec
+from flatland.runtime.appearance import (
+    checked_color,
+    find_bodies,
+    layer_bits,
+    new_color,
+    plain_numbers,
+    set_layers,
+)
+from flatland.runtime.placement import check_if_blocked
 
 if TYPE_CHECKING:
+    from flatland.entities.collision_filter import CollisionFilter
+    from flatland.entities.model import Model
+    from flatland.physics import PhysicsWorld
+    from flatland.runtime.changes import Changes
     from flatland.runtime.contacts import ContactReporter
     from flatland.runtime.observer import Observers
     from flatland.runtime.placement import IfBlocked, Placement
     from flatland.runtime.plugin_host import PluginHost
     from flatland.runtime.requests import Requests
-    from flatland.world import World
 
 
 class ModelSet:
-    """The models of one world by name, in the order in which they were spawned.
+    """The models of one world, in the order in which they were spawned.
+
+    A request for several models changes all of them or none. Observers are notified when it has
+    succeeded.
 
     Attributes:
-        by_name: The models; not to be changed from outside.
+        by_name: The models by name; not to be changed from outside.
     """
 
     def __init__(
         self,
-        world: World,
+        physics: PhysicsWorld,
+        collision_filter: CollisionFilter,
+        make_model: Callable[[str, str, str], Model],
         host: PluginHost,
         contacts: ContactReporter,
         placement: Placement,
         observers: Observers,
         requests: Requests,
+        changes: Changes,
+        new_sources: Callable[[], ModelSources],
     ) -> None:
         """Creates an empty set.
 
         Args:
-            world: The world of the models.
+            physics: Contains the bodies and joints.
+            collision_filter: The names of layers.
+            make_model: Returns an empty model with a name, a namespace and a path.
             host: Starts and ends the plugins of models.
             contacts: Reports the contacts of the bodies.
             placement: Finds out whether a pose is free.
             observers: Notified of changes.
             requests: Notified while plugins react to the end of a model.
+            changes: Carries out the changes.
+            new_sources: Returns a reader of the model files of one request.
         """
         self.by_name: dict[str, Model] = {}
-        self._world = world
+        self._physics = physics
+        self._collision_filter = collision_filter
+        self._make_model = make_model
         self._host = host
         self._contacts = contacts
         self._placement = placement
         self._observers = observers
         self._requests = requests
+        self._changes = changes
+        self._new_sources = new_sources
+
+    def __getstate__(self) -> dict[str, Model]:
+        """Returns the part of the state of the world that a snapshot saves."""
+        return self.by_name.copy()
+
+    def __setstate__(self, models: dict[str, Model]) -> None:
+        """Restores a saved state."""
+        self.by_name.clear()
+        self.by_name.update(models)
 
     def find(self, name: str) -> Model:
         """Returns the model of a name.
 
         Raises:
-            WorldError: It does not exist.
+            WorldError: The model does not exist.
         """
         try:
             return self.by_name[name]
         except KeyError:
             raise WorldError(f'model with name "{name}" does not exist') from None
 
-    def spawn(self, spec: ModelSpec, if_blocked: IfBlocked) -> Model:
-        """Creates a model; see `World.spawn_model`."""
-        model = self.create(spec, if_blocked, ModelSources(self._world))
-        self.announce(model, if_blocked)
+    # -- requests --------------------------------------------------------------------------
+
+    def spawn_model(
+        self,
+        yaml_path: str | os.PathLike[str],
+        name: str,
+        namespace: str,
+        pose: Sequence[float],
+        if_blocked: IfBlocked,
+    ) -> Model | None:
+        """Adds a model; see `World.spawn_model`."""
+        check_if_blocked(if_blocked)
+        spec = ModelSpec(os.fspath(yaml_path), name, namespace, pose)
+        arguments = {
+            "yaml_path": spec.yaml_path,
+            "name": name,
+            "namespace": namespace,
+            "pose": plain_pose(pose),
+            "if_blocked": if_blocked,
+        }
+        return self._changes.make("spawn_model", arguments, lambda: self._spawn(spec, if_blocked))
+
+    def move_model(
+        self, name: str, pose: Sequence[float], if_blocked: IfBlocked, keep_odometry: bool
+    ) -> Model | None:
+        """Moves a model; see `World.move_model`."""
+        check_if_blocked(if_blocked)
+        arguments = {
+            "name": name,
+            "pose": plain_pose(pose),
+            "if_blocked": if_blocked,
+            "keep_odometry": keep_odometry,
+        }
+        return self._changes.make(
+            "move_model",
+            arguments,
+            lambda: self._move(name, pose, if_blocked, keep_odometry),
+        )
+
+    def delete_model(self, name: str) -> None:
+        """Removes a model; see `World.delete_model`."""
+        self._changes.make("delete_model", {"name": name}, lambda: self.delete(name))
+
+    def spawn_models(
+        self, models: Iterable[ModelSpec], if_blocked: IfBlocked
+    ) -> list[Model] | None:
+        """Adds several models; see `World.spawn_models`."""
+        specs = [replace(spec, pose=plain_pose(spec.pose)) for spec in models]
+        check_if_blocked(if_blocked)
+        arguments = {"models": specs, "if_blocked": if_blocked}
+        return self._changes.make(
+            "spawn_models", arguments, lambda: self._spawn_all(specs, if_blocked)
+        )
+
+    def move_models(
+        self,
+        poses: Mapping[str, Sequence[float]] | Iterable[tuple[str, Sequence[float]]],
+        if_blocked: IfBlocked,
+        keep_odometry: bool,
+    ) -> list[Model] | None:
+        """Moves several models; see `World.move_models`."""
+        pairs = poses.items() if isinstance(poses, Mapping) else poses
+        targets = [(name, plain_pose(pose)) for name, pose in pairs]
+        check_if_blocked(if_blocked)
+        return self._changes.make(
+            "move_models",
+            {"poses": targets, "if_blocked": if_blocked, "keep_odometry": keep_odometry},
+            lambda: self._move_all(targets, if_blocked, keep_odometry),
+        )
+
+    def delete_models(self, names: Iterable[str]) -> None:
+        """Removes several models; see `World.delete_models`."""
+        listed = list(names)
+        self._changes.make("delete_models", {"names": listed}, lambda: self._delete_all(listed))
+
+    def set_appearance(
+        self,
+        model: str,
+        body: str,
+        color: Sequence[float] | None,
+        layers: str | Iterable[str] | None,
+        visible: bool | None,
+    ) -> None:
+        """Changes colour, layers and visibility; see `World.set_appearance`."""
+        names = [layers] if isinstance(layers, str) else None if layers is None else list(layers)
+        numbers = None if color is None else plain_numbers(color)
+        shown = None if visible is None else bool(visible)
+        self._changes.make(
+            "set_appearance",
+            {"model": model, "body": body, "color": numbers, "layers": names, "visible": shown},
+            lambda: self._set_appearance(model, body, numbers, names, shown),
+        )
+
+    # -- changes ---------------------------------------------------------------------------
+
+    def _spawn(self, spec: ModelSpec, if_blocked: IfBlocked) -> Model:
+        model = self._create(spec, if_blocked, self._new_sources())
+        self._announce(model, if_blocked)
         return model
 
-    def create(self, spec: ModelSpec, if_blocked: IfBlocked, sources: ModelSources) -> Model:
-        """Adds a model to the world; `announce` or `discard` must follow.
+    def _spawn_all(self, specs: Sequence[ModelSpec], if_blocked: IfBlocked) -> list[Model]:
+        """Spawns models one after the other."""
+        sources = self._new_sources()
+        spawned: list[Model] = []
+        try:
+            for index, spec in enumerate(specs):
+                with _item(f"models[{index}]", index):
+                    spawned.append(self._create(spec, if_blocked, sources))
+        except BaseException:
+            for model in reversed(spawned):
+                self._discard(model)
+            raise
+        for model in spawned:
+            self._announce(model, if_blocked)
+        return spawned
+
+    def _move_all(
+        self,
+        poses: Sequence[tuple[str, Sequence[float]]],
+        if_blocked: IfBlocked,
+        keep_odometry: bool,
+    ) -> list[Model]:
+        """Moves models together."""
+        moved: dict[str, Model] = {}
+        targets: list[Pose] = []
+        for index, (name, pose) in enumerate(poses):
+            with _item(f"models[{index}]", index):
+                moved[name] = self._find_to("move", name)
+                _refuse_repetition(moved, index, name)
+                try:
+                    targets.append(finite_pose(pose))
+                except ValueError as error:
+                    raise WorldError(f'failed to move model "{name}", {error}') from None
+        models = list(moved.values())
+        previous: list[Mapping[str, Pose]] = [
+            {body.name: body.pose for body in model.bodies} for model in models
+        ]
+        displacements = [model.displacement for model in models]
+        saved = self._physics.saved_motions()
+        try:
+            self._place_all(models, targets, if_blocked)
+        except BaseException:
+            self._physics.restore_motions(saved)
+            for model, displacement in zip(models, displacements, strict=True):
+                model.displacement = displacement
+            raise
+        self._announce_moves(models, previous, if_blocked, keep_odometry)
+        return models
+
+    def _announce_moves(
+        self,
+        models: list[Model],
+        previous: list[Mapping[str, Pose]],
+        if_blocked: IfBlocked,
+        keep_odometry: bool,
+    ) -> None:
+        """Notifies the plugins of moved models and the observers, and logs blocked poses."""
+        for model, before in zip(models, previous, strict=True):
+            self._host.model_moved(model, before, keep_odometry)
+        for model in models:
+            if if_blocked == "warn":
+                self._placement.warn_if_blocked(model)
+            self._observers.model_moved(model)
+
+    def _delete_all(self, names: Sequence[str]) -> None:
+        """Deletes models one after the other."""
+        found: dict[str, Model] = {}
+        for index, name in enumerate(names):
+            with _item(f"names[{index}]", index):
+                found[name] = self._find_to("delete", name)
+                _refuse_repetition(found, index, name)
+        for name in found:
+            # A plugin that reacts to the end of a model may have deleted the next one.
+            if name in self.by_name:
+                self.delete(name)
+
+    def _place_all(self, models: list[Model], targets: list[Pose], if_blocked: IfBlocked) -> None:
+        """Moves all models to their poses, and then away from overlaps."""
+        for index, (model, target) in enumerate(zip(models, targets, strict=True)):
+            with _item(f"models[{index}]", index):
+                self._put(model, target)
+        for index, (model, target) in enumerate(zip(models, targets, strict=True)):
+            with _item(f"models[{index}]", index):
+                chosen = self._placement.choose_pose(model, target, if_blocked, "move")
+                model.displacement = (chosen[0] - target[0], chosen[1] - target[1])
+                if chosen != target:
+                    self._put(model, chosen)
+
+    # -- changes of one model ---------------------------------------------------------------
+
+    def _create(self, spec: ModelSpec, if_blocked: IfBlocked, sources: ModelSources) -> Model:
+        """Adds a model to the world; `_announce` or `_discard` must follow.
 
         Args:
             spec: The model.
@@ -83,11 +305,11 @@ class ModelSet:
         Raises:
             FlatlandError: The model is invalid, or the pose is blocked; nothing was changed.
         """
-        world, name = self._world, spec.name
+        name = spec.name
         checked_pose = self._check_spawn(spec)
         path, reader = sources.read(spec.yaml_path)
-        model = Model(world, name, spec.namespace, path)
-        loader = ModelLoader(world.physics, world.collision_filter, model, reader)
+        model = self._make_model(name, spec.namespace, path)
+        loader = ModelLoader(self._physics, self._collision_filter, model, reader)
         try:
             loader.load_bodies_and_joints(checked_pose)
             self._place(model, model.pose, if_blocked, "spawn")
@@ -101,20 +323,20 @@ class ModelSet:
         self.by_name[name] = model
         return model
 
-    def announce(self, model: Model, if_blocked: IfBlocked) -> None:
+    def _announce(self, model: Model, if_blocked: IfBlocked) -> None:
         """Notifies the observers of a created model, and logs if its pose is blocked."""
         if if_blocked == "warn":
             self._placement.warn_if_blocked(model)
         self._observers.model_added(model)
 
-    def discard(self, model: Model) -> None:
+    def _discard(self, model: Model) -> None:
         """Removes a created model of which the observers were not notified."""
         # A plugin of a later model may have deleted it.
         if self.by_name.get(model.name) is model:
             del self.by_name[model.name]
             self._remove(model)
 
-    def put(self, model: Model, pose: Pose) -> None:
+    def _put(self, model: Model, pose: Pose) -> None:
         """Moves a model to a pose, whether it is blocked or not.
 
         Raises:
@@ -125,28 +347,71 @@ class ModelSet:
         except ValueError as error:
             raise WorldError(f'failed to move model "{model.name}", {error}') from None
 
-    def move(
+    def _move(
         self, name: str, pose: Sequence[float], if_blocked: IfBlocked, keep_odometry: bool
     ) -> Model:
-        """Moves a model; see `World.move_model`."""
-        model = self.find_to("move", name)
+        model = self._find_to("move", name)
         previous = {body.name: body.pose for body in model.bodies}
         try:
             self._place(model, finite_pose(pose), if_blocked, "move")
         except ValueError as error:
             raise WorldError(f'failed to move model "{name}", {error}') from None
-        self._host.model_moved(model, previous, keep_odometry)
-        if if_blocked == "warn":
-            self._placement.warn_if_blocked(model)
-        self._observers.model_moved(model)
+        self._announce_moves([model], [previous], if_blocked, keep_odometry)
         return model
+
+    def _set_appearance(
+        self,
+        name: str,
+        body_name: str,
+        color: tuple[float, ...] | str | None,
+        layers: list[str] | None,
+        visible: bool | None,
+    ) -> None:
+        model = self._find_to("change the appearance of", name)
+        try:
+            bodies = find_bodies(model, body_name)
+            painted = None if color is None else checked_color(color)
+            bits = None if layers is None else layer_bits(self._collision_filter, layers)
+        except WorldError as error:
+            text = f'failed to change the appearance of model "{name}", {error.message}'
+            raise WorldError(text, hint=error.hint) from None
+        for body in bodies:
+            if painted is not None:
+                body.color = new_color(body.color, painted)
+            if visible is not None:
+                body.visible = visible
+        if bits is not None:
+            set_layers(bodies, bits)
+            self._physics.find_new_contacts()
+            # A body that rested on the model, or that the model now overlaps, may be asleep.
+            self._wake()
+            self._placement.warn_if_blocked(model)
+        self._observers.model_changed(model)
 
     def delete(self, name: str) -> None:
         """Deletes a model; see `World.delete_model`."""
-        model = self.find_to("delete", name)
+        model = self._find_to("delete", name)
         del self.by_name[name]
         self._remove(model)
         self._observers.model_removed(model)
+
+    def clear(self) -> None:
+        """Deletes all models, the last one first."""
+        for name in reversed(list(self.by_name)):
+            # A plugin that reacts to the end of a model may have deleted others.
+            if name in self.by_name:
+                self.delete(name)
+
+    def react_to_walls(self) -> None:
+        """Wakes all models after a change of walls, and logs those that overlap walls."""
+        self._wake()
+        for model in self.by_name.values():
+            self._placement.warn_if_blocked(model)
+
+    def _wake(self) -> None:
+        for model in self.by_name.values():
+            for body in model.bodies:
+                body.awake = True
 
     def _check_spawn(self, spec: ModelSpec) -> Pose:
         name, namespace = spec.name, spec.namespace
@@ -166,11 +431,11 @@ class ModelSet:
         except ValueError as error:
             raise WorldError(f'failed to spawn model "{name}", {error}') from None
 
-    def find_to(self, verb: str, name: str) -> Model:
+    def _find_to(self, verb: str, name: str) -> Model:
         """Returns the model of a name.
 
         Raises:
-            WorldError: It does not exist; the text names the operation.
+            WorldError: The model does not exist; the text names the operation.
         """
         try:
             return self.by_name[name]
@@ -197,3 +462,25 @@ class ModelSet:
         with self._requests.hooks():
             self._contacts.dispatch()
         self._contacts.remove_bodies(model.bodies)
+
+
+@contextmanager
+def _item(what: str, index: int) -> Iterator[None]:
+    """Adds the item of a request to the errors of a block."""
+    try:
+        yield
+    except FlatlandError as error:
+        raise BatchError(what, index, error) from error
+
+
+def _refuse_repetition(found: Mapping[str, Model], index: int, name: str) -> None:
+    if len(found) <= index:
+        raise WorldError(f'model "{name}" occurs twice in the request')
+
+
+def plain_pose(pose: Sequence[float]) -> Sequence[float]:
+    """Returns a pose as plain numbers if it is one; an invalid one is rejected later."""
+    try:
+        return tuple(float(number) for number in pose)
+    except (TypeError, ValueError):
+        return repr(pose)  # type: ignore[return-value]

@@ -78,7 +78,7 @@ def _first_free(is_free: Callable[[DoubleArray], BoolArray]) -> DoubleArray:
 def _refined(
     offsets: DoubleArray, spacing: float, is_free: Callable[[DoubleArray], BoolArray]
 ) -> DoubleArray:
-    """Replaces each offset by the shortest free one near it; drops those that are too long."""
+    """Replaces each offset by the shortest free offset near it; drops offsets that are too long."""
     axis = np.arange(-2, 3) * spacing
     around = np.stack(np.meshgrid(axis, axis), axis=-1).reshape(-1, 2)
     candidates = offsets[:, np.newaxis] + around

@@ -13,31 +13,30 @@ if TYPE_CHECKING:
     from flatland.plugin_api.ports import Command, Output
     from flatland.runtime.faults import Faults
     from flatland.values import Transform
-    from flatland.world import World
 
 
 class WorldObserver:
     """Receives notifications of world events; each method does nothing unless overridden.
 
-    All methods are called in the thread that loads or steps the world. What a method raises is
-    handled as what a plugin raises (see `World`, argument `plugin_errors`), except in
-    `output_opened` and `command_opened`, where it refuses the port.
+    All methods are called in the thread that loads or steps the world. An exception of a method is
+    handled like an exception of a plugin (see `World`, argument `plugin_errors`), except in
+    `output_opened` and `command_opened`, where an exception refuses the port.
     """
 
-    def attached(self, world: World) -> None:
-        """The observer was added to a world; called before any other method."""
+    def attached(self, world: Any) -> None:
+        """The observer was added to a `flatland.World`; called before any other method."""
 
     def detached(self) -> None:
         """The observer was removed, or the world was closed; called after all other methods."""
 
     def output_opened(self, output: Output[Any]) -> None:
-        """A plugin declares an output; raising refuses it, and the plugin fails to load."""
+        """A plugin declares an output; if this raises, the plugin fails to load."""
 
     def output_closed(self, output: Output[Any]) -> None:
         """The last plugin that declared an output is gone."""
 
     def command_opened(self, command: Command[Any]) -> None:
-        """A plugin declares a command; raising refuses it, and the plugin fails to load."""
+        """A plugin declares a command; if this raises, the plugin fails to load."""
 
     def command_closed(self, command: Command[Any]) -> None:
         """The plugin that declared a command is gone."""
@@ -106,7 +105,7 @@ class Observers:
         """Creates an empty list.
 
         Args:
-            faults: Takes what observers raise.
+            faults: Handles the exceptions of observers.
         """
         self._faults = faults
         self._all: tuple[WorldObserver, ...] = ()
@@ -117,16 +116,15 @@ class Observers:
         self._of_finish: tuple[WorldObserver, ...] = ()
         self._of_steps: tuple[WorldObserver, ...] = ()  # all of the four
 
-    def add(self, observer: WorldObserver, world: World) -> None:
-        """Adds an observer and attaches it to a world."""
-        observer.attached(world)
+    def add(self, observer: WorldObserver) -> None:
+        """Adds an observer, which has been attached to the world."""
         self._set((*self._all, observer))
 
     def remove(self, observer: WorldObserver) -> None:
         """Removes an observer and detaches it.
 
         Raises:
-            ValueError: It was not added, or has been removed.
+            ValueError: The observer was not added, or has been removed.
         """
         if observer not in self._all:
             raise ValueError(f"{observer!r} is not an observer of this world")
@@ -147,10 +145,10 @@ class Observers:
         of_any = (*self._of_time, *self._of_transforms, *self._of_start, *self._of_finish)
         self._of_steps = tuple(dict.fromkeys(of_any))
 
-    # -- ports: raising refuses the port ---------------------------------------------------
+    # -- ports: an exception refuses the port ----------------------------------------------
 
     def output_opened(self, output: Output[Any]) -> None:
-        """Notifies all observers; if one refuses, those notified before are notified of the end."""
+        """Notifies all observers; if one raises, notifies the ones before it of the end."""
         self._open(output, "output_opened", "output_closed")
 
     def output_closed(self, output: Output[Any]) -> None:
@@ -158,7 +156,7 @@ class Observers:
         self._notify("output_closed", output)
 
     def command_opened(self, command: Command[Any]) -> None:
-        """Notifies all observers; if one refuses, those notified before are notified of the end."""
+        """Notifies all observers; if one raises, notifies the ones before it of the end."""
         self._open(command, "command_opened", "command_closed")
 
     def command_closed(self, command: Command[Any]) -> None:
@@ -204,7 +202,11 @@ class Observers:
     @property
     def watch_steps(self) -> bool:
         """Whether an observer is to be notified of each step."""
-        return any(observer.watches_steps for observer in self._of_steps)
+        # A generator expression takes longer than a short step.
+        for observer in self._of_steps:  # noqa: SIM110
+            if observer.watches_steps:
+                return True
+        return False
 
     @property
     def watch_time(self) -> bool:
@@ -214,7 +216,10 @@ class Observers:
     @property
     def want_transforms(self) -> bool:
         """Whether an observer wants the transforms of this step."""
-        return any(observer.wants_transforms for observer in self._of_transforms)
+        for observer in self._of_transforms:  # noqa: SIM110 - as for `watch_steps`
+            if observer.wants_transforms:
+                return True
+        return False
 
     def step_started(self) -> None:
         """Notifies the observers that override the method."""

@@ -6,7 +6,7 @@ import logging
 import math
 import zlib
 from collections.abc import Callable, Iterable, Sequence
-from typing import TYPE_CHECKING, ClassVar, Final, TypeAlias
+from typing import TYPE_CHECKING, Final, TypeAlias
 
 import numpy as np
 
@@ -20,9 +20,10 @@ from flatland.runtime.free_space import FreeSpace, Spread
 from flatland.runtime.nearest_place import SEARCH_RADIUS, nearest_offset
 
 if TYPE_CHECKING:
-    from flatland.physics import PhysicsBody
+    from flatland.entities.collision_filter import CollisionFilter
+    from flatland.physics import PhysicsBody, PhysicsWorld
     from flatland.runtime.contacts import ContactReporter
-    from flatland.world import World
+    from flatland.runtime.layer_set import LayerSet
 
 _LOG = logging.getLogger("flatland")
 
@@ -43,20 +44,42 @@ def check_if_blocked(if_blocked: str) -> None:
 class Placement:
     """Finds overlaps and free places in a world, between two steps."""
 
-    outside_state: ClassVar[dict[str, Callable[[], object]]] = {"_spaces": dict}
-
-    def __init__(self, world: World, contacts: ContactReporter) -> None:
+    def __init__(
+        self,
+        physics: PhysicsWorld,
+        collision_filter: CollisionFilter,
+        layers: LayerSet,
+        contacts: ContactReporter,
+        find_model: Callable[[str], Model],
+        find_seed: Callable[[], int],
+    ) -> None:
         """Creates the placement of a world.
 
         Args:
-            world: The world.
+            physics: Contains the bodies and walls.
+            collision_filter: The names of layers.
+            layers: The layers.
             contacts: Maps physics bodies to bodies of models and layers.
+            find_model: Returns the model of a name.
+            find_seed: Returns the seed of the world.
         """
-        self._world = world
+        self._physics = physics
+        self._collision_filter = collision_filter
+        self._layers = layers
         self._contacts = contacts
+        self._find_model = find_model
+        self._find_seed = find_seed
         self._rng: np.random.Generator | None = None
         # Walls and free spaces by the arguments of the query; they do not depend on models.
         self._spaces: dict[tuple[object, ...], tuple[DoubleArray, FreeSpace]] = {}
+
+    def __getstate__(self) -> np.random.Generator | None:
+        """Returns the part of the state of the world that a snapshot saves."""
+        return self._rng
+
+    def __setstate__(self, rng: np.random.Generator | None) -> None:
+        """Restores a saved state."""
+        self._rng = rng
 
     def forget_random_state(self) -> None:
         """Returns to the initial state of the generator for samples of free places."""
@@ -86,7 +109,7 @@ class Placement:
         failure = f'failed to {verb} model "{model.name}", it {overlap}'
         if if_blocked == "refuse":
             raise WorldError(failure)
-        physics, bodies = self._world.physics, [body.physics for body in model.bodies]
+        physics, bodies = self._physics, [body.physics for body in model.bodies]
         offset = nearest_offset(
             lambda offsets: physics.free_poses(
                 bodies, _poses(offsets + pose[:2], pose[2]), least_gap=-_ROUNDING
@@ -105,7 +128,7 @@ class Placement:
     def _overlap(self, model: Model, pose: Pose) -> str | None:
         """Returns a description of the overlaps of a model at a pose, None if there are none."""
         bodies = [body.physics for body in model.bodies]
-        overlapped = self._world.physics.overlapping_bodies(bodies, pose, least_gap=-TOLERANCE)
+        overlapped = self._physics.overlapping_bodies(bodies, pose, least_gap=-TOLERANCE)
         if not overlapped:
             return None
         x, y, theta = pose
@@ -136,7 +159,7 @@ class Placement:
         """Checks one pose; see `World.is_free`."""
         x, y, theta = finite_pose(pose if len(pose) == 3 else (*pose, 0.0))
         least_gap = _checked("clearance", clearance) - TOLERANCE
-        physics, ignored = self._world.physics, self._bodies(ignore)
+        physics, ignored = self._physics, self._bodies(ignore)
         if radius is not None and model is None:
             disc, bits = _checked("radius", radius), self._bits(layers)
             free = physics.free_discs(
@@ -176,7 +199,7 @@ class Placement:
         for tries in (_FIRST_TRIES + 32 * n, len(cells)):
             picked = generator.choice(cells, size=min(tries, len(cells)), replace=False)
             places = space.places_in(picked, generator)
-            free = self._world.physics.free_discs(
+            free = self._physics.free_discs(
                 _poses(places, 0.0), radius, bits, ignored=ignored, least_gap=clearance
             )
             if spread.fill(places[free], n):
@@ -191,7 +214,7 @@ class Placement:
     def _free_space(
         self, bits: int, radius: float, clearance: float, bounds: Sequence[float] | None
     ) -> FreeSpace:
-        layers = [layer for layer in self._world.layers if layer.category_bits & bits]
+        layers = [layer for layer in self._layers.all if layer.category_bits & bits]
         walls = np.concatenate([np.empty((0, 4)), *(layer.world_edges for layer in layers)])
         area = bounds_of(walls.reshape(-1, 2)) if bounds is None else _checked_bounds(bounds)
         if area is None:
@@ -204,7 +227,7 @@ class Placement:
         bodies = [layer.body.physics for layer in layers]
 
         def fits(points: DoubleArray, disc: float) -> BoolArray:
-            return self._world.physics.free_discs(_poses(points, 0.0), disc, bits, only=bodies)
+            return self._physics.free_discs(_poses(points, 0.0), disc, bits, only=bodies)
 
         space = FreeSpace(walls, area, radius, clearance, fits)
         if len(self._spaces) >= _MAX_SPACES:
@@ -216,20 +239,20 @@ class Placement:
         if rng is not None:
             return np.random.default_rng(rng)
         if self._rng is None:
-            seeds = [self._world.seed, zlib.crc32(b"placement")]
+            seeds = [self._find_seed(), zlib.crc32(b"placement")]
             self._rng = np.random.default_rng(np.random.SeedSequence(seeds))
         return self._rng
 
     def _bits(self, layers: str | Iterable[str]) -> int:
         names = [layers] if isinstance(layers, str) else list(layers)
-        unknown = self._world.collision_filter.unknown(names)
+        unknown = self._collision_filter.unknown(names)
         if unknown:
             raise WorldError(f'layer with name "{unknown[0]}" does not exist')
-        return self._world.collision_filter.category_bits(names)
+        return self._collision_filter.category_bits(names)
 
     def _bodies(self, models: Models) -> list[PhysicsBody]:
         each = [models] if isinstance(models, str | Model) else models
-        found = [self._world.model(one) if isinstance(one, str) else one for one in each]
+        found = [self._find_model(one) if isinstance(one, str) else one for one in each]
         return [body.physics for model in found for body in model.bodies]
 
 

@@ -8,14 +8,15 @@ from collections.abc import Callable
 from typing import Any
 
 from flatland.plugin_api.plugin import FlatlandPlugin, describe
-from flatland.runtime.hooks import Hook
+
+Hook = Callable[..., object]
 
 
 class PluginCosts:
     """The wall time of all hooks since the start of a measurement, by plugin.
 
-    The time of a hook includes its scans and the messages of the outputs to which it emits. See
-    `PluginHost.measure`.
+    The time of a hook includes its scans and the messages of the outputs to which it emits.
+    `PluginHost.costs` is the current measurement.
 
     Attributes:
         running: The plugin whose hook runs, None between two hooks.

@@ -2,20 +2,36 @@
 
 from __future__ import annotations
 
+import enum
 import logging
 import threading
 from collections import deque
 from collections.abc import Callable, Iterator
 from concurrent.futures import Future
-from contextlib import contextmanager, suppress
-from typing import Any, Final, TypeVar
+from contextlib import AbstractContextManager, contextmanager
+from typing import Any, TypeVar
 
 from flatland.errors import WorldError
 
 _LOG = logging.getLogger("flatland")
-_LOCK_POLL_PERIOD: Final = 0.005  # s between two attempts of a waiting thread to get the lock
+
+Post = Callable[[Callable[[], object]], Future[Any]]
+"""Runs an action between two steps, as `Requests.post` does; safe from any thread."""
 
 R = TypeVar("R")
+
+_RLock: Any = type(threading.RLock())
+
+
+class Role(enum.Enum):
+    """What a thread does with a world."""
+
+    ACTION = "action"
+    """Runs an action between two steps."""
+    PLUGIN = "plugin"
+    """Runs code of a plugin between two steps: `on_initialize` or a callback."""
+    HOOK = "hook"
+    """Steps the world, or runs a hook of a plugin."""
 
 
 class Requests:
@@ -30,24 +46,30 @@ class Requests:
     Attributes:
         lock: Held during each step and each batch of actions.
         actions: The actions that wait.
-        hook_thread: Identifier of the thread that runs hooks of plugins, None if none does.
-        on_post: Called from any thread after an action was queued.
         blocked_by: Code of a plugin that keeps actions from running, as found by a watchdog; empty
             if there is none.
     """
 
-    def __init__(self) -> None:
-        """Creates an empty queue."""
-        self.lock = threading.RLock()
+    def __init__(self, on_post: Callable[[], None] | None = None) -> None:
+        """Creates an empty queue.
+
+        Args:
+            on_post: Called from any thread after an action was queued; None for no function.
+        """
+        # Threads that wait for their actions. They are notified when actions have run, when the
+        # lock is released, and when no thread serves the queue any longer.
+        self._waiting = _Waiting()
+        self.lock = StepLock(self._waiting)
         self.actions: deque[Callable[[], None]] = deque()
-        self._server: int | None = None
-        self._wake: Callable[[], None] | None = None
-        self.on_post: Callable[[], None] | None = None
-        self.hook_thread: int | None = None
         self.blocked_by = ""
-        # Identifiers of the threads that run other code of plugins, and that run actions.
-        self._plugin_thread: int | None = None
-        self._action_thread: int | None = None
+        self._on_post = on_post
+        # The thread that serves the queue, and the function that wakes it.
+        self._server: tuple[int, Callable[[], None]] | None = None
+        # The thread that uses the world at the moment and its role, the innermost use last.
+        self._uses: list[tuple[int, Role]] = []
+        self._as_action = _Use(self._uses, Role.ACTION)
+        self._as_plugin = _Use(self._uses, Role.PLUGIN)
+        self._as_hook = _Use(self._uses, Role.HOOK)
 
     # -- threads ---------------------------------------------------------------------------
 
@@ -64,38 +86,41 @@ class Requests:
         with self.lock:
             if self._server is not None:
                 raise WorldError("the world is already run by another simulation")
-            self._server, self._wake = threading.get_ident(), wake
+            self._server = threading.get_ident(), wake
         try:
             yield
         finally:
-            self._server = self._wake = None
+            self._server = None
+            self._waiting.notify()
 
-    @contextmanager
-    def hooks(self) -> Iterator[None]:
+    @property
+    def served(self) -> bool:
+        """Whether a thread serves the queue at the moment."""
+        return self._server is not None
+
+    def hooks(self) -> AbstractContextManager[None]:
         """Marks the current thread as running hooks of plugins, for the duration of the block."""
-        previous, self.hook_thread = self.hook_thread, threading.get_ident()
-        try:
-            yield
-        finally:
-            self.hook_thread = previous
+        return self._as_hook
 
-    @contextmanager
-    def plugin_code(self) -> Iterator[None]:
+    def plugin_code(self) -> AbstractContextManager[None]:
         """Marks the current thread as running code of a plugin between two steps.
 
         This is `on_initialize` or a callback; changes take effect immediately.
         """
-        previous = self._plugin_thread
-        self._plugin_thread = threading.get_ident()
-        try:
-            yield
-        finally:
-            self._plugin_thread = previous
+        return self._as_plugin
+
+    @property
+    def _role(self) -> Role | None:
+        """What the current thread does with the world; None if it does not use it."""
+        if not self._uses:
+            return None
+        thread, role = self._uses[-1]
+        return role if thread == threading.get_ident() else None
 
     @property
     def in_hook(self) -> bool:
         """Whether the current thread runs a hook of a plugin."""
-        return self.hook_thread == threading.get_ident()
+        return self._role is Role.HOOK
 
     def refuse_in_plugin(self, method: str) -> None:
         """Raises if the current thread executes code of a plugin.
@@ -106,8 +131,7 @@ class Requests:
         Raises:
             WorldError: The current thread executes code of a plugin.
         """
-        thread = threading.get_ident()
-        if thread in (self.hook_thread, self._plugin_thread):
+        if self._uses and self._role in (Role.HOOK, Role.PLUGIN):
             raise WorldError(f"{method} must not be called from a plugin's hook")
 
     # -- actions ---------------------------------------------------------------------------
@@ -116,7 +140,8 @@ class Requests:
         """Queues an action; safe from any thread.
 
         Returns:
-            Holds what the action returned or raised, once it has run.
+            Holds what the action returned or raised, once it has run. KeyboardInterrupt and
+            SystemExit are also raised by the step, or the call, that runs the action.
         """
         future: Future[R] = Future()
 
@@ -125,21 +150,19 @@ class Requests:
                 return
             try:
                 future.set_result(action())
+            except Exception as error:
+                future.set_exception(error)
             except BaseException as error:
                 future.set_exception(error)
+                raise
 
         self.actions.append(run)
-        if self.on_post is not None:
-            self.on_post()
-        wake = self._wake
-        if wake is not None:
-            wake()
+        if self._on_post is not None:
+            self._on_post()
+        server = self._server
+        if server is not None:
+            server[1]()
         return future
-
-    @property
-    def served(self) -> bool:
-        """Whether a thread serves the queue at the moment."""
-        return self._server is not None
 
     def process_if_idle(self) -> bool:
         """Runs the actions that are waiting, unless another thread serves the queue or steps.
@@ -147,9 +170,7 @@ class Requests:
         Returns:
             Whether they were run.
         """
-        if self._server not in (None, threading.get_ident()):
-            return False
-        if not self.lock.acquire(blocking=False):
+        if not self._acquire():
             return False
         try:
             self.process()
@@ -157,17 +178,27 @@ class Requests:
             self.lock.release()
         return True
 
+    def _acquire(self) -> bool:
+        """Acquires the lock if this thread may run actions now; returns whether it did."""
+        server = self._server
+        is_free = server is None or server[0] == threading.get_ident()
+        return is_free and self.lock.acquire(blocking=False)
+
     def process(self) -> None:
-        """Runs the actions that are waiting; not those that they queue in turn."""
-        with self.lock:
-            previous, self._action_thread = self._action_thread, threading.get_ident()
+        """Runs the actions in the queue, except actions that are queued meanwhile.
+
+        Raises:
+            BaseException: A KeyboardInterrupt or SystemExit of an action; later actions wait for
+                the next call.
+        """
+        with self.lock, self._as_action:
             try:
                 for _ in range(len(self.actions)):
                     # An action may process the queue itself, so it can be empty earlier.
                     if self.actions:
                         self.actions.popleft()()
             finally:
-                self._action_thread = previous
+                self._waiting.notify()
 
     def change(self, action: Callable[[], R], what: str) -> R | None:
         """Runs a change of the world: now, or after the step if a hook requests it.
@@ -184,36 +215,86 @@ class Requests:
             return None
         return self.run(action)
 
-    def read(self, action: Callable[[], R]) -> R:
-        """Runs a function that reads the world, while no other thread steps it."""
-        return action() if self.in_hook else self.run(action)
-
     def run(self, action: Callable[[], R]) -> R:
-        """Runs an action between two steps and waits for it, after those that wait already.
+        """Runs an action between two steps, after all queued ones, and waits for its end.
 
-        Within an action or code of a plugin between two steps, it runs at once.
+        An action that is run by another action, a hook or other code of a plugin runs at once.
         """
-        if threading.get_ident() in (self._action_thread, self._plugin_thread):
+        if self._role is not None:
             return action()
         future = self.post(action)
         while not future.done():
-            if self._server not in (None, threading.get_ident()):
-                _wait(future)
-            elif self.lock.acquire(timeout=_LOCK_POLL_PERIOD):
-                try:
-                    self.process()
-                finally:
-                    self.lock.release()
+            if not self.process_if_idle():
+                self._waiting.wait(lambda: future.done() or self._is_idle())
         return future.result()
 
+    def _is_idle(self) -> bool:
+        """Returns whether `process_if_idle` would run actions."""
+        is_idle = self._acquire()
+        if is_idle:
+            self.lock.release()
+        return is_idle
 
-def _wait(future: Future[Any]) -> None:
-    """Waits for a future, for a limited time: the thread that serves the queue may end."""
-    with suppress(TimeoutError):
-        future.exception(timeout=_LOCK_POLL_PERIOD)
+
+class _Waiting:
+    """Threads that wait for a change of the requests of a world."""
+
+    def __init__(self) -> None:
+        self._condition = threading.Condition()
+        self.count = 0  # of the threads that wait
+
+    def wait(self, is_over: Callable[[], bool]) -> None:
+        """Waits for a notification, unless a condition holds already."""
+        with self._condition:
+            # Counted before the condition is tested: a change after the test is notified.
+            self.count += 1
+            try:
+                if not is_over():
+                    self._condition.wait()
+            finally:
+                self.count -= 1
+
+    def notify(self) -> None:
+        """Wakes all threads that wait."""
+        if self.count:
+            with self._condition:
+                self._condition.notify_all()
 
 
-def _log_failure(what: str, done: Future[Any]) -> None:
+class StepLock(_RLock):  # type: ignore[misc]
+    """A reentrant lock; its release notifies the threads that wait to run their requests."""
+
+    def __init__(self, waiting: _Waiting) -> None:
+        """Creates a free lock."""
+        self._waiting = waiting
+
+    def release(self) -> None:
+        """Releases the lock once."""
+        _RLock.release(self)  # Each step releases the lock; `super` takes longer.
+        if self._waiting.count:
+            self._waiting.notify()
+
+    def __exit__(self, *_: object) -> None:
+        self.release()
+
+
+class _Use:
+    """A block in which the current thread uses the world in a role; blocks can be nested."""
+
+    __slots__ = ("_role", "_uses")
+
+    def __init__(self, uses: list[tuple[int, Role]], role: Role) -> None:
+        self._uses = uses
+        self._role = role
+
+    def __enter__(self) -> None:
+        self._uses.append((threading.get_ident(), self._role))
+
+    def __exit__(self, *_: object) -> None:
+        self._uses.pop()
+
+
+def _log_failure(what: str, done: Future[R]) -> None:
     error = done.exception()
     if error is not None:
         _LOG.error("%s: %s", what, error)

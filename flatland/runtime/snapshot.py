@@ -1,48 +1,33 @@
-"""Snapshots and clones of a world."""
+"""Snapshots, clones and resets of a world."""
 
 from __future__ import annotations
 
 import logging
-from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any, Final
 
-from flatland.copying.kind import UncopyableError
-from flatland.copying.record import Recorder
-from flatland.entities.collision_filter import CollisionFilter
+from flatland.copying.copier import Copier
+from flatland.copying.kinds import UncopyableError
+from flatland.copying.record import SavedObjects
 from flatland.errors import WorldError
-from flatland.loading.world_loader import reload_world
+from flatland.plugin_api.plugin import FlatlandPlugin, describe
 from flatland.runtime.appearance import appearance_of
-from flatland.runtime.clone import clone_world
-from flatland.runtime.uncopyable import check_revivable, located, parts_outside
 from flatland.timekeeper import NANOSECONDS
 
 if TYPE_CHECKING:
-    from flatland.copying.kind import Kind
-    from flatland.copying.record import StateRecord
+    from flatland.copying.kinds import Kind
     from flatland.entities.model import Model
     from flatland.physics import PhysicsWorld
-    from flatland.world import World
+    from flatland.plugin_api.port_registry import PortRegistry
+    from flatland.plugin_api.ports import Output
+    from flatland.runtime.model_set import ModelSet
+    from flatland.runtime.observer import Observers
+    from flatland.runtime.plugin_host import PluginHost
+    from flatland.timekeeper import Timekeeper
 
 _LOG = logging.getLogger("flatland")
-
-OUTSIDE: Final = frozenset(
-    [
-        "requests",
-        "params",
-        "read_yaml",
-        "path",
-        "model_path",
-        "plugin_errors",
-        "on_invalid_body",
-        "_observers",
-        "_change_log",
-        "_paused",
-        "_closed",
-        "_states",
-        "_view",
-    ]
+_ADVICE: Final = (
+    'the class can define __getstate__ and __setstate__, see "Snapshots" in docs/write_a_plugin.md'
 )
-"""Attributes of a world that are not part of its state."""
 
 
 class WorldSnapshot:
@@ -50,28 +35,40 @@ class WorldSnapshot:
 
     Attributes:
         time_ns: Simulated time [ns].
-        number: Number of the snapshot, from 0 on, in the order in which those of a world were
+        number: Number of the snapshot in its world, from 0 on, in the order in which snapshots were
             taken.
     """
 
-    __slots__ = ("_models", "_owner", "_physics", "_ports", "_record", "number", "time_ns")
+    __slots__ = ("_models", "_objects", "_owner", "_physics", "_ports", "number", "time_ns")
 
-    def __init__(self, owner: WorldStates, physics: PhysicsWorld, record: StateRecord) -> None:
+    def __init__(
+        self,
+        owner: Snapshots,
+        number: int,
+        time_ns: int,
+        physics: PhysicsWorld,
+        objects: SavedObjects,
+        models: list[Model],
+        ports: _Ports,
+    ) -> None:
         """Creates a snapshot.
 
         Args:
             owner: Takes the snapshots of the world.
+            number: Number of the snapshot.
+            time_ns: Simulated time [ns].
             physics: A copy of the physics world, which nothing else uses.
-            record: The contents of all objects of the world.
+            objects: The contents of all objects of the world.
+            models: The models.
+            ports: The open ports.
         """
-        world = owner.world
-        self.time_ns = world.timekeeper.sim_time_ns
-        self.number = owner.taken
+        self.number = number
+        self.time_ns = time_ns
         self._owner = owner
         self._physics = physics
-        self._record = record
-        self._models = world._models.by_name.copy()
-        self._ports = _Ports(world)
+        self._objects = objects
+        self._models = models
+        self._ports = ports
 
     @property
     def time(self) -> float:
@@ -85,80 +82,115 @@ class WorldSnapshot:
 class _Ports:
     """The open ports of a world."""
 
-    def __init__(self, world: World) -> None:
-        outputs, commands = world.ports.kept
-        self.outputs = [*world.ports.outputs.values(), *outputs]
-        self.commands = [c for same in world.ports.commands.values() for c in same] + commands
+    def __init__(self, ports: PortRegistry) -> None:
+        outputs, commands = ports.kept
+        self.outputs = [*ports.outputs.values(), *outputs]
+        self.commands = [c for same in ports.commands.values() for c in same] + commands
 
 
-class WorldStates:
-    """Takes and restores snapshots of one world, and clones it.
+class Snapshots:
+    """Takes and restores snapshots of one world, and copies its state to another one.
+
+    A snapshot consists of a copy of the physics world and of the contents of the other parts, with
+    all objects that they refer to. A part that defines `__getstate__` and `__setstate__` saves and
+    restores itself; others are saved attribute by attribute.
 
     Attributes:
-        world: The world.
         taken: Number of snapshots that were taken.
     """
 
-    def __init__(self, world: World, attributes: Iterable[str]) -> None:
-        """Prepares snapshots of a world.
+    def __init__(
+        self,
+        saved: tuple[object, ...],
+        others: tuple[object, ...],
+        physics: PhysicsWorld,
+        timekeeper: Timekeeper,
+        models: ModelSet,
+        host: PluginHost,
+        ports: PortRegistry,
+        observers: Observers,
+    ) -> None:
+        """Stores the parts of the world.
 
         Args:
-            world: The world.
-            attributes: Names of the attributes that flatland defines; others were added by users.
+            saved: The parts of the world that have a state.
+            others: The world and its other parts, which the former refer to.
+            physics: The physics world.
+            timekeeper: The simulated time.
+            models: The models.
+            host: The plugins.
+            ports: The ports.
+            observers: Notified of what a restore changes.
         """
-        self.world = world
-        self._attributes = tuple(name for name in attributes if name not in OUTSIDE)
         self.taken = 0
+        self._saved = saved
+        self._others = (*others, self)
+        self._physics = physics
+        self._timekeeper = timekeeper
+        self._models = models
+        self._host = host
+        self._ports = ports
+        self._observers = observers
         self._kinds: dict[type[Any], Kind] = {}
 
     # -- snapshots -------------------------------------------------------------------------
 
     def take(self) -> WorldSnapshot:
         """Takes a snapshot; see `World.snapshot`."""
-        world = self.world
-        recorder = Recorder(self._kinds, parts_outside(world))
-        attributes = {name: getattr(world, name) for name in self._attributes}
-        recorder.add(_set_attributes, world, attributes)
         try:
-            record = recorder.record(attributes.values())
+            objects = SavedObjects(self._saved, self._kinds, self._not_saved)
         except UncopyableError as error:
-            raise located(world, self._kinds, error) from None
-        snapshot = WorldSnapshot(self, world.physics.copy(), record)
+            raise self._located(error) from None
+        snapshot = WorldSnapshot(
+            self,
+            self.taken,
+            self._timekeeper.sim_time_ns,
+            self._physics.copy(),
+            objects,
+            list(self._models.by_name.values()),
+            _Ports(self._ports),
+        )
         self.taken += 1
         return snapshot
 
+    @property
+    def _not_saved(self) -> list[object]:
+        """The parts that have no state which a snapshot saves."""
+        costs = self._host.costs
+        measured = [] if costs is None else [costs, *vars(costs).values()]
+        return [*self._others, self._host.registry, *measured]
+
     def restore(self, snapshot: WorldSnapshot) -> None:
         """Restores a snapshot; see `World.restore`."""
-        world = self.world
         if snapshot._owner is not self:
             raise WorldError("the snapshot is one of another world")
-        models, saved = world.models, snapshot._models
-        kept = set(models) & set(saved.values())
-        revived = [model for model in saved.values() if model not in kept]
+        models, observers = list(self._models.by_name.values()), self._observers
+        kept = set(models) & set(snapshot._models)
+        revived = [model for model in snapshot._models if model not in kept]
         for model in revived:
             for plugin in model.plugins:
-                check_revivable(world, self._kinds, plugin)
+                self._check_revivable(plugin)
         for model in reversed(models):
             if model not in kept:
-                world._models.delete(model.name)
-        watched = kept if world._observers.watch_appearance else ()
+                self._models.delete(model.name)
+        watched = kept if observers.watch_appearance else ()
         appearances = [(model, appearance_of(model)) for model in models if model in watched]
-        ports, time_ns = _Ports(world), world.timekeeper.sim_time_ns
-        world.physics.become_copy_of(snapshot._physics)
-        error = snapshot._record.write_back()
-        world.plugin_host.schedule.change()  # Other outputs may be wanted than at that time.
-        if world.timekeeper.sim_time_ns != time_ns:
-            world._observers.time_advanced(world.timekeeper.sim_time_ns)
-        self._notify(ports, snapshot, revived)
+        ports, time_ns = _Ports(self._ports), self._timekeeper.sim_time_ns
+        self._physics.become_copy_of(snapshot._physics)
+        error = snapshot._objects.write_back()
+        self._host.jobs.change()  # Other outputs may be wanted than at that time.
+        if self._timekeeper.sim_time_ns != time_ns:
+            observers.time_advanced(self._timekeeper.sim_time_ns)
+        self._notify(ports, snapshot._ports, revived)
         for model, appearance in appearances:
             if appearance_of(model) != appearance:
-                world._observers.model_changed(model)
+                observers.model_changed(model)
         if error is not None:
             raise error
 
-    def _notify(self, before: _Ports, snapshot: WorldSnapshot, revived: list[Model]) -> None:
+    def _notify(self, before: _Ports, now: _Ports, revived: list[Model]) -> None:
         """Notifies the observers of ports and models that were restored or removed."""
-        observers, now = self.world._observers, snapshot._ports
+        observers = self._observers
         for output in _without(before.outputs, now.outputs):
             output.closed = True
             observers.output_closed(output)
@@ -174,34 +206,12 @@ class WorldStates:
                 plugin.ros = observers.plugin_ros(plugin)
             observers.model_added(model)
 
-    # -- reset -----------------------------------------------------------------------------
+    def restore_or_log(self, before: WorldSnapshot | None) -> None:
+        """Restores the state before a reset that failed, if it can be restored.
 
-    def reset(self, seed: int | None, keep_time: bool) -> None:
-        """Loads the world again; see `World.reset`."""
-        world = self.world
-        if not world.path:
-            raise WorldError("only a world that was loaded from a file can be reset")
-        try:
-            before = self.take()
-        except WorldError:
-            before = None  # A plugin cannot be copied.
-        with world.ports.keeping():
-            self._empty()
-            if not keep_time:
-                world.timekeeper.sim_time_ns = 0
-                world._observers.time_advanced(0)
-            try:
-                reload_world(world, world.seed if seed is None else seed)
-                world.physics.find_new_contacts()
-            except BaseException:
-                self._empty()
-                self._roll_back(before)
-                raise
-            finally:
-                world._former_layers.clear()
-
-    def _roll_back(self, before: WorldSnapshot | None) -> None:
-        """Restores the state before a reset that failed, if it can be restored."""
+        Args:
+            before: A snapshot, None if it could not be taken.
+        """
         try:
             if before is not None:
                 self.restore(before)
@@ -210,32 +220,100 @@ class WorldStates:
             _LOG.error("%s", error)
         _LOG.error("the reset failed, and the world is empty: a plugin cannot be restored")
 
-    def _empty(self) -> None:
-        """Removes all contents of the world."""
-        world = self.world
-        world.plugin_host.shut_down(list(world.plugin_host.world_plugins))
-        for model in reversed(world.models):
-            world._models.delete(model.name)
-        world._former_layers.update({layer.name: layer for layer in world.layers})
-        world.layers.clear()
-        world.collision_filter = CollisionFilter()
-        world._contacts.clear()
-        world._placement.forget_random_state()
-        world.physics.clear()
-
     # -- clones ----------------------------------------------------------------------------
 
-    def clone(self) -> World:
-        """Returns an independent copy; see `World.clone`."""
-        clone = clone_world(self.world, self._attributes, self._kinds)
-        clone._states = WorldStates(clone, self._attributes)
-        return clone
+    def copy_to(self, clone: Snapshots) -> None:
+        """Copies the state of this world to an empty one.
+
+        Args:
+            clone: The snapshots of the other world, which has the same parts.
+
+        Raises:
+            WorldError: A plugin has an attribute that cannot be copied.
+        """
+        copier = Copier(self._kinds)
+        physics, copy = self._physics, clone._physics
+        copy.become_copy_of(physics)
+        parts = (physics, *self._saved)
+        for part, other in zip(parts, (copy, *clone._saved), strict=True):
+            copier.fill(part, copier.add(part, other))
+        for part, other in zip(self._others, clone._others, strict=True):
+            copier.add(part, other)
+        costs = self._host.costs
+        if costs is not None:
+            copier.add(costs, costs)
+        try:
+            copier.finish()
+            for output in self._ports.outputs.values():
+                _copy_subscriptions(output, copier)
+            copier.finish()
+        except UncopyableError as error:
+            raise self._located(error) from None
+        clone._host.jobs.change()
+        if costs is not None:
+            clone._host.costs = None
+
+    # -- errors ----------------------------------------------------------------------------
+
+    def _located(self, error: UncopyableError) -> WorldError:
+        """Returns the error for an object that cannot be copied, with the plugin that has it."""
+        for plugin in self._plugins:
+            name = self._find_outside(plugin)
+            if name:
+                what = f'{describe(plugin)}: attribute "{name}"'
+                return WorldError(f"{what} holds {error}, which cannot be copied; {_ADVICE}")
+        return WorldError(f"the world holds {error}, which cannot be copied; {_ADVICE}")
+
+    def _check_revivable(self, plugin: FlatlandPlugin) -> None:
+        """Checks that a deleted plugin was not connected to anything outside the world.
+
+        Raises:
+            WorldError: The plugin was connected, and does not define how it is copied.
+        """
+        if type(plugin).__getstate__ is not vars(object)["__getstate__"]:
+            return
+        name = self._find_outside(plugin)
+        if name:
+            raise WorldError(
+                f'{describe(plugin)}: attribute "{name}" holds a connection that ended when the '
+                f"model was deleted; {_ADVICE}"
+            )
+
+    @property
+    def _plugins(self) -> list[FlatlandPlugin]:
+        of_models = [p for model in self._models.by_name.values() for p in model.plugins]
+        return [*of_models, *self._host.world_plugins]
+
+    def _find_outside(self, plugin: FlatlandPlugin) -> str:
+        """Returns the attribute of a plugin that cannot be copied, empty for none."""
+        attributes = plugin.__getstate__()
+        if not isinstance(attributes, dict):
+            return ""
+        models = self._models.by_name.values()
+        others = [*self._saved, *self._not_saved, *models, *self._plugins, plugin]
+        name: str
+        for name, value in attributes.items():
+            try:
+                saved = SavedObjects([value], self._kinds, others)
+            except UncopyableError:
+                return name
+            if saved.outside and name not in type(plugin).outside_state:
+                return name
+        return ""
 
 
-def _set_attributes(world: World, attributes: dict[str, Any]) -> None:
-    for name, value in attributes.items():
-        if vars(world).get(name) is not value:
-            setattr(world, name, value)
+def _copy_subscriptions(output: Output[Any], copier: Copier) -> None:
+    """Copies the subscriptions of plugins, and which outputs they want."""
+    copy = copier.find(output)
+    subscribers = []
+    wanters = {copier.find(who) for who in output._wanters} - {None}
+    for token, callback in output._subscribers:
+        owner = getattr(callback, "__self__", None)
+        if owner is not None and copier.find(owner) is not None:
+            subscribers.append((token, copier(callback)))
+            if token in output._wanters:
+                wanters.add(token)
+    copy._subscribers, copy._wanters = tuple(subscribers), frozenset(wanters)
 
 
 def _without(ports: list[Any], others: list[Any]) -> list[Any]:

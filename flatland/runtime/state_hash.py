@@ -39,6 +39,7 @@ def state_hash(
 
     Raises:
         WorldError: The state of a plugin cannot be hashed.
+        Exception: Raised by the method `state` of a plugin.
     """
     hasher = StateHasher()
     hasher.add((seed, timekeeper.sim_time_ns, timekeeper.step_size_ns))
@@ -54,10 +55,11 @@ def _add_plugins(hasher: StateHasher, plugins: Sequence[FlatlandPlugin]) -> None
     for plugin in plugins:
         hasher.add((plugin.name, plugin.type))
         hasher.add(plugin._random_state())
+        # Of the class: the instance may have an attribute of its own with this name.
+        state = type(plugin).state(plugin)
         try:
             hasher.add(plugin._command_state())
-            # Of the class: the instance may have an attribute of its own with this name.
-            hasher.add(type(plugin).state(plugin))
+            hasher.add(state)
         except TypeError as error:
             raise WorldError(f"{describe(plugin)}: its state has {error}") from None
 

@@ -1,23 +1,52 @@
-"""The order of a step, and runs of steps in which no code of plugins is called."""
+"""The steps of a world: one loop, which the core performs until code has to be called.
+
+`Stepping.run` describes a run of steps as a generator: it yields what the core is to perform, and
+is sent what is to be done outside of the core. `World.step`, paced steps and `step_worlds` differ
+only in how they have the core perform a run.
+"""
 
 from __future__ import annotations
 
-import threading
-from collections.abc import Callable
-from typing import TYPE_CHECKING, ClassVar
+from collections.abc import Callable, Generator
+from typing import TYPE_CHECKING, Any, ClassVar, Protocol
 
-from flatland.physics import END_OF_ORDER, RunEnd, StepRun, to_report
+from flatland.physics import Run, RunEnd, to_report
 
 if TYPE_CHECKING:
-    from contextlib import ExitStack
-
-    from flatland.physics import RunResult, StepReport, WorkTimes
+    from flatland.physics import PhysicsWorld, RunResult, WorkTimes
     from flatland.runtime.body_monitor import BodyMonitor
-    from flatland.runtime.change_log import ChangeLog
-    from flatland.runtime.contacts import ContactReporter
+    from flatland.runtime.changes import ChangeLog
     from flatland.runtime.faults import Faults
     from flatland.runtime.observer import Observers
-    from flatland.world import World
+    from flatland.runtime.plugin_host import PluginHost
+    from flatland.runtime.requests import Requests
+    from flatland.runtime.transforms import TransformBuffer
+    from flatland.timekeeper import Timekeeper
+
+
+# As integers, since comparisons with members of an enumeration take as long as a short step.
+_DONE, _BEFORE, _PHYSICS, _AFTER_PHYSICS, _AFTER, _LAST_CALLS = map(int, RunEnd)
+
+
+class SteppedWorld(Protocol):
+    """What the steps of a world need of it."""
+
+    physics: PhysicsWorld
+    timekeeper: Timekeeper
+    requests: Requests
+    velocity_iterations: int
+    position_iterations: int
+
+    @property
+    def paused(self) -> bool:
+        """Whether steps have no effect."""
+
+    def check_open(self) -> None:
+        """Raises `WorldError` if the world is closed."""
+
+
+StepRun = Generator[Run, "RunResult", int]
+"""Yields steps for the core, is sent their results, and returns the number of complete steps."""
 
 
 class Pace:
@@ -51,45 +80,48 @@ class Stepping:
 
     def __init__(
         self,
-        world: World,
-        contacts: ContactReporter,
+        world: SteppedWorld,
+        host: PluginHost,
         body_monitor: BodyMonitor,
         observers: Observers,
+        transforms: TransformBuffer,
         faults: Faults,
     ) -> None:
         """Creates the steps of a world.
 
         Args:
             world: The world.
-            contacts: Reports contacts to plugins.
+            host: Calls the plugins.
             body_monitor: Handles the bodies that a physics step reports.
             observers: Notified of each step.
-            faults: The exceptions of hooks.
+            transforms: The transforms of each step.
+            faults: Takes what plugins raise.
         """
         self.change_log: ChangeLog | None = None
         self._world = world
         self._physics = world.physics
-        self._plan = world.physics.plan
+        self._queue = world.physics.jobs
         self._timekeeper = world.timekeeper
-        self._host = world.plugin_host
         self._requests = world.requests
-        self._transforms = world.transform_buffer
-        self._contacts = contacts
+        self._host = host
         self._body_monitor = body_monitor
         self._observers = observers
+        self._transforms = transforms
         self._faults = faults
 
     def step(self, n: int, *, while_paused: bool = False) -> None:
         """Steps n times; see `World.step`."""
-        self._requests.refuse_in_plugin("step")
         while n > 0:
-            n -= self._step_up_to(n, while_paused)
+            n -= perform(self.run(n, while_paused=while_paused), self._queue.run)
 
-    def step_up_to(self, n: int) -> int:
+    def step_up_to(self, n: int, pace: Pace | None = None) -> int:
         """Steps at most n times: until code has been called or a request has been processed.
 
         Args:
             n: Maximum number of steps, at least 1.
+            pace: The times at which the steps are performed, the first one at once; its `times` are
+                set. The steps also end if one was late, and after 25 ms. None to perform the steps
+                as fast as possible.
 
         Returns:
             The number of steps; 1 for a paused world, 0 if a request came before the first step.
@@ -97,237 +129,139 @@ class Stepping:
         Raises:
             Exception: As `World.step`.
         """
-        self._requests.refuse_in_plugin("step")
-        return self._step_up_to(n, while_paused=False)
+        queue = self._queue
 
-    def step_paced(self, n: int, pace: Pace) -> int:
-        """Steps at most n times: the first time at once, then at the times of a pace.
+        def run_paced(*arguments: Any) -> RunResult:
+            run = Run(*arguments)
+            if pace is None or run.n == 1:
+                return queue.run(*run)
+            if self._observers.watch_time or pace.is_interrupted():
+                return queue.run(*run._replace(n=1))
+            result, pace.times = queue.run_paced(run, pace.due, pace.period)
+            return result
 
-        Returns after a step in which code has been called, before a request is processed, if a step
-        was late, and after 25 ms.
+        return perform(self.run(n), run_paced)
+
+    def run(self, n: int, *, while_paused: bool = False) -> StepRun:
+        """Performs up to n steps, at least one unless another thread interrupts.
+
+        A run ends after a step in which code was called, and after an interrupt. Observers are
+        notified of its start and end, and of the time whenever code is called and at the end. With
+        an observer that watches single steps, and during a recording, a run is a single step.
 
         Args:
             n: Maximum number of steps, at least 1.
-            pace: The times; its `times` are set.
+            while_paused: Whether to step a paused world.
 
         Returns:
-            As `step_up_to`.
+            The run, to be driven by `perform` or `step_worlds`; its result is 1 for a paused world.
 
         Raises:
-            Exception: As `World.step`.
+            WorldError: The world is closed, a plugin calls this, or a body is not finite.
+            Exception: Raised by a plugin, subscriber or observer, with `plugin_errors="raise"`.
         """
-        self._requests.refuse_in_plugin("step")
-        return self._step_up_to(n, while_paused=False, pace=pace)
-
-    def _step_up_to(self, n: int, while_paused: bool, pace: Pace | None = None) -> int:
-        requests, faults = self._requests, self._faults
-        made = 1
+        requests = self._requests
+        requests.refuse_in_plugin("step")
         with requests.lock:
-            self._start()
-            if while_paused or not self._world.paused:
-                requests.hook_thread = threading.get_ident()
-                self._observers.step_started()
-                try:
-                    made = self._advance(n, pace)
-                finally:
-                    self._observers.step_finished()
-                    requests.hook_thread = None
+            self._world.check_open()
+            self._queue.clear_interrupt()
             if requests.actions:
                 requests.process()
-        if faults.first is not None:
-            faults.raise_first()
+                self._world.check_open()  # A request may have closed it.
+            made = 1
+            if while_paused or not self._world.paused:
+                with requests.hooks():
+                    self._observers.step_started()
+                    try:
+                        made = yield from self._steps(n)
+                    finally:
+                        self._observers.step_finished()
+            if requests.actions:
+                requests.process()
+        if self._faults.first is not None:
+            self._faults.raise_first()
         return made
 
-    def begin_batch(self, n: int, locks: ExitStack) -> StepRun | None:
-        """Prepares up to n steps in the core; for `flatland.runtime.batch`.
-
-        Args:
-            n: Number of steps.
-            locks: Holds the lock of the requests until the run ends.
-
-        Returns:
-            The run; None if `step` has to perform the steps.
-
-        Raises:
-            WorldError: The world is closed, or a plugin calls this.
-        """
-        self._requests.refuse_in_plugin("step")
-        locks.enter_context(self._requests.lock)
-        self._start()
-        if self._world.paused or self._is_watched:
-            return None
-        return self._begin_run(n)
-
-    def end_batch(self, run: StepRun, result: RunResult | Exception) -> int:
-        """Accounts for the steps of a run, and performs the next one if it calls hooks.
-
-        Args:
-            run: What `begin_batch` returned.
-            result: How the run ended.
-
-        Returns:
-            The number of steps.
-
-        Raises:
-            Exception: As `World.step`.
-        """
-        if isinstance(result, Exception):
-            raise result
-        requests = self._requests
-        requests.hook_thread = threading.get_ident()
-        try:
-            made = self._end_run(run, result)
-        finally:
-            requests.hook_thread = None
-        if requests.actions:
-            requests.process()
-        self._faults.raise_first()
-        return made
-
-    def _start(self) -> None:
-        """Runs the pending actions before a step."""
-        self._world.check_open()
-        self._plan.clear_interrupt()
-        if self._requests.actions:
-            self._requests.process()
-
-    def _advance(self, n: int, pace: Pace | None) -> int:
-        """Performs up to n steps, at least one unless another thread interrupts.
-
-        Args:
-            n: Number of steps.
-            pace: When the steps are due; None to perform them as fast as possible.
-
-        Returns:
-            The number of steps.
-
-        Raises:
-            WorldError: A body is not finite, with the policy `raise`.
-        """
-        run = self._begin_run(n)
-        if run is not None:
-            return self._end_run(run, self._perform(run, pace))
-        timekeeper = self._timekeeper
-        step, rest = divmod(timekeeper.sim_time_ns, timekeeper.step_size_ns)
-        self._make_step(step, is_aligned=not rest)
-        return 1
-
-    def _perform(self, run: StepRun, pace: Pace | None) -> RunResult:
-        """Performs steps in the core."""
-        if pace is None:
-            return self._plan.run(run)
-        if run.n == 1 or self._observers.watch_time or pace.is_interrupted():
-            return self._plan.run(run._replace(n=1))
-        result, pace.times = self._plan.run_paced(run, pace.due, pace.period)
-        return result
-
-    @property
-    def _is_watched(self) -> bool:
-        """Whether every step has to be reported to observers or to the change log."""
-        return self._observers.watch_steps or self.change_log is not None
-
-    def _begin_run(self, n: int) -> StepRun | None:
-        """Prepares up to n steps in the core.
-
-        Returns:
-            The run; None if hooks are to be called in the first step.
-        """
-        self._prepare()
-        timekeeper = self._timekeeper
-        step, rest = divmod(timekeeper.sim_time_ns, timekeeper.step_size_ns)
-        if rest or self._physics.pre_solve is not None or self._host.hooks.has_unscheduled:
-            return None
-        is_watched = self._is_watched
-        return StepRun(
-            self._physics,
+    def _steps(self, n: int) -> StepRun:
+        world, host, timekeeper = self._world, self._host, self._timekeeper
+        host.contacts.update()
+        host.jobs.refresh(self._observers.want_transforms)
+        is_single = self._observers.watch_steps or self.change_log is not None
+        start, step = timekeeper.sim_time_ns, timekeeper.step_size_ns
+        run = Run(
+            start,
             step,
-            1 if is_watched else n,
+            1 if is_single else n,
             timekeeper.step_size,
-            self._world.velocity_iterations,
-            self._world.position_iterations,
-            is_watched,
+            world.velocity_iterations,
+            world.position_iterations,
+            False,
+            self._physics.pre_solve is not None,
         )
-
-    def _end_run(self, run: StepRun, result: RunResult) -> int:
-        """Accounts for the steps of a run, and performs the next one if it calls hooks.
-
-        Args:
-            run: The run.
-            result: How it ended.
-
-        Returns:
-            The number of steps.
-
-        Raises:
-            WorldError: A body is not finite, with the policy `raise`.
-        """
-        timekeeper = self._timekeeper
-        made, end, report = result
-        if made:
-            timekeeper.sim_time_ns += made * timekeeper.step_size_ns
-            self._observers.time_advanced(timekeeper.sim_time_ns)
-        if end in (RunEnd.DONE, RunEnd.STOPPED):
-            return made
-        if end == RunEnd.CALL:
-            self._make_step(run.step + made, is_aligned=True)
-        elif end == RunEnd.PHYSICS:
-            self._finish_step(0, to_report(report))
-        else:
-            self._host.call_failed(timekeeper)
-            self._finish_step(0, self._physics_step())
-        return made + 1
-
-    def _prepare(self) -> None:
-        """Updates contacts and schedule to the changes since the last step."""
-        self._contacts.update()
-        schedule = self._host.schedule
-        schedule.refresh(self._observers.want_transforms)
-        if schedule.targets:
-            schedule.push_targets()
-
-    def _make_step(self, step: int, *, is_aligned: bool) -> None:
-        """Performs a step in which hooks are called.
-
-        Args:
-            step: Number of the step.
-            is_aligned: Whether the time is a multiple of the step size; otherwise, timers and
-                the clocks of the core differ, and all hooks are called.
-        """
-        host, timekeeper = self._host, self._timekeeper
-        due = 0
-        if self._plan.is_used:
-            due = self._plan.begin_step(step)
-            if not is_aligned:
-                due = host.schedule.call_all()
-        host.call_step_hooks("before_physics_step", due, timekeeper)
-        if self._plan.is_used and self._plan.carry_out(False, END_OF_ORDER, timekeeper.step_size):
-            host.call_failed(timekeeper)
-        self._finish_step(due, self._physics_step())
-        host.schedule.calls_made(due)
-
-    def _physics_step(self) -> StepReport | None:
-        world = self._world
-        return self._physics.step(
-            self._timekeeper.step_size, world.velocity_iterations, world.position_iterations
-        )
-
-    def _finish_step(self, due: int, report: StepReport | None) -> None:
-        """Performs the part of a step that follows the physics step.
-
-        Args:
-            due: The clocks of updates that are due, as bits.
-            report: The report of the physics step.
-        """
-        timekeeper = self._timekeeper
-        if report is not None:
-            self._body_monitor.examine(report, timekeeper)
-        self._contacts.dispatch()
-        timekeeper.advance()
-        self._observers.time_advanced(timekeeper.sim_time_ns)
-        due = self._host.schedule.with_contacts(due)
-        self._host.call_step_hooks("after_physics_step", due, timekeeper)
-        if self._plan.is_used:
-            self._plan.carry_out(True, END_OF_ORDER, timekeeper.step_size)
+        steps, end, calls, failed, report = yield run
+        while end != _DONE:
+            is_after = end >= _AFTER
+            self._set_time(start + (steps + is_after) * step)
+            if failed:
+                host.jobs.failed(failed, is_after=is_after)
+            if calls:
+                host.call_updates(calls)
+            if end in (_PHYSICS, _AFTER_PHYSICS):
+                self._examine(report, calls_physics=end == _PHYSICS)
+            if end == _LAST_CALLS:
+                steps += 1
+                break
+            _, end, calls, failed, report = yield run._replace(
+                time=start + steps * step, n=1, continues=True
+            )
+            if end == _DONE:
+                steps += 1
+        self._set_time(start + steps * step)
         self._transforms.flush()
-        if self.change_log is not None:
+        if self.change_log is not None and steps:
             self.change_log.step_done()
+        return steps
+
+    def _set_time(self, time_ns: int) -> None:
+        if time_ns != self._timekeeper.sim_time_ns:
+            self._timekeeper.sim_time_ns = time_ns
+            self._observers.time_advanced(time_ns)
+
+    def _examine(self, report: tuple[list[int], list[int]] | None, *, calls_physics: bool) -> None:
+        """Handles the report and the contacts of a physics step, which it performs if asked to."""
+        world = self._world
+        found = to_report(report)
+        if calls_physics:
+            found = self._physics.step(
+                self._timekeeper.step_size, world.velocity_iterations, world.position_iterations
+            )
+        if found is not None:
+            self._body_monitor.examine(found, self._timekeeper)
+        self._host.contacts.dispatch()
+
+
+def perform(run: StepRun, core: Callable[..., RunResult]) -> int:
+    """Performs a run of one world.
+
+    Args:
+        run: Result of `Stepping.run`.
+        core: Has the core perform steps; called with the members of a `Run`.
+
+    Returns:
+        The number of steps.
+
+    Raises:
+        Exception: As `Stepping.run`.
+    """
+    try:
+        steps = next(run)
+        while True:
+            try:
+                result = core(*steps)
+            except BaseException as error:
+                steps = run.throw(error)
+            else:
+                steps = run.send(result)
+    except StopIteration as end:
+        made: int = end.value
+        return made

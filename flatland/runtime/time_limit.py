@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-import ctypes
 import signal
+import sys
 import threading
-from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+import time
+from collections.abc import Callable
 from types import FrameType
-from typing import Final
+from typing import Any, Final, TypeVar
+
+T = TypeVar("T")
 
 _RETRY_PERIOD: Final = 0.1  # s, until code that catches everything has been left
 
@@ -17,32 +19,33 @@ class TimeLimitExceeded(BaseException):
     """The limit of wall time is exceeded; not an `Exception`, so that handlers do not catch it."""
 
 
-@contextmanager
-def time_limit(seconds: float | None) -> Iterator[None]:
-    """Raises in the calling thread when the block takes too long.
+def call_with_limit(seconds: float | None, action: Callable[[], T]) -> T:
+    """Returns the result of a function, which is interrupted if it takes too long.
 
     In the main thread, a signal (SIGALRM) interrupts Python code and system calls that wait, such
-    as `sleep`, a socket or a lock. In other threads, only Python code is interrupted. Code of an
-    extension that neither returns nor handles signals cannot be interrupted at all.
+    as `sleep`, a socket or a lock. The signal is repeated if the function catches the exception.
+
+    Other threads receive no signals. There, a trace function compares the time with the limit
+    before each line of Python code. Calls that wait are not interrupted, and neither is
+    code that catches the exception. The function runs more slowly, and debuggers do not stop in it.
+
+    Code of an extension that neither returns nor handles signals cannot be interrupted at all.
 
     Args:
         seconds: Limit of wall time [s]; None for no limit.
+        action: The function.
 
     Raises:
-        TimeLimitExceeded: The block took longer.
+        TimeLimitExceeded: The function took longer.
     """
     if seconds is None:
-        yield
-    elif threading.current_thread() is threading.main_thread():
-        with _signal_limit(seconds):
-            yield
-    else:
-        with _exception_limit(seconds):
-            yield
+        return action()
+    if threading.current_thread() is threading.main_thread():
+        return _call_with_signal(min(seconds, threading.TIMEOUT_MAX), action)
+    return _call_traced(seconds, action)
 
 
-@contextmanager
-def _signal_limit(seconds: float) -> Iterator[None]:
+def _call_with_signal(seconds: float, action: Callable[[], T]) -> T:
     is_active = True
 
     def interrupt(_number: int, _frame: FrameType | None) -> None:
@@ -52,8 +55,8 @@ def _signal_limit(seconds: float) -> Iterator[None]:
     previous = signal.signal(signal.SIGALRM, interrupt)
     try:
         try:
-            signal.setitimer(signal.ITIMER_REAL, min(seconds, threading.TIMEOUT_MAX), _RETRY_PERIOD)
-            yield
+            signal.setitimer(signal.ITIMER_REAL, seconds, _RETRY_PERIOD)
+            return action()
         finally:
             # A signal that arrives from here on must not skip the rest of the clean-up.
             is_active = False
@@ -62,40 +65,17 @@ def _signal_limit(seconds: float) -> Iterator[None]:
         signal.signal(signal.SIGALRM, previous)
 
 
-@contextmanager
-def _exception_limit(seconds: float) -> Iterator[None]:
-    thread = ctypes.c_ulong(threading.get_ident())
-    finished = threading.Event()
-    lock = threading.Lock()
-    has_expired = False
+def _call_traced(seconds: float, action: Callable[[], T]) -> T:
+    deadline = time.monotonic() + seconds
 
-    def raise_in_thread() -> None:
-        exception = ctypes.py_object(TimeLimitExceeded)
-        ctypes.pythonapi.PyThreadState_SetAsyncExc(thread, exception)
+    def trace(_frame: FrameType, _event: str, _argument: object) -> Any:
+        if time.monotonic() > deadline:
+            raise TimeLimitExceeded
+        return trace
 
-    def interrupt() -> None:
-        nonlocal has_expired
-        wait = min(seconds, threading.TIMEOUT_MAX)
-        while not finished.wait(wait):
-            with lock:
-                if not finished.is_set():
-                    has_expired = True
-                    raise_in_thread()
-            wait = _RETRY_PERIOD
-
-    threading.Thread(target=interrupt, name="flatland-time-limit", daemon=True).start()
+    previous = sys.gettrace()
+    sys.settrace(trace)  # for functions that are called from here on, not for this one
     try:
-        yield
+        return action()
     finally:
-        while not finished.is_set():
-            # An exception of the limit can also be raised here.
-            with suppress(TimeLimitExceeded), lock:
-                finished.set()
-        if has_expired:
-            # Another exception may be pending. It must be raised, not cancelled: Python 3.11 does
-            # not reset its request flag for a cancelled one. All code would then be slower, and
-            # traced code would not proceed.
-            with suppress(TimeLimitExceeded):
-                raise_in_thread()
-                while True:
-                    pass
+        sys.settrace(previous)

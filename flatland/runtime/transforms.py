@@ -9,6 +9,7 @@ from flatland.runtime.frame_senders import FrameSenders
 from flatland.values import Transform
 
 if TYPE_CHECKING:
+    from flatland.geometry import Pose
     from flatland.plugin_api.plugin import FlatlandPlugin
     from flatland.runtime.observer import Observers
 
@@ -19,7 +20,7 @@ TransformFields: TypeAlias = tuple[int, float, float, float, float]
 
 
 class TransformBuffer:
-    """The latest transform of each pair of frames, and those of the current step.
+    """The latest transform of each pair of frames, and the transforms of the current step.
 
     Transforms are kept as plain tuples, since most of them are never read.
     """
@@ -47,8 +48,14 @@ class TransformBuffer:
         """
         self._senders.add(plugin, frames)
 
+    def declare(
+        self, plugin: FlatlandPlugin, frames: FramePair, pose: Pose | None, switch: str
+    ) -> None:
+        """Registers a pair of frames that a plugin is going to send; see `declare_transform`."""
+        self._senders.add(plugin, frames, pose, switch)
+
     def send(self, frames: FramePair, fields: TransformFields) -> None:
-        """Adds a transform to those of this step."""
+        """Adds a transform of this step."""
         self._pending[frames] = fields
 
     def add_past(self, frames: FramePair, fields: TransformFields) -> None:

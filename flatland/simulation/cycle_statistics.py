@@ -67,7 +67,7 @@ class CycleWindow:
         """Adds a cycle, or several.
 
         Args:
-            worked: Wall time spent working in all of them [s].
+            worked: Wall time spent working in all cycles [s].
             count: Number of cycles.
             extremes: Wall time spent working in the shortest and in the longest one [s]; None if
                 all are of the same length.

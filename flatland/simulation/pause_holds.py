@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Hashable
 
-from flatland.world import World
+from flatland.plugin_api.plugin_world import PluginWorld
 
 
 class PauseHolds:
@@ -15,7 +15,7 @@ class PauseHolds:
     since. Must be used between two steps.
     """
 
-    def __init__(self, world: World) -> None:
+    def __init__(self, world: PluginWorld) -> None:
         """Creates an empty set of holds.
 
         Args:

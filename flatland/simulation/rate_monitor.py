@@ -10,7 +10,8 @@ from dataclasses import dataclass, field
 from typing import Final
 
 from flatland.runtime.plugin_costs import PluginCosts
-from flatland.world import World
+from flatland.runtime.plugin_host import PluginHost
+from flatland.timekeeper import Timekeeper
 
 _LOG = logging.getLogger("flatland")
 
@@ -49,14 +50,18 @@ class RateMonitor:
     cheap plugins 10 to 30 % slower.
     """
 
-    def __init__(self, world: World, clock: Callable[[], float]) -> None:
+    def __init__(
+        self, timekeeper: Timekeeper, host: PluginHost, clock: Callable[[], float]
+    ) -> None:
         """Creates a monitor without a watch.
 
         Args:
-            world: The world that the loop steps.
+            timekeeper: Simulated time of the world that the loop steps.
+            host: Measures the costs of the plugins.
             clock: Returns the wall time [s].
         """
-        self._world = world
+        self._timekeeper = timekeeper
+        self._host = host
         self._clock = clock
         self._watch: _Watch | None = None
         self._silent_until = -math.inf
@@ -72,7 +77,7 @@ class RateMonitor:
         watch = self._watch
         if watch is None:
             if now >= self._silent_until:
-                self._watch = _Watch(now, self._world.timekeeper.sim_time_ns)
+                self._watch = _Watch(now, self._timekeeper.sim_time_ns)
             return
         watch.lost += lost
         elapsed = now - watch.start
@@ -83,11 +88,10 @@ class RateMonitor:
             self._end()
             self._silent_until = now + WARNING_PERIOD
         else:
-            timekeeper = self._world.timekeeper
-            now_ns = timekeeper.sim_time_ns
-            rate = (now_ns - watch.start_ns) / timekeeper.step_size_ns / elapsed
+            now_ns = self._timekeeper.sim_time_ns
+            rate = (now_ns - watch.start_ns) / self._timekeeper.step_size_ns / elapsed
             costs = PluginCosts(self._clock)
-            self._world.plugin_host.measure(costs)
+            self._host.costs = costs
             self._watch = _Measurement(now, now_ns, costs=costs, rate=rate)
 
     def add(self, worked: float, now: float) -> None:
@@ -112,7 +116,7 @@ class RateMonitor:
 
     def _end(self) -> None:
         if isinstance(self._watch, _Measurement):
-            self._world.plugin_host.measure(None)
+            self._host.costs = None
         self._watch = None
 
     @staticmethod

@@ -161,7 +161,7 @@ class Simulation:
         # The core can wait between steps on the clock of this module only.
         self._is_real_time = clock is time.perf_counter and wait is threading.Event.wait
         self._stopped = False
-        self._steps = StepRequests(world, clock)
+        self._steps = StepRequests(world.stepping, world.timekeeper, clock)
 
     @property
     def stopped(self) -> bool:
@@ -191,7 +191,7 @@ class Simulation:
         """Makes `run` return after the current step; safe from any thread."""
         self._stopped = True
         self._wake.set()
-        self.world.physics.plan.interrupt()
+        self.world.physics.jobs.interrupt()
 
     def post(self, action: Callable[[], R]) -> Future[R]:
         """Queues an action that runs between two steps; safe from any thread, see `World.post`.
@@ -201,7 +201,7 @@ class Simulation:
         return self.world.post(action)
 
     def request_steps(self, count: int) -> Future[int]:
-        """Requests steps in addition to those of the loop; safe from any thread.
+        """Requests steps in addition to the steps of the loop; safe from any thread.
 
         The steps are carried out without delay and as fast as possible, after the steps that were
         requested before. Other requests are carried out in between. A paused world is stepped and
@@ -221,7 +221,7 @@ class Simulation:
             raise ValueError(f"the number of steps must be at least 1, got {count}")
         done = self._steps.add(count)
         self._wake.set()
-        self.world.physics.plan.interrupt()
+        self.world.physics.jobs.interrupt()
         if self._stopped:
             self._steps.fail()
         return done
@@ -241,7 +241,7 @@ class Simulation:
         timekeeper = self.world.timekeeper
         start, elapsed = self._clock(), _ElapsedTime(timekeeper)
         duration_ns = math.inf if math.isinf(duration) else round(duration * NANOSECONDS)
-        monitor = RateMonitor(self.world, self._clock)
+        monitor = RateMonitor(timekeeper, self.world.plugin_host, self._clock)
         try:
             with self.world.requests.serving(self._wake.set):
                 if self.world.requests.actions:  # queued before, without a call of `_wake.set`
@@ -303,7 +303,7 @@ class Simulation:
                 steps = _next_steps(steps, worked, left / timekeeper.step_size_ns)
 
     def _paced_cycle(self, due: float, period: float, left: float) -> _Cycle:
-        """Performs a step, and further ones in the core as long as that calls no Python code.
+        """Performs a step, and further ones in the core as long as no Python code is called.
 
         Args:
             due: Wall time at which the first step was due [s].
@@ -314,13 +314,13 @@ class Simulation:
             self.world.step()
             return _Cycle(1)
         pace = Pace(due, period, self._wake.is_set)
-        count = self.world.stepping.step_paced(math.ceil(min(left, _MAX_STEPS)), pace)
+        count = self.world.stepping.step_up_to(math.ceil(min(left, _MAX_STEPS)), pace)
         return _Cycle(count, pace.times)
 
     def _wait_until(self, due: float, period: float) -> float:
         """Waits until a wall time and runs requests meanwhile.
 
-        Returns early if one of them changes the period, and, in lockstep, after requested steps.
+        Returns early if a request changes the period, and, in lockstep, after requested steps.
 
         Returns:
             Wall time of the requested steps, by which the wait was prolonged [s].

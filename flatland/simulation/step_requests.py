@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections import deque
 from collections.abc import Callable
 from concurrent.futures import Future
@@ -10,7 +9,8 @@ from dataclasses import dataclass, field
 from typing import Final
 
 from flatland.errors import WorldError
-from flatland.world import World
+from flatland.runtime.stepping import Stepping
+from flatland.timekeeper import Timekeeper
 
 _MAX_BATCH_TIME: Final = 0.005  # s of wall time between two checks whether to go on
 
@@ -35,14 +35,18 @@ class StepRequests:
     by cancelling its future, also while its steps are carried out.
     """
 
-    def __init__(self, world: World, clock: Callable[[], float] = time.perf_counter) -> None:
+    def __init__(
+        self, stepping: Stepping, timekeeper: Timekeeper, clock: Callable[[], float]
+    ) -> None:
         """Creates an empty queue.
 
         Args:
-            world: The world to step.
+            stepping: Performs the steps.
+            timekeeper: The simulated time.
             clock: Returns the wall time [s].
         """
-        self._world = world
+        self._stepping = stepping
+        self._timekeeper = timekeeper
         self._clock = clock
         self._waiting: deque[_Request] = deque()
         # Number of steps between two checks, adapted to the wall time of a step.
@@ -90,7 +94,7 @@ class StepRequests:
         try:
             while left and not stopped() and not request.done.cancelled():
                 batch, start = min(left, self._batch), self._clock()
-                self._world.step(batch, while_paused=True)
+                self._stepping.step(batch, while_paused=True)
                 left -= batch
                 took = self._clock() - start
                 if took > _MAX_BATCH_TIME:
@@ -105,7 +109,7 @@ class StepRequests:
             text = f"the simulation has stopped after {done} of {request.count} steps"
             _fail(request.done, WorldError(text))
         elif request.done.set_running_or_notify_cancel():
-            request.done.set_result(self._world.timekeeper.sim_time_ns)
+            request.done.set_result(self._timekeeper.sim_time_ns)
 
 
 def _fail(done: Future[int], error: BaseException) -> None:

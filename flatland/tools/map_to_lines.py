@@ -12,14 +12,15 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-import cv2
 import numpy as np
 import yaml
 
 from flatland.config.reader import YamlReader
 from flatland.errors import FlatlandError, MapFileError
+from flatland.extras import require
 from flatland.geometry import DoubleArray, Pose
-from flatland.maps.map_image import GreyImage, read_grey_image, threshold_in_place
+from flatland.maps.grey_image import GreyImage, read_grey_image
+from flatland.maps.map_image import threshold_in_place
 from flatland.tools.wall_segments import find_wall_segments
 
 IMAGE_SCALES = {"low": 1.05, "med": 1.5, "high": 2.0}
@@ -110,11 +111,12 @@ def write_map(path: Path, data_name: str, image_map: ImageMap) -> None:
 
 
 def write_overlay(path: Path, segments: DoubleArray, image: GreyImage) -> None:
-    """Writes an image of the map with the segments drawn over it.
+    """Writes an image of the map with the segments on top.
 
     Raises:
         OSError: The image cannot be written.
     """
+    cv2 = require("cv2", "images of line segments need")
     overlay = cv2.cvtColor(image, cv2.COLOR_GRAY2BGR)
     for x1, y1, x2, y2 in segments:
         # The origin of OpenCV is the centre of the top left pixel.

@@ -8,10 +8,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-import cv2
 import numpy as np
 import numpy.typing as npt
 
+from flatland.extras import require
 from flatland.geometry import DoubleArray
 
 Mask = npt.NDArray[np.bool_]
@@ -24,7 +24,7 @@ _LOG_EPS = 1.0
 _DENSITY = 0.8
 
 _PADDING = 8
-"""Width of a border around the image [pixels]; the detector finds no lines close to the border."""
+"""Width of a border around the image [pixels]; the detector finds no lines close to the edge."""
 _TOLERANCE = 0.95
 """Largest distance of a segment from the walls [pixels]; less than 1 to allow for rounding."""
 _SAMPLES_PER_PIXEL = 4
@@ -107,6 +107,7 @@ def find_wall_segments(mask: Mask, image_scale: float) -> DoubleArray:
 
 def _detect(mask: Mask, image_scale: float) -> DoubleArray:
     image = np.where(np.pad(mask, _PADDING, constant_values=True), 255, 0).astype(np.uint8)
+    cv2 = require("cv2", "the detection of line segments needs")
     detector = cv2.createLineSegmentDetector(
         cv2.LSD_REFINE_STD,
         image_scale,

@@ -4,16 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
-from typing import Final
 
 import numpy as np
 
-from flatland.drawing.model_preview import bodies_of_file
-from flatland.entities.body import Body, Color
-from flatland.geometry import DoubleArray, circle_points, transform_points
-from flatland.physics import PhysicsFixture
-
-_CIRCLE_POINTS: Final = 32
+from flatland.config.inputs import Inputs
+from flatland.entities.body import Color
+from flatland.geometry import DoubleArray, transform_points
+from flatland.scene.description import BodyDescription
+from flatland.scene.model_preview import describe_file
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -45,8 +43,8 @@ def read_outline(
     Raises:
         YamlError: The file cannot be read, or a body or joint in it is invalid.
     """
-    with bodies_of_file(path, params, name=name) as bodies:
-        return [Outline(body.color, _segments(body)) for body in bodies if body.fixtures]
+    bodies = describe_file(path, Inputs(params), name=name)
+    return [Outline(body.color, _segments(body)) for body in bodies if body.shapes]
 
 
 def max_radius(outlines: Iterable[Outline]) -> float:
@@ -54,17 +52,7 @@ def max_radius(outlines: Iterable[Outline]) -> float:
     return max((float(np.hypot(*each.segments.T).max()) for each in outlines), default=0.0)
 
 
-def _segments(body: Body) -> DoubleArray:
+def _segments(body: BodyDescription) -> DoubleArray:
     """Returns the edges of all fixtures of a body in the model's frame [m], shape (2 n, 2)."""
-    p_body = np.concatenate([_fixture_segments(fixture) for fixture in body.fixtures])
+    p_body = np.concatenate([shape.segments() for shape in body.shapes])
     return transform_points(body.pose, p_body)
-
-
-def _fixture_segments(fixture: PhysicsFixture) -> DoubleArray:
-    """Returns the edges of a circle or polygon in the body's frame [m], shape (2 n, 2)."""
-    if fixture.shape == "circle":
-        points = circle_points(fixture.center, fixture.radius, _CIRCLE_POINTS)
-    else:
-        points = np.asarray(fixture.vertices, dtype=np.float64)
-    segments: DoubleArray = np.stack([points, np.roll(points, -1, axis=0)], axis=1)
-    return segments.reshape(-1, 2)

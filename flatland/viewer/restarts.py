@@ -1,6 +1,6 @@
 """Runs the viewer in a child process, and starts it again after a crash.
 
-RViz and OpenGL run inside the viewer, and a crash of them cannot be handled in its process.
+RViz and OpenGL run inside the viewer, and a crash in them cannot be handled in the same process.
 """
 
 from __future__ import annotations
@@ -44,9 +44,9 @@ def run_with_restarts(run: Callable[[Callable[[], None]], int]) -> int:
             before the end.
 
     Returns:
-        In the child, the exit code of the function. In this process, that of the child, or 128 and
-        the number of the signal that ended it; 0 if it crashed after a stop signal or with restarts
-        disabled.
+        In the child, the exit code of the function. In this process, the exit code of the child, or
+        128 plus the number of the signal that ended it; 0 if it crashed after a stop signal or with
+        restarts disabled.
     """
     child = 0
     is_stopped = False
@@ -56,7 +56,7 @@ def run_with_restarts(run: Callable[[Callable[[], None]], int]) -> int:
         nonlocal is_stopped
         is_stopped = True
         if child != 0:
-            with suppress(ProcessLookupError):  # It has just ended.
+            with suppress(ProcessLookupError):  # The child has just ended.
                 os.kill(child, number)
 
     parent = os.getpid()

@@ -10,7 +10,7 @@ from urllib.parse import urlsplit
 import rosgraph
 import rospy
 
-from flatland.ros.parameters import ParameterError, read_parameters
+from flatland.node.parameters import ParameterError, read_parameters
 
 _LASER_TYPE: Final = "sensor_msgs/LaserScan"
 _CONNECT_TIMEOUT: Final = 1.0  # s

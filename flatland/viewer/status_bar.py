@@ -79,7 +79,7 @@ class RealTimeFactor:
 
 
 class StatusBar(QStatusBar):
-    """Shows the state of the simulator and lets the user set its update rate."""
+    """Shows the state of the simulator, with a field to set its update rate."""
 
     rate_requested = pyqtSignal(float)  # steps per second [Hz], 0 for as fast as possible
 

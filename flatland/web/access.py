@@ -1,4 +1,4 @@
-"""Who may connect: the token, and the origin of the page that opens a connection."""
+"""Access control: the token, and the origin of the page that opens a connection."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ class Access:
 
     Attributes:
         host: Address that the server listens on.
-        token: What clients have to know, None if they need nothing.
+        token: Token that clients must send, None if no token is required.
     """
 
     host: str
@@ -24,22 +24,22 @@ class Access:
 
     @classmethod
     def for_host(cls, host: str, token: str | None) -> Access:
-        """Returns the access for an address, with a random token if it needs one and has none."""
+        """Returns the access for an address, with a random token if one is required and missing."""
         if token is None and not is_loopback(host):
             token = secrets.token_urlsafe(16)
         return cls(host, token)
 
     def allows_token(self, token: str) -> bool:
-        """Returns whether a client knows the token; takes the same time for all wrong ones."""
+        """Returns whether a token is valid; takes the same time for all invalid tokens."""
         if self.token is None:
             return True
         return hmac.compare_digest(token.encode("utf-8", "replace"), self.token.encode())
 
     def allows_host(self, host: str) -> bool:
-        """Returns whether the name by which a request addresses the server is acceptable.
+        """Returns whether the header `Host` of a request is accepted.
 
-        A page of another site can let its name point to this machine. Without a token, only names
-        of this machine are therefore accepted.
+        The name of another site can resolve to this machine, so that a page of the site could
+        connect. Without a token, only names of this machine are therefore accepted.
         """
         if self.token is not None:
             return True
@@ -47,10 +47,10 @@ class Access:
         return name is not None and (name == self.host.lower() or is_loopback(name))
 
     def allows_origin(self, origin: str | None, host: str) -> bool:
-        """Returns whether a page may connect: one of this server, or a program without a page.
+        """Returns whether a page may connect: a page of this server, or a program without a page.
 
         Args:
-            origin: Header `Origin`, None if there is none.
+            origin: Header `Origin`, None if the request has none.
             host: Header `Host`.
         """
         return origin is None or origin.lower() in (
@@ -67,7 +67,7 @@ class Access:
 
 
 def is_loopback(host: str) -> bool:
-    """Returns whether a name or an address is that of this machine itself."""
+    """Returns whether a name or an address is a loopback address."""
     if host.lower() == "localhost":
         return True
     try:
@@ -84,7 +84,7 @@ def _hostname(url: str) -> str | None:
 
 
 def _reachable_name(host: str) -> str:
-    """Returns the address of this machine in its network if the server listens on all of them."""
+    """Returns the address of a host; for all addresses, that of this machine in its network."""
     if host not in ("", "0.0.0.0", "::"):  # noqa: S104 - compared only
         return host
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:

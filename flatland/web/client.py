@@ -5,17 +5,15 @@ from __future__ import annotations
 import asyncio
 import dataclasses
 from collections import deque
-from typing import TYPE_CHECKING, Any, Final
+from collections.abc import Callable, Mapping
+from typing import Any, Final
 
 from aiohttp import WSCloseCode, WSMsgType, web
 
-from flatland.web.client_view import Seen, View
 from flatland.web.encoding import text_message
 from flatland.web.feed import WorldFeed
 from flatland.web.messages import Message, MessageError, parse
-
-if TYPE_CHECKING:
-    from flatland.web.hub import Hub
+from flatland.web.views import Received, View
 
 MAX_MESSAGES_PER_SECOND: Final = 120
 _BURST: Final = 240  # messages
@@ -23,38 +21,45 @@ _MAX_TEXTS: Final = 1000  # replies and notices that wait to be sent
 
 
 class Client:
-    """One connection: what it looks at, and what it has received.
+    """One connection: what the client looks at, and what the client has received.
 
     Attributes:
-        view: What it looks at.
-        waiting: Number of its requests that are not answered.
+        waiting: Number of requests of the client without a reply.
         connected: Whether the connection has not ended.
+        notify: Makes the client send the messages that are new.
     """
 
-    def __init__(self, socket: web.WebSocketResponse, hub: Hub) -> None:
-        """Creates a client that looks at nothing yet.
+    def __init__(self, socket: web.WebSocketResponse, feeds: Mapping[int, WorldFeed]) -> None:
+        """Creates a client that looks at no world.
 
         Args:
             socket: The connection.
-            hub: The worlds.
+            feeds: The worlds by index; may change.
         """
-        self.view = View()
         self.waiting = 0
         self.connected = True
         self._socket = socket
-        self._hub = hub
-        self._end = (int(WSCloseCode.OK), b"")
-        self._wish: tuple[int, ...] = ()
+        self._feeds = feeds
+        self._view = View()
+        self._close_code, self._close_reason = int(WSCloseCode.OK), b""
+        self._worlds: tuple[int, ...] = ()  # requested indices, also of worlds that do not exist
         self._hidden = False
-        self._seen: dict[WorldFeed, Seen] = {}
+        self._received: dict[WorldFeed, Received] = {}
         self._texts: deque[str] = deque()
-        self._wake = asyncio.Event()
-        self.wake = self._wake.set
+        self._new = asyncio.Event()
+        self.notify = self._new.set
         self._tokens = float(_BURST)
         self._tokens_time = asyncio.get_running_loop().time()
 
-    async def run(self) -> None:
-        """Serves the connection until it ends."""
+    async def run(
+        self, receive: Callable[[Client, Message], None], forget: Callable[[Client], None]
+    ) -> None:
+        """Serves the connection until it ends.
+
+        Args:
+            receive: Called with each message of the client.
+            forget: Called when the client has disconnected.
+        """
         writer = asyncio.create_task(self._write())
         try:
             async for message in self._socket:
@@ -63,26 +68,27 @@ class Client:
                         await self.end(WSCloseCode.UNSUPPORTED_DATA, "only text is accepted")
                         break
                     self._count_message()
-                    self._hub.receive(self, parse(message.data))
+                    receive(self, parse(message.data))
                 except MessageError as error:
                     await self.end(WSCloseCode.POLICY_VIOLATION, str(error))
                     break
         finally:
             self.connected = False
             writer.cancel()
-            self._hub.forget(self)
-        # If another task closes the connection, the loop above ends before it has sent the code.
+            for feed in self._received:
+                feed.audience.remove(self.notify)
+            forget(self)
+        # If another task closes the connection, the loop above ends before the code is sent.
         await self._close()
 
     async def end(self, code: int, reason: str) -> None:
         """Closes the connection."""
-        # A reason has at most 123 bytes.
-        self._end = code, reason.encode()[:120]
+        # The protocol limits a reason to 123 bytes.
+        self._close_code, self._close_reason = code, reason.encode()[:120]
         await self._close()
 
     async def _close(self) -> None:
-        code, reason = self._end
-        await self._socket.close(code=code, message=reason)
+        await self._socket.close(code=self._close_code, message=self._close_reason)
 
     def _count_message(self) -> None:
         now = asyncio.get_running_loop().time()
@@ -92,58 +98,58 @@ class Client:
         if self._tokens < 0:
             raise MessageError(f"more than {MAX_MESSAGES_PER_SECOND} messages per second")
 
-    # -- what it looks at ------------------------------------------------------------------
+    # -- view ------------------------------------------------------------------------------
 
     def look(self, message: Message) -> None:
         """Changes what the client looks at; fields that are not given keep their value."""
         fields = message.fields
-        self._wish = fields.get("worlds", self._wish)
+        self._worlds = fields.get("worlds", self._worlds)
         self._hidden = fields.get("hidden", self._hidden)
         names = ("scans", "frames", "inspect", "series")
-        self.view = dataclasses.replace(
-            self.view, **{name: fields[name] for name in names if name in fields}
+        self._view = dataclasses.replace(
+            self._view, **{name: fields[name] for name in names if name in fields}
         )
         self.update_feeds()
 
     def update_feeds(self) -> None:
-        """Looks at the worlds that the client wants and that exist."""
-        feeds = [self._hub.feeds[n] for n in self._wish if n in self._hub.feeds]
-        for feed in self._seen:
+        """Joins the audience of the requested worlds that exist, and leaves all others."""
+        feeds = [self._feeds[n] for n in self._worlds if n in self._feeds]
+        for feed in self._received:
             if feed not in feeds or self._hidden:
-                feed.look_away(self.wake)
-        self._seen = {feed: self._seen.get(feed, Seen()) for feed in feeds}
+                feed.audience.remove(self.notify)
+        self._received = {feed: self._received.get(feed, Received()) for feed in feeds}
         if not self._hidden:
             for feed in feeds:
-                feed.look(self.wake, self.view)
-        self.wake()
+                feed.audience.set_view(self.notify, self._view)
+        self.notify()
 
-    # -- what it receives ------------------------------------------------------------------
+    # -- messages to the client ------------------------------------------------------------
 
     def send(self, message: dict[str, Any]) -> None:
-        """Sends a message that must not be left out, before those of worlds."""
+        """Sends a message that no other replaces, before the messages of worlds."""
         if len(self._texts) < _MAX_TEXTS:
             self._texts.append(text_message(message))
-            self.wake()
+            self.notify()
 
     async def _write(self) -> None:
         try:
             while True:
-                await self._wake.wait()
-                self._wake.clear()
+                await self._new.wait()
+                self._new.clear()
                 while (message := self._next()) is not None:
                     if isinstance(message, str):
                         await self._socket.send_str(message)
                     else:
                         await self._socket.send_bytes(message)
         except ConnectionError:
-            return  # The reader ends too.
+            return  # `run` ends, too.
 
     def _next(self) -> str | bytes | None:
         if self._texts:
             return self._texts.popleft()
         if not self._hidden:
-            for feed, seen in self._seen.items():
-                message = feed.next_message(seen, self.view)
+            for feed, received in self._received.items():
+                message = feed.next_message(received, self._view)
                 if message is not None:
                     return message
         return None

@@ -1,20 +1,21 @@
-"""Carries out the messages of clients."""
+"""Performs the requests of clients."""
 
 from __future__ import annotations
 
 import asyncio
 import re
 from collections.abc import Awaitable, Callable, Hashable
+from functools import partial
 from typing import TYPE_CHECKING, Any, Final
 
 from flatland.errors import WorldError
 from flatland.plugin_api.plugin import describe
+from flatland.runtime.file_reads import read_in_time_async
 from flatland.values import Twist
 from flatland.web.feed import WorldFeed
 from flatland.web.messages import Message
 from flatland.web.model_files import check_file, model_files, preview
 from flatland.web.numbers import series_of
-from flatland.web.world_requests import between_steps
 
 if TYPE_CHECKING:
     from flatland.web.client import Client
@@ -26,61 +27,64 @@ _CHECK_PERIOD: Final = 0.1  # s between two searches for such holds and robots
 _SUPERSEDED: Final = {"superseded": True}
 _NAME: Final = re.compile(r"[A-Za-z0-9_./ ()+-]+")
 
+_Hold = tuple["Client", WorldFeed, int]  # the last part is the id of the model
+_Drive = tuple["Client", WorldFeed, str]  # the last part is the topic
+
 
 class Commands:
-    """Carries out messages; all methods are called in the thread of the loop."""
+    """Performs the requests of clients; all methods are called in the thread of the loop."""
 
-    def __init__(self) -> None:
-        """Creates an object without holds and moving robots."""
+    def __init__(self, read_only: bool) -> None:
+        """Creates an object without holds and moving robots.
+
+        Args:
+            read_only: Whether clients see only those model files that the list contains.
+        """
+        self._read_only = read_only
         self._newest = _Newest()
-        # Wall times at which holds end, by client, world and id of the model, and at which robots
-        # stop, by client, world and topic.
-        self._holds: dict[tuple[Client, WorldFeed, int], float] = {}
-        self._drives: dict[tuple[Client, WorldFeed, str], float] = {}
+        self._holds: dict[_Hold, float] = {}  # wall time at which each hold ends [s]
+        self._drives: dict[_Drive, float] = {}  # wall time at which each robot stops [s]
         self._active = asyncio.Event()
 
-    async def carry_out(self, client: Client, feed: WorldFeed, message: Message) -> Any:
-        """Carries out a message for a world, and returns the result for the reply.
+    async def perform(self, client: Client, feed: WorldFeed, message: Message) -> Any:
+        """Performs a request for a world, and returns the result for the reply.
 
         Raises:
-            FlatlandError: It cannot be carried out.
-            ValueError: As above.
+            FlatlandError: The request cannot be performed.
+            ValueError: An argument is invalid.
         """
-        carry_out = _ACTIONS[message.type]
-        return await carry_out(self, client, feed, message.fields)
+        return await _ACTIONS[message.type](self, client, feed, message.fields)
 
     # -- time ------------------------------------------------------------------------------
 
     async def _pause(self, _client: Client, feed: WorldFeed, _fields: Any) -> None:
         def pause() -> None:
-            feed.holds.keep_paused()
+            feed.controller.holds.keep_paused()
             feed.controller.pause()
 
-        await between_steps(feed.world, pause)
+        await feed.requests.run(pause)
 
     async def _resume(self, _client: Client, feed: WorldFeed, _fields: Any) -> None:
-        await between_steps(feed.world, feed.controller.resume)
+        await feed.requests.run(feed.controller.resume)
 
     async def _step(self, _client: Client, feed: WorldFeed, fields: Any) -> None:
-        count = fields.get("n", 1)
-        await feed.wait_for(feed.controller.step(count))
+        await feed.requests.wait_for(feed.controller.step(fields.get("n", 1)))
 
     async def _set_rate(self, _client: Client, feed: WorldFeed, fields: Any) -> None:
-        await between_steps(feed.world, lambda: feed.controller.set_rate(fields["rate"]))
+        await feed.requests.run(lambda: feed.controller.set_rate(fields["rate"]))
 
     # -- models ----------------------------------------------------------------------------
 
     async def _move(self, client: Client, feed: WorldFeed, fields: Any) -> Any:
         number, pose = fields["model"], fields["pose"]
-        key = (client, feed, number)
-        if key in self._holds:
-            self._holds[key] = _now() + HOLD_TIMEOUT
-        return await self._newest.run(
-            ("move", *key),
-            lambda: between_steps(
-                feed.world, lambda: feed.controller.move(feed.find_model(number).name, pose)
-            ),
-        )
+        hold = (client, feed, number)
+        if hold in self._holds:
+            self._holds[hold] = _now() + HOLD_TIMEOUT
+
+        def move() -> None:
+            feed.controller.move(feed.find_model(number).name, pose)
+
+        return await self._newest.run(("move", *hold), lambda: feed.requests.run(move))
 
     async def _hold(self, client: Client, feed: WorldFeed, fields: Any) -> None:
         number = fields["model"]
@@ -89,15 +93,15 @@ class Commands:
 
         def hold() -> None:
             feed.find_model(number)
-            feed.holds.hold((client, number))
+            feed.controller.holds.hold((client, number))
 
-        await between_steps(feed.world, hold)
+        await feed.requests.run(hold)
 
     async def _release(self, client: Client, feed: WorldFeed, fields: Any) -> None:
-        number = fields["model"]
-        await self._newest.idle(("move", client, feed, number))
-        self._holds.pop((client, feed, number), None)
-        await between_steps(feed.world, lambda: feed.holds.release((client, number)))
+        hold = (client, feed, fields["model"])
+        await self._newest.idle(("move", *hold))
+        self._holds.pop(hold, None)
+        await feed.requests.run(partial(_release_model, *hold))
 
     async def _spawn(self, _client: Client, feed: WorldFeed, fields: Any) -> dict[str, str]:
         file, name, namespace = fields["file"], fields["name"], fields.get("namespace", "")
@@ -105,24 +109,28 @@ class Commands:
             raise WorldError(
                 f'the name "{name}" has a character other than letters, digits, _./()+-'
             )
-        pose = fields["pose"]
-        await between_steps(
-            feed.world, lambda: feed.controller.spawn(check_file(file), name, namespace, pose)
-        )
+        pose, source = fields["pose"], feed.world.source
+        path = check_file(file)
+        store = await read_in_time_async(lambda: source.read_models_ahead([path]))
+        spawn = partial(feed.controller.spawn, path, name, namespace, pose)
+        await feed.requests.run(source.inputs.using(store)(spawn))
         return {"name": name}
 
-    async def _preview(self, _client: Client, feed: WorldFeed, fields: Any) -> dict[str, Any]:
-        return await asyncio.to_thread(preview, feed.world, fields["file"])
+    async def _preview(self, client: Client, feed: WorldFeed, fields: Any) -> dict[str, Any]:
+        # An error of another file would tell whether it exists.
+        if self._read_only and all(
+            file["path"] != fields["file"] for file in await self._files(client, feed, fields)
+        ):
+            raise WorldError("a read-only viewer previews only the listed model files")
+        return await read_in_time_async(lambda: preview(feed.world, fields["file"]))
 
     async def _delete(self, _client: Client, feed: WorldFeed, fields: Any) -> None:
         number = fields["model"]
-        await between_steps(
-            feed.world, lambda: feed.controller.delete(feed.find_model(number).name)
-        )
+        await feed.requests.run(lambda: feed.controller.delete(feed.find_model(number).name))
 
     async def _files(self, _client: Client, feed: WorldFeed, _fields: Any) -> list[dict[str, str]]:
-        feed.state.model_files = await asyncio.to_thread(model_files, feed.world)
-        return feed.state.model_files
+        feed.contents.model_files = await read_in_time_async(lambda: model_files(feed.world))
+        return feed.contents.model_files
 
     # -- velocity commands -----------------------------------------------------------------
 
@@ -138,14 +146,14 @@ class Commands:
             return found
 
         async def run() -> None:
-            found = await between_steps(feed.world, drive)
+            found = await feed.requests.run(drive)
             if moves and client.connected:
                 self._drives[client, feed, found] = _now() + DRIVE_TIMEOUT
                 self._active.set()
             else:
                 self._drives.pop((client, feed, found), None)
                 if moves:
-                    feed.post(_stopping(feed, found))
+                    feed.requests.post(partial(_stop_robot, feed, found))
 
         return await self._newest.run(("drive", client, feed, number, topic), run)
 
@@ -156,12 +164,12 @@ class Commands:
             outputs = feed.world.ports.outputs.values()
             return sorted(name for output in outputs for name in series_of(output))
 
-        return await between_steps(feed.world, describe_all)
+        return await feed.requests.run(describe_all)
 
-    # -- what ends by itself ---------------------------------------------------------------
+    # -- holds and robots without further requests -----------------------------------------
 
     async def watch(self) -> None:
-        """Ends holds that are not repeated, and stops robots that are not commanded any more."""
+        """Ends holds and stops robots after their timeouts; runs until it is cancelled."""
         while True:
             await self._active.wait()
             await asyncio.sleep(_CHECK_PERIOD)
@@ -174,34 +182,31 @@ class Commands:
                 self._active.clear()
 
     def forget(self, client: Client) -> None:
-        """Ends the holds of a client that has disconnected, and stops its robots."""
+        """Ends the holds and stops the robots of a client that has disconnected."""
         self._end(
             [key for key in self._holds if key[0] is client],
             [key for key in self._drives if key[0] is client],
         )
 
     def forget_world(self, feed: WorldFeed) -> None:
-        """Ends the holds and stops the robots of a world that is not shown any more."""
+        """Ends the holds and stops the robots of a world that was removed from the server."""
         self._end(
             [key for key in self._holds if key[1] is feed],
             [key for key in self._drives if key[1] is feed],
         )
 
-    def _end(
-        self,
-        holds: list[tuple[Client, WorldFeed, int]],
-        drives: list[tuple[Client, WorldFeed, str]],
-    ) -> None:
-        for client, feed, number in holds:
-            del self._holds[client, feed, number]
-            feed.post(_releasing(feed, client, number))
-        for client, feed, topic in drives:
-            del self._drives[client, feed, topic]
-            feed.post(_stopping(feed, topic))
+    def _end(self, holds: list[_Hold], drives: list[_Drive]) -> None:
+        for hold in holds:
+            del self._holds[hold]
+            hold[1].requests.post(partial(_release_model, *hold))
+        for drive in drives:
+            del self._drives[drive]
+            _, feed, topic = drive
+            feed.requests.post(partial(_stop_robot, feed, topic))
 
 
 class _Newest:
-    """Runs one action of a key at a time; of those that wait, only the newest."""
+    """Performs one action of a key at a time; of the actions that wait, only the newest."""
 
     def __init__(self) -> None:
         self._running: set[Hashable] = set()
@@ -209,7 +214,12 @@ class _Newest:
         self._idle: dict[Hashable, list[asyncio.Future[None]]] = {}
 
     async def run(self, key: Hashable, action: Callable[[], Awaitable[Any]]) -> Any:
-        """Returns the result of an action, or of a newer one of the same key instead."""
+        """Returns the result of an action, or `_SUPERSEDED` if a newer one of the key replaced it.
+
+        Args:
+            key: Identifies actions that replace each other.
+            action: The action.
+        """
         if key in self._running:
             former = self._waiting.pop(key, None)
             if former is not None and not former.done():
@@ -224,7 +234,7 @@ class _Newest:
         finally:
             following = self._waiting.pop(key, None)
             if following is not None and not following.done():
-                following.set_result(True)  # `_running` keeps the key for it.
+                following.set_result(True)  # The key remains in `_running` for this action.
             else:
                 self._running.discard(key)
                 for waiter in self._idle.pop(key, []):
@@ -240,10 +250,10 @@ class _Newest:
 
 
 def _drive_topic(feed: WorldFeed, number: int, topic: str | None) -> str:
-    """Returns the topic of a velocity command of a model; to be called between two steps.
+    """Returns the topic of a velocity command of a model; must be called between two steps.
 
     Raises:
-        WorldError: The model has none, or not this one.
+        WorldError: The model has no velocity command, or none with this topic.
     """
     model = feed.find_model(number)
     ports = feed.world.ports
@@ -259,16 +269,13 @@ def _drive_topic(feed: WorldFeed, number: int, topic: str | None) -> str:
     return topics[0] if topic is None else topic
 
 
-def _releasing(feed: WorldFeed, client: Client, number: int) -> Callable[[], None]:
-    return lambda: feed.holds.release((client, number))
+def _release_model(client: Client, feed: WorldFeed, number: int) -> None:
+    feed.controller.holds.release((client, number))
 
 
-def _stopping(feed: WorldFeed, topic: str) -> Callable[[], None]:
-    def stop() -> None:
-        if topic in feed.world.ports.commands:
-            feed.world.command(topic).set(Twist())
-
-    return stop
+def _stop_robot(feed: WorldFeed, topic: str) -> None:
+    if topic in feed.world.ports.commands:
+        feed.world.command(topic).set(Twist())
 
 
 def _now() -> float:

@@ -1,11 +1,11 @@
-"""Encodes messages of the server, binary ones little endian; see `docs/web_protocol.md`."""
+"""Encodes messages of the server: JSON, and little-endian binary; see `docs/web_protocol.md`."""
 
 from __future__ import annotations
 
 import json
 import struct
 from collections.abc import Sequence
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -25,63 +25,62 @@ _COUNT: Final = struct.Struct("<I")
 Ids = npt.NDArray[np.uint32]
 
 
+class Head(NamedTuple):
+    """Header of a binary message.
+
+    Attributes:
+        world: Index of the world.
+        revision: Revision of the world.
+        time: Simulated time [s].
+    """
+
+    world: int
+    revision: int
+    time: float
+
+    def packed(self, kind: int) -> bytes:
+        """Returns the header of a message of a kind."""
+        return _HEADER.pack(kind, VERSION, *self)
+
+
 def text_message(message: dict[str, Any]) -> str:
     """Returns a text message as JSON without spaces."""
     return json.dumps(message, separators=(",", ":"))
 
 
-def edges_message(world: int, revision: int, time: float, layer: int, edges: FloatArray) -> bytes:
+def edges_message(head: Head, layer: int, edges: FloatArray) -> bytes:
     """Returns the message of all edges of a layer.
 
     Args:
-        world: Index of the world.
-        revision: Revision of the world.
-        time: Simulated time [s].
+        head: Header.
         layer: Index of the layer.
         edges: (x1, y1, x2, y2) in the world frame [m], shape (n, 4).
     """
-    head = _HEADER.pack(EDGES, VERSION, world, revision, time) + _TWO_COUNTS.pack(layer, len(edges))
-    return head + edges.astype("<f4").tobytes()
+    counts = _TWO_COUNTS.pack(layer, len(edges))
+    return head.packed(EDGES) + counts + edges.astype("<f4").tobytes()
 
 
-def poses_message(world: int, revision: int, time: float, ids: Ids, poses: FloatArray) -> bytes:
+def poses_message(head: Head, poses: FloatArray, ids: Ids | None = None) -> bytes:
     """Returns the message of the poses of some bodies.
 
     Args:
-        world: Index of the world.
-        revision: Revision of the world.
-        time: Simulated time [s].
-        ids: Ids of the bodies, shape (n,).
+        head: Header.
         poses: (x, y, theta) in the world frame [m, rad], shape (n, 3).
+        ids: Ids of the bodies, shape (n,); None for the bodies of the previous message of poses.
     """
-    head = _HEADER.pack(POSES, VERSION, world, revision, time) + _COUNT.pack(len(ids))
-    return head + ids.astype("<u4").tobytes() + poses.astype("<f4").tobytes()
+    start = head.packed(SAME_BODIES if ids is None else POSES) + _COUNT.pack(len(poses))
+    columns = b"" if ids is None else ids.astype("<u4").tobytes()
+    return start + columns + poses.astype("<f4").tobytes()
 
 
-def same_bodies_message(world: int, revision: int, time: float, poses: FloatArray) -> bytes:
-    """Returns the message of the poses of the bodies of the previous message of poses.
-
-    Args:
-        world: Index of the world.
-        revision: Revision of the world.
-        time: Simulated time [s].
-        poses: (x, y, theta) in the world frame [m, rad], shape (n, 3).
-    """
-    head = _HEADER.pack(SAME_BODIES, VERSION, world, revision, time) + _COUNT.pack(len(poses))
-    return head + poses.astype("<f4").tobytes()
-
-
-def scans_message(world: int, revision: int, time: float, groups: Sequence[bytes]) -> bytes:
+def scans_message(head: Head, groups: Sequence[bytes]) -> bytes:
     """Returns the message of some scans.
 
     Args:
-        world: Index of the world.
-        revision: Revision of the world.
-        time: Simulated time [s].
-        groups: Scans as returned by `scan_group`.
+        head: Header.
+        groups: Groups of scans, returned by `scan_group`.
     """
-    head = _HEADER.pack(SCANS, VERSION, world, revision, time) + _COUNT.pack(len(groups))
-    return b"".join((head, *groups))
+    return b"".join((head.packed(SCANS), _COUNT.pack(len(groups)), *groups))
 
 
 def scan_group(ids: Ids, poses: FloatArray, ranges: FloatArray) -> bytes:

@@ -3,25 +3,22 @@
 from __future__ import annotations
 
 import asyncio
-import itertools
 import logging
-from collections.abc import Coroutine
+from contextlib import suppress
 from typing import Any, Final
 
-from flatland.errors import PLUGIN_FAULTS, FlatlandError
+from flatland.errors import PLUGIN_FAULTS, FlatlandError, WorldError
+from flatland.runtime.file_reads import read_in_time_async
 from flatland.web.client import MAX_MESSAGES_PER_SECOND, Client
 from flatland.web.commands import Commands
-from flatland.web.controller import WorldController
+from flatland.web.encoding import VERSION
 from flatland.web.feed import WorldFeed
 from flatland.web.messages import MAX_SIZE, READ_ONLY_TYPES, Message
 from flatland.web.model_files import model_files
-from flatland.web.scene import LayerContents
-from flatland.world import World
 
 _LOG = logging.getLogger("flatland")
 
-PROTOCOL_VERSION: Final = 1
-MAX_WAITING: Final = 64  # requests of a client that wait for the simulator
+MAX_WAITING: Final = 64  # requests of a client without a reply
 
 
 class Hub:
@@ -30,6 +27,7 @@ class Hub:
     Attributes:
         feeds: The worlds by index.
         clients: The connections.
+        commands: Performs the requests of clients.
     """
 
     def __init__(self, title: str, read_only: bool) -> None:
@@ -37,71 +35,61 @@ class Hub:
 
         Args:
             title: Title of the page.
-            read_only: Whether clients may only look.
+            read_only: Whether to refuse all requests that change a world.
         """
         self.feeds: dict[int, WorldFeed] = {}
         self.clients: set[Client] = set()
-        self.read_only = read_only
+        self.commands = Commands(read_only)
+        self._read_only = read_only
         self._title = title
-        self._ids = itertools.count(1)
         self._tasks: dict[WorldFeed, asyncio.Task[None]] = {}
         self._jobs: set[asyncio.Task[None]] = set()
-        self._commands = Commands()
 
     # -- worlds ----------------------------------------------------------------------------
 
-    def add(self, index: int, name: str, world: World, controller: WorldController) -> WorldFeed:
-        """Adds a world."""
-        feed = WorldFeed(index, name, world, controller, self._ids)
-        self.feeds[index] = feed
+    def add(self, feed: WorldFeed) -> None:
+        """Adds a world and starts to capture it."""
+        self.feeds[feed.index] = feed
         self._tasks[feed] = asyncio.create_task(self._run(feed))
         for client in self.clients:
-            client.send(self.hello())
+            client.send(self._hello())
             client.update_feeds()
-        return feed
 
     async def _run(self, feed: WorldFeed) -> None:
         try:
-            feed.state.model_files = await asyncio.to_thread(model_files, feed.world)
+            with suppress(WorldError):  # The page requests the list again.
+                feed.contents.model_files = await read_in_time_async(
+                    lambda: model_files(feed.world)
+                )
             await feed.run()
         except asyncio.CancelledError:
             raise
         except Exception:
             _LOG.exception("unexpected internal error in the web viewer")
-        self.remove(feed.index)
+        self.remove(feed)
 
-    def remove(self, index: int) -> None:
-        """Removes a world, if it is there."""
-        feed = self.feeds.pop(index, None)
-        if feed is None:
+    def remove(self, feed: WorldFeed) -> None:
+        """Removes a world; further calls have no effect."""
+        task = self._tasks.pop(feed, None)
+        if task is None:
             return
-        task = self._tasks.pop(feed)
+        del self.feeds[feed.index]
         if task is not asyncio.current_task():
             task.cancel()
-        self._commands.forget_world(feed)
+        self.commands.forget_world(feed)
         for client in self.clients:
             client.update_feeds()
-            client.send({"type": "gone", "world": index})
-
-    def layers_changed(self, index: int) -> None:
-        """Has the layers of a world copied again."""
-        if index in self.feeds:
-            self.feeds[index].layers_changed()
-
-    def draw(self, index: int, lines: LayerContents) -> None:
-        """Shows lines in addition to the layers of a world."""
-        if index in self.feeds:
-            self.feeds[index].draw(lines)
+            client.send({"type": "gone", "world": feed.index})
 
     # -- clients ---------------------------------------------------------------------------
 
-    def hello(self) -> dict[str, Any]:
+    def _hello(self) -> dict[str, Any]:
         """Returns the first message of a connection; sent again when a world is added."""
         return {
             "type": "hello",
-            "version": PROTOCOL_VERSION,
+            "version": VERSION,
             "title": self._title,
-            "read_only": self.read_only,
+            "read_only": self._read_only,
             "worlds": [{"world": n, "name": feed.name} for n, feed in sorted(self.feeds.items())],
             "limits": {"message_size": MAX_SIZE, "messages_per_second": MAX_MESSAGES_PER_SECOND},
         }
@@ -109,54 +97,51 @@ class Hub:
     async def serve(self, client: Client) -> None:
         """Serves a connection until it ends."""
         self.clients.add(client)
-        client.send(self.hello())
-        await client.run()
+        client.send(self._hello())
+        await client.run(self.receive, self.forget)
 
     def forget(self, client: Client) -> None:
-        """Ends everything that a client has begun."""
+        """Removes a client that has disconnected, with its holds and moving robots."""
         self.clients.discard(client)
-        self._commands.forget(client)
-        for feed in self.feeds.values():
-            feed.look_away(client.wake)
+        self.commands.forget(client)
 
     def receive(self, client: Client, message: Message) -> None:
-        """Carries out a message of a client and replies to it."""
-        self._start(self._carry_out(client, message))
-
-    def _start(self, work: Coroutine[Any, Any, None]) -> None:
-        task = asyncio.create_task(work)
+        """Starts to perform a request of a client; a reply follows."""
+        task = asyncio.create_task(self._reply(client, message))
         self._jobs.add(task)
         task.add_done_callback(self._jobs.discard)
 
-    async def watch(self) -> None:
-        """Ends what clients have begun and do not continue; runs until it is cancelled."""
-        await self._commands.watch()
-
-    async def _carry_out(self, client: Client, message: Message) -> None:
+    async def _reply(self, client: Client, message: Message) -> None:
         client.waiting += 1
         try:
-            if client.waiting > MAX_WAITING:
-                raise FlatlandError("too many requests wait for the simulator")
-            if self.read_only and message.type not in READ_ONLY_TYPES:
-                raise FlatlandError("this viewer is read-only")
-            result = await self._result(client, message)
-            client.send({"type": "reply", "id": message.id, "ok": True, "result": result})
+            reply: dict[str, Any] = {"ok": True, "result": await self._perform(client, message)}
         except (FlatlandError, ValueError) as error:
-            client.send({"type": "reply", "id": message.id, "ok": False, "error": str(error)})
+            reply = {"ok": False, "error": str(error)}
         except PLUGIN_FAULTS as error:
             _LOG.exception("web viewer: %s failed", message.type)
-            client.send({"type": "reply", "id": message.id, "ok": False, "error": repr(error)})
+            reply = {"ok": False, "error": repr(error)}
         finally:
             client.waiting -= 1
+        client.send({"type": "reply", "id": message.id, **reply})
 
-    async def _result(self, client: Client, message: Message) -> object:
+    async def _perform(self, client: Client, message: Message) -> object:
+        """Performs a request of a client and returns the result.
+
+        Raises:
+            FlatlandError: The request is not accepted or cannot be performed.
+            ValueError: An argument is invalid.
+        """
+        if client.waiting > MAX_WAITING:
+            raise FlatlandError("too many requests wait for the simulator")
+        if self._read_only and message.type not in READ_ONLY_TYPES:
+            raise FlatlandError("this viewer is read-only")
         if message.type == "look":
             client.look(message)
             return None
         feed = self.feeds.get(message.world)
         if feed is None:
             raise FlatlandError(f"there is no world {message.world}")
-        return await self._commands.carry_out(client, feed, message)
+        return await self.commands.perform(client, feed, message)
 
     async def disconnect(self, code: int, reason: str) -> None:
         """Closes all connections."""
@@ -165,8 +150,8 @@ class Hub:
         )
 
     async def close(self) -> None:
-        """Ends all tasks."""
-        tasks = [*self._tasks.values(), *self._jobs]
+        """Cancels all tasks and waits until they have ended."""
+        tasks: list[asyncio.Task[Any]] = [*self._tasks.values(), *self._jobs]
         for task in tasks:
             task.cancel()
         await asyncio.gather(*tasks, return_exceptions=True)

@@ -7,71 +7,58 @@ from typing import Any, Final
 
 from flatland.entities.layer import Layer
 from flatland.errors import WorldError
-from flatland.geometry import Pose
 from flatland.plugin_api.plugin import describe
 from flatland.plugin_api.ports import Output
 from flatland.timekeeper import NANOSECONDS
+from flatland.web.model_tracker import Json, TrackedModel
 from flatland.web.numbers import as_json
-from flatland.web.scene import Description, TrackedModel
 from flatland.world import World
 
 _MAX_CONTACTS: Final = 50
 
 
-@dataclass(frozen=True, slots=True)
-class Part:
-    """The state of a body.
-
-    Attributes:
-        name: Its name.
-        type: Its type.
-        pose: Pose in the world frame [m, rad].
-        velocity: Velocity of its origin in the world frame [m/s, rad/s].
-        mass: Mass [kg].
-        inertia: Moment of inertia about its origin [kg m²].
-    """
-
-    name: str
-    type: str
-    pose: Pose
-    velocity: Pose
-    mass: float
-    inertia: float
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class Details:
-    """A copy of the state of a model; values of topics are not converted yet.
+    """A copy of the details of a model, from which `details_message` makes a message.
 
     Attributes:
         model: Id of the model.
-        path: Its file.
-        parts: Its bodies.
-        contacts: Names of what it touches.
+        path: File of the model.
+        physics: Fields of the message that need no conversion.
         plugins: Name and type of each plugin.
-        topics: Topic, type, latest value, and whether it is an output or a command.
+        topics: For each topic: name, type, latest value, and `output` or `command`.
     """
 
     model: int
     path: str
-    parts: list[Part]
-    contacts: list[str]
+    physics: Json
     plugins: list[tuple[str, str]]
     topics: list[tuple[str, str, object, str]]
 
 
-def outputs_of(world: World, known: TrackedModel) -> list[Output[Any]]:
-    """Returns the outputs of a model; to be called between two steps."""
-    owners = {describe(plugin) for plugin in known.model.plugins}
+def outputs_of(world: World, tracked: TrackedModel) -> list[Output[Any]]:
+    """Returns the outputs of a model; must be called between two steps."""
+    owners = {describe(plugin) for plugin in tracked.model.plugins}
     return [o for o in world.ports.outputs.values() if not owners.isdisjoint(o.owners)]
 
 
-def copy_details(world: World, known: TrackedModel) -> Details:
-    """Copies the state of a model; to be called between two steps."""
-    model = known.model
+def copy_details(world: World, tracked: TrackedModel) -> Details:
+    """Copies the details of a model; must be called between two steps."""
+    model = tracked.model
+    first = model.bodies[0]
+    bodies = [
+        {
+            "name": body.name,
+            "type": body.type,
+            "pose": list(body.pose),
+            "velocity": list(body.velocity),
+            "mass": body.mass,
+        }
+        for body in model.bodies
+    ]
     topics = [
         (output.topic, output.value_type.__name__, output.latest, "output")
-        for output in outputs_of(world, known)
+        for output in outputs_of(world, tracked)
     ]
     topics += [
         (command.topic, command.value_type.__name__, command.value, "command")
@@ -79,24 +66,27 @@ def copy_details(world: World, known: TrackedModel) -> Details:
         for command in world.ports.commands_of(describe(plugin))
     ]
     return Details(
-        model=known.id,
+        model=tracked.id,
         path=model.path,
-        parts=[
-            Part(body.name, body.type, body.pose, body.velocity, body.mass, body.inertia)
-            for body in model.bodies
-        ],
-        contacts=_contacts(world, known),
+        physics={
+            "pose": list(first.pose),
+            "velocity": list(first.velocity),
+            "mass": sum(body["mass"] for body in bodies),
+            "inertia": first.inertia,
+            "contacts": _contacts(world, tracked),
+            "bodies": bodies,
+        },
         plugins=[(plugin.name, plugin.type) for plugin in model.plugins],
         topics=topics,
     )
 
 
-def _contacts(world: World, known: TrackedModel) -> list[str]:
-    own = {body.id for body in known.model.bodies}
+def _contacts(world: World, tracked: TrackedModel) -> list[str]:
+    """Returns the names of the models and layers that a model touches."""
+    own = {body.id for body in tracked.model.bodies}
     found: dict[str, None] = {}
     for contact in world.physics.contacts():
-        bodies = (contact.body_a, contact.body_b)
-        others = [number for number in bodies if number not in own]
+        others = [number for number in (contact.body_a, contact.body_b) if number not in own]
         if len(others) != 1:
             continue
         try:
@@ -107,34 +97,19 @@ def _contacts(world: World, known: TrackedModel) -> list[str]:
     return list(found)[:_MAX_CONTACTS]
 
 
-def details_message(world: int, details: Details, parameters: Description) -> Description:
-    """Returns the message of the details of a model.
+def details_message(world: int, details: Details, parameters: Json) -> Json:
+    """Returns the message `details`.
 
     Args:
         world: Index of the world.
-        details: The details.
-        parameters: Parameters of the plugins by name.
+        details: Details of the model.
+        parameters: Parameters of the plugins by the name of the plugin.
     """
-    first = details.parts[0]
     return {
         "type": "details",
         "world": world,
         "model": details.model,
-        "pose": list(first.pose),
-        "velocity": list(first.velocity),
-        "mass": sum(part.mass for part in details.parts),
-        "inertia": first.inertia,
-        "contacts": details.contacts,
-        "bodies": [
-            {
-                "name": part.name,
-                "type": part.type,
-                "pose": list(part.pose),
-                "velocity": list(part.velocity),
-                "mass": part.mass,
-            }
-            for part in details.parts
-        ],
+        **details.physics,
         "plugins": [
             {"name": name, "type": kind, "parameters": as_json(parameters.get(name, {}))}
             for name, kind in details.plugins

@@ -1,4 +1,4 @@
-"""Messages of clients: their fields are checked before anything is done."""
+"""Messages of clients: parsing, and complete checks of all fields."""
 
 from __future__ import annotations
 
@@ -27,8 +27,8 @@ class Message:
     """A message of a client.
 
     Attributes:
-        id: Number that the reply repeats, None if the client gave none.
-        type: What is requested.
+        id: Number that the reply repeats, None if the client has sent none.
+        type: Type of the request.
         world: Index of the world.
         fields: The other fields by name, with values of the required types.
     """
@@ -55,7 +55,7 @@ def _text(limit: int, *, empty: bool = False) -> Check:
 
 def _number(low: float, high: float) -> Check:
     def check(value: object) -> float:
-        # Compared before the conversion, which would raise for a large integer.
+        # Compared before the conversion, because the conversion of a large integer raises.
         if (
             isinstance(value, bool)
             or not isinstance(value, int | float)
@@ -108,7 +108,7 @@ _INDEX: Final = _integer(0, 2**16 - 1)
 _SPEED: Final = _number(-1e6, 1e6)
 _MODEL: Final = ("model", _ID)
 
-# The fields of each message besides `id`, `type` and `world`: required ones, then optional ones.
+# Required and optional fields of each type of message, in addition to `id`, `type` and `world`.
 _FIELDS: Final[dict[str, tuple[dict[str, Check], dict[str, Check]]]] = {
     "look": (
         {},

@@ -1,4 +1,4 @@
-"""Model files that can be spawned, and what they contain."""
+"""Model files that can be spawned, and their contents."""
 
 from __future__ import annotations
 
@@ -10,26 +10,28 @@ from typing import Any, Final
 
 import yaml
 
-from flatland.config.inputs import only_files_in
+from flatland.config.documents import is_yaml_text
+from flatland.config.files import open_regular
+from flatland.config.inputs import Inputs
 from flatland.config.node import ListNode, MapNode, Node, ScalarNode
 from flatland.config.preprocessor import preprocess_file
-from flatland.drawing.model_preview import bodies_of_file
 from flatland.errors import WorldError, YamlError
-from flatland.loading.model_source import is_yaml_text
-from flatland.web.scene import Description, describe_shape
+from flatland.scene.model_preview import describe_file
+from flatland.web.model_tracker import Json, shape_json
 from flatland.world import World
 
 _MAX_FILES: Final = 500
-_MAX_DEPTH: Final = 3  # folders below that of the world file
-_MAX_VISITED: Final = 5000  # entries of folders
-_HEAD_SIZE: Final = 64 * 1024  # bytes in which the key `bodies` is searched
+_MAX_DEPTH: Final = 3  # levels of folders below the folder of the world file
+_MAX_VISITED: Final = 5000  # files in these folders
+_HEAD_SIZE: Final = 64 * 1024  # bytes of a file that are searched for the key `bodies`
 _BODIES: Final = re.compile(rb"^bodies[ \t]*:", re.MULTILINE)
 
 
 def model_files(world: World) -> list[dict[str, str]]:
-    """Returns the model files of the models of a world, and those in the folder of its file.
+    """Returns the model files that can be spawned in a world.
 
-    Takes long for large folders.
+    They are the files of its models, and the model files in the folder of the world file and
+    below. Reads files, which takes long for large folders.
 
     Returns:
         Label and absolute path of each file.
@@ -60,7 +62,7 @@ def _files_below(folder: Path) -> Iterator[Path]:
 
 def _is_model(path: Path) -> bool:
     try:
-        with path.open("rb") as file:
+        with open_regular(str(path)) as file:
             return _BODIES.search(file.read(_HEAD_SIZE)) is not None
     except OSError:
         return False
@@ -81,18 +83,18 @@ def _label(path: str, folder: Path) -> str:
 
 
 def check_file(path: str) -> str:
-    """Returns the path of a model file that a client sent.
+    """Returns a path of a model file that a client has sent.
 
     Raises:
-        WorldError: It is YAML text instead of a path.
+        WorldError: The path is YAML text.
     """
     if is_yaml_text(path):
         raise WorldError("the path of a model file is expected, not YAML text")
     return path
 
 
-def preview(world: World, path: str) -> Description:
-    """Describes the bodies of a model file, with the model at the origin; takes long.
+def preview(world: World, path: str) -> Json:
+    """Describes the bodies of a model file as in the reply to `preview`; reads files.
 
     Args:
         world: World in which the model may be spawned.
@@ -101,41 +103,35 @@ def preview(world: World, path: str) -> Description:
     Raises:
         FlatlandError: The file cannot be read, or a body in it is invalid.
     """
-    params = world.params
-    look_up = params if callable(params) or params is None else params.get
-    with (
-        only_files_in(world.model_path),
-        bodies_of_file(
-            world.resolve_path(check_file(path)), look_up, name=Path(path).name
-        ) as bodies,
-    ):
-        return {
-            "bodies": [
-                {
-                    "color": list(body.color),
-                    "pose": list(body.pose),
-                    "shapes": [describe_shape(fixture, []) for fixture in body.fixtures],
-                }
-                for body in bodies
-            ]
-        }
+    inputs = Inputs(world.params, folders=world.model_path)
+    file = world.resolve_path(check_file(path))
+    bodies = describe_file(file, inputs, name=Path(path).name)
+    return {
+        "bodies": [
+            {
+                "color": list(body.color),
+                "pose": list(body.pose),
+                "shapes": [shape_json(shape, []) for shape in body.shapes],
+            }
+            for body in bodies
+        ]
+    }
 
 
 def plugin_parameters(world: World, path: str) -> dict[str, Any]:
-    """Returns the parameters of the plugins in a model file, by the name of the plugin.
+    """Returns the parameters of the plugins in a model file by the name of the plugin.
 
     Args:
         world: World that contains the model.
         path: Path of the file.
 
     Returns:
-        Empty for a model that was not read from a file, or whose file cannot be read any more.
+        An empty dictionary for a model without a file, or whose file cannot be read any more.
     """
     if not Path(path).is_absolute():
         return {}
     try:
-        with only_files_in(world.model_path):
-            root = preprocess_file(path, world.params)
+        root = preprocess_file(path, Inputs(world.params, folders=world.model_path))
     except (YamlError, OSError):
         return {}
     plugins = root.entries.get("plugins") if isinstance(root, MapNode) else None

@@ -1,4 +1,4 @@
-"""Values of outputs and commands as JSON, and the numbers in them."""
+"""Conversion of values of outputs and commands to JSON, and access to the numbers in values."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ import numpy as np
 from flatland.errors import PLUGIN_FAULTS
 from flatland.plugin_api.ports import Output
 
-_MAX_ITEMS: Final = 16  # of a list in a text for users
-_MAX_LISTED: Final = 8  # items of a list whose numbers are offered for plots
+_MAX_ITEMS: Final = 16  # items of a list that are shown to users
+_MAX_LISTED: Final = 8  # length of a list up to which its numbers can be plotted
 _MAX_DEPTH: Final = 4
 _MAX_TEXT: Final = 200  # characters
 
 
 def as_json(value: object, depth: int = 0) -> Any:
-    """Converts a value to what JSON can represent; long lists are shortened, with their length."""
+    """Converts a value to JSON; a long list is shortened, and its length is appended."""
     if value is None or isinstance(value, bool | str):
         return value[:_MAX_TEXT] if isinstance(value, str) else value
     if isinstance(value, int | float | np.number):
@@ -41,7 +41,7 @@ def as_json(value: object, depth: int = 0) -> Any:
 
 
 def number_at(value: object, path: Iterable[str]) -> float | None:
-    """Returns the number at a path of names and indices in a value, None if there is none."""
+    """Returns the number at a path of names and indices in a value, None if it does not exist."""
     for part in path:
         if dataclasses.is_dataclass(value) and part in {f.name for f in dataclasses.fields(value)}:
             value = getattr(value, part)
@@ -83,7 +83,7 @@ def find_number(
 
 
 def series_of(output: Output[Any]) -> list[str]:
-    """Returns the names of the numbers of an output, as far as they are known without a value."""
+    """Returns the names of the numbers of an output, from the latest value or the type."""
     if output.latest is not None:
         paths = _paths_of_value(output.latest)
     else:
@@ -122,7 +122,7 @@ def _paths_of_type(kind: object, depth: int = 0) -> Iterator[tuple[str, ...]]:
     elif isinstance(kind, type) and dataclasses.is_dataclass(kind):
         try:
             hints = typing.get_type_hints(kind)
-        except PLUGIN_FAULTS:  # names that exist only for type checkers
+        except PLUGIN_FAULTS:  # The type refers to names that exist only for type checkers.
             return
         for field in dataclasses.fields(kind):
             for path in _paths_of_type(hints.get(field.name), depth + 1):

@@ -12,7 +12,7 @@ from typing import Final
 
 from aiohttp import WSCloseCode, web
 
-from flatland.web.access import Access
+from flatland.web.access import Access, is_loopback
 from flatland.web.client import Client
 from flatland.web.hub import Hub
 from flatland.web.messages import MAX_SIZE
@@ -24,7 +24,7 @@ Handler = Callable[[web.Request], Awaitable[web.StreamResponse]]
 PAGE: Final = Path(__file__).parent / "page"
 SUBPROTOCOL: Final = "flatland.1"
 WRONG_TOKEN: Final = 4401  # code that closes a connection
-HEARTBEAT: Final = 10.0  # s between two pings; a client that does not answer is disconnected
+HEARTBEAT: Final = 10.0  # s between two pings; a client that does not reply is disconnected
 MAX_CLIENTS: Final = 64
 
 _TYPES: Final = {
@@ -37,49 +37,61 @@ _TYPES: Final = {
     ".png": "image/png",
     ".ico": "image/x-icon",
 }
-# No part begins with a dot, so that no file outside the folder can be named.
+# No part begins with a dot, so that a name cannot refer to a file outside the folder.
 _FILE_NAME: Final = re.compile(r"[\w-][\w.-]*(/[\w-][\w.-]*)*", re.ASCII)
 _POLICY: Final = (
     "default-src 'self'; img-src 'self' data: blob:; media-src 'self' blob:; object-src 'none'; "
     "base-uri 'none'; form-action 'none'; frame-ancestors {ancestors}"
 )
-# Notebooks on this machine show the page in a frame. A foreign page does not know the token.
+# Notebooks on this machine show the page in a frame.
 _LOCAL_ANCESTORS: Final = (
     "'self' http://localhost:* http://127.0.0.1:* https://localhost:* https://127.0.0.1:*"
 )
 
 
 class Server:
-    """Answers the requests of browsers."""
+    """Serves the HTTP requests of browsers."""
 
-    def __init__(self, hub: Hub, access: Access, page: Path = PAGE) -> None:
+    def __init__(
+        self,
+        hub: Hub,
+        access: Access,
+        on_request: Callable[[asyncio.Transport | None], None],
+        *,
+        embeddable: bool,
+    ) -> None:
         """Creates a server.
 
         Args:
             hub: The worlds.
-            access: Decides who may connect.
-            page: Folder of the files of the page.
+            access: Access control.
+            on_request: Called with the connection of each request.
+            embeddable: Whether pages of all other sites may show the page in a frame.
         """
         self._hub = hub
         self._access = access
-        self._page = page
-        ancestors = _LOCAL_ANCESTORS if access.token is None else "*"
+        self._on_request = on_request
+        ancestors = _LOCAL_ANCESTORS if is_loopback(access.host) else "'self'"
+        if embeddable:
+            ancestors = "*"
         self._headers = {
             "Content-Security-Policy": _POLICY.format(ancestors=ancestors),
             "X-Content-Type-Options": "nosniff",
             "Referrer-Policy": "no-referrer",  # The address contains the token.
-            "Cache-Control": "no-cache",  # Files are used again only if their ETag is the same.
+            "Cache-Control": "no-cache",  # Browsers reuse a file only if its ETag is unchanged.
         }
 
     def application(self) -> web.Application:
         """Returns the application of aiohttp."""
         application = web.Application(middlewares=[self._check], client_max_size=1024)
+        application.on_response_prepare.append(_hide_version)
         application.router.add_get("/ws", self._connect)
         application.router.add_get("/{path:.*}", self._file)
         return application
 
     @web.middleware
     async def _check(self, request: web.Request, handler: Handler) -> web.StreamResponse:
+        self._on_request(request.transport)
         if not self._access.allows_host(request.host):
             return web.Response(status=403, text="unknown name of the server in the header Host\n")
         try:
@@ -93,7 +105,7 @@ class Server:
 
     async def _file(self, request: web.Request) -> web.StreamResponse:
         name = request.match_info["path"] or "index.html"
-        path = self._page / name
+        path = PAGE / name
         kind = _TYPES.get(path.suffix)
         if kind is None or not _FILE_NAME.fullmatch(name) or not path.is_file():
             return web.Response(status=404, text="not found\n", headers=self._headers)
@@ -114,10 +126,14 @@ class Server:
             return web.Response(status=400, text="a WebSocket is expected\n")
         await socket.prepare(request)
         if not self._access.allows_token(request.query.get("token", "")):
-            await asyncio.sleep(0.5)  # slows down guesses
+            await asyncio.sleep(0.5)  # slows down attempts to guess the token
             await socket.close(code=WRONG_TOKEN, message=b"the token is missing or wrong")
         elif len(self._hub.clients) >= MAX_CLIENTS:
             await socket.close(code=WSCloseCode.TRY_AGAIN_LATER, message=b"too many clients")
         else:
-            await self._hub.serve(Client(socket, self._hub))
+            await self._hub.serve(Client(socket, self._hub.feeds))
         return socket
+
+
+async def _hide_version(_request: web.Request, response: web.StreamResponse) -> None:
+    response.headers["Server"] = "flatland"

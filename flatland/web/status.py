@@ -1,4 +1,4 @@
-"""The message `status` of one world, with its real-time factor."""
+"""The message `status` of one world, with the real-time factor."""
 
 from __future__ import annotations
 
@@ -6,43 +6,43 @@ import math
 from collections import deque
 from typing import Final
 
-from flatland.web.capture import Captured
-from flatland.web.client_view import Seen
+from flatland.web.capture import CapturedWorld
 from flatland.web.encoding import text_message
+from flatland.web.views import Received
 
 STATUS_PERIOD: Final = 0.2  # s of wall time between two messages `status`
 RATE_WINDOW: Final = 1.0  # s of wall time over which the real-time factor is measured
-STALE_AFTER: Final = 0.5  # s without an answer of the simulator that clients are told of
+STALE_TIMEOUT: Final = 0.5  # s without an answer of the simulator before clients are informed
 _MARGIN: Final = 1 / 30  # s by which a capture may be late and remains in the window
 
 
-class Status:
-    """Time, rate and real-time factor of one world as clients see them.
+class WorldStatus:
+    """Time, rate and real-time factor of one world, for clients.
 
-    All wall times are on the same clock [s].
+    All wall times are times of the same clock [s].
     """
 
     def __init__(self, index: int) -> None:
-        """Creates a status of a world that has not been captured.
+        """Creates the status of a world that has not been captured.
 
         Args:
             index: Index of the world in messages.
         """
         self._index = index
-        self._last: Captured | None = None
+        self._last: CapturedWorld | None = None
         self._answered = -math.inf
         self._times: deque[tuple[float, float]] = deque()  # wall time, simulated time
         self._text = ""
         self._version = 0
         self._due = -math.inf
 
-    def apply(self, captured: Captured, asked: float, answered: float) -> None:
-        """Takes over a captured state.
+    def apply(self, captured: CapturedWorld, asked: float, answered: float) -> None:
+        """Updates the status; the message is renewed after its period, a pause or a new rate.
 
         Args:
-            captured: The state.
-            asked: Wall time at which it was requested.
-            answered: Wall time at which it arrived.
+            captured: The captured world.
+            asked: Wall time at which the capture was requested.
+            answered: Wall time at which the capture was received.
         """
         previous, self._last = self._last, captured
         self._answered = answered
@@ -59,7 +59,7 @@ class Status:
             self.renew(asked)
 
     def renew(self, now: float) -> None:
-        """Has the status sent again, with the time since the last answer."""
+        """Creates a new message with the wall time since the last answer."""
         self._due = now + STATUS_PERIOD
         last = self._last
         if last is None:
@@ -76,23 +76,23 @@ class Status:
                 "rate": None if rate is None else 0 if math.isinf(rate) else rate,
                 "real_time_factor": None if last.lockstep else self._real_time_factor(),
                 "lockstep": last.lockstep,
-                "stale": round(silence, 1) if silence > STALE_AFTER else 0,
+                "stale": round(silence, 1) if silence > STALE_TIMEOUT else 0,
             }
         )
 
-    def rest(self) -> None:
-        """Starts to measure the real-time factor anew, because nobody looks meanwhile."""
+    def restart(self) -> None:
+        """Restarts the measurement of the real-time factor, after a time without captures."""
         self._times.clear()
 
-    def next_message(self, seen: Seen) -> str | None:
-        """Returns the status if a client has not received it.
+    def next_message(self, received: Received) -> str | None:
+        """Returns the message if a client has not received it, else None.
 
         Args:
-            seen: What the client has received; updated.
+            received: What the client has received; updated.
         """
-        if seen.status >= self._version:
+        if received.status >= self._version:
             return None
-        seen.status = self._version
+        received.status = self._version
         return self._text
 
     def _real_time_factor(self) -> float:

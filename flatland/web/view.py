@@ -1,12 +1,11 @@
-"""A live view of a world that a program steps: in a cell of a notebook, or at an address."""
+"""A live view of a world that a program steps, in a cell of a notebook or at an address."""
 
 from __future__ import annotations
 
 import html
 import secrets
 import sys
-from types import TracebackType
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Self
 
 from flatland.runtime.observer import WorldObserver
 from flatland.web.viewer import WebViewer
@@ -16,10 +15,10 @@ if TYPE_CHECKING:
 
 
 class LiveView(WorldObserver):
-    """Shows a world in the browser until it is closed, or the world is; see `World.view`.
+    """Shows a world in the browser until the view or the world is closed; see `World.view`.
 
-    A notebook shows it as the result of a cell. The program continues meanwhile; what it does to
-    the world is visible at once, also between two steps.
+    As the result of a cell, a notebook shows the page. The program continues; changes of the world
+    are visible immediately, also between two steps.
 
     Attributes:
         world: The world.
@@ -45,10 +44,14 @@ class LiveView(WorldObserver):
         world.check_open()
         self.world = world
         self._height = height
-        # A notebook has an origin of its own: only a token distinguishes its frame from those of
-        # other sites.
+        # The page of a notebook has another origin. Only a token distinguishes its frame from the
+        # frames of other sites.
         self._viewer = WebViewer(
-            host, port, token=token or secrets.token_urlsafe(16), read_only=read_only
+            host,
+            port,
+            token=token or secrets.token_urlsafe(16),
+            read_only=read_only,
+            embeddable=True,
         )
         try:
             self._viewer.start()
@@ -70,7 +73,7 @@ class LiveView(WorldObserver):
         return self._closed
 
     def close(self) -> None:
-        """Ends the server; the world continues. Further calls have no effect."""
+        """Stops the server, not the world; further calls have no effect."""
         if self._closed:
             return
         self._closed = True
@@ -79,20 +82,15 @@ class LiveView(WorldObserver):
             self.world.between_steps(lambda: self.world.remove_observer(self))
 
     def detached(self) -> None:
-        """Ends the server with the world."""
+        """Stops the server when the world is closed."""
         self._closed = True
         self._viewer.close()
 
-    def __enter__(self) -> LiveView:
-        """Returns the view, which is closed at the end of the block."""
+    def __enter__(self) -> Self:
+        """Returns the view; the end of the block closes the view."""
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *error: object) -> None:
         """Closes the view."""
         self.close()
 
@@ -114,7 +112,7 @@ class LiveView(WorldObserver):
 def open_view(
     world: World, host: str, port: int, token: str | None, read_only: bool, height: int
 ) -> LiveView:
-    """Opens the view of a world instead of its previous one; see `World.view`.
+    """Opens a view of a world and closes the previous view of the world; see `World.view`.
 
     Raises:
         FlatlandError: The world is closed, or the server cannot listen on the port.

@@ -1,8 +1,9 @@
-"""The public class of the viewer: a server in a thread of its own."""
+"""The public class of the viewer: a server that runs in a separate thread."""
 
 from __future__ import annotations
 
 import asyncio
+import itertools
 import logging
 import socket
 import threading
@@ -10,36 +11,39 @@ from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
-from types import TracebackType
-from typing import Final
+from typing import Final, cast
 
 import numpy as np
 from aiohttp import WSCloseCode, web
 
 from flatland.defaults import WEB_HOST, WEB_PORT
 from flatland.errors import FlatlandError
-from flatland.geometry import FloatArray
+from flatland.geometry import IDENTITY, FloatArray
 from flatland.runtime.observer import WorldObserver
+from flatland.scene.description import LayerDescription
 from flatland.simulation import Simulation
+from flatland.web.acceptor import Acceptor
 from flatland.web.access import Access
-from flatland.web.controller import DefaultController, WorldController
+from flatland.web.controller import WorldController, controller_of
+from flatland.web.feed import WorldFeed
 from flatland.web.hub import Hub
-from flatland.web.scene import LayerContents
 from flatland.web.server import Server
 from flatland.world import World
 
 _LOG = logging.getLogger("flatland")
 
 _CLOSE_TIMEOUT: Final = 5.0  # s
+_SHUTDOWN_TIMEOUT: Final = 1.0  # s, for requests that are being answered
+_KEEP_ALIVE: Final = 15.0  # s between two requests of a connection
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class WorldHandle:
-    """A world that is shown; returned by `WebViewer.add_world`.
+    """A world that a viewer shows; returned by `WebViewer.add_world`.
 
     Attributes:
         index: Index of the world in the protocol.
-        name: Its name for users.
+        name: Name of the world for users.
     """
 
     index: int
@@ -47,10 +51,10 @@ class WorldHandle:
 
 
 class WebViewer:
-    """Shows worlds in browsers; the server runs in a thread of its own.
+    """Shows worlds in browsers; the server runs in a separate thread.
 
-    While nobody looks, nothing is computed. Clients that look receive a copy of the state that is
-    taken between two steps, at most 30 times per second of wall time.
+    Without clients, nothing is computed. With clients, the state of a world is copied between two
+    steps, at most 30 times per second of wall time.
     """
 
     def __init__(
@@ -61,16 +65,19 @@ class WebViewer:
         token: str | None = None,
         read_only: bool = False,
         title: str = "flatland",
+        embeddable: bool = False,
     ) -> None:
         """Creates a viewer that is not started.
 
         Args:
             host: Address to listen on; `0.0.0.0` for all addresses of the machine.
             port: TCP port; 0 for any free one.
-            token: What clients have to know. None for no token if `host` is an address of the
-                machine itself (loopback), else for a random one.
-            read_only: Whether clients may only look.
+            token: Token that clients must send. None for no token if `host` is a loopback address,
+                otherwise for a random token.
+            read_only: Whether to refuse all requests of clients that change a world.
             title: Title of the page.
+            embeddable: Whether pages of all other sites may show the page in a frame; otherwise
+                only pages of this machine, if `host` is a loopback address.
 
         Raises:
             ValueError: The port is out of range, or the token is empty.
@@ -81,26 +88,23 @@ class WebViewer:
             raise ValueError("token must not be empty")
         self._access = Access.for_host(host, token)
         self._port = port
+        self._embeddable = embeddable
         self._loop: asyncio.AbstractEventLoop | None = None
         self._before_start: list[Callable[[], object]] = []
         self._hub = Hub(title, read_only)
-        self._handles: dict[WorldHandle, tuple[World, _LayerObserver]] = {}
+        self._ids = itertools.count(1)  # of models, bodies and lasers of all worlds
+        self._shown: dict[WorldHandle, tuple[WorldFeed, WorldObserver]] = {}
         self._thread: threading.Thread | None = None
         self._stop = asyncio.Event()
         self._closed = False
         self._lock = threading.Lock()
 
     def __enter__(self) -> WebViewer:
-        """Starts the viewer, which is closed at the end of the block."""
+        """Starts the viewer; the end of the block closes the viewer."""
         self.start()
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *error: object) -> None:
         """Closes the viewer."""
         self.close()
 
@@ -116,7 +120,7 @@ class WebViewer:
 
     @property
     def token(self) -> str | None:
-        """What clients have to know, None if they need nothing."""
+        """Token that clients must send, None if no token is required."""
         return self._access.token
 
     # -- start and end ---------------------------------------------------------------------
@@ -163,7 +167,7 @@ class WebViewer:
                 return
             self._closed = True
             thread = self._thread
-        for handle in list(self._handles):
+        for handle in list(self._shown):
             self.remove_world(handle)
         if thread is None:
             return
@@ -182,19 +186,31 @@ class WebViewer:
             loop.close()
 
     async def _serve(self, listener: socket.socket) -> None:
-        application = Server(self._hub, self._access).application()
-        # Requests that are not HTTP are answered by status 400, and are not worth a log entry.
+        acceptor = Acceptor(listener)
+        server = Server(
+            self._hub, self._access, acceptor.received_request, embeddable=self._embeddable
+        )
+        # Requests that are not HTTP result in status 400, without a log entry.
         silent = logging.Logger("flatland.web", logging.CRITICAL)
-        runner = web.AppRunner(application, access_log=None, logger=silent, handle_signals=False)
+        runner = web.AppRunner(
+            server.application(),
+            access_log=None,
+            logger=silent,
+            handle_signals=False,
+            keepalive_timeout=_KEEP_ALIVE,
+        )
         await runner.setup()
-        await web.SockSite(runner, listener, shutdown_timeout=1.0).start()
-        watch = asyncio.create_task(self._hub.watch())
+        connections = cast("web.Server", runner.server)
+        acceptor.start(connections)
+        watch = asyncio.create_task(self._hub.commands.watch())
         try:
             await self._stop.wait()
             await self._hub.disconnect(WSCloseCode.GOING_AWAY, "the viewer ends")
         finally:
             watch.cancel()
+            acceptor.close()
             await self._hub.close()
+            await connections.shutdown(_SHUTDOWN_TIMEOUT)
             await runner.cleanup()
             rest = asyncio.all_tasks() - {asyncio.current_task()}
             for task in rest:
@@ -214,11 +230,12 @@ class WebViewer:
         """Shows a world; safe from any thread.
 
         Args:
-            world: The world. If it is closed, it is removed.
-            name: Name for users; by default that of its file, or of its folder for `world.yaml`.
+            world: The world; removed from the viewer when it is closed.
+            name: Name of the world for users; by default the name of the world file, or of the
+                folder of a file `world.yaml`.
             simulation: The simulation that steps the world, if there is one.
-            controller: Carries out what clients request; None for one that acts on the world and
-                the simulation.
+            controller: Performs the requests of clients; None for a controller that acts on the
+                world and the simulation.
 
         Returns:
             The handle for `remove_world`.
@@ -229,28 +246,32 @@ class WebViewer:
         world.check_open()
         name = name or _name_of(world.path)
         if controller is None:
-            controller = DefaultController(world, simulation)
+            controller = controller_of(world, simulation)
         with self._lock:
             if self._closed:
                 raise FlatlandError("the viewer is closed")
-            used = {handle.index for handle in self._handles}
+            used = {handle.index for handle in self._shown}
             index = next(n for n in range(len(used) + 1) if n not in used)
             handle = WorldHandle(index, name)
-            observer = _LayerObserver(self, handle)
-            self._handles[handle] = (world, observer)
-        self._call(lambda: self._hub.add(index, name, world, controller))
+            feed = WorldFeed(index, name, world, controller, self._ids)
+            observer = _FeedObserver(
+                layer_changed=lambda: self._call(feed.layers_changed),
+                detached=lambda: self.remove_world(handle),
+            )
+            self._shown[handle] = (feed, observer)
+        self._call(lambda: self._hub.add(feed))
         world.between_steps(lambda: world.add_observer(observer))
         return handle
 
     def remove_world(self, handle: WorldHandle) -> None:
         """Removes a world; further calls have no effect. Safe from any thread."""
         with self._lock:
-            found = self._handles.pop(handle, None)
+            found = self._shown.pop(handle, None)
         if found is None:
             return
-        world, observer = found
-        self._call(lambda: self._hub.remove(handle.index))
-        observer.active = False
+        feed, observer = found
+        world = feed.world
+        self._call(lambda: self._hub.remove(feed))
         if not world.closed:
             world.post(lambda: world.remove_observer(observer))
 
@@ -260,8 +281,8 @@ class WebViewer:
         """Shows lines that are not part of a world, such as goals; safe from any thread.
 
         Args:
-            handle: The world. If it was removed, the call has no effect.
-            name: Name for users; lines of the same name are replaced.
+            handle: The world; without effect if the world was removed.
+            name: Name of the lines for users; replaces lines of the same name.
             color: (r, g, b, a), each in [0, 1].
             edges: (x1, y1, x2, y2) in the world frame [m], shape (n, 4).
 
@@ -271,14 +292,15 @@ class WebViewer:
         lines = np.array(edges, np.float32)
         if lines.ndim != 2 or lines.shape[1] != 4:
             raise ValueError(f"edges must have the shape (n, 4), got {lines.shape}")
-        contents = LayerContents(name, tuple(map(float, color)), (0.0, 0.0, 0.0), lines)
-        self._call(lambda: self._hub.draw(handle.index, contents))
-
-    def _layers_changed(self, handle: WorldHandle) -> None:
-        self._call(lambda: self._hub.layers_changed(handle.index))
+        r, g, b, a = map(float, color)
+        description = LayerDescription(name, (r, g, b, a), IDENTITY, lines)
+        with self._lock:
+            shown = self._shown.get(handle)
+        if shown is not None:
+            self._call(lambda: shown[0].draw(description))
 
     def _call(self, action: Callable[[], object]) -> None:
-        """Calls a function in the thread of the loop, when it has started and has not ended."""
+        """Calls a function in the thread of the loop: after the start, and not after the end."""
         with self._lock:
             if self._loop is None:
                 self._before_start.append(action)
@@ -287,28 +309,24 @@ class WebViewer:
             self._loop.call_soon_threadsafe(action)
 
 
-class _LayerObserver(WorldObserver):
-    """Notifies a viewer of changed layers and of the end of a world; costs nothing in steps."""
+class _FeedObserver(WorldObserver):
+    """Calls functions when the layers of a world change, and at the end of the world."""
 
-    def __init__(self, viewer: WebViewer, handle: WorldHandle) -> None:
-        self._viewer = viewer
-        self._handle = handle
-        self.active = True
+    def __init__(self, layer_changed: Callable[[], None], detached: Callable[[], None]) -> None:
+        self._layer_changed = layer_changed
+        self._detached = detached
 
-    def layer_changed(self, layer_name: str) -> None:
-        """Has the layers copied again."""
-        del layer_name
-        if self.active:
-            self._viewer._layers_changed(self._handle)
+    def layer_changed(self, layer_name: str) -> None:  # noqa: ARG002
+        """Calls the first function."""
+        self._layer_changed()
 
     def detached(self) -> None:
-        """Removes the world."""
-        if self.active:
-            self._viewer.remove_world(self._handle)
+        """Calls the second function."""
+        self._detached()
 
 
 def _name_of(path: str) -> str:
-    """Returns the name of a world file for users."""
+    """Returns the name of a world for users, from the path of its file."""
     file = Path(path)
     is_plain = file.stem in ("", "world")
     return (file.absolute().parent.name if is_plain and path else file.stem) or "world"

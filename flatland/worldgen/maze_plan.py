@@ -27,7 +27,7 @@ def draw_maze(raster: Raster, _reach: Reach, radius: float, rng: np.random.Gener
     Args:
         raster: The plan.
         _reach: Not required: the passages are wide enough.
-        radius: Radius of the disc that reaches all of it [m].
+        radius: Radius of the disc that reaches all of the maze [m].
         rng: Random numbers.
     """
     raster.fill(Rect(0, 0, *raster.size), WALL)

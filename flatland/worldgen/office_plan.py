@@ -57,7 +57,7 @@ class _Row:
 
     Attributes:
         y_min: Lower end of the inner area [m].
-        y_max: Upper end of it [m].
+        y_max: Upper end of the inner area [m].
         wall: Lower end of the wall to the corridor [m].
         is_below: Whether the corridor is above the row.
     """
@@ -73,7 +73,7 @@ def draw_office(raster: Raster, reach: Reach, radius: float, rng: np.random.Gene
 
     Args:
         raster: The plan.
-        reach: Examines whether a disc reaches all of it.
+        reach: Examines whether a disc reaches all of the plan.
         radius: Radius of the disc [m].
         rng: Random numbers.
     """

@@ -5,7 +5,6 @@ from __future__ import annotations
 import importlib.resources
 import math
 import os
-import tempfile
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,8 +15,10 @@ import numpy as np
 from flatland.errors import WorldError
 from flatland.geometry import BoolArray, Pose
 from flatland.maps.occupancy_grid import FREE as FREE_CELL
-from flatland.maps.occupancy_grid import OCCUPIED, OccupancyGrid
+from flatland.maps.occupancy_grid import OCCUPIED
+from flatland.values import OccupancyGrid
 from flatland.worldgen import maze_plan, office_plan, warehouse_plan
+from flatland.worldgen.new_files import expand, grey_image, write_new
 from flatland.worldgen.raster import FREE, FURNITURE, Raster
 from flatland.worldgen.reach import Reach
 
@@ -105,20 +106,9 @@ class RandomWorld:
             "y": f"{self.start[1]:.3f}",
         }
         templates = importlib.resources.files("flatland.worldgen") / "templates"
-        texts = {
-            "world.yaml": templates / "world" / "world.yaml.in",
-            "map.yaml": templates / "world" / "map.yaml.in",
-            "robot.model.yaml": templates / "robot" / "__name__.model.yaml.in",
-        }
-        files = {}
-        for file, template in texts.items():
-            text = template.read_text(encoding="utf-8")
-            for key, value in values.items():
-                given = "robot" if file == "robot.model.yaml" and key == "name" else value
-                text = text.replace(f"@{key}@", given)
-            files[file] = text.encode()
-        files["map.pgm"] = self._image()
-        return files
+        files = expand(templates / "world", values) | expand(templates / "robot", {"name": "robot"})
+        kinds = np.where(self.grid.cells == FREE_CELL, 0, np.where(self.furniture, 2, 1))
+        return files | {"map.pgm": grey_image(_GREY[kinds[::-1]])}
 
     def write(self, folder: str | os.PathLike[str]) -> Path:
         """Writes the files into a new folder: all of them, or none.
@@ -138,21 +128,8 @@ class RandomWorld:
             raise WorldError(f"the folder {target} exists")
         if not target.parent.is_dir():
             raise WorldError(f"the folder {target.parent} does not exist")
-        # In a temporary folder first, so that nothing incomplete is left behind.
-        with tempfile.TemporaryDirectory(dir=target.parent, prefix=".flatland-new-") as temporary:
-            content = Path(temporary) / "content"
-            content.mkdir()
-            for name, data in self.files(target.name).items():
-                (content / name).write_bytes(data)
-            os.rename(content, target)  # noqa: PTH104
+        write_new(target, self.files(target.name))
         return target / "world.yaml"
-
-    def _image(self) -> bytes:
-        """Returns the map as a grey image (PGM), whose bytes depend on no library."""
-        values = np.where(self.grid.cells == FREE_CELL, 0, np.where(self.furniture, 2, 1))
-        rows, columns = values.shape
-        pixels: bytes = _GREY[values[::-1]].tobytes()
-        return b"P5\n%d %d\n255\n" % (columns, rows) + pixels
 
 
 def generate(

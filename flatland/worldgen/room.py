@@ -11,9 +11,7 @@ from flatland.worldgen.reach import Reach
 
 DOOR_DEPTH: Final = 1.0  # free space behind a door [m]
 _DOOR_SIDE: Final = 0.1  # free space beside a door [m]
-_PORCH: Final = (
-    1.0  # length of the free strip in front of a door from which the room is reached [m]
-)
+_PORCH: Final = 1.0  # length of the free strip in front of a door, outside the room [m]
 
 
 def narrowest_opening(radius: float, resolution: float) -> float:
@@ -28,7 +26,7 @@ class Room:
     inner corner (0, 0). The plan of the room may be mirrored.
 
     Attributes:
-        kind: What the room is, for example `meeting`.
+        kind: Use of the room, for example `meeting`.
         rect: Its inner area in the plan.
         width: Extent along u [m].
         depth: Extent along v [m].
@@ -49,12 +47,12 @@ class Room:
         """Creates a room without doors and furniture.
 
         Args:
-            kind: What the room is.
+            kind: Use of the room.
             rect: Its inner area in the plan [m].
             raster: The plan, in which walls and doors are drawn already.
             reach: Examines whether all of the room is reached.
             rng: Random numbers for the furniture.
-            front_is_north: Whether the front wall is that with the greatest y.
+            front_is_north: Whether the front wall is the wall with the greatest y.
             mirrored: Whether u runs against x.
         """
         self.kind, self.rect, self.rng = kind, rect, rng
@@ -87,17 +85,17 @@ class Room:
         self._kept_free.append(kept)
 
     def add(self, u: float, v: float, width: float, depth: float) -> bool:
-        """Places a rectangular object if there is room for it.
+        """Places a rectangular object if there is room.
 
         Args:
-            u: Its corner nearest to the origin [m].
-            v: The same along v [m].
+            u: Position along u of the corner nearest to the origin [m].
+            v: Position along v of this corner [m].
             width: Extent along u [m].
             depth: Extent along v [m].
 
         Returns:
-            Whether it was placed: it is inside the room, neither on other furniture nor in front of
-            a door, and all free places remain connected.
+            Whether the object was placed. It must be inside the room, neither on other furniture
+            nor in front of a door, and all free places must remain connected.
         """
         rect = self._to_plan(u, v, width, depth)
         return self._is_allowed(rect) and self._place(rect, None)

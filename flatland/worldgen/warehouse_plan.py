@@ -43,7 +43,7 @@ def draw_warehouse(raster: Raster, reach: Reach, radius: float, rng: np.random.G
 
     Args:
         raster: The plan.
-        reach: Examines whether a disc reaches all of it.
+        reach: Examines whether a disc reaches all of the plan.
         radius: Radius of the disc [m].
         rng: Random numbers.
     """
@@ -162,7 +162,7 @@ class _WarehousePlan:
             low = office.y_max + _TABLES
         elif office is not None:
             high = office.y_min - _TABLES
-        # Tables stand at the side walls that are not those of the office.
+        # Tables stand at the side walls without the office.
         if low == area.y_min and high - low > 2 * _DOCK_PITCH:
             low += _TABLES
             self._add_tables(Rect(area.x_min, area.y_min, area.x_max, low), at_north=False)
@@ -176,7 +176,7 @@ class _WarehousePlan:
             self._add_dock(Rect(area.x_min, y, area.x_max, y + pitch))
 
     def _add_dock(self, area: Rect) -> None:
-        """Adds a dock, and a lane of pallets, the goods of a lorry, behind it."""
+        """Adds a dock, and behind the dock a lane of pallets, the goods of a lorry."""
         rng = self._rng
         room = Room("dock", area, self._raster, self._reach, rng)
         middle = area.height / 2
@@ -198,7 +198,7 @@ class _WarehousePlan:
                 room.add(1.6 + number * 3.4, 0.0, *_TABLE)
 
     def _draw_office(self, area: Rect) -> Rect | None:
-        """Draws a small office in a corner; returns its area with walls, None if it is missing."""
+        """Draws a small office in a corner; returns its area with walls, None without an office."""
         raster, rng, snap = self._raster, self._rng, self._raster.snap
         if area.height < 14.0 or area.width < _OFFICE[0] + 3.5:
             return None

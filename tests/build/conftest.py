@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import shutil
-import subprocess
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
-from waiting import BUILD_TIMEOUT, TIMEOUT
+from programs import output_of
+from waiting import BUILD_TIMEOUT
 
 WORLD = """
 properties: {}
@@ -28,27 +28,6 @@ def clean_environment(home: Path) -> dict[str, str]:
     return {"HOME": str(home), "PATH": "/usr/bin:/bin", "LANG": "C.UTF-8"}
 
 
-def run(
-    command: Sequence[str | Path],
-    environment: dict[str, str],
-    folder: Path,
-    timeout: float = TIMEOUT,
-) -> str:
-    """Runs a command and returns its output; fails the test if the command fails."""
-    done = subprocess.run(
-        command,
-        env=environment,
-        cwd=folder,
-        timeout=timeout,
-        stdin=subprocess.DEVNULL,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.STDOUT,
-        text=True,
-    )
-    assert done.returncode == 0, f"{command} exited with {done.returncode}:\n{done.stdout}"
-    return done.stdout
-
-
 @dataclass(frozen=True)
 class Space:
     """The devel or the install space of the workspace.
@@ -65,9 +44,9 @@ class Space:
     environment: dict[str, str]
     scratch: Path
 
-    def run(self, *command: str | Path, timeout: float = TIMEOUT) -> str:
+    def run(self, *command: str | Path) -> str:
         """Runs a command in the environment of the space and returns its output."""
-        return run(command, self.environment, self.scratch, timeout)
+        return output_of(command, self.environment, self.scratch)
 
 
 @pytest.fixture(scope="session")
@@ -90,13 +69,13 @@ def catkin_workspace(tmp_path_factory: pytest.TempPathFactory, checkout: Path) -
     (workspace / "src" / "flatland").symlink_to(checkout)
     (workspace / "src" / "my_robots").symlink_to(checkout / "examples" / "my_robots")
     (workspace / "src" / "a_client").symlink_to(checkout / "tests" / "build" / "client")
-    # For a short build: messages for C++ and Python only, and less optimization. The installation
-    # by pip tests the default.
+    # For a short build: messages for C++ and Python only, and no optimization. The installation by
+    # pip tests the default.
     languages = {"ROS_LANG_DISABLE": "geneus:genlisp:gennodejs"}
     environment = clean_environment(workspace) | languages
-    fast = ["-DCMAKE_BUILD_TYPE=RelWithDebInfo", "-DCMAKE_CXX_FLAGS_RELWITHDEBINFO=-O1"]
-    run(["catkin_make", "-j2", *fast], environment, workspace, timeout=BUILD_TIMEOUT)
-    run(["catkin_make", "install", "-j2"], environment, workspace, timeout=BUILD_TIMEOUT)
+    fast = ["-DCMAKE_BUILD_TYPE=RelWithDebInfo", "-DCMAKE_CXX_FLAGS_RELWITHDEBINFO=-O0"]
+    output_of(["catkin_make", "-j2", *fast], environment, workspace, silence=BUILD_TIMEOUT)
+    output_of(["catkin_make", "install", "-j2"], environment, workspace, silence=BUILD_TIMEOUT)
     return workspace
 
 
@@ -108,7 +87,7 @@ def make_space(
 
     def enter(name: str) -> Space:
         scratch = tmp_path_factory.mktemp(name)
-        exported = run(
+        exported = output_of(
             ["bash", "-c", '. "$0" && env -0', catkin_workspace / name / "setup.bash"],
             clean_environment(scratch),
             scratch,

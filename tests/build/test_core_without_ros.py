@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import os
-import subprocess
 import sys
+
+from programs import run_program
 
 CHECK = """
 import importlib, pkgutil, sys
@@ -41,12 +42,6 @@ with flatland.World.from_yaml(sys.argv[1]) as world:
 
 def test_core_imports_and_steps_with_ros_blocked(world_file):
     environment = {name: v for name, v in os.environ.items() if not name.startswith("ROS_")}
-    done = subprocess.run(
-        [sys.executable, "-W", "error", "-c", CHECK, str(world_file)],
-        env=environment,
-        cwd=world_file.parent,
-        capture_output=True,
-        text=True,
-    )
-    assert done.returncode == 0, done.stderr
+    command = [sys.executable, "-W", "error", "-c", CHECK, world_file]
+    done = run_program(command, env=environment, cwd=world_file.parent, check=True)
     assert done.stdout == "steps: 10\n"

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import os
-import signal
 import socket
-import subprocess
 from pathlib import Path
 
 import pytest
-from waiting import BUILD_TIMEOUT, TIMEOUT
+from programs import Program, run_program
+from waiting import BUILD_TIMEOUT
 
 # The first test builds the workspace.
 pytestmark = pytest.mark.timeout(BUILD_TIMEOUT)
@@ -76,9 +74,7 @@ def test_a_clone_in_a_workspace_needs_nothing_else(catkin_workspace):
     linked = ["CMakeLists.txt", "a_client", "flatland", "my_robots"]
     assert sorted(path.name for path in source.iterdir()) == linked
     environment = {"PATH": "/usr/bin:/bin", "ROS_PACKAGE_PATH": str(source)}
-    listed = subprocess.run(
-        ["rospack", "list"], env=environment, capture_output=True, text=True, check=True
-    ).stdout.splitlines()
+    listed = run_program(["rospack", "list"], env=environment, check=True).stdout.splitlines()
     found = [line.split(" ", 1) for line in listed if f" {source}/" in line]
     assert sorted(found) == [
         ["a_client", f"{source}/a_client"],
@@ -93,26 +89,15 @@ def test_cpp_client_of_the_reference(space, room):
         free.bind(("127.0.0.1", 0))
         port = free.getsockname()[1]
     environment = {**space.environment, "ROS_MASTER_URI": f"http://127.0.0.1:{port}"}
-    log = space.scratch / f"{space.name}.log"
     command = ["roslaunch", "-p", str(port), "flatland_server", "server.launch"]
-    with log.open("w") as output:
-        launch = subprocess.Popen(
-            [*command, f"world_path:={room}", "show_viz:=true", "use_rviz:=true"],
-            env=environment,
-            cwd=space.scratch,
-            stdout=output,
-            stderr=subprocess.STDOUT,
-            start_new_session=True,
-        )
+    launch = Program(
+        [*command, f"world_path:={room}", "show_viz:=true", "use_rviz:=true"],
+        env=environment,
+        cwd=space.scratch,
+    )
     client = space.folder / "lib" / "a_client" / "a_client"
     try:
-        done = subprocess.run(
-            [client, room.with_name("crate.yaml")],
-            env=environment,
-            timeout=TIMEOUT,
-            capture_output=True,
-            text=True,
-        )
+        done = run_program([client, room.with_name("crate.yaml")], env=environment)
         types = space.run(
             "env",
             f"ROS_MASTER_URI={environment['ROS_MASTER_URI']}",
@@ -120,13 +105,11 @@ def test_cpp_client_of_the_reference(space, room):
             "type",
             "/spawn_model",
         )
-        os.kill(launch.pid, signal.SIGINT)
-        assert launch.wait(TIMEOUT) == 0, log.read_text()
+        assert launch.stop() == 0, launch.output
     finally:
-        if launch.poll() is None:
-            os.killpg(launch.pid, signal.SIGKILL)
+        launch.kill()
     # The lines of rosconsole start with the code of a colour.
     printed = [line for line in done.stdout.splitlines() if not line.startswith("\x1b")]
-    assert printed == RESULTS, done.stdout + done.stderr + log.read_text()
+    assert printed == RESULTS, done.stdout + done.stderr + launch.output
     assert done.returncode == 0
     assert types == "flatland_msgs/SpawnModel\n"

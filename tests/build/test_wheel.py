@@ -5,7 +5,7 @@ from __future__ import annotations
 import fcntl
 import subprocess
 import sys
-import tomllib
+import tarfile
 import xml.etree.ElementTree as ElementTree
 import zipfile
 from collections.abc import Iterator
@@ -13,6 +13,8 @@ from pathlib import Path
 
 import pytest
 from waiting import BUILD_TIMEOUT
+
+from flatland.version import VERSION
 
 pytestmark = pytest.mark.timeout(BUILD_TIMEOUT)
 
@@ -58,7 +60,7 @@ def test_package_contains_sources_and_built_files_only(wheel, checkout):
     modules = {"flatland/msg/__init__.py", "flatland/srv/__init__.py"}
     assert {"flatland/py.typed", "flatland/_core.pyi"} <= sources
     (extension,) = names - sources - messages - services - modules
-    assert extension.startswith("flatland/_core.cpython-311")
+    assert extension.startswith(f"flatland/_core.{sys.implementation.cache_tag}-")
     assert sources | messages | services | modules <= names
 
 
@@ -114,8 +116,25 @@ def test_each_script_is_an_entry_point(wheel, checkout):
         assert info.external_attr >> 16 & 0o111, "roslaunch finds executable files only"
 
 
-def test_versions_agree(checkout):
-    project = tomllib.loads((checkout / "pyproject.toml").read_text())["project"]
+def test_versions_agree(wheel, checkout):
+    """flatland/version.py is the source of the version; manifests of ROS contain copies."""
     packages = [*checkout.glob("catkin/*/package.xml"), *checkout.glob("compat/*/package.xml")]
     versions = [ElementTree.parse(path).getroot().findtext("version") for path in packages]
-    assert versions == [project["version"]] * 5
+    assert versions == [VERSION] * 5
+    assert f"flatland_sim-{VERSION}.dist-info/METADATA" in wheel.namelist()
+
+
+def test_source_distribution(tmp_path, checkout):
+    """It contains what the wheel is built from; files behind links of catkin/ occur once."""
+    backend = "import scikit_build_core.build as b, sys; print(b.build_sdist(sys.argv[1]))"
+    subprocess.run([sys.executable, "-c", backend, tmp_path], cwd=checkout, check=True)
+    [path] = tmp_path.iterdir()
+    assert path.name == f"flatland_sim-{VERSION}.tar.gz"
+    with tarfile.open(path) as archive:
+        names = {name.split("/", 1)[1] for name in archive.getnames()}
+    folders = ("cmake/", "compat/", "flatland/", "launch/", "msg/", "rviz/", "scripts/")
+    needed = {n for n in source_files(checkout) if n.startswith((*folders, "src/", "srv/"))}
+    assert {n for n in needed if not (checkout / n).is_dir()} <= names
+    assert {"CMakeLists.txt", "LICENSE", "pyproject.toml", "catkin/flatland/package.xml"} <= names
+    assert not [n for n in names if n.endswith(".so") or n.startswith(("tests/", "docs/images/"))]
+    assert len([n for n in names if n.startswith("catkin/")]) == 1

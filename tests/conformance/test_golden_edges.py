@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
+from flatland.config.inputs import Inputs
 from flatland.maps.map_file import load_map
 
 
@@ -30,6 +31,6 @@ def undirected(edges: npt.ArrayLike) -> npt.NDArray[np.float64]:
 def test_edges_match_the_trace(golden_dir: Path, layer: str, map_file: str) -> None:
     trace = json.loads((golden_dir / "free.trace.json").read_text())
     expected = {entry["name"]: entry["edges"] for entry in trace["layers"]}[layer]
-    layer_map = load_map(str(golden_dir / map_file), layer)
+    layer_map = load_map(str(golden_dir / map_file), layer, inputs=Inputs())
     assert layer_map.edges.shape == (len(expected), 4)
     np.testing.assert_allclose(undirected(layer_map.edges), undirected(expected), rtol=0, atol=1e-5)

@@ -2,18 +2,13 @@
 
 from __future__ import annotations
 
-import contextlib
-import os
-import re
-import signal
 import socket
-import subprocess
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 
 import pytest
-from waiting import TIMEOUT, wait_until
+from programs import Program
 
 import flatland
 
@@ -24,76 +19,6 @@ def free_port() -> int:
         probe.bind(("127.0.0.1", 0))
         port: int = probe.getsockname()[1]
         return port
-
-
-def run(
-    command: Sequence[str | Path],
-    environment: Mapping[str, str],
-    folder: Path,
-    timeout: float = TIMEOUT,
-) -> str:
-    """Runs a command and returns its output; the test fails if the command fails."""
-    done = subprocess.run(
-        command,
-        env=environment,
-        cwd=folder,
-        timeout=timeout,
-        stdin=subprocess.DEVNULL,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.STDOUT,
-        text=True,
-    )
-    assert done.returncode == 0, f"{command} exited with {done.returncode}:\n{done.stdout}"
-    return done.stdout
-
-
-class Background:
-    """A program that runs concurrently with the test, such as roslaunch."""
-
-    def __init__(
-        self, command: Sequence[str | Path], environment: Mapping[str, str], folder: Path, log: Path
-    ) -> None:
-        self._log = log
-        with log.open("w") as output:
-            self._process = subprocess.Popen(
-                command,
-                env=environment,
-                cwd=folder,
-                stdin=subprocess.DEVNULL,
-                stdout=output,
-                stderr=subprocess.STDOUT,
-                start_new_session=True,
-            )
-
-    @property
-    def output(self) -> str:
-        """The output so far."""
-        return self._log.read_text(errors="replace")
-
-    def wait_for(self, pattern: str, timeout: float = TIMEOUT) -> None:
-        """Waits until the output matches a pattern."""
-
-        def printed() -> bool:
-            # Checked first, because the output is complete once the program has ended.
-            ended = self._process.poll() is not None
-            found = re.search(pattern, self.output) is not None
-            if ended and not found:
-                pytest.fail(f"ended without {pattern!r}:\n{self.output}")
-            return found
-
-        wait_until(f"output with {pattern!r}", printed, timeout, poll_period=0.05)
-
-    def stop(self) -> None:
-        """Stops the program as Ctrl-C does."""
-        if self._process.poll() is None:
-            os.killpg(self._process.pid, signal.SIGINT)
-            try:
-                self._process.wait(TIMEOUT)
-            except subprocess.TimeoutExpired:
-                with contextlib.suppress(ProcessLookupError):
-                    os.killpg(self._process.pid, signal.SIGKILL)
-                self._process.wait()
-                pytest.fail(f"did not stop on SIGINT:\n{self.output}")
 
 
 @pytest.fixture(scope="session")
@@ -145,26 +70,19 @@ def environment(
 
 
 @pytest.fixture
-def start(tmp_path: Path) -> Iterator[Callable[..., Background]]:
+def start(tmp_path: Path) -> Iterator[Callable[..., Program]]:
     """Starts programs, which are stopped at the end of the test."""
-    started: list[Background] = []
+    started: list[Program] = []
 
     def start_program(
         command: Sequence[str | Path], environment: Mapping[str, str], folder: Path = tmp_path
-    ) -> Background:
-        log = tmp_path / f"background{len(started)}.log"
-        started.append(Background(command, environment, folder, log))
+    ) -> Program:
+        started.append(Program(command, env=environment, cwd=folder))
         return started[-1]
 
     yield start_program
     for program in reversed(started):
         program.stop()
-
-
-@pytest.fixture(scope="session")
-def run_command() -> Callable[..., str]:
-    """Runs a command, as `run_command(command, environment, folder, timeout=...)`."""
-    return run
 
 
 @pytest.fixture

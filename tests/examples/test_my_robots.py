@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-import subprocess
 import sys
 from textwrap import dedent
 
 import pytest
+from programs import output_of, run_program
 
 
-def test_the_test_of_the_package_passes_without_ros(example, environment, tmp_path, run_command):
+def test_the_test_of_the_package_passes_without_ros(example, environment, tmp_path):
     """Importing a ROS module fails."""
     blocked = tmp_path / "blocked"
     blocked.mkdir()
@@ -17,7 +17,7 @@ def test_the_test_of_the_package_passes_without_ros(example, environment, tmp_pa
         (blocked / f"{module}.py").write_text(f"raise RuntimeError('{module} was imported')")
     environment["PYTHONPATH"] = f"{blocked}:{environment['PYTHONPATH']}"
     del environment["ROS_PACKAGE_PATH"]
-    printed = run_command(
+    printed = output_of(
         [sys.executable, "-W", "error", "-m", "unittest", "discover", "-s", str(example / "test")],
         environment,
         tmp_path,
@@ -27,14 +27,7 @@ def test_the_test_of_the_package_passes_without_ros(example, environment, tmp_pa
 
 def test_flatland_does_not_contain_the_package(environment, tmp_path):
     code = "import flatland, importlib.util as u; print(u.find_spec('my_robots'))"
-    done = subprocess.run(
-        [sys.executable, "-c", code],
-        env=environment,
-        cwd=tmp_path,
-        capture_output=True,
-        text=True,
-        check=True,
-    )
+    done = run_program([sys.executable, "-c", code], env=environment, cwd=tmp_path, check=True)
     assert done.stdout.strip() == "None"
 
 
@@ -94,20 +87,18 @@ LISTEN = dedent(
     assert rospy.ServiceProxy("/delete_model", DeleteModel)("cart").success
     answer = rospy.ServiceProxy("/reset_models", Trigger)()
     assert (answer.success, answer.message) == (True, "moved: "), answer
-    topics = dict(rospy.get_published_topics())
-    assert "/battery" not in topics, topics
+    while "/battery" in dict(rospy.get_published_topics()):  # the node unregisters it later
+        time.sleep(0.01)
     print("all checks passed")
     """
 )
 
 
 @pytest.mark.ros
-def test_on_ros_the_package_is_found_on_the_package_path(
-    example, environment, tmp_path, start, run_command
-):
+def test_on_ros_the_package_is_found_on_the_package_path(example, environment, tmp_path, start):
     pytest.importorskip("rospy", reason="ROS is not installed")
     environment["ROS_PACKAGE_PATH"] += f":{example}"
-    packages = run_command(
+    packages = output_of(
         ["rospack", "plugins", "--attrib=plugin", "flatland"], environment, tmp_path
     )
     assert f"my_robots {example}/flatland_plugins.xml" in packages.splitlines()
@@ -116,10 +107,12 @@ def test_on_ros_the_package_is_found_on_the_package_path(
         ["roslaunch", "flatland", "server.launch", f"world_path:={world}", "show_viz:=false"],
         environment,
     )
-    server.wait_for('loaded ".*world.yaml"')
-    printed = run_command([sys.executable, "-c", LISTEN], environment, tmp_path)
+    server.wait_for_line('loaded ".*world.yaml"')
+    printed = output_of([sys.executable, "-c", LISTEN], environment, tmp_path)
     assert printed.endswith("all checks passed\n")
     assert "Traceback" not in server.output
-    assert "WARN" not in server.output
+    warnings = [line for line in server.output.splitlines() if "WARN" in line]
+    # A busy machine does not hold the rate.
+    assert [line for line in warnings if "cannot be held" not in line] == []
     server.stop()
     assert "killing on exit" in server.output

@@ -15,7 +15,7 @@ from typing import Any
 
 import pytest
 import yaml
-from waiting import TIMEOUT
+from programs import output_of, run_program
 
 import flatland
 
@@ -80,13 +80,10 @@ def resolve(new_environment: Any, package: Path, tmp_path_factory: Any) -> Calla
 
     def run(*launches: str) -> list[tuple[dict[str, Any], dict[str, Any]]]:
         files = [shlex.split(launch) for launch in launches]
-        done = subprocess.run(
+        done = run_program(
             [sys.executable, "-c", RESOLVE],
             env=shell,
             input=json.dumps([[f"{package}/launch/{name}", *more] for name, *more in files]),
-            capture_output=True,
-            text=True,
-            timeout=TIMEOUT,
         )
         assert done.returncode == 0, done.stderr
         return json.loads(done.stdout[done.stdout.index("JSON") + 4 :])
@@ -114,11 +111,11 @@ def test_the_launch_files_start_the_nodes(resolve):
 
 
 @pytest.mark.ros
-def test_the_package_is_found_by_roslaunch(shell, run_command, tmp_path):
+def test_the_package_is_found_by_roslaunch(shell, tmp_path):
     command = ["roslaunch", "flatland_navigation", "navigation.launch", "--nodes"]
-    assert "/move_base" in run_command(command, shell, tmp_path).split()
+    assert "/move_base" in output_of(command, shell, tmp_path).split()
     command = ["rosrun", "flatland_navigation", "tour.py", "--help"]
-    assert "--ground-truth" in run_command(command, shell, tmp_path)
+    assert "--ground-truth" in output_of(command, shell, tmp_path)
 
 
 @pytest.mark.ros
@@ -274,10 +271,13 @@ OBSERVE = dedent(
     while rospy.wait_for_message("/scan", LaserScan).header.stamp.to_sec() < later.to_sec() + 0.2:
         pass  # several periods of all transforms
     master = rosgraph.Master("/observer")
-    subscribers = master.getSystemState()[1]
+    subscribed = []
+    while "/cmd_vel" not in subscribed:  # the node registers asynchronously
+        subscribers = master.getSystemState()[1]
+        subscribed = [topic for topic, nodes in subscribers if "/flatland_server" in nodes]
+        time.sleep(0.01)
     print("JSON" + json.dumps({
         "types": dict(master.getTopicTypes()),
-        "subscribed": [topic for topic, nodes in subscribers if "/flatland_server" in nodes],
         "parents": parents,
         "scan": scan.header.frame_id,
         "odom": [odom.header.frame_id, odom.child_frame_id],
@@ -289,19 +289,18 @@ OBSERVE = dedent(
 
 @pytest.mark.ros
 def test_the_simulator_provides_the_frames_and_topics_of_all_nodes(
-    package, shell, params, start, run_command, tmp_path
+    package, shell, params, start, tmp_path
 ):
     launch = package / "launch" / "components" / "simulator.launch"
     server = start(["roslaunch", launch, "rviz:=false"], shell)
-    server.wait_for('loaded ".*world.yaml"')
-    printed = run_command([sys.executable, "-c", OBSERVE], shell, tmp_path)
+    server.wait_for_line('loaded ".*world.yaml"')
+    printed = output_of([sys.executable, "-c", OBSERVE], shell, tmp_path)
     seen = json.loads(printed[printed.index("JSON") + 4 :])
 
     # What amcl, the SLAM nodes and move_base subscribe to by the default arguments.
     assert seen["types"]["/scan"] == "sensor_msgs/LaserScan"
     assert seen["types"]["/odometry/filtered"] == "nav_msgs/Odometry"
     assert seen["types"]["/clock"] == "rosgraph_msgs/Clock"
-    assert "/cmd_vel" in seen["subscribed"]
     frames = [params[f"/amcl/{frame}_frame_id"] for frame in ("global", "odom", "base")]
     assert seen["odom"] == frames[1:]
     assert seen["truth"] == [frames[0], frames[2]]
@@ -400,12 +399,8 @@ def tour_of(shell, package, tmp_path) -> Callable[..., subprocess.CompletedProce
 
     def drive(text: str, *options: str) -> subprocess.CompletedProcess[str]:
         (tmp_path / "tour.yaml").write_text(text)
-        return subprocess.run(
-            [package / "scripts" / "tour.py", tmp_path / "tour.yaml", *options],
-            env=shell,
-            capture_output=True,
-            text=True,
-            timeout=TIMEOUT,
+        return run_program(
+            [package / "scripts" / "tour.py", tmp_path / "tour.yaml", *options], env=shell
         )
 
     return drive
@@ -416,9 +411,8 @@ def test_a_tour_reports_times_and_errors(checkout, shell, start, tour_of):
     world = checkout / "worlds" / "simple" / "world.yaml"
     launch = ["roslaunch", "flatland", "server.launch", f"world_path:={world}", "show_viz:=false"]
     server = start([*launch, "update_rate:=1000"], shell)
-    server.wait_for('loaded ".*world.yaml"')
+    server.wait_for_line('loaded ".*world.yaml"')
     driver = start([sys.executable, "-c", DRIVER], shell)
-    driver.wait_for("")
     done = tour_of(TOUR, "--base-frame", "estimate")
     assert done.returncode == 1, done.stderr
     rows = {

@@ -13,10 +13,10 @@ PAGES = ["lockstep.md", "moving_over.md", "several_robots.md"]
 @pytest.mark.ros
 @pytest.mark.parametrize("page", PAGES)
 def test_the_commands_of_a_page_print_the_documented_output(
-    page, checkout, environment, tmp_path, run_command, start
+    page, checkout, environment, tmp_path, start
 ):
     if shutil.which("roslaunch", path=environment["PATH"]) is None:
         pytest.skip("roslaunch is not installed")
     blocks = read_page(checkout / "docs" / page)
     assert {block.kind for block in blocks} >= {"file", "run", "prints"}
-    follow(blocks, Shell(environment, tmp_path, run_command), start)
+    follow(blocks, Shell(environment, tmp_path), start)

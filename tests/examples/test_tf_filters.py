@@ -7,12 +7,12 @@ from __future__ import annotations
 
 import re
 import shlex
-import subprocess
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import pytest
+from programs import run_program
 from waiting import BUILD_TIMEOUT
 
 DURATION = 8.0  # simulated time [s]
@@ -32,11 +32,9 @@ def build(folder: Path) -> Path:
     """Compiles the program that counts scans."""
     source = Path(__file__).parent / "tf_filter" / "tf_filter.cpp"
     program = folder / "tf_filter"
-    flags = subprocess.run(
-        ["pkg-config", "--cflags", "--libs", *PACKAGES], check=True, capture_output=True, text=True
-    ).stdout
+    flags = run_program(["pkg-config", "--cflags", "--libs", *PACKAGES], check=True).stdout
     command = ["g++", "-std=c++17", "-w", str(source), "-o", str(program), *shlex.split(flags)]
-    subprocess.run(command, check=True, timeout=BUILD_TIMEOUT)
+    run_program(command, check=True, silence=BUILD_TIMEOUT)
     return program
 
 
@@ -54,14 +52,14 @@ def test_no_scan_is_dropped_at_any_speed(
         master = {**environment, "ROS_MASTER_URI": f"http://127.0.0.1:{unused_port()}"}
         launch = ["roslaunch", "flatland", "server.launch", "show_viz:=false"]
         server = start([*launch, f"update_rate:={rate}"], master)
-        server.wait_for('loaded ".*world.yaml"')
+        server.wait_for_line('loaded ".*world.yaml"')
         counters = [
             start([program, str(DURATION), topic, *frames], master) for topic, frames, _ in LASERS
         ]
         started[speed] = server, counters
     for speed, (server, counters) in started.items():
         for (topic, _, period), counter in zip(LASERS, counters, strict=True):
-            counter.wait_for(RESULT.pattern, FRAME_TIMEOUT)
+            counter.wait_for_line(RESULT.pattern, FRAME_TIMEOUT)
             check(f"{topic}, {speed}", counter.output, SPEEDS[speed], period)
         server.stop()
 

@@ -19,11 +19,14 @@ with atheris.instrument_imports(
 ):
     from fuzz_targets import TARGETS
 
+    from flatland.maps import grey_image
+
 
 def main() -> None:
     """Runs the target until the limit of time, or the first finding."""
     name, *options = sys.argv[1:]
     logging.disable()
+    grey_image.MAX_PIXELS = 2**24  # A header of a few bytes can claim an image of 1 GB.
     atheris.Setup([sys.argv[0], *options], TARGETS[name])
     atheris.Fuzz()
 

@@ -28,6 +28,7 @@ from flatland_sweep.measurements import Measurements
 from flatland_sweep.planner import PlanningError, plan_path
 from flatland_sweep.results import Results, read_results
 from flatland_sweep.summary import summarize, wilson_interval
+from pages import code_blocks
 from waiting import TIMEOUT, wait_until
 
 import flatland
@@ -776,7 +777,7 @@ def test_the_commands_of_the_page_are_valid(monkeypatch):
 
 
 def test_the_controller_of_the_page_reaches_goals(tmp_path):
-    (code,) = re.findall(r"```python\n(import math.*?)```", PAGE.read_text(), re.DOTALL)
+    (code,) = (b for b in code_blocks(PAGE.read_text(), "python") if b.startswith("import math"))
     (tmp_path / "careful.py").write_text(code)
     rows = [
         run_cell(Cell(WORLD, "careful.py:Careful", seed), Settings(), str(tmp_path))
@@ -792,7 +793,8 @@ def test_the_page_describes_all_columns():
 
 def test_the_environment_of_the_program_for_rllib_can_be_created():
     page = SCRIPT.parents[2] / "docs" / "learning.md"
-    (program,) = re.findall(r"```python\n(import ray\n.*?)```", page.read_text(), re.DOTALL)
+    blocks = code_blocks(page.read_text(), "python")
+    (program,) = (block for block in blocks if block.startswith("import ray\n"))
     (function,) = [node for node in ast.parse(program).body if isinstance(node, ast.FunctionDef)]
     names: dict[str, Any] = {}
     exec(compile(ast.Module([function], []), page.name, "exec"), names)

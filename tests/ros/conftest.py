@@ -9,14 +9,13 @@ import queue
 import re
 import signal
 import socket
-import subprocess
 import sys
-import threading
 import time
 import warnings
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
+from xmlrpc.client import ServerProxy
 
 import pytest
 
@@ -26,11 +25,12 @@ pytest.importorskip("flatland.msg", reason="the messages are not built")
 import rosgraph
 import roslib.packages
 import rospy
+from programs import Program
 from roscpp.srv import SetLoggerLevel
 from waiting import TIMEOUT, wait_until
 
 import flatland
-from flatland.srv import DeleteModel, MoveModel, SpawnModel
+from flatland.srv import DeleteModel, MoveModel, ResetWorld, SpawnModel, StepWorld, WaitUntilReady
 
 MAP = "type: line_segments\ndata: walls.dat\nscale: 1.0\norigin: [0, 0, 0]\n"
 WALLS = "-5 -5 5 -5\n5 -5 5 5\n5 5 -5 5\n-5 5 -5 -5\n"  # a room of 10 m by 10 m around (0, 0)
@@ -59,96 +59,6 @@ def _collect_garbage() -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         gc.collect()
-
-
-class Process:
-    """A running program and the lines that it has printed."""
-
-    def __init__(self, command: list[str], environment: Mapping[str, str]) -> None:
-        self.lines: list[str] = []
-        self._changed = threading.Condition()
-        self._popen = subprocess.Popen(
-            command,
-            env=environment,
-            stdin=subprocess.DEVNULL,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.STDOUT,
-            text=True,
-            start_new_session=True,
-        )
-        self._reader = threading.Thread(target=self._read, daemon=True)
-        self._reader.start()
-
-    def _read(self) -> None:
-        assert self._popen.stdout is not None
-        for line in self._popen.stdout:
-            with self._changed:
-                self.lines.append(re.sub(r"\x1b\[[0-9;]*m", "", line.rstrip("\n")))
-                self._changed.notify_all()
-        self._popen.stdout.close()
-        with self._changed:
-            self._changed.notify_all()
-
-    @property
-    def output(self) -> str:
-        """The text printed so far."""
-        with self._changed:
-            return "\n".join(self.lines)
-
-    @property
-    def running(self) -> bool:
-        """Whether the program has not ended."""
-        return self._popen.poll() is None
-
-    def wait_for_line(self, pattern: str, timeout: float = TIMEOUT) -> re.Match[str]:
-        """Waits for a line that matches a pattern."""
-        end = time.monotonic() + timeout
-        seen = 0
-        with self._changed:
-            while True:
-                for line in self.lines[seen:]:
-                    match = re.search(pattern, line)
-                    if match:
-                        return match
-                seen = len(self.lines)
-                left = end - time.monotonic()
-                ended = not self._reader.is_alive()
-                if left <= 0 or ended:
-                    break
-                self._changed.wait(min(left, 0.5))
-        pytest.fail(f"no line with {pattern!r} in:\n{self.output}")
-
-    @property
-    def children(self) -> list[int]:
-        """Process ids of the children of the program."""
-        pid = self._popen.pid
-        return list(map(int, Path(f"/proc/{pid}/task/{pid}/children").read_text().split()))
-
-    def send(self, number: signal.Signals) -> None:
-        """Sends a signal."""
-        self._popen.send_signal(number)
-
-    def wait(self, timeout: float = TIMEOUT) -> int:
-        """Waits until the program ends and returns its exit code."""
-        try:
-            code = self._popen.wait(timeout)
-        except subprocess.TimeoutExpired:
-            self.kill()
-            pytest.fail(f"still running after {timeout} s:\n{self.output}")
-        self._reader.join(TIMEOUT)
-        return code
-
-    def stop(self) -> int:
-        """Stops the program with SIGINT and returns its exit code."""
-        if self.running:
-            self.send(signal.SIGINT)
-        return self.wait()
-
-    def kill(self) -> None:
-        """Kills the program and its children."""
-        with contextlib.suppress(ProcessLookupError):
-            os.killpg(self._popen.pid, signal.SIGKILL)
-        self._popen.wait()
 
 
 # s; until a publisher is advertised again. A subscriber may miss a publisher of this process that
@@ -270,23 +180,63 @@ class Ros:
 
         return self.call("/move_model", MoveModel, name, Pose2D(*pose))
 
+    def step(self, duration: float = 0.0) -> int:
+        """Calls /step_world for a time [s], by default one step; returns the new time [ns]."""
+        answer = self.call("/step_world", StepWorld, duration)
+        assert answer.success, answer.message
+        return int(answer.stamp.to_nsec())
+
     def log_everything(self, node: str = "/flatland_server") -> None:
         """Makes a node log messages of all levels."""
         self.call(f"{node}/set_logger_level", SetLoggerLevel, "rosout", "debug")
 
-    def registered(self, node: str = "/flatland_server") -> dict[str, set[str]]:
-        """Returns the publishers, subscribers and services that a node has registered.
+    def wait_until_ready(self, *topics: str, node: str = "/flatland_server") -> None:
+        """Waits until a node has registered everything, and topics of it are connected."""
+        name = rosgraph.names.namespace(node) + "wait_until_ready"
+        answer = self.call(name, WaitUntilReady, topics, TIMEOUT)
+        assert answer.success, answer.message
 
-        Without those of the interactive markers, the pause state and the diagnostics, which every
-        node registers some time after its start.
+    def ready_topic(self, name: str, message_type: type[Any]) -> Topic:
+        """Subscribes as `topic`; the node sends all messages from its next step on."""
+        topic = self.topic(name, message_type)
+        self.wait_until_ready(name)
+        return topic
+
+    def step_until(self, what: str, condition: Callable[[], Any], duration: float = 0.1) -> Any:
+        """Steps until the node has received what this process has published."""
+        return wait_until(what, lambda: self.step(duration) and condition())
+
+    def reset(self) -> None:
+        """Calls /reset_world with the same seed."""
+        answer = self.call("/reset_world", ResetWorld, False, -1)
+        assert (answer.success, answer.message) == (True, "")
+
+    def registered(self, node: str = "/flatland_server") -> dict[str, set[str]]:
+        """Returns what a running node has registered, once nothing is being registered.
+
+        Without the interactive markers, the pause state and the diagnostics of each node.
         """
-        late = re.compile(rf"/interactive_model_markers/|^{node}/paused$|^/diagnostics$")
+        self.wait_until_ready(node=node)
+        of_each_node = re.compile(rf"/interactive_model_markers/|^{node}/paused$|^/diagnostics$")
+        return {
+            kind: {name for name in names if not of_each_node.search(name)}
+            for kind, names in self.registered_now(node).items()
+        }
+
+    def registered_now(self, node: str = "/flatland_server") -> dict[str, set[str]]:
+        """Returns the publishers, subscribers and services that a node has registered."""
         state = self.master.getSystemState()
         kinds = ("publishers", "subscribers", "services")
         return {
-            kind: {name for name, nodes in entries if node in nodes and not late.search(name)}
+            kind: {name for name, nodes in entries if node in nodes}
             for kind, entries in zip(kinds, state, strict=True)
         }
+
+    def connected_topics(self, node: str = "/flatland_server") -> set[str]:
+        """Returns the topics of a node that have a connection."""
+        api = ServerProxy(self.master.lookupNode(node))
+        _, _, connections = api.getBusInfo("/flatland_tests")
+        return {topic for _, _, _, _, topic, *_ in connections}
 
     def types(self) -> dict[str, str]:
         """Returns the message type of each topic."""
@@ -349,7 +299,7 @@ def _overlay(checkout: Path, folder: Path) -> Path:
 def ros_master(ros_environment: dict[str, str]) -> Iterator[dict[str, str]]:
     """A running roscore with this process as a node; yields the environment."""
     port = ros_environment["ROS_MASTER_URI"].rsplit(":", 1)[1]
-    core = Process(["roscore", "-p", port], ros_environment)
+    core = Program(["roscore", "-p", port], env=ros_environment)
     names = [name for name in ros_environment if name.startswith("ROS_")]
     os.environ.update({name: ros_environment[name] for name in names})
     try:
@@ -402,30 +352,32 @@ class Launcher:
     def __init__(self, environment: dict[str, str], server: str) -> None:
         self.environment = environment
         self._server = server
-        self._processes: list[Process] = []
+        self._processes: list[Program] = []
 
-    def program(self, *command: str, **environment: str) -> Process:
+    def program(self, *command: str, **environment: str) -> Program:
         """Starts a program."""
-        process = Process(list(command), {**self.environment, **environment})
+        process = Program(command, env={**self.environment, **environment})
         self._processes.append(process)
         return process
 
-    def start(self, *arguments: str, **parameters: object) -> Process:
+    def start(self, *arguments: str, **parameters: object) -> Program:
         """Starts a server with private parameters, without waiting for it."""
         clear = rosgraph.Master("/flatland_tests")
         for node in ("/flatland_server", "/flatland_benchmark"):
             with contextlib.suppress(rosgraph.MasterException):
                 clear.deleteParam(node)
+        # On a busy machine, a node may need longer than its default to end.
+        parameters = {"shutdown_timeout": TIMEOUT, **parameters}
         given = [f"_{name}:={value}" for name, value in parameters.items()]
         return self.program(self._server, *arguments, *given)
 
-    def server(self, world: Path, *arguments: str, **parameters: object) -> Process:
-        """Starts a server and waits for its services."""
+    def server(self, world: Path, *arguments: str, **parameters: object) -> Program:
+        """Starts a server and waits until it has opened all its topics and services."""
         process = self.start(*arguments, world_path=world, **parameters)
-        wait_for_services(process)
+        wait_until_server_is_ready(process)
         return process
 
-    def launch(self, *arguments: str) -> Process:
+    def launch(self, *arguments: str) -> Program:
         """Starts roslaunch."""
         return self.program("roslaunch", *arguments)
 
@@ -436,22 +388,26 @@ class Launcher:
                 process.send(signal.SIGINT)
         for process in self._processes:
             process.wait()
+            # Part of the report of a test that fails.
+            print(f"{process}\n{process.output}")
         self._processes.clear()
 
 
-def wait_for_services(process: Process, name: str = "/toggle_pause") -> None:
-    """Waits for the services of a server; by default, for the one that is advertised last."""
-    master = rosgraph.Master("/flatland_tests")
+def wait_until_server_is_ready(process: Program) -> None:
+    """Waits until a server has opened all its topics and services."""
 
     def ready() -> bool:
         if not process.running:
             process.wait()
             pytest.fail(f"the server ended:\n{process.output}")
-        with contextlib.suppress(rosgraph.MasterError):
-            return bool(master.lookupService(name))
+        # The service may be that of an earlier server, which has ended without unregistering it.
+        with contextlib.suppress(rospy.ServiceException):
+            return bool(
+                rospy.ServiceProxy("/wait_until_ready", WaitUntilReady)([], TIMEOUT).success
+            )
         return False
 
-    wait_until(f"service {name}", ready)
+    wait_until("a server that is ready", ready)
 
 
 @pytest.fixture

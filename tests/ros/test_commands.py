@@ -11,76 +11,84 @@ import pytest
 from geometry_msgs.msg import Twist, Vector3
 from nav_msgs.msg import Odometry
 from rosgraph_msgs.msg import Log
+from waiting import wait_until
+
+PERIOD = 0.02  # s, of the odometry
 
 
 @pytest.fixture(scope="module", autouse=True)
 def server(module_launcher: Any, write_world: Callable[..., Path]) -> Any:
     world = write_world("[{name: robot, model: robot.model.yaml, namespace: r1}]")
-    return module_launcher.server(world, update_rate=1000)
+    return module_launcher.server(world, lockstep=True)
 
 
-@pytest.fixture(autouse=True)
-def start_at_origin(ros: Any) -> None:
-    publisher = ros.publisher("/r1/cmd_vel", Twist)
-    publisher.publish(Twist())
-    odometry = ros.topic("/r1/odometry/ground_truth", Odometry)
-    odometry.until(lambda m: m.twist.twist.linear.x == 0 and m.twist.twist.angular.z == 0)
-    ros.move("robot", (0, 0, 0))
-    odometry.until(lambda m: abs(m.pose.pose.position.x) + abs(m.pose.pose.position.y) < 1e-5)
+@pytest.fixture(scope="module")
+def commands(server: Any, module_ros: Any) -> Any:
+    """A publisher shared by all tests, as advertising takes long."""
+    del server
+    return module_ros.publisher("/r1/cmd_vel", Twist)
+
+
+@pytest.fixture
+def robot(ros: Any) -> Any:
+    """Returns the next odometry, after a step to its time; at first, the robot is at the origin."""
+    ros.reset()
+    odometry = ros.ready_topic("/r1/odometry/ground_truth", Odometry)
+
+    def advance() -> Any:
+        ros.step(PERIOD)
+        return odometry.next()
+
+    return advance
 
 
 def twist(linear: float, angular: float) -> Twist:
     return Twist(Vector3(linear, 0, 0), Vector3(0, 0, angular))
 
 
-def test_robot_follows_the_command(ros: Any) -> None:
-    odometry = ros.topic("/r1/odometry/ground_truth", Odometry)
-    ros.publisher("/r1/cmd_vel", Twist).publish(twist(0.5, 0.25))
-    first = odometry.until(lambda m: m.twist.twist.linear.x > 0)
+def test_robot_follows_the_command(commands: Any, robot: Any) -> None:
+    def moving() -> Any:
+        message = robot()
+        return message if message.twist.twist.linear.x > 0 else None
+
+    commands.publish(twist(0.5, 0.25))
+    first = wait_until("a moving robot", moving)
     assert first.twist.twist.linear.x == pytest.approx(0.5, abs=1e-4)
     assert first.twist.twist.angular.z == pytest.approx(0.25, abs=1e-4)
-    last = odometry.until(lambda m: m.header.stamp.to_sec() > first.header.stamp.to_sec() + 2)
+    for _ in range(100):
+        last = robot()
+    # After 2 s, on a circle of radius 0.5 / 0.25 around (0, 2).
     position = last.pose.pose.position
-    # The robot drives in a circle of radius 0.5 / 0.25 around (0, 2).
     assert math.hypot(position.x, position.y - 2) == pytest.approx(2, abs=0.02)
     assert position.x > 0.5
 
 
-def test_last_command_is_in_effect(ros: Any) -> None:
-    odometry = ros.topic("/r1/odometry/ground_truth", Odometry)
-    publisher = ros.publisher("/r1/cmd_vel", Twist)
-    for i in range(100):
-        publisher.publish(twist(0, i))
-    publisher.publish(twist(0, -0.5))
-    odometry.until(lambda m: m.twist.twist.angular.z == pytest.approx(-0.5, abs=1e-4))
-    rates = [message.twist.twist.angular.z for message in odometry.take(5)]
-    assert rates == pytest.approx([-0.5] * 5, abs=1e-4)
-
-
 @pytest.mark.parametrize("bad", [math.nan, math.inf])
-def test_command_that_is_not_finite_is_ignored(ros: Any, bad: float) -> None:
-    odometry = ros.topic("/r1/odometry/ground_truth", Odometry)
-    publisher = ros.publisher("/r1/cmd_vel", Twist)
-    publisher.publish(twist(0.1, 0))
-    odometry.until(lambda m: m.twist.twist.linear.x > 0.05)
-    publisher.publish(twist(bad, 0))
-    publisher.publish(twist(0, bad))
-    velocities = [message.twist.twist.linear.x for message in odometry.take(10)]
-    assert velocities == pytest.approx([0.1] * 10, abs=1e-4)
+def test_a_command_that_is_not_finite_is_ignored(commands: Any, robot: Any, bad: float) -> None:
+    velocities: list[float] = []
+
+    def velocity() -> float:
+        velocities.append(robot().twist.twist.linear.x)
+        return velocities[-1]
+
+    commands.publish(twist(0.1, 0))
+    wait_until("the first command", lambda: velocity() > 0.05)
+    commands.publish(twist(bad, 0))
+    commands.publish(twist(0, bad))
+    commands.publish(twist(0.2, 0))
+    wait_until("the last command", lambda: velocity() > 0.15)
+    assert sorted({round(each, 3) for each in velocities} - {0.0}) == [0.1, 0.2]
 
 
-def test_ignored_command_gives_a_warning_on_rosout(
-    ros: Any, server: Any, eventually: Callable[..., Any]
-) -> None:
+def test_ignored_command_gives_a_warning_on_rosout(ros: Any, commands: Any, server: Any) -> None:
     log = ros.topic("/rosout", Log)
-    publisher = ros.publisher("/r1/cmd_vel", Twist)
 
     def warning_of_the_command() -> Log | None:
-        publisher.publish(twist(math.nan, 0))  # the warning is logged at most once a second
+        commands.publish(twist(math.nan, 0))  # the warning is logged at most once a second
         messages = log.rest(silence=0.1)
         return next((m for m in messages if "previous command remains" in m.msg), None)
 
-    warning = eventually("a warning on /rosout", warning_of_the_command)
+    warning = wait_until("a warning on /rosout", warning_of_the_command)
     server.wait_for_line(r"\[WARN\].*previous command remains in effect")
     assert warning.level == Log.WARN
     assert warning.name == "/flatland_server"

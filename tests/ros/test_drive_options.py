@@ -27,18 +27,22 @@ plugins:
 """
 
 
+PERIOD = 0.02  # s, of all messages
+
+
 @pytest.fixture(scope="module")
 def robot(module_launcher: Any, module_ros: Any, write_world: Callable[..., Path]) -> Any:
     """The node with a tricycle; returns its command."""
     models = "[{name: robot, model: robot.model.yaml}]"
-    module_launcher.server(write_world(models, robot=ROBOT), seed=1)
+    module_launcher.server(write_world(models, robot=ROBOT), lockstep=True, seed=1)
     return module_ros.publisher("/cmd_vel", Twist)
 
 
 def test_the_tree_of_frames_is_complete(robot: Any, ros: Any) -> None:
     del robot
-    transforms = ros.topic("/tf", TFMessage)
+    transforms = ros.ready_topic("/tf", TFMessage)
     parents: dict[str, str] = {}
+    ros.step(0.1)
 
     def complete(message: Any) -> bool:
         parents.update({t.child_frame_id: t.header.frame_id for t in message.transforms})
@@ -51,7 +55,8 @@ def test_the_tree_of_frames_is_complete(robot: Any, ros: Any) -> None:
 
 def test_scans_have_transforms_of_their_time(robot: Any, ros: Any) -> None:
     del robot
-    transforms, scans = ros.topic("/tf", TFMessage), ros.topic("/scan", LaserScan)
+    transforms, scans = ros.ready_topic("/tf", TFMessage), ros.ready_topic("/scan", LaserScan)
+    ros.step(0.1)
     for scan in scans.take(5):
         stamp = scan.header.stamp
         message = transforms.until(lambda m, due=stamp: m.transforms[0].header.stamp >= due)
@@ -64,15 +69,25 @@ def test_scans_have_transforms_of_their_time(robot: Any, ros: Any) -> None:
 
 def test_a_planner_commands_speed_and_yaw_rate(robot: Any, ros: Any) -> None:
     truths, odometry = (
-        ros.topic(f"/odometry/{name}", Odometry) for name in ("ground_truth", "filtered")
+        ros.ready_topic(f"/odometry/{name}", Odometry) for name in ("ground_truth", "filtered")
     )
     command = Twist()
     command.linear.x, command.angular.z = 0.3, -0.4
     robot.publish(command)
-    truth = truths.until(lambda m: abs(m.twist.twist.angular.z + 0.4) < 0.01).twist.twist
+
+    def turning() -> Any:
+        velocity = truths.next().twist.twist
+        return velocity if abs(velocity.angular.z + 0.4) < 0.01 else None
+
+    truth = ros.step_until("the yaw rate", turning, PERIOD)
     # At the front wheel, 1 m before the rear axle.
     assert (truth.linear.x, truth.linear.y) == pytest.approx((0.3, -0.4), abs=0.01)
-    drifted = odometry.until(lambda m: m.pose.covariance[35] > 0.001)
-    assert drifted.header.frame_id == "odom"
-    assert min(drifted.pose.covariance[i] for i in (0, 7, 35)) > 0
-    assert min(drifted.twist.covariance[i] for i in (0, 7, 35)) > 0
+
+    def drifted() -> Any:
+        message = odometry.next()
+        return message if message.pose.covariance[35] > 0.001 else None
+
+    message = ros.step_until("a drift", drifted, PERIOD)
+    assert message.header.frame_id == "odom"
+    assert min(message.pose.covariance[i] for i in (0, 7, 35)) > 0
+    assert min(message.twist.covariance[i] for i in (0, 7, 35)) > 0

@@ -43,7 +43,7 @@ def world(write_world: Callable[..., Path]) -> Path:
 @pytest.fixture(scope="module", autouse=True)
 def server(module_launcher: Any, module_ros: Any, world: Path) -> Any:
     """One server for most tests of this file; the scans of both robots have a subscriber."""
-    process = module_launcher.server(world, seed=1)
+    process = module_launcher.server(world, seed=1, update_rate=20)
     for robot in ("lost", "found"):
         module_ros.topic(f"/{robot}/scan", LaserScan)
     return process
@@ -104,28 +104,6 @@ def test_map_is_latched_and_created_once(ros: Any, server: Any) -> None:
     assert 'publishing layer "low" as a map of 3 x 2 cells of 0.5 m' in lines[0]
 
 
-@pytest.mark.parametrize(
-    ("layer", "reason"),
-    [
-        (
-            "roof",
-            'Invalid parameter "~publish_map": it must be the name of a layer '
-            "(2d, grey, low, empty), got 'roof'",
-        ),
-        ("empty", 'layer "empty" has no walls and therefore no map'),
-    ],
-)
-def test_an_invalid_layer_is_reported_in_one_fatal_line(
-    launcher: Any, world: Path, layer: str, reason: str
-) -> None:
-    # With another name, so that it does not replace the server of this file.
-    process = launcher.start("__name:=other", world_path=world, publish_map=layer)
-    assert process.wait() == 1
-    (line,) = [line for line in process.lines if "[FATAL]" in line]
-    assert reason in line
-    assert "Traceback" not in process.output
-
-
 def test_a_laser_without_a_path_to_the_world_causes_one_warning(server: Any) -> None:
     server.wait_for_line(
         r'\[WARN\].*Model Plugin "eye" type "Laser" model "lost": no TF path leads from frame '
@@ -133,31 +111,3 @@ def test_a_laser_without_a_path_to_the_world_causes_one_warning(server: Any) -> 
         r'"lost_base"\).*Remedy: enable_odom_tf_pub'
     )
     assert sum("no TF path" in line for line in server.lines) == 1
-
-
-class TestParameters:
-    """Other servers replace the one of this file from here on."""
-
-    def test_a_layer_of_line_segments(
-        self, launcher: Any, ros: Any, world: Path, server: Any
-    ) -> None:
-        server.stop()
-        launcher.server(world, publish_map="2d", map_resolution=0.5, map_frame="/arena")
-        grid = ros.call("/static_map", GetMap).map
-        assert grid.header.frame_id == "arena"
-        assert (grid.info.width, grid.info.height, grid.info.resolution) == (21, 21, 0.5)
-        assert (grid.info.origin.position.x, grid.info.origin.position.y) == (-5, -5)
-        assert grid.info.origin.orientation.w == 1
-        cells = np.array(grid.data).reshape(21, 21)
-        assert (cells[[0, -1]] == 100).all()
-        assert (cells[:, [0, -1]] == 100).all()
-        assert (cells[1:-1, 1:-1] == 0).all()
-
-    def test_false_overrides_the_world_file(
-        self, launcher: Any, ros: Any, world: Path, server: Any
-    ) -> None:
-        server.stop()
-        launcher.server(world, publish_map="false")
-        registered = ros.registered()
-        assert "/map" not in registered["publishers"]
-        assert "/static_map" not in registered["services"]

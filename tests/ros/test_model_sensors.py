@@ -19,7 +19,6 @@ from std_msgs.msg import Bool
 from tf2_msgs.msg import TFMessage
 
 from flatland.msg import SemanticScan
-from flatland.srv import StepWorld
 
 START, SPEED = -3.0, 0.5  # m, m/s; the nearest wall ahead is at 5 m
 SONAR, ARM = 0.3, 0.4  # m; distances from the centre of the shuttle
@@ -85,18 +84,15 @@ def server(module_launcher: Any, write_world: Callable[..., Path]) -> Any:
     return module_launcher.server(world, lockstep=True, seed=7)
 
 
-def step(ros: Any, duration: float) -> None:
-    answer = ros.call("/step_world", StepWorld, duration)
-    assert answer.success, answer.message
-
-
 @pytest.fixture(scope="module")
 def messages(module_ros: Any, server: Any) -> dict[str, Any]:
     """The second message on each topic, and all of /tf; subscribed before the first step."""
-    topics = {name: module_ros.topic(name, kind) for name, kind in TOPICS.items()}
-    step(module_ros, 0.405)
+    topics = {name: module_ros.ready_topic(name, kind) for name, kind in TOPICS.items()}
+    module_ros.step(0.405)
     found = {name: topic.take(2)[-1] for name, topic in topics.items() if name != "/tf"}
-    found["/tf"] = [each for message in topics["/tf"].rest() for each in message.transforms]
+    transforms = found["/tf"] = []
+    while not transforms or transforms[-1].header.stamp.to_sec() < 0.4:
+        transforms += topics["/tf"].next().transforms
     return found
 
 
@@ -183,15 +179,14 @@ def test_hitched(messages: dict[str, Any]) -> None:
 
 def test_odometry_of_an_omni_drive(ros: Any) -> None:
     """The wheels limit (0.5, 0.5, 0) to the half: that at the front right would have 1 m/s."""
-    truth = ros.topic("/o/odometry/ground_truth", Odometry)
+    truth = ros.ready_topic("/o/odometry/ground_truth", Odometry)
     ros.publisher("/o/cmd_vel", Twist).publish(Twist(Vector3(1.0, 1.0, 0), Vector3()))
-    for _ in range(100):
-        step(ros, 0.05)
+
+    def moving() -> Any:
         message = truth.next()
-        if message.twist.twist.linear.y:
-            break
-    else:
-        pytest.fail("the robot does not move")
+        return message if message.twist.twist.linear.y else None
+
+    message = ros.step_until("a moving robot", moving, 0.05)
     velocity = message.twist.twist
     expected = (0.5, 0.5, 0)
     found = (velocity.linear.x, velocity.linear.y, velocity.angular.z)

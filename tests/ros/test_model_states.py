@@ -9,18 +9,10 @@ from typing import Any
 import pytest
 from geometry_msgs.msg import Pose2D, Twist
 from nav_msgs.msg import Odometry
-from raw_subscriber import RawSubscriber
 from std_srvs.srv import Empty
 
 from flatland.msg import ModelPose, ModelSpec, ModelStates
-from flatland.srv import (
-    DeleteModels,
-    GetModelStates,
-    MoveModels,
-    ResetWorld,
-    SpawnModels,
-    StepWorld,
-)
+from flatland.srv import DeleteModels, GetModelStates, MoveModels, SpawnModels
 
 STEP_NS = 5_000_000
 MODELS = """
@@ -41,13 +33,7 @@ def server(module_launcher: Any, world: Path) -> Any:
 
 @pytest.fixture(autouse=True)
 def fresh_world(ros: Any) -> None:
-    assert ros.call("/reset_world", ResetWorld, False, -1).success
-
-
-def step(ros: Any, duration: float = 0.0) -> int:
-    answer = ros.call("/step_world", StepWorld, duration)
-    assert answer.success, answer.message
-    return int(answer.stamp.to_nsec())
+    ros.reset()
 
 
 def states(ros: Any, *names: str) -> Any:
@@ -66,19 +52,17 @@ def test_states_of_all_models(ros: Any) -> None:
 
 
 def test_states_of_a_moving_model(ros: Any) -> None:
-    commands = ros.publisher("/first/cmd_vel", Twist)
-    truth = ros.topic("/first/odometry/ground_truth", Odometry)
+    truth = ros.ready_topic("/first/odometry/ground_truth", Odometry)
     command = Twist()
     command.linear.x, command.angular.z = 0.5, 0.25
-    while states(ros, "first").twist[0].angular.z == 0:
-        commands.publish(command)
-        now = step(ros, 0.1)
+    ros.publisher("/first/cmd_vel", Twist).publish(command)
+    ros.step_until("a moving robot", lambda: states(ros, "first").twist[0].angular.z)
     got = states(ros, "first")
-    assert got.header.stamp.to_nsec() == now
+    now = got.header.stamp
     # The ground truth of the next step is that of its start.
-    truth.drop()
-    step(ros)
-    odometry = truth.until(lambda m: m.header.stamp.to_nsec() == now)
+    ros.step()
+    odometry = truth.until(lambda message: message.header.stamp >= now)
+    assert odometry.header.stamp == now
     position = odometry.pose.pose.position
     assert (got.pose[0].x, got.pose[0].y) == (position.x, position.y)
     twist = got.twist[0]
@@ -113,45 +97,33 @@ def test_states_can_be_sent_back(ros: Any) -> None:
 
 
 def test_topic_equals_the_service_at_its_rate(ros: Any) -> None:
-    raw = RawSubscriber(ros.master, "/model_states", ModelStates)
-    first = raw.next()  # without a step
-    assert first.name == ["first", "ball"]
-    step(ros, 0.1)
-    raw.received()
+    topic = ros.ready_topic("/model_states", ModelStates)
+    first = topic.next()  # without a step
+    assert (first.name, first.header.stamp.to_nsec()) == (["first", "ball"], 0)
     # At 50 Hz, every fourth step of 5 ms, with the time after the step.
-    step(ros, 0.1)
-    received = raw.received()
-    assert len(received) == 5
+    end = ros.step(0.1)
+    received = topic.take(5)
     times = [message.header.stamp.to_nsec() for message in received]
-    assert times == list(range(times[0], times[0] + 5 * 4 * STEP_NS, 4 * STEP_NS))
-    while raw.received() == []:
-        step(ros)
-    step(ros, 0.02)
-    (last,) = raw.received()
+    assert times == list(range(4 * STEP_NS, end + 1, 4 * STEP_NS))
     expected = states(ros)
-    last.header.seq = expected.header.seq = 0
-    assert last == expected
-    raw.close()
+    received[-1].header.seq = expected.header.seq = 0
+    assert received[-1] == expected
 
 
 def test_changes_of_a_paused_world_are_published_once(ros: Any) -> None:
     ros.call("/pause", Empty)
-    topic = ros.topic("/model_states", ModelStates)
+    topic = ros.ready_topic("/model_states", ModelStates)
     topic.next()
-    topic.rest()
     models = [ModelSpec("ball.model.yaml", f"b{i}", "", Pose2D(i, 0, 0)) for i in range(3)]
     assert ros.call("/spawn_models", SpawnModels, models).success
-    (message,) = topic.rest()
-    assert message.name == ["first", "ball", "b0", "b1", "b2"]
+    assert topic.next().name == ["first", "ball", "b0", "b1", "b2"]
     moves = [ModelPose("b0", Pose2D(0, 1, 0)), ModelPose("b1", Pose2D(1, 1, 0))]
     assert ros.call("/move_models", MoveModels, moves).success
-    (message,) = topic.rest()
-    assert message.pose[2] == Pose2D(0, 1, 0)
+    assert topic.next().pose[2] == Pose2D(0, 1, 0)
     assert ros.call("/delete_models", DeleteModels, ["ball", "b1"]).success
-    (message,) = topic.rest()
-    assert message.name == ["first", "b0", "b2"]
-    assert ros.call("/reset_world", ResetWorld, False, -1).success
-    assert topic.rest()[-1].name == ["first", "ball"]
+    assert topic.next().name == ["first", "b0", "b2"]
+    ros.reset()
+    assert topic.next().name == ["first", "ball"]
     ros.call("/resume", Empty)
 
 
@@ -168,15 +140,3 @@ def test_a_world_without_models(ros: Any) -> None:
     message = topic.until(lambda message: message.name == [])
     assert (message.pose, message.twist) == ([], [])
     assert states(ros).name == []
-
-
-def test_one_message_per_step(launcher: Any, ros: Any, world: Path, server: Any) -> None:
-    server.stop()
-    launcher.server(world, lockstep=True, model_states_rate=0)
-    raw = RawSubscriber(ros.master, "/model_states", ModelStates)
-    raw.next()
-    step(ros, 0.1)
-    raw.received()
-    step(ros, 0.1)
-    assert len(raw.received()) == 20
-    raw.close()

@@ -77,27 +77,3 @@ def test_node_in_a_group(
     # `param()` resolves relative names in the namespace of the node.
     truth = ros.topic("/robots/odometry/ground_truth", Odometry).next()
     assert truth.pose.pose.position.x == pytest.approx(2.5, abs=1e-4)
-
-
-@pytest.mark.parametrize("namespace", ["my robot", "1robot", "robot-1", "ro//bot-1", "~robot"])
-def test_world_with_an_illegal_namespace_does_not_start(
-    launcher: Any, write_world: Callable[..., Path], namespace: str
-) -> None:
-    world = write_world(f"[{{name: robot, model: robot.model.yaml, namespace: '{namespace}'}}]")
-    process = launcher.start(world_path=world)
-    assert process.wait() == 1
-    (line,) = [line for line in process.lines if "[FATAL]" in line]
-    assert f'namespace "{namespace}" is not a legal ROS name' in line
-
-
-def test_topic_of_the_node_itself_with_another_type_is_refused(
-    launcher: Any, write_world: Callable[..., Path]
-) -> None:
-    world = write_world(
-        "[{name: robot, model: clock.model.yaml}]",
-        clock=GLOBAL.replace("/odom,", "/clock,"),
-    )
-    process = launcher.start(world_path=world)
-    assert process.wait() == 1
-    (line,) = [line for line in process.lines if "[FATAL]" in line]
-    assert 'publisher "/clock" has the type rosgraph_msgs/Clock already' in line

@@ -9,7 +9,6 @@ from __future__ import annotations
 import importlib
 import math
 import os
-import subprocess
 import sys
 from collections.abc import Callable, Iterator
 from itertools import pairwise
@@ -17,9 +16,10 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from programs import run_program
 
 from flatland.msg import PeopleStates
-from flatland.srv import GetModelStates, StepWorld
+from flatland.srv import GetModelStates
 
 DEFINITIONS = {
     "people_msgs": {
@@ -60,7 +60,7 @@ def packages(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
         for other in ("std_msgs", "geometry_msgs"):
             include.append(f"-I{other}:/usr/share/{other}/msg")
         generate = ["/usr/bin/python3", "-E", "/usr/lib/genpy/genmsg_py.py"]
-        subprocess.run([*generate, "-p", package, "-o", output, *include, *files], check=True)
+        run_program([*generate, "-p", package, "-o", output, *include, *files], check=True)
         (output / "__init__.py").write_text("".join(f"from ._{n} import *\n" for n in definitions))
         (folder / package / "__init__.py").touch()
     sys.path.append(str(folder))
@@ -82,16 +82,12 @@ def server(packages: Path, module_launcher: Any, write_world: Callable[..., Path
     return module_launcher.server(world, lockstep=True, seed=1, show_viz=False)
 
 
-def step(ros: Any, duration: float) -> None:
-    answer = ros.call("/step_world", StepWorld, duration)
-    assert answer.success, answer.message
-
-
 def test_tracked_people_are_those_of_the_states(ros: Any) -> None:
     messages = importlib.import_module("people_msgs.msg")
     tracked = ros.topic("/people/tracked", messages.People)
     states = ros.topic("/people/states", PeopleStates)
-    step(ros, 1.0)
+    ros.wait_until_ready("/people/tracked", "/people/states")
+    ros.step(1.0)
     expected = states.next()
     message = tracked.until(lambda people: people.header.stamp == expected.header.stamp)
     assert message.header.frame_id == "map"
@@ -115,7 +111,7 @@ def test_a_car_is_driven_within_the_limits_of_a_message(ros: Any) -> None:
     ros.publisher("/ackermann_cmd", messages.AckermannDriveStamped).publish(command)
     twists = []
     while len(twists) < 6:
-        step(ros, 0.1)
+        ros.step(0.1)
         answer = ros.call("/get_model_states", GetModelStates, ["car"])
         assert answer.success, answer.message
         [twist] = answer.states.twist

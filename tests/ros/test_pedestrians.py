@@ -10,6 +10,7 @@ from typing import Any
 import pytest
 from geometry_msgs.msg import Pose2D, PoseArray
 from visualization_msgs.msg import Marker, MarkerArray
+from waiting import wait_until
 
 from flatland.msg import PeopleStates
 from flatland.srv import DeleteModel, DirectPeople, RemovePeople, ResetWorld, SpawnPeople
@@ -23,7 +24,17 @@ GROUPS = (
 @pytest.fixture(scope="module", autouse=True)
 def server(module_launcher: Any, write_world: Callable[..., Path]) -> Any:
     plugins = f"[{{name: people, type: Pedestrians, groups: {GROUPS}}}]"
-    return module_launcher.server(write_world(plugins=plugins))
+    return module_launcher.server(write_world(plugins=plugins), lockstep=True, seed=1)
+
+
+def step_until(ros: Any, topic: Any, accept: Callable[[Any], bool]) -> Any:
+    """Makes steps until a message is accepted, and returns it."""
+
+    def accepted() -> list[Any]:
+        ros.step(0.1)
+        return [message for message in topic.rest(0) if accept(message)]
+
+    return wait_until(f"a message on {topic.name}", accepted)[0]
 
 
 def states(ros: Any) -> Any:
@@ -31,15 +42,19 @@ def states(ros: Any) -> Any:
 
 
 def test_the_topics_carry_the_same_people(ros: Any) -> None:
-    topic = states(ros)
-    people = topic.next()
+    topic, poses_topic = states(ros), ros.topic("/people", PoseArray)
+    ros.wait_until_ready("/people/states", "/people")
+    ros.step(0.1)
+    people, poses = topic.next(), poses_topic.next()
     assert people.name == ["a_0", "a_1"]
     assert people.group == ["a", "a"]
     assert people.header.frame_id == "map"
-    poses = ros.topic("/people", PoseArray).next()
-    assert poses.header.frame_id == "map"
-    assert len(poses.poses) == len(people.pose) == len(people.twist) == len(people.standing) == 2
-    topic.until(lambda moving: moving.twist[0].linear.x > 0.3)
+    assert poses.header == people.header
+    assert [(pose.position.x, pose.position.y) for pose in poses.poses] == [
+        (pose.x, pose.y) for pose in people.pose
+    ]
+    assert len(people.twist) == len(people.standing) == 2
+    step_until(ros, topic, lambda moving: moving.twist[0].linear.x > 0.3)
 
 
 def test_people_are_spawned_directed_and_removed(ros: Any) -> None:
@@ -56,22 +71,24 @@ def test_people_are_spawned_directed_and_removed(ros: Any) -> None:
         return math.hypot(pose.x - 2, pose.y + 2) < 0.4
 
     topic = states(ros)
-    topic.until(has_arrived)
+    step_until(ros, topic, has_arrived)
     assert ros.call("/delete_model", DeleteModel, "b_1").success
     removed = ros.call("/remove_people", RemovePeople, ["b_0", "b_2"])
     assert (removed.success, removed.message) == (True, "")
-    topic.until(lambda people: people.name == ["a_0", "a_1"])
+    step_until(ros, topic, lambda people: people.name == ["a_0", "a_1"])
 
 
 def test_markers_show_bodies_velocities_and_names(ros: Any) -> None:
     answer = ros.call("/spawn_people", SpawnPeople, "b", 0, [Pose2D(0, -2, 0), Pose2D(1, -2, 0)])
     assert answer.success
-    topic = ros.topic("/people/markers", MarkerArray)
+    people_topic, topic = states(ros), ros.topic("/people/markers", MarkerArray)
+    ros.wait_until_ready("/people/states", "/people/markers")
+    ros.step(0.2)
     first = topic.next().markers
     assert first[0].action == Marker.DELETEALL
     shown = {(marker.ns, marker.id): marker for marker in first[1:]}
     assert len(shown) == len(first) - 1
-    people = states(ros).next()
+    people = people_topic.next()
     assert [len(shown["people", group].points) for group in (0, 1)] == [2, 2]
     bodies = shown["people", 1]
     assert (bodies.type, bodies.header.frame_id) == (Marker.SPHERE_LIST, "map")
@@ -82,17 +99,17 @@ def test_markers_show_bodies_velocities_and_names(ros: Any) -> None:
     assert set(names) == set(people.name)
     lines = shown["velocities", 0].points
     assert len(lines) == 8
-    topic.until(lambda array: _speed_of_first(array) > 0.3)
+    step_until(ros, topic, lambda array: _speed_of_first(array) > 0.3)
     assert ros.call("/remove_people", RemovePeople, answer.names).success
 
     def is_removal(array: Any) -> bool:
         deleted = {(m.ns, m.id) for m in array.markers if m.action == Marker.DELETE}
         return deleted == {("people", 1), *(("names", names[n].id) for n in answer.names)}
 
-    removed = topic.until(is_removal)
+    removed = step_until(ros, topic, is_removal)
     assert len([m for m in removed.markers if m.ns == "names" and m.action == Marker.ADD]) == 2
     assert ros.call("/reset_world", ResetWorld, False, -1).success
-    topic.until(lambda array: array.markers[0].action == Marker.DELETEALL)
+    step_until(ros, topic, lambda array: array.markers[0].action == Marker.DELETEALL)
 
 
 def _speed_of_first(array: Any) -> float:
@@ -112,4 +129,7 @@ def test_failed_calls_report_a_reason_and_change_nothing(ros: Any) -> None:
     assert (answer.success, "nobody" in answer.message) == (False, True)
     answer = ros.call("/direct_people", DirectPeople, ["a_0"], 7, Pose2D())
     assert "action must be from 0 to 2" in answer.message
-    assert states(ros).next().name == ["a_0", "a_1"]
+    people = states(ros)
+    ros.wait_until_ready("/people/states")
+    ros.step(0.1)
+    assert people.next().name == ["a_0", "a_1"]

@@ -83,7 +83,7 @@ class Journal(flatland.ModelPlugin):
 
     def on_shutdown(self):
         self.record("on_shutdown")
-        print("journal at the end:", self.names(), flush=True)
+        print(f"journal of {self.model.name} at the end:", self.names(), flush=True)
 
     def names(self):
         rows = self.database.execute("SELECT DISTINCT name FROM calls ORDER BY name")
@@ -102,8 +102,8 @@ plugins: [{type: "test::Journal", name: journal}]
 """
 
 
-@pytest.fixture
-def server(launcher: Any, write_world: Callable[..., Path]) -> Any:
+@pytest.fixture(scope="module")
+def server(module_launcher: Any, write_world: Callable[..., Path]) -> Any:
     """A server with a plugin of each class; `loaded` touches `ball`."""
     world = write_world(
         "[{name: loaded, model: journal.model.yaml, namespace: loaded},"
@@ -120,18 +120,22 @@ def server(launcher: Any, write_world: Callable[..., Path]) -> Any:
     )
     manifest = world.parent / "manifest.xml"
     manifest.write_text(f'<library path=".">{classes}</library>')
-    launcher.environment = {**launcher.environment, "FLATLAND_PLUGIN_PATH": str(manifest)}
-    return launcher.server(world, plugin_timeout=30)
+    module_launcher.environment = {
+        **module_launcher.environment,
+        "FLATLAND_PLUGIN_PATH": str(manifest),
+    }
+    return module_launcher.server(world)
 
 
-@pytest.mark.parametrize("origin", ["world file", "service"])
+@pytest.mark.parametrize("spawned", [False, True])
 def test_all_code_of_a_plugin_runs_in_one_thread(
-    ros: Any, server: Any, eventually: Callable[..., Any], origin: str
+    ros: Any, server: Any, eventually: Callable[..., Any], spawned: bool
 ) -> None:
     name = "loaded"
-    if origin == "service":
+    if spawned:
         name = "spawned"
-        answer = ros.spawn("journal.model.yaml", name, name, (-0.3, 0, 0))
+        assert ros.move("ball", (0.3, 0, 0)).success
+        answer = ros.spawn("journal.model.yaml", name, name)
         assert answer.success, answer.message
     notes = ros.publisher(f"/{name}/note", String)
     speeds = ros.publisher(f"/{name}/speed", Twist)
@@ -150,9 +154,8 @@ def test_all_code_of_a_plugin_runs_in_one_thread(
     assert ros.move(name, (-3, -3, 0)).success
     eventually("end of the contact", lambda: "end_contact" in recorded())
     assert ros.delete(name).success
-    server.wait_for_line("journal at the end: .* on_shutdown")
-    assert server.stop() == 0
-    assert "Traceback" not in server.output
+    server.wait_for_line(f"journal of {name} at the end: .* on_shutdown")
+    assert "ProgrammingError" not in server.output
 
 
 def test_exception_of_an_adapter_does_not_disable_the_sensor(ros: Any, server: Any) -> None:

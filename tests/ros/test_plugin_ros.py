@@ -175,7 +175,7 @@ def test_latched_message_of_on_initialize_holds_a_parameter(ros: Any, talker: No
 
 def test_callback_runs_in_the_thread_that_steps_the_world(ros: Any, talker: None) -> None:
     del talker
-    echo = ros.topic("/t1/echo", String)
+    echo = ros.ready_topic("/t1/echo", String)
     ros.publisher("/t1/listen", String).publish(String("hi"))
     assert echo.next().data == "hi True"
 
@@ -184,7 +184,7 @@ def test_callback_that_raises_is_logged_and_called_again(
     ros: Any, talker: None, server: Any
 ) -> None:
     del talker
-    echo = ros.topic("/t1/echo", String)
+    echo = ros.ready_topic("/t1/echo", String)
     publisher = ros.publisher("/t1/listen", String)
     for word, kind in (("raise", "ValueError"), ("exit", "SystemExit")):
         publisher.publish(String(word))
@@ -258,7 +258,7 @@ def test_second_service_of_the_same_name_is_refused(ros: Any, talker: None) -> N
 @pytest.mark.parametrize("method", ["step", "close"])
 def test_callback_may_not_step_or_close_the_world(ros: Any, server: Any, method: str) -> None:
     assert ros.spawn("Talker.model.yaml", "m").success
-    echo = ros.topic("/echo", String)
+    echo = ros.ready_topic("/echo", String)
     ros.publisher("/listen", String).publish(String(method))
     assert f"{method} must not be called from a plugin's hook" in echo.next().data
     assert ros.delete("m").success

@@ -9,9 +9,7 @@ from typing import Any
 
 import pytest
 from raw_subscriber import RawSubscriber
-from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import LaserScan
-from std_srvs.srv import Empty
 
 BEAMS = """
 bodies: [{name: base, footprints: [{type: circle, radius: 0.2, density: 1}]}]
@@ -19,48 +17,42 @@ plugins:
   - {type: Laser, name: laser, body: base, range: 20,
      angle: {min: -2, max: 2, increment: 0.0004}}
 """
-SCAN_SIZE = 40_000  # bytes, about: 10 001 beams
+DURATION = 2.5  # s of simulated time: 500 scans of 40 kB exceed the buffers of any socket
 
 
-@pytest.fixture(autouse=True)
-def server(launcher: Any, write_world: Callable[..., Path]) -> Any:
+@pytest.fixture(scope="module", autouse=True)
+def server(module_launcher: Any, write_world: Callable[..., Path]) -> Any:
     world = write_world("[{name: robot, model: beams.model.yaml}]", beams=BEAMS)
-    return launcher.server(world, update_rate=1000)
+    return module_launcher.server(world, lockstep=True)
 
 
 @pytest.fixture
 def stuck(ros: Any) -> Iterator[RawSubscriber]:
     subscriber = RawSubscriber(ros.master, "/scan", LaserScan, receive_buffer=4096)
+    ros.wait_until_ready("/scan")
     yield subscriber
-    subscriber.socket.close()
+    subscriber.close()
 
 
 def test_other_subscribers_receive_all_messages(ros: Any, stuck: RawSubscriber) -> None:
     del stuck
-    clock, scans = ros.topic("/clock", Clock), ros.topic("/scan", LaserScan)
-    # 500 scans of 40 kB exceed the buffers of any socket.
-    first = clock.next().clock.to_sec()
-    clock.until(lambda message: message.clock.to_sec() > first + 500 * 0.005)
-    scans.drop()
-    scans.take(10)
-    # Services and the simulation are not affected either.
+    scans = ros.ready_topic("/scan", LaserScan)
+    for _ in range(50):
+        now = ros.step(DURATION / 50)
+        # Ten scans at a time, which the buffers of a subscriber that reads can hold.
+        stamps = [scan.header.stamp.to_nsec() for scan in scans.take(10)]
+        assert stamps == list(range(now - 50_000_000, now, 5_000_000))
+    # Services are not affected either.
     assert ros.spawn("ball.model.yaml", "ball").success
-    clock.drop()
-    clock.next()
 
 
 def test_slow_reader_receives_complete_messages_up_to_the_newest(
     ros: Any, stuck: RawSubscriber
 ) -> None:
-    clock = ros.topic("/clock", Clock)
-    first = clock.next().clock.to_sec()
-    later = clock.until(lambda message: message.clock.to_sec() > first + 500 * 0.005)
-    ros.call("/pause", Empty)
-    last = [later, *clock.rest(1.0)][-1].clock.to_nsec()
+    last = ros.step(DURATION) - 5_000_000  # A scan has the time before its step.
     stamps = []
-    while not stamps or stamps[-1] < last - 5_000_000:
-        scan = LaserScan()
-        scan.deserialize(stuck.read_frame())
+    while not stamps or stamps[-1] < last:
+        scan = stuck.next()
         assert len(scan.ranges) == 10_001
         stamps.append(scan.header.stamp.to_nsec())
     # In order, without duplicates, and with gaps of dropped messages.
@@ -70,10 +62,11 @@ def test_slow_reader_receives_complete_messages_up_to_the_newest(
 
 
 def test_closed_connection_is_removed(ros: Any, stuck: RawSubscriber, server: Any) -> None:
-    clock = ros.topic("/clock", Clock)
-    first = clock.next().clock.to_sec()
-    clock.until(lambda message: message.clock.to_sec() > first + 500 * 0.005)
-    stuck.socket.close()
-    ros.topic("/scan", LaserScan).take(5)
+    ros.step(DURATION)
+    stuck.close()
+    ros.step(0.1)
+    scans = ros.ready_topic("/scan", LaserScan)
+    ros.step(0.025)
+    scans.take(5)
     assert "Traceback" not in server.output
     assert server.stop() == 0

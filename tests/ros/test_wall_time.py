@@ -75,10 +75,13 @@ def test_stamps_are_current_after_a_pause(server: Any, ros: Any) -> None:
     scan = ros.topic("/scan", LaserScan)
     scan.next()
     ros.call("/pause", Empty)
-    scan.rest()
+    paused = time.time()
+    ros.wait_until_ready()
     resumed = time.time()
     ros.call("/resume", Empty)
-    assert scan.next().header.stamp.to_sec() >= resumed
+    # Scans of the time before the pause may be received after it.
+    message = scan.until(lambda message: message.header.stamp.to_sec() > paused)
+    assert message.header.stamp.to_sec() >= resumed
 
 
 def test_markers_have_wall_time(server: Any, ros: Any) -> None:
@@ -94,5 +97,4 @@ def test_contradiction_to_other_nodes_is_reported(
 ) -> None:
     ros.master.setParam("/use_sim_time", True)
     process = launcher.start("__name:=other", world_path=write_world(), use_sim_time=False)
-    line = process.wait_for_line(r"\[WARN\].*/use_sim_time is true").string
-    assert "publishes no /clock" in line
+    process.wait_for_line(r"\[WARN\].*/use_sim_time is true.*publishes no /clock")

@@ -20,12 +20,15 @@ import numpy as np
 import numpy.typing as npt
 from selenium import webdriver
 from selenium.webdriver.chrome.service import Service
-from waiting import TIMEOUT, wait_until
+from urllib3.exceptions import HTTPError
+from waiting import wait_until
 
 Image = npt.NDArray[np.uint8]
 Point = tuple[float, float]
 
 PHONE: Final = (390, 844)  # CSS pixels
+_SCRIPT_TIMEOUT: Final = 60.0  # s; for a script of a test, and for the load of a page
+_ANSWER_TIMEOUT: Final = 75.0  # s; for the driver
 _PROGRAMS: Final = ("chromium", "chromedriver")
 _FLAGS: Final = (
     "--headless=new",
@@ -91,6 +94,25 @@ def missing_programs() -> list[str]:
     return [name for name in _PROGRAMS if shutil.which(name) is None]
 
 
+class _Driver(webdriver.Chrome):
+    """The driver of Selenium; a browser that does not answer is ended with its log shown."""
+
+    def __init__(self, options: webdriver.ChromeOptions, log: Path) -> None:
+        self._log = log
+        service = Service(shutil.which("chromedriver") or "", log_output=str(log))
+        super().__init__(options=options, service=service)
+        self.command_executor.client_config.timeout = _ANSWER_TIMEOUT
+
+    def execute(self, driver_command: str, params: dict[str, Any] | None = None) -> dict[str, Any]:
+        try:
+            return super().execute(driver_command, params)
+        except HTTPError as error:
+            if self.service.process is not None:
+                self.service.process.kill()
+            error.add_note(f"{self._log}:\n{self._log.read_text()[-5000:]}")
+            raise
+
+
 class Chromium:
     """A headless browser; methods concern its current tab.
 
@@ -115,10 +137,9 @@ class Chromium:
             options.add_argument(flag)
         options.set_capability("goog:loggingPrefs", {"browser": "ALL", "performance": "ALL"})
         self.downloads = downloads
-        self.driver = webdriver.Chrome(
-            options=options, service=Service(shutil.which("chromedriver") or "")
-        )
-        self.driver.set_script_timeout(TIMEOUT)
+        self.driver = _Driver(options, downloads / "chromedriver.log")
+        self.driver.set_script_timeout(_SCRIPT_TIMEOUT)
+        self.driver.set_page_load_timeout(_SCRIPT_TIMEOUT)
         self.command(
             "Browser.setDownloadBehavior",
             behavior="allow",

@@ -7,7 +7,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from waiting import TIMEOUT
+from programs import run_program
 
 from flatland import cli
 
@@ -15,7 +15,7 @@ from flatland import cli
 def run(*arguments: str | Path, **options: Any) -> subprocess.CompletedProcess[str]:
     """Runs the command in a new process."""
     command = [sys.executable, "-W", "error", "-m", "flatland", *map(str, arguments)]
-    return subprocess.run(command, capture_output=True, text=True, timeout=TIMEOUT, **options)
+    return run_program(command, **options)
 
 
 def main(*arguments: str | Path) -> int:

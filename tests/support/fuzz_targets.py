@@ -19,11 +19,13 @@ import numpy as np
 
 from flatland.config.convert import to_plain
 from flatland.config.documents import load_documents
+from flatland.config.inputs import Inputs
 from flatland.config.reader import YamlReader
 from flatland.errors import FlatlandError, MapFileError, PluginError, YamlError
+from flatland.maps.grey_image import read_grey_image
 from flatland.maps.line_segments import read_line_segments
 from flatland.maps.map_file import load_map
-from flatland.maps.map_image import image_edges, read_grey_image, threshold_in_place
+from flatland.maps.map_image import image_edges, threshold_in_place
 from flatland.plugin_api.manifest import read_manifest, read_reference_names
 from flatland.plugin_api.package_exports import package_exports
 from flatland.recording.log_file import RecordingError, decode_value, encode_value, read_recording
@@ -49,7 +51,7 @@ def _file(name: str, content: bytes) -> str:
 def fuzz_yaml(data: bytes) -> None:
     """Parses a YAML file."""
     try:
-        roots = load_documents(_file("input.yaml", data))
+        roots = load_documents(_file("input.yaml", data), Inputs())
     except YamlError:
         return
     for root in roots:
@@ -100,7 +102,7 @@ def fuzz_map(data: bytes) -> None:
     _file("image", content)
     path = _file("map.yaml", text)
     try:
-        layer_map = load_map(path, "layer", simplify=len(data) % 3)
+        layer_map = load_map(path, "layer", inputs=Inputs(), simplify=len(data) % 3)
     except FlatlandError:
         return
     assert np.isfinite(layer_map.edges).all()

@@ -16,6 +16,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from programs import output_of
+
 _BLOCK = re.compile(
     r"(?:^(?P<how>File|Add to) `(?P<path>[^`]+)`:\n\n"
     r"|^(?P<background><!-- leave running(?P<also>: also)? -->)\n)?"
@@ -55,6 +57,11 @@ def read_page(page: Path) -> list[Block]:
     return blocks
 
 
+def code_blocks(text: str, language: str) -> list[str]:
+    """Returns the blocks of a language, such as `python`, in the text of a page."""
+    return [match["text"] for match in _BLOCK.finditer(text) if match["language"] == language]
+
+
 def joined(before: str, part: str) -> str:
     """Appends a part to a file, with the blank lines that PEP 8 requires."""
     first = part.split("\n", 1)[0]
@@ -90,14 +97,8 @@ def assert_printed(expected: str, printed: str) -> None:
 class Shell:
     """A shell that keeps its working directory and exported variables between commands."""
 
-    def __init__(
-        self,
-        environment: Mapping[str, str],
-        folder: Path,
-        run: Callable[[Sequence[str | Path], Mapping[str, str], Path], str],
-    ) -> None:
+    def __init__(self, environment: Mapping[str, str], folder: Path) -> None:
         self._folder = folder
-        self._run_command = run
         (folder / "cwd").write_text(environment["HOME"])
         exports = [f"export {name}={shlex.quote(value)}" for name, value in environment.items()]
         (folder / "exports").write_text("\n".join(exports))
@@ -127,7 +128,7 @@ class Shell:
 
     def run(self, commands: str) -> str:
         """Runs commands and returns their output."""
-        return self._run_command(self.script(commands), {"PATH": "/usr/bin:/bin"}, self._folder)
+        return output_of(self.script(commands), {"PATH": "/usr/bin:/bin"}, self._folder)
 
 
 def follow(blocks: Sequence[Block], shell: Shell, start: Callable[..., Any]) -> None:
@@ -156,6 +157,6 @@ def follow(blocks: Sequence[Block], shell: Shell, start: Callable[..., Any]) -> 
             background.append(start(command, {"PATH": "/usr/bin:/bin"}))
             printed = None
         elif printed is None:
-            background[-1].wait_for(pattern_of(block.text))
+            background[-1].wait_for_line(pattern_of(block.text))
         else:
             assert_printed(block.text, printed)

@@ -18,19 +18,24 @@ from controller_calls import ControllerCalls
 
 from flatland.errors import PhysicsError, StaleHandleError, WorldLockedError
 from flatland.physics import (
+    Handle,
     PhysicsBody,
     PhysicsFixture,
     PhysicsJoint,
     PhysicsWorld,
     RangeFinder,
     RangeNoise,
+    Run,
     RunEnd,
     ScanRequest,
-    StepRun,
+    boundary_edges,
+    boundary_loops,
+    connected_regions,
+    dilated,
+    distances_to_off,
     scan_all,
+    simplified_loop,
 )
-from flatland.physics.boundaries import boundary_edges, boundary_loops
-from flatland.physics.handle import Handle
 
 ERRORS: Final = (ValueError, PhysicsError)
 """The documented errors of all calls."""
@@ -272,9 +277,9 @@ class RandomCalls(ControllerCalls):
 
     def do_create_edges(self) -> None:
         body = self.body()
-        before = set(self.world._core.fixtures(body.id))
+        before = set(body.fixture_ids)
         count = body.create_edges(self.array(12, 4), **self._material())
-        new = set(self.world._core.fixtures(body.id)) - before
+        new = set(body.fixture_ids) - before
         self._require(len(new) == count, f"makes {len(new)} edges, not {count}")
         self.objects.fixtures[body.id] |= new
         for fixture in new:
@@ -334,18 +339,19 @@ class RandomCalls(ControllerCalls):
         self.body().set_velocity(*self.triple())
 
     def do_run(self) -> None:
-        plan = self.world.plan
-        run = StepRun(
-            self.world, self.rng.randint(0, 1000), self.rng.randint(0, 20), 0.005, 8, 3, False
-        )
-        made, end, report = plan.run(run)
-        self._require(0 <= made <= run.n, "makes too many steps")
-        self._require(end != RunEnd.DONE or made == run.n, "ends too early")
-        # If a controller fails at once, no step reports the bodies that are still invalid.
-        if made > 0 or end == RunEnd.PHYSICS:
-            self.invalid = set() if report is None else set(report[1])
+        n, start = self.rng.randint(0, 20), 5_000_000 * self.rng.randint(0, 1000)
+        run = Run(start, 5_000_000, n, 0.005, 8, 3)
+        made, end, calls, failed, report = self.world.jobs.run(*run)
+        self._require(0 <= made <= n, "makes too many steps")
+        self._require(calls == [], "calls what was not added")
+        while end != RunEnd.DONE:
+            # The physics step ends a run if it reports bodies or records contacts.
+            is_physics = end == RunEnd.AFTER_PHYSICS
+            self._require(is_physics or bool(failed), "ends without a reason")
+            if report is not None:
+                self.invalid = set(report[1])
+            _, end, _, failed, report = self.world.jobs.run(*run._replace(n=1, continues=True))
         self._require(self.invalid <= set(self.objects.fixtures), "reports unknown bodies")
-        plan.take_failed()
 
     def do_collect_touches(self) -> None:
         bodies = self.some_bodies()
@@ -598,6 +604,12 @@ class RandomCalls(ControllerCalls):
         self.finite("boundary", boundary_edges(mask, self.positive()))
         for loop in boundary_loops(mask):
             self._require(len(loop) >= 4, "returns an open loop")
+            self._require(len(simplified_loop(loop, self.positive())) >= 1, "returns no loop")
+        runs = generator.integers(-9, 9, (self.rng.randrange(5), 3))
+        grown = dilated(mask, runs, outside=self.rng.random() < 0.5)
+        regions = connected_regions(mask, diagonally=self.rng.random() < 0.5)
+        for result in (grown, regions, distances_to_off(mask)):
+            self._require(result.shape == mask.shape, "returns a wrong shape")
 
     def do_close(self) -> None:
         old = self.world

@@ -22,6 +22,7 @@ class RawSubscriber:
         message_type: type[Any],
         receive_buffer: int | None = None,
         name: str = "/raw",
+        publisher: str = "/flatland_server",
     ) -> None:
         """Connects to the publisher of a topic.
 
@@ -31,12 +32,13 @@ class RawSubscriber:
             message_type: ROS message class.
             receive_buffer: Size of the receive buffer of the socket [bytes]; None for the default.
             name: Name of the node; a publisher keeps one connection for each name.
+            publisher: Node to connect to if several nodes publish the topic: that of another test
+                may not have been unregistered.
         """
         self._message_type = message_type
         nodes = next(nodes for name, nodes in master.getSystemState()[0] if name == topic)
-        # The node of another test may not have been unregistered yet.
-        (publisher,) = nodes if len(nodes) == 1 else [n for n in nodes if n == "/flatland_server"]
-        node = ServerProxy(master.lookupNode(publisher))
+        (only,) = nodes if len(nodes) == 1 else [node for node in nodes if node == publisher]
+        node = ServerProxy(master.lookupNode(only))
         code, text, protocol = node.requestTopic(name, topic, [["TCPROS"]])
         assert code == 1, text
         self.socket = socket.socket()

@@ -191,6 +191,12 @@ class RawWebClient:
                 return message
         raise TimeoutError(f"no message {kind}")
 
+    def receive_until(self, kind: str) -> list[Any]:
+        """Returns all messages up to the next one of a type."""
+        start = len(self.received)
+        self.wait(kind)
+        return self.received[start:]
+
     def receive_for(self, seconds: float) -> list[Any]:
         """Returns all messages that arrive in some time."""
         end, found = time.monotonic() + seconds, []

@@ -6,7 +6,6 @@ import contextlib
 import os
 import re
 import signal
-import socket
 import subprocess
 import sys
 import threading
@@ -22,6 +21,8 @@ from flatland.simulation import Simulation
 from flatland.web import WebViewer
 
 R = TypeVar("R")
+
+_SILENCE: Final = 30.0  # s after which a program that prints nothing is ended
 
 # Hues that the page itself does not use.
 ROBOT_COLOR: Final = (255, 0, 255)
@@ -103,6 +104,10 @@ class ViewedWorld:
         """Returns the names of all models."""
         return self.ask(lambda: [model.name for model in self.world.models])
 
+    def time(self) -> float:
+        """Returns the simulated time [s]."""
+        return self.ask(lambda: self.world.time)
+
     def scans_wanted(self) -> bool:
         """Returns whether anything receives the scans of the robot."""
         # Unlike `World.output`, the registry does not make the output wanted.
@@ -141,7 +146,7 @@ class ViewProgram:
     def __init__(self, *arguments: str | Path) -> None:
         """Starts the program and waits for the address."""
         command = [sys.executable, "-m", "flatland", "view", *map(str, arguments), "--no-browser"]
-        environment = {**os.environ, "PYTHONUNBUFFERED": "1"}
+        environment = {**os.environ, "PYTHONUNBUFFERED": "1", "PYTHONFAULTHANDLER": "1"}
         self.process = subprocess.Popen(
             command,
             env=environment,
@@ -152,7 +157,8 @@ class ViewProgram:
         )
         assert self.process.stdout is not None
         lines = []
-        timer = threading.Timer(TIMEOUT, self.process.kill)
+        # The signal ends the program with the stacks of its threads.
+        timer = threading.Timer(_SILENCE, self.process.send_signal, [signal.SIGABRT])
         timer.start()
         for line in self.process.stdout:
             lines.append(line)
@@ -176,15 +182,8 @@ class ViewProgram:
         if self.process.poll() is None:
             self.process.send_signal(number)
         try:
-            self.process.communicate(timeout=TIMEOUT)
+            self.process.communicate(timeout=_SILENCE)
         except subprocess.TimeoutExpired:
-            self.process.kill()
-            self.process.communicate()
-            pytest.fail("flatland view did not end")
-
-
-def free_port() -> int:
-    """Returns a port of this machine that no program listens at."""
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return int(probe.getsockname()[1])
+            self.process.send_signal(signal.SIGABRT)
+            output, _ = self.process.communicate()
+            pytest.fail(f"flatland view did not end:\n{output}")

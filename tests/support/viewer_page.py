@@ -7,6 +7,22 @@ from typing import Any
 
 from chromium import Chromium, Image, Point
 
+# Returns to the first state of the page. The page listens for changes of its address first.
+_RESET = """
+const [done] = arguments;
+for (const dialog of document.querySelectorAll("dialog[open]")) dialog.close();
+for (const form of document.querySelectorAll("dialog form")) form.reset();
+const buttons = document.querySelectorAll("figure.plot button, #notices button");
+for (const button of buttons) button.click();
+if (!document.querySelector("#plots").hidden) document.querySelector("#plots-close").click();
+if (document.body.dataset.panel === "closed") document.querySelector("#panel-toggle").click();
+localStorage.clear();
+document.querySelector("#tool-select").click();
+document.activeElement.blur();
+addEventListener("hashchange", () => done(), { once: true });
+location.hash = `reset=${performance.now()}`;
+"""
+
 
 class ViewerPage:
     """The page in the current tab of a browser.
@@ -34,6 +50,25 @@ class ViewerPage:
             " && Object.values(models).every(({pose}) => pose)))(flatland.state.worlds)"
         )
         self.wait_for_frame()  # which fits the view to the world
+
+    def reset(self) -> None:
+        """Returns to the state after loading: view, selection, displays, tools, plots, dialogs."""
+        self.browser.driver.execute_async_script(_RESET)
+
+    def wait_for_poses(
+        self, poses: dict[str, tuple[float, float, float]], *, paused: bool = False
+    ) -> None:
+        """Waits until the page has drawn a world with exactly these models at these poses."""
+        self.browser.until(
+            "((expected, {paused, models}) => paused === arguments[1]"
+            " && Object.keys(models).sort().join() === Object.keys(expected).sort().join()"
+            " && Object.entries(expected).every(([name, pose]) =>"
+            "   models[name].pose?.every((value, i) => Math.abs(value - pose[i]) < 1e-3)))"
+            "(arguments[0], flatland.state.worlds[0])",
+            poses,
+            paused,
+        )
+        self.wait_for_frame()
 
     def wait_for_connection(self, text: str) -> None:
         """Waits for a state of the connection: connected, reconnecting."""

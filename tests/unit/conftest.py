@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from textwrap import dedent
 from typing import Any
@@ -11,8 +11,11 @@ from typing import Any
 import cv2
 import numpy as np
 import pytest
+from waiting import TIMEOUT
 
 import flatland
+from flatland.config import inputs
+from flatland.config.files import read_regular
 
 MINIMAL_MODEL = """
 bodies:
@@ -110,3 +113,25 @@ class FakeTime:
 def fake_time() -> FakeTime:
     """A clock and a wait function for a `Simulation`, controlled by the test."""
     return FakeTime()
+
+
+@pytest.fixture
+def block_file(monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[[str], threading.Event]]:
+    """Makes reading a file of a name last until the returned event is set, or the test ends."""
+    events: list[threading.Event] = []
+
+    def block(name: str) -> threading.Event:
+        released = threading.Event()
+        events.append(released)
+
+        def read(path: str) -> bytes:
+            if Path(path).name == name:
+                assert released.wait(TIMEOUT)
+            return read_regular(path)
+
+        monkeypatch.setattr(inputs, "read_regular", read)
+        return released
+
+    yield block
+    for event in events:
+        event.set()

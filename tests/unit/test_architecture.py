@@ -3,24 +3,31 @@
 from __future__ import annotations
 
 import ast
+import functools
+import graphlib
+import sys
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
+from programs import run_program
 
 # From the bottom up. A module imports only from floors below its own and from its own room.
 FLOORS = (
     ("defaults", "errors", "geometry", "graph_names", "requirements", "timekeeper", "version"),
-    ("physics", "values"),
+    ("extras", "physics", "values"),
     ("config", "entities"),
     ("copying", "maps", "plugin_api"),
-    ("loading", "plugins", "worldgen"),
+    ("loading", "worldgen"),
+    ("plugins",),
     ("runtime",),
     ("world",),
+    ("scene",),
     ("simulation", "drawing", "recording"),
     ("web",),
-    ("gym", "ros", "tools"),
+    ("gym", "node", "tools"),
+    ("ros",),
     ("viewer",),
     ("cli",),
     ("__main__",),
@@ -35,12 +42,20 @@ PACKAGE = Path(__file__).resolve().parents[2] / "flatland"
 
 @dataclass(frozen=True)
 class Import:
-    """An import of one module of the package by another."""
+    """An import by a module of the package."""
 
     module: str
-    room: str
-    target: str
+    name: str
     kind: str  # "type", "late" or "run"
+
+    @property
+    def room(self) -> str:
+        return room_of(self.module)
+
+    @property
+    def target(self) -> str:
+        """Room of the imported module."""
+        return room_of(self.name)
 
 
 def room_of(module: str) -> str:
@@ -48,39 +63,52 @@ def room_of(module: str) -> str:
     return module.split(".")[1] if "." in module else ""
 
 
-def imports() -> Iterator[Import]:
-    for path in sorted(PACKAGE.rglob("*.py")):
-        parts = path.relative_to(PACKAGE.parent).with_suffix("").parts
-        if parts[1] in ("msg", "srv"):
-            continue
-        module = ".".join(parts).removesuffix(".__init__")
-        for node, kind in nodes(ast.parse(path.read_text()), "run"):
-            for name in imported_names(node):
-                assert not name.startswith("flatland_msgs"), module
-                if name == "flatland" or name.startswith("flatland."):
-                    yield Import(module, room_of(module), room_of(name), kind)
+def module_of(path: Path) -> str:
+    parts = path.relative_to(PACKAGE.parent).with_suffix("").parts
+    return ".".join(parts).removesuffix(".__init__")
 
 
-def nodes(tree: ast.AST, kind: str) -> Iterator[tuple[ast.AST, str]]:
+@functools.cache
+def syntax_trees() -> dict[str, ast.AST]:
+    """Returns the syntax trees of all modules except the generated messages."""
+    modules = {module_of(path): path for path in sorted(PACKAGE.rglob("*.py"))}
+    return {
+        name: ast.parse(path.read_text())
+        for name, path in modules.items()
+        if room_of(name) not in ("msg", "srv")
+    }
+
+
+@functools.cache
+def imports() -> list[Import]:
+    """Returns the imports of all modules."""
+    found = []
+    for module, tree in syntax_trees().items():
+        for node, kind in import_nodes(tree, "run"):
+            found += [Import(module, name, kind) for name in imported_names(node)]
+    return found
+
+
+def import_nodes(tree: ast.AST, kind: str) -> Iterator[tuple[ast.Import | ast.ImportFrom, str]]:
     for node in ast.iter_child_nodes(tree):
         inner = kind
         if isinstance(node, ast.FunctionDef) and kind == "run":
             inner = "late"
         elif isinstance(node, ast.If) and "TYPE_CHECKING" in ast.unparse(node.test):
             inner = "type"
-        yield node, inner
-        yield from nodes(node, inner)
+        if isinstance(node, (ast.Import, ast.ImportFrom)):
+            yield node, inner
+        elif not isinstance(node, ast.expr):
+            yield from import_nodes(node, inner)
 
 
-def imported_names(node: ast.AST) -> list[str]:
+def imported_names(node: ast.Import | ast.ImportFrom) -> list[str]:
     if isinstance(node, ast.Import):
         return [alias.name for alias in node.names]
-    if isinstance(node, ast.ImportFrom):
-        assert node.level == 0
-        if node.module == "flatland":
-            return [f"flatland.{alias.name}" for alias in node.names]
-        return [node.module or ""]
-    return []
+    assert node.level == 0
+    if node.module == "flatland":
+        return [f"flatland.{alias.name}" for alias in node.names]
+    return [node.module or ""]
 
 
 def floor_of(room: str) -> int:
@@ -90,7 +118,10 @@ def floor_of(room: str) -> int:
     pytest.fail(f'room "{room}" has no floor; add it to FLOORS and to docs/architecture.md')
 
 
-ALL = [found for found in imports() if found.kind != "type"]
+def run_time_imports() -> list[Import]:
+    """Returns the imports of modules of the package that are carried out."""
+    package = [found for found in imports() if found.name.split(".")[0] == "flatland"]
+    return [found for found in package if found.kind != "type"]
 
 
 def test_every_room_has_a_floor() -> None:
@@ -102,7 +133,7 @@ def test_every_room_has_a_floor() -> None:
 
 def test_modules_import_only_from_rooms_below_their_own() -> None:
     wrong = []
-    for found in ALL:
+    for found in run_time_imports():
         if found.room in ("", found.target) or found.target in ("", *SPECIAL):
             continue  # within a room, or the facade flatland/__init__.py
         if (found.room, found.target) in LATE and found.kind == "late":
@@ -112,31 +143,71 @@ def test_modules_import_only_from_rooms_below_their_own() -> None:
     assert wrong == []
 
 
+def test_the_plugin_api_does_not_refer_to_the_running_world() -> None:
+    """Not even for types: a plugin gets what it needs of a world by `PluginWorld`."""
+    above = {room for rooms in FLOORS[floor_of("runtime") :] for room in rooms}
+    package = [each for each in imports() if each.name.startswith("flatland.")]
+    assert [each for each in package if each.room == "plugin_api" and each.target in above] == []
+
+
+def test_modules_do_not_import_each_other_in_circles() -> None:
+    """Not even for types, apart from a model, its plugins, and what these use of a world."""
+    modules = syntax_trees().keys() - {"flatland"}  # without the facade
+    targets: dict[str, set[str]] = {}
+    for module in modules:
+        found: set[str] = set()
+        for node, kind in import_nodes(syntax_trees()[module], "run"):
+            if isinstance(node, ast.ImportFrom) and kind != "late":
+                names = {f"{node.module}.{alias.name}" for alias in node.names}
+                found |= (names & modules) or ({str(node.module)} & modules)
+        targets[module] = found - {module}
+    known = {"entities.model", "plugin_api.plugin", "plugin_api.plugin_world"}
+    circle = {f"flatland.{name}" for name in known}
+    for module in circle:
+        targets[module] -= circle
+    graphlib.TopologicalSorter(targets).prepare()  # raises for a circle
+
+
 def test_only_one_room_imports_the_extension_and_none_a_fixed_message_package() -> None:
-    for found in ALL:
+    for found in run_time_imports():
         if found.target in SPECIAL:
             assert found.room in SPECIAL[found.target], found.module
+    assert [each.module for each in imports() if each.name.startswith("flatland_msgs")] == []
 
 
 def test_only_front_ends_import_the_facade() -> None:
-    assert {found.module for found in ALL if found.target == ""} <= {"flatland.cli.main"}
+    front_ends = {found.module for found in run_time_imports() if found.target == ""}
+    assert front_ends <= {"flatland.cli.main"}
 
 
-def test_plugins_and_adapters_do_not_import_each_other() -> None:
-    for package, shared in (("plugins", ()), ("ros/adapters", ("convert", ""))):
-        prefix = f"flatland.{package.replace('/', '.')}"
-        for path in (PACKAGE / package).glob("*.py"):
-            for node, _ in nodes(ast.parse(path.read_text()), "run"):
-                for name in imported_names(node):
-                    if name.startswith(prefix):
-                        target = name.removeprefix(prefix).removeprefix(".").split(".")[0]
-                        assert target.startswith("_") or target in shared, f"{path} imports {name}"
+@pytest.mark.parametrize(
+    ("package", "shared"), [("flatland.plugins", ()), ("flatland.ros.adapters", ("convert", ""))]
+)
+def test_plugins_and_adapters_do_not_import_each_other(
+    package: str, shared: tuple[str, ...]
+) -> None:
+    for found in imports():
+        if found.module.startswith(package) and found.name.startswith(package):
+            target = found.name.removeprefix(package).removeprefix(".").split(".")[0]
+            assert target.startswith("_") or target in shared, found
+
+
+def test_the_room_of_the_node_imports_no_module_of_ros() -> None:
+    """Neither directly nor by another module, so that clients of several kinds of ROS share it."""
+    modules = [f"flatland.node.{path.stem}" for path in sorted((PACKAGE / "node").glob("*.py"))]
+    code = (
+        "import importlib, sys\n"
+        "for name in ('rospy', 'rosgraph', 'genpy', 'rosbag', 'rclpy', 'flatland.ros'):\n"
+        "    sys.modules[name] = None\n"
+        f"for name in {modules}:\n"
+        "    importlib.import_module(name.removesuffix('.__init__'))\n"
+        "messages = ('flatland.msg', 'flatland.srv')\n"
+        "print([name for name in sys.modules if name.endswith('_msgs') or name in messages])\n"
+    )
+    done = run_program([sys.executable, "-c", code])
+    assert done.stdout == "[]\n", done.stdout + done.stderr
 
 
 def test_the_exceptions_are_used() -> None:
-    late = {(found.room, found.target) for found in ALL if found.kind == "late"}
+    late = {(found.room, found.target) for found in run_time_imports() if found.kind == "late"}
     assert late >= LATE
-
-
-def test_the_world_is_a_facade_of_at_most_350_lines() -> None:
-    assert len((PACKAGE / "world.py").read_text().splitlines()) <= 350

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 import yaml
+from pages import code_blocks
 
 import flatland
 from flatland.plugin_api.manifest import INCLUDED_PACKAGE
@@ -20,11 +21,6 @@ from flatland.plugin_api.registry import PluginRegistry
 def docs(checkout: Path) -> Path:
     """The folder of the documentation."""
     return checkout / "docs"
-
-
-def blocks(page: Path, language: str) -> list[str]:
-    """Returns all blocks of a language."""
-    return re.findall(rf"^```{language}\n(.*?)^```", page.read_text(), re.MULTILINE | re.DOTALL)
 
 
 def listed_files(entry: Any) -> Iterator[str]:
@@ -44,7 +40,8 @@ def test_the_site_contains_all_pages(docs, checkout):
     listed = list(listed_files(yaml.safe_load((docs / "toc.yml").read_text())))
     assert len(listed) == len(set(listed))
     pages = [*docs.rglob("*.md"), *docs.rglob("*.rst"), *(checkout / "examples").rglob("*.md")]
-    pages += [checkout / name for name in ("README.md", "CONTRIBUTING.md", "CHANGELOG.rst")]
+    names = ("README.md", "CONTRIBUTING.md", "RELEASING.md", "CHANGELOG.rst")
+    pages += [checkout / name for name in names]
     assert sorted(listed) == sorted(str(p.relative_to(checkout).with_suffix("")) for p in pages)
 
 
@@ -72,7 +69,7 @@ def test_the_reference_contains_all_public_names(docs):
 
 
 def test_the_robot_of_the_first_page_drives_and_scans(docs, tmp_path):
-    [robot] = blocks(docs / "README.md", "yaml")
+    [robot] = code_blocks((docs / "README.md").read_text(), "yaml")
     (tmp_path / "robot.yaml").write_text(robot)
     (tmp_path / "world.yaml").write_text(
         "properties: {}\nlayers: []\nmodels: [{name: r, model: robot.yaml}]\n"
@@ -88,7 +85,7 @@ def test_the_robot_of_the_first_page_drives_and_scans(docs, tmp_path):
 @pytest.mark.parametrize("page", ["README.md", "docs/README.md"])
 def test_the_program_of_a_page_runs(page, checkout, monkeypatch, capsys):
     monkeypatch.chdir(checkout)
-    [program] = blocks(checkout / page, "python")
+    [program] = code_blocks((checkout / page).read_text(), "python")
     exec(compile(program, page, "exec"), {})
     assert re.search(r"\(.*\) \d", capsys.readouterr().out)
 
@@ -99,7 +96,7 @@ def test_the_programs_of_a_page_run_one_after_the_other(
 ):
     (tmp_path / "worlds").symlink_to(checkout / "worlds")
     monkeypatch.chdir(tmp_path)
-    first, *others = blocks(docs / page, "python")
+    first, *others = code_blocks((docs / page).read_text(), "python")
     exec(compile(first, page, "exec"), {})
     # The first program closes its world; the others continue with an open one.
     with flatland.World.from_yaml("worlds/office/world.yaml", seed=1) as world:
@@ -115,12 +112,11 @@ def without_comments(text: str) -> str:
     return "\n".join(line for line in lines if line)
 
 
-def test_blocks_that_name_a_file_are_part_of_it(docs, checkout):
-    found = re.findall(
-        r"^```yaml\n# (worlds/\S+)\n(.*?)^```",
-        (docs / "models.md").read_text(),
-        re.MULTILINE | re.DOTALL,
-    )
-    assert len(found) == 4
-    for path, text in found:
-        assert without_comments(text) in without_comments((checkout / path).read_text())
+@pytest.mark.parametrize("page", ["models.md", "drives.md", "moving_models.md"])
+def test_blocks_that_name_a_file_are_part_of_it(page, docs, checkout):
+    texts = code_blocks((docs / page).read_text(), "yaml")
+    found = [text.split("\n", 1) for text in texts if text.startswith("# worlds/")]
+    assert found
+    for first, text in found:
+        path = checkout / first.removeprefix("# ")
+        assert without_comments(text) in without_comments(path.read_text())

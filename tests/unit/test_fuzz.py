@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 from fuzz_targets import TARGETS
 from physics_calls import CallError, RandomCalls
+from programs import run_program
 
 from flatland.physics import PhysicsBody, PhysicsWorld
 
@@ -28,18 +29,13 @@ def test_an_input_raises_documented_errors_only(path: Path) -> None:
     TARGETS[path.parent.name](path.read_bytes())
 
 
-# Sequences with extreme numbers, with joints, and with ordinary numbers only.
-@pytest.mark.parametrize("seed", range(28))
-def test_random_calls_of_the_physics_engine_leave_it_consistent(seed: int) -> None:
-    RandomCalls(seed).run(300)
-
-
-def test_the_random_calls_succeed_fail_and_reach_the_hook() -> None:
-    sequences = [RandomCalls(seed) for seed in range(10)]
+def test_random_calls_of_the_physics_engine_leave_it_consistent() -> None:
+    """Sequences with extreme numbers, with joints, and with ordinary numbers only."""
+    sequences = [RandomCalls(seed) for seed in range(16)]
     for sequence in sequences:
         sequence.run(300)
     assert {sequence.extremes for sequence in sequences} == {0.0, 0.02, 0.2}
-    assert 170 < sum(sequence.errors for sequence in sequences) < 1500
+    assert 300 < sum(sequence.errors for sequence in sequences) < 2500
     assert sum(sequence.hook_calls for sequence in sequences) > 10
 
 
@@ -47,14 +43,18 @@ def raise_undocumented(*_: object) -> None:
     raise RuntimeError("not documented")
 
 
+# The defects below replace these methods.
+set_pose, destroy = PhysicsBody.set_pose, PhysicsBody.destroy
+
+
 def move_and_raise(body: PhysicsBody, *_: float) -> None:
-    body._core.set_pose(body.id, 3.25, 0.5, 0.125)
+    set_pose(body, 3.25, 0.5, 0.125)
     raise ValueError("half done")
 
 
 def destroy_more(body: PhysicsBody) -> None:
-    body._core.destroy_body(body.id)
-    body._core.create_body("static", 0, 0, 0, 0, 0)
+    destroy(body)
+    body.world.create_body("static", (0, 0, 0))
 
 
 @pytest.mark.parametrize(
@@ -81,23 +81,13 @@ def fuzz(*arguments: str) -> subprocess.CompletedProcess[str]:
     """Runs the program of `make fuzz`, without atheris."""
     support = str(FUZZ.parent / "support")
     path = os.pathsep.join([str(FUZZ.parents[1]), support, os.environ.get("PYTHONPATH", "")])
-    return subprocess.run(
-        [sys.executable, str(FUZZ / "run.py"), *arguments],
-        check=False,
-        capture_output=True,
-        text=True,
-        env={**os.environ, "PYTHONPATH": path},
+    return run_program(
+        [sys.executable, str(FUZZ / "run.py"), *arguments], env={**os.environ, "PYTHONPATH": path}
     )
 
 
 def test_the_program_prints_a_line_for_each_target() -> None:
-    result = fuzz("--duration", "1", "physics")
+    result = fuzz("--duration", "0.1", "physics")
     assert result.returncode == 0, result.stdout + result.stderr
     assert result.stdout.startswith("physics ")
     assert " sequences of 300 calls" in result.stdout
-
-
-def test_an_unknown_target_is_an_error() -> None:
-    result = fuzz("phisics")
-    assert result.returncode == 2
-    assert "unknown target phisics, choose from yaml, " in result.stderr

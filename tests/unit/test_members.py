@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import ast
-import subprocess
 import sys
 from pathlib import Path
 
 import pytest
+from programs import run_program
 
 import flatland
 
@@ -35,7 +35,7 @@ def test_members_for_type_checkers_are_those_at_run_time() -> None:
 
 def test_modules_are_members() -> None:
     code = "import flatland; print(flatland.physics.PhysicsWorld.__name__)"
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    done = run_program([sys.executable, "-c", code])
     assert done.stdout == "PhysicsWorld\n", done.stderr
 
 
@@ -51,7 +51,7 @@ def test_a_module_whose_packages_are_missing_is_no_member() -> None:
         "import flatland; print(hasattr(flatland, 'gym'))\n"
         "flatland.gym"
     )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    done = run_program([sys.executable, "-c", code])
     assert done.stdout == "False\n", done.stderr
     assert "AttributeError: module 'flatland' has no attribute 'gym': " in done.stderr
 
@@ -59,10 +59,11 @@ def test_a_module_whose_packages_are_missing_is_no_member() -> None:
 def test_the_node_publishes_its_time_before_the_simulation_is_imported() -> None:
     code = (
         "import sys\n"
-        "import flatland.ros.node, flatland.ros.clock, flatland.ros.parameter_server\n"
+        "import flatland.ros.node, flatland.node.clock, flatland.ros.parameter_server\n"
         "import flatland.ros.logs, flatland.ros.transport.inbound\n"
+        "import flatland.ros.transport.ros_transport\n"
         "late = ('world', 'simulation', 'values', 'plugin_api', 'config', 'physics', '_core')\n"
         "print([name for name in late if 'flatland.' + name in sys.modules])\n"
     )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    done = run_program([sys.executable, "-c", code])
     assert done.stdout == "[]\n", done.stdout + done.stderr

@@ -4,26 +4,22 @@ from __future__ import annotations
 
 import doctest
 import math
-import re
-import subprocess
-import sys
 from pathlib import Path
 from typing import Any
 
 import cv2
 import numpy as np
 import pytest
+from pages import code_blocks
 
 import flatland
-
-_SESSION = re.compile(r"^```pycon\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 
 
 def test_the_sessions_of_the_documentation_have_the_documented_output(
     checkout: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(checkout)
-    sessions = _SESSION.findall((checkout / "docs" / "python.md").read_text())
+    sessions = code_blocks((checkout / "docs" / "python.md").read_text(), "pycon")
     assert sessions
     for session in sessions:
         test = doctest.DocTestParser().get_doctest(session, {}, "docs/python.md", None, 0)
@@ -104,19 +100,3 @@ class TestNotebook:
         world = files.load("{properties: {}, layers: []}")
         world.close()
         assert world._repr_png_() is None
-
-    def test_a_world_is_no_image_without_matplotlib(self, tmp_path: Path) -> None:
-        program = (
-            "import sys; sys.modules['matplotlib'] = None\n"
-            "import flatland\n"
-            "with flatland.World() as world: print(world._repr_png_())\n"
-        )
-        done = subprocess.run(
-            [sys.executable, "-c", program],
-            capture_output=True,
-            text=True,
-            cwd=tmp_path,
-            check=False,
-        )
-        assert done.returncode == 0, done.stderr
-        assert done.stdout.strip() == "None"

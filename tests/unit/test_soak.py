@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import importlib.util
 import re
-import subprocess
 import sys
 from collections.abc import Iterator
 from pathlib import Path
@@ -28,21 +27,6 @@ def soak(checkout: Path) -> Iterator[ModuleType]:
     finally:
         sys.path.remove(str(checkout / "bench"))
         sys.modules.pop("soak", None)
-
-
-@pytest.mark.parametrize(
-    ("scenario", "scale"), [("models", 0.004), ("worlds", 0.008), ("office", 0.003)]
-)
-def test_nothing_grows_in_a_short_run(checkout: Path, scenario: str, scale: float) -> None:
-    # In a process of its own: threads that other tests have left behind may end meanwhile.
-    done = subprocess.run(
-        [sys.executable, checkout / "bench" / "soak.py", scenario, "--scale", str(scale)],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.STDOUT,
-        text=True,
-    )
-    assert done.returncode == 0, done.stdout
-    assert len(done.stdout.splitlines()) > 30
 
 
 @pytest.mark.parametrize(

@@ -11,14 +11,15 @@ import ast
 import logging
 import re
 import shutil
-import subprocess
 from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from pages import code_blocks, pattern_of
+from programs import run_program
 
 import flatland
-from flatland.ros.parameters import ParameterError, read_parameters
+from flatland.node.parameters import ParameterError, read_parameters
 
 WORLD = "properties: {}\nlayers: []\nmodels: [{name: r1, model: robot.yaml}]\n"
 BODY = "bodies: [{name: base, footprints: [{type: circle, radius: 0.2, density: 1}]}]\n"
@@ -76,7 +77,7 @@ def not_set_up(case: Case) -> str:
     checkout = Path(__file__).resolve().parents[2]
     shutil.copy(checkout / "setup.bash", case.folder)
     command = ["bash", "-c", f". {case.folder}/setup.bash"]
-    return subprocess.run(command, capture_output=True, text=True, check=False).stderr
+    return run_program(command).stderr
 
 
 def invalid_parameter(case: Case) -> str:
@@ -187,16 +188,16 @@ PROVOKED: dict[str, Callable[[Case], str]] = {
 WRITTEN_IN = {
     "Debian packages are missing": "tools/apt_packages.sh",
     "`make run WORLD=…` does not find the world": "tools/run.sh",
-    "The node ends immediately: no world": "flatland/ros/parameters.py",
+    "The node ends immediately: no world": "flatland/node/parameters.py",
     "The node does not start": "flatland/ros/node.py",
     "Other nodes show wall time, or discard transforms as too old": "flatland/ros/node.py",
     "A plugin takes too long to start": "flatland/runtime/plugin_host.py",
-    "A topic of a plugin does not exist in ROS": "flatland/ros/bridge.py",
+    "A topic of a plugin does not exist in ROS": "flatland/node/bridge.py",
     "The simulation is slower than real time": "flatland/simulation/rate_monitor.py",
-    "The node does not end": "flatland/ros/shutdown.py",
-    "RViz displays no scan": "flatland/ros/frame_monitor.py",
+    "The node does not end": "flatland/node/shutdown.py",
+    "RViz displays no scan": "flatland/node/frame_monitor.py",
     "The viewer does not open": "flatland/viewer/app.py",
-    "The viewer in the browser does not start": "flatland/ros/browser_viewer.py",
+    "The viewer in the browser does not start": "flatland/node/browser_viewer.py",
     "The viewer does not find a master": "flatland/viewer/app.py",
 }
 
@@ -206,7 +207,7 @@ def messages(checkout: Path) -> dict[str, str]:
     page = (checkout / "docs" / "troubleshooting.md").read_text()
     found = {}
     for section in re.split(r"^### ", page, flags=re.MULTILINE)[1:]:
-        blocks = re.findall(r"^```text\n(.*?)^```", section, re.MULTILINE | re.DOTALL)
+        blocks = code_blocks(section, "text")
         assert len(blocks) <= 1, section
         if blocks:
             found[section.split("\n", 1)[0]] = blocks[0].strip()
@@ -242,8 +243,9 @@ def test_a_message_is_printed(section, checkout, tmp_path, caplog, monkeypatch):
     caplog.set_level(logging.WARNING, logger="flatland")
     message = messages(checkout)[section]
     printed = PROVOKED[section](Case(tmp_path, caplog))
-    pattern = re.escape(message).replace(r"\.\.\.", ".*")
-    assert re.search(f"^{pattern}", printed, re.MULTILINE), f"page:\n{message}\n\n{printed}"
+    assert re.search(f"^{pattern_of(message)}", printed, re.MULTILINE), (
+        f"page:\n{message}\n\n{printed}"
+    )
 
 
 @pytest.mark.parametrize("section", WRITTEN_IN)

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-import threading
 
 import pytest
 
 import flatland
 from flatland import ModelPlugin, WorldError, YamlError
+from flatland.loading.world_source import WorldSource
 from flatland.runtime.observer import WorldObserver
 from flatland.world import World
 
@@ -146,16 +146,6 @@ def test_contact_hooks_have_the_time_before_the_step(files, probe):
     assert world.contacts == []
 
 
-def test_a_contact_ends_when_a_body_is_moved_away(files, probe):
-    world = files.load("{properties: {}, layers: []}")
-    world.spawn_model("probe.model.yaml", "a")
-    world.spawn_model("minimal.model.yaml", "b", pose=(0.3, 0, 0))
-    world.step()
-    world.move_model("b", (50, 0, 0))
-    world.step()
-    assert ("p", "end", 5_000_000) in probe.calls
-
-
 def test_pause_stops_hooks_and_time(files, probe):
     world = files.load("{properties: {}, layers: []}")
     world.spawn_model("probe.model.yaml", "a")
@@ -170,13 +160,6 @@ def test_pause_stops_hooks_and_time(files, probe):
     assert world.paused
     world.resume()
     assert not world.paused
-
-
-def test_gravity_is_zero(files):
-    world = files.load("{properties: {}, layers: []}")
-    model = world.spawn_model("minimal.model.yaml", "a", pose=(1, 2, 3))
-    world.step(100)
-    assert model.pose == pytest.approx((1, 2, 3))
 
 
 def test_a_move_is_rigid_and_sets_velocities_to_zero(files):
@@ -212,43 +195,6 @@ def test_a_move_that_is_invalid_for_one_body_moves_no_body(files):
 NAN, INF = math.nan, math.inf
 
 
-@pytest.mark.parametrize("pose", [(NAN, 0, 0), (0, INF, 0), (0, 0, -INF), (0, 0), "abc"])
-def test_invalid_poses_raise(files, pose):
-    world = files.load("{properties: {}, layers: []}")
-    model = world.spawn_model("minimal.model.yaml", "m", pose=(1, 2, 3))
-    with pytest.raises(WorldError, match=r'failed to move model "m", pose must be'):
-        world.move_model("m", pose)
-    with pytest.raises(WorldError, match=r'failed to spawn model "n", pose must be'):
-        world.spawn_model("minimal.model.yaml", "n", pose=pose)
-    assert model.pose == pytest.approx((1, 2, 3))
-    assert [other.name for other in world.models] == ["m"]
-    if len(pose) == 3 and not isinstance(pose, str):
-        with pytest.raises(ValueError, match="must be finite"):
-            model.bodies[0].set_pose(*pose)
-        with pytest.raises(ValueError, match="finite"):
-            model.bodies[0].set_velocity(*pose)
-
-
-@pytest.mark.parametrize("pose", [(1e30, 0, 0), (0, -1e10, 0), (0, 0, 1e300)])
-def test_poses_beyond_the_range_of_the_physics_raise(files, pose):
-    world = files.load("{properties: {}, layers: []}")
-    model = world.spawn_model("minimal.model.yaml", "m", pose=(1, 2, 3))
-    with pytest.raises(WorldError, match=r'failed to move model "m", pose .*must be finite and'):
-        world.move_model("m", pose)
-    with pytest.raises(YamlError, match=r'model "n" body "base", pose .*must be finite and within'):
-        world.spawn_model("minimal.model.yaml", "n", pose=pose)
-    assert model.pose == pytest.approx((1, 2, 3))
-    assert world.models == [model]
-
-
-@pytest.mark.parametrize("path", ["~no-such-user/m.yaml", "a\0b", "x" * 5000, "/dev/zero", "."])
-def test_spawning_from_a_path_that_is_not_a_file_raises(files, path):
-    world = files.load("{properties: {}, layers: []}")
-    with pytest.raises(YamlError, match=r"File does not exist|Failed to read file"):
-        world.spawn_model(path, "m")
-    assert world.models == []
-
-
 def test_a_request_to_a_closing_world_fails(files):
     """A request that is made while the world is closing must not wait forever."""
     world = files.load("{properties: {}, layers: []}")
@@ -256,48 +202,6 @@ def test_a_request_to_a_closing_world_fails(files):
     world.close()
     with pytest.raises(WorldError, match="the world is closed"):
         future.result(timeout=0)
-
-
-def test_unknown_names_raise(files):
-    world = files.load("{properties: {}, layers: []}")
-    with pytest.raises(WorldError) as caught:
-        world.delete_model("M")
-    assert (
-        str(caught.value)
-        == 'Flatland World: failed to delete model, model with name "M" does not exist'
-    )
-    with pytest.raises(WorldError) as caught:
-        world.move_model("M", (0, 0, 0))
-    assert (
-        str(caught.value)
-        == 'Flatland World: failed to move model, model with name "M" does not exist'
-    )
-    with pytest.raises(WorldError, match='model with name "M" does not exist'):
-        world.model("M")
-
-
-@pytest.mark.parametrize(
-    ("path", "name", "namespace", "error"),
-    [
-        ("minimal.model.yaml", "", "", "its name must not be empty"),
-        ("", "m", "", "the path must not be empty"),
-        ("minimal.model.yaml", "m", "my robot", 'namespace "my robot" is not a legal ROS name'),
-        ("minimal.model.yaml", "m", "1st", "is not a legal ROS name"),
-        ("minimal.model.yaml", "m", "a//b c", "is not a legal ROS name"),
-        ("minimal.model.yaml", "there", "", 'Model with name "there" already exists'),
-        ("nowhere.yaml", "m", "", 'File does not exist, path="'),
-        (".", "m", "", "Flatland YAML: "),
-    ],
-)
-def test_a_failed_spawn_leaves_the_world_unchanged(files, path, name, namespace, error):
-    world = files.load("{properties: {}, layers: []}")
-    there = world.spawn_model("minimal.model.yaml", "there", pose=(20, 20, 0))
-    with pytest.raises((WorldError, YamlError)) as caught:
-        world.spawn_model(path, name, namespace)
-    assert error in str(caught.value)
-    assert world.models == [there]
-    assert world.physics.ray_cast((-5, 0), (5, 0)) is None
-    world.step()
 
 
 def test_a_spawn_that_fails_late_leaves_nothing_behind(files, probe):
@@ -370,14 +274,6 @@ def test_requests_of_a_hook_run_after_the_step(files, probe, hook):
     world.step(10)
 
 
-def test_a_failed_request_of_a_hook_is_logged(files, probe, caplog):
-    world = files.load("{properties: {}, layers: []}")
-    world.spawn_model("probe.model.yaml", "a")
-    probe.hook, probe.act = "before", staticmethod(lambda p: p.world.delete_model("absent"))
-    world.step()
-    assert 'model with name "absent" does not exist' in caplog.text
-
-
 def test_step_and_close_raise_in_a_hook(files, probe, caplog):
     world = files.load("{properties: {}, layers: []}", plugin_errors="disable")
     world.spawn_model("probe.model.yaml", "a")
@@ -390,48 +286,6 @@ def test_step_and_close_raise_in_a_hook(files, probe, caplog):
     world.step()
     assert "close must not be called from a plugin's hook" in caplog.text
     assert world.timekeeper.sim_time_ns == 10_000_000
-
-
-@pytest.mark.threads
-def test_requests_of_other_threads_run_between_steps(files):
-    world = files.load("{properties: {}, layers: []}")
-    errors = []
-    running = threading.Event()
-    stop = threading.Event()
-
-    def drive():
-        running.set()
-        while not stop.is_set():
-            world.step(10)
-
-    def send_requests(index):
-        try:
-            for turn in range(20):
-                name = f"m{index}"
-                world.spawn_model("minimal.model.yaml", name, pose=(index, 0, 0))
-                world.move_model(name, (index, turn, 0))
-                # Reading a body during a physics step raises.
-                pose = world.between_steps(lambda: world.model(name).pose)  # noqa: B023
-                assert pose[1] == pytest.approx(turn)
-                world.delete_model(name)
-            with pytest.raises(WorldError):
-                world.delete_model(f"absent{index}")
-        except BaseException as error:
-            errors.append(error)
-
-    driver = threading.Thread(target=drive)
-    askers = [threading.Thread(target=send_requests, args=(i,)) for i in range(4)]
-    driver.start()
-    running.wait()
-    for thread in askers:
-        thread.start()
-    for thread in askers:
-        thread.join()
-    stop.set()
-    driver.join()
-    assert errors == []
-    assert world.models == []
-    assert world.time > 0
 
 
 def test_posted_actions_run_in_order_even_while_paused(files):
@@ -495,37 +349,8 @@ def test_ports_are_found_by_topic(files):
         command.set(flatland.Twist())
 
 
-def test_seed_makes_noise_repeatable(files):
-    files.write(
-        "noisy.model.yaml",
-        """
-        bodies: [{name: base, footprints: [{type: circle, radius: 0.2, density: 1}]}]
-        plugins: [{name: drive, type: DiffDrive, body: base, odom_pose_noise: [1, 1, 1]}]
-        """,
-    )
-
-    def run(seed):
-        world = files.load("{properties: {}, layers: []}", seed=seed)
-        for name in ("a", "b"):
-            world.spawn_model("noisy.model.yaml", name, name)
-        outputs = [world.output(f"/{name}/odometry/filtered") for name in ("a", "b")]
-        world.step(3)
-        return [output.latest.pose for output in outputs]
-
-    assert run(5) == run(5)
-    assert run(5) != run(6)
-    first, second = run(5)
-    assert first != second
-
-
-@pytest.mark.parametrize("step_size", [0.0, -1.0, math.nan, math.inf, 1e-7, 1001.0])
-def test_step_size_is_checked(files, step_size):
-    with pytest.raises(ValueError, match="step_size must be from 1e-06 to 1000 s"):
-        files.load("{properties: {}, layers: []}", step_size=step_size)
-
-
 def test_a_world_can_be_created_without_a_file(tmp_path):
-    with World(seed=3, base_dir=tmp_path) as world:
+    with World(seed=3, source=WorldSource(folder=tmp_path)) as world:
         (tmp_path / "m.yaml").write_text("bodies: [{name: b, footprints: []}]")
         world.spawn_model("m.yaml", "m")
         world.step(3)

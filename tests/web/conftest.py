@@ -1,9 +1,8 @@
-"""Fixtures: a browser for all tests of a process, worlds that it looks at, and its page."""
+"""Fixtures: a browser for all files, a room and its page for a file, reset before each test."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from contextlib import ExitStack
+from collections.abc import Iterator
 
 import pytest
 from chromium import Chromium, missing_programs
@@ -12,29 +11,26 @@ from viewer_page import ViewerPage
 
 
 @pytest.fixture(scope="session")
-def start_browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Callable[[], Chromium]]:
-    """Starts browsers, which end with the last test; skips the test if Chromium is missing."""
+def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Chromium]:
+    """A browser for all tests of a process; the tests are skipped if Chromium is missing."""
     if missing := missing_programs():
         pytest.skip(f"not installed: {', '.join(missing)} (make setup-dev installs them)")
-    with ExitStack() as browsers:
-        yield lambda: browsers.enter_context(Chromium(tmp_path_factory.mktemp("downloads")))
+    with Chromium(tmp_path_factory.mktemp("downloads")) as browser:
+        yield browser
 
 
-@pytest.fixture(scope="session")
-def browser(start_browser: Callable[[], Chromium]) -> Chromium:
-    """A browser for most tests."""
-    return start_browser()
-
-
-@pytest.fixture(scope="session")
-def other_browser(start_browser: Callable[[], Chromium]) -> Chromium:
-    """A second browser, which shares nothing with the first one."""
-    return start_browser()
+@pytest.fixture(scope="module", autouse=True)
+def closed_page(browser: Chromium) -> Iterator[None]:
+    """Closes the page after the tests of a file; it would use half a processor in other tests."""
+    yield
+    browser.driver.get("about:blank")
 
 
 @pytest.fixture(scope="module")
-def shared_room(tmp_path_factory: pytest.TempPathFactory) -> Iterator[ViewedWorld]:
-    """A room with a robot and a crate that runs in real time, for all tests of a file."""
+def shared_room(
+    tmp_path_factory: pytest.TempPathFactory, closed_page: None
+) -> Iterator[ViewedWorld]:
+    """A room with a robot and a crate that runs in real time."""
     with viewed_room(tmp_path_factory.mktemp("room")) as room:
         yield room
 
@@ -48,11 +44,13 @@ def room(shared_room: ViewedWorld) -> ViewedWorld:
 
 @pytest.fixture
 def page(room: ViewedWorld, browser: Chromium) -> Iterator[ViewerPage]:
-    """The page with the room; the test fails if the page logs an error."""
+    """The page with the room in its first state; the test fails if the page logs an error."""
     page = ViewerPage(browser)
-    browser.console()
-    page.open(room.viewer.url)
+    if browser.driver.current_url.startswith(room.viewer.url):
+        page.reset()
+    else:
+        browser.console()
+        page.open(room.viewer.url)
+    page.wait_for_poses({name: room.pose(name) for name in room.names()})
     yield page
     assert browser.console() == []
-    browser.evaluate("localStorage.clear()")
-    browser.open("about:blank")

@@ -28,48 +28,38 @@ def rooms(tmp_path: Path) -> Iterator[list[ViewedWorld]]:
             room.close()
 
 
-@pytest.fixture
-def grid(rooms: list[ViewedWorld], browser: Chromium) -> Iterator[ViewerPage]:
-    """The page with all rooms."""
-    browser.console()
-    page = ViewerPage(browser)
-    page.open(rooms[0].viewer.url)
-    page.browser.until(
-        "flatland.state.worlds.length === 4 &&"
-        " flatland.state.worlds.every((world) => world.models.robot)"
-    )
-    yield page
-    assert browser.console() == []
-    browser.open("about:blank")
-
-
-def robots(image: Image) -> int:
+def robots(page: ViewerPage, image: Image) -> int:
     """The number of connected areas of the colour of the robot."""
-    count, _, stats, _ = cv2.connectedComponentsWithStats(mask(image, ROBOT_COLOR).astype(np.uint8))
+    found = mask(page.canvas(image), ROBOT_COLOR).astype(np.uint8)
+    count, _, stats, _ = cv2.connectedComponentsWithStats(found)
     return sum(int(stats[i, cv2.CC_STAT_AREA]) > 20 for i in range(1, count))
 
 
 def test_all_worlds_are_visible_and_one_is_enlarged(
-    rooms: list[ViewedWorld], grid: ViewerPage
+    rooms: list[ViewedWorld], browser: Chromium
 ) -> None:
-    browser = grid.browser
-    browser.picture_until("four robots", lambda image: robots(grid.canvas(image)) == 4)
+    page = ViewerPage(browser)
+    browser.console()
+    page.open(rooms[0].viewer.url)
+
+    def wait_for_robots(number: int) -> None:
+        browser.picture_until(f"{number} robots", lambda image: robots(page, image) == number)
+
+    wait_for_robots(4)
     rooms[2].ask(lambda: rooms[2].world.command("/cmd_vel").set(Twist(linear_x=1.0)))
     browser.until("flatland.state.worlds[2].models.robot.pose[0] > -1")
-    assert grid.pose("robot", 1) == pytest.approx((-2, 1, 0))
+    assert page.pose("robot", 1) == pytest.approx((-2, 1, 0))
     browser.click(".tile:nth-child(3)")
     browser.until("flatland.state.current === 2")
-    browser.picture_until("one robot", lambda image: robots(grid.canvas(image)) == 1)
+    wait_for_robots(1)
     browser.click("#pause")
     wait_until("that world is paused", lambda: rooms[2].ask(lambda: rooms[2].world.paused))
     assert not rooms[1].ask(lambda: rooms[1].world.paused)
     browser.click("#all-worlds")
-    browser.picture_until("four robots again", lambda image: robots(grid.canvas(image)) == 4)
-
-
-def test_worlds_come_and_go(rooms: list[ViewedWorld], grid: ViewerPage) -> None:
-    browser = grid.browser
+    wait_for_robots(4)
     rooms.pop().close()
-    browser.picture_until("three robots", lambda image: robots(grid.canvas(image)) == 3)
+    wait_for_robots(3)
     rooms.append(ViewedWorld(rooms[0].viewer, Path(rooms[0].world.path), name="another"))
-    browser.picture_until("four robots", lambda image: robots(grid.canvas(image)) == 4)
+    wait_for_robots(4)
+    assert browser.console() == []
+    browser.open("about:blank")

@@ -63,21 +63,3 @@ def test_a_cell_shows_the_world_while_the_program_steps_it(
                 browser.driver.switch_to.default_content()
             assert browser.console() == []
             browser.open("about:blank")
-
-
-def test_a_page_of_another_site_cannot_show_a_view_without_its_token(
-    browser: Chromium, tmp_path: Path
-) -> None:
-    with World.from_yaml(write_room(tmp_path), seed=1) as world:
-        view = world.view()
-        frame = view._repr_html_().replace(view.url.split("token=")[1], "guess")
-        with notebook(frame) as url:
-            browser.open(url)
-            browser.driver.switch_to.frame(browser.driver.find_element("tag name", "iframe"))
-            try:
-                browser.until("document.body.innerText.includes('token')")
-                assert browser.evaluate("flatland.state.worlds") == []
-            finally:
-                browser.driver.switch_to.default_content()
-            browser.open("about:blank")
-        browser.console()

@@ -1,4 +1,4 @@
-"""What the page shows: the moving robot, displays, the view, and links to it."""
+"""What the page draws: the moving robot, displays, the view, and links to it."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from chromium import Chromium, Image, centroid, line, mask
+from chromium import Image, centroid, line, mask
 from viewed_world import CRATE_COLOR, ROBOT_COLOR, WALL_COLOR, ViewedWorld
 from viewer_page import ViewerPage
 from waiting import wait_until
@@ -28,10 +28,27 @@ def pixels(image: Image, color: tuple[int, int, int]) -> int:
     return int(np.count_nonzero(mask(image, color)))
 
 
-def test_the_picture_shows_the_robot_move(room: ViewedWorld, page: ViewerPage) -> None:
+def pause(room: ViewedWorld, page: ViewerPage) -> None:
+    """Pauses the world and waits until the page has drawn its last state."""
+    room.ask(room.world.pause)
+    page.wait_for_pause()
+    page.wait_for_poses({name: room.pose(name) for name in room.names()}, paused=True)
+
+
+def test_the_world_is_drawn_where_it_is_while_the_robot_moves(
+    room: ViewedWorld, page: ViewerPage
+) -> None:
     page.show("scans", False)
-    start = centroid(page.canvas(page.browser.picture()), ROBOT_COLOR)
+    image = page.canvas(page.browser.picture())
+    start = centroid(image, ROBOT_COLOR)
     assert start == close_to(page.screen(-2, 1))
+    assert centroid(image, CRATE_COLOR) == close_to(page.screen(2, -2))
+    rows, columns = np.nonzero(mask(image, WALL_COLOR))
+    left, top = page.screen(-5, 5)
+    right, bottom = page.screen(5, -5)
+    limits = (columns.min(), columns.max(), rows.min(), rows.max())
+    assert limits == close_to((left, right, top, bottom))
+
     drive(room, FORWARD)
     metre = page.scale()
 
@@ -41,70 +58,44 @@ def test_the_picture_shows_the_robot_move(room: ViewedWorld, page: ViewerPage) -
         return x > start[0] + metre
 
     page.browser.picture_until("the robot one metre further", moved)
-    drive(room, Twist())
-    room.ask(room.world.pause)
-    page.wait_for_pause()
-    page.wait_for_frame()
+    pause(room, page)
     x, y, _ = room.pose("robot")
     assert centroid(page.canvas(page.browser.picture()), ROBOT_COLOR) == close_to(page.screen(x, y))
 
 
-def test_walls_models_and_scans_are_drawn_where_they_are(
-    room: ViewedWorld, page: ViewerPage
-) -> None:
+def test_displays_are_switched_off_and_on(page: ViewerPage) -> None:
     page.show("scans", False)
-    image = page.canvas(page.browser.picture())
-    assert centroid(image, CRATE_COLOR) == close_to(page.screen(2, -2))
-    rows, columns = np.nonzero(mask(image, WALL_COLOR))
-    left, top = page.screen(-5, 5)
-    right, bottom = page.screen(5, -5)
-    limits = (columns.min(), columns.max(), rows.min(), rows.max())
-    assert limits == close_to((left, right, top, bottom))
+    for display, color in (("layers", WALL_COLOR), ("models", CRATE_COLOR)):
+        for shown in (True, False, True):
+            page.show(display, shown)
+
+            def is_right(image: Image, color: Any = color, shown: bool = shown) -> bool:
+                found = pixels(page.canvas(image), color)
+                return found > 100 if shown else found < 10
+
+            page.browser.picture_until(f"{display}: {shown}", is_right)
 
 
-@pytest.mark.parametrize(
-    ("display", "color"), [("layers", WALL_COLOR), ("models", CRATE_COLOR)], ids=str
-)
-def test_a_display_is_switched_off_and_on(
-    page: ViewerPage, display: str, color: tuple[int, int, int]
-) -> None:
-    page.show("scans", False)
-    page.browser.picture_until("it is drawn", lambda image: pixels(page.canvas(image), color) > 100)
-    page.show(display, False)
-    page.browser.picture_until("it is gone", lambda image: pixels(page.canvas(image), color) < 10)
-    page.show(display, True)
-    page.browser.picture_until("it is back", lambda image: pixels(page.canvas(image), color) > 100)
-
-
-@pytest.mark.parametrize("display", ["scans", "frames", "names", "trails"])
-def test_a_display_changes_the_picture(room: ViewedWorld, page: ViewerPage, display: str) -> None:
-    for name in ("scans", "frames", "names", "trails"):
-        page.show(name, name == display)
+def test_each_display_changes_the_picture(room: ViewedWorld, page: ViewerPage) -> None:
+    displays = ("scans", "frames", "names", "trails")
+    for display in displays:
+        page.show(display, True)
+    page.browser.until("flatland.state.worlds[0].scans === 1")
     drive(room, FORWARD)
     page.browser.until("flatland.state.worlds[0].models.robot.pose[0] > -1")
-    drive(room, Twist())
-    room.ask(room.world.pause)
-    page.wait_for_pause()
-    page.wait_for_frame()
-    shown = page.canvas(page.browser.picture()).astype(int)
-    page.show(display, False)
+    pause(room, page)
+    for display in displays:
+        shown = page.canvas(page.browser.picture()).astype(int)
+        page.show(display, False)
 
-    def is_gone(image: Image) -> bool:
-        return int((np.abs(page.canvas(image) - shown).max(axis=-1) > 25).sum()) > 30
+        def is_gone(image: Image, shown: Any = shown) -> bool:
+            return int((np.abs(page.canvas(image) - shown).max(axis=-1) > 25).sum()) > 30
 
-    page.browser.picture_until(f"{display} are not drawn", is_gone)
-
-
-def test_lasers_scan_only_for_those_who_look(room: ViewedWorld, page: ViewerPage) -> None:
-    page.browser.until("flatland.state.worlds[0].scans === 1")
-    assert room.scans_wanted()
-    page.show("scans", False)
-    wait_until("the laser rests", lambda: not room.scans_wanted())
-    page.show("scans", True)
-    wait_until("the laser scans", room.scans_wanted)
+        page.browser.picture_until(f"{display} are not drawn", is_gone)
+        page.wait_for_frame()
 
 
-def test_wheel_and_drag_zoom_and_pan(page: ViewerPage) -> None:
+def test_wheel_drag_and_fingers_zoom_and_pan(page: ViewerPage) -> None:
     browser, before = page.browser, page.scale()
     ground = page.screen(0, 3)
     browser.wheel(ground, -240)
@@ -115,12 +106,9 @@ def test_wheel_and_drag_zoom_and_pan(page: ViewerPage) -> None:
     browser.drag(start, end)
     assert page.screen(0, 3) == close_to(end)
 
-
-def test_keys_and_fingers_zoom(page: ViewerPage) -> None:
-    browser = page.browser
     browser.resize(1200, 800, touch=True)
     try:
-        center, before = page.screen(0, 0), page.scale()
+        center, before = page.screen(0, 3), page.scale()
         near = [(center[0] - 40, center[1]), (center[0] + 40, center[1])]
         far = [(center[0] - 120, center[1]), (center[0] + 120, center[1])]
         browser.touch("Start", *near)
@@ -128,7 +116,7 @@ def test_keys_and_fingers_zoom(page: ViewerPage) -> None:
             browser.touch("Move", left, right)
         browser.touch("End")
         assert page.scale() == pytest.approx(3 * before, rel=0.1)
-        assert page.screen(0, 0) == close_to(center, 6)
+        assert page.screen(0, 3) == close_to(center, 6)
     finally:
         browser.resize(1200, 800)
 
@@ -139,9 +127,7 @@ def test_the_view_follows_the_selected_robot(room: ViewedWorld, page: ViewerPage
     page.browser.until("flatland.state.followed === 'robot'")
     drive(room, FORWARD)
     page.browser.until("flatland.state.worlds[0].models.robot.pose[0] > -1")
-    room.ask(room.world.pause)
-    page.wait_for_pause()
-    page.wait_for_frame()
+    pause(room, page)
     x, y, _ = room.pose("robot")
     box = page.browser.evaluate(
         "((b) => [b.x + b.width / 2, b.y + b.height / 2])"
@@ -152,18 +138,30 @@ def test_the_view_follows_the_selected_robot(room: ViewedWorld, page: ViewerPage
     page.browser.until("flatland.state.followed === null")
 
 
-def test_a_link_restores_the_view(
-    room: ViewedWorld, page: ViewerPage, other_browser: Chromium
-) -> None:
+def test_a_link_restores_the_view(page: ViewerPage) -> None:
     browser = page.browser
     browser.wheel(page.screen(1, 1), -360)
     browser.drag(page.screen(0, 2), page.screen(0.5, 2.5))
     page.show("names", False)
     browser.click("#share")
-    url = browser.until("location.hash.includes('zoom') && location.href")
     browser.until("document.querySelector('#notices').innerText.startsWith('Link')")
-    other = ViewerPage(other_browser)
-    other.open(url)
-    assert other.scale() == pytest.approx(page.scale(), rel=0.01)
-    assert other.screen(1, 1) == close_to(page.screen(1, 1), 3)
-    assert not other_browser.evaluate("document.querySelector('[data-display=names]').checked")
+    url = browser.until("location.hash.includes('zoom') && location.href")
+    scale, point = page.scale(), page.screen(1, 1)
+    page.open(url)
+    assert page.scale() == pytest.approx(scale, rel=0.01)
+    assert page.screen(1, 1) == close_to(point)
+    assert not browser.evaluate("document.querySelector('[data-display=names]').checked")
+
+
+def test_lasers_scan_only_for_visible_pages_that_show_scans(
+    room: ViewedWorld, page: ViewerPage
+) -> None:
+    wait_until("the laser scans", room.scans_wanted)
+    page.show("scans", False)
+    wait_until("the laser rests", lambda: not room.scans_wanted())
+    page.show("scans", True)
+    wait_until("the laser scans again", room.scans_wanted)
+    with page.browser.tab_in_front():
+        wait_until("the laser rests for a hidden tab", lambda: not room.scans_wanted())
+    wait_until("the laser scans for a visible tab", room.scans_wanted)
+    page.browser.until("flatland.state.worlds[0].time > arguments[0]", room.time())

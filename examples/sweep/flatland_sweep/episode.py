@@ -222,7 +222,7 @@ def _hash_files(world: World) -> str:
     """Returns a hash of the names and contents of all files that a world was loaded from."""
     digest = hashlib.sha256()
     folder = Path(world.path).absolute().parent
-    for path in sorted(os.path.relpath(path, folder) for path in world.inputs.files):
+    for path in sorted(os.path.relpath(path, folder) for path in world.source.inputs.files):
         content = Path(folder, path).read_bytes()
         digest.update(f"{path}\0{len(content)}\0".encode())
         digest.update(content)

@@ -2,7 +2,7 @@
 
 from ackermann_msgs.msg import AckermannDriveStamped  # type: ignore[import-not-found]
 
-from flatland.ros.adapters import register_adapter
+from flatland.ros.adapters import register_built_in
 from flatland.values import AckermannCommand
 
 
@@ -14,4 +14,4 @@ def from_message(message: AckermannDriveStamped) -> AckermannCommand:
     )
 
 
-register_adapter(AckermannCommand, AckermannDriveStamped, from_message=from_message)
+register_built_in(AckermannCommand, AckermannDriveStamped, from_message=from_message)

@@ -1,56 +1,37 @@
-"""Conversion of message parts: headers, poses, velocities, covariances."""
+"""Conversion of message parts: stamps, headers, poses."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from typing import Any
 
-from geometry_msgs.msg import Point, Pose, Quaternion, Twist, Vector3
+from genpy import Time
+from geometry_msgs.msg import Point, Pose, Quaternion
 from std_msgs.msg import Header
 
 from flatland import geometry
-from flatland.geometry import DoubleArray, quaternion_from_yaw
-from flatland.ros.stamps import set_stamps as set_stamps
-from flatland.ros.stamps import stamp as stamp
-from flatland.ros.stamps import time as time
+from flatland.geometry import quaternion_from_yaw
+from flatland.node.clock import stamp as stamp
+from flatland.timekeeper import NANOSECONDS
 
 
-def make(message_type: type[Any], *fields: Any) -> Any:
-    """Creates a message from all of its fields in order.
-
-    Equivalent to the constructor of the message, but more than twice as fast.
-    """
-    message = object.__new__(message_type)
-    for name, value in zip(message_type.__slots__, fields, strict=True):
-        setattr(message, name, value)
-    return message
+def time(nanoseconds: int) -> Time:
+    """Converts simulated nanoseconds to the ROS time of a stamp without rounding."""
+    return Time(*divmod(stamp(nanoseconds), NANOSECONDS))
 
 
 def header(stamp: int, frame_id: str) -> Header:
     """Creates a header; rospy sets the sequence number."""
-    return make(Header, 0, time(stamp), frame_id)
+    return Header(0, time(stamp), frame_id)
 
 
-def quaternion(yaw: float, roll: float = 0.0) -> Quaternion:
-    """Creates the rotation about x by `roll` followed by the rotation about z by `yaw` [rad]."""
-    return make(Quaternion, *quaternion_from_yaw(yaw, roll))
+def quaternion(yaw: float) -> Quaternion:
+    """Creates the rotation about z by `yaw` [rad]."""
+    return Quaternion(*quaternion_from_yaw(yaw))
 
 
 def pose(x: float, y: float, yaw: float) -> Pose:
     """Creates a planar pose."""
-    return make(Pose, make(Point, x, y, 0.0), quaternion(yaw))
-
-
-def twist(linear_x: float, linear_y: float, angular_z: float) -> Twist:
-    """Creates a planar velocity."""
-    return make(Twist, make(Vector3, linear_x, linear_y, 0.0), make(Vector3, 0.0, 0.0, angular_z))
-
-
-def covariance(matrix: DoubleArray) -> Sequence[float]:
-    """Flattens a square matrix in row-major order."""
-    numbers: list[float] = matrix.ravel().tolist()
-    return numbers
+    return Pose(Point(x, y, 0.0), quaternion(yaw))
 
 
 def planar_pose(message: Pose) -> geometry.Pose | None:

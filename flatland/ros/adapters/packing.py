@@ -1,12 +1,12 @@
 """Serialized message parts: headers, texts, poses, velocities, covariances.
 
-The functions return what `genpy` writes for the parts that `convert` creates, without creating a
-Python object for each part.
+The functions return what `genpy` writes, without creating a Python object for each part.
 """
 
 from __future__ import annotations
 
 import struct
+from collections.abc import Sequence
 from functools import lru_cache
 from typing import Any, Final
 
@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from flatland.geometry import Pose, quaternion_from_yaw
-from flatland.ros.adapters import convert
+from flatland.node.clock import stamp as clock_stamp
 from flatland.timekeeper import NANOSECONDS
 
 COUNT: Final = struct.Struct("<I")
@@ -33,13 +33,18 @@ def text(value: str) -> bytes:
     return COUNT.pack(len(data)) + data
 
 
+def texts(values: Sequence[str]) -> bytes:
+    """Returns a serialized list of strings."""
+    return COUNT.pack(len(values)) + b"".join(map(text, values))
+
+
 def stamp(time_ns: int) -> bytes:
     """Returns the serialized beginning of a header: the sequence number 0 and the stamp.
 
     Args:
         time_ns: Simulated time [ns].
     """
-    return _HEADER.pack(0, *divmod(convert.stamp(time_ns), NANOSECONDS))
+    return _HEADER.pack(0, *divmod(clock_stamp(time_ns), NANOSECONDS))
 
 
 def header(time_ns: int, frame_id: str) -> bytes:

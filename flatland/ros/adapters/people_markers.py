@@ -7,7 +7,7 @@ from geometry_msgs.msg import Point, Pose, Quaternion, Vector3
 from std_msgs.msg import ColorRGBA, Header
 from visualization_msgs.msg import Marker, MarkerArray
 
-from flatland.ros.adapters import convert, register_adapter
+from flatland.ros.adapters import convert, register_built_in
 from flatland.values import PeopleMarkers
 
 HEIGHT: Final = 1.7  # of a person [m]
@@ -68,4 +68,4 @@ def _marker(
     )
 
 
-register_adapter(PeopleMarkers, MarkerArray, to_message)
+register_built_in(PeopleMarkers, MarkerArray, to_message=to_message)

@@ -5,7 +5,7 @@ from typing import Any
 
 from geometry_msgs.msg import Point
 
-from flatland.ros.adapters import convert, register_adapter
+from flatland.ros.adapters import convert, register_built_in
 from flatland.values import TrackedPeople
 
 _messages: Any = importlib.import_module("people_msgs.msg")
@@ -29,4 +29,4 @@ def to_message(value: TrackedPeople) -> Any:
     return message
 
 
-register_adapter(TrackedPeople, _messages.People, to_message)
+register_built_in(TrackedPeople, _messages.People, to_message=to_message)

@@ -1,16 +1,14 @@
 """The protocol of interactive markers on non-blocking connections, in serialized form.
 
-A client receives the full state on `update_full`, and numbered changes of it on `update`. It starts
-to display markers once it has a full state with a number among those of the updates that it has
-received, and starts again if a number is missing. Keep-alive messages repeat the last number.
+A client receives the full state on `update_full`, and numbered changes on `update`. A client starts
+to display markers when the number of a full state is the number of an update that was received, and
+starts again if a number is missing. Keep-alive messages repeat the last number.
 """
 
 from __future__ import annotations
 
 import struct
 import time
-from collections.abc import Callable
-from concurrent.futures import Future
 from io import BytesIO
 from typing import Any, Final
 
@@ -23,12 +21,17 @@ from visualization_msgs.msg import (
     InteractiveMarkerUpdate,
 )
 
+from flatland.entities.model import Model
 from flatland.geometry import Pose
-from flatland.ros.adapters import packing
+from flatland.node.handles import SERVER_NAME, Event, Feedback, Handles
+from flatland.node.values import ReceivedPose
+from flatland.ros.adapters import convert, packing
+from flatland.ros.interactive.model_handle import model_handle
 from flatland.ros.transport.publisher import Publisher
 from flatland.ros.transport.registrar import Registrar
 from flatland.ros.transport.state_topic import StateTopic
 from flatland.ros.transport.subscriber import Subscriber
+from flatland.runtime.requests import Post
 
 CONNECTING_TIME: Final = 3.0
 """Time after a new connection in which each update is followed by the full state [s]."""
@@ -39,8 +42,13 @@ _NUMBER_AND_TYPE: Final = struct.Struct("<QB")
 _NUMBER: Final = struct.Struct("<Q")
 _HEADER_SIZE: Final = 3 * 4  # bytes of a header before the frame
 
-Feedback = Callable[[InteractiveMarkerFeedback, float], None]
-"""Callback with feedback and the time at which it was received (`time.monotonic`) [s]."""
+_EVENTS: Final = {
+    InteractiveMarkerFeedback.KEEP_ALIVE: Event.KEEP_ALIVE,
+    InteractiveMarkerFeedback.MOUSE_DOWN: Event.PRESS,
+    InteractiveMarkerFeedback.POSE_UPDATE: Event.MOVE,
+    InteractiveMarkerFeedback.MOUSE_UP: Event.RELEASE,
+    InteractiveMarkerFeedback.MENU_SELECT: Event.MENU,
+}
 
 
 class MarkerServer:
@@ -49,25 +57,13 @@ class MarkerServer:
     All methods must be called in the thread that steps the world.
     """
 
-    def __init__(
-        self,
-        registrar: Registrar,
-        name: str,
-        post: Callable[[Callable[[], object]], Future[Any]],
-        *,
-        pose_of: Callable[[str], Pose],
-        receive: Feedback,
-        on_connection: Callable[[], None],
-    ) -> None:
+    def __init__(self, registrar: Registrar, post: Post, handles: Handles) -> None:
         """Advertises the topics asynchronously.
 
         Args:
             registrar: Registers the topics with the ROS master.
-            name: Namespace of the topics.
             post: Runs an action between two steps.
-            pose_of: Returns the current pose of a marker.
-            receive: Called with feedback, between two steps.
-            on_connection: Called in a rospy thread when a client connects or disconnects.
+            handles: Returns the poses of the markers, and receives feedback.
         """
         self._server_id = packing.text(rospy.get_name())
         self._number = 0  # of the last update
@@ -76,16 +72,15 @@ class MarkerServer:
         self._inserted: dict[str, None] = {}
         self._moved: dict[str, None] = {}
         self._erased: list[str] = []
-        self._pose_of = pose_of
+        self._pose_of = handles.pose_of
         self._post = post
-        self._receive = receive
-        self._on_connection = on_connection
+        self._handles = handles
         self._connecting_until = 0.0  # s, `time.monotonic`
         self._full_state_due = 0.0
         self._full_state_is_outdated = False  # for those who have subscribed to it for long
         self._init = StateTopic(
             registrar,
-            f"{name}/update_full",
+            f"{SERVER_NAME}/update_full",
             InteractiveMarkerInit,
             self._full_state,
             post,
@@ -93,13 +88,13 @@ class MarkerServer:
         )
         self._update = Publisher(
             registrar,
-            f"{name}/update",
+            f"{SERVER_NAME}/update",
             InteractiveMarkerUpdate,
             queue_size=_UPDATE_QUEUE,
             on_connection=self._connection_changed,
         )
         self._feedback = Subscriber(
-            registrar, f"{name}/feedback", InteractiveMarkerFeedback, self._receive_feedback
+            registrar, f"{SERVER_NAME}/feedback", InteractiveMarkerFeedback, self._receive_feedback
         )
 
     @property
@@ -109,10 +104,10 @@ class MarkerServer:
 
     # -- changes ---------------------------------------------------------------------------
 
-    def insert(self, marker: InteractiveMarker) -> None:
-        """Adds or replaces a marker; takes effect with the next update."""
-        self._markers[marker.name] = _PackedMarker(marker)
-        self._inserted[marker.name] = None
+    def insert(self, model: Model, name: str) -> None:
+        """Adds or replaces the marker of a model; takes effect with the next update."""
+        self._markers[name] = _PackedMarker(model_handle(model, name))
+        self._inserted[name] = None
 
     def move(self, name: str) -> None:
         """Publishes the current pose of a marker with the next update."""
@@ -124,7 +119,7 @@ class MarkerServer:
         del self._markers[name]
         self._moved.pop(name, None)
         if name in self._inserted:
-            del self._inserted[name]  # It has not been published.
+            del self._inserted[name]  # The marker has not been published.
         else:
             self._erased.append(name)
 
@@ -201,12 +196,19 @@ class MarkerServer:
 
     def _connection_changed(self, _connected: bool) -> None:
         self._connecting_until = time.monotonic() + CONNECTING_TIME
-        self._on_connection()
+        self._handles.connection_changed()
 
-    def _receive_feedback(self, feedback: InteractiveMarkerFeedback) -> None:
+    def _receive_feedback(self, message: InteractiveMarkerFeedback) -> None:
         """Posts feedback to the thread that steps the world."""
-        now = time.monotonic()
-        self._post(lambda: self._receive(feedback, now))
+        feedback = Feedback(
+            message.marker_name,
+            message.client_id,
+            _EVENTS.get(message.event_type, Event.OTHER),
+            message.menu_entry_id,
+            ReceivedPose(message.header.frame_id.lstrip("/"), convert.planar_pose(message.pose)),
+            time.monotonic(),
+        )
+        self._post(lambda: self._handles.receive(feedback))
 
 
 class _PackedMarker:

@@ -11,12 +11,13 @@ from geometry_msgs.msg import Pose as PoseMessage
 from std_msgs.msg import ColorRGBA
 from visualization_msgs.msg import InteractiveMarker, InteractiveMarkerControl, Marker, MenuEntry
 
-from flatland.entities.body import Body
 from flatland.entities.model import Model
 from flatland.geometry import DoubleArray, Pose, compose, invert
+from flatland.node.handles import DELETE_ENTRY
 from flatland.ros.adapters import convert
-from flatland.ros.markers.marker_geometry import outline
+from flatland.ros.markers.marker_geometry import flat
 from flatland.ros.markers.packed_markers import FRAME
+from flatland.scene.description import BodyDescription, describe_model
 
 HANDLE_SIZE: Final = (0.5, 0.5, 0.05)  # m
 HANDLE_COLOR: Final = (0.0, 1.0, 0.0, 0.5)
@@ -25,9 +26,6 @@ NAME_HEIGHT: Final = 0.4  # m
 NAME_COLOR: Final = (1.0, 1.0, 1.0, 1.0)
 LINE_WIDTH: Final = 0.03  # m
 MIN_SCALE: Final = 1.0  # m; diameter of the ring that rotates the model
-
-DELETE_ENTRY: Final = 1
-"""Id of the menu entry that deletes the model."""
 
 # Rotates the x axis, about which a control acts, to the z axis.
 _ABOUT_Z: Final = Quaternion(0.0, math.sqrt(0.5), 0.0, math.sqrt(0.5))
@@ -104,12 +102,12 @@ class _ModelOutline:
         self.markers: list[Marker] = []
         self.radius = 0.0
         to_first = invert(model.pose)
-        for body in model.bodies:
-            outlines = [outline(fixture) for fixture in body.fixtures]
-            if outlines:
-                self._add(body, compose(to_first, body.pose), np.concatenate(outlines))
+        for body in describe_model(model).bodies:
+            if body.shapes:
+                points = flat(np.concatenate([shape.segments() for shape in body.shapes]))
+                self._add(body, compose(to_first, body.pose), points)
 
-    def _add(self, body: Body, pose: Pose, points: DoubleArray) -> None:
+    def _add(self, body: BodyDescription, pose: Pose, points: DoubleArray) -> None:
         if body.visible:
             marker = _marker(Marker.LINE_LIST, (LINE_WIDTH, 0.0, 0.0), body.color)
             marker.pose = pose_message(pose)

@@ -1,4 +1,4 @@
-"""Debug markers: one topic per layer and per model, for RViz and the viewer."""
+"""Debug markers for RViz and the viewer: one topic per layer and per model, and combined topics."""
 
 from __future__ import annotations
 
@@ -13,14 +13,15 @@ from visualization_msgs.msg import MarkerArray
 from flatland.entities.layer import Layer
 from flatland.entities.model import Model
 from flatland.errors import FlatlandError
+from flatland.node.names import UniqueNames, legal_name
+from flatland.node.ticker import Ticker, TickerThread
+from flatland.ros.markers.combined_markers import CombinedMarkers, Make
 from flatland.ros.markers.layer_markers import LayerMarkers
 from flatland.ros.markers.model_markers import ModelMarkers
 from flatland.ros.markers.packed_markers import PackedMarkers
 from flatland.ros.message_types import message_class
-from flatland.ros.names import UniqueNames, legal_name
 from flatland.ros.transport.registrar import Registrar
 from flatland.ros.transport.state_topic import StateTopic
-from flatland.ros.transport.ticker import Ticker, TickerThread
 from flatland.runtime.observer import WorldObserver
 from flatland.simulation import Simulation
 
@@ -40,7 +41,7 @@ class _Entry:
 
 
 class DebugTopics(WorldObserver):
-    """Publishes the markers of each layer and each model on a topic of its own.
+    """Publishes the markers of each layer and each model on separate and on combined topics.
 
     Markers are created only for topics with subscribers. A new subscriber receives the current
     state, even if the world is paused.
@@ -62,6 +63,8 @@ class DebugTopics(WorldObserver):
         self._world = simulation.world
         self._closed = False
         self._names = UniqueNames()
+        self._layer_markers: dict[str, LayerMarkers] = {}
+        self._model_markers: dict[str, ModelMarkers] = {}
         self._layers: dict[str, list[_Entry]] = {}
         self._models: dict[str, _Entry] = {}
         self._closing: dict[str, tuple[StateTopic, float]] = {}  # by name, with the closing time
@@ -71,6 +74,9 @@ class DebugTopics(WorldObserver):
             self._add_layer(layer)
         for model in self._world.models:
             self._add_model(model)
+        self._combined = CombinedMarkers(
+            self._layer_markers, self._model_markers, self._open_markers
+        )
         self._world.add_observer(self)
 
     def close(self) -> None:
@@ -90,6 +96,7 @@ class DebugTopics(WorldObserver):
         else:
             self._add_layer(self._world.layer(layer_name))
             self._topics.send()
+        self._combined.send_layers()
 
     def model_added(self, model: Model) -> None:
         """Advertises the topic of a model."""
@@ -102,23 +109,27 @@ class DebugTopics(WorldObserver):
         entry = self._models.pop(model.name, None)
         if entry is None or self._closed:
             return
+        del self._model_markers[model.name]
+        self._combined.delete_models()
         self._names.release(entry.name)
-        entry.topic.replace(self._with_time(PackedMarkers.deletion_of_all))
+        entry.topic.replace(
+            self._with_time(lambda time_ns: PackedMarkers.deletion_of_all(time_ns).packed)
+        )
         self._closing[entry.name] = entry.topic, time.monotonic() + CLOSE_DELAY
         self._topics.send()
         self._ticker.wake()
 
     def _add_layer(self, layer: Layer) -> None:
-        markers = LayerMarkers(layer)
+        markers = self._layer_markers[layer.name] = LayerMarkers(layer)
         self._layers[layer.name] = [
-            self._open_entry("layer", layer.name, "", markers.lines),
-            self._open_entry("layer", layer.name, "_3d", markers.walls),
+            self._open_entry("layer", layer.name, "", lambda ns: markers.lines(ns).packed),
+            self._open_entry("layer", layer.name, "_3d", lambda ns: markers.walls(ns).packed),
         ]
 
     def _add_model(self, model: Model) -> None:
-        markers = ModelMarkers(model)
+        markers = self._model_markers[model.name] = ModelMarkers(model)
         self._models[model.name] = self._open_entry(
-            "model", model.name, "", markers.message, lambda _connected: self._ticker.wake()
+            "model", model.name, "", lambda ns: markers.message(ns).packed, periodic=True
         )
 
     # -- topics ----------------------------------------------------------------------------
@@ -128,8 +139,9 @@ class DebugTopics(WorldObserver):
         kind: str,
         name: str,
         suffix: str,
-        make: Callable[[int], PackedMarkers],
-        on_connection: Callable[[bool], None] | None = None,
+        make: Make,
+        *,
+        periodic: bool = False,
     ) -> _Entry:
         """Advertises the markers of a layer or a model under an unused legal name."""
         preferred = f"{kind}/{legal_name(name)}{suffix}"
@@ -140,7 +152,7 @@ class DebugTopics(WorldObserver):
                 topic.replace(self._with_time(make))
             else:
                 try:
-                    topic = self._open(claimed, MarkerArray, self._with_time(make), on_connection)
+                    topic = self._open_markers(claimed, make, periodic)
                 except FlatlandError:
                     continue  # A plugin uses the topic for another message type.
             if claimed != f"{kind}/{name}{suffix}":
@@ -169,8 +181,12 @@ class DebugTopics(WorldObserver):
             on_connection=on_connection,
         )
 
-    def _with_time(self, make: Callable[[int], PackedMarkers]) -> Callable[[], bytes]:
-        return lambda: make(self._world.timekeeper.sim_time_ns).packed
+    def _open_markers(self, name: str, make: Make, periodic: bool) -> StateTopic:
+        wake = (lambda _connected: self._ticker.wake()) if periodic else None
+        return self._open(name, MarkerArray, self._with_time(make), wake)
+
+    def _with_time(self, make: Make) -> Callable[[], bytes]:
+        return lambda: make(self._world.timekeeper.sim_time_ns)
 
     def _topic_list(self) -> Any:
         layers = [entry for entries in self._layers.values() for entry in entries]
@@ -182,4 +198,6 @@ class DebugTopics(WorldObserver):
             self._closing.pop(name)[0].close()
         for entry in self._models.values():
             entry.topic.send()
-        return bool(self._closing) or any(entry.topic.connected for entry in self._models.values())
+        connected = self._combined.send_models()
+        connected = connected or any(entry.topic.connected for entry in self._models.values())
+        return connected or bool(self._closing)

@@ -4,14 +4,18 @@ from __future__ import annotations
 
 import logging
 import math
+from collections.abc import Callable
+from functools import partial
 from typing import Any, Final
 
 from visualization_msgs.msg import Marker
 
 from flatland.entities.layer import Layer
-from flatland.ros.markers.marker_geometry import edge_lines, wall_triangles
+from flatland.geometry import DoubleArray, FloatArray
+from flatland.ros.markers.marker_geometry import flat, wall_triangles
 from flatland.ros.markers.model_markers import LINE_WIDTH
 from flatland.ros.markers.packed_markers import PackedMarkers
+from flatland.scene.description import describe_layer
 
 _LOG = logging.getLogger("flatland")
 
@@ -38,11 +42,7 @@ class LayerMarkers:
         Args:
             time_ns: Stamp of the markers, simulated time [ns].
         """
-        layer, markers = self._layer, PackedMarkers(self._layer.name)
-        edges = layer.edges
-        if len(edges):
-            markers.add(Marker.LINE_LIST, edge_lines(edges), scale=LINE_WIDTH, color=layer.color)
-        return self._finish(markers, time_ns)
+        return self._message(time_ns, Marker.LINE_LIST, flat, LINE_WIDTH)
 
     def walls(self, time_ns: int) -> PackedMarkers:
         """Returns the edges as walls; no marker for a layer without edges.
@@ -50,21 +50,26 @@ class LayerMarkers:
         Args:
             time_ns: Stamp of the markers, simulated time [ns].
         """
-        layer, markers = self._layer, PackedMarkers(self._layer.name)
-        edges = layer.edges
-        if len(edges):
-            markers.add(
-                Marker.TRIANGLE_LIST,
-                wall_triangles(edges, *self._heights),
-                scale=(1.0, 1.0, 1.0),
-                color=layer.color,
-                frame_locked=True,
-            )
-        return self._finish(markers, time_ns)
+        walls = partial(wall_triangles, min_z=self._heights[0], max_z=self._heights[1])
+        return self._message(time_ns, Marker.TRIANGLE_LIST, walls, (1.0, 1.0, 1.0), locked=True)
 
-    def _finish(self, markers: PackedMarkers, time_ns: int) -> PackedMarkers:
+    def _message(
+        self,
+        time_ns: int,
+        kind: int,
+        points: Callable[[FloatArray], DoubleArray],
+        scale: tuple[float, float, float],
+        *,
+        locked: bool = False,
+    ) -> PackedMarkers:
+        layer = describe_layer(self._layer)
+        markers = PackedMarkers(layer.name)
+        if len(layer.edges):
+            number = markers.add(
+                kind, points(layer.edges), scale=scale, color=layer.color, frame_locked=locked
+            )
+            markers.set_poses([number], layer.pose)
         markers.set_stamp(time_ns)
-        markers.set_poses(range(len(markers)), self._layer.body.pose)
         return markers
 
 

@@ -1,4 +1,4 @@
-"""A MarkerArray that is stored in serialized form.
+"""Serialized MarkerArray messages.
 
 The points of an ordinary marker are Python objects, and a map has hundreds of thousands of them.
 Here, points are copied from an array to the serialized message. Stamps and poses, which change from
@@ -10,16 +10,16 @@ from __future__ import annotations
 import struct
 from collections.abc import Iterable, Sequence
 from io import BytesIO
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 import numpy.typing as npt
 from std_msgs.msg import ColorRGBA
-from visualization_msgs.msg import Marker, MarkerArray
+from visualization_msgs.msg import Marker
 
 from flatland.geometry import quaternion_from_yaw
+from flatland.node.names import sendable_text
 from flatland.ros.adapters import convert
-from flatland.ros.names import sendable_text
 from flatland.timekeeper import NANOSECONDS
 
 FRAME: Final = "map"
@@ -34,8 +34,8 @@ _BEFORE_POSE: Final = 3 * 4  # bytes of id, type, action
 _POSE_TO_POINTS: Final = 7 * 8 + 3 * 8 + 4 * 4 + 2 * 4 + 1
 
 
-class PackedMarkers(MarkerArray):  # type: ignore[misc]
-    """Markers in the frame `map`, numbered from 0, with a common namespace."""
+class PackedMarkers:
+    """A serialized array of numbered markers in the frame `map`, with a common namespace."""
 
     def __init__(self, namespace: str = "") -> None:
         """Creates an array without markers.
@@ -43,7 +43,6 @@ class PackedMarkers(MarkerArray):  # type: ignore[misc]
         Args:
             namespace: Namespace of all markers.
         """
-        # super().__init__ is not called: it would assign to `markers`, a property here.
         self._namespace = sendable_text(namespace)
         self._data = bytearray(_COUNT.size)
         self._stamp: tuple[int, int] | None = None  # of all markers, None if one was added since
@@ -108,17 +107,15 @@ class PackedMarkers(MarkerArray):  # type: ignore[misc]
         if stamp == self._stamp:
             return
         self._stamp = stamp
-        data, packed = self._data, _STAMP.pack(*stamp)
         for offset in self._stamps:
-            data[offset : offset + _STAMP.size] = packed
+            _STAMP.pack_into(self._data, offset, *stamp)
 
     def set_poses(self, numbers: Iterable[int], pose: tuple[float, float, float]) -> None:
         """Sets the planar pose (x, y, theta) of several markers."""
         x, y, theta = pose
-        data = _POSE.pack(x, y, 0.0, *quaternion_from_yaw(theta))
+        values = (x, y, 0.0, *quaternion_from_yaw(theta))
         for number in numbers:
-            offset = self._poses[number]
-            self._data[offset : offset + _POSE.size] = data
+            _POSE.pack_into(self._data, self._poses[number], *values)
 
     def set_points(self, number: int, points: bytes) -> None:
         """Replaces the points of a marker.
@@ -128,7 +125,7 @@ class PackedMarkers(MarkerArray):  # type: ignore[misc]
             points: The same number of points (x, y, z) in the frame of the marker [m], as float64.
 
         Raises:
-            ValueError: The number of points differs from that of the marker.
+            ValueError: The number of points differs from the number in the marker.
         """
         offset, count = self._points[number]
         if len(points) != count * _POINT_SIZE:
@@ -144,15 +141,6 @@ class PackedMarkers(MarkerArray):  # type: ignore[misc]
     def packed_markers(self) -> memoryview:
         """The serialized markers without their count; a view of the message."""
         return memoryview(self._data)[_COUNT.size :]
-
-    def serialize(self, buff: Any) -> None:
-        """Serializes the message; called by rospy."""
-        buff.write(self._data)
-
-    @property
-    def markers(self) -> list[Marker]:
-        """The deserialized markers; a new list on each access."""
-        return MarkerArray().deserialize(bytes(self._data)).markers  # type: ignore[no-any-return]
 
     def _new(self, action: int, kind: int = Marker.ARROW) -> Marker:
         marker = Marker(ns=self._namespace, id=len(self), type=kind, action=action)
@@ -184,27 +172,10 @@ class PackedMarkers(MarkerArray):  # type: ignore[misc]
         return number
 
 
-class JoinedMarkers(MarkerArray):  # type: ignore[misc]
-    """The markers of several `PackedMarkers` with different namespaces in one message."""
-
-    def __init__(self, parts: Sequence[PackedMarkers]) -> None:
-        """Stores references; the parts must not change before the message is published."""
-        self._parts = parts
-
-    @property
-    def packed(self) -> bytes:
-        """The serialized message."""
-        count = _COUNT.pack(sum(map(len, self._parts)))
-        return b"".join((count, *(part.packed_markers for part in self._parts)))
-
-    def serialize(self, buff: Any) -> None:
-        """Serializes the message; called by rospy."""
-        buff.write(self.packed)
-
-    @property
-    def markers(self) -> list[Marker]:
-        """The deserialized markers; a new list on each access."""
-        return [marker for part in self._parts for marker in part.markers]
+def join(parts: Sequence[PackedMarkers]) -> bytes:
+    """Returns a serialized message with the markers of several arrays of different namespaces."""
+    count = _COUNT.pack(sum(map(len, parts)))
+    return b"".join((count, *(part.packed_markers for part in parts)))
 
 
 def _packed(points: npt.NDArray[np.float64]) -> bytes:

@@ -10,7 +10,7 @@ import sys
 import time
 from typing import TYPE_CHECKING, Any, Final
 
-from flatland.ros.parameters import ParameterError, TeleopParameters, read_teleop_parameters
+from flatland.node.parameters import ParameterError, TeleopParameters, read_table
 from flatland.ros.teleop.held_key import HeldKey, decode
 from flatland.ros.teleop.terminal import KeyInput, StopRequests
 
@@ -61,7 +61,7 @@ def main() -> int:
 
     log_to_ros()
     try:
-        parameters = read_teleop_parameters(lambda name: rospy.get_param(f"~{name}", None))
+        parameters = read_table(TeleopParameters, lambda name: rospy.get_param(f"~{name}", None))
     except ParameterError as error:
         _LOG.critical("%s", error)
         rospy.signal_shutdown("invalid parameter")

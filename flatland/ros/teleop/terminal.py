@@ -7,7 +7,6 @@ import os
 import signal
 import socket
 import termios
-from types import TracebackType
 from typing import Final
 
 _STOP_SIGNALS: Final = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT)
@@ -41,12 +40,7 @@ class KeyInput:
         termios.tcsetattr(self._fd, termios.TCSADRAIN, attributes)
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *error: object) -> None:
         """Restores the attributes and discards keys that were not read."""
         with contextlib.suppress(termios.error):  # The terminal was closed.
             termios.tcsetattr(self._fd, termios.TCSAFLUSH, self._saved)
@@ -64,7 +58,7 @@ class KeyInput:
 
 
 class StopRequests:
-    """Becomes readable when a signal or another thread requests a stop."""
+    """A file that becomes readable when a signal or another thread requests a stop."""
 
     def __init__(self) -> None:
         """Handles the signals from now on; must be called in the main thread."""

@@ -7,7 +7,6 @@ descriptors left. The XML-RPC server of rospy has a thread for each connection, 
 
 from __future__ import annotations
 
-import errno
 import logging
 import resource
 import select
@@ -27,6 +26,14 @@ from rosgraph.network import (
     write_ros_handshake_header,
 )
 
+from flatland.runtime.client_limits import (
+    ACCEPTED_AT_ONCE,
+    EXHAUSTED,
+    EXHAUSTED_PERIOD,
+    LimitedLog,
+    connection_limit,
+)
+
 _LOG = logging.getLogger("flatland")
 
 HANDSHAKE_TIMEOUT: Final = 10.0  # s from the connection to its complete header
@@ -36,12 +43,8 @@ MAX_HEADER_SIZE: Final = 1 << 20  # bytes
 MAX_REQUEST_SIZE: Final = 1 << 24  # bytes, of XML-RPC
 _MAX_FILES: Final = 65_536  # file descriptors that are requested from the system
 _BACKLOG: Final = 1024  # connections that wait to be accepted
-_ACCEPTED_AT_ONCE: Final = 64
 _POLL_PERIOD: Final = 0.5  # s between two checks of the time limits
-_EXHAUSTED_PERIOD: Final = 0.1  # s until a connection is accepted again
 _CLOSE_PERIOD: Final = 0.005  # s, for a thread to close its connection
-_WARNING_PERIOD: Final = 1.0  # s between two equal warnings
-_EXHAUSTED: Final = (errno.EMFILE, errno.ENFILE, errno.ENOBUFS, errno.ENOMEM)
 _SIZE: Final = struct.Struct("<I")
 
 
@@ -56,26 +59,6 @@ def install() -> None:
         resource.setrlimit(resource.RLIMIT_NOFILE, (max(soft, wanted), hard))
     rospy.impl.tcpros_base.TCPServer = TcprosServer
     rosgraph.xmlrpc.ThreadingXMLRPCServer = XmlRpcServer
-
-
-def _max_connections() -> int:
-    """Returns the limit for each of the two servers: a quarter of all files at most."""
-    soft, _ = resource.getrlimit(resource.RLIMIT_NOFILE)
-    return MAX_CONNECTIONS if soft == resource.RLIM_INFINITY else min(MAX_CONNECTIONS, soft // 4)
-
-
-class _Warnings:
-    """Logs warnings, and equal ones once a second at most."""
-
-    def __init__(self) -> None:
-        self._last = ""
-        self._due = 0.0
-
-    def log(self, text: str) -> None:
-        now = time.monotonic()
-        if text != self._last or now >= self._due:
-            self._last, self._due = text, now + _WARNING_PERIOD
-            _LOG.warning("%s", text)
 
 
 class _Handshake:
@@ -148,9 +131,9 @@ class TcprosServer(rospy.impl.tcpros_base.TCPServer):  # type: ignore[misc]
     def run(self) -> None:
         """Accepts connections until the node ends; called by rospy in a separate thread."""
         self.is_shutdown = False
-        self._warnings = _Warnings()
+        self._warnings = LimitedLog()
         self._pending: dict[int, _Handshake] = {}  # by file descriptor, the oldest first
-        self._max_pending = _max_connections()
+        self._max_pending = connection_limit(MAX_CONNECTIONS)
         self._poll = select.epoll()
         server = self.server_sock.fileno()
         self._poll.register(server, select.EPOLLIN)
@@ -160,7 +143,7 @@ class TcprosServer(rospy.impl.tcpros_base.TCPServer):  # type: ignore[misc]
             except Exception:
                 if not self.is_shutdown:
                     _LOG.exception("cannot accept connections of ROS clients")
-                    time.sleep(_EXHAUSTED_PERIOD)
+                    time.sleep(EXHAUSTED_PERIOD)
 
     def _serve(self, server: int) -> None:
         """Waits for events of the server and of incomplete connections, and handles them."""
@@ -174,16 +157,16 @@ class TcprosServer(rospy.impl.tcpros_base.TCPServer):  # type: ignore[misc]
             self._drop_oldest()
 
     def _accept(self) -> None:
-        for _ in range(_ACCEPTED_AT_ONCE):
+        for _ in range(ACCEPTED_AT_ONCE):
             try:
                 handshake = _Handshake(*self.server_sock.accept())
             except BlockingIOError:
                 return
             except OSError as error:
-                if error.errno in _EXHAUSTED:
-                    self._warnings.log(f"cannot accept connections of ROS clients: {error}")
+                if error.errno in EXHAUSTED:
+                    self._warnings.warn(f"cannot accept connections of ROS clients: {error}")
                     if not self._drop_oldest():
-                        time.sleep(_EXHAUSTED_PERIOD)
+                        time.sleep(EXHAUSTED_PERIOD)
                 return
             if len(self._pending) >= self._max_pending:
                 self._drop_oldest()
@@ -203,7 +186,7 @@ class TcprosServer(rospy.impl.tcpros_base.TCPServer):  # type: ignore[misc]
             self._forget(handshake)
             handshake.socket.close()
             host = handshake.address[0]
-            self._warnings.log(f"closed a connection from {host}: not a header of TCPROS: {error}")
+            self._warnings.warn(f"closed a connection from {host}: not a header of TCPROS: {error}")
         else:
             self._forget(handshake)
             self._connect(handshake, header)
@@ -225,13 +208,13 @@ class TcprosServer(rospy.impl.tcpros_base.TCPServer):  # type: ignore[misc]
                     refusal = "node shutting down"
                 else:
                     client = header.get("callerid", address[0])
-                    self._warnings.log(f"refused a connection of {client}: {refusal}")
+                    self._warnings.warn(f"refused a connection of {client}: {refusal}")
                 write_ros_handshake_header(connection, {"error": refusal})
                 connection.close()
         except Exception as error:
             connection.close()
             if not rospy.core.is_shutdown_requested():
-                self._warnings.log(f"a connection from {address[0]} failed: {error}")
+                self._warnings.warn(f"a connection from {address[0]} failed: {error}")
 
     def _forget(self, handshake: _Handshake) -> None:
         number = handshake.socket.fileno()
@@ -246,7 +229,7 @@ class TcprosServer(rospy.impl.tcpros_base.TCPServer):  # type: ignore[misc]
         self._forget(handshake)
         handshake.socket.close()
         host = handshake.address[0]
-        self._warnings.log(f"closed a connection from {host}: its header is not complete")
+        self._warnings.warn(f"closed a connection from {host}: its header is not complete")
         return True
 
 
@@ -269,9 +252,9 @@ class _RequestHandler(rosgraph.xmlrpc.SilenceableXMLRPCRequestHandler):  # type:
 class XmlRpcServer(rosgraph.xmlrpc.ThreadingXMLRPCServer):  # type: ignore[misc]
     """Handles requests of other nodes and of the master, in a thread for each connection.
 
-    If there are more than `MAX_CONNECTIONS`, or no file descriptors are left, the one
-    that has been without a request for the longest time is closed. Clients with an open connection
-    that they do not use connect again.
+    If there are more than `MAX_CONNECTIONS`, or no file descriptors are left, the connection that
+    has been without a request for the longest time is closed. Its client connects again when
+    necessary.
     """
 
     def __init__(self, address: tuple[str, int], log_requests: int = 1) -> None:
@@ -281,8 +264,8 @@ class XmlRpcServer(rosgraph.xmlrpc.ThreadingXMLRPCServer):  # type: ignore[misc]
             address: Address and port, 0 for any.
             log_requests: Whether to log each request.
         """
-        self._warnings = _Warnings()
-        self._max_connections = _max_connections()
+        self._warnings = LimitedLog()
+        self._max_connections = connection_limit(MAX_CONNECTIONS)
         self._lock = threading.Lock()
         self._idle: dict[socket.socket, None] = {}  # the oldest first
         self._busy: set[socket.socket] = set()
@@ -298,9 +281,9 @@ class XmlRpcServer(rosgraph.xmlrpc.ThreadingXMLRPCServer):  # type: ignore[misc]
         try:
             accepted: tuple[socket.socket, Any] = super().get_request()
         except OSError as error:
-            if error.errno in _EXHAUSTED:
-                self._warnings.log(f"cannot accept connections of ROS clients: {error}")
-                time.sleep(_CLOSE_PERIOD if self._drop_oldest() else _EXHAUSTED_PERIOD)
+            if error.errno in EXHAUSTED:
+                self._warnings.warn(f"cannot accept connections of ROS clients: {error}")
+                time.sleep(_CLOSE_PERIOD if self._drop_oldest() else EXHAUSTED_PERIOD)
             raise
         with self._lock:
             self._idle[accepted[0]] = None

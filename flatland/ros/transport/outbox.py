@@ -89,7 +89,7 @@ class Outbox:
                 _flusher().watch(self)
 
     def disable_delay(self) -> None:
-        """Disables the delay of small messages by the system, and sends those that wait.
+        """Disables the delay of small messages by the system, and sends waiting messages.
 
         By default (Nagle's algorithm), a small message waits for up to 40 ms until the subscriber
         has acknowledged the previous one, which is cheaper for many messages.

@@ -11,7 +11,7 @@ from typing import Any, Final
 import rospy
 
 from flatland.ros.transport.outbox import Outbox
-from flatland.ros.transport.registrar import Registrar
+from flatland.ros.transport.registrar import Registrar, unregister
 
 _LOG = logging.getLogger("flatland")
 
@@ -23,11 +23,12 @@ _MAX_SEQUENCE: Final = 0xFFFF_FFFF
 class Publisher:
     """Publishes messages on a topic from the thread that steps the world.
 
-    Registration and connections are those of rospy; the writes to sockets are replaced, see
+    rospy registers and connects; the writes to sockets are replaced, see
     `outbox`. Messages are serialized by rospy, or passed as bytes.
 
     Attributes:
         topic: Resolved name of the topic.
+        owner: Plugin that publishes, for messages.
         connected: Whether the topic has subscribers.
     """
 
@@ -39,7 +40,7 @@ class Publisher:
         *,
         queue_size: int = 1,
         latch: bool = False,
-        on_connection: Callable[[bool], None] | None = None,
+        on_connection: Callable[[bool], object] | None = None,
         owner: str = "",
     ) -> None:
         """Advertises a topic asynchronously.
@@ -59,6 +60,7 @@ class Publisher:
             FlatlandError: This node publishes messages of another type on the topic.
         """
         self.topic: str = rospy.resolve_name(topic)
+        self.owner = owner
         self.connected = False
         self._registrar = registrar
         self._message_type = message_type
@@ -66,7 +68,6 @@ class Publisher:
         self._queue_size = queue_size
         self._latch = latch
         self._on_connection = on_connection
-        self._owner = owner
         self._closed = False
         self._publisher: rospy.Publisher | None = None
         self._early_message: Any = None  # latched message of a topic that is not advertised yet
@@ -74,13 +75,26 @@ class Publisher:
         # `publish` of an early message could deadlock with a new connection.
         self._early_lock = threading.Lock()
         self._update_lock = threading.Lock()
-        self._listener = _ConnectionListener(self._update)
-        registrar.claim("publisher", self.topic, message_type, owner)
+        self._listener = _ConnectionListener(self._connection_changed)
+        registrar.claim("publisher", self.topic, message_type, self)
         registrar.submit(self._open)
 
+    @property
+    def ready(self) -> bool:
+        """Whether there are subscribers, of which the owner of the topic has been notified."""
+        with self._update_lock:
+            return self.connected
+
     def publish(self, message: Any) -> None:
-        """Sends a message to all subscribers; has no effect once closed or during a shutdown."""
+        """Sends a message to all subscribers; has no effect once closed or during a shutdown.
+
+        Args:
+            message: The message, or its bytes, see `publish_serialized`.
+        """
         if self._closed:
+            return
+        if isinstance(message, bytes):
+            self.publish_serialized(message)
             return
         publisher = self._publisher
         if publisher is None:
@@ -147,7 +161,7 @@ class Publisher:
             return
         self._closed = True
         self._update()
-        self._registrar.release("publisher", self.topic, self._owner)
+        self._registrar.release("publisher", self.topic, self)
         self._registrar.submit_closing(self._end)
 
     # -- in the registrar's thread ---------------------------------------------------------
@@ -167,7 +181,7 @@ class Publisher:
         self._update()
 
     def _take_over(self, impl: Any) -> None:
-        """Gives each further connection an outbox, and observes the connections."""
+        """Creates an outbox for each further connection, and observes the connections."""
         if "add_connection" not in vars(impl):  # Publishers of one topic share the connections.
             add_connection = impl.add_connection
 
@@ -187,9 +201,13 @@ class Publisher:
         listeners = publisher.impl.subscriber_listeners
         if listeners is not None and self._listener in listeners:
             listeners.remove(self._listener)
-        publisher.unregister()
+        unregister(publisher)
 
     # -- in rospy's threads ----------------------------------------------------------------
+
+    def _connection_changed(self, _publish_single: Callable[[Any], None] | None) -> None:
+        """Handles a new connection, with the function that publishes to it alone, or its end."""
+        self._update()
 
     def _update(self) -> None:
         # The state is read under a lock instead of taken from the arguments of the listener,
@@ -218,14 +236,16 @@ class SerializedMessage:
 class _ConnectionListener(rospy.SubscribeListener):  # type: ignore[misc]
     """Reports every new and every closed connection."""
 
-    def __init__(self, on_change: Callable[[], None]) -> None:
+    def __init__(self, on_change: Callable[[Callable[[Any], None] | None], None]) -> None:
         super().__init__()
         self._on_change = on_change
 
-    def peer_subscribe(self, _topic: str, _publish: Any, _publish_single: Any) -> None:
+    def peer_subscribe(
+        self, _topic: str, _publish: Any, publish_single: Callable[[Any], None]
+    ) -> None:
         """Reports a new subscriber; called by rospy."""
-        self._on_change()
+        self._on_change(publish_single)
 
     def peer_unsubscribe(self, _topic: str, _num_peers: int) -> None:
         """Reports a closed connection; called by rospy."""
-        self._on_change()
+        self._on_change(None)

@@ -2,7 +2,7 @@
 
 Each topic and service costs a call to the master. The call takes a millisecond if the master
 responds, and otherwise blocks until it does, because rospy retries indefinitely. The thread that
-steps the world only queues these calls; they are made in the order in which they were queued.
+steps the world only queues these calls, which are made in the order of the queue.
 """
 
 from __future__ import annotations
@@ -12,13 +12,38 @@ import logging
 import queue
 import threading
 from collections.abc import Callable, Iterator, Mapping
-from typing import Any
+from typing import Any, Protocol
 
 import rospy
 
 from flatland.errors import FlatlandError
 
 _LOG = logging.getLogger("flatland")
+
+
+def unregister(topic: rospy.topics.Topic) -> None:
+    """Unregisters a publisher or subscriber of rospy, and closes all descriptors of it.
+
+    rospy polls the connections of a topic with a descriptor that it leaves to Python's cyclic
+    garbage collector. To be called in an action of the registrar.
+    """
+    impl = topic.impl
+    topic.unregister()
+    if impl is not None and impl.closed:  # not while another publisher of the topic uses it
+        with impl.c_lock:  # A thread that adds a connection checks `closed` with this lock.
+            impl.connection_poll.poller.close()
+
+
+class Endpoint(Protocol):
+    """A publisher, subscriber or service of the node."""
+
+    @property
+    def owner(self) -> str:
+        """Plugin that uses it, for messages; empty for the node itself."""
+
+    @property
+    def ready(self) -> bool:
+        """Whether it is registered, and its owner has been notified of a connection."""
 
 
 class Registrar:
@@ -37,7 +62,7 @@ class Registrar:
         self.master_lost = False
         self._lock = threading.Lock()
         self._types: dict[tuple[str, str], type[Any]] = {}
-        self._owners: dict[tuple[str, str], list[str]] = {}
+        self._endpoints: dict[tuple[str, str], list[Endpoint]] = {}
         # Parameters by resolved name: as the node found them, and as it has set them.
         self._found_parameters: dict[str, object] = {}
         self._own_parameters: dict[str, object] = {}
@@ -63,7 +88,7 @@ class Registrar:
 
         A topic that is closed and opened again in the block stays registered, with the same
         connections, because rospy counts its publishers and subscriptions. To be used in the thread
-        that steps the world, which is the one that closes topics.
+        that steps the world, which also closes topics.
         """
         self._postponed = []
         try:
@@ -91,7 +116,7 @@ class Registrar:
         return done.wait(timeout)
 
     def claim(
-        self, kind: str, name: str, ros_type: type[Any], owner: str, *, shared: bool = True
+        self, kind: str, name: str, ros_type: type[Any], endpoint: Endpoint, *, shared: bool = True
     ) -> None:
         """Reserves a name, because rospy does not detect two types of the same name.
 
@@ -99,8 +124,8 @@ class Registrar:
             kind: `publisher`, `subscriber` or `service`.
             name: Resolved name.
             ros_type: Message or service class.
-            owner: Plugin that uses the name, for messages; empty for the node itself.
-            shared: Whether the name may have other owners with the same type.
+            endpoint: What uses the name.
+            shared: Whether other endpoints of the same type may use the name.
 
         Raises:
             FlatlandError: The name has another type, or cannot be shared.
@@ -108,24 +133,38 @@ class Registrar:
         key = kind, name
         with self._lock:
             known = self._types.setdefault(key, ros_type)
-            owners = self._owners.setdefault(key, [])
-            used_by = f", used by {owners[0]}" if owners and owners[0] else ""
+            endpoints = self._endpoints.setdefault(key, [])
+            used_by = f", used by {endpoints[0].owner}" if endpoints and endpoints[0].owner else ""
             if known is not ros_type:
                 raise FlatlandError(
                     f'{kind} "{name}" has the type {known._type} already{used_by}, '
                     f"not {ros_type._type}"
                 )
-            if owners and not shared:
+            if endpoints and not shared:
                 raise FlatlandError(f'{kind} "{name}" exists already{used_by}')
-            owners.append(owner)
+            endpoints.append(endpoint)
 
-    def release(self, kind: str, name: str, owner: str) -> None:
+    def release(self, kind: str, name: str, endpoint: Endpoint) -> None:
         """Releases a name reserved by `claim`."""
         key = kind, name
         with self._lock:
-            self._owners[key].remove(owner)
-            if not self._owners[key]:
-                del self._owners[key], self._types[key]
+            self._endpoints[key].remove(endpoint)
+            if not self._endpoints[key]:
+                del self._endpoints[key], self._types[key]
+
+    def is_connected(self, topic: str) -> bool:
+        """Returns whether all publishers and subscribers of this node for a topic are connected.
+
+        Args:
+            topic: Resolved name; a topic that this node does not use is not connected.
+        """
+        with self._lock:
+            endpoints = [
+                endpoint
+                for kind in ("publisher", "subscriber")
+                for endpoint in self._endpoints.get((kind, topic), ())
+            ]
+        return bool(endpoints) and all(endpoint.ready for endpoint in endpoints)
 
     def set_parameter(self, name: str, value: object) -> None:
         """Sets a parameter asynchronously; without a master, as soon as there is one.

@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
+import importlib
 from collections.abc import Callable
-from concurrent.futures import Future
-from typing import Any, Final, TypeVar
+from typing import Any
 
 import rospy
 
+from flatland.node.parameters import OWN_PACKAGE
+from flatland.node.transport import CallError
+from flatland.ros.message_types import service_class, with_arrays
 from flatland.ros.transport.registrar import Registrar
-from flatland.runtime.requests import Requests
-
-_POLL_PERIOD: Final = 0.2  # s between two checks of a request that waits
-
-R = TypeVar("R")
 
 
 class Service:
@@ -21,6 +19,7 @@ class Service:
 
     Attributes:
         name: Resolved name of the service.
+        owner: Plugin that offers the service, for messages.
     """
 
     def __init__(
@@ -38,59 +37,95 @@ class Service:
             registrar: Registers the service with the ROS master.
             name: Name in the namespace of the node, global with a leading `/`.
             service_type: ROS service class.
-            handler: Called with each request; returns the response.
+            handler: Called with each request; returns the response. A `CallError` is reported to
+                the client without a traceback in the log.
             owner: Plugin that offers the service, for messages.
 
         Raises:
             FlatlandError: This node already has a service of this name.
         """
         self.name: str = rospy.resolve_name(name)
+        self.owner = owner
         self._registrar = registrar
         self._service_type = service_type
         self._handler = handler
-        self._owner = owner
         self._closed = False
         self._service: rospy.Service | None = None
-        registrar.claim("service", self.name, service_type, owner, shared=False)
+        registrar.claim("service", self.name, service_type, self, shared=False)
         registrar.submit(self._open)
+
+    @property
+    def ready(self) -> bool:
+        """Whether the service is registered."""
+        return self._service is not None
 
     def close(self) -> None:
         """Unregisters the service asynchronously."""
         if self._closed:
             return
         self._closed = True
-        self._registrar.release("service", self.name, self._owner)
+        self._registrar.release("service", self.name, self)
         self._registrar.submit(self._end)
+
+    def _handle(self, request: Any) -> Any:
+        try:
+            return self._handler(request)
+        except CallError as error:
+            raise rospy.ServiceException(str(error)) from error
 
     def _open(self) -> None:
         if not self._closed:
-            self._service = rospy.Service(self.name, self._service_type, self._handler)
+            self._service = rospy.Service(self.name, self._service_type, self._handle)
 
     def _end(self) -> None:
         if self._service is not None:
             self._service.shutdown()
 
 
-def wait_for(future: Future[R], requests: Requests) -> R:
-    """Waits in the thread of a service until the simulation has handled a request.
+def fields_service(
+    service_type: str, handler: Callable[[Any], dict[str, Any]]
+) -> tuple[type[Any], Callable[[Any], Any]]:
+    """Returns the class and the handler of a service whose handler returns fields.
 
     Args:
-        future: Result of the request.
-        requests: The queue of the request.
-
-    Raises:
-        rospy.ServiceException: The node shuts down first, or a plugin blocks the simulation; in
-            the latter case, the request is withdrawn.
+        service_type: `PACKAGE/NAME`, with the package `flatland` for the selected one.
+        handler: Returns the fields of the response by name, see `Transport.serve`.
     """
-    while True:
-        try:
-            return future.result(timeout=_POLL_PERIOD)
-        except TimeoutError:
-            if future.done():
-                raise
-            if rospy.core.is_shutdown_requested():
-                raise rospy.ServiceException("the simulator is shutting down") from None
-            if requests.blocked_by and future.cancel():
-                raise rospy.ServiceException(
-                    f"the simulation is blocked: {requests.blocked_by} does not return"
-                ) from None
+    package, _, name = service_type.partition("/")
+    if package == OWN_PACKAGE:
+        base = service_class(name)
+    else:
+        base = getattr(importlib.import_module(f"{package}.srv"), name)
+
+    class Served(base):  # type: ignore[misc, valid-type]
+        """The service with requests and responses whose arrays are numpy arrays."""
+
+        _request_class = with_arrays(base._request_class)
+        _response_class = with_arrays(base._response_class)
+
+    response_type = Served._response_class
+    types = dict(zip(response_type.__slots__, response_type._slot_types, strict=True))
+
+    def respond(request: Any) -> Any:
+        fields = handler(request)
+        return response_type(**{name: _field(types[name], value) for name, value in fields.items()})
+
+    return Served, respond
+
+
+def _field(field_type: str, value: Any) -> Any:
+    """Converts a field of a response to its type of ROS."""
+    from geometry_msgs.msg import Pose2D
+
+    from flatland.ros.adapters import convert, find_adapter
+
+    if field_type == "time":
+        return convert.time(value)
+    if field_type == "geometry_msgs/Pose2D[]":
+        return [Pose2D(*pose) for pose in value]
+    if isinstance(value, (bool, int, str)):
+        return value
+    adapter = find_adapter(type(value))
+    if adapter is None or adapter.to_message is None:
+        raise LookupError(f"no adapter converts {type(value).__name__} to {field_type}")
+    return adapter.to_message(value)

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Callable
-from concurrent.futures import Future
 from typing import Any
 
 import rospy
 
 from flatland.ros.transport.publisher import Publisher, SerializedMessage
 from flatland.ros.transport.registrar import Registrar
+from flatland.runtime.requests import Post
 
 _LOG = logging.getLogger("flatland")
 
@@ -28,9 +28,8 @@ class StateTopic(Publisher):
         topic: str,
         message_type: type[Any],
         make: Callable[[], Any],
-        post: Callable[[Callable[[], object]], Future[Any]],
-        *,
-        on_connection: Callable[[bool], None] | None = None,
+        post: Post,
+        on_connection: Callable[[bool], object] | None = None,
     ) -> None:
         """Advertises a topic asynchronously.
 
@@ -50,7 +49,6 @@ class StateTopic(Publisher):
         self._make = make
         self._post = post
         self._new_subscribers: list[Callable[[Any], None]] = []
-        self._connect_listener = _ConnectListener(self._on_connect)
         super().__init__(registrar, topic, message_type, latch=True, on_connection=on_connection)
 
     def send(self) -> None:
@@ -59,11 +57,7 @@ class StateTopic(Publisher):
             # A subscriber that connects from here on is added again; at worst it receives the
             # message twice.
             self._new_subscribers.clear()
-            message = self._make()
-            if isinstance(message, bytes):
-                self.publish_serialized(message)
-            else:
-                self.publish(message)
+            self.publish(self._make())
 
     def replace(self, make: Callable[[], Any]) -> None:
         """Publishes another state from now on; must be called in the thread that steps the world.
@@ -74,10 +68,14 @@ class StateTopic(Publisher):
         self._make = make
         self.send()
 
-    def _on_connect(self, publish_single: Callable[[Any], None]) -> None:
+    def _connection_changed(self, publish_single: Callable[[Any], None] | None) -> None:
         """Schedules a message to a new subscriber; called in a rospy thread."""
-        self._new_subscribers.append(publish_single)
-        self._post(self._serve_new_subscribers)
+        # `connected` is set first; otherwise, `send` could skip a change of the state that follows
+        # the first message to a new subscriber.
+        super()._connection_changed(publish_single)
+        if publish_single is not None:
+            self._new_subscribers.append(publish_single)
+            self._post(self._serve_new_subscribers)
 
     def _serve_new_subscribers(self) -> None:
         if self._closed or not self._new_subscribers:
@@ -120,27 +118,3 @@ class StateTopic(Publisher):
         impl.add_headers({"latching": "1"})
         impl.is_latch = False
         super()._take_over(impl)
-        # After the listener that sets `connected`; otherwise, `send` could skip a change of the
-        # state that follows the first message to a new subscriber.
-        impl.add_subscriber_listener(self._connect_listener)
-
-    def _end(self) -> None:
-        publisher = self._publisher
-        listeners = publisher.impl.subscriber_listeners if publisher and publisher.impl else None
-        if listeners is not None and self._connect_listener in listeners:
-            listeners.remove(self._connect_listener)
-        super()._end()
-
-
-class _ConnectListener(rospy.SubscribeListener):  # type: ignore[misc]
-    """Reports every new subscriber, with a function that publishes to this subscriber only."""
-
-    def __init__(self, on_connect: Callable[[Callable[[Any], None]], None]) -> None:
-        super().__init__()
-        self._on_connect = on_connect
-
-    def peer_subscribe(
-        self, _topic: str, _publish: Any, publish_single: Callable[[Any], None]
-    ) -> None:
-        """Reports a new subscriber; called by rospy."""
-        self._on_connect(publish_single)

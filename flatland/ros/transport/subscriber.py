@@ -7,7 +7,7 @@ from typing import Any
 
 import rospy
 
-from flatland.ros.transport.registrar import Registrar
+from flatland.ros.transport.registrar import Registrar, unregister
 
 
 class Subscriber:
@@ -15,6 +15,7 @@ class Subscriber:
 
     Attributes:
         topic: Resolved name of the topic.
+        owner: Plugin that subscribes, for messages.
     """
 
     def __init__(
@@ -39,21 +40,29 @@ class Subscriber:
             FlatlandError: This node subscribes to the topic with another message type.
         """
         self.topic: str = rospy.resolve_name(topic)
+        self.owner = owner
         self._registrar = registrar
         self._message_type = message_type
         self._callback = callback
-        self._owner = owner
         self._closed = False
         self._subscriber: rospy.Subscriber | None = None
-        registrar.claim("subscriber", self.topic, message_type, owner)
+        registrar.claim("subscriber", self.topic, message_type, self)
         registrar.submit(self._open)
+
+    @property
+    def ready(self) -> bool:
+        """Whether a publisher has accepted a connection."""
+        subscriber = self._subscriber
+        impl = subscriber.impl if subscriber is not None else None
+        # rospy lists a connection before the publisher accepts it with its header.
+        return impl is not None and any(each.header for each in impl.connections)
 
     def close(self) -> None:
         """Unsubscribes asynchronously; no callback starts after this call."""
         if self._closed:
             return
         self._closed = True
-        self._registrar.release("subscriber", self.topic, self._owner)
+        self._registrar.release("subscriber", self.topic, self)
         self._registrar.submit_closing(self._end)
 
     def _receive(self, message: Any) -> None:
@@ -66,4 +75,4 @@ class Subscriber:
 
     def _end(self) -> None:
         if self._subscriber is not None:
-            self._subscriber.unregister()
+            unregister(self._subscriber)

@@ -1,10 +1,9 @@
-#include <pybind11/numpy.h>
 #include <pybind11/stl.h>
 
-#include <cstring>
 #include <string>
-#include <tuple>
+#include <vector>
 
+#include "bindings/arrays.h"
 #include "bindings/bindings.h"
 #include "bindings/tuples.h"
 #include "world/bodies.h"
@@ -20,11 +19,9 @@ struct SavedMotions {
 };
 
 b2BodyType body_type(const std::string& name) {
-  if (name == "static") return b2_staticBody;
-  if (name == "kinematic") return b2_kinematicBody;
-  if (name == "dynamic") return b2_dynamicBody;
-  throw py::value_error("body_type must be one of: static, kinematic, dynamic, got \"" + name +
-                        "\"");
+  return chosen<b2BodyType>(
+      name, "body_type",
+      {{"static", b2_staticBody}, {"kinematic", b2_kinematicBody}, {"dynamic", b2_dynamicBody}});
 }
 
 const char* type_name(b2BodyType type) {
@@ -32,68 +29,235 @@ const char* type_name(b2BodyType type) {
   return type == b2_kinematicBody ? "kinematic" : "dynamic";
 }
 
-}  // namespace
+void bind_motion(py::class_<BodyHandle, Handle>& body) {
+  body.def_property_readonly(
+      "pose", [](const BodyHandle& self) { return to_python(pose_of(self.core(), self.id)); },
+      "Pose (x, y, theta) of the origin of the body in the world frame [m, rad].");
+  body.def(
+      "set_pose",
+      [](const BodyHandle& self, double x, double y, double theta) {
+        set_pose(self.core(), self.id, {x, y, theta});
+      },
+      py::arg("x"), py::arg("y"), py::arg("theta"), R"(
+Moves the origin of the body to a pose in the world frame and wakes the body.
 
-void bind_bodies(WorldClass& world) {
+Raises:
+    ValueError: A number is not finite.
+    StaleHandleError: The body was destroyed.
+    WorldLockedError: The world is stepping.
+)");
+  body.def_property_readonly(
+      "velocity",
+      [](const BodyHandle& self) { return to_python(velocity_of(self.core(), self.id)); },
+      "Velocity (vx, vy, omega) of the origin of the body in the world frame [m/s, rad/s].");
+  body.def(
+      "set_velocity",
+      [](const BodyHandle& self, double vx, double vy, double omega) {
+        set_velocity(self.core(), self.id, {vx, vy, omega});
+      },
+      py::arg("vx"), py::arg("vy"), py::arg("omega"), R"(
+Sets the velocity of the origin of the body in the world frame; static bodies ignore it.
+
+Args:
+    vx: Velocity along x [m/s].
+    vy: Velocity along y [m/s].
+    omega: Angular velocity [rad/s].
+
+Raises:
+    ValueError: A number is not finite.
+    StaleHandleError: The body was destroyed.
+    WorldLockedError: The world is stepping.
+)");
+  body.def(
+      "apply_force",
+      [](const BodyHandle& self, const std::vector<double>& force,
+         const std::vector<double>& point) {
+        // More coordinates, such as those of a geometry_msgs/Vector3, are ignored.
+        if (force.size() < 2 || point.size() < 2) {
+          throw py::value_error("force and point must have two coordinates");
+        }
+        apply_force(self.core(), self.id, force[0], force[1], point[0], point[1]);
+      },
+      py::arg("force"), py::arg("point"), R"(
+Applies a force to a dynamic body during the next step and wakes the body.
+
+Args:
+    force: Force in the world frame [N].
+    point: Point of application in the world frame [m].
+
+Raises:
+    ValueError: A number is not finite, or the force is too large for the mass.
+    StaleHandleError: The body was destroyed.
+    WorldLockedError: The world is stepping.
+)");
+  body.def(
+      "apply_torque",
+      [](const BodyHandle& self, double torque) { apply_torque(self.core(), self.id, torque); },
+      py::arg("torque"), R"(
+Applies a torque to a dynamic body during the next step and wakes the body.
+
+Args:
+    torque: Torque about the z axis [N m].
+
+Raises:
+    ValueError: The torque is not finite, or too large for the moment of inertia.
+    StaleHandleError: The body was destroyed.
+    WorldLockedError: The world is stepping.
+)");
+  body.def_property(
+      "awake", [](const BodyHandle& self) { return read(self).IsAwake(); },
+      [](const BodyHandle& self, bool awake) { self.core().change_body(self.id)->SetAwake(awake); },
+      R"(
+Whether the body is awake; settable. Box2D simulates only bodies that are awake.
+
+A body that is put to sleep loses its velocity.
+)");
+}
+
+void bind_properties(py::class_<BodyHandle, Handle>& body) {
+  body.def(
+      "destroy", [](const BodyHandle& self) { self.core().destroy_body(self.id); }, R"(
+Destroys the body with its fixtures and joints, and ends its contacts.
+
+Raises:
+    StaleHandleError: The body has already been destroyed.
+    WorldLockedError: The world is stepping.
+)");
+  body.def_property_readonly(
+      "type", [](const BodyHandle& self) { return type_name(read(self).GetType()); },
+      "Type of the body, `static`, `kinematic` or `dynamic`.");
+  def_reading(body, "mass", &b2Body::GetMass,
+              "Mass [kg], 1 for a dynamic body without massive fixtures, 0 if it is not dynamic.");
+  def_reading(body, "inertia", &b2Body::GetInertia,
+              "Moment of inertia about the origin of the body [kg m^2].");
+  def_reading(
+      body, "local_center", [](const b2Body& self) { return to_python(self.GetLocalCenter()); },
+      "Center of mass in the body frame [m].");
+  def_reading(
+      body, "world_center", [](const b2Body& self) { return to_python(self.GetWorldCenter()); },
+      "Center of mass in the world frame [m].");
+  def_reading(body, "linear_damping", &b2Body::GetLinearDamping,
+              "Linear damping coefficient [1/s].");
+  def_reading(body, "angular_damping", &b2Body::GetAngularDamping,
+              "Angular damping coefficient [1/s].");
+  body.def_property_readonly(
+      "fixtures",
+      [](const BodyHandle& self) {
+        std::vector<FixtureHandle> fixtures;
+        for (const Id id : fixtures_of(self.core(), self.id)) fixtures.emplace_back(self.world, id);
+        return fixtures;
+      },
+      "Fixtures of the body in order of creation.");
+  body.def_property_readonly(
+      "fixture_ids", [](const BodyHandle& self) { return fixtures_of(self.core(), self.id); },
+      "Ids of the fixtures of the body in order of creation.");
+  body.def(
+      "fixture",
+      [](const BodyHandle& self, Id fixture_id) { return FixtureHandle(self.world, fixture_id); },
+      py::arg("fixture_id"),
+      "Returns the handle of a fixture of the same world by its id, without checking the id.");
+  body.def_property_readonly(
+      "joints",
+      [](const BodyHandle& self) {
+        std::vector<JointHandle> joints;
+        for (const Id id : joints_of(self.core(), self.id)) joints.emplace_back(self.world, id);
+        return joints;
+      },
+      "Joints attached to the body in order of creation.");
+}
+
+void bind_all_bodies(WorldClass& world) {
   world.def(
       "create_body",
-      [](World& self, const std::string& type, double x, double y, double theta,
-         double linear_damping, double angular_damping) {
-        return create_body(self, body_type(type), {x, y, theta}, linear_damping, angular_damping);
+      [](const PyWorld& self, const std::string& type, const PyPose& pose, double linear_damping,
+         double angular_damping) {
+        return BodyHandle(
+            self, create_body(*self.core, body_type(type), pose, linear_damping, angular_damping));
       },
-      py::arg("body_type"), py::arg("x"), py::arg("y"), py::arg("theta"), py::arg("linear_damping"),
-      py::arg("angular_damping"));
-  world.def("pose", [](const World& self, Id body) { return to_python(pose_of(self, body)); });
-  world.def("set_pose", [](World& self, Id body, double x, double y, double theta) {
-    set_pose(self, body, {x, y, theta});
-  });
-  world.def("velocity",
-            [](const World& self, Id body) { return to_python(velocity_of(self, body)); });
-  world.def("set_velocity", [](World& self, Id body, double vx, double vy, double omega) {
-    set_velocity(self, body, {vx, vy, omega});
-  });
-  world.def("apply_force", &apply_force);
-  world.def("apply_torque", &apply_torque);
-  world.def("body_type",
-            [](const World& self, Id body) { return type_name(self.read_body(body)->GetType()); });
-  world.def("awake", [](const World& self, Id body) { return self.read_body(body)->IsAwake(); });
-  world.def("set_awake",
-            [](World& self, Id body, bool awake) { self.change_body(body)->SetAwake(awake); });
-  world.def("mass", [](const World& self, Id body) { return self.read_body(body)->GetMass(); });
-  world.def("inertia",
-            [](const World& self, Id body) { return self.read_body(body)->GetInertia(); });
-  world.def("local_center", [](const World& self, Id body) {
-    return to_python(self.read_body(body)->GetLocalCenter());
-  });
-  world.def("world_center", [](const World& self, Id body) {
-    return to_python(self.read_body(body)->GetWorldCenter());
-  });
-  world.def("linear_damping",
-            [](const World& self, Id body) { return self.read_body(body)->GetLinearDamping(); });
-  world.def("angular_damping",
-            [](const World& self, Id body) { return self.read_body(body)->GetAngularDamping(); });
-  world.def("body_states", [](const World& self) {
-    const std::vector<BodyState> states = states_of(self);
-    constexpr auto kColumns = std::tuple_size_v<BodyState>;
-    py::array_t<float> rows({states.size(), kColumns});
-    if (!states.empty()) std::memcpy(rows.mutable_data(), states.data(), rows.nbytes());
-    return rows;
-  });
-  // Opaque to Python, hence a class instead of a list.
-  py::class_<SavedMotions>(world, "SavedMotions");
-  world.def("saved_motions", [](const World& self) { return SavedMotions{saved_motions(self)}; });
-  world.def("restore_motions",
-            [](World& self, const SavedMotions& saved) { restore_motions(self, saved.motions); });
+      py::arg("body_type"), py::arg("pose"), py::kw_only(), py::arg("linear_damping") = 0.0,
+      py::arg("angular_damping") = 0.0, R"(
+Creates a body without fixtures, awake and at rest.
+
+Args:
+    body_type: Type of the body: `static`, `kinematic` or `dynamic`.
+    pose: Pose (x, y, theta) of the origin of the body in the world frame [m, rad].
+    linear_damping: Linear damping coefficient, at least 0 [1/s].
+    angular_damping: Angular damping coefficient, at least 0 [1/s].
+
+Returns:
+    The new body.
+
+Raises:
+    ValueError: The type is unknown, a number is not finite, or a damping is negative.
+    StaleHandleError: The world is closed.
+    WorldLockedError: The world is stepping.
+)");
+  world.def(
+      "body", [](const PyWorld& self, Id body_id) { return BodyHandle(self, body_id); },
+      py::arg("body_id"),
+      "Returns the handle of a body by its id, without checking that the body exists.");
+  world.def(
+      "body_states", [](const World& self) { return to_array(states_of(self)); },
+      R"(
+Returns the states of all bodies in order of creation, exactly as Box2D stores them.
+
+Returns:
+    Position of the origin (x, y) and angle, centre of mass (x, y), velocity of the centre of mass
+    (vx, vy, omega), all in the world frame [m, rad, s], and 1 if the body is awake, else 0; shape
+    (n, 9).
+
+Raises:
+    StaleHandleError: The world is closed.
+    WorldLockedError: The world is stepping.
+)");
   world.def(
       "motions",
-      [](const World& self, const std::vector<Id>& bodies) {
-        py::array_t<double> rows({bodies.size(), std::size_t{6}});
-        motions_of(self, bodies.data(), bodies.size(), rows.mutable_data());
+      [](const World& self, const Bodies& bodies) {
+        const std::vector<Id> ids = ids_in(self, bodies);
+        py::array_t<double> rows({ids.size(), std::size_t{6}});
+        motions_of(self, ids.data(), ids.size(), rows.mutable_data());
         return rows;
       },
-      py::arg("bodies"));
-  world.def("fixtures", &fixtures_of);
-  world.def("joints", &joints_of);
+      py::arg("bodies"), R"(
+Returns the poses and velocities of the origins of some bodies, in one call.
+
+Args:
+    bodies: The bodies.
+
+Returns:
+    (x, y, theta, vx, vy, omega) of each body in the world frame [m, rad, s], shape (n, 6).
+
+Raises:
+    StaleHandleError: A body was destroyed, or the world is closed.
+    WorldLockedError: The world is stepping.
+)");
+}
+
+void bind_saved_motions(WorldClass& world) {
+  // Opaque to Python, hence a class instead of a list.
+  py::class_<SavedMotions>(world, "SavedMotions", "Result of `saved_motions`.");
+  world.def(
+      "saved_motions", [](const World& self) { return SavedMotions{saved_motions(self)}; },
+      "Returns the poses, velocities and sleep of all bodies, for `restore_motions`.");
+  world.def(
+      "restore_motions",
+      [](World& self, const SavedMotions& saved) { restore_motions(self, saved.motions); },
+      py::arg("saved"), R"(
+Restores poses, velocities and sleep bit by bit.
+
+Args:
+    saved: Result of `saved_motions`. Bodies that do not exist any more are ignored, and bodies that
+        were created since are unchanged.
+)");
+}
+
+}  // namespace
+
+void bind_bodies(Classes& classes) {
+  bind_motion(classes.body);
+  bind_properties(classes.body);
+  bind_all_bodies(classes.world);
+  bind_saved_motions(classes.world);
 }
 
 }  // namespace flatland

@@ -3,12 +3,15 @@
 
 #include <cmath>
 #include <map>
+#include <optional>
 #include <string>
 #include <tuple>
 #include <utility>
 #include <vector>
 
 #include "bindings/bindings.h"
+#include "bindings/tuples.h"
+#include "bindings/values.h"
 #include "crowd/crowd.h"
 #include "crowd/gait.h"
 #include "crowd/orca.h"
@@ -23,12 +26,11 @@ namespace {
 
 using crowd::Crowd;
 using crowd::Settings;
-using crowd::Vec;
-using Pair = std::pair<double, double>;
 
-Crowd& changed_crowd(World& world, Id id) {
+Crowd& changed_crowd(const CrowdHandle& handle) {
+  World& world = handle.core();
   world.check_changeable();
-  Crowd* crowd = world.plan().find_crowd(id);
+  Crowd* crowd = world.jobs().find_crowd(handle.id);
   if (crowd == nullptr) throw StaleHandleError("the crowd was removed");
   return *crowd;
 }
@@ -39,14 +41,14 @@ crowd::Person& changed_person(Crowd& crowd, Id body) {
   return *person;
 }
 
-Vec to_vec(const Pair& pair) {
-  if (!std::isfinite(pair.first) || !std::isfinite(pair.second)) {
+Vec to_vec(const PyPoint& point) {
+  if (!std::isfinite(point[0]) || !std::isfinite(point[1])) {
     throw py::value_error("coordinates must be finite");
   }
-  return {pair.first, pair.second};
+  return {point[0], point[1]};
 }
 
-Pair to_pair(Vec v) { return {v.x, v.y}; }
+PyPair to_pair(Vec v) { return {v.x, v.y}; }
 
 std::uint32_t checked_index(std::uint32_t index, std::size_t count, const char* what) {
   if (index >= count) throw py::value_error(std::string(what) + " does not exist");
@@ -92,130 +94,238 @@ void set_numbers(Settings& settings, const std::map<std::string, double>& number
   }
 }
 
-crowd::Route::Order order_of(const std::string& name) {
-  using Order = crowd::Route::Order;
-  if (name == "loop") return Order::kLoop;
-  if (name == "back_and_forth") return Order::kBackAndForth;
-  if (name == "random") return Order::kRandom;
-  if (name == "once") return Order::kOnce;
-  throw py::value_error("order must be one of: loop, back_and_forth, random, once, got \"" + name +
-                        "\"");
+crowd::Person to_person(World& world, const py::handle& member) {
+  const auto id_of = [&](const py::handle& body) {
+    const Id id = id_in(world, body.cast<const BodyHandle&>());
+    world.change_body(id);  // throws if it does not exist
+    return id;
+  };
+  crowd::Person person;
+  person.body = id_of(member.attr("body"));
+  const py::sequence legs = member.attr("legs");
+  if (legs.size() != 0 && legs.size() != 2) throw py::value_error("a person has two legs or none");
+  for (std::size_t i = 0; i < legs.size(); ++i) person.legs[i] = id_of(py::object(legs[i]));
+  person.radius = member.attr("radius").cast<double>();
+  person.speed = member.attr("speed").cast<double>();
+  person.is_aware = member.attr("is_aware").cast<bool>();
+  person.phase = member.attr("phase").cast<double>();
+  person.phase -= std::floor(person.phase);
+  if (!(person.radius > 0.0) || !(person.speed > 0.0)) {
+    throw py::value_error("radius and speed must be positive");
+  }
+  return person;
 }
 
-void bind_parts(WorldClass& world) {
-  world.def(
-      "add_crowd_waypoint",
-      [](World& self, Id id, const Pair& low, const Pair& high, double radius, const Pair& wait,
-         bool is_queue, double spacing) {
-        crowd::Waypoint waypoint;
-        waypoint.place = {to_vec(low), to_vec(high), radius};
-        waypoint.wait = {wait.first, wait.second};
-        waypoint.is_queue = is_queue;
-        waypoint.spacing = spacing;
-        return changed_crowd(self, id).add_waypoint(waypoint);
-      },
-      py::arg("crowd"), py::arg("low"), py::arg("high"), py::arg("radius"), py::arg("wait"),
-      py::arg("is_queue"), py::arg("spacing"));
-  world.def(
-      "add_crowd_route",
-      [](World& self, Id id, std::vector<std::uint32_t> waypoints, const std::string& order,
-         double stop_interval, const Pair& stop) {
-        Crowd& crowd = changed_crowd(self, id);
-        if (waypoints.empty()) throw py::value_error("a route needs waypoints");
-        for (const std::uint32_t waypoint : waypoints) {
-          checked_index(waypoint, crowd.waypoint_count(), "the waypoint");
-        }
-        crowd::Route route;
-        route.waypoints = std::move(waypoints);
-        route.order = order_of(order);
-        route.stop_interval = stop_interval;
-        route.stop = {stop.first, stop.second};
-        return crowd.add_route(route);
-      },
-      py::arg("crowd"), py::arg("waypoints"), py::arg("order"), py::arg("stop_interval"),
-      py::arg("stop"));
-  world.def(
-      "add_crowd_party",
-      [](World& self, Id id, std::uint32_t route, std::uint32_t first_leg, bool is_backward) {
-        Crowd& crowd = changed_crowd(self, id);
-        checked_index(route, crowd.route_count(), "the route");
-        checked_index(first_leg, crowd.route_size(route), "the waypoint of the route");
-        return crowd.add_party(route, first_leg, is_backward);
-      },
-      py::arg("crowd"), py::arg("route"), py::arg("first_leg"), py::arg("is_backward"));
-  world.def(
-      "add_crowd_person",
-      [](World& self, Id id, Id body, const std::pair<Id, Id>& legs, std::uint32_t party,
-         double radius, double speed, bool is_aware, double phase) {
-        Crowd& crowd = changed_crowd(self, id);
-        checked_index(party, crowd.party_count(), "the party");
-        if (!(radius > 0.0) || !(speed > 0.0)) {
-          throw py::value_error("radius and speed must be positive");
-        }
-        self.change_body(body);  // throws if it does not exist
-        crowd::Person person;
-        person.body = body;
-        person.legs[0] = legs.first;
-        person.legs[1] = legs.second;
-        person.party = party;
-        person.radius = radius;
-        person.speed = speed;
-        person.is_aware = is_aware;
-        person.phase = phase - std::floor(phase);
-        return crowd.add_person(person);
-      },
-      py::arg("crowd"), py::arg("body"), py::arg("legs"), py::arg("party"), py::arg("radius"),
-      py::arg("speed"), py::arg("is_aware"), py::arg("phase"));
+CrowdHandle add_crowd(const PyWorld& world, bool is_orca, bool is_dynamic, std::int64_t bits,
+                      std::int64_t interval, std::uint64_t key,
+                      const std::map<std::string, double>& numbers) {
+  world.core->check_changeable();
+  Settings settings;
+  settings.model = is_orca ? Settings::Model::kOrca : Settings::Model::kSocialForce;
+  settings.is_dynamic = is_dynamic;
+  settings.bits = checked_bits(bits, "bits");
+  if (interval < 1) throw py::value_error("interval must be at least 1 step");
+  settings.interval = interval;
+  settings.key = key;
+  set_numbers(settings, numbers);
+  return {world, world.core->jobs().add_crowd(settings)};
 }
 
-void bind_people(WorldClass& world) {
-  world.def("remove_crowd_person", [](World& self, Id id, Id body) {
-    Crowd& crowd = changed_crowd(self, id);
-    changed_person(crowd, body);
-    crowd.remove_person(body);
-  });
-  world.def("stop_crowd_person", [](World& self, Id id, Id body, bool is_stopped) {
-    crowd::Person& person = changed_person(changed_crowd(self, id), body);
-    person.is_stopped = is_stopped;
-    person.sent_to = crowd::kNone;
-  });
-  world.def("send_crowd_person", [](World& self, Id id, Id body, std::uint32_t waypoint) {
-    Crowd& crowd = changed_crowd(self, id);
-    crowd::Person& person = changed_person(crowd, body);
-    person.sent_to = checked_index(waypoint, crowd.waypoint_count(), "the waypoint");
-    person.is_stopped = false;
-  });
-  world.def("crowd_reach", [](World& self, Id id, std::uint32_t waypoint) {
-    Crowd& crowd = changed_crowd(self, id);
-    return crowd.reach_of(self, checked_index(waypoint, crowd.waypoint_count(), "the waypoint"));
-  });
-  world.def("crowd_way", [](World& self, Id id, std::uint32_t waypoint, const Pair& place) {
-    Crowd& crowd = changed_crowd(self, id);
+std::uint32_t add_waypoint(const CrowdHandle& handle, const PyPoint& low, const PyPoint& high,
+                           double radius, const PyPoint& wait, bool is_queue, double spacing,
+                           bool temporary) {
+  crowd::Waypoint waypoint;
+  waypoint.place = {to_vec(low), to_vec(high), radius};
+  waypoint.wait = {wait[0], wait[1]};
+  waypoint.is_queue = is_queue;
+  waypoint.spacing = spacing;
+  waypoint.is_temporary = temporary;
+  return changed_crowd(handle).add_waypoint(waypoint);
+}
+
+std::uint32_t add_route(const CrowdHandle& handle, std::vector<std::uint32_t> waypoints,
+                        const std::string& order, double stop_interval, const PyPoint& stop) {
+  Crowd& crowd = changed_crowd(handle);
+  if (waypoints.empty()) throw py::value_error("a route needs waypoints");
+  for (const std::uint32_t waypoint : waypoints) {
     checked_index(waypoint, crowd.waypoint_count(), "the waypoint");
-    return to_pair(crowd.way_from(self, waypoint, to_vec(place)));
-  });
-  world.def("crowd_people", [](World& self, Id id) {
-    Crowd& crowd = changed_crowd(self, id);
-    py::list rows;
-    for (const crowd::Person& person : crowd.people()) {
-      if (!self.has_body(person.body)) continue;
-      const Triple pose = pose_of(self, person.body);
-      const Triple velocity = velocity_of(self, person.body);
-      rows.append(py::make_tuple(person.body, pose[0], pose[1], pose[2], velocity[0], velocity[1],
-                                 velocity[2], crowd.is_standing(person)));
-    }
-    return rows;
-  });
-  world.def("crowd_state", [](World& self, Id id) {
-    const std::vector<double> state = changed_crowd(self, id).state();
-    return py::array_t<double>(static_cast<py::ssize_t>(state.size()), state.data());
-  });
+  }
+  crowd::Route route;
+  route.waypoints = std::move(waypoints);
+  using Order = crowd::Route::Order;
+  route.order = chosen<Order>(order, "order",
+                              {{"loop", Order::kLoop},
+                               {"back_and_forth", Order::kBackAndForth},
+                               {"random", Order::kRandom},
+                               {"once", Order::kOnce}});
+  route.stop_interval = stop_interval;
+  route.stop = {stop[0], stop[1]};
+  return crowd.add_route(route);
 }
 
+void add_party(const CrowdHandle& handle, std::uint32_t route, std::uint32_t first_leg,
+               const PyMembers& members) {
+  Crowd& crowd = changed_crowd(handle);
+  checked_index(route, crowd.route_count(), "the route");
+  checked_index(first_leg, crowd.route_size(route), "the waypoint of the route");
+  if (members.empty()) throw py::value_error("a party needs members");
+  std::vector<crowd::Person> people;
+  for (const py::handle member : members) people.push_back(to_person(handle.core(), member));
+  crowd.add_party(route, first_leg, people);
+}
+
+std::optional<Id> send(const CrowdHandle& handle, const Bodies& bodies, const PyPoint& place,
+                       double radius) {
+  Crowd& crowd = changed_crowd(handle);
+  const std::vector<Id> ids = ids_in(handle.core(), bodies);
+  for (const Id body : ids) changed_person(crowd, body);
+  const Id stranded = crowd.send(handle.core(), ids, {to_vec(place), to_vec(place), radius});
+  return stranded == 0 ? std::nullopt : std::optional(stranded);
+}
+
+std::vector<PyPersonState> read_people(const CrowdHandle& handle) {
+  Crowd& crowd = changed_crowd(handle);
+  std::vector<PyPersonState> people;
+  for (const crowd::Person& person : crowd.people()) {
+    const Triple pose = pose_of(handle.core(), person.body);
+    const Triple velocity = velocity_of(handle.core(), person.body);
+    people.push_back(make_value<PyPersonState>(person.body, pose[0], pose[1], pose[2], velocity[0],
+                                               velocity[1], velocity[2],
+                                               crowd.is_standing(person)));
+  }
+  return people;
+}
+
+void bind_steps_of(py::class_<CrowdHandle, Handle>& crowd) {
+  crowd.def(
+      "remove",
+      [](const CrowdHandle& self) {
+        changed_crowd(self);
+        self.core().jobs().remove_crowd(self.id);
+      },
+      "Removes the crowd; the bodies keep their velocities.");
+  crowd.def(
+      "set_place",
+      [](const CrowdHandle& self, std::int64_t order, std::int64_t number) {
+        changed_crowd(self).place = JobPlace{order, number};
+        self.core().jobs().place_changed();
+      },
+      py::arg("order"), py::arg("number"),
+      "Sets the place of the crowd in the order of a step; see `JobQueue`.");
+}
+
+void bind_places(py::class_<CrowdHandle, Handle>& crowd) {
+  crowd.def("add_waypoint", &add_waypoint, py::arg("low"), py::arg("high"), py::arg("radius"),
+            py::kw_only(), py::arg("wait") = py::make_tuple(0.0, 0.0), py::arg("is_queue") = false,
+            py::arg("spacing") = 0.7, py::arg("temporary") = false, R"(
+Adds a waypoint: the points within a distance of a rectangle, which may be a point.
+
+Args:
+    low: Corner of the rectangle with the least coordinates [m], world frame.
+    high: The opposite corner.
+    radius: The distance [m].
+    wait: Shortest and longest duration for which people wait there [s].
+    is_queue: Whether people queue in front of the place and wait there one by one.
+    spacing: Distance of people in the queue [m].
+    temporary: Whether the waypoint is on no route; the next temporary waypoint replaces it.
+
+Returns:
+    The number of the waypoint.
+
+Raises:
+    ValueError: A coordinate is not finite.
+)");
+  crowd.def("add_route", &add_route, py::arg("waypoints"), py::arg("order"), py::kw_only(),
+            py::arg("stop_interval") = 0.0, py::arg("stop") = py::make_tuple(0.0, 0.0), R"(
+Adds a route and returns its number.
+
+Args:
+    waypoints: Numbers of the waypoints.
+    order: The order in which they are visited: `loop`, `back_and_forth`, `random` or `once`.
+    stop_interval: Mean time between two stops on the way [s], 0 for none.
+    stop: Shortest and longest duration of a stop [s].
+
+Raises:
+    ValueError: A waypoint or the order does not exist.
+)");
+  crowd.def(
+      "reach",
+      [](const CrowdHandle& self, std::uint32_t waypoint) {
+        Crowd& changed = changed_crowd(self);
+        checked_index(waypoint, changed.waypoint_count(), "the waypoint");
+        return changed.reach_of(self.core(), waypoint);
+      },
+      py::arg("waypoint"),
+      "Returns the number of cells of the planning grid from which a way leads to a waypoint.");
+  crowd.def(
+      "way",
+      [](const CrowdHandle& self, std::uint32_t waypoint, const PyPoint& place) {
+        Crowd& changed = changed_crowd(self);
+        checked_index(waypoint, changed.waypoint_count(), "the waypoint");
+        return to_pair(changed.way_from(self.core(), waypoint, to_vec(place)));
+      },
+      py::arg("waypoint"), py::arg("place"),
+      "Returns the direction of the way from a place to a waypoint, (0, 0) if there is none.");
+}
+
+void bind_people(py::class_<CrowdHandle, Handle>& crowd) {
+  crowd.def("add_party", &add_party, py::arg("route"), py::arg("first_leg"), py::arg("members"), R"(
+Adds people who walk together, or a single person.
+
+Args:
+    route: Number of the route.
+    first_leg: Index of the first waypoint in the route.
+    members: The people, at least one.
+
+Raises:
+    ValueError: The route or the waypoint does not exist, or a number is out of range.
+)");
+  crowd.def(
+      "stop",
+      [](const CrowdHandle& self, const BodyHandle& body, bool is_stopped) {
+        const Id id = id_in(self.core(), body);
+        crowd::Person& person = changed_person(changed_crowd(self), id);
+        person.is_stopped = is_stopped;
+        person.sent_to = crowd::kNone;
+      },
+      py::arg("body"), py::arg("is_stopped"),
+      "Stops a person, or makes the person return to the route.");
+  crowd.def("send", &send, py::arg("bodies"), py::arg("place"), py::arg("radius"), R"(
+Makes people walk to a place and stop there, all of them or none.
+
+Args:
+    bodies: Bodies of the people.
+    place: The place [m], world frame.
+    radius: Distance at which the place is reached [m].
+
+Returns:
+    None, or the id of the body of a person from whom there is no way to the place.
+
+Raises:
+    ValueError: A coordinate is not finite, or a body is not that of a person.
+)");
+  crowd.def(
+      "set_key",
+      [](const CrowdHandle& self, std::uint64_t key) { changed_crowd(self).set_key(key); },
+      py::arg("key"), "Sets the integer from which all further random numbers derive.");
+  crowd.def_property_readonly("people", &read_people,
+                              "All people in the order in which they were added.");
+  crowd.def_property_readonly(
+      "state",
+      [](const CrowdHandle& self) {
+        const std::vector<double> state = changed_crowd(self).state();
+        return py::array_t<double>(static_cast<py::ssize_t>(state.size()), state.data());
+      },
+      "Everything besides the bodies that affects the future, as numbers.");
+}
+
+// The formulas of the models, for tests.
 void bind_formulas(py::module_& module) {
+  using Numbers = std::map<std::string, double>;
+  using PyDisc = std::tuple<PyPoint, PyPoint, double>;
   module.def(
       "crowd_repulsion",
-      [](const Pair& offset, const Pair& velocity, const std::map<std::string, double>& numbers) {
+      [](const PyPoint& offset, const PyPoint& velocity, const Numbers& numbers) {
         Settings settings;
         set_numbers(settings, numbers);
         return to_pair(crowd::repulsion(settings.forces, to_vec(offset), to_vec(velocity)));
@@ -223,7 +333,7 @@ void bind_formulas(py::module_& module) {
       py::arg("offset"), py::arg("velocity"), py::arg("numbers"));
   module.def(
       "crowd_wall_repulsion",
-      [](const Pair& offset, double radius, const std::map<std::string, double>& numbers) {
+      [](const PyPoint& offset, double radius, const Numbers& numbers) {
         Settings settings;
         set_numbers(settings, numbers);
         return to_pair(crowd::wall_repulsion(settings.forces, to_vec(offset), radius));
@@ -231,70 +341,52 @@ void bind_formulas(py::module_& module) {
       py::arg("offset"), py::arg("radius"), py::arg("numbers"));
   module.def(
       "crowd_avoid",
-      [](const std::tuple<Pair, Pair, double>& disc, const std::tuple<Pair, Pair, double>& other,
-         double horizon, double share, double dt) {
-        const auto to_disc = [](const std::tuple<Pair, Pair, double>& d) {
+      [](const PyDisc& disc, const PyDisc& other, double horizon, double share, double dt) {
+        const auto to_disc = [](const PyDisc& d) {
           return crowd::Disc{to_vec(std::get<0>(d)), to_vec(std::get<1>(d)), std::get<2>(d)};
         };
         const crowd::HalfPlane plane =
             crowd::avoid(to_disc(disc), to_disc(other), horizon, share, dt);
-        return py::make_tuple(to_pair(plane.normal), plane.offset);
+        return std::pair{to_pair(plane.normal), plane.offset};
       },
-      py::arg("disc"), py::arg("other"), py::arg("horizon"), py::arg("share"), py::arg("dt"));
+      py::arg("disc"), py::arg("other"), py::kw_only(), py::arg("horizon"), py::arg("share"),
+      py::arg("dt"));
   module.def(
       "nearest_point",
-      [](const std::vector<std::pair<Pair, double>>& planes, std::size_t hard, double radius,
-         const Pair& preferred) {
+      [](const std::vector<std::pair<PyPoint, double>>& planes, const PyPoint& preferred,
+         double radius, std::size_t hard) {
         std::vector<crowd::HalfPlane> half_planes;
         for (const auto& [normal, offset] : planes) half_planes.push_back({to_vec(normal), offset});
         return to_pair(crowd::nearest_point(half_planes, hard, radius, to_vec(preferred)));
       },
-      py::arg("planes"), py::arg("hard"), py::arg("radius"), py::arg("preferred"));
+      py::arg("planes"), py::arg("preferred"), py::kw_only(), py::arg("radius"),
+      py::arg("hard") = 0);
   module.def("step_length", &crowd::step_length, py::arg("speed"));
   module.def("leg_offset", &crowd::leg_offset, py::arg("phase"), py::arg("speed"));
 }
 
 }  // namespace
 
-void bind_crowd(py::module_& module, WorldClass& world) {
-  world.def(
-      "add_crowd",
-      [](World& self, bool is_orca, bool is_dynamic, std::int64_t bits, std::int64_t interval,
-         std::uint64_t key, const std::map<std::string, double>& numbers) {
-        self.check_changeable();
-        Settings settings;
-        settings.model = is_orca ? Settings::Model::kOrca : Settings::Model::kSocialForce;
-        settings.is_dynamic = is_dynamic;
-        settings.bits = checked_bits(bits, "bits");
-        if (interval < 1) throw py::value_error("interval must be at least 1 step");
-        settings.interval = interval;
-        settings.key = key;
-        set_numbers(settings, numbers);
-        return self.plan().add_crowd(settings);
-      },
-      py::arg("is_orca"), py::arg("is_dynamic"), py::arg("bits"), py::arg("interval"),
-      py::arg("key"), py::arg("numbers"));
-  world.def("has_crowd", [](World& self, Id id) { return self.plan().find_crowd(id) != nullptr; });
-  world.def("remove_crowd", [](World& self, Id id) {
-    changed_crowd(self, id);
-    self.plan().remove_crowd(id);
-  });
-  world.def(
-      "schedule_crowd",
-      [](World& self, Id id, std::int64_t order, bool is_automatic) {
-        Crowd& crowd = changed_crowd(self, id);
-        crowd.order = order;
-        crowd.is_automatic = is_automatic;
-        self.plan().order_changed();
-      },
-      py::arg("crowd"), py::arg("order"), py::arg("is_automatic"));
-  world.def("advance_crowd", [](World& self, Id id, double dt) {
-    self.plan().advance_now(self, changed_crowd(self, id), dt);
-  });
-  world.def("set_crowd_key",
-            [](World& self, Id id, std::uint64_t key) { changed_crowd(self, id).set_key(key); });
-  bind_parts(world);
-  bind_people(world);
+void bind_crowd(py::module_& module, Classes& classes) {
+  classes.world.def("add_crowd", &add_crowd, py::kw_only(), py::arg("is_orca"),
+                    py::arg("is_dynamic"), py::arg("bits"), py::arg("interval"), py::arg("key"),
+                    py::arg("numbers"), R"(
+Creates a crowd without people.
+
+Args:
+    is_orca: Whether velocities are chosen by ORCA, otherwise by the social force model.
+    is_dynamic: Whether the bodies are dynamic, otherwise kinematic.
+    bits: Bits of the layers whose walls and bodies people avoid.
+    interval: Number of steps between two choices of velocities.
+    key: A 64-bit integer from which all random numbers derive.
+    numbers: Parameters of the models by name; see `src/cpp/crowd`.
+
+Raises:
+    ValueError: A parameter is unknown or out of range.
+)");
+  bind_steps_of(classes.crowd);
+  bind_places(classes.crowd);
+  bind_people(classes.crowd);
   bind_formulas(module);
 }
 

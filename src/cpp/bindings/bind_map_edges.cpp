@@ -1,8 +1,10 @@
 #include <pybind11/numpy.h>
 #include <pybind11/pybind11.h>
+#include <pybind11/stl.h>
 
 #include <algorithm>
 #include <cfloat>
+#include <cstddef>
 #include <cstdint>
 #include <memory>
 #include <new>
@@ -10,14 +12,13 @@
 #include <utility>
 #include <vector>
 
+#include "bindings/masks.h"
 #include "maps/map_edges.h"
 
 namespace py = pybind11;
 
 namespace flatland {
-namespace {
 
-// Checks the shape and type of a mask and returns it in C order, without a copy if possible.
 py::array checked_mask(const py::array& mask) {
   const bool is_byte =
       mask.itemsize() == 1 && (mask.dtype().kind() == 'b' || mask.dtype().kind() == 'u');
@@ -42,19 +43,19 @@ Bitmap view_of(const py::array& mask) {
           static_cast<std::size_t>(mask.shape(1))};
 }
 
+namespace {
+
 // Converts rows to an array without a copy; the array owns the vector.
 template <typename Scalar, typename Row>
-py::array_t<Scalar> to_array(std::vector<Row> rows) {
+py::array_t<Scalar> table_of(std::vector<Row> rows) {
   constexpr std::size_t width = sizeof(Row) / sizeof(Scalar);
   static_assert(sizeof(Row) == width * sizeof(Scalar), "rows must be packed");
   auto owned = std::make_unique<std::vector<Row>>(std::move(rows));
   const std::vector<Row>& kept = *owned;
   py::capsule owner(owned.get(), [](void* data) { delete static_cast<std::vector<Row>*>(data); });
   owned.release();
-  const auto count = static_cast<py::ssize_t>(kept.size());
-  const auto* data = reinterpret_cast<const Scalar*>(kept.data());
-  if (width == 1) return py::array_t<Scalar>({count}, data, owner);
-  return py::array_t<Scalar>({count, static_cast<py::ssize_t>(width)}, data, owner);
+  return py::array_t<Scalar>({kept.size(), width}, reinterpret_cast<const Scalar*>(kept.data()),
+                             owner);
 }
 
 py::array_t<float> py_boundary_edges(const py::array& mask, double resolution) {
@@ -73,10 +74,10 @@ py::array_t<float> py_boundary_edges(const py::array& mask, double resolution) {
     py::gil_scoped_release unlocked;
     edges = boundary_edges(bitmap, resolution);
   }
-  return to_array<float>(std::move(edges));
+  return table_of<float>(std::move(edges));
 }
 
-py::tuple py_boundary_loops(const py::array& mask) {
+std::vector<py::array_t<std::int32_t>> py_boundary_loops(const py::array& mask) {
   const py::array pixels = checked_mask(mask);
   const Bitmap bitmap = view_of(pixels);
   BoundaryLoops loops;
@@ -85,17 +86,59 @@ py::tuple py_boundary_loops(const py::array& mask) {
     py::gil_scoped_release unlocked;
     loops = boundary_loops(bitmap);
   }
-  return py::make_tuple(to_array<std::int32_t>(std::move(loops.points)),
-                        to_array<std::int64_t>(std::move(loops.starts)));
+  const auto points = table_of<std::int32_t>(std::move(loops.points));
+  std::vector<py::array_t<std::int32_t>> views;
+  for (std::size_t i = 0; i + 1 < loops.starts.size(); ++i) {
+    const auto count = static_cast<py::ssize_t>(loops.starts[i + 1] - loops.starts[i]);
+    views.emplace_back(py::array::ShapeContainer{count, py::ssize_t{2}},
+                       points.data(static_cast<py::ssize_t>(loops.starts[i]), 0), points);
+  }
+  return views;
 }
 
 }  // namespace
 
 void bind_map_edges(py::module_& module) {
-  module.def("boundary_edges", &py_boundary_edges, py::arg("mask"), py::arg("resolution"),
-             "Returns the boundary between on and off pixels as straight edges [m], shape (n, 4).");
-  module.def("boundary_loops", &py_boundary_loops, py::arg("mask"),
-             "Returns the boundary as loops: corners (n, 2) and the start of each loop (m + 1,).");
+  module.def("boundary_edges", &py_boundary_edges, py::arg("mask"), py::arg("resolution"), R"(
+Returns the exact boundary between the on and off pixels of a bitmap as straight edges.
+
+All pixels outside the bitmap are on. The corners of pixels have integer coordinates: x counts
+columns from the left edge, y counts rows upwards from the bottom edge. Multiplied by the
+resolution, they are coordinates in the frame of the body of a layer.
+
+Each edge is a maximal straight run between pixels that differ, horizontal between two rows or
+vertical between two columns. A run continues through a corner at which only diagonally adjacent
+pixels are equal.
+
+Args:
+    mask: Pixels with the top row first, on where non-zero; shape (rows, columns), bool or uint8.
+    resolution: Size of a pixel [m].
+
+Returns:
+    Edges (x1, y1, x2, y2) relative to the lower left corner of the bitmap [m], shape (n, 4). The
+    order depends only on the bitmap.
+
+Raises:
+    ValueError: The mask has a wrong shape or type, or the resolution is not positive, or a
+        coordinate is outside the range of a 32-bit float.
+)");
+  module.def("boundary_loops", &py_boundary_loops, py::arg("mask"), R"(
+Returns the boundary of `boundary_edges` as closed loops.
+
+On pixels lie to the left of a loop. Two on pixels are connected only through a common side, so at a
+corner where four sides of the boundary meet, the sides of each on pixel belong together.
+
+Args:
+    mask: Pixels with the top row first, on where non-zero; shape (rows, columns), bool or uint8.
+
+Returns:
+    For each loop, the pixel corners (x, y) at which it turns, shape (k, 2) with k even and at least
+    4, starting at its topmost, then leftmost corner. The loops are sorted by their first corners,
+    from the top.
+
+Raises:
+    ValueError: The mask has a wrong shape or type.
+)");
 }
 
 }  // namespace flatland

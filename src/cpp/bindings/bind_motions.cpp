@@ -1,18 +1,15 @@
 #include <pybind11/stl.h>
 
-#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <memory>
 #include <string>
-#include <tuple>
-#include <type_traits>
 #include <utility>
-#include <variant>
 #include <vector>
 
 #include "bindings/bindings.h"
 #include "bindings/controllers.h"
+#include "bindings/values.h"
 #include "world/bodies.h"
 
 namespace py = pybind11;
@@ -20,228 +17,372 @@ namespace py = pybind11;
 namespace flatland {
 namespace {
 
-void bind_ackermann(WorldClass& world) {
-  world.def(
-      "add_ackermann_controller",
-      [](World& self, Id body, double wheelbase, double track,
-         const std::pair<double, double>& rear, const std::vector<std::pair<Id, double>>& joints,
-         bool takes_twist) {
-        AckermannMotion motion;
-        if (!(wheelbase > 0.0)) throw py::value_error("wheelbase must be positive");
-        if (!joints.empty() && joints.size() != 2) throw py::value_error("a car has two joints");
-        for (std::size_t i = 0; i < joints.size(); ++i) {
-          if (self.read_joint(joints[i].first).joint->GetType() != e_revoluteJoint) {
-            throw py::value_error("the joints of the front wheels must be revolute joints");
-          }
-          motion.joints[i] = joints[i].first;
-          motion.steering_signs[i] = joints[i].second;
+// Returns the motion of a vehicle with steered wheels.
+template <typename Kind>
+Kind steered_motion(double wheelbase, const PyPoint& rear_center, bool takes_twist) {
+  if (!(wheelbase > 0.0)) throw py::value_error("wheelbase must be positive");
+  Kind motion;
+  motion.wheelbase = wheelbase;
+  motion.rear_center = {rear_center[0], rear_center[1]};
+  motion.takes_twist = takes_twist;
+  return motion;
+}
+
+Id checked_joint(const World& world, const JointHandle& joint, const char* error) {
+  const Id id = id_in(world, joint);
+  if (world.read_joint(id).joint->GetType() != e_revoluteJoint) throw py::value_error(error);
+  return id;
+}
+
+template <typename Kind>
+auto steering_state(const ControllerHandle& self) {
+  const auto& motion = motion_of<Kind>(self);
+  return std::make_tuple(motion.angle, motion.angle_velocity, motion.speed, motion.target_angle);
+}
+
+template <typename Kind>
+void set_steering_target(const ControllerHandle& self, double linear, double angular) {
+  motion_of<Kind>(self).target = {linear, 0.0, angular};
+}
+
+template <typename Kind>
+void set_steering_limits(const ControllerHandle& self, const PyLimits& linear,
+                         const PyLimits& angular, double max_angle) {
+  auto& motion = motion_of<Kind>(self);
+  const SpeedLimits checked_linear = to_limits(linear);
+  const SpeedLimits checked_angular = to_limits(angular);
+  motion.max_angle = checked_limit(max_angle);
+  motion.linear = checked_linear;
+  motion.angular = checked_angular;
+}
+
+void bind_tricycle(py::class_<BodyHandle, Handle>& body,
+                   py::class_<TricycleHandle, DriveHandle>& controller) {
+  body.def(
+      "control_tricycle",
+      [](const BodyHandle& self, const JointHandle& front_joint, double steering_sign,
+         double wheelbase, const PyPoint& rear_center, bool takes_twist) {
+        const Id joint = checked_joint(self.core(), front_joint,
+                                       "the joint of the front wheel must be a revolute joint");
+        auto motion = steered_motion<TricycleMotion>(wheelbase, rear_center, takes_twist);
+        motion.joint = joint;
+        motion.steering_sign = steering_sign;
+        return TricycleHandle(self.world, add_controller(self.core(), self.id, motion));
+      },
+      py::arg("front_joint"), py::kw_only(), py::arg("steering_sign"), py::arg("wheelbase"),
+      py::arg("rear_center"), py::arg("takes_twist"), R"(
+Creates a controller that steers and drives the front wheel of the body.
+
+Args:
+    front_joint: Revolute joint of the steered wheel at the origin of the body; its limits are set
+        to the steering angle.
+    steering_sign: Sign of the angle of the joint if the wheel is steered to the left.
+    wheelbase: Distance from the rear center to the front wheel [m].
+    rear_center: Midpoint of the rear wheels in the frame of the body [m].
+    takes_twist: Whether commands are velocities of the rear center and yaw rates.
+
+Raises:
+    ValueError: The wheelbase is not positive.
+    StaleHandleError: The body or the joint was destroyed.
+    WorldLockedError: The world is stepping.
+)");
+  controller.def("set_target", &set_steering_target<TricycleMotion>, py::arg("linear"),
+                 py::arg("angular"), R"(
+Sets the command, from the next step on.
+
+Args:
+    linear: Speed of the front wheel; of the rear center if the drive takes a twist [m/s].
+    angular: Steering angle [rad]; the yaw rate if the drive takes a twist [rad/s].
+)");
+  controller.def("set_limits", &set_steering_limits<TricycleMotion>, py::arg("linear"),
+                 py::arg("angular"), py::arg("max_angle"), R"(
+Sets limits of velocity, acceleration and deceleration.
+
+Args:
+    linear: Limits of the front wheel [m/s].
+    angular: Limits of the steering angle [rad/s].
+    max_angle: Largest steering angle [rad], 0 for no limit.
+
+Raises:
+    ValueError: A limit is negative or NaN.
+)");
+  controller.def_property(
+      "state", &steering_state<TricycleMotion>,
+      [](const TricycleHandle& self, const std::tuple<double, double, double, double>& state) {
+        auto& motion = motion_of<TricycleMotion>(self);
+        std::tie(motion.angle, motion.angle_velocity, motion.speed, motion.target_angle) = state;
+      },
+      "The state; settable.");
+}
+
+void bind_ackermann(py::class_<BodyHandle, Handle>& body,
+                    py::class_<AckermannHandle, DriveHandle>& controller) {
+  body.def(
+      "control_ackermann",
+      [](const BodyHandle& self, double wheelbase, double track, const PyPoint& rear_center,
+         const std::vector<std::pair<const JointHandle*, double>>& front_joints, bool takes_twist) {
+        auto motion = steered_motion<AckermannMotion>(wheelbase, rear_center, takes_twist);
+        if (!front_joints.empty() && front_joints.size() != 2) {
+          throw py::value_error("a car has two joints");
         }
-        motion.wheelbase = wheelbase;
+        for (std::size_t i = 0; i < front_joints.size(); ++i) {
+          const auto& [joint, sign] = front_joints[i];
+          if (joint == nullptr) throw py::type_error("a joint is required, got None");
+          motion.joints[i] = checked_joint(
+              self.core(), *joint, "the joints of the front wheels must be revolute joints");
+          motion.steering_signs[i] = sign;
+        }
         motion.track = track;
-        motion.rear_center[0] = rear.first;
-        motion.rear_center[1] = rear.second;
-        motion.takes_twist = takes_twist;
-        return add_controller(self, body, motion);
+        return AckermannHandle(self.world, add_controller(self.core(), self.id, motion));
       },
-      py::arg("body"), py::arg("wheelbase"), py::arg("track"), py::arg("rear_center"),
-      py::arg("joints"), py::arg("takes_twist"));
-  world.def("set_ackermann_limits",
-            [](World& self, Id id, const Limits& linear, const Limits& angular, double max_angle) {
-              auto& motion = motion_of<AckermannMotion>(self, id);
-              const SpeedLimits checked_linear = to_limits(linear);
-              const SpeedLimits checked_angular = to_limits(angular);
-              if (!(max_angle > 0.0 && max_angle < 1.5707)) {
-                throw py::value_error("max_angle must be between 0 and 90 degrees");
-              }
-              motion.max_angle = max_angle;
-              motion.linear = checked_linear;
-              motion.angular = checked_angular;
-            });
-  world.def("set_ackermann_target", [](World& self, Id id, double speed, double angular) {
-    motion_of<AckermannMotion>(self, id).target = {speed, 0.0, angular};
-  });
-  world.def("ackermann_state", [](World& self, Id id) {
-    const auto& motion = motion_of<AckermannMotion>(self, id);
-    return py::make_tuple(motion.angle, motion.angle_velocity, motion.speed, motion.target_angle);
-  });
-}
+      py::kw_only(), py::arg("wheelbase"), py::arg("track"), py::arg("rear_center"),
+      py::arg("front_joints"), py::arg("takes_twist"), R"(
+Creates a controller that steers and drives the body as a car.
 
-void bind_omni(WorldClass& world) {
-  world.def(
-      "add_omni_controller",
-      [](World& self, Id body, const std::vector<PyTriple>& wheels, double wheel_speed,
-         double wheel_acceleration) {
-        std::vector<Triple> rows;
-        for (const PyTriple& row : wheels) rows.push_back(from_python(row));
-        OmniMotion motion;
-        motion.wheels = std::make_shared<const std::vector<Triple>>(std::move(rows));
-        motion.wheel_speed = checked_limit(wheel_speed);
-        motion.wheel_acceleration = checked_limit(wheel_acceleration);
-        return add_controller(self, body, motion);
-      },
-      py::arg("body"), py::arg("wheels"), py::arg("wheel_speed"), py::arg("wheel_acceleration"));
-  world.def("set_omni_limits", [](World& self, Id id, const Limits& linear, const Limits& angular) {
-    auto& motion = motion_of<OmniMotion>(self, id);
-    const SpeedLimits checked = to_limits(linear);
-    motion.angular = to_limits(angular);
-    motion.linear = checked;
-  });
-  world.def("set_omni_target",
-            [](World& self, Id id, double forward, double sideways, double omega) {
-              motion_of<OmniMotion>(self, id).target = {forward, sideways, omega};
-            });
-  world.def("omni_velocity",
-            [](World& self, Id id) { return to_python(motion_of<OmniMotion>(self, id).velocity); });
-}
+Args:
+    wheelbase: Distance of the axles [m].
+    track: Distance of the front wheels [m].
+    rear_center: Centre of the rear axle in the frame of the body [m].
+    front_joints: Revolute joints of the left and the right front wheel, each with the sign of its
+        angle if the wheel is steered to the left; may be empty. Their limits are set to the angles
+        of the wheels.
+    takes_twist: Whether commands are velocities of the rear center and yaw rates.
 
-// The traction of a drive, null for other controllers.
-Traction* traction_of(Motion& motion) {
-  return std::visit(
-      [](auto& kind) -> Traction* {
-        using Kind = std::decay_t<decltype(kind)>;
-        if constexpr (std::is_same_v<Kind, TweenMotion> || std::is_same_v<Kind, PathMotion> ||
-                      std::is_same_v<Kind, RollingWheels>) {
-          return nullptr;
-        } else {
-          return &kind.traction;
+Raises:
+    ValueError: An argument is invalid.
+    StaleHandleError: The body or a joint was destroyed.
+    WorldLockedError: The world is stepping.
+)");
+  controller.def("set_target", &set_steering_target<AckermannMotion>, py::arg("speed"),
+                 py::arg("angular"), R"(
+Sets the command, from the next step on.
+
+Args:
+    speed: Speed of the centre of the rear axle [m/s].
+    angular: Steering angle [rad]; the yaw rate if the drive takes a twist [rad/s].
+)");
+  controller.def(
+      "set_limits",
+      [](const AckermannHandle& self, const PyLimits& linear, const PyLimits& angular,
+         double max_angle) {
+        if (!(max_angle > 0.0 && max_angle < 1.5707)) {
+          throw py::value_error("max_angle must be between 0 and 90 degrees");
         }
+        set_steering_limits<AckermannMotion>(self, linear, angular, max_angle);
       },
-      motion);
+      py::arg("linear"), py::arg("angular"), py::arg("max_angle"), R"(
+Sets limits of velocity, acceleration and deceleration.
+
+Args:
+    linear: Limits of the speed [m/s].
+    angular: Limits of the steering angle [rad/s].
+    max_angle: Largest steering angle [rad].
+
+Raises:
+    ValueError: A limit is negative or NaN, or the angle is not between 0 and 90 degrees.
+)");
+  controller.def_property_readonly(
+      "state", &steering_state<AckermannMotion>,
+      "Steering angle [rad], its rate [rad/s], speed [m/s] and commanded angle [rad].");
 }
 
-Traction& changed_traction(World& world, Id id) {
-  Traction* traction = traction_of(changed_controller(world, id).motion);
-  if (traction == nullptr) throw PhysicsError("the controller has no traction");
-  return *traction;
+PathHandle control_path(const BodyHandle& body, const std::vector<PyPose>& waypoints,
+                        const std::string& mode, bool faces_forward, const PyLimits& linear,
+                        const PyLimits& angular, double wait, std::uint64_t key) {
+  World& world = body.core();
+  Path path;
+  if (waypoints.empty()) throw py::value_error("there must be at least one waypoint");
+  path.waypoints.push_back(pose_of(world, body.id));
+  path.waypoints.insert(path.waypoints.end(), waypoints.begin(), waypoints.end());
+  using Mode = Path::Mode;
+  path.mode = chosen<Mode>(mode, "mode",
+                           {{"loop", Mode::kLoop},
+                            {"once", Mode::kOnce},
+                            {"there_and_back", Mode::kThereAndBack},
+                            {"random", Mode::kRandom}});
+  path.faces_forward = faces_forward;
+  path.linear = to_limits(linear);
+  path.angular = to_limits(angular);
+  path.wait = checked_limit(wait);
+  if (!(path.linear.velocity > 0.0 && path.angular.velocity > 0.0)) {
+    throw py::value_error("the limits of velocity must be positive");
+  }
+  PathMotion motion;
+  motion.pose = path.waypoints.front();
+  motion.path = std::make_shared<const Path>(std::move(path));
+  motion.is_dynamic = world.read_body(body.id)->GetType() == b2_dynamicBody;
+  motion.key = key;
+  return {body.world, add_controller(world, body.id, motion)};
 }
 
-void bind_traction(WorldClass& world) {
-  world.def(
-      "set_traction",
-      [](World& self, Id id, const std::vector<Id>& bodies, bool is_holonomic, bool acts_at_center,
-         double max_force, double max_torque, double grip, double radius) {
-        Traction& traction = changed_traction(self, id);
-        const Id driven = changed_controller(self, id).body;
-        if (self.read_body(driven)->GetType() != b2_dynamicBody) {
-          throw py::value_error("a drive with forces needs a dynamic body");
-        }
-        for (const Id body : bodies) self.read_body(body);
-        Traction changed;
-        changed.max_force = checked_limit(max_force);
-        changed.max_torque = checked_limit(max_torque);
-        changed.grip = checked_limit(grip);
-        changed.radius = checked_limit(radius);
-        changed.is_enabled = true;
-        changed.is_holonomic = is_holonomic;
-        changed.acts_at_center = acts_at_center;
-        changed.bodies = std::make_shared<const std::vector<Id>>(bodies);
-        traction = changed;
+void bind_path(py::class_<BodyHandle, Handle>& body,
+               py::class_<PathHandle, ControllerHandle>& controller) {
+  body.def("control_path", &control_path, py::arg("waypoints"), py::kw_only(), py::arg("mode"),
+           py::arg("faces_forward"), py::arg("linear"), py::arg("angular"), py::arg("wait"),
+           py::arg("key"), R"(
+Creates a controller of a motion along waypoints.
+
+Args:
+    waypoints: Poses after the current pose of the body, world frame [m, rad].
+    mode: `loop`, `once`, `there_and_back` or `random`.
+    faces_forward: Whether the body turns towards the next waypoint and then drives there; otherwise
+        it reaches the angle of a waypoint on the way.
+    linear: Limits of speed [m/s], which is above 0, acceleration and deceleration [m/s²].
+    angular: The same of the rotation [rad/s, rad/s²].
+    wait: Time at each waypoint [s].
+    key: Key of the random numbers of mode `random`, from 0 to 2^64 - 1.
+
+Raises:
+    ValueError: An argument is invalid.
+    StaleHandleError: The body was destroyed.
+    WorldLockedError: The world is stepping.
+)");
+  controller.def(
+      "set_start",
+      [](const PathHandle& self, bool is_started, std::uint64_t starts) {
+        auto& motion = motion_of<PathMotion>(self);
+        motion.is_started = is_started;
+        motion.starts = starts;
       },
-      py::arg("controller"), py::arg("bodies"), py::arg("is_holonomic"), py::arg("acts_at_center"),
-      py::arg("max_force"), py::arg("max_torque"), py::arg("grip"), py::arg("radius"));
-  world.def("release_brakes",
-            [](World& self, Id id) { changed_traction(self, id).is_braked = false; });
-  world.def("traction_state", [](World& self, Id id) {
-    const Traction& traction = changed_traction(self, id);
-    return py::make_tuple(traction.load, traction.is_braked, to_python(traction.brake_pose));
-  });
-}
+      py::arg("is_started"), py::arg("starts"), R"(
+Sets whether the body moves, from the next step on.
 
-Path::Mode path_mode(const std::string& name) {
-  if (name == "loop") return Path::Mode::kLoop;
-  if (name == "once") return Path::Mode::kOnce;
-  if (name == "there_and_back") return Path::Mode::kThereAndBack;
-  if (name == "random") return Path::Mode::kRandom;
-  throw py::value_error("mode must be one of: loop, once, there_and_back, random, got \"" + name +
-                        "\"");
-}
-
-void bind_path(WorldClass& world) {
-  world.def(
-      "add_path_controller",
-      [](World& self, Id body, const std::vector<PyTriple>& waypoints, const std::string& mode,
-         bool faces_forward, const Limits& linear, const Limits& angular, double wait,
-         std::uint64_t key) {
-        Path path;
-        if (waypoints.empty()) throw py::value_error("there must be at least one waypoint");
-        path.waypoints.push_back(pose_of(self, body));
-        for (const PyTriple& each : waypoints) path.waypoints.push_back(from_python(each));
-        path.mode = path_mode(mode);
-        path.faces_forward = faces_forward;
-        path.linear = to_limits(linear);
-        path.angular = to_limits(angular);
-        path.wait = checked_limit(wait);
-        if (!(path.linear.velocity > 0.0 && path.angular.velocity > 0.0)) {
-          throw py::value_error("the limits of velocity must be positive");
-        }
-        PathMotion motion;
-        motion.pose = path.waypoints.front();
-        motion.path = std::make_shared<const Path>(std::move(path));
-        motion.is_dynamic = self.read_body(body)->GetType() == b2_dynamicBody;
-        motion.key = key;
-        return add_controller(self, body, motion);
+Args:
+    is_started: Whether it moves; otherwise it stops at the next waypoint.
+    starts: Number of commands to start so far.
+)");
+  controller.def(
+      "set_key",
+      [](const PathHandle& self, std::uint64_t key) { motion_of<PathMotion>(self).key = key; },
+      py::arg("key"), "Sets the key of the random numbers, from 0 to 2^64 - 1.");
+  controller.def(
+      "restart",
+      [](const PathHandle& self) {
+        const Id moved = changed_controller(self).body;
+        restart_path(motion_of<PathMotion>(self), pose_of(self.core(), moved));
       },
-      py::arg("body"), py::arg("waypoints"), py::arg("mode"), py::arg("faces_forward"),
-      py::arg("linear"), py::arg("angular"), py::arg("wait"), py::arg("key"));
-  world.def("set_path_start", [](World& self, Id id, bool is_started, std::uint64_t starts) {
-    auto& motion = motion_of<PathMotion>(self, id);
-    motion.is_started = is_started;
-    motion.starts = starts;
-  });
-  world.def("set_path_key", [](World& self, Id id, std::uint64_t key) {
-    motion_of<PathMotion>(self, id).key = key;
-  });
-  world.def("restart_path", [](World& self, Id id) {
-    const Id body = changed_controller(self, id).body;
-    restart_path(motion_of<PathMotion>(self, id), pose_of(self, body));
-  });
-  // Last waypoint, next one, whether it moves, direction, number of legs, time of this leg, starts,
-  // pose, pose at the beginning of the leg, key.
-  world.def("path_state", [](World& self, Id id) {
-    const auto& motion = motion_of<PathMotion>(self, id);
-    return py::make_tuple(motion.waypoint, motion.next, motion.is_moving, motion.is_forward,
-                          motion.legs, motion.time, motion.used_starts, to_python(motion.pose),
-                          to_python(motion.from), motion.key);
-  });
+      "Continues from the current pose of the body, which was moved.");
+  controller.def_property_readonly(
+      "state",
+      [](const PathHandle& self) {
+        const auto& motion = motion_of<PathMotion>(self);
+        return make_value<PyPathState>(motion.waypoint, motion.next, motion.is_moving,
+                                       motion.is_forward, motion.legs, motion.time,
+                                       motion.used_starts, to_python(motion.pose),
+                                       to_python(motion.from), motion.key);
+      },
+      "Everything that changes.");
 }
 
-void bind_wheels(WorldClass& world) {
-  // A wheel is (body, x, y, heading, radius, slide).
-  using PyWheel = std::tuple<Id, double, double, double, double, double>;
-  world.def("add_rolling_wheels", [](World& self, const std::vector<PyWheel>& given) {
-    if (given.empty()) throw py::value_error("there must be at least one wheel");
-    std::vector<Wheel> wheels;
-    for (const auto& [body, x, y, heading, radius, slide] : given) {
-      self.read_body(body);
-      if (!(radius > 0.0)) throw py::value_error("the radius of a wheel must be positive");
-      wheels.push_back({body, x, y, heading, radius, slide});
+WheelsHandle measure_wheels_of(const PyWorld& world, const PyWheels& given) {
+  World& core = *world.core;
+  std::vector<Wheel> wheels;
+  for (const py::handle item : given) {
+    const auto number = [&](const char* name) { return item.attr(name).cast<double>(); };
+    const auto [x, y] = item.attr("position").cast<std::pair<double, double>>();
+    const Id body = id_in(core, item.attr("body").cast<const BodyHandle&>());
+    wheels.push_back({body, {x, y}, number("heading"), number("radius"), number("slide")});
+    core.read_body(body);
+    if (!(wheels.back().radius > 0.0)) {
+      throw py::value_error("the radius of a wheel must be positive");
     }
-    RollingWheels motion;
-    motion.states.resize(wheels.size());
-    const Id body = wheels.front().body;
-    motion.wheels = std::make_shared<const std::vector<Wheel>>(std::move(wheels));
-    measure_wheels(self, motion);
-    return add_controller(self, body, motion);
-  });
-  world.def("skip_wheel_motion",
-            [](World& self, Id id) { skip_motion(self, motion_of<RollingWheels>(self, id)); });
-  world.def("wheel_states", [](World& self, Id id) {
-    std::vector<std::pair<double, double>> states;
-    for (const auto& state : motion_of<RollingWheels>(self, id).states) {
-      states.emplace_back(state.angle, state.speed);
-    }
-    return states;
-  });
+  }
+  if (wheels.empty()) throw py::value_error("there must be at least one wheel");
+  RollingWheels motion;
+  motion.states.resize(wheels.size());
+  const Id body = wheels.front().body;
+  motion.wheels = std::make_shared<const std::vector<Wheel>>(std::move(wheels));
+  measure_wheels(core, motion);
+  return {world, add_controller(core, body, motion)};
+}
+
+void bind_wheels(WorldClass& world, py::class_<WheelsHandle, ControllerHandle>& controller) {
+  world.def("measure_wheels", &measure_wheels_of, py::arg("wheels"), R"(
+Creates a controller that measures how far wheels roll.
+
+Args:
+    wheels: The wheels, at least one.
+
+Raises:
+    ValueError: There is no wheel, or a radius is not positive.
+    StaleHandleError: A body was destroyed.
+    WorldLockedError: The world is stepping.
+)");
+  controller.def(
+      "skip",
+      [](const WheelsHandle& self) { skip_motion(self.core(), motion_of<RollingWheels>(self)); },
+      "Makes the next measurement start from the current poses.");
+  controller.def_property_readonly(
+      "states",
+      [](const WheelsHandle& self) {
+        std::vector<std::pair<double, double>> states;
+        for (const auto& state : motion_of<RollingWheels>(self).states) {
+          states.emplace_back(state.angle, state.speed);
+        }
+        return states;
+      },
+      "Angle [rad] and speed [rad/s] of each wheel, positive if it rolls forwards.");
+}
+
+void bind_tween(py::class_<BodyHandle, Handle>& body,
+                py::class_<TweenHandle, ControllerHandle>& controller) {
+  body.def(
+      "control_tween",
+      [](const BodyHandle& self, const PyPose& delta, double duration, const std::string& mode,
+         const std::string& easing) {
+        if (!(duration > 0.0)) throw py::value_error("duration must be positive");
+        TweenMotion motion;
+        using Mode = TweenMotion::Mode;
+        motion.mode = chosen<Mode>(mode, "mode",
+                                   {{"yoyo", Mode::kYoyo},
+                                    {"loop", Mode::kLoop},
+                                    {"once", Mode::kOnce},
+                                    {"trigger", Mode::kTrigger}});
+        motion.easing = easing_of(easing);
+        motion.duration = duration;
+        motion.start = motion.pose = pose_of(self.core(), self.id);
+        motion.delta = delta;
+        motion.is_dynamic = self.core().read_body(self.id)->GetType() == b2_dynamicBody;
+        return TweenHandle(self.world, add_controller(self.core(), self.id, motion));
+      },
+      py::arg("delta"), py::kw_only(), py::arg("duration"), py::arg("mode"), py::arg("easing"), R"(
+Creates a controller that moves the body between its pose and a pose at an offset.
+
+Args:
+    delta: Offset of the other end from the current pose [m, rad].
+    duration: Duration of the motion to the other end [s].
+    mode: `yoyo`, `loop`, `once` or `trigger`.
+    easing: Name of the easing curve.
+
+Raises:
+    ValueError: An argument is invalid.
+    StaleHandleError: The body was destroyed.
+    WorldLockedError: The world is stepping.
+)");
+  controller.def(
+      "set_trigger",
+      [](const TweenHandle& self, bool is_triggered) {
+        motion_of<TweenMotion>(self).is_triggered = is_triggered;
+      },
+      py::arg("is_triggered"),
+      "Sets the direction of the motion in mode `trigger`, from the next step on.");
+  controller.def_property_readonly(
+      "state",
+      [](const TweenHandle& self) {
+        const auto& motion = motion_of<TweenMotion>(self);
+        return std::make_tuple(motion.progress, motion.exact_progress, motion.is_forward);
+      },
+      "Progress in 32 bits, exact progress, and whether the motion is forward.");
 }
 
 }  // namespace
 
-void bind_motions(WorldClass& world) {
-  bind_ackermann(world);
-  bind_omni(world);
-  bind_traction(world);
-  bind_path(world);
-  bind_wheels(world);
+void bind_motions(Classes& classes) {
+  bind_tricycle(classes.body, classes.tricycle);
+  bind_ackermann(classes.body, classes.ackermann);
+  bind_path(classes.body, classes.path);
+  bind_wheels(classes.world, classes.wheels);
+  bind_tween(classes.body, classes.tween);
 }
 
 }  // namespace flatland

@@ -8,7 +8,9 @@
 #include <utility>
 #include <vector>
 
+#include "bindings/arrays.h"
 #include "bindings/bindings.h"
+#include "bindings/tuples.h"
 #include "world/errors.h"
 #include "world/overlap.h"
 
@@ -17,15 +19,10 @@ namespace py = pybind11;
 namespace flatland {
 namespace {
 
-using Poses = py::array_t<double, py::array::c_style | py::array::forcecast>;
-using PyPose = std::tuple<double, double, double>;
-using Ids = std::vector<Id>;
+using Poses = Array<double>;
 
 void check_poses(const Poses& poses) {
-  if (poses.ndim() != 2 || poses.shape(1) != 3) {
-    throw py::value_error("poses must have shape (n, 3), got " +
-                          std::string(py::str(poses.attr("shape"))));
-  }
+  check_shape(poses, 3, "poses");
   const double* values = poses.data();
   for (py::ssize_t i = 0; i < poses.size(); ++i) {
     if (std::abs(values[i]) <= kMaxMagnitude) continue;
@@ -34,19 +31,20 @@ void check_poses(const Poses& poses) {
   }
 }
 
-Probe complete(Probe probe, const World& world, const Ids& ignored, const std::optional<Ids>& only,
-               double least_gap) {
+Probe complete(Probe probe, const World& world, const std::vector<Id>& ignored, double least_gap) {
   probe.ignored = sorted_bodies(world, ignored);
-  if (only) probe.only = sorted_bodies(world, *only);
   probe.least_gap = checked_finite(least_gap, "least_gap");
   return probe;
 }
 
 // The bodies of a probe are among the ignored bodies.
-Probe model_probe(const World& world, const Ids& bodies, Ids ignored, double least_gap) {
-  Probe probe = probe_of_bodies(world, bodies);
-  ignored.insert(ignored.end(), bodies.begin(), bodies.end());
-  return complete(std::move(probe), world, ignored, std::nullopt, least_gap);
+Probe model_probe(const World& world, const Bodies& bodies, const Bodies& ignored,
+                  double least_gap) {
+  const std::vector<Id> ids = ids_in(world, bodies);
+  Probe probe = probe_of_bodies(world, ids);
+  std::vector<Id> all_ignored = ids_in(world, ignored);
+  all_ignored.insert(all_ignored.end(), ids.begin(), ids.end());
+  return complete(std::move(probe), world, all_ignored, least_gap);
 }
 
 py::array_t<bool> free_at(World& world, const Probe& probe, const Poses& poses) {
@@ -62,37 +60,104 @@ py::array_t<bool> free_at(World& world, const Probe& probe, const Poses& poses) 
   return is_free;
 }
 
-Ids py_overlapping_bodies(const World& world, const Ids& bodies, const PyPose& pose,
-                          const Ids& ignored, double least_gap) {
-  const auto& [x, y, theta] = pose;
-  b2Transform transform;
-  transform.p = checked_vector(x, y, "pose");
-  transform.q.Set(checked_finite(theta, "pose angle"));
-  world.check_readable();
-  const Probe probe = model_probe(world, bodies, ignored, least_gap);
-  return overlapping_bodies(world.engine(), probe, transform);
+std::vector<BodyHandle> py_overlapping_bodies(const PyWorld& world, const Bodies& bodies,
+                                              const PyPose& pose, const Bodies& ignored,
+                                              double least_gap) {
+  const World& core = *world.core;
+  const b2Transform transform = checked_pose(pose);
+  core.check_readable();
+  const Probe probe = model_probe(core, bodies, ignored, least_gap);
+  std::vector<BodyHandle> found;
+  for (const Id id : overlapping_bodies(core.engine(), probe, transform)) {
+    found.emplace_back(world, id);
+  }
+  return found;
 }
 
-py::array_t<bool> py_free_poses(World& world, const Ids& bodies, const Poses& poses,
-                                const Ids& ignored, double least_gap) {
+py::array_t<bool> py_free_poses(World& world, const Bodies& bodies, const Poses& poses,
+                                const Bodies& ignored, double least_gap) {
   world.check_readable();
   return free_at(world, model_probe(world, bodies, ignored, least_gap), poses);
 }
 
 py::array_t<bool> py_free_discs(World& world, const Poses& poses, double radius, std::int64_t bits,
-                                const Ids& ignored, const std::optional<Ids>& only,
+                                const Bodies& ignored, const std::optional<Bodies>& only,
                                 double least_gap) {
   world.check_readable();
   Probe disc = probe_of_disc(checked_not_negative(radius, "radius"), checked_bits(bits, "bits"));
-  return free_at(world, complete(std::move(disc), world, ignored, only, least_gap), poses);
+  disc = complete(std::move(disc), world, ids_in(world, ignored), least_gap);
+  if (only) disc.only = sorted_bodies(world, ids_in(world, *only));
+  return free_at(world, disc, poses);
 }
 
 }  // namespace
 
 void bind_overlap(WorldClass& world) {
-  world.def("overlapping_bodies", &py_overlapping_bodies);
-  world.def("free_poses", &py_free_poses);
-  world.def("free_discs", &py_free_discs);
+  world.def("overlapping_bodies", &py_overlapping_bodies, py::arg("bodies"), py::arg("pose"),
+            py::kw_only(), py::arg("ignored") = py::tuple(), py::arg("least_gap") = 0.0, R"(
+Returns the other bodies that a rigid group of bodies would overlap at a pose.
+
+Only pairs of fixtures that can collide are considered: neither is a sensor, their category and mask
+bits match, at least one body is dynamic, and no joint prevents the collision. The distance of two
+shapes excludes the polygon radius of Box2D. Edges have no interior: a closed loop of edges overlaps
+only shapes that intersect one of the edges.
+
+Args:
+    bodies: Bodies of the group, at least one.
+    pose: Pose (x, y, theta) of the first body in the world frame [m, rad].
+    ignored: Bodies that may be overlapped.
+    least_gap: Distance below which two fixtures overlap [m]; if negative, the penetration depth
+        that is tolerated.
+
+Returns:
+    The overlapped bodies, each once, in order of their ids.
+
+Raises:
+    ValueError: There are no bodies, or a number is not finite.
+    StaleHandleError: A body was destroyed, or the world is closed.
+    WorldLockedError: The world is stepping.
+)");
+  world.def("free_poses", &py_free_poses, py::arg("bodies"), py::arg("poses"), py::kw_only(),
+            py::arg("ignored") = py::tuple(), py::arg("least_gap") = 0.0, R"(
+Returns the poses at which a rigid group of bodies would not overlap other bodies.
+
+See `overlapping_bodies`. Releases the GIL.
+
+Args:
+    bodies: Bodies of the group, at least one.
+    poses: Poses (x, y, theta) of the first body in the world frame [m, rad], shape (n, 3).
+    ignored: Bodies that may be overlapped.
+    least_gap: Distance below which two fixtures overlap [m].
+
+Returns:
+    Whether each pose is free, shape (n,).
+
+Raises:
+    ValueError: There are no bodies, an array has a wrong shape, or a number is not finite.
+    StaleHandleError: A body was destroyed, or the world is closed.
+    WorldLockedError: The world is stepping.
+)");
+  world.def("free_discs", &py_free_discs, py::arg("poses"), py::arg("radius"), py::arg("bits"),
+            py::kw_only(), py::arg("ignored") = py::tuple(), py::arg("only") = py::none(),
+            py::arg("least_gap") = 0.0, R"(
+Returns the poses at which a disc would not overlap any body; see `free_poses`.
+
+Args:
+    poses: Poses (x, y, theta) of the center in the world frame [m, rad], shape (n, 3).
+    radius: Radius of the disc, at least 0 [m].
+    bits: Category and mask bits of the disc.
+    ignored: Bodies that may be overlapped.
+    only: Bodies that are considered; None for all bodies.
+    least_gap: Distance below which a fixture overlaps the disc [m].
+
+Returns:
+    Whether each pose is free, shape (n,).
+
+Raises:
+    ValueError: An array has a wrong shape or a number is out of range.
+    StaleHandleError: A body was destroyed, or the world is closed.
+    WorldLockedError: The world is stepping.
+)");
 }
 
 }  // namespace flatland

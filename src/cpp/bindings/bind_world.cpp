@@ -1,23 +1,28 @@
 #include <pybind11/stl.h>
 
 #include "bindings/bindings.h"
+#include "bindings/values.h"
 
 namespace py = pybind11;
 
 namespace flatland {
 
-py::object to_python(const StepReport& report) {
-  if (report.empty()) return py::none();
-  return py::make_tuple(report.limited, report.invalid);
+std::optional<PyReport> to_python(const StepReport& report) {
+  if (report.empty()) return std::nullopt;
+  return PyReport{report.limited, report.invalid};
 }
 
-WorldClass bind_world(py::module_& module) {
-  WorldClass world(module, "World", "A Box2D world without gravity; owns all objects in it.");
+void bind_world(WorldClass& world) {
   world.def(py::init<>());
-  world.def("close", &World::close, "Destroys all objects; all ids become stale.");
-  world.def_property_readonly("closed", &World::closed);
+  world.def("close", &World::close, R"(
+Destroys the world and all objects in it; idempotent.
+
+Raises:
+    WorldLockedError: The world is stepping.
+)");
+  world.def_property_readonly("closed", &World::closed, "Whether the world is closed.");
   world.def(
-      "step",
+      "_step",
       [](World& self, double dt, int velocity_iterations, int position_iterations) {
         // Safe without the GIL: the world is in exclusive use by this thread, and without a hook
         // the step accesses no Python object.
@@ -27,25 +32,53 @@ WorldClass bind_world(py::module_& module) {
         }));
       },
       py::arg("dt"), py::arg("velocity_iterations"), py::arg("position_iterations"));
-  world.def("copy", [](World& self) {
-    auto copy = std::make_shared<World>();
-    copy->become_copy_of(self);
-    copy->rays().fans().share(self.rays().fans());
-    return copy;
-  });
-  world.def("become_copy_of", &World::become_copy_of, py::arg("source"));
-  world.def("clear", &World::clear, "Destroys all objects; unlike a new world, ids go on.");
-  world.def("find_new_contacts", &World::find_new_contacts);
-  world.def("destroy_body", &World::destroy_body, py::arg("body"));
-  world.def("destroy_joint", &World::destroy_joint, py::arg("joint"));
-  world.def("object_counts", [](const World& self) {
-    const auto counts = self.object_counts();
-    return py::make_tuple(counts[0], counts[1], counts[2], counts[3]);
-  });
-  world.def("has_body", &World::has_body, py::arg("body"));
-  world.def("has_fixture", &World::has_fixture, py::arg("fixture"));
-  world.def("has_joint", &World::has_joint, py::arg("joint"));
-  return world;
+  world.def(
+      "_share_fans",
+      [](World& self, World& source) { self.rays().fans().share(source.rays().fans()); },
+      py::arg("source"), "Makes this world use the sorted rays of another one.");
+  world.def("become_copy_of", &World::become_copy_of, py::arg("source"), R"(
+Replaces all objects by exact copies of those of another world, with the same ids.
+
+Handles of objects whose ids do not exist in the other world become stale, and their ids are not
+used again.
+
+Args:
+    source: The other world, such as an earlier copy of this one.
+
+Raises:
+    StaleHandleError: One of the worlds is closed.
+    WorldLockedError: One of the worlds is stepping.
+)");
+  world.def("clear", &World::clear, R"(
+Destroys all objects; the results of the same further calls are those of a new world.
+
+Raises:
+    StaleHandleError: The world is closed.
+    WorldLockedError: The world is stepping.
+)");
+  world.def("find_new_contacts", &World::find_new_contacts, R"(
+Searches for pairs of fixtures that may touch, which the next step would do otherwise.
+
+The first search takes as long as many steps if there are many edges. The results of the next step
+are the same.
+
+Raises:
+    StaleHandleError: The world is closed.
+    WorldLockedError: The world is stepping.
+)");
+  world.def(
+      "object_counts",
+      [](const World& self) {
+        const auto [bodies, fixtures, joints, contacts] = self.object_counts();
+        return make_value<PyObjectCounts>(bodies, fixtures, joints, contacts);
+      },
+      R"(
+Returns the numbers of objects.
+
+Raises:
+    StaleHandleError: The world is closed.
+    WorldLockedError: The world is stepping.
+)");
 }
 
 }  // namespace flatland

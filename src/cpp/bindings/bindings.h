@@ -1,13 +1,18 @@
-// The parts of the extension module. It exposes the class `_core.World`, whose methods take ids;
-// flatland.physics wraps the ids in handles. Engine code does not include this file.
+// The parts of the extension module. Engine code does not include this file.
 #pragma once
 
 #include <pybind11/pybind11.h>
+#include <pybind11/stl.h>
 
 #include <cstdint>
+#include <initializer_list>
 #include <memory>
+#include <optional>
+#include <string>
 #include <utility>
+#include <vector>
 
+#include "bindings/handles.h"
 #include "world/world.h"
 
 namespace flatland {
@@ -15,21 +20,20 @@ namespace flatland {
 using WorldClass = pybind11::class_<World, std::shared_ptr<World>>;
 
 void bind_errors();
-WorldClass bind_world(pybind11::module_& module);
-void bind_bodies(WorldClass& world);
-void bind_crowd(pybind11::module_& module, WorldClass& world);
-void bind_fixtures(WorldClass& world);
-void bind_joints(WorldClass& world);
-void bind_motions(WorldClass& world);
-void bind_contacts(pybind11::module_& module, WorldClass& world);
+void bind_world(WorldClass& world);
+void bind_handles(pybind11::class_<Handle>& handle);
+void bind_bodies(Classes& classes);
+void bind_fixtures(Classes& classes);
+void bind_joints(Classes& classes);
+void bind_controllers(pybind11::module_& module, Classes& classes);
+void bind_motions(Classes& classes);
+void bind_crowd(pybind11::module_& module, Classes& classes);
+void bind_touches(Classes& classes);
+void bind_contacts(pybind11::module_& module, Classes& classes);
 void bind_raycast(WorldClass& world);
-void bind_range_finder(pybind11::module_& module);
-void bind_controllers(pybind11::module_& module, WorldClass& world);
-void bind_steps(WorldClass& world);
-void bind_paced_run(WorldClass& world);
-void bind_run_worlds(pybind11::module_& module);
-void bind_touches(WorldClass& world);
 void bind_overlap(WorldClass& world);
+void bind_range_finder(pybind11::module_& module);
+void bind_jobs(pybind11::module_& module, Classes& classes);
 void bind_map_edges(pybind11::module_& module);
 
 // Calls work() and ends the use of the world, even if work() throws.
@@ -63,10 +67,24 @@ auto without_gil_if(bool is_long, Use& use, Work&& work) {
 // A step that is expected to be shorter is not worth a release of the GIL [s].
 inline constexpr double kShortStep = 1e-4;
 
-// None for an empty report, else the ids of limited and of invalid bodies.
-pybind11::object to_python(const StepReport& report);
+// The ids of limited and of invalid bodies.
+using PyReport = std::pair<std::vector<Id>, std::vector<Id>>;
+// None for an empty report.
+std::optional<PyReport> to_python(const StepReport& report);
 
 // Converts a Python int to 16 bits; throws a ValueError that names `what` if it is out of range.
 std::uint16_t checked_bits(std::int64_t bits, const char* what);
+
+// Returns the choice with a name; throws a ValueError that names `what` if there is none.
+template <typename Value>
+Value chosen(const std::string& name, const std::string& what,
+             std::initializer_list<std::pair<const char*, Value>> choices) {
+  std::string names;
+  for (const auto& [each, value] : choices) {
+    if (name == each) return value;
+    names += (names.empty() ? "" : ", ") + std::string(each);
+  }
+  throw pybind11::value_error(what + " must be one of: " + names + ", got \"" + name + "\"");
+}
 
 }  // namespace flatland

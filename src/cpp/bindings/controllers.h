@@ -1,4 +1,4 @@
-// Access to controllers by id, for the bindings of their kinds.
+// Access to the motions of controllers, for the bindings of their kinds.
 #pragma once
 
 #include <tuple>
@@ -11,7 +11,8 @@
 
 namespace flatland {
 
-using Limits = std::tuple<double, double, double>;
+// Limits of velocity, acceleration and deceleration.
+using PyLimits = std::tuple<double, double, double>;
 
 inline double checked_limit(double limit) {
   if (!(limit >= 0.0)) {
@@ -20,21 +21,22 @@ inline double checked_limit(double limit) {
   return limit;
 }
 
-inline SpeedLimits to_limits(const Limits& limits) {
+inline SpeedLimits to_limits(const PyLimits& limits) {
   const auto& [velocity, acceleration, deceleration] = limits;
   return {checked_limit(velocity), checked_limit(acceleration), checked_limit(deceleration)};
 }
 
-inline Controller& changed_controller(World& world, Id id) {
+inline Controller& changed_controller(const ControllerHandle& handle) {
+  World& world = handle.core();
   world.check_changeable();
-  Controller* controller = world.plan().find_controller(id);
+  Controller* controller = world.jobs().find_controller(handle.id);
   if (controller == nullptr) throw StaleHandleError("the controller was removed");
   return *controller;
 }
 
 template <typename Kind>
-Kind& motion_of(World& world, Id id) {
-  Kind* motion = std::get_if<Kind>(&changed_controller(world, id).motion);
+Kind& motion_of(const ControllerHandle& handle) {
+  Kind* motion = std::get_if<Kind>(&changed_controller(handle).motion);
   if (motion == nullptr) throw PhysicsError("the controller is of another kind");
   return *motion;
 }
@@ -44,7 +46,7 @@ inline Id add_controller(World& world, Id body, Motion motion) {
   Controller controller;
   controller.body = body;
   controller.motion = std::move(motion);
-  return world.plan().add_controller(controller);
+  return world.jobs().add_controller(controller);
 }
 
 }  // namespace flatland

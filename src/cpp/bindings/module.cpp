@@ -3,26 +3,29 @@
 #include <string>
 
 #include "bindings/bindings.h"
+#include "bindings/masks.h"
 
 PYBIND11_MODULE(_core, module) {
-  module.doc() = "Box2D objects by id; used only by flatland.physics.";
+  module.doc() = "The physics engine; used only by flatland.physics, which documents it.";
   module.attr("BOX2D_VERSION") = std::to_string(b2_version.major) + "." +
                                  std::to_string(b2_version.minor) + "." +
                                  std::to_string(b2_version.revision);
   flatland::bind_errors();
-  flatland::WorldClass world = flatland::bind_world(module);
-  flatland::bind_bodies(world);
-  flatland::bind_crowd(module, world);
-  flatland::bind_fixtures(world);
-  flatland::bind_joints(world);
-  flatland::bind_contacts(module, world);
-  flatland::bind_raycast(world);
+  flatland::Classes classes(module);
+  flatland::bind_handles(classes.handle);
   flatland::bind_range_finder(module);
-  flatland::bind_controllers(module, world);
-  flatland::bind_steps(world);
-  flatland::bind_paced_run(world);
-  flatland::bind_run_worlds(module);
-  flatland::bind_touches(world);
-  flatland::bind_overlap(world);
+  flatland::bind_world(classes.world);
+  flatland::bind_bodies(classes);
+  flatland::bind_fixtures(classes);
+  flatland::bind_joints(classes);
+  flatland::bind_controllers(module, classes);
+  flatland::bind_motions(classes);
+  flatland::bind_crowd(module, classes);
+  flatland::bind_touches(classes);
+  flatland::bind_contacts(module, classes);
+  flatland::bind_raycast(classes.world);
+  flatland::bind_overlap(classes.world);
+  flatland::bind_jobs(module, classes);
   flatland::bind_map_edges(module);
+  flatland::bind_masks(module);
 }

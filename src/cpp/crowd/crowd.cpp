@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "crowd/random.h"
 #include "world/bodies.h"
@@ -10,15 +11,13 @@
 namespace flatland::crowd {
 
 std::uint32_t Crowd::add_waypoint(const Waypoint& waypoint) {
-  auto index = static_cast<std::uint32_t>(waypoints_.size());
-  // A waypoint without a spacing is temporary: it is on no route, and its number is used again once
-  // nobody is sent there.
-  for (std::uint32_t i = 0; waypoint.spacing == 0.0 && i < waypoints_.size(); ++i) {
-    const bool is_free = waypoints_[i].spacing == 0.0 &&
-                         std::none_of(people_.begin(), people_.end(),
-                                      [i](const Person& person) { return person.sent_to == i; });
-    if (is_free) index = std::min(index, i);
-  }
+  std::uint32_t index = 0;
+  const auto is_sent_there = [&](const Person& person) { return person.sent_to == index; };
+  const auto is_free = [&] {
+    return waypoint.is_temporary && waypoints_[index].is_temporary &&
+           std::none_of(people_.begin(), people_.end(), is_sent_there);
+  };
+  while (index < waypoints_.size() && !is_free()) ++index;
   if (index == waypoints_.size()) {
     waypoints_.emplace_back();
     queues_.emplace_back();
@@ -38,46 +37,89 @@ std::uint32_t Crowd::add_waypoint(const Waypoint& waypoint) {
   return index;
 }
 
+Id Crowd::send(World& world, const std::vector<Id>& bodies, const Place& place) {
+  const Crowd before = *this;
+  Waypoint goal;
+  goal.place = place;
+  goal.is_temporary = true;
+  const std::uint32_t waypoint = add_waypoint(goal);
+  for (const Id body : bodies) {
+    const Triple pose = pose_of(world, body);
+    if (square(way_from(world, waypoint, {pose[0], pose[1]})) == 0.0) {
+      *this = before;
+      return body;
+    }
+  }
+  for (const Id body : bodies) {
+    Person* person = find(body);
+    person->sent_to = waypoint;
+    person->is_stopped = false;
+  }
+  return 0;
+}
+
 std::uint32_t Crowd::add_route(const Route& route) {
   routes_.push_back(route);
   return static_cast<std::uint32_t>(routes_.size() - 1);
 }
 
-std::uint32_t Crowd::add_party(std::uint32_t route, std::uint32_t first_leg, bool is_backward) {
+void Crowd::add_party(std::uint32_t route, std::uint32_t first_leg,
+                      const std::vector<Person>& people) {
   Party party;
+  party.number = next_party_++;
   party.route = route;
   party.leg = first_leg;
-  party.is_backward = is_backward;
-  parties_.push_back(party);
-  return static_cast<std::uint32_t>(parties_.size() - 1);
-}
-
-std::uint32_t Crowd::add_person(Person person) {
-  person.number = next_number_++;
-  own_.insert(person.body);
-  for (const Id leg : person.legs) {
-    if (leg != 0) own_.insert(leg);
+  for (Person person : people) {
+    person.number = next_number_++;
+    person.party = static_cast<std::uint32_t>(parties_.size());
+    party.members.push_back(static_cast<std::uint32_t>(people_.size()));
+    own_.insert(person.body);
+    for (const Id leg : person.legs) {
+      if (leg != 0) own_.insert(leg);
+    }
+    people_.push_back(person);
   }
-  people_.push_back(person);
-  return person.number;
+  parties_.push_back(std::move(party));
 }
 
 void Crowd::remove_person(Id body) {
-  const auto found = std::find_if(people_.begin(), people_.end(),
-                                  [body](const Person& person) { return person.body == body; });
-  if (found == people_.end()) return;
-  own_.erase(found->body);
-  for (const Id leg : found->legs) own_.erase(leg);
+  const Person* found = find(body);
+  if (found == nullptr) return;
+  const Person person = *found;
+  own_.erase(person.body);
+  for (const Id leg : person.legs) own_.erase(leg);
   for (auto& queue : queues_) {
-    queue.erase(std::remove(queue.begin(), queue.end(), found->number), queue.end());
+    queue.erase(std::remove(queue.begin(), queue.end(), person.number), queue.end());
   }
-  people_.erase(found);
+  people_.erase(people_.begin() + (found - people_.data()));
+  if (parties_[person.party].members.size() == 1) {
+    parties_.erase(parties_.begin() + person.party);
+    for (Person& other : people_) {
+      if (other.party > person.party) --other.party;
+    }
+  }
+  for (Party& party : parties_) party.members.clear();
+  for (std::uint32_t i = 0; i < people_.size(); ++i) {
+    parties_[people_[i].party].members.push_back(i);
+  }
 }
 
 Person* Crowd::find(Id body) {
   const auto found = std::find_if(people_.begin(), people_.end(),
                                   [body](const Person& person) { return person.body == body; });
   return found == people_.end() ? nullptr : &*found;
+}
+
+const Person* Crowd::numbered(std::uint32_t number) const {
+  const auto found =
+      std::lower_bound(people_.begin(), people_.end(), number,
+                       [](const Person& person, std::uint32_t n) { return person.number < n; });
+  return found == people_.end() || found->number != number ? nullptr : &*found;
+}
+
+bool Crowd::is_queued(const Person& person) const {
+  const auto& queue = queues_[target_of(person)];
+  return std::find(queue.begin(), queue.end(), person.number) != queue.end();
 }
 
 std::uint32_t Crowd::target_of(const Person& person) const {
@@ -88,10 +130,8 @@ std::uint32_t Crowd::target_of(const Person& person) const {
 
 bool Crowd::is_standing(const Person& person) const {
   const Party& party = parties_[person.party];
-  if (person.is_stopped || person.stop_until != 0 || party.is_waiting || party.is_done) return true;
-  const std::uint32_t target = target_of(person);
-  const auto& queue = queues_[target];
-  return std::find(queue.begin(), queue.end(), person.number) != queue.end();
+  return person.is_stopped || person.stop_until != 0 || party.is_waiting || party.is_done ||
+         is_queued(person);
 }
 
 std::size_t Crowd::reach_of(World& world, std::uint32_t waypoint) {
@@ -112,8 +152,8 @@ std::vector<double> Crowd::state() const {
                               static_cast<double>(settings_.key & 0xFFFFFFFFU)};
   const auto add = [&](std::initializer_list<double> more) { numbers.insert(numbers.end(), more); };
   for (const Person& p : people_) {
-    add({static_cast<double>(p.number), static_cast<double>(p.party), p.radius, p.speed,
-         static_cast<double>(p.is_aware), static_cast<double>(p.is_stopped),
+    add({static_cast<double>(p.number), static_cast<double>(parties_[p.party].number), p.radius,
+         p.speed, static_cast<double>(p.is_aware), static_cast<double>(p.is_stopped),
          static_cast<double>(p.sent_to), static_cast<double>(p.stop_until),
          static_cast<double>(p.draws), p.delay, p.lost, static_cast<double>(p.yields_to),
          static_cast<double>(p.yield_until), p.velocity.x, p.velocity.y, p.heading, p.phase,
@@ -159,13 +199,8 @@ void Crowd::read_surroundings(const World& world) {
 }
 
 void Crowd::read_people(World& world) {
-  for (std::size_t i = people_.size(); i-- > 0;) {
-    Person& person = people_[i];
+  for (Person& person : people_) {
     const b2Body* body = world.find_body(person.body);
-    if (body == nullptr) {
-      remove_person(person.body);
-      continue;
-    }
     const Triple pose = pose_of(*body);
     person.position = {pose[0], pose[1]};
     person.heading = pose[2];
@@ -189,7 +224,7 @@ Vec Crowd::way_to(std::uint32_t waypoint, Vec p) {
   const Vec straight = waypoints_[waypoint].place.nearest(p) - p;
   const FlowField* field = field_of(waypoint);
   if (field == nullptr) return unit(straight);
-  // The directions of the grid are coarse next to the place.
+  // Next to the place, the directions of the grid are too coarse.
   const double close = 3.0 * grid_->cell();
   if (square(straight) < close * close && surroundings_.walls().is_clear(p, p + straight)) {
     return unit(straight);
@@ -206,7 +241,6 @@ void Crowd::advance(World& world, std::int64_t k, double dt) {
   if (!settings_.is_dynamic) return;
   for (const Person& person : people_) {
     b2Body* body = world.find_body(person.body);
-    if (body == nullptr) continue;
     const Vec change = dt * person.acceleration;
     body->SetLinearVelocity(body->GetLinearVelocity() +
                             b2Vec2(static_cast<float>(change.x), static_cast<float>(change.y)));

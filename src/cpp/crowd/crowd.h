@@ -1,8 +1,17 @@
 // A crowd: people of a world, each with a body and possibly legs, who walk on their own.
 //
-// A crowd is a value that refers to bodies by id, so that a copy of a world can copy it. Every few
-// steps it chooses the velocity of each person; in between, the physics moves kinematic bodies with
-// these velocities, and dynamic ones with the accelerations of the model.
+// A crowd is a value that refers to bodies by id, so that a copy of a world can contain a copy of
+// the crowd. An update, every few steps, chooses the velocity of each person. Between two updates,
+// kinematic bodies move with these velocities, and dynamic bodies with constant accelerations.
+//
+// The source files follow the order of an update:
+//   crowd.cpp         reads poses, walls and obstacles; contains the methods for callers
+//   routes.cpp        where each person wants to walk: waypoints, waiting, queues, stops
+//   right_of_way.cpp  who passes a door first, and on which side people pass each other
+//   giving_way.cpp    who makes room for whom
+//   motion.cpp        the velocity by a model, free of contacts, and the motion of the legs
+// Parts without a state: flow_field (ways on a grid), walls and surroundings (what is avoided),
+// gates (doors), social_force and orca with half_planes (the models), gait (legs), random.
 #pragma once
 
 #include <cstddef>
@@ -16,6 +25,7 @@
 #include "crowd/half_planes.h"
 #include "crowd/people.h"
 #include "crowd/surroundings.h"
+#include "world/job_place.h"
 
 namespace flatland {
 
@@ -28,51 +38,56 @@ class Crowd {
   Crowd() : Crowd(Settings{}) {}
   explicit Crowd(const Settings& settings) : settings_(settings), surroundings_(settings.bits) {}
 
-  std::int64_t order = 0;       // of the plugin
-  bool is_automatic = false;    // whether each step carries it out
-  std::uint64_t last_step = 0;  // number of the step in which it was carried out last
+  JobPlace place;
 
-  // Carries out step k, before its physics.
+  // Moves the people in step k, before the physics step.
   void advance(World& world, std::int64_t k, double dt);
 
   std::uint32_t add_waypoint(const Waypoint& waypoint);
+  // Makes people walk to a place and stop there, instead of following their routes. Returns the
+  // body of a person from whom there is no way to the place, and changes nothing in this case;
+  // returns 0 on success.
+  Id send(World& world, const std::vector<Id>& bodies, const Place& place);
   std::uint32_t add_route(const Route& route);
-  std::uint32_t add_party(std::uint32_t route, std::uint32_t first_leg, bool is_backward);
-  // Returns the number of the person.
-  std::uint32_t add_person(Person person);
+  // Adds people who walk together; the list must not be empty.
+  void add_party(std::uint32_t route, std::uint32_t first_leg, const std::vector<Person>& people);
+  // Does nothing if the body is not that of a person. A party ends with its last member.
   void remove_person(Id body);
   void set_key(std::uint64_t key) { settings_.key = key; }
 
   std::size_t waypoint_count() const { return waypoints_.size(); }
   std::size_t route_count() const { return routes_.size(); }
   std::size_t route_size(std::uint32_t route) const { return routes_[route].waypoints.size(); }
-  std::size_t party_count() const { return parties_.size(); }
   const std::vector<Person>& people() const { return people_; }
+  // Null if the body is not that of a person.
   Person* find(Id body);
-  // The waypoint to which a person walks, or at which the person has arrived.
+  // Returns the waypoint to which a person walks, or at which the person has arrived.
   std::uint32_t target_of(const Person& person) const;
-  // Whether a person stands on purpose: stopped, waiting or in a queue.
+  // Returns whether a person stands on purpose: stopped, waiting or in a queue.
   bool is_standing(const Person& person) const;
-  // The number of cells of the grid from which there is a way to a waypoint; reads the walls.
+  // Returns the number of cells of the grid from which there is a way to a waypoint.
   std::size_t reach_of(World& world, std::uint32_t waypoint);
-  // The direction of the way from a place to a waypoint, 0 if there is none; reads the walls.
+  // Returns the direction of the way from a place to a waypoint, a zero vector if there is none.
   Vec way_from(World& world, std::uint32_t waypoint, Vec place);
-  // Everything besides bodies that affects the future, as numbers.
+  // Returns everything besides the bodies that affects the future, as numbers.
   std::vector<double> state() const;
 
  private:
   struct Choice {
     Vec velocity;
-    Vec direction;         // of the way, also of somebody who stands
-    bool is_held = false;  // at a door, while others come out
+    Vec direction;         // direction of the way, even if the velocity is zero
+    bool is_held = false;  // whether the person waits at a door while others come out
   };
 
-  // Who gives way: those who walk to those with a higher priority, those who are idle at a waypoint
-  // to everybody, and those who are stopped or in a queue to nobody.
+  // To whom a person gives way: kWalking to people with a higher priority, kIdle (at a waypoint) to
+  // everybody, kFixed (stopped or in a queue) to nobody.
   enum class Stance : std::uint8_t { kWalking, kIdle, kFixed };
 
   void read_surroundings(const World& world);
   void read_people(World& world);
+  // Null if the person was removed.
+  const Person* numbered(std::uint32_t number) const;
+  bool is_queued(const Person& person) const;
   const FlowField* field_of(std::uint32_t waypoint);
   Vec way_to(std::uint32_t waypoint, Vec p);
   double draw(std::uint64_t& draws, std::uint64_t stream, Span span);
@@ -91,7 +106,7 @@ class Crowd {
   struct Approach {
     std::size_t person = 0;
     std::size_t gate = 0;
-    int direction = 0;  // index, see Demand
+    int direction = 0;  // index of a direction, see Demand
     bool is_inside = false;
   };
 
@@ -124,22 +139,23 @@ class Crowd {
   std::vector<Route> routes_;
   std::vector<Party> parties_;
   std::vector<Person> people_;
-  std::vector<std::vector<std::uint32_t>> queues_;  // numbers of people by waypoint
-  std::uint32_t next_number_ = 0;
+  std::vector<std::vector<std::uint32_t>> queues_;  // numbers of people, by waypoint
+  std::uint32_t next_number_ = 0;                   // number of the next person
+  std::uint32_t next_party_ = 0;                    // number of the next party
 
   Surroundings surroundings_;
-  std::unordered_set<Id> own_;            // bodies and legs
-  std::shared_ptr<const FreeGrid> grid_;  // null without walls, or if it is to be created
-  bool has_grid_ = false;
+  std::unordered_set<Id> own_;            // bodies and legs of all people
+  std::shared_ptr<const FreeGrid> grid_;  // null in a world without walls
+  bool has_grid_ = false;                 // whether `grid_`, `fields_` and `gates_` match the walls
   std::vector<std::shared_ptr<const FlowField>> fields_;  // by waypoint, null if not needed yet
   std::shared_ptr<const std::vector<Gate>> gates_ = std::make_shared<const std::vector<Gate>>();
-  std::vector<Signal> signals_;  // of the gates
+  std::vector<Signal> signals_;  // by gate
 
-  // Of one update.
-  std::vector<std::uint32_t> guests_;  // people who stand at each waypoint
+  // The members below are valid within one update.
+  std::vector<std::uint32_t> guests_;  // number of people who stand at each waypoint
   std::vector<std::uint32_t> neighbours_, neighbour_starts_;
   std::vector<Vec> chosen_;
-  std::size_t decided_ = 0;  // people whose velocity is chosen
+  std::size_t decided_ = 0;  // number of people whose velocity is chosen
   std::vector<NearPoint> near_;
   std::vector<HalfPlane> planes_;
 };

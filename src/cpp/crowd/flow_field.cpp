@@ -10,8 +10,8 @@
 namespace flatland::crowd {
 namespace {
 
-constexpr double kClearance = 0.4;     // beyond which walls do not slow down [m]
-constexpr double kMostSlowness = 4.0;  // next to a wall
+constexpr double kClearance = 0.4;     // gap beyond which a wall has no effect on the time [m]
+constexpr double kMostSlowness = 4.0;  // time to cross a metre next to a wall [s]
 constexpr float kNever = std::numeric_limits<float>::infinity();
 constexpr double kUnit = 127.0;  // length of the stored directions
 
@@ -78,7 +78,7 @@ class Front {
   std::priority_queue<Entry, std::vector<Entry>, std::greater<>> front_;
 };
 
-// The derivative of the arrival time from the side from which the front came.
+// Returns the derivative of the arrival time on the side from which the front arrived.
 double upwind(float before, float here, float after) {
   if (std::min(before, after) >= here) return 0.0;
   return before < after ? static_cast<double>(here - before) : static_cast<double>(after - here);
@@ -113,7 +113,8 @@ FlowField::FlowField(const FreeGrid& grid, const Place& place)
     : low_(grid.low()), cell_(grid.cell()), columns_(grid.columns()), rows_(grid.rows()) {
   Front front(grid);
   directions_.resize(static_cast<std::size_t>(columns_ * rows_));
-  // Not the whole place: a part of it may be on the other side of a wall.
+  // The front starts only in cells within `reach` of the place, without its radius: a part of the
+  // disc around the place may be on the other side of a wall.
   const double reach = 0.75 * cell_;
   for (std::size_t i = 0; i < directions_.size(); ++i) {
     const Vec center = grid.center(i);
@@ -127,7 +128,7 @@ FlowField::FlowField(const FreeGrid& grid, const Place& place)
       ++reached_;
       const Vec slope{upwind(front.time(column - 1, row), here, front.time(column + 1, row)),
                       upwind(front.time(column, row - 1), here, front.time(column, row + 1))};
-      // At the place itself there is no slope.
+      // The slope is zero at the place itself.
       const Vec center = grid.center(index(column, row));
       const Vec direction = unit(-slope, unit(place.nearest(center) - center, {1.0, 0.0}));
       directions_[index(column, row)] = {
@@ -159,7 +160,8 @@ Vec FlowField::direction(Vec p, const Walls& walls) const {
     sum += weight * Vec{static_cast<double>(d.x), static_cast<double>(d.y)};
   }
   if (square(sum) > 1.0) return unit(sum);
-  // Outside the free space, for example after a push: to the nearest cell with a way.
+  // The point is outside the free space, for example after a push. Search for the nearest cell with
+  // a way.
   constexpr std::int64_t kSearch = 4;
   double nearest = std::numeric_limits<double>::infinity();
   Vec target;

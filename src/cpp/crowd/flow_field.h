@@ -1,13 +1,12 @@
-// The ways to a place: on a grid of the free space, the direction of the fastest way from each
-// cell.
+// The ways to a place: the direction of the fastest way from each cell of a grid.
 #pragma once
 
 #include <cstddef>
 #include <cstdint>
 #include <vector>
 
-#include "crowd/vec.h"
 #include "crowd/walls.h"
+#include "vec.h"
 
 namespace flatland::crowd {
 
@@ -20,12 +19,12 @@ struct Place {
   bool contains(Vec p) const { return length(nearest(p) - p) <= radius; }
 };
 
-// Square cells with the time that a disc takes to cross them: more near walls, so that the ways
-// keep a distance from them. Immutable.
+// Square cells with the time that a disc takes to cross each cell. The time is longer near walls,
+// so that the fastest ways keep a distance from walls. Immutable.
 class FreeGrid {
  public:
-  // `radius` is that of the disc [m], `cell` the size of the cells, which are larger if they would
-  // be too many.
+  // Creates cells of the size `cell` [m] for a disc of a radius [m]. The cells are larger if there
+  // would be too many of them, see `cell_size`.
   FreeGrid(const Walls& walls, Vec low, Vec high, double cell, double radius);
 
   std::int64_t columns() const { return columns_; }
@@ -33,7 +32,7 @@ class FreeGrid {
   double cell() const { return cell_; }
   Vec low() const { return low_; }
   Vec center(std::size_t index) const;
-  // Time to cross a metre at a speed of 1 m/s; 0 if the disc does not fit.
+  // Returns the time to cross a metre at a speed of 1 m/s; 0 if the disc does not fit.
   float slowness(std::size_t index) const { return slowness_[index]; }
 
  private:
@@ -48,15 +47,16 @@ class FlowField {
  public:
   FlowField(const FreeGrid& grid, const Place& place);
 
-  // Number of cells from which there is a way.
+  // Returns the number of cells from which there is a way.
   std::size_t reached() const { return reached_; }
-  // Returns the unit vector of the way from a point; 0 if there is none. From a point at which the
-  // disc does not fit, it leads to the nearest cell with a way that no wall hides.
+  // Returns the unit vector of the way from a point, a zero vector if there is none. From a point
+  // at which the disc does not fit, the way leads to the nearest visible cell with a way.
   Vec direction(Vec p, const Walls& walls) const;
 
  private:
+  // A vector of the length kUnit; (0, 0) if there is no way.
   struct Direction {
-    std::int8_t x = 0, y = 0;  // both 0 without a way
+    std::int8_t x = 0, y = 0;
   };
 
   std::size_t index(std::int64_t column, std::int64_t row) const {

@@ -16,7 +16,8 @@ double leg_offset(double phase, double speed) {
   // Below this speed, steps become shorter, so that both legs stand side by side in the end.
   constexpr double kFullSteps = 0.3;  // m/s
   const double half = 0.5 * step_length(speed) * std::min(speed / kFullSteps, 1.0);
-  // From +1 to -1 while the body passes over the standing leg, then back.
+  // The wave falls from +1 to -1 while the body passes over the standing left leg, and rises again
+  // while the leg swings.
   const double wave = phase < 0.5 ? 1.0 - 4.0 * phase : 4.0 * phase - 3.0;
   return half * wave;
 }

@@ -1,7 +1,7 @@
-// The legs of a walking person: one stands while the other one swings.
+// The motion of legs: one leg stands while the other one swings.
 #pragma once
 
-#include "crowd/vec.h"
+#include "vec.h"
 
 namespace flatland::crowd {
 
@@ -9,12 +9,12 @@ namespace flatland::crowd {
 // discretization of pedestrian movement in continuous space", Physical Review E 86 (2012).
 double step_length(double speed);
 
-// Returns the phase after a distance was walked at a speed. A phase is in [0, 1); the left leg
-// stands in the first half, the right one in the second.
+// Returns the phase of the gait after walking a distance [m] at a speed [m/s]. A phase is in [0,
+// 1): the left leg stands in the first half, the right leg in the second half.
 double advance_phase(double phase, double distance, double speed);
 
-// Returns the position of the left leg along the heading, relative to the body [m]; that of the
-// right leg is the negative. A standing leg does not move over the ground.
+// Returns the position of the left leg along the heading, relative to the body [m]. The position of
+// the right leg is the negative. A standing leg does not move over the ground.
 double leg_offset(double phase, double speed);
 
 }  // namespace flatland::crowd

@@ -8,21 +8,22 @@
 namespace flatland::crowd {
 namespace {
 
-constexpr double kWidth = 1.35;      // of a passage, at most [m]
+constexpr double kWidth = 1.35;      // greatest width of a passage [m]
 constexpr double kOpposite = -0.8;   // cosine of the angle between directions to opposite walls
-constexpr double kMostDepth = 3.0;   // half of the length of a passage, at most [m]
-constexpr double kMostOffset = 0.9;  // of its cells from its axis, at most [m]
+constexpr double kMostDepth = 3.0;   // greatest half of the length of a passage [m]
+constexpr double kMostOffset = 0.9;  // greatest distance of a cell from the axis of a passage [m]
 constexpr double kOpen = 8.0;        // time for one direction while people wait in the other [s]
-constexpr double kClearing = 6.0;    // time after which those who block a passage turn back [s]
+constexpr double kClearing = 6.0;    // further time until people in the passage turn back [s]
 
-// The part of a passage across its axis at some cell.
+// The cross-section of a passage at a cell.
 struct Throat {
   std::size_t cell = 0;
   Vec a, b;  // the nearest points of the opposite walls
   double width = 0.0;
 };
 
-// Returns whether a point is between opposite walls that are close to each other.
+// Returns whether a point is between opposite walls that are close to each other, and sets the
+// cross-section in this case.
 bool is_between(const Walls& walls, Vec p, std::vector<NearPoint>& near, Throat& throat) {
   near.clear();
   walls.find_near(p, kWidth, near);
@@ -45,7 +46,7 @@ bool is_between(const Walls& walls, Vec p, std::vector<NearPoint>& near, Throat&
   return throat.width < kWidth;
 }
 
-// Collects the cells around a first one that are narrow, and marks them as done.
+// Returns the connected narrow cells that contain a first cell, and marks them by a width of 0.
 std::vector<Throat> passage_from(std::size_t first, const FreeGrid& grid,
                                  std::vector<Throat>& narrow) {
   std::vector<Throat> passage;
@@ -78,7 +79,7 @@ std::vector<Gate> find_gates(const FreeGrid& grid, const Walls& walls) {
   std::vector<Throat> narrow(static_cast<std::size_t>(grid.columns() * grid.rows()));
   std::vector<NearPoint> near;
   for (std::size_t i = 0; i < narrow.size(); ++i) {
-    if (grid.slowness(i) <= 1.0F) continue;  // no room for anybody, or far from all walls
+    if (grid.slowness(i) <= 1.0F) continue;  // a disc does not fit, or all walls are far away
     if (is_between(walls, grid.center(i), near, narrow[i])) {
       narrow[i].cell = i;
     } else {
@@ -89,7 +90,7 @@ std::vector<Gate> find_gates(const FreeGrid& grid, const Walls& walls) {
   for (std::size_t i = 0; i < narrow.size(); ++i) {
     if (narrow[i].width == 0.0) continue;
     const std::vector<Throat> passage = passage_from(i, grid, narrow);
-    // Of the narrowest cells of a door, those on its axis.
+    // The middle is the cell nearest to the axis among the narrowest cells.
     const auto middle =
         std::min_element(passage.begin(), passage.end(), [&](const Throat& s, const Throat& t) {
           const auto rank = [&](const Throat& throat) {

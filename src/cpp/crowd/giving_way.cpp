@@ -1,10 +1,11 @@
 // How people who block each other give way.
 //
-// Whoever makes no progress asks those in front to make room, and they ask those behind them. The
-// scheme is a continuous form of priority inheritance: K. Okumura, M. Machida, X. Défago and
-// Y. Tamura, "Priority inheritance with backtracking for iterative multi-agent path finding",
-// Artificial Intelligence 310 (2022). As there, the priority of people grows with the time since
-// they left their last waypoint, so that everybody has the highest one eventually.
+// A person without progress (the root of a request) asks the people in front to make room, and
+// these people ask the people behind them. The scheme is a continuous form of priority inheritance:
+// K. Okumura, M. Machida, X. Défago and Y. Tamura, "Priority inheritance with backtracking for
+// iterative multi-agent path finding", Artificial Intelligence 310 (2022). As in this source, the
+// priority of a person grows with the time since the last waypoint, so that every person has the
+// highest priority eventually.
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
@@ -14,17 +15,18 @@
 namespace flatland::crowd {
 namespace {
 
-constexpr double kSlow = 0.2;       // progress of blocked people, of the preferred speed, at most
-constexpr double kPatience = 0.5;   // time without progress after which people ask for room [s]
-constexpr double kStuck = 2.0;      // the same, for room of those who walk [s]
-constexpr double kMostDelay = 3.0;  // s
-constexpr double kRecovery = 4.0;   // progress that makes up for a second without it [s]
+constexpr double kSlow = 0.2;       // share of the preferred speed below which there is no progress
+constexpr double kPatience = 0.5;   // delay from which a person asks idle people for room [s]
+constexpr double kStuck = 2.0;      // delay from which a person also asks walking people [s]
+constexpr double kMostDelay = 3.0;  // greatest delay that is counted [s]
+constexpr double kRecovery = 4.0;   // decrease of the delay per second of progress [s/s]
 constexpr double kHold = 1.5;       // time for which people make room [s]
-constexpr double kReach = 0.4;      // gap to those who are asked, at most [m]
-constexpr double kMargin = 0.1;     // of the lane that is to be free [m]
-constexpr double kSameWay = 0.5;    // cosine of the angle between ways that are taken as the same
-constexpr double kSideways = 0.7;   // share of the sideways velocity of those who make room
-constexpr double kStraight = 0.05;  // offset from the axis of the lane that decides the side [m]
+constexpr double kReach = 0.4;      // greatest gap to a person who is asked [m]
+constexpr double kMargin = 0.1;     // additional half width of the lane to be freed [m]
+constexpr double kSameWay = 0.5;    // cosine of the angle between ways that count as equal
+constexpr double kSideways = 0.7;   // sideways part of the motion that makes room
+constexpr double kStraight =
+    0.05;  // offset to the right up to which a person makes room to the left [m]
 
 }  // namespace
 
@@ -35,9 +37,7 @@ bool Crowd::precedes(const Person& a, const Person& b) const {
 }
 
 Crowd::Stance Crowd::stance_of(const Person& person, const Choice& choice) const {
-  if (person.is_stopped || person.stop_until != 0) return Stance::kFixed;
-  const auto& queue = queues_[target_of(person)];
-  if (std::find(queue.begin(), queue.end(), person.number) != queue.end()) return Stance::kFixed;
+  if (person.is_stopped || person.stop_until != 0 || is_queued(person)) return Stance::kFixed;
   return square(choice.velocity) > 0.0 && !choice.is_held ? Stance::kWalking : Stance::kIdle;
 }
 
@@ -65,18 +65,16 @@ void Crowd::give_way(std::vector<Choice>& choices, std::int64_t step, double dt,
   for (std::size_t i = 0; i < people_.size(); ++i) {
     Person& person = people_[i];
     if (person.yields_to == kNone) continue;
-    const auto other =
-        std::lower_bound(people_.begin(), people_.end(), person.yields_to,
-                         [](const Person& p, std::uint32_t number) { return p.number < number; });
-    const bool is_over = other == people_.end() || other->number != person.yields_to ||
-                         step >= person.yield_until || stances[i] == Stance::kFixed;
+    const Person* other = numbered(person.yields_to);
+    const bool is_over =
+        other == nullptr || step >= person.yield_until || stances[i] == Stance::kFixed;
     if (is_over) {
       person.yields_to = kNone;
       person.yield_until = 0;
       continue;
     }
-    // Ahead of the other one, and out of the lane: in doubt to the right of somebody who comes
-    // towards the other one.
+    // The person walks ahead of the other person and out of the lane. Near the axis of the lane,
+    // the side is the left one as seen by the other person.
     const Vec way = way_to(target_of(*other), person.position);
     const double aside = cross(way, person.position - other->position);
     const double sign = aside > -kStraight ? 1.0 : -1.0;
@@ -111,7 +109,7 @@ void Crowd::ask_for_room(std::size_t root, const std::vector<Choice>& choices,
       is_asked[j] = true;
       asking.push_back(j);
       const double cosine = dot(choices[j].direction, way_to(target, other.position));
-      // This one waits for the same people.
+      // Person j walks the same way, and is blocked by the same people.
       if ((is_walking || choices[j].is_held) && cosine > kSameWay) continue;
       other.yields_to = first.number;
       other.yield_until = until;

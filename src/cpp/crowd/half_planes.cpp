@@ -6,15 +6,16 @@
 namespace flatland::crowd {
 namespace {
 
-constexpr double kParallel = 1e-9;  // sine of an angle between lines that are parallel
+constexpr double kParallel = 1e-9;  // greatest sine of the angle between parallel lines
 
-// What is to be found: the point nearest to `aim`, or the farthest one in its direction.
+// The objective: the point nearest to `aim`, or the farthest point in the direction `aim`.
 struct Objective {
   Vec aim;
   bool is_direction = false;
 };
 
-// Finds the best point on the border of half-plane i that the previous ones and the disc contain.
+// Finds the best point on the border of half-plane i, within the previous half-planes and the disc.
+// Returns false if there is no such point.
 bool solve_on_border(const std::vector<HalfPlane>& planes, std::size_t i, double radius,
                      const Objective& objective, Vec& point) {
   const HalfPlane& plane = planes[i];
@@ -43,7 +44,8 @@ bool solve_on_border(const std::vector<HalfPlane>& planes, std::size_t i, double
   return true;
 }
 
-// Returns the number of half-planes that could be satisfied; all of them on success.
+// Finds the best point. Returns the number of half-planes that the point satisfies, counted from
+// the first one up to the first half-plane that leaves no point.
 std::size_t solve(const std::vector<HalfPlane>& planes, double radius, const Objective& objective,
                   Vec& point) {
   point = objective.is_direction ? radius * objective.aim : limited(objective.aim, radius);
@@ -68,7 +70,8 @@ Vec nearest_point(const std::vector<HalfPlane>& planes, std::size_t hard, double
   std::vector<HalfPlane> bounds;
   for (std::size_t i = satisfied; i < planes.size(); ++i) {
     if (planes[i].offset - dot(planes[i].normal, point) <= violation) continue;
-    // Half-plane i is violated most. Move along its normal as far as no other is violated more.
+    // Half-plane i is violated most. Move the point along the normal until another half-plane is
+    // violated as much.
     bounds.assign(planes.begin(), planes.begin() + static_cast<std::ptrdiff_t>(std::min(hard, i)));
     for (std::size_t j = hard; j < i; ++j) {
       const Vec normal = planes[j].normal - planes[i].normal;

@@ -4,7 +4,7 @@
 #include <cstddef>
 #include <vector>
 
-#include "crowd/vec.h"
+#include "vec.h"
 
 namespace flatland::crowd {
 
@@ -14,10 +14,10 @@ struct HalfPlane {
   double offset = 0.0;
 };
 
-// Returns the point nearest to `preferred` among those of all half-planes and of the disc with a
-// radius around the origin. If there is none, returns a point of the disc at which the greatest
-// violation of the half-planes from number `hard` on is as small as possible, and those before it
-// are satisfied if possible.
+// Returns the point nearest to `preferred` in the intersection of all half-planes and of the disc
+// with a radius around the origin. If the intersection is empty, returns a point of the disc that
+// minimizes the greatest violation of the half-planes with an index of at least `hard`, and
+// satisfies the half-planes with a lower index if possible.
 //
 // Source: the incremental linear programs of M. de Berg et al., "Computational Geometry" (2008),
 // chapter 4, as used by J. van den Berg, S. Guy, M. Lin and D. Manocha, "Reciprocal n-body

@@ -1,4 +1,5 @@
-// How people move: velocities by the model of the crowd, without contacts, and steps of the legs.
+// How people move: the velocity by the model of the crowd, the nearest velocity without contacts,
+// and the motion of the legs.
 #include <algorithm>
 #include <cmath>
 #include <numeric>
@@ -14,15 +15,16 @@
 namespace flatland::crowd {
 namespace {
 
-constexpr std::uint64_t kFluctuations = std::uint64_t{3} << 40U;  // a stream of random numbers
+// The streams of random numbers of the fluctuations, to which the number of a person is added.
+constexpr std::uint64_t kFluctuations = std::uint64_t{3} << 40U;
 
-constexpr double kSkin = 2e-4;              // gap that single precision may use up [m]
-constexpr double kParting = 0.5;            // most speed at which overlaps are resolved [m/s]
-constexpr double kRounding = 1e-6;          // of velocities [m/s]
-constexpr double kWallSight = 1.0;          // distance at which walls are considered [m]
-constexpr double kNegligible = 0.01;        // acceleration [m/s²]
-constexpr double kMostSpeed = 1.3;          // as a multiple of the preferred speed
-constexpr double kMostAcceleration = 20.0;  // of dynamic bodies [m/s²]
+constexpr double kSkin = 2e-4;              // gap that covers the rounding of single precision [m]
+constexpr double kParting = 0.5;            // greatest speed at which overlaps are resolved [m/s]
+constexpr double kRounding = 1e-6;          // bound of the rounding error of velocities [m/s]
+constexpr double kWallSight = 1.0;          // distance within which walls are considered [m]
+constexpr double kNegligible = 0.01;        // acceleration that is ignored [m/s²]
+constexpr double kMostSpeed = 1.3;          // greatest speed as a multiple of the preferred speed
+constexpr double kMostAcceleration = 20.0;  // greatest acceleration of a dynamic body [m/s²]
 constexpr double kTurning = 0.2;            // time constant of the heading [s]
 constexpr double kStanding = 0.05;          // speed below which the heading remains [m/s]
 
@@ -30,7 +32,8 @@ double normalized(double angle) { return std::remainder(angle, kTwoPi); }
 
 double most_speed(const Person& person) { return std::max(kMostSpeed * person.speed, 0.5); }
 
-// The speed at which a gap may close within a period, or must open if it is negative.
+// Returns the least speed along the normal of a half-plane for which a gap remains after a period;
+// positive if the gap is negative and must open.
 double closing_offset(double gap, double period) {
   return std::min((kSkin - gap) / period, kParting);
 }
@@ -75,8 +78,6 @@ Vec Crowd::by_social_force(std::size_t i, const Choice& choice, Vec preferred, d
   const SocialForces& forces = settings_.forces;
   const Walls& walls = surroundings_.walls();
   Vec sum = driving_acceleration(forces, preferred, person.velocity);
-  Vec others;
-  int members = 1;
   for (std::uint32_t k = neighbour_starts_[i]; k < neighbour_starts_[i + 1]; ++k) {
     const Person& other = people_[neighbours_[k]];
     const Vec offset = person.position - other.position;
@@ -84,7 +85,7 @@ Vec Crowd::by_social_force(std::size_t i, const Choice& choice, Vec preferred, d
       sum += group_repulsion(forces, offset);
       continue;
     }
-    // Blocked people press forward: those who are to make room for them do not repel them.
+    // A person without progress presses forward, and is not repelled by people who make room.
     if (other.yields_to == person.number && person.delay > 0.0) continue;
     const Vec push = repulsion(forces, offset, other.velocity - forces.relative * person.velocity);
     if (square(push) < kNegligible * kNegligible) continue;
@@ -97,7 +98,7 @@ Vec Crowd::by_social_force(std::size_t i, const Choice& choice, Vec preferred, d
     if (length(obstacle.center - person.position) - obstacle.radius > settings_.sight) continue;
     const double gap = obstacle.gap(person.position, away);
     const Vec velocity = obstacle.velocity_at(person.position - gap * away);
-    // The surface repels like a person who touches it from inside.
+    // The surface repels like a person whose circumference is on the surface.
     const Vec push = repulsion(forces, (std::max(gap, 0.0) + person.radius) * away,
                                velocity - forces.relative * person.velocity);
     sum += view_weight(forces, choice.direction, push) * push;
@@ -108,22 +109,23 @@ Vec Crowd::by_social_force(std::size_t i, const Choice& choice, Vec preferred, d
   for (const NearPoint& wall : near_) {
     sum += wall_repulsion(forces, person.position - wall.point, person.radius);
   }
-  for (const Person& other : people_) {
-    if (other.party != person.party || other.number == person.number) continue;
-    others += other.position;
-    ++members;
-  }
-  if (members > 1 && square(preferred) > 0.0) {
-    const Vec center = (1.0 / (members - 1)) * others;
-    sum += group_attraction(forces, members, choice.direction, person.velocity,
-                            center - person.position);
+  const auto& members = parties_[person.party].members;
+  if (members.size() > 1 && square(preferred) > 0.0) {
+    Vec others;
+    for (const std::uint32_t j : members) {
+      if (j != i) others += people_[j].position;
+    }
+    const auto size = static_cast<int>(members.size());
+    const Vec center = (1.0 / (size - 1)) * others;
+    sum +=
+        group_attraction(forces, size, choice.direction, person.velocity, center - person.position);
   }
   return limited(person.velocity + period * sum, kMostSpeed * person.speed);
 }
 
 Vec Crowd::by_orca(std::size_t i, Vec preferred, double period) {
   const Person& person = people_[i];
-  constexpr double kMargin = 0.05;  // added to the radius [m]
+  constexpr double kMargin = 0.05;  // additional gap [m]
   planes_.clear();
   near_.clear();
   surroundings_.walls().find_near(person.position, person.radius + kWallSight, near_);
@@ -151,11 +153,11 @@ Vec Crowd::by_orca(std::size_t i, Vec preferred, double period) {
   return nearest_point(planes_, hard, most_speed(person), preferred);
 }
 
-// Returns the velocity nearest to the chosen one with which the person touches neither walls nor
-// others until the next update. Each half-plane keeps a gap along the line between the nearest
-// points, which is sufficient because all shapes are convex. People before number `decided_` move
-// with their chosen velocities; those after it are taken to stand still, and will consider the
-// velocity of this person in turn. Standing still is therefore always possible.
+// Returns the velocity nearest to a given one with which person i touches neither walls nor others
+// until the next update. Each half-plane keeps a gap along the line between the nearest points,
+// which is sufficient because all shapes are convex. People with an index below `decided_` move
+// with the velocities in `chosen_`. The other people count as standing: their velocities are chosen
+// later, and then respect the velocity of person i. Standing still is therefore always possible.
 Vec Crowd::without_contact(std::size_t i, Vec velocity, double period) {
   const Person& person = people_[i];
   planes_.clear();
@@ -195,7 +197,7 @@ Vec Crowd::without_contact(std::size_t i, Vec velocity, double period) {
     return most;
   };
   const Vec nearest = nearest_point(planes_, hard, fastest, velocity);
-  // Half-planes that are almost parallel can have a solution that rounding hides.
+  // With almost parallel half-planes, rounding can produce a velocity that is worse than standing.
   return violation_of(nearest) <= violation_of({}) + kRounding ? nearest : Vec{};
 }
 
@@ -265,7 +267,7 @@ void Crowd::move_legs(World& world, const Person& person, Vec next, double perio
     if (leg == nullptr) continue;
     const double sign = side == 0 ? 1.0 : -1.0;
     Vec offset = sign * (along * ahead + 0.5 * settings_.leg_spacing * left_of(ahead));
-    // A foot does not step through a wall.
+    // The offset is reduced until the foot does not touch a wall.
     for (int tries = 0;
          tries < 3 && walls.distance(next + offset, settings_.leg_radius) < settings_.leg_radius;
          ++tries) {

@@ -5,8 +5,8 @@
 namespace flatland::crowd {
 namespace {
 
-// Returns the change from a relative velocity to the nearest one outside a disc of velocities.
-// `normal` receives its direction.
+// Returns the change from a relative velocity to the nearest velocity outside a disc of velocities,
+// and sets `normal` to the direction of the change.
 Vec out_of_disc(Vec velocity, Vec center, double radius, Vec fallback, Vec& normal) {
   const Vec from_center = velocity - center;
   normal = unit(from_center, fallback);
@@ -26,7 +26,7 @@ HalfPlane avoid(const Disc& disc, const Disc& other, double horizon, double shar
   if (distance2 <= radius * radius) {
     change = out_of_disc(velocity, (1.0 / dt) * offset, radius / dt, fallback, normal);
   } else {
-    // The velocity obstacle is a cone that is cut off by a disc.
+    // The velocity obstacle is a cone whose apex is cut off by a disc.
     const Vec center = (1.0 / horizon) * offset;
     const Vec from_center = velocity - center;
     const double along = dot(from_center, offset);

@@ -5,7 +5,7 @@
 #pragma once
 
 #include "crowd/half_planes.h"
-#include "crowd/vec.h"
+#include "vec.h"
 
 namespace flatland::crowd {
 
@@ -14,14 +14,14 @@ struct Disc {
   double radius = 0.0;
 };
 
-// Returns the velocities of one disc that avoid another one for `horizon` seconds if the other one
-// takes the rest of the `share` of the change. `dt` is the time in which an overlap is to be
-// resolved [s].
+// Returns the velocities of a disc that avoid another disc for `horizon` seconds. The disc makes
+// `share` of the necessary change of the relative velocity, the other disc the rest. An overlap is
+// resolved in the time `dt` [s].
 HalfPlane avoid(const Disc& disc, const Disc& other, double horizon, double share, double dt);
 
-// Returns the velocities with which a disc at a distance `gap` from an obstacle does not reach it
-// within `horizon` seconds. `away` is the unit vector from the obstacle, which moves with a
-// velocity.
+// Returns the velocities with which a disc does not reach an obstacle within `horizon` seconds. The
+// gap is the distance of the disc from the obstacle [m]; `away` is the unit vector from the
+// obstacle to the disc.
 HalfPlane keep_off(Vec away, double gap, Vec obstacle_velocity, double horizon);
 
 }  // namespace flatland::crowd

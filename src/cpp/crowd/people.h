@@ -1,4 +1,4 @@
-// People, where they walk, and the parameters of a crowd.
+// The data of a crowd: people, parties, routes, waypoints and parameters.
 #pragma once
 
 #include <cstdint>
@@ -6,7 +6,7 @@
 
 #include "crowd/flow_field.h"
 #include "crowd/social_force.h"
-#include "crowd/vec.h"
+#include "vec.h"
 #include "world/slot_map.h"
 
 namespace flatland::crowd {
@@ -19,12 +19,15 @@ struct Span {
   double most = 0.0;
 };
 
-// A place on a route.
+// A place that people visit.
 struct Waypoint {
   Place place;
   Span wait;
-  bool is_queue = false;  // where people are served one after the other
-  double spacing = 0.7;   // of people in the queue [m]
+  bool is_queue = false;  // whether people queue there, and wait one after the other
+  double spacing = 0.7;   // distance of people in the queue [m]
+  // Whether the waypoint is on no route. Once nobody is sent to a temporary waypoint, the next
+  // temporary waypoint replaces it.
+  bool is_temporary = false;
 };
 
 struct Route {
@@ -33,41 +36,43 @@ struct Route {
   std::vector<std::uint32_t> waypoints;  // not empty
   Order order = Order::kLoop;
   double stop_interval = 0.0;  // mean time between two stops on the way [s], 0 for none
-  Span stop;
+  Span stop;                   // duration of a stop
 };
 
 // People who walk together, or a single person.
 struct Party {
+  std::uint32_t number = 0;            // never reused
+  std::vector<std::uint32_t> members;  // indices in the list of people, ascending
   std::uint32_t route = 0;
-  std::uint32_t leg = 0;  // the waypoint of the route to which they walk
+  std::uint32_t leg = 0;  // index in the route of the waypoint to which the party walks
   bool is_backward = false;
   bool is_waiting = false;
-  bool is_done = false;         // at the last waypoint of a route of order kOnce
-  std::int64_t wait_until = 0;  // step
-  std::uint64_t draws = 0;      // of random numbers
-  std::int64_t since = 0;       // step in which they left their last waypoint
+  bool is_done = false;         // whether the party reached the end of a route of order kOnce
+  std::int64_t wait_until = 0;  // number of a step
+  std::uint64_t draws = 0;      // count of random numbers drawn
+  std::int64_t since = 0;       // step in which the party left the last waypoint
 };
 
 struct Person {
   std::uint32_t number = 0;  // never reused
   Id body = 0;
-  Id legs[2] = {0, 0};  // 0 without legs
-  std::uint32_t party = 0;
-  double radius = 0.2;   // [m]
-  double speed = 1.34;   // that the person prefers [m/s]
-  bool is_aware = true;  // of robots
+  Id legs[2] = {0, 0};      // 0 without legs
+  std::uint32_t party = 0;  // index in the list of parties
+  double radius = 0.2;      // [m]
+  double speed = 1.34;      // preferred speed [m/s]
+  bool is_aware = true;     // whether the person avoids robots, that is, dynamic bodies
   bool is_stopped = false;
-  std::uint32_t sent_to = kNone;    // waypoint instead of that of the route
-  std::int64_t stop_until = 0;      // step
-  std::uint64_t draws = 0;          // of random numbers
-  double delay = 0.0;               // time without progress, as far as it is not made up [s]
-  double lost = 0.0;                // time without progress since the last waypoint [s]
-  std::uint32_t yields_to = kNone;  // number of the person for whom this one makes room
-  std::int64_t yield_until = 0;     // step
+  std::uint32_t sent_to = kNone;    // waypoint that replaces the route
+  std::int64_t stop_until = 0;      // number of a step, 0 if the person does not stop on the way
+  std::uint64_t draws = 0;          // count of random numbers drawn
+  double delay = 0.0;               // recent time without progress; progress reduces the time [s]
+  double lost = 0.0;                // total time without progress since the last waypoint [s]
+  std::uint32_t yields_to = kNone;  // number of the person who gets room
+  std::int64_t yield_until = 0;     // number of a step
   Vec position, velocity;           // at the last update
-  double heading = 0.0;
-  double phase = 0.0;  // of the gait
-  Vec acceleration;    // of a dynamic body until the next update
+  double heading = 0.0;             // at the last update [rad]
+  double phase = 0.0;               // phase of the gait, from 0 to 1
+  Vec acceleration;                 // acceleration of a dynamic body until the next update
 };
 
 struct Settings {
@@ -75,18 +80,18 @@ struct Settings {
 
   Model model = Model::kSocialForce;
   SocialForces forces;
-  double horizon = 2.0;        // of ORCA, for other people [s]
-  double wall_horizon = 0.5;   // of ORCA, for walls and obstacles [s]
+  double horizon = 2.0;        // time horizon of ORCA for other people [s]
+  double wall_horizon = 0.5;   // time horizon of ORCA for walls and obstacles [s]
   double fluctuation = 0.1;    // standard deviation of the preferred velocity [m/s]
   double sight = 3.0;          // distance at which others are avoided [m]
-  double cell = 0.1;           // of the grid for ways [m]
-  double clearance = 0.22;     // distance from walls of the middle of a way, at least [m]
+  double cell = 0.1;           // size of the cells of the planning grid [m]
+  double clearance = 0.22;     // least distance between a planned way and a wall [m]
   std::int64_t interval = 10;  // steps between two updates
-  std::uint16_t bits = 0;      // of the layers of walls and obstacles
-  bool is_dynamic = false;     // whether the bodies are
+  std::uint16_t bits = 0;      // category bits of walls and obstacles
+  bool is_dynamic = false;     // whether the bodies of people are dynamic, otherwise kinematic
   double leg_radius = 0.07;    // [m]
-  double leg_spacing = 0.2;    // of the centers of both legs across the heading [m]
-  std::uint64_t key = 0;       // of all random numbers
+  double leg_spacing = 0.2;    // distance of the centers of both legs across the heading [m]
+  std::uint64_t key = 0;       // key of all random numbers
 };
 
 }  // namespace flatland::crowd

@@ -1,5 +1,5 @@
-// How people pass doors: in one direction at a time; the others wait beside the door. Elsewhere,
-// they keep right of those who come towards them.
+// How people pass doors and each other. People pass a door in one direction at a time, and wait
+// beside the door for the other direction. Elsewhere, people keep right of oncoming people.
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
@@ -11,19 +11,19 @@
 namespace flatland::crowd {
 namespace {
 
-constexpr double kApproach = 4.0;    // distance at which people approach a door [m]
-constexpr double kAhead = 0.5;       // cosine of the angle between their way and the door, at least
-constexpr double kThrough = 0.3;     // cosine of the angle between the way and the axis, at least
+constexpr double kApproach = 4.0;    // distance within which people approach a door [m]
+constexpr double kAhead = 0.5;       // least cosine of the angle between the way and the door
+constexpr double kThrough = 0.3;     // least cosine of the angle between the way and the axis
 constexpr double kThreshold = 0.35;  // space on both sides that belongs to the passage [m]
-constexpr double kLane = 0.25;       // by which a lane is wider than its door, on each side [m]
+constexpr double kLane = 0.25;       // additional width of a lane on each side of the door [m]
 constexpr double kWait = 1.2;        // distance from the passage at which people wait [m]
-constexpr double kRetreat = 0.8;     // distance below which people step back from it [m]
-constexpr double kAside = 0.6;       // share of the preferred speed of those who step aside
+constexpr double kRetreat = 0.8;     // distance from the passage below which people step back [m]
+constexpr double kAside = 0.6;       // share of the preferred speed with which people step aside
 
-constexpr double kView = 3.0;      // distance at which people keep right [m]
-constexpr double kLeft = 0.8;      // of the way, within which others come towards a person [m]
-constexpr double kRight = 1.5;     // the same on the other side [m]
-constexpr double kOpposed = -0.5;  // cosine of the angle between opposite ways, at most
+constexpr double kView = 3.0;      // distance within which people are oncoming [m]
+constexpr double kLeft = 0.8;      // distance to the left of the way for the same [m]
+constexpr double kRight = 1.5;     // distance to the right of the way for the same [m]
+constexpr double kOpposed = -0.5;  // greatest cosine of the angle between opposite ways
 constexpr double kMostTurn = 0.5;  // tangent of the greatest angle by which people turn right
 
 }  // namespace
@@ -33,7 +33,7 @@ bool Crowd::approaches(std::size_t i, const Choice& choice, std::size_t gate, Ap
   const Gate& g = (*gates_)[gate];
   const Vec offset = person.position - g.center;
   if (square(offset) > kApproach * kApproach) return false;
-  // The way at the center, because that next to a door post may lead anywhere.
+  // The way is taken at the center: next to a door post, the way may lead in any direction.
   const double cosine = dot(way_to(target_of(person), g.center), g.axis);
   if (std::fabs(cosine) < kThrough) return false;
   const double along = dot(offset, g.axis);
@@ -103,7 +103,8 @@ void Crowd::keep_doors_clear(std::vector<Choice>& choices, std::int64_t step, do
 bool Crowd::comes_towards(const Person& person, Vec way, std::size_t j, const Choice& choice,
                           double& ahead) const {
   if (dot(choice.direction, way) > kOpposed || square(choice.velocity) == 0.0) return false;
-  if (target_of(people_[j]) == target_of(person)) return false;  // at a door, from its other side
+  // People with the same target can walk in opposite directions only at its door.
+  if (target_of(people_[j]) == target_of(person)) return false;
   const Vec offset = people_[j].position - person.position;
   ahead = dot(offset, way);
   const double left = cross(way, offset);

@@ -1,4 +1,4 @@
-// Where people want to walk: waypoints, waiting, queues and stops.
+// Where people want to walk: to waypoints, with waiting times, queues and stops.
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
@@ -10,18 +10,19 @@
 namespace flatland::crowd {
 namespace {
 
-// Streams of random numbers of people and of parties differ.
+// The streams of random numbers of people and of parties, to which their numbers are added.
 constexpr std::uint64_t kStops = std::uint64_t{1} << 40U;
 constexpr std::uint64_t kParties = std::uint64_t{2} << 40U;
 
-constexpr double kRoom = 0.5;       // area that each person needs at a waypoint [m²]
-constexpr double kGiveUp = 8.0;     // time without progress after which wanderers turn away [s]
-constexpr double kCrowded = 4.0;    // distance at which a crowded place is reached, at most [m]
-constexpr double kArrival = 0.7;    // time constant of the approach to a point in a queue [s]
-constexpr double kNearPoint = 0.1;  // distance to that point at which people stand still [m]
-constexpr double kCounter = 0.3;    // distance to the head of a queue at which it is reached [m]
+constexpr double kRoom = 0.5;     // area that each person needs at a waypoint [m²]
+constexpr double kGiveUp = 8.0;   // time without progress until people who wander turn away [s]
+constexpr double kCrowded = 4.0;  // greatest distance at which a crowded place is reached [m]
+constexpr double kArrival = 0.7;  // time constant of the approach to a point in a queue [s]
+constexpr double kNearPoint =
+    0.1;                          // distance to a point in a queue at which people stand still [m]
+constexpr double kCounter = 0.3;  // distance to the head of a queue at which waiting begins [m]
 
-// The distance from a place within which there is room for `count` people.
+// Returns the distance from a place within which there is room for `count` people.
 double room_for(const Place& place, std::uint32_t count) {
   const Vec size = place.high - place.low;
   const double half_girth = size.x + size.y;
@@ -52,7 +53,7 @@ bool Crowd::has_arrived(const Person& person, std::uint32_t waypoint) const {
   const Vec nearest = place.nearest(person.position);
   const double distance = length(nearest - person.position);
   double reach = std::max(place.radius, room_for(place, guests_[waypoint] + 1));
-  // In a crowd, those who are nearer to the place need room as well.
+  // In a crowd, people who are nearer to the place need room as well.
   if (distance > reach && distance < kCrowded && person.delay > 0.0) {
     const auto is_nearer = [&](const Person& other) {
       return square(place.nearest(other.position) - other.position) < distance * distance;
@@ -74,7 +75,7 @@ void Crowd::arrive(Party& party, std::uint32_t waypoint, std::int64_t step, doub
     leave(party, waypoint, step);
     return;
   }
-  const auto stream = kParties + static_cast<std::uint64_t>(&party - parties_.data());
+  const std::uint64_t stream = kParties + party.number;
   party.is_waiting = true;
   party.wait_until = step + steps(draw(party.draws, stream, wait), dt);
 }
@@ -82,8 +83,8 @@ void Crowd::arrive(Party& party, std::uint32_t waypoint, std::int64_t step, doub
 void Crowd::leave(Party& party, std::uint32_t waypoint, std::int64_t step) {
   party.is_waiting = false;
   party.since = step;
-  for (Person& person : people_) {
-    if (&parties_[person.party] != &party) continue;
+  for (const std::uint32_t i : party.members) {
+    Person& person = people_[i];
     person.lost = 0.0;
     auto& queue = queues_[waypoint];
     queue.erase(std::remove(queue.begin(), queue.end(), person.number), queue.end());
@@ -107,8 +108,8 @@ void Crowd::leave(Party& party, std::uint32_t waypoint, std::int64_t step) {
       break;
     case Route::Order::kRandom: {
       if (count == 1) break;
-      // Any other waypoint, with the same probability.
-      const auto stream = kParties + static_cast<std::uint64_t>(&party - parties_.data());
+      // All other waypoints have the same probability.
+      const std::uint64_t stream = kParties + party.number;
       const auto skip =
           static_cast<std::uint32_t>(draw(party.draws, stream, {1.0, static_cast<double>(count)}));
       party.leg = (party.leg + std::min(skip, count - 1)) % count;
@@ -122,14 +123,9 @@ Crowd::Choice Crowd::queue_up(Person& person, Party& party, std::uint32_t waypoi
   auto& queue = queues_[waypoint];
   const double spacing = waypoints_[waypoint].spacing;
   const auto place = std::find(queue.begin(), queue.end(), person.number);
-  const auto position_of = [&](std::uint32_t number) {
-    return std::find_if(people_.begin(), people_.end(),
-                        [number](const Person& p) { return p.number == number; })
-        ->position;
-  };
   if (place == queue.end()) {
     const Vec tail = queue.empty() ? waypoints_[waypoint].place.nearest(person.position)
-                                   : position_of(queue.back());
+                                   : numbered(queue.back())->position;
     const double reach = std::max(2.0 * spacing, waypoints_[waypoint].place.radius);
     if (length(tail - person.position) < reach &&
         surroundings_.walls().is_clear(person.position, tail)) {
@@ -143,7 +139,7 @@ Crowd::Choice Crowd::queue_up(Person& person, Party& party, std::uint32_t waypoi
       arrive(party, waypoint, step, dt);
     }
   } else {
-    const Vec ahead = position_of(*(place - 1));
+    const Vec ahead = numbered(*(place - 1))->position;
     goal = ahead + spacing * unit(person.position - ahead);
   }
   const Vec remaining = goal - person.position;
@@ -175,7 +171,7 @@ Crowd::Choice Crowd::choose(Person& person, std::int64_t step, double dt, double
       return {{}, facing};
     }
   }
-  // Whoever wanders and makes no progress walks to another place instead.
+  // A person who wanders without progress turns to another place.
   if (route.order == Route::Order::kRandom && person.lost > kGiveUp) {
     leave(party, route.waypoints[party.leg], step);
   }

@@ -7,8 +7,8 @@ namespace flatland::crowd {
 namespace {
 
 constexpr double kRightAngle = 1.5707963267948966;
-// Half the field of view without turning the head [rad], and the least distance of two members of
-// a group [m]; both from the source.
+// Both constants are those of the source: half of the field of view without turning the head [rad],
+// and the least distance of two members of a group [m].
 constexpr double kGroupView = kRightAngle;
 constexpr double kGroupDistance = 0.8;
 
@@ -26,11 +26,11 @@ Vec repulsion(const SocialForces& forces, Vec offset, Vec other_velocity) {
   const double here = length(offset);
   const double there = length(later);
   const double sum = here + there;
-  constexpr double kLeast = 1e-3;  // m; on the line between the foci, b is 0
+  constexpr double kLeast = 1e-3;  // least b [m]; on the line between the foci, b would be 0
   const double b = std::max(0.5 * std::sqrt(std::max(sum * sum - square(step), 0.0)), kLeast);
   const double size = forces.strength / forces.range * std::exp(-b / forces.range);
   const Vec slope = sum / (4.0 * b) * (unit(offset, {1.0, 0.0}) + unit(later));
-  // The gradient of b, which grows beyond all limits next to the foci.
+  // The gradient of b is limited, because its length has no bound next to the foci.
   constexpr double kMostSlope = 3.0;
   return size * limited(slope, kMostSlope);
 }
@@ -49,7 +49,7 @@ Vec group_attraction(const SocialForces& forces, int size, Vec heading, Vec velo
                      Vec to_center) {
   Vec sum;
   const double angle = std::fabs(std::atan2(cross(heading, to_center), dot(heading, to_center)));
-  // Somebody who must turn the head to see the others walks more slowly.
+  // A person who must turn the head to see the others walks more slowly.
   if (angle > kGroupView) sum -= forces.gaze * (angle - kGroupView) * velocity;
   if (length(to_center) > 0.5 * (size - 1)) sum += forces.cohesion * unit(to_center);
   return sum;

@@ -16,9 +16,7 @@
 namespace flatland::crowd {
 namespace {
 
-constexpr int kCircleCorners = 24;  // of the polygon around a static circle
-
-Vec to_vec(b2Vec2 v) { return {static_cast<double>(v.x), static_cast<double>(v.y)}; }
+constexpr int kCircleCorners = 24;  // number of corners of the polygon around a static circle
 
 Vec in_world(const b2Body& body, b2Vec2 point) { return to_vec(body.GetWorldPoint(point)); }
 
@@ -37,7 +35,8 @@ double Obstacle::gap(Vec p, Vec& away) const {
     away = unit(p - center, {1.0, 0.0});
     return length(p - center) - radius;
   }
-  // Inside, the distance to the nearest side; outside, that to the nearest point.
+  // Inside, the gap is the negative distance to the nearest side; outside, the distance to the
+  // nearest point.
   double depth = -std::numeric_limits<double>::infinity();
   double nearest = std::numeric_limits<double>::infinity();
   Vec normal_inside;
@@ -132,7 +131,7 @@ void Surroundings::add_obstacles(const b2Body& body) {
         obstacle.radius = std::max(obstacle.radius, length(corner - obstacle.center));
       }
     } else {
-      continue;  // layers, which are static, have edges
+      continue;  // only layers have edges, and layers are static
     }
     obstacle.origin = to_vec(body.GetPosition());
     obstacle.velocity = to_vec(body.GetLinearVelocityFromLocalPoint({0.0F, 0.0F}));

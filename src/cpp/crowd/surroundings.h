@@ -1,4 +1,4 @@
-// What people avoid besides each other: walls, which do not move, and bodies that do.
+// What people avoid besides each other: walls, which are static, and obstacles, which move.
 #pragma once
 
 #include <box2d/b2_body.h>
@@ -10,8 +10,8 @@
 #include <unordered_set>
 #include <vector>
 
-#include "crowd/vec.h"
 #include "crowd/walls.h"
+#include "vec.h"
 #include "world/slot_map.h"
 
 namespace flatland::crowd {
@@ -19,22 +19,22 @@ namespace flatland::crowd {
 // A convex part of a moving body.
 struct Obstacle {
   std::vector<Vec> corners;  // counter-clockwise; empty for a circle
-  Vec center;                // of the circle, or of the corners
-  double radius = 0.0;       // of the circle, or around the center
-  Vec origin, velocity;      // of the body
-  double omega = 0.0;        // of the body
-  bool is_dynamic = false;   // otherwise, the body is kinematic
+  Vec center;                // center of the circle, or centroid of the corners
+  double radius = 0.0;       // radius of the circle, or of a disc that contains the corners
+  Vec origin, velocity;      // position and velocity of the origin of the body
+  double omega = 0.0;        // angular velocity of the body
+  bool is_dynamic = false;   // whether the body is dynamic, otherwise kinematic
 
-  // Returns the distance of the surface from a point, negative inside. `away` receives the unit
+  // Returns the distance of a point from the surface, negative inside. Sets `away` to the unit
   // vector from the surface to the point.
   double gap(Vec p, Vec& away) const;
   Vec velocity_at(Vec p) const { return velocity + omega * left_of(p - origin); }
 };
 
-// Reads the walls and the obstacles from a physics world.
+// The walls and the obstacles of a physics world.
 class Surroundings {
  public:
-  // Only fixtures that collide in one of the layers of `bits` count.
+  // Considers only fixtures that collide and have one of the category bits.
   explicit Surroundings(std::uint16_t bits = 0) : bits_(bits) {}
 
   // Reads all bodies except `own`. Returns whether the walls have changed.
@@ -46,7 +46,7 @@ class Surroundings {
  private:
   // Identifies a static body with its fixtures at its pose.
   struct Key {
-    std::array<std::uint64_t, 2> ids;  // of the body and of its newest fixture
+    std::array<std::uint64_t, 2> ids;  // ids of the body and of the newest fixture
     std::array<float, 3> pose;
 
     bool operator==(const Key& other) const { return ids == other.ids && pose == other.pose; }

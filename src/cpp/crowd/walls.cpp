@@ -46,7 +46,7 @@ Walls::Walls(std::vector<Segment> segments) : segments_(std::move(segments)) {
   cell_ = cell_size(size, kCell);
   columns_ = static_cast<std::int64_t>(size.x / cell_) + 1;
   rows_ = static_cast<std::int64_t>(size.y / cell_) + 1;
-  // Two passes: the number of segments in each cell, then the segments themselves.
+  // The first pass counts the segments in each cell, the second pass stores the segments.
   starts_.assign(static_cast<std::size_t>(columns_ * rows_) + 1, 0);
   const double reach = 0.5 * std::sqrt(2.0) * cell_ * (1.0 + 1e-6);
   const auto each_cell = [&](auto&& visit) {
@@ -98,7 +98,7 @@ void Walls::find_near(Vec p, double range, std::vector<NearPoint>& found) const 
     const auto cell = static_cast<std::size_t>(row * columns_ + column);
     for (std::uint32_t k = starts_[cell]; k < starts_[cell + 1]; ++k) {
       const Vec point = nearest_on(segments_[members_[k]], p);
-      // A segment is in several cells; it counts in that of its nearest point.
+      // A segment can be in several cells, and is found in the cell of the nearest point.
       if (column_of(point.x) != column || row_of(point.y) != row) continue;
       const double distance = length(point - p);
       if (distance <= range) found.push_back({point, distance});
@@ -137,7 +137,7 @@ void keep_sides(Vec p, std::vector<NearPoint>& points) {
   std::sort(points.begin(), points.end(), [](const NearPoint& a, const NearPoint& b) {
     return std::tie(a.distance, a.point.x, a.point.y) < std::tie(b.distance, b.point.x, b.point.y);
   });
-  constexpr double kTolerance = 1e-6;  // cosine of the angle between walls at a right angle
+  constexpr double kTolerance = 1e-6;  // greatest cosine of a right angle, because of rounding
   std::size_t kept = 0;
   for (const NearPoint& each : points) {
     const Vec direction = unit(each.point - p);

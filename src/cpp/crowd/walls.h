@@ -1,11 +1,11 @@
-// The walls around people, in a grid of cells for queries of a neighbourhood.
+// The walls of a world, in a grid of cells for queries about a neighbourhood.
 #pragma once
 
 #include <cstddef>
 #include <cstdint>
 #include <vector>
 
-#include "crowd/vec.h"
+#include "vec.h"
 
 namespace flatland::crowd {
 
@@ -21,8 +21,8 @@ struct NearPoint {
   double distance = 0.0;
 };
 
-// The size of the cells of a grid over an area: the wanted size, or more if there would be more
-// than four million cells.
+// Returns the size of the cells of a grid over an area: the wanted size, or a greater size if there
+// would be more than four million cells.
 double cell_size(Vec area, double wanted);
 
 // Immutable, so that copies of a crowd share it.
@@ -36,9 +36,9 @@ class Walls {
 
   // Appends the nearest points of all segments within a range.
   void find_near(Vec p, double range, std::vector<NearPoint>& found) const;
-  // The distance to the nearest segment, at most `range`.
+  // Returns the distance to the nearest segment, at most `range`.
   double distance(Vec p, double range) const;
-  // Whether no segment crosses the straight line between two points.
+  // Returns whether no segment crosses the straight line between two points.
   bool is_clear(Vec from, Vec to) const;
 
  private:
@@ -51,12 +51,13 @@ class Walls {
   Vec low_, high_;
   double cell_ = 1.0;
   std::int64_t columns_ = 0, rows_ = 0;
-  std::vector<std::uint32_t> starts_;  // of the cells in `members_`
-  std::vector<std::uint32_t> members_;
+  std::vector<std::uint32_t> starts_;   // index of the first entry of each cell in `members_`
+  std::vector<std::uint32_t> members_;  // indices of the segments in each cell, cell by cell
 };
 
-// Keeps one point for each side on which there are walls: the nearest one, and others at an angle
-// of at least 90 degrees to those that are kept. A wall that consists of many segments counts once.
+// Reduces the nearest points of segments to one point for each side on which there is a wall: keeps
+// the nearest point, and each further point at an angle of at least 90 degrees to all points that
+// are kept. A wall that consists of many segments thus counts once.
 void keep_sides(Vec p, std::vector<NearPoint>& points);
 
 }  // namespace flatland::crowd

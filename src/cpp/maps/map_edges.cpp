@@ -16,7 +16,7 @@ std::uint64_t load_word(const std::uint8_t* bytes) {
 }
 
 // One row of the bitmap as zeros and ones. The pixel to the left of corner x has the index x, the
-// one to the right x + 1. Pixels beyond both ends of the row are on.
+// pixel to the right has the index x + 1. Pixels beyond both ends of the row are on.
 class PaddedRow {
  public:
   explicit PaddedRow(std::size_t cols) : bytes_(cols + 2 + kWordSize, 1), cols_(cols) {}
@@ -34,8 +34,8 @@ class PaddedRow {
   std::size_t cols_;
 };
 
-// A corner at which the boundary turns: three of the four adjacent pixels are equal, or, if
-// `crossing`, only the diagonally adjacent ones.
+// A corner at which the boundary turns. Three of the four adjacent pixels are equal, or, at a
+// crossing, only diagonally adjacent pixels.
 struct Turn {
   std::int32_t x;
   std::int32_t line;  // counted downwards from the top edge
@@ -112,7 +112,7 @@ std::vector<BoundaryEdge> boundary_edges(const Bitmap& bitmap, double resolution
 
 namespace {
 
-// Index of a corner of a loop; a crossing has two nodes.
+// The index of a corner of a loop. A crossing consists of two nodes.
 using Node = std::int64_t;
 constexpr Node kNoNode = -1;
 

@@ -20,11 +20,11 @@
 namespace flatland {
 namespace {
 
-// More threads than this are of no use for any call.
+// The greatest number of threads of a call. More threads would not save time.
 constexpr std::size_t kMaxThreads = 256;
 
 std::size_t allowed_processors() {
-  // The kernel refuses a set that is smaller than its own.
+  // The call fails if the set is smaller than the set of the kernel.
   for (std::size_t size = 1024; size <= 1024 * 1024; size *= 2) {
     const std::unique_ptr<cpu_set_t, void (*)(cpu_set_t*)> set(
         CPU_ALLOC(size), [](cpu_set_t* allocated) { CPU_FREE(allocated); });
@@ -36,7 +36,8 @@ std::size_t allowed_processors() {
   return std::max(1U, std::thread::hardware_concurrency());
 }
 
-// Processors that the control group (version 2) of the process may use on average, rounded up.
+// Returns the number of processors that the control group (version 2) of the process may use on
+// average, rounded up.
 std::size_t processor_quota() {
   std::ifstream file("/sys/fs/cgroup/cpu.max");  // "QUOTA PERIOD" or "max PERIOD", in microseconds
   double quota = 0.0;
@@ -65,7 +66,7 @@ class Batch {
     }
   }
 
-  // To be called after all threads have left `work`.
+  // Must be called after all threads have left `work`.
   void rethrow() const {
     if (failure_ != nullptr) std::rethrow_exception(failure_);
   }
@@ -127,7 +128,7 @@ class ThreadPool::Crew {
   }
 
  private:
-  // Starts workers until there are `count`, or until the system refuses one.
+  // Starts workers until there are `count`, or until the system cannot start another thread.
   void hire(std::size_t count) {
     if (workers_.size() >= count) return;
     // A signal of the process interrupts one of its other threads.
@@ -177,8 +178,8 @@ ThreadPool::~ThreadPool() { stop(); }
 
 void ThreadPool::stop() {
   Crew* crew = crew_.exchange(nullptr);
-  // The threads of another process do not exist in this one, and its locks may be held for ever.
-  // Such a crew is not destroyed.
+  // After a fork, the threads of the parent process do not exist in this process, and the locks of
+  // their crew may never be released. Such a crew is not destroyed.
   if (crew != nullptr && crew->is_of_this_process()) delete crew;
 }
 

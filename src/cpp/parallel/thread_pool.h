@@ -7,12 +7,12 @@
 
 namespace flatland {
 
-// Number of threads that can run at the same time: the processors that the process may use, reduced
-// to the quota of its control group. At least 1.
+// Returns the number of threads that can run at the same time, at least 1: the number of processors
+// that the process may use, reduced to the quota of the control group.
 std::size_t available_threads();
 
-// A set of worker threads, which are started when they are first needed and then wait for the next
-// call. A pool without calls costs nothing. Several threads may call `parallel_for` concurrently.
+// A set of worker threads. The first call starts the threads, which then wait for the next call. A
+// pool without calls has no threads. Several threads may call `parallel_for` concurrently.
 //
 // Jobs must not acquire the GIL: a thread that stops the pool may hold it.
 class ThreadPool {
@@ -26,8 +26,8 @@ class ThreadPool {
 
   // Calls job(i) once for each i from 0 to jobs - 1, on up to `num_threads` threads (0: as many as
   // are available), of which the calling thread is one. Threads take jobs in order of i as they
-  // become free. Returns when all jobs have ended. If jobs throw, all others are carried out all
-  // the same; afterwards the exception of the first job, in order of i, is rethrown.
+  // become free. Returns when all jobs have ended. If jobs throw, the other jobs are still carried
+  // out; then the exception of the first job, in order of i, is rethrown.
   //
   // While the pool is in use by another thread, or in a job of the same pool, the calling thread
   // carries out all jobs. The same happens if no thread can be created.

@@ -6,11 +6,11 @@
 
 namespace flatland {
 
-// An array of floats at a multiple of 64 bytes, so that no aligned vector extends over two cache
-// lines: a load that overlaps a preceding store only in part is slow.
+// An array of floats at a multiple of 64 bytes. No aligned vector extends over two cache lines, and
+// no aligned load overlaps a preceding store only in part, which would be slow.
 class AlignedFloats {
  public:
-  // Sizes are rounded up to multiples of this number, that of the widest vectors.
+  // Sizes are rounded up to multiples of this number, the width of the widest vectors.
   static constexpr std::size_t kBlock = 16;
 
   static constexpr std::size_t rounded(std::size_t size) {

@@ -64,7 +64,7 @@ BeamFan::BeamFan(const float* ends, std::size_t count) : ends_(ends, ends + 2 * 
 BeamFan::~BeamFan() = default;
 
 MirroredFan::MirroredFan(const float* ends, std::size_t count) : fan(ends, count), place(count) {
-  // No ray has a length of zero, so that the order contains all of them.
+  // No ray has a length of zero, so `order_` contains all rays.
   for (std::size_t i = 0; i < count; ++i) place[fan.order()[i]] = static_cast<std::uint32_t>(i);
   is_reversed = true;
   for (std::size_t i = 1; i < count; ++i) {

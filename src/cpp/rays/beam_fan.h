@@ -1,4 +1,4 @@
-// Sorted ray directions, shared by all scans of a rangefinder.
+// The beams of a range finder, sorted by direction and shared by all scans.
 #pragma once
 
 #include <cstddef>
@@ -20,19 +20,19 @@ class BeamFan {
   BeamFan(const float* ends, std::size_t count);
   ~BeamFan();
 
-  // Whether the fan was made from these end points.
+  // Returns whether the fan was created from these end points.
   bool matches(const float* ends, std::size_t count) const;
 
-  // Number of end points.
+  // Returns the number of end points.
   std::size_t size() const { return ends_.size() / 2; }
 
-  // Number of rays of non-zero length. Rays of zero length fill the last block of the sorted
-  // arrays.
+  // Returns the number of rays of non-zero length. Rays of zero length fill the last block of the
+  // sorted arrays.
   std::size_t count() const { return order_.size(); }
   const float* x() const { return x_.data(); }
   const float* y() const { return y_.data(); }
   const float* length() const { return length_.data(); }
-  // For each sorted ray, its index in the array of end points.
+  // The index of each sorted ray in the array of end points.
   const std::vector<std::uint32_t>& order() const { return order_; }
 
   // Rays that are consecutive in both orders: `count` rays from `sorted` on, whose indices in the
@@ -40,18 +40,18 @@ class BeamFan {
   struct Run {
     std::size_t sorted, original, count;
   };
-  // All rays in order of their indices, so that the vector of the last rays of a run may extend
-  // into the next one; empty if there are too many runs or rays of zero length.
+  // All rays as runs, in order of the indices in the array of end points: a vector that begins in a
+  // run may extend into the next run. Empty if there are too many runs, or rays of zero length.
   const std::vector<Run>& runs() const { return runs_; }
 
-  // The fan with the opposite angles. Thread-safe; it is made by the first call.
+  // Returns the fan with the opposite angles, which the first call creates. Thread-safe.
   const MirroredFan& mirrored() const;
 
   float min_length() const { return min_length_; }
   float max_length() const { return max_length_; }
 
-  // The full circle is divided into cells; their number is 2 to the power of `cell_bits`. The entry
-  // of a cell is the first ray at or after its start.
+  // The full circle is divided into 2^cell_bits cells. The entry of a cell is the first ray at or
+  // after the start of the cell.
   int cell_bits() const { return cell_bits_; }
   const std::int32_t* first_in_cell() const { return first_in_cell_.data(); }
 
@@ -72,22 +72,23 @@ class BeamFan {
 
 // The rays of a fan with the opposite angles.
 struct MirroredFan {
-  // From end points that differ from the origin.
+  // Creates the fan from end points that differ from the origin.
   MirroredFan(const float* ends, std::size_t count);
 
   BeamFan fan;
-  // For each sorted ray of the original fan, its place among those of this one.
+  // The index in this fan of each sorted ray of the original fan.
   std::vector<std::uint32_t> place;
-  // Whether the order is the opposite one, up to a rotation: no rays have the same direction.
+  // Whether the order of the rays is reversed, up to a rotation. This is the case if no rays have
+  // the same direction.
   bool is_reversed;
 };
 
-// The most recently used fans, so that the rays of a laser are sorted only once. Thread-safe.
+// A cache of the most recently used fans: the rays of a laser are sorted only once. Thread-safe.
 class FanCache {
  public:
-  // Null if the fan is unknown.
+  // Returns the fan with these end points, null if the cache does not contain the fan.
   std::shared_ptr<const BeamFan> find(const float* ends, std::size_t count);
-  // The end points must be finite.
+  // Returns the fan with these end points, which must be finite.
   std::shared_ptr<const BeamFan> make(const float* ends, std::size_t count);
   // Shares the fans of another cache.
   void share(FanCache& other);

@@ -1,4 +1,5 @@
-// Boxes and their trees, a part of depth_kernel.h: eight boxes at a time.
+// Finds the rays that bounding boxes cover, eight boxes at a time, and traverses trees of boxes; a
+// part of depth_kernel.h.
 
 #include "rays/ray_kernel.h"
 
@@ -18,12 +19,12 @@ struct BoxKernel : RayKernel<kFindsFixtures> {
                                frame.sin_to_sensor * x + frame.cos_to_sensor * y);
   }
 
-  // Half-open ranges of rays. They begin within the full circle and may extend beyond it.
+  // Half-open ranges of rays, which begin within the full circle and may extend beyond.
   struct Rays {
     simd::Ints begin, end;
   };
 
-  // Finds the rays between two angles, or all rays where `is_all`.
+  // Returns the rays between two angles, or all rays in the lanes in which `is_all` is set.
   FLATLAND_INLINE Rays find_rays(simd::Floats low, simd::Floats high, simd::Ints is_all) const {
     const float cells_per_unit = static_cast<float>(1 << scan.cell_bits) / 4.0F;
     // An angle is NaN if a point coincides with the origin; `is_all` is set in these lanes.
@@ -48,7 +49,7 @@ struct BoxKernel : RayKernel<kFindsFixtures> {
   FLATLAND_INLINE Rays drawn_part(Rays rays) const {
     const simd::Ints from = simd::Ints{} + scan.drawn.begin, to = simd::Ints{} + scan.drawn.end;
     Rays part{to, from};
-    // The range may overlap with the rays after a turn, or before.
+    // A range may contain the same rays one turn earlier or later.
     for (std::int32_t turn = -scan.count; turn <= scan.count; turn += scan.count) {
       const simd::Ints begin = simd::max(rays.begin + turn, from);
       const simd::Ints end = simd::min(rays.end + turn, to);
@@ -61,7 +62,7 @@ struct BoxKernel : RayKernel<kFindsFixtures> {
     return {part.begin - turn, part.end - turn};
   }
 
-  // The first rays at or after the starts of cells; see BeamFan.
+  // Returns the first rays at or after the starts of cells; see BeamFan.
   FLATLAND_INLINE simd::Ints first_rays(simd::Ints cell) const {
     std::int32_t index[simd::kWidth], first[simd::kWidth];
     simd::store(index, cell & ((1 << scan.cell_bits) - 1));
@@ -69,7 +70,8 @@ struct BoxKernel : RayKernel<kFindsFixtures> {
     return simd::load(first) + (cell >> scan.cell_bits) * scan.count;
   }
 
-  // Finds the rays covered by boxes of a set, given by its bits, and the distances of the boxes.
+  // Finds the rays that boxes cover, and lower bounds of the distances of the boxes, for the boxes
+  // whose bits are set in `set`.
   FLATLAND_INLINE void find_boxes(const float* min_x, const float* min_y, const float* max_x,
                                   const float* max_y, std::uint32_t set, Candidates& out) const {
     const simd::Floats x0 = simd::load(min_x) - frame.origin.x;
@@ -85,7 +87,7 @@ struct BoxKernel : RayKernel<kFindsFixtures> {
     if constexpr (kFindsFixtures) {
       const simd::Floats height = simd::max(x0 * hits->front.x, x1 * hits->front.x) +
                                   simd::max(y0 * hits->front.y, y1 * hits->front.y);
-      out.set &= ~Lanes::bits(height < hits->front_distance);  // NaN: not finite
+      out.set &= ~Lanes::bits(height < hits->front_distance);  // a box that is not finite remains
       if (scan.first_in_cell == nullptr) {
         find_in_bundle(x0, y0, x1, y1, out);
         return;
@@ -93,8 +95,8 @@ struct BoxKernel : RayKernel<kFindsFixtures> {
     }
     const simd::Floats size = (x1 - x0) + (y1 - y0);
 
-    // The silhouette of a box consists of two of its corners, its rightmost and its leftmost one
-    // when viewed from the origin.
+    // The silhouette of a box consists of two corners, the rightmost and the leftmost corner as
+    // seen from the origin.
     const simd::Ints is_right = x0 > 0.0F, is_left = x1 < 0.0F;
     const simd::Ints is_above = y0 > 0.0F, is_below = y1 < 0.0F;
     const simd::Floats near_x = is_right ? x0 : x1;
@@ -106,7 +108,7 @@ struct BoxKernel : RayKernel<kFindsFixtures> {
     const simd::Floats from = angle_in_sensor(low_x, low_y);
     const simd::Floats turn = simd::wrap_difference(angle_in_sensor(high_x, high_y) - from);
     const simd::Ints is_near = distance <= kNearTolerance * size;
-    // False for NaN.
+    // The comparison with NaN is false.
     const simd::Ints is_partial = simd::abs(turn) <= 2.0F - kNearTolerance;
     const Rays rays = find_rays(from + simd::min(turn, zero), from + simd::max(turn, zero),
                                 is_near | ~is_partial);
@@ -143,7 +145,7 @@ struct BoxKernel : RayKernel<kFindsFixtures> {
         const Floats fraction = Lanes::load(scan.fraction + first);
         const Mask is_beside = Lanes::either(Lanes::less(reach, side), Lanes::less(end, zero));
         const Mask is_missed = Lanes::either(is_beside, Lanes::less(fraction, least));
-        // Boxes that are not finite are never missed.
+        // The comparisons are written so that boxes that are not finite are found.
         is_hit =
             Lanes::either(is_hit, Lanes::but_not(Lanes::less_equal(zero, fraction), is_missed));
       }

@@ -1,10 +1,9 @@
-// The inner loops of depth_scan.cpp, which includes this file once for each instruction set, in a
-// namespace with a type `Lanes` (see simd.h). All functions are inlined into `draw_tree` and
-// `draw_solids`. Function templates of other headers must not be used: the linker could choose a
-// copy compiled for an instruction set that the processor lacks.
+// The inner loops of depth_scan.cpp; see every_instruction_set.h. All functions are inlined into
+// `draw_tree` and `draw_solids`. Function templates of other headers must not be used: the linker
+// could choose a copy compiled for an instruction set that the processor lacks.
 //
-// EdgeKernel and SolidKernel draw shapes; both derive from BoxKernel, and this from RayKernel. The
-// files of all of them are included only here, in this order.
+// EdgeKernel and SolidKernel draw shapes. Both derive from BoxKernel, which derives from RayKernel.
+// Only this file includes the files of these classes.
 
 #include "rays/box_kernel.h"
 #include "rays/edge_kernel.h"
@@ -47,3 +46,5 @@ void find_in_solids(const ScanView& scan, const ScanFrame& frame, const HitView&
                     const SolidView& solids) {
   draw_all(SolidKernel<true>{{{scan, frame, &hits}}}, solids);
 }
+
+constexpr Functions kFunctions{set_frame, draw_tree, draw_solids, find_in_tree, find_in_solids};

@@ -17,7 +17,7 @@ namespace flatland {
 
 static_assert(AlignedFloats::kBlock % simd::kWidth == 0, "a block consists of whole vectors");
 
-// A half-open range of ray numbers. It begins within the full circle and may extend beyond it.
+// A half-open range of ray numbers, which begins within the full circle and may extend beyond.
 struct Interval {
   std::int32_t begin, end;
 };
@@ -27,14 +27,15 @@ struct HitView {
   const float* nearest;  // null if there are no limits
   float* fixture;
   float* brightness;
-  const std::uint16_t* number;  // of the material of a fixture, by its slot
-  std::size_t count;            // of these numbers; fixtures with other slots have no material
-  const Optics* optics;         // of materials, by their numbers
+  const std::uint16_t* number;  // number of the material of a fixture, by slot
+  std::size_t count;            // size of `number`; fixtures with greater slots have no material
+  const Optics* optics;         // by number of the material
   bool uses_materials;
   const std::uint32_t* words;
   std::uint32_t leg, excluded;
   std::uint16_t preferred;
-  // Hits are inside of this half-plane in the current frame, relative to the origin of the rays.
+  // The half-plane that contains all hits, in the current frame and relative to the origin of the
+  // rays.
   b2Vec2 front;
   float front_distance;
 };
@@ -54,8 +55,8 @@ struct ScanView {
 
 // The relation of the rays to the frame of a body.
 struct ScanFrame {
-  // Origin of the rays in the frame, rotation from the frame to that of the fan, and bound of the
-  // error of a diamond angle.
+  // The origin of the rays in the frame of the body, the rotation from this frame to the frame of
+  // the fan, and a bound of the error of a diamond angle.
   b2Vec2 origin;
   float cos_to_sensor, sin_to_sensor;
   float margin;
@@ -76,15 +77,15 @@ std::uint32_t slot_of(const b2Fixture& fixture) {
   return static_cast<std::uint32_t>(const_cast<b2Fixture&>(fixture).GetUserData().pointer);
 }
 
-// A node or leaf that remains to be drawn.
+// A node or leaf that is not drawn yet.
 struct StackEntry {
   float distance;
   Interval rays;
   std::uint32_t child;
 };
 
-// The objects of a set of up to eight that rays may hit, the rays, and lower bounds of the
-// distances of the objects.
+// The objects, up to eight, that rays may hit, with the range of rays and a lower bound of the
+// distance of each object.
 struct Candidates {
   std::uint32_t set;
   std::int32_t begin[simd::kWidth], end[simd::kWidth];
@@ -94,82 +95,45 @@ struct Candidates {
 const Optics kPlain;
 constexpr std::uint16_t kNoMaterial[EdgeTree::kFanOut] = {};
 
-// A box is assumed to surround the origin of the rays if its distance is at most this fraction of
-// its size. Also the margin [diamond angle] by which an object must span less than a half circle.
+// A box counts as surrounding the origin of the rays if the distance of the box is at most this
+// fraction of its size. The same number is the margin [diamond angle] by which an object must span
+// less than a half circle.
 constexpr float kNearTolerance = 1e-3F;
-// Factors that turn computed distances into lower bounds: the first one covers the rounding of the
-// distance of a box, the second one the error of the formula of Box2D for circles, which takes the
-// square root of a difference of large numbers.
+// Factors that turn computed distances into lower bounds. The first factor covers the rounding of
+// the distance of a box. The second factor covers the error of the formula of Box2D for circles,
+// which takes the square root of a difference of large numbers.
 constexpr float kBoxRounding = 1.0F - 1e-5F;
 constexpr float kCircleRounding = 1.0F - 1e-3F;
-// By how much a box is enlarged for the rays of a bundle because of rounding, as a part of its
-// largest coordinate.
+// The margin by which a box is enlarged for the rays of a bundle because of rounding, as a fraction
+// of the largest coordinate.
 constexpr float kBundleTolerance = 1e-5F;
 constexpr auto kBundle = static_cast<std::int32_t>(RayBundle::kMaxInAnyOrder);
 // Up to this number of vectors of rays, drawing all edges of a leaf costs less than finding the
 // rays that each edge covers.
 constexpr std::int32_t kFewVectors = 3;
-// The distance of the line of an edge seen edge-on from the origin of the rays, as a part of the
-// distances of its ends.
+// An edge is seen edge-on if the distance of its line from the origin of the rays is at most this
+// fraction of the distances of its ends.
 constexpr float kEdgeOn = 1e-4F;
-// Part of the squared radius by which the origin of the rays must be inside a circle.
+// The origin of the rays counts as inside a circle only by a margin, this fraction of the squared
+// radius.
 constexpr float kInside = 1e-3F;
 
-// The same code is compiled for several instruction sets, one of which is selected at run time.
-namespace baseline {
-using Lanes = simd::Lanes8;
-#include "rays/depth_kernel.h"
-}  // namespace baseline
-
-#if defined(__x86_64__)
-#pragma GCC push_options
-#pragma GCC target("avx2")
-namespace avx2 {
-using Lanes = simd::Lanes8Avx2;
-#include "rays/depth_kernel.h"
-}  // namespace avx2
-#pragma GCC pop_options
-
-#pragma GCC push_options
-#pragma GCC target("avx512f,avx512vl,avx512dq,avx512bw")
-namespace avx512 {
-using Lanes = simd::Lanes16;
-#include "rays/depth_kernel.h"
-}  // namespace avx512
-#pragma GCC pop_options
-#endif
-
 struct Functions {
-  decltype(&baseline::set_frame) set_frame;
-  decltype(&baseline::draw_tree) draw_tree;
-  decltype(&baseline::draw_solids) draw_solids;
-  decltype(&baseline::find_in_tree) find_in_tree;
-  decltype(&baseline::find_in_solids) find_in_solids;
+  void (*set_frame)(const ScanView&, const ScanFrame&, const b2Transform&);
+  void (*draw_tree)(const ScanView&, const ScanFrame&, const EdgeTree::Node*,
+                    const EdgeTree::Leaf*);
+  void (*draw_solids)(const ScanView&, const ScanFrame&, const SolidView&);
+  void (*find_in_tree)(const ScanView&, const ScanFrame&, const HitView&, const EdgeTree::Node*,
+                       const EdgeTree::Leaf*, const EdgeTree::LeafFixtures*);
+  void (*find_in_solids)(const ScanView&, const ScanFrame&, const HitView&, const SolidView&);
 };
 
-const Functions& functions() {
-  static const Functions kSelected = [] {
-#if defined(__x86_64__)
-    switch (instruction_set()) {
-      case InstructionSet::kAvx512:
-        return Functions{avx512::set_frame, avx512::draw_tree, avx512::draw_solids,
-                         avx512::find_in_tree, avx512::find_in_solids};
-      case InstructionSet::kAvx2:
-        return Functions{avx2::set_frame, avx2::draw_tree, avx2::draw_solids, avx2::find_in_tree,
-                         avx2::find_in_solids};
-      case InstructionSet::kBaseline:
-        break;
-    }
-#endif
-    return Functions{baseline::set_frame, baseline::draw_tree, baseline::draw_solids,
-                     baseline::find_in_tree, baseline::find_in_solids};
-  }();
-  return kSelected;
-}
+#define FLATLAND_KERNEL "rays/depth_kernel.h"
+#include "rays/every_instruction_set.h"
 
-// Bound of the difference between the diamond angle of a ray in the frame of a body and in the fan.
-// It is caused by the rounding of coordinates and is largest for short rays far from the origin of
-// the world.
+// Returns a bound of the difference between the diamond angle of a ray in the frame of a body and
+// in the fan. The rounding of coordinates causes the difference, which is largest for short rays
+// far from the origin of the world.
 float angle_margin(const RayBundle& rays, const b2Transform& pose, const b2Transform& body) {
   const float coordinates = pose.p.Length() + body.p.Length() + rays.max_length;
   constexpr float kFullCircle = 4.0F;
@@ -187,7 +151,7 @@ DepthScan::DepthScan(const RayBundle& rays, const b2Transform& pose, ScanBuffer&
       last_(static_cast<std::int32_t>(rays.count)) {
   buffer.d_x.resize(rays.count);
   buffer.d_y.resize(rays.count);
-  // Whole vectors are read from the start of any run of rays on.
+  // A vector may begin at any ray, so that the arrays need a further block.
   buffer.fraction.resize(rays.count + AlignedFloats::kBlock);
   std::fill_n(buffer.fraction.data(), buffer.fraction.size(), kMissFraction);
   if (rules == nullptr) return;
@@ -211,7 +175,7 @@ DepthScan::DepthScan(const RayBundle& rays, std::size_t first, std::size_t last,
                                &buffer.fixture, &buffer.brightness}) {
     if (array->size() < rays.count) array->resize(rays.count);
   }
-  // Hits of the other rays in the same vectors are not nearer than -1.
+  // The other rays in the same vectors have a fraction of -1, so that no hit is nearer.
   constexpr std::size_t kBlock = AlignedFloats::kBlock;
   const auto clear = [&](std::size_t begin, std::size_t end) {
     begin = begin / kBlock * kBlock;
@@ -230,7 +194,7 @@ float* DepthScan::limit_nearest() {
 }
 
 ScanView DepthScan::view() const {
-  // A bit less than the reciprocal, so that rounding does not matter.
+  // The factor is slightly less than the reciprocal, so that rounding has no effect.
   const float fraction_per_metre = (1.0F - 1e-6F) / rays_.max_length;
   return {rays_.x,
           rays_.y,

@@ -1,7 +1,7 @@
-// A scan as a one-dimensional depth buffer that holds the range of each ray of a fan.
+// A scan as a one-dimensional depth buffer, which contains the range of each ray of a fan.
 //
-// Edges and shapes are drawn into the rays that they cover, approximately from front to back. Boxes
-// that are hidden behind the hits of all of their rays are culled. The intersection of a ray with a
+// Edges and shapes are drawn into the rays that they cover, approximately from front to back. A box
+// is culled if it is behind the hits of all rays that it covers. The intersection of a ray with a
 // shape is computed with the arithmetic of the RayCast functions of Box2D, in the same order and in
 // single precision, so that the fractions equal those of b2World::RayCast. The only difference is
 // the test for edges: a ray crosses an edge if the end points of the edge lie on different sides of
@@ -29,7 +29,7 @@ struct HitView;
 struct ScanFrame;
 struct ScanView;
 
-// The smallest fraction of a miss.
+// The least fraction that stands for a miss.
 inline constexpr float kMissFraction = 1.0F + std::numeric_limits<float>::epsilon();
 
 // A fixture stops a ray if it has a category in each of the two masks.
@@ -42,24 +42,26 @@ struct RayMasks {
   }
 };
 
-// The memory of scans, for any number of them one after the other: for each ray, the vector along
-// it in some frame, and the fraction of the nearest hit. The others are only used to find fixtures:
-// the least fraction of a hit, the bits of the slot of the fixture that is hit, and its brightness.
+// The memory of scans, which any number of scans may use one after the other. For each ray, d_x and
+// d_y are the vector along the ray in some frame, and `fraction` is the fraction of the nearest
+// hit. The other arrays are used only by scans that find fixtures: `nearest` is the least fraction
+// of a hit, `fixture` has the bits of the slot of the fixture, and `brightness` is that of the hit.
 struct ScanBuffer {
   AlignedFloats d_x, d_y, fraction, nearest, fixture, brightness;
 
-  // The slots of the fixtures; unspecified for a miss.
+  // The slots of the fixtures. The slot of a miss is unspecified.
   using Slot = std::uint32_t __attribute__((may_alias));
   Slot* slots() { return reinterpret_cast<Slot*>(fixture.data()); }
   const Slot* slots() const { return reinterpret_cast<const Slot*>(fixture.data()); }
 };
 
-// Rays from a common origin to points in a frame of their own.
+// Rays from a common origin to points in the frame of the rays.
 struct RayBundle {
   const float *x, *y;  // whole blocks
   std::size_t count;
-  float min_length, max_length;  // bounds of all lengths
-  // See BeamFan. Null for a few rays in any order, which are compared one by one with boxes.
+  float min_length, max_length;  // bounds of the lengths of the rays
+  // The table of BeamFan. Null for a few rays in any order, which are compared one by one with
+  // boxes.
   static constexpr std::size_t kMaxInAnyOrder = AlignedFloats::kBlock;
   const std::int32_t* first_in_cell;
   int cell_bits;
@@ -71,41 +73,42 @@ struct RayBundle {
   }
 };
 
-// How fixtures are hit, for scans that find out which ones are. A ray passes a fixture that
-// transmits if a random word is below its limit: `fate_word` of the word of the ray and of the slot
-// of the fixture with the bits of the leg.
+// The rules of scans that find fixtures. A ray passes a fixture that transmits beams if a random
+// word is below the limit of the material. The random word is `mix_fixture` of the word of the ray,
+// and of the slot of the fixture with the bits of the leg.
 struct HitRules {
   static constexpr std::uint32_t kNoFixture = 0xFFFFFFFFU;
-  // The legs of a path: before and after a reflection.
+  // The legs of a path, before and after a reflection.
   static constexpr std::uint32_t kDirect = 0;
   static constexpr std::uint32_t kReflected = 0x80000000U;
-  // The brightness of a hit, before a reflection, that reflects the ray as a mirror.
+  // The brightness of a hit of the first leg at which a mirror reflects the ray.
   static constexpr float kReflects = -1.0F;
 
   const Materials* materials;  // null if all fixtures are opaque
-  const std::uint32_t* words;  // for each ray in sorted order, whole blocks; see `draw_words`
+  const std::uint32_t* words;  // random words of the sorted rays, whole blocks; see `draw_words`
   std::uint32_t leg;
   std::uint32_t excluded;   // a fixture that is not hit, or kNoFixture
-  std::uint16_t preferred;  // of two coincident edges, the one with these categories is hit
+  std::uint16_t preferred;  // categories of the edge that is hit, of two coincident edges
 };
 
-// Half of the world.
+// One side of a line.
 struct HalfPlane {
   b2Vec2 normal;  // unit vector, to the inside
-  float offset;   // of the boundary from the origin of a scan, along the normal [m]
+  float offset;   // position of the line along the normal, from the origin of a scan [m]
 };
 
 class DepthScan {
  public:
-  // The fan and the buffer must outlive the scan. Initially all rays are misses.
+  // Creates a scan in which all rays are misses. The fan and the buffer must outlive the scan.
   DepthScan(const BeamFan& fan, const b2Transform& pose, ScanBuffer& buffer)
       : DepthScan(RayBundle::of(fan), pose, buffer, nullptr) {}
-  // A scan that also finds the fixtures, at about 1.2 times the cost. The rules must outlive it.
+  // Creates a scan that also finds the fixtures, at about 1.2 times the cost. The rules must
+  // outlive the scan.
   DepthScan(const BeamFan& fan, const b2Transform& pose, ScanBuffer& buffer, const HitRules& rules)
       : DepthScan(RayBundle::of(fan), pose, buffer, &rules) {}
-  // A scan of some rays, from `first` to `last` - 1; those from `count` on are the first ones of
-  // the bundle again. The caller makes the rays misses that are to be cast, and sets their
-  // `nearest` fractions. Fixtures outside of the half-plane may be skipped.
+  // Creates a scan of the rays from `first` to `last` - 1. Ray `count` + i is ray i of the bundle.
+  // The caller marks the rays that are to be cast as misses, and sets their `nearest` fractions.
+  // Fixtures outside of the half-plane may be skipped.
   DepthScan(const RayBundle& rays, std::size_t first, std::size_t last, const HalfPlane& inside,
             const b2Transform& pose, ScanBuffer& buffer, const HitRules& rules);
 
@@ -114,12 +117,13 @@ class DepthScan {
   // Draws circles and polygons.
   void draw(const SolidTree& solids, RayMasks masks);
 
-  // Fraction of the nearest hit of each ray, in sorted order; greater than 1 for a miss. While
-  // drawing, hits at or beyond these fractions are ignored; the caller may change them in between.
+  // The fraction of the nearest hit of each ray, in sorted order; greater than 1 for a miss. `draw`
+  // ignores hits at or beyond these fractions. The caller may change the fractions between two
+  // calls of `draw`.
   float* fractions() { return buffer_.fraction.data(); }
   const float* fractions() const { return buffer_.fraction.data(); }
-  // Ignores hits of each ray at lower fractions than these, which are initially 0; only for scans
-  // that find fixtures.
+  // Returns the fractions below which `draw` ignores hits, one for each ray and initially 0. Only
+  // for scans that find fixtures.
   float* limit_nearest();
 
  private:
@@ -130,7 +134,7 @@ class DepthScan {
   void set_frame(const ScanView& view, const ScanFrame& frame, const b2Transform& body);
   ScanView view() const;
   HitView hits(const b2Rot& body) const;
-  // The relation of the rays to the world.
+  // Returns the relation of the rays to the world frame.
   ScanFrame world_frame(const ScanView& view, RayMasks masks);
 
   RayBundle rays_;
@@ -139,7 +143,7 @@ class DepthScan {
   const HitRules* rules_;
   bool has_nearest_ = false;
   HalfPlane inside_{{0.0F, 0.0F}, 0.0F};
-  b2Transform frame_;  // of the vectors along the rays in the buffer, that of the tree drawn last
+  b2Transform frame_;  // frame of the vectors d_x, d_y in the buffer: that of the last tree
   bool has_frame_ = false;
   std::int32_t first_ = 0, last_;
 };

@@ -1,4 +1,4 @@
-// Edges, a part of depth_kernel.h: eight at a time.
+// Draws edges, eight at a time; a part of depth_kernel.h.
 
 template <bool kFindsFixtures>
 struct EdgeKernel : BoxKernel<kFindsFixtures> {
@@ -17,18 +17,19 @@ struct EdgeKernel : BoxKernel<kFindsFixtures> {
   using typename Base::Mask;
   using typename Base::Rays;
 
-  // The ends of eight edges relative to the origin of the rays, and the numerators of fractions.
+  // The ends of eight edges relative to the origin of the rays, and the numerators of the
+  // fractions.
   struct Edges {
     float a_x[simd::kWidth], a_y[simd::kWidth], b_x[simd::kWidth], b_y[simd::kWidth];
     float numerator[simd::kWidth];
-    // Used only with kFindsFixtures.
+    // The members below are used only with kFindsFixtures.
     std::uint32_t fixture[simd::kWidth];
     float reflectance[simd::kWidth];
     const std::uint16_t* material;
   };
 
-  // Draws the edges of a set, given by its bits, into a vector of rays. For edges seen edge-on, see
-  // `find_edge_on`. With kHasFate, edges may let rays pass or reflect them.
+  // Draws the edges whose bits are set in `set` into a vector of rays. kIsEdgeOn: see
+  // `find_edge_on`. kHasFate: edges may let rays pass, or reflect rays.
   template <bool kIsEdgeOn, bool kHasFate>
   FLATLAND_INLINE void draw_edges(const EdgeTree::Leaf& leaf, const Edges& edges, std::uint32_t set,
                                   std::int32_t first) const {
@@ -52,7 +53,7 @@ struct EdgeKernel : BoxKernel<kFindsFixtures> {
       const Mask is_crossed = Lanes::both(Lanes::less_equal(Lanes::min(side_a, side_b), zero),
                                           Lanes::less_equal(zero, Lanes::max(side_a, side_b)));
       if constexpr (kFindsFixtures) {
-        // After a reflection, most edges of a leaf are beside the few remaining rays.
+        // After a reflection only few rays remain, and most edges of a leaf cross none of them.
         if (!Lanes::any(is_crossed)) continue;
       }
       const Floats denominator = leaf.normal_x[i] * d_x + leaf.normal_y[i] * d_y;
@@ -88,7 +89,7 @@ struct EdgeKernel : BoxKernel<kFindsFixtures> {
     }
   }
 
-  // Finds the edges whose lines pass through the origin of the rays, within the rounding errors.
+  // Returns the edges whose lines pass through the origin of the rays, within the rounding errors.
   // The fraction of a ray along such a line is a quotient of two rounding errors, and rounding
   // decides whether the ray crosses the edge. The fraction is therefore limited to those of the
   // ends of the edge, so that no ray has a hit beside the edge.
@@ -98,8 +99,8 @@ struct EdgeKernel : BoxKernel<kFindsFixtures> {
     return Lanes::bits(simd::abs(numerator) <= kEdgeOn * size);
   }
 
-  // Draws the edges of a leaf; `rays` covers all of them. The fixtures are null without
-  // kFindsFixtures.
+  // Draws the edges of a leaf. `leaf_rays` contains all rays that may cross the edges; `fixtures`
+  // is null without kFindsFixtures.
   FLATLAND_INLINE void draw_leaf(const EdgeTree::Leaf& leaf, const EdgeTree::LeafFixtures* fixtures,
                                  Interval leaf_rays) const {
     const simd::Floats a_x = simd::load(leaf.x1) - frame.origin.x;
@@ -183,20 +184,19 @@ struct EdgeKernel : BoxKernel<kFindsFixtures> {
     return wanted;
   }
 
-  // Whether the second of two coincident edges is the one that rays hit: it stops them and the
-  // first one does not, or it has a preferred category.
+  // Returns whether rays hit the second of two coincident edges: the second edge stops rays, and
+  // either the first edge does not, or the second edge has a preferred category.
   FLATLAND_INLINE simd::Ints is_second(const EdgeTree::Leaf& leaf) const {
     const simd::Ints bits = simd::load(leaf.coincident_bits);
     return pass(bits) & (~pass(simd::load(leaf.category_bits)) | ((bits & hits->preferred) != 0));
   }
 
-  // Whether edges with these category bits stop rays.
+  // Returns whether edges with these category bits stop rays.
   FLATLAND_INLINE simd::Ints pass(simd::Ints category_bits) const {
     return ((category_bits & frame.masks.stop) != 0) & ((category_bits & frame.masks.select) != 0);
   }
 
-  // Draws the edges of a set into the rays that they cover, which do not extend beyond the full
-  // circle.
+  // Draws the edges of a set into ranges of rays that do not extend beyond the full circle.
   template <bool kHasFate>
   FLATLAND_INLINE void draw_runs(const EdgeTree::Leaf& leaf, const Edges& edges,
                                  std::uint32_t wanted, Rays rays) const {

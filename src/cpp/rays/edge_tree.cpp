@@ -67,7 +67,7 @@ class EdgeTreeBuilder {
   std::uint32_t make_node(Range range, std::size_t depth) {
     const auto index = static_cast<std::uint32_t>(tree_.nodes_.size());
     tree_.nodes_.emplace_back();
-    // Split the largest part until there are 8 parts or all of them fit into leaves.
+    // Split the largest part until there are 8 parts, or until each part fits into a leaf.
     std::vector<Range> parts{range};
     while (parts.size() < kFanOut) {
       const auto largest =
@@ -191,7 +191,7 @@ class EdgeTreeBuilder {
       boxes[bin].add(box_of(edges_[e]));
       ++counts[bin];
     }
-    std::array<float, kBins> cost_after{};  // cost of this bin and all later ones
+    std::array<float, kBins> cost_after{};  // cost of a bin together with all later bins
     Box box;
     std::size_t count = 0;
     for (std::size_t bin = kBins; bin-- > 1;) {

@@ -1,5 +1,5 @@
-// A bounding-volume tree for casting rays at the edges of bodies with a common frame. It is
-// immutable and holds coordinates in that frame, without references to a world.
+// A bounding-volume tree for casting rays at the edges of bodies with a common frame. A tree is
+// immutable, contains coordinates in this frame, and does not refer to a world.
 #pragma once
 
 #include <array>
@@ -13,15 +13,15 @@ namespace flatland {
 struct TreeEdge {
   float x1, y1, x2, y2;
   std::uint16_t category_bits;
-  std::uint16_t coincident_bits = 0;  // categories of a coincident edge; 0 without one
-  std::uint16_t material = 0;         // its number; see Materials
+  std::uint16_t coincident_bits = 0;  // categories of a coincident edge; 0 if there is none
+  std::uint16_t material = 0;         // number of the material; see Materials
   // Slots of the fixtures of this edge and of the coincident one.
   std::uint32_t fixture = 0;
   std::uint32_t coincident_fixture = 0;
 };
 
-// Removes duplicate edges, and merges two coincident edges with different categories into one,
-// because layers of a world often have most of their walls in common. Edges with different
+// Removes duplicate edges, and merges two coincident edges with different categories into one edge:
+// the layers of a world often have most of their walls in common. Coincident edges with different
 // materials remain.
 void merge_coincident(std::vector<TreeEdge>& edges);
 
@@ -40,8 +40,8 @@ class EdgeTree {
     std::uint16_t common_bits;  // categories that all edges have
   };
 
-  // Slots of the fixtures of a leaf, and the numbers of their materials, apart from it because most
-  // scans do not need them.
+  // Slots of the fixtures of a leaf and numbers of their materials. They are not part of `Leaf`,
+  // because most scans do not need them.
   struct LeafFixtures {
     std::uint32_t fixture[kFanOut], coincident[kFanOut];
     std::uint16_t material[kFanOut];

@@ -1,12 +1,12 @@
-// The instruction sets for which inner loops are compiled. Results are the same with all of them.
+// The instruction sets for which inner loops are compiled. All of them give the same results.
 #pragma once
 
 namespace flatland {
 
 enum class InstructionSet { kBaseline, kAvx2, kAvx512 };
 
-// The best one that the processor has, or a lesser one named by the environment variable
-// FLATLAND_SIMD: "baseline", "avx2" or "avx512". It is determined by the first call.
+// Returns the best instruction set of the processor, or a lesser one that the environment variable
+// FLATLAND_SIMD selects: "baseline", "avx2" or "avx512". The first call determines the result.
 InstructionSet instruction_set();
 
 }  // namespace flatland

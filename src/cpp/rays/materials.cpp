@@ -49,7 +49,7 @@ std::uint16_t Materials::number(const Material& material) {
   }
   bool is_partial = optics.pass_limit != Optics::kOpaque;
   if (specular > 0.0) {
-    // Single precision: shares that are meant to add up to 1 do so only approximately.
+    // In single precision, shares with the sum 1 add up to 1 only approximately.
     constexpr double kAll = 1.0 - 1e-6;
     const double share = transmission + specular;
     const double limit = share >= kAll ? kWords : std::max(std::floor(share * kWords), 1.0);

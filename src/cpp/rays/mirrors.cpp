@@ -59,7 +59,7 @@ const std::vector<Mirror>& MirroredRays::find(const RayScene& scene, const BeamF
   return mirrors_;
 }
 
-// Finds the rays that are reflected, in reverse order.
+// Collects the rays that are reflected, in reverse order.
 void MirroredRays::collect(const ScanBuffer& hits, std::size_t count) {
   const auto* brightness = reinterpret_cast<const Word*>(hits.brightness.data());
   rays_.resize(count);
@@ -67,8 +67,8 @@ void MirroredRays::collect(const ScanBuffer& hits, std::size_t count) {
   std::uint32_t found = 0;
   for (std::size_t i = count; i-- > 0;) {
     rays[found] = static_cast<std::uint32_t>(i);
-    // Only the brightness of a reflected ray has a sign. Without a branch, because reflections may
-    // be random.
+    // Only the brightness of a reflected ray is negative. The loop has no branch: reflections may
+    // be random, and a branch could not be predicted.
     found += brightness[i] >> 31U;
   }
   count_ = found;
@@ -92,7 +92,7 @@ void MirroredRays::group() {
   }
 }
 
-// Returns the index of a mirror, which is added if it is not known.
+// Returns the index of a mirror. A mirror that is not in the list is added.
 std::uint32_t MirroredRays::index_of(std::uint32_t fixture, std::int32_t face) {
   std::size_t i = mirrors_.size();
   while (i > 0 && (mirrors_[i - 1].fixture != fixture || mirrors_[i - 1].face != face)) --i;
@@ -137,7 +137,7 @@ HalfPlane front_of(const MirrorPlane& plane, const b2Vec2& sensor, const b2Vec2&
   const bool is_inside = b2Dot(sensor - plane.point, plane.normal) >= 0.0F;
   const b2Vec2 normal = is_inside ? plane.normal : -plane.normal;
   const float offset = b2Dot(plane.point - origin, normal);
-  // Less by more than the rounding of coordinates.
+  // The offset is reduced by more than the rounding of coordinates.
   constexpr float kTolerance = 1e-3F;
   return {normal, offset - kTolerance * (1.0F + b2Abs(offset))};
 }

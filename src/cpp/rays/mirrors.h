@@ -12,26 +12,27 @@
 
 namespace flatland {
 
-// A mirror, or a face of a polygon, with the rays that it reflects.
+// A mirror, or a face of a polygon, with the reflected rays.
 struct Mirror {
   std::uint32_t fixture;
-  std::int32_t face;    // of a polygon; 0 for other shapes
-  std::uint32_t count;  // of its rays
+  std::int32_t face;    // index of the face of a polygon; 0 for other shapes
+  std::uint32_t count;  // number of rays
   std::uint32_t* rays;
 };
 
 // The rays of a scan that mirrors reflect, grouped by mirror.
 class MirroredRays {
  public:
-  // Finds the rays whose hits have the brightness HitRules::kReflects. The rays of a mirror are in
-  // reverse order, which is the order of their images. The mirrors are valid until the next call.
+  // Finds the rays whose hits have the brightness HitRules::kReflects, and returns their mirrors.
+  // The rays of a mirror are in reverse order, which is the order of their images. The result is
+  // valid until the next call.
   const std::vector<Mirror>& find(const RayScene& scene, const BeamFan& fan,
                                   const b2Transform& pose, const ScanBuffer& hits);
 
  private:
-  // Successive rays of a mirror, up to the beginning of the next run.
+  // Consecutive rays of one mirror, up to the beginning of the next run.
   struct Run {
-    std::uint32_t mirror;  // its index
+    std::uint32_t mirror;  // index of the mirror
     std::uint32_t begin;
   };
 
@@ -44,28 +45,28 @@ class MirroredRays {
 
   std::vector<Mirror> mirrors_;
   std::vector<Run> runs_;
-  std::vector<std::uint32_t> rays_;  // in the order of the scan
+  std::vector<std::uint32_t> rays_;  // reflected rays in the order of the scan
   std::uint32_t count_ = 0;
-  std::vector<std::uint32_t> grouped_;  // by mirror, unless they are grouped already
+  std::vector<std::uint32_t> grouped_;  // rays by mirror, unless `rays_` is in this order
 };
 
 // A line in the world frame.
 struct MirrorPlane {
   b2Vec2 point;
-  b2Vec2 normal;  // unit vector to any side
+  b2Vec2 normal;  // unit vector to either side
 };
 
-// The line of an edge or of a face of a polygon.
+// Returns the line of an edge or of a face of a polygon.
 MirrorPlane plane_of(const b2Fixture& mirror, std::int32_t face);
-// The tangent of a circle at a point of its outline.
+// Returns the tangent of a circle at a point of the outline.
 MirrorPlane tangent_of(const b2Fixture& circle, const b2Vec2& point);
 
-// The pose of a sensor in a mirror. Directions at the angle psi become 2 alpha - psi, with the
-// angle alpha of the mirror; the fan is mirrored, too.
+// Returns the pose of the image of a sensor in a mirror. A direction at the angle psi becomes
+// 2 alpha - psi, where alpha is the angle of the mirror. The image requires the mirrored fan.
 b2Transform image_of(const b2Transform& pose, const MirrorPlane& plane);
 
-// The half-plane in front of a mirror, relative to a point, within rounding. A sensor, or another
-// point, is in front of it.
+// Returns the half-plane in front of a mirror, relative to `origin`. The side of `sensor` is in
+// front. A margin covers rounding.
 HalfPlane front_of(const MirrorPlane& plane, const b2Vec2& sensor, const b2Vec2& origin);
 
 }  // namespace flatland

@@ -1,9 +1,9 @@
 // Random numbers for vectors of counters. This file is included once for each instruction set, in a
 // namespace with a type `Lanes` (see simd.h); the results of all of them are the same.
 
-// Four random words for each counter: the generator Philox4x32-10 of J. Salmon, M. Moraes, R. Dror
-// and D. Shaw, "Parallel random numbers: as easy as 1, 2, 3", SC11 (2011). The first word of a
-// counter is `first + lane`.
+// Four random words for each counter, by the generator Philox4x32-10: J. Salmon, M. Moraes, R. Dror
+// and D. Shaw, "Parallel random numbers: as easy as 1, 2, 3", SC11 (2011). The first word of the
+// counter of a lane is `first + lane`.
 struct RandomWords {
   using Words = Lanes::Words;
 
@@ -56,8 +56,8 @@ FLATLAND_INLINE Lanes::Floats exponential(Lanes::Words random) {
 }
 
 // Two independent standard normal numbers from two random words, up to 6.6 in magnitude, by the
-// method of Box and Muller. The absolute error is below 2e-6, except near 0, where it is that of
-// the root of the error of an exponential number.
+// method of Box and Muller. The absolute error is below 2e-6, except near 0, where the error is the
+// root of the error of an exponential number.
 struct NormalPair {
   Lanes::Floats first, second;
 

@@ -16,7 +16,7 @@
 namespace flatland {
 namespace {
 
-// Replaces the first range by the shortest one; NaN if all are misses.
+// Replaces the first range by the shortest range, NaN if all beams are misses.
 void keep_nearest(float* ranges, std::size_t count) {
   float nearest = std::numeric_limits<float>::quiet_NaN();
   for (std::size_t i = 0; i < count; ++i) {
@@ -36,7 +36,7 @@ RangeFinder::RangeFinder(std::shared_ptr<const BeamFan> fan, const Parameters& p
   }
 }
 
-std::array<double, 3> RangeFinder::pose_of(const std::array<double, 3>& body) const {
+Triple RangeFinder::pose_of(const Triple& body) const {
   // The operations of flatland.geometry.compose.
   const auto& [x, y, theta] = body;
   const auto& [dx, dy, turn] = parameters_.origin;

@@ -1,9 +1,9 @@
-// Range finders: a fan of beams, what stops them, and how hits become readings.
+// Range finders: a fan of beams, the fixtures that stop beams, and the conversion of hits to
+// readings.
 #pragma once
 
 #include <box2d/b2_math.h>
 
-#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <memory>
@@ -15,72 +15,71 @@
 #include "rays/range_noise.h"
 #include "rays/scene_view.h"
 #include "rays/trace.h"
+#include "world/triple.h"
 
 namespace flatland {
 
-// The memory of scans, for any number of them one after the other.
+// The memory of scans, which any number of scans may use one after the other.
 struct ScanMemory {
   ScanBuffer buffer;
   AlignedFloats ranges;
   std::vector<float> limits;
   std::unique_ptr<bool[]> reflects, is_hit;
-  std::size_t flags = 0;  // size of the arrays above
+  std::size_t flags = 0;  // size of `reflects` and of `is_hit`
   TraceMemory trace;
 };
 
-// What the beams of a scan hit: the bodies with the categories of their fixtures.
+// The bodies that the beams of a scan hit, with the categories of the fixtures.
 struct HitTable {
   struct Entry {
     Id body;
     std::uint16_t category_bits;
   };
 
-  // For each beam, 0 for none, else 1 + the index of an entry.
+  // One number for each beam: 0 for a miss, otherwise 1 + the index of an entry.
   std::uint32_t* labels;
   std::vector<Entry> entries;
 };
 
-// Where the readings of a scan are written. `intensities` and `hits` are null if they are not
-// needed.
+// The arrays for the readings of a scan. `intensities` and `hits` may be null.
 struct Readings {
   float* ranges;
   float* intensities;
   HitTable* hits = nullptr;
 };
 
-// Immutable, without references to a world.
+// A range finder is immutable and does not refer to a world.
 class RangeFinder {
  public:
   struct Parameters {
-    std::array<double, 3> origin;  // pose (x, y, theta) in the frame of the body [m, rad]
-    float length;                  // of the beams; the factor of fractions [m]
-    std::uint16_t mask;            // categories that stop a beam
-    std::uint16_t reflect_mask;    // categories that reflect; 0 for no intensities
+    Triple origin;               // pose in the frame of the body
+    float length;                // length of the beams; the factor of fractions [m]
+    std::uint16_t mask;          // categories that stop a beam
+    std::uint16_t reflect_mask;  // categories that reflect; 0 for no intensities
     RangeLimits limits;
     std::optional<RangeNoise> noise;
-    bool uses_materials;  // otherwise all fixtures stop the beams
-    bool is_cone;         // whether there is only one reading, that of the nearest hit
+    bool uses_materials;  // whether beams pass glass; otherwise all fixtures stop the beams
+    bool is_cone;         // whether the nearest hit is the only reading
   };
 
-  // The fan has the end points of the beams in the frame of the sensor. Throws
-  // std::invalid_argument if the noise model is not defined for all ranges up to `length`.
+  // The end points of the fan are in the frame of the sensor. Throws std::invalid_argument if the
+  // noise model is not defined for all ranges up to `length`.
   RangeFinder(std::shared_ptr<const BeamFan> fan, const Parameters& parameters);
 
   std::size_t beams() const { return fan_->size(); }
-  // Number of ranges of a scan.
+  // Returns the number of ranges of a scan.
   std::size_t readings() const { return parameters_.is_cone ? 1 : beams(); }
   bool has_intensities(const RayScene& scene) const {
     return !parameters_.is_cone && (parameters_.reflect_mask != 0 || sees_materials(scene));
   }
 
-  // Pose of the sensor in the world frame from that of its body.
-  std::array<double, 3> pose_of(const std::array<double, 3>& body) const;
+  // Returns the pose of the sensor from the pose of the body, both in the world frame.
+  Triple pose_of(const Triple& body) const;
 
-  // Performs a scan from a pose of the sensor. The intensity is 255 where the reading is that of a
-  // reflecting fixture at the distance of the nearest hit, else 0. In a world with materials, other
-  // hits have the intensity of a surface that scatters light (Lambert): 255 times the reflectance
-  // times the cosine of the angle of incidence, divided by the square of the range [m] if it is
-  // greater than 1.
+  // Performs a scan from a pose of the sensor. The intensity is 255 if a reflecting fixture is at
+  // the distance of the nearest hit, otherwise 0. In a world with materials, other hits have the
+  // intensity of a surface that scatters light (Lambert): 255 times the reflectance times the
+  // cosine of the angle of incidence, divided by the square of the range [m] for ranges above 1 m.
   void scan(const SceneView& scene, const b2Transform& pose, const NoiseKey& key,
             const Readings& out, ScanMemory& memory) const;
 

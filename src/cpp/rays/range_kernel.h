@@ -1,5 +1,7 @@
-// The loops over the ranges of a scan. range_noise.cpp includes this file once for each instruction
-// set, in a namespace with a type `Lanes` (see simd.h). Arrays have whole blocks.
+// The loops over the ranges of a scan, in range_noise.cpp; see every_instruction_set.h. All arrays
+// have whole blocks.
+
+#include "rays/random_kernel.h"
 
 // Replaces the ranges that the sensor does not report: hits that are too close, and misses (NaN).
 struct Limits {
@@ -25,7 +27,7 @@ void limit(float* ranges, std::size_t count, const RangeLimits& limits) {
   }
 }
 
-// Ranges from the fractions of consecutive rays, NaN for a miss; `count` is rounded up.
+// Converts the fractions of consecutive rays to ranges, NaN for a miss; `count` is rounded up.
 void scale(const float* fractions, std::size_t count, float length, float* ranges) {
   const Lanes::Floats nan = Lanes::broadcast(kNaN);
   const Lanes::Floats one = Lanes::broadcast(1.0F);
@@ -36,7 +38,7 @@ void scale(const float* fractions, std::size_t count, float length, float* range
   }
 }
 
-// Intensities from the brightnesses of rays; see `to_intensities`.
+// Converts the brightnesses of rays to intensities; see `to_intensities`.
 void dim(const float* fractions, const float* lengths, std::size_t count, float max_range,
          float* brightness) {
   const Lanes::Floats zero = Lanes::broadcast(0.0F);
@@ -51,8 +53,8 @@ void dim(const float* fractions, const float* lengths, std::size_t count, float 
   }
 }
 
-// Adds normal noise to exact ranges, and applies the limits. Beams are numbered in groups of 64:
-// the four words of a counter belong to four beams of a group, 16 beams apart.
+// Adds normal noise to exact ranges, and applies the limits. Beams form groups of 64. The four
+// words of a counter belong to four beams of a group that are 16 beams apart.
 void add_normal_noise(float* ranges, std::size_t count, const NoiseKey& key, float deviation,
                       bool is_proportional, const RangeLimits& limits) {
   using Floats = Lanes::Floats;
@@ -79,8 +81,8 @@ void add_normal_noise(float* ranges, std::size_t count, const NoiseKey& key, flo
   }
 }
 
-// The random numbers of 16 beams: all words of one counter per beam, and two normal numbers made of
-// the second and the third word.
+// Draws the random numbers of 16 beams: for each beam all words of one counter, and two normal
+// numbers, which are computed from the second and the third word.
 void draw_beams(const NoiseKey& key, std::uint32_t first_beam, BeamDraws& out) {
   for (std::size_t i = 0; i < kBeamsPerDraw; i += Lanes::kWidth) {
     const RandomWords random(key, first_beam + static_cast<std::uint32_t>(i), 0);
@@ -93,7 +95,7 @@ void draw_beams(const NoiseKey& key, std::uint32_t first_beam, BeamDraws& out) {
   }
 }
 
-// One random word for each beam; beams share counters as for normal noise.
+// Draws one random word for each beam. Beams share counters as in `add_normal_noise`.
 void draw_words(const NoiseKey& key, std::size_t count, std::uint32_t* words) {
   for (std::size_t group = 0; group < count; group += kBeamsPerGroup) {
     const auto first_counter = static_cast<std::uint32_t>(group / 4);
@@ -106,3 +108,5 @@ void draw_words(const NoiseKey& key, std::size_t count, std::uint32_t* words) {
     }
   }
 }
+
+constexpr Functions kFunctions{limit, scale, add_normal_noise, draw_beams, draw_words, dim};

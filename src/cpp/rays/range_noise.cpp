@@ -16,10 +16,10 @@
 namespace flatland {
 namespace {
 
-// Beams that share 16 counters; see add_normal_noise.
+// Number of beams that share 16 counters; see add_normal_noise.
 constexpr std::size_t kBeamsPerGroup = kWordsPerGroup;
 constexpr std::size_t kBeamsPerDraw = 16;
-// The number of the attempt in the counters of `draw_words`. Noise uses the numbers from 0 on.
+// The attempt in the counters of `draw_words`. Noise uses the attempts 0, 1, and so on.
 constexpr std::uint32_t kWordsAttempt = 0x80000000U;
 
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
@@ -31,74 +31,29 @@ struct BeamDraws {
   float normal[2][kBeamsPerDraw];
 };
 
-// The same code is compiled for several instruction sets, one of which is selected at run time, and
-// for single numbers.
 namespace single {
 using Lanes = simd::Lanes1;
 #include "rays/random_kernel.h"
 }  // namespace single
 
-namespace baseline {
-using Lanes = simd::Lanes8;
-#include "rays/random_kernel.h"
-#include "rays/range_kernel.h"
-}  // namespace baseline
-
-#if defined(__x86_64__)
-#pragma GCC push_options
-#pragma GCC target("avx2")
-namespace avx2 {
-using Lanes = simd::Lanes8Avx2;
-#include "rays/random_kernel.h"
-#include "rays/range_kernel.h"
-}  // namespace avx2
-#pragma GCC pop_options
-
-#pragma GCC push_options
-#pragma GCC target("avx512f,avx512vl,avx512dq,avx512bw")
-namespace avx512 {
-using Lanes = simd::Lanes16;
-#include "rays/random_kernel.h"
-#include "rays/range_kernel.h"
-}  // namespace avx512
-#pragma GCC pop_options
-#endif
-
 struct Functions {
-  decltype(&baseline::limit) limit;
-  decltype(&baseline::scale) scale;
-  decltype(&baseline::add_normal_noise) add_normal_noise;
-  decltype(&baseline::draw_beams) draw_beams;
-  decltype(&baseline::draw_words) draw_words;
-  decltype(&baseline::dim) dim;
+  void (*limit)(float*, std::size_t, const RangeLimits&);
+  void (*scale)(const float*, std::size_t, float, float*);
+  void (*add_normal_noise)(float*, std::size_t, const NoiseKey&, float, bool, const RangeLimits&);
+  void (*draw_beams)(const NoiseKey&, std::uint32_t, BeamDraws&);
+  void (*draw_words)(const NoiseKey&, std::size_t, std::uint32_t*);
+  void (*dim)(const float*, const float*, std::size_t, float, float*);
 };
 
-const Functions& functions() {
-  static const Functions kSelected = [] {
-#if defined(__x86_64__)
-    switch (instruction_set()) {
-      case InstructionSet::kAvx512:
-        return Functions{avx512::limit,      avx512::scale,      avx512::add_normal_noise,
-                         avx512::draw_beams, avx512::draw_words, avx512::dim};
-      case InstructionSet::kAvx2:
-        return Functions{avx2::limit,      avx2::scale,      avx2::add_normal_noise,
-                         avx2::draw_beams, avx2::draw_words, avx2::dim};
-      case InstructionSet::kBaseline:
-        break;
-    }
-#endif
-    return Functions{baseline::limit,      baseline::scale,      baseline::add_normal_noise,
-                     baseline::draw_beams, baseline::draw_words, baseline::dim};
-  }();
-  return kSelected;
-}
+#define FLATLAND_KERNEL "rays/range_kernel.h"
+#include "rays/every_instruction_set.h"
 
-// Uniformly distributed in (0, 1).
+// Returns a number that is uniformly distributed in (0, 1).
 double to_uniform(std::uint32_t random) {
   return (static_cast<double>(random) + 0.5) / 4294967296.0;
 }
 
-// The random words of one beam, those of further counters after the first one.
+// The random words of one beam from the second counter on.
 class MoreWords {
  public:
   MoreWords(const NoiseKey& key, std::uint32_t beam) : key_(key), beam_(beam) {}
@@ -111,8 +66,9 @@ class MoreWords {
   std::uint32_t attempt_ = 0;
 };
 
-// A normal distribution, truncated to an interval that contains the mean and is at least as wide as
-// the deviation. By rejection: a draw is accepted with a probability of more than 0.34.
+// Draws from a normal distribution, truncated to an interval that contains the mean and is at least
+// as wide as the deviation. A draw of the rejection method is accepted with a probability of more
+// than 0.34.
 class TruncatedNormal {
  public:
   TruncatedNormal(float mean, float deviation, float high)
@@ -139,10 +95,11 @@ class TruncatedNormal {
   float mean_, deviation_, high_;
 };
 
-// An exponential distribution, truncated to [0, high]. By rejection from the exponential
-// distribution if most of it is in the interval, else from the uniform one: x is accepted with the
-// probability exp(-lambda x), that of an exponentially distributed number above lambda x. A draw is
-// accepted with a probability of more than 0.36.
+// Draws from an exponential distribution, truncated to [0, high]. The rejection method draws from
+// the exponential distribution if the greater part is in the interval, otherwise from the uniform
+// distribution. In the second case, x is accepted with the probability exp(-lambda x), which is the
+// probability that an exponentially distributed number is above lambda x. A draw is accepted with a
+// probability of more than 0.36.
 class TruncatedExponential {
  public:
   TruncatedExponential(double lambda, float high) : lambda_(lambda), high_(high) {}

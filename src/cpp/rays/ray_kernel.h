@@ -1,9 +1,9 @@
-// Rays and their hits, a part of depth_kernel.h.
+// A vector of rays and their hits; a part of depth_kernel.h.
 //
 // With kFindsFixtures, the kernel also records which fixture each ray hits, and fixtures may let
-// rays pass (see HitRules). Of several fixtures at the same distance, one is recorded that depends
-// neither on the instruction set nor on other scans: edges are always drawn in the same order, and
-// circles and polygons replace fixtures with higher slots.
+// rays pass (see HitRules). If several fixtures are at the same distance, the recorded fixture
+// depends neither on the instruction set nor on other scans: edges are always drawn in the same
+// order, and circles and polygons replace fixtures with higher slots.
 
 template <bool kFindsFixtures>
 struct RayKernel {
@@ -15,7 +15,7 @@ struct RayKernel {
   const ScanFrame& frame;
   const HitView* hits;  // null without kFindsFixtures
 
-  // A fixture to be drawn, used only with kFindsFixtures.
+  // A fixture that is drawn; used only with kFindsFixtures.
   struct Object {
     std::uint32_t fixture;
     const Optics* optics;
@@ -37,7 +37,7 @@ struct RayKernel {
     return false;
   }
 
-  // Whether one of the rays reaches a distance.
+  // Returns whether one of the rays reaches a distance.
   FLATLAND_INLINE bool is_visible(Interval rays, float distance) const {
     const Floats least = Lanes::broadcast(distance * scan.fraction_per_metre);
     return any_of(rays, [&](std::int32_t first, std::int32_t begin, std::int32_t end) {
@@ -46,8 +46,8 @@ struct RayKernel {
     });
   }
 
-  // Records the hits of a vector of rays that are nearer than their previous ones; NaN is a miss.
-  // `height` is that of the ray above the surface, of either sign.
+  // Records the hits of a vector of rays that are nearer than the previous hits; NaN is a miss.
+  // `height` is the length of a ray times the cosine of the angle of incidence, with either sign.
   FLATLAND_INLINE void record_hits(std::int32_t first, Floats fraction, Floats height, Mask is_hit,
                                    const Object& object) const {
     const Floats before = Lanes::load(scan.fraction + first);
@@ -74,13 +74,13 @@ struct RayKernel {
     }
   }
 
-  // The least fraction of a hit of a vector of rays.
+  // Returns the least fractions of the hits of a vector of rays.
   FLATLAND_INLINE Floats least_fraction(std::int32_t first) const {
     if (hits->nearest == nullptr) return Lanes::broadcast(0.0F);
     return Lanes::load(hits->nearest + first);
   }
 
-  // How bright hits of an object are, before the division by the lengths of the rays.
+  // Returns the brightness of hits of an object, which is proportional to the length of the ray.
   FLATLAND_INLINE Floats brightness_of(Floats height, const Object& object) const {
     return magnitude(height) * object.optics->reflectance;
   }
@@ -92,8 +92,8 @@ struct RayKernel {
     const bool has_fate = optics.pass_limit != Optics::kOpaque || reflects(optics);
     if (!has_fate || !Lanes::any(is_hit)) return;
     const auto* words = reinterpret_cast<const float*>(hits->words);
-    const Words fate =
-        fate_word(Lanes::as_words(Lanes::load(words + first)), hits->leg ^ object.fixture);
+    Words fate = Lanes::as_words(Lanes::load(words + first));
+    mix_fixture(fate, hits->leg ^ object.fixture);
     is_hit = Lanes::but_not(is_hit, Lanes::less(fate, Lanes::words(optics.pass_limit)));
     if (!reflects(optics)) return;
     const Mask is_scattered = Lanes::less(Lanes::words(optics.last_reflected), fate);
@@ -110,7 +110,7 @@ struct RayKernel {
     return {fixture, hits->optics + number};
   }
 
-  // End points of a vector of rays in the world frame.
+  // Computes the end points of a vector of rays in the world frame.
   FLATLAND_INLINE void load_ends(std::int32_t first, Floats& x, Floats& y) const {
     const b2Transform& pose = scan.pose;
     const Floats fan_x = Lanes::load(scan.fan_x + first);

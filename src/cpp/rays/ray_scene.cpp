@@ -92,7 +92,8 @@ void RayScene::become_copy_of(RayScene& source,
                               const std::function<b2Fixture*(const b2Fixture*)>& copy_of_fixture) {
   std::vector<b2Fixture*> solids;
   for (const b2Fixture* fixture : source.solids_) solids.push_back(copy_of_fixture(fixture));
-  std::vector<EdgeGroup> groups = source.edge_groups();  // makes the trees, to be shared
+  std::vector<EdgeGroup> groups =
+      source.edge_groups();  // creates missing trees, so that they are shared
   for (EdgeGroup& group : groups) {
     for (const b2Body*& body : group.bodies) body = copy_of(body);
   }

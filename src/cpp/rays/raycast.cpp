@@ -39,7 +39,7 @@ class ClosestHit final : public b2RayCastCallback {
 
 std::optional<RayHit> closest(const b2World& world, const b2Vec2& from, const b2Vec2& to,
                               RayMasks masks) {
-  // Box2D aborts if the squared length of a ray is zero, which can be due to underflow.
+  // Box2D aborts if the squared length of a ray is zero. Underflow can be the reason.
   if (!((to - from).LengthSquared() > 0.0F)) return std::nullopt;
   ClosestHit callback(masks);
   world.RayCast(&callback, from, to);

@@ -1,4 +1,4 @@
-// Nearest hits of single rays and of scans.
+// The nearest hits of single rays, and of scans without a range finder.
 #pragma once
 
 #include <box2d/b2_math.h>
@@ -27,7 +27,7 @@ struct RayHit {
 
 // Rays from the origin of a rangefinder to points in its frame.
 struct ScanRequest {
-  b2Transform pose;            // of the rangefinder, world frame
+  b2Transform pose;            // pose of the rangefinder in the world frame
   const float* ends;           // x and y of each end point
   std::size_t count;           // number of rays
   std::uint16_t mask;          // categories that stop a ray
@@ -47,16 +47,17 @@ struct ScanResult {
 inline constexpr float kDistanceTolerance = 1e-4F;
 inline constexpr float kFractionTolerance = 1e-5F;
 
-// The nearest fixture with a category in the mask that is not a sensor. A ray of zero length is a
-// miss.
+// Returns the nearest hit of a fixture that has a category in the mask and is not a sensor. A ray
+// of zero length is a miss.
 std::optional<RayHit> ray_cast(const b2World& world, const b2Vec2& from, const b2Vec2& to,
                                std::uint16_t mask);
 
-// Performs a scan with b2World::RayCast; slow, the reference for tests of `cast_rays`.
+// Performs a scan with b2World::RayCast. This is slow, and the reference in tests of `cast_rays`.
 void cast_rays_reference(const b2World& world, const ScanRequest& request,
                          const ScanResult& result);
 
-// Performs a scan with a depth buffer; see depth_scan.h. The fan is that of the end points.
+// Performs a scan with a depth buffer; see depth_scan.h. The fan must have the end points of the
+// request.
 void cast_rays(RayScene& scene, const BeamFan& fan, const ScanRequest& request,
                const ScanResult& result);
 

@@ -10,11 +10,11 @@ namespace flatland {
 namespace {
 
 constexpr std::uint32_t kBundle = RayBundle::kMaxInAnyOrder;
-// If a mirror reflects at most one of this number of rays in its direction, bundles of these rays
-// cost less than a scan of all of them.
+// If a mirror reflects at most one in this number of the rays in its direction, casting only these
+// rays in bundles costs less than a scan of all of the rays.
 constexpr std::uint32_t kSparse = 4;
-// By how much a hit may seem to be behind the mirror because of rounding, as a part of the length
-// of a ray, and in metres.
+// The distance by which a hit may seem to be behind the mirror because of rounding, as a fraction
+// of the length of a ray, and in metres.
 constexpr float kMirrorTolerance = 1e-5F;
 
 // The least fraction of a hit after the reflection.
@@ -22,7 +22,7 @@ float nearest_after(float fraction, float length) {
   return std::max(fraction - kMirrorTolerance * (1.0F + 1.0F / length), 0.0F);
 }
 
-// A range of rays of a fan; those from its number of rays on are the first ones again.
+// A range of rays of a fan. The index `count` + i refers to ray i of a fan with `count` rays.
 struct Arc {
   std::uint32_t begin, end;
 };
@@ -32,9 +32,10 @@ Arc arc_of(const MirroredFan& fan, const Mirror& mirror) {
   const auto count = static_cast<std::uint32_t>(fan.place.size());
   const std::uint32_t front = fan.place[mirror.rays[0]];
   const std::uint32_t back = fan.place[mirror.rays[mirror.count - 1]];
-  // The usual case: all other gaps are smaller than that of the remaining, larger part of the fan.
+  // In the usual case, the largest gap is the part of the fan outside of the rays.
   if (fan.is_reversed && front < back && back - front < count / 2) return {front, back + 1};
-  // It begins after the largest gap. Except for rays with the same direction, places increase.
+  // The range begins after the largest gap. The places increase, except for rays with the same
+  // direction.
   std::uint32_t begin = front;
   std::uint32_t gap = begin + count - back;
   for (std::uint32_t k = 1; k < mirror.count; ++k) {
@@ -85,8 +86,8 @@ class Reflector {
 
   void draw(DepthScan& hits) const { scene_.draw(hits, {rules_.mask, kAnyCategory}); }
 
-  // Scans from the image of the sensor in a flat mirror: what is in front of the mirror is where
-  // the rays would hit it without the mirror.
+  // Scans from the image of the sensor in a flat mirror. A straight ray from the image passes
+  // through the mirror, and coincides with the reflected ray in front of the mirror.
   void scan_image(const Mirror& mirror, const MirrorPlane& plane) {
     const b2Transform image = image_of(pose_, plane);
     const HalfPlane front = front_of(plane, pose_.p, image.p);
@@ -132,7 +133,8 @@ class Reflector {
     scan(hits, mirror);
   }
 
-  // Performs the scan of an image, with the rays of the mirror at `memory.places`.
+  // Performs the scan from an image, for the rays of the mirror, whose indices are in
+  // `memory.places`.
   void scan(DepthScan& hits, const Mirror& mirror) {
     const std::uint32_t* places = memory_.places.data();
     const std::uint32_t* words = memory_.words.data();
@@ -193,7 +195,7 @@ class Reflector {
             memory_.image.brightness[0] / rest);
   }
 
-  // Replaces the end of a ray by that of its reflection.
+  // Replaces the end of a ray by the end of the reflected ray.
   void set_end(std::uint32_t ray, float fraction, std::uint32_t slot, float brightness) {
     memory_.ends.fraction[ray] = fraction;
     memory_.ends.slots()[ray] = slot;

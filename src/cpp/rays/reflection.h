@@ -1,4 +1,4 @@
-// Rays after their reflection by mirrors.
+// The paths of rays after their reflection by mirrors.
 #pragma once
 
 #include <box2d/b2_math.h>

@@ -7,9 +7,10 @@
 namespace flatland {
 namespace {
 
-// Consecutive scans that one thread performs, so that they share memory. A scan takes about 10 us.
+// Number of consecutive scans that one thread performs with the same memory. A scan takes about
+// 10 us.
 constexpr std::size_t kScansPerJob = 4;
-// Fewer beams are not worth the time to wake another thread.
+// Least number of beams for which the start of another thread pays off.
 constexpr std::size_t kBeamsPerThread = 1000;
 
 }  // namespace

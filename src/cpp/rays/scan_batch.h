@@ -14,13 +14,14 @@ namespace flatland {
 struct ScanJob {
   RayScene* scene;
   const RangeFinder* finder;
-  b2Transform pose;  // of the sensor, world frame
+  b2Transform pose;  // pose of the sensor in the world frame
   NoiseKey key;
   Readings out;
 };
 
-// Performs all scans. The scenes must not change meanwhile. The readings do not depend on the
-// number of threads (0: as many as are available) nor on the other scans.
+// Performs all scans, on up to `num_threads` threads; 0 for as many as are available. The scenes
+// must not change meanwhile. The readings of a scan depend neither on the number of threads nor on
+// other scans.
 void scan_all(const std::vector<ScanJob>& jobs, ThreadPool& pool, std::size_t num_threads);
 
 }  // namespace flatland

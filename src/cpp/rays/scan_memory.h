@@ -1,4 +1,4 @@
-// Memory of scans that is used again by later ones.
+// Memory of scans that later scans use again.
 #pragma once
 
 #include <memory>

@@ -9,7 +9,7 @@
 namespace flatland {
 namespace {
 
-// Numbers of solids and of scans for which a tree pays off.
+// Least numbers of solids and of scans for which a tree pays off.
 constexpr std::size_t kManySolids = 64;
 constexpr std::size_t kManyScans = 4;
 

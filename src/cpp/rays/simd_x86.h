@@ -6,9 +6,10 @@
 
 #include "rays/simd.h"
 
-#pragma GCC push_options
-#pragma GCC target("avx2")
-namespace flatland::simd {
+FLATLAND_BEGIN_TARGET("avx2")
+namespace flatland::avx2::simd {
+
+#include "rays/simd_lanes8.h"
 
 struct Lanes8Avx2 : Lanes8 {
   static FLATLAND_INLINE void multiply(Words a, std::uint32_t b, Words& high, Words& low) {
@@ -28,14 +29,16 @@ struct Lanes8Avx2 : Lanes8 {
   }
 };
 
-}  // namespace flatland::simd
-#pragma GCC pop_options
+}  // namespace flatland::avx2::simd
+FLATLAND_END_TARGET
 
-#pragma GCC push_options
-#pragma GCC target("avx512f,avx512vl,avx512dq,avx512bw")
-namespace flatland::simd {
+FLATLAND_BEGIN_TARGET("avx512f,avx512vl,avx512dq,avx512bw")
+namespace flatland::avx512::simd {
 
-// Intrinsics, because the compiler does not vectorize comparisons of generic vectors of this size.
+#include "rays/simd_lanes8.h"
+
+// The operations are intrinsics, because the compiler does not vectorize comparisons of generic
+// vectors of this size.
 struct Lanes16 {
   static constexpr std::int32_t kWidth = 16;
   using Floats = __m512;
@@ -113,5 +116,5 @@ struct Lanes16 {
   static FLATLAND_INLINE bool any(Mask mask) { return mask != 0; }
 };
 
-}  // namespace flatland::simd
-#pragma GCC pop_options
+}  // namespace flatland::avx512::simd
+FLATLAND_END_TARGET

@@ -1,4 +1,4 @@
-// Circles and polygons, a part of depth_kernel.h.
+// Draws circles and polygons; a part of depth_kernel.h.
 
 template <bool kFindsFixtures>
 struct SolidKernel : BoxKernel<kFindsFixtures> {

@@ -22,7 +22,8 @@ struct Part {
 };
 
 bool is_finite(const b2AABB& box) {
-  // NaN or infinity in any number makes the sum not finite, unless it overflows.
+  // The sum is not finite if one of the numbers is not finite. The sum of large numbers can
+  // overflow, too; the box then counts as not finite.
   return std::isfinite(box.lowerBound.x + box.lowerBound.y + box.upperBound.x + box.upperBound.y);
 }
 
@@ -34,8 +35,8 @@ std::uint32_t spread(std::uint32_t x) {
   return (x | x << 1U) & 0x55555555U;
 }
 
-// Position of a box along a curve that fills the bounds, such that neighbours on the curve are
-// neighbours in space (a Morton code).
+// Returns the position of a box along a curve that fills the bounds, a Morton code. Neighbours on
+// the curve are neighbours in space.
 std::uint32_t place_of(const b2AABB& box, const b2AABB& bounds) {
   constexpr float kCells = 65535.0F;
   const b2Vec2 offset = box.GetCenter() - bounds.lowerBound;
@@ -117,7 +118,7 @@ SolidTree::SolidTree(const std::vector<b2Fixture*>& solids, bool has_nodes) {
 }
 
 void SolidTree::build(std::vector<b2Fixture*> solids, const b2AABB& bounds) {
-  // The index makes the order, and hence everything computed from it, unique.
+  // The index makes the order unique, and thus all results that depend on the order.
   std::vector<std::pair<std::uint32_t, std::uint32_t>> order;
   order.reserve(solids.size());
   for (std::uint32_t i = 0; i < solids.size(); ++i) {
@@ -132,7 +133,8 @@ void SolidTree::build(std::vector<b2Fixture*> solids, const b2AABB& bounds) {
   }
   groups_ = groups_of(sorted);
 
-  // Leaves, then levels of nodes up to the root, which becomes the first node.
+  // The leaves are created first, then the levels of nodes up to the root. The root becomes the
+  // first node.
   std::vector<EdgeTree::Node> reversed;
   bool is_leaf = true;
   do {

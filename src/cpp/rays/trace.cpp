@@ -11,8 +11,9 @@
 namespace flatland {
 namespace {
 
-// Casts the rays again at the fixtures with preferred categories only, near the distances of the
-// hits; see `find_reflections` in scene_view.h.
+// Marks the rays with a preferred fixture at the distance of the hit: casts the rays again at
+// fixtures with preferred categories only, near the distances of the hits. See `find_reflections`
+// in scene_view.h.
 void find_preferred(const SceneView& scene, const BeamFan& fan, const b2Transform& pose,
                     const TraceRules& rules, TraceMemory& memory) {
   const HitRules hit_rules{nullptr, nullptr, HitRules::kDirect, HitRules::kNoFixture, 0};

@@ -141,7 +141,7 @@ void apply_force(World& world, Id body_id, double fx, double fy, double px, doub
   if (mass > 0.0F) {
     acceleration = force.Length() / mass;
     check_acceleration(acceleration, "force");
-    const float inertia = body->GetInertia() - mass * body->GetLocalCenter().LengthSquared();
+    const auto inertia = inertia_about_center<float>(*body);
     const float torque = b2Cross(point - body->GetWorldCenter(), force);
     if (inertia > 0.0F) angular_acceleration = torque / inertia;
     check_acceleration(angular_acceleration, "force");
@@ -153,8 +153,7 @@ void apply_force(World& world, Id body_id, double fx, double fy, double px, doub
 void apply_torque(World& world, Id body_id, double torque) {
   b2Body* body = world.change_body(body_id);
   const float checked = checked_finite(torque, "torque");
-  const float mass = body->GetMass();
-  const float inertia = body->GetInertia() - mass * body->GetLocalCenter().LengthSquared();
+  const auto inertia = inertia_about_center<float>(*body);
   const float acceleration = inertia > 0.0F ? checked / inertia : 0.0F;
   check_acceleration(acceleration, "torque");
   body->ApplyTorque(checked, true);
@@ -222,20 +221,16 @@ std::vector<std::array<float, 4>> edges_of(const World& world, Id body_id) {
   return reversed(std::move(edges));
 }
 
-std::vector<std::array<double, 2>> vertices_of(const b2Fixture& fixture) {
-  std::vector<std::array<double, 2>> vertices;
-  const auto add = [&](const b2Vec2& v) {
-    vertices.push_back({static_cast<double>(v.x), static_cast<double>(v.y)});
-  };
+std::vector<b2Vec2> vertices_of(const b2Fixture& fixture) {
   if (fixture.GetType() == b2Shape::e_polygon) {
     const auto* polygon = static_cast<const b2PolygonShape*>(fixture.GetShape());
-    std::for_each(polygon->m_vertices, polygon->m_vertices + polygon->m_count, add);
-  } else if (fixture.GetType() == b2Shape::e_edge) {
-    const auto* edge = static_cast<const b2EdgeShape*>(fixture.GetShape());
-    add(edge->m_vertex1);
-    add(edge->m_vertex2);
+    return {polygon->m_vertices, polygon->m_vertices + polygon->m_count};
   }
-  return vertices;
+  if (fixture.GetType() == b2Shape::e_edge) {
+    const auto* edge = static_cast<const b2EdgeShape*>(fixture.GetShape());
+    return {edge->m_vertex1, edge->m_vertex2};
+  }
+  return {};
 }
 
 b2Vec2 center_of(const b2Fixture& fixture) {

@@ -29,20 +29,30 @@ Triple pose_of(const b2Body& body);
 void set_pose(World& world, Id body, const Triple& pose);
 void set_pose(World& world, b2Body* body, const Triple& pose);
 
-// Velocity of the origin of the body, not of its center of mass.
+// Returns the velocity of the origin of a body, not of the center of mass.
 Triple velocity_of(const World& world, Id body);
 void set_velocity(World& world, Id body, const Triple& velocity);
 void set_velocity(b2Body* body, const Triple& velocity);
 
-// The state of a body as Box2D stores it: position of the origin (x, y) and angle, center of mass
-// (x, y), velocity of the center of mass (vx, vy, omega), and 1 if the body is awake, else 0.
+// The state of a body in the numbers of Box2D: position of the origin (x, y) and angle, center of
+// mass (x, y), velocity of the center of mass (vx, vy, omega), and 1 if the body is awake,
+// otherwise 0.
 using BodyState = std::array<float, 9>;
-// States of all bodies, in order of creation.
+// Returns the states of all bodies, in order of creation.
 std::vector<BodyState> states_of(const World& world);
 
-// Poses and velocities of the origins of some bodies, one after the other: x, y, theta, vx, vy,
-// omega.
+// Returns the poses and velocities of the origins of bodies, one body after the other: x, y, theta,
+// vx, vy, omega.
 void motions_of(const World& world, const Id* bodies, std::size_t count, double* motions);
+
+// Returns the moment of inertia about the center of mass [kg m^2], which Box2D stores only about
+// the origin of the body. The result is computed in the type `Number`.
+template <typename Number>
+Number inertia_about_center(const b2Body& body) {
+  return static_cast<Number>(body.GetInertia()) -
+         static_cast<Number>(body.GetMass()) *
+             static_cast<Number>(body.GetLocalCenter().LengthSquared());
+}
 
 void apply_force(World& world, Id body, double fx, double fy, double px, double py);
 void apply_torque(World& world, Id body, double torque);
@@ -56,7 +66,7 @@ Id create_polygon(World& world, Id body, const std::vector<b2Vec2>& points,
 std::size_t create_edges(World& world, Id body, const float* edges, std::size_t count,
                          const FixtureOptions& options);
 
-// Ids in order of creation.
+// Return ids in order of creation.
 std::vector<Id> fixtures_of(const World& world, Id body);
 std::vector<Id> joints_of(const World& world, Id body);
 // Returns the edge fixtures as rows (x1, y1, x2, y2) in the body frame.
@@ -64,7 +74,7 @@ std::vector<std::array<float, 4>> edges_of(const World& world, Id body);
 
 // Returns the corners of a polygon (counter-clockwise) or the end points of an edge in the body
 // frame; no points for a circle.
-std::vector<std::array<double, 2>> vertices_of(const b2Fixture& fixture);
+std::vector<b2Vec2> vertices_of(const b2Fixture& fixture);
 // Returns the center of a circle, centroid of a polygon or midpoint of an edge in the body frame.
 b2Vec2 center_of(const b2Fixture& fixture);
 

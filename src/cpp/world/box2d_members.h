@@ -1,7 +1,7 @@
-// Private members of Box2D 2.4. Box2D has no public access to them; an explicit template
-// instantiation may name them, so the compiler checks names and types.
+// Private members of Box2D 2.4, which has no public access to these members. An explicit template
+// instantiation may name private members, and the compiler checks their names and types.
 //
-// `get<Tag>(object)` returns a reference to the member. Only for source files.
+// `get<Tag>(object)` returns a reference to a member. Only source files may include this header.
 #pragma once
 
 #include <box2d/b2_body.h>

@@ -149,12 +149,8 @@ ContactRow ContactRecorder::make_row(b2Contact* contact, ContactKind kind) const
   if (count > 0) {
     b2WorldManifold manifold;
     contact->GetWorldManifold(&manifold);
-    row.normal[0] = manifold.normal.x;
-    row.normal[1] = manifold.normal.y;
-    for (int32 i = 0; i < count; ++i) {
-      row.points[i][0] = manifold.points[i].x;
-      row.points[i][1] = manifold.points[i].y;
-    }
+    row.normal = manifold.normal;
+    std::copy_n(manifold.points, count, row.points);
   }
   return row;
 }

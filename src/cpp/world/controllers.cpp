@@ -12,7 +12,7 @@
 namespace flatland {
 namespace {
 
-// min and max of Python, which return the first one of two equal numbers.
+// The functions min and max of Python, which return the first one of two equal numbers.
 double lesser(double a, double b) { return b < a ? b : a; }
 double greater(double a, double b) { return b > a ? b : a; }
 
@@ -26,27 +26,34 @@ double crossing_change(const SpeedLimits& limits, double speed, double dt) {
   return speed + acceleration * (dt - time_to_zero);
 }
 
+// Drives with a velocity (forward, sideways, omega) in the frame of the body.
+void drive_in_body_frame(World& world, b2Body* body, Traction& traction, const Triple& velocity,
+                         double dt) {
+  const auto [forward, sideways, omega] = velocity;
+  const double yaw = pose_of(*body)[2];
+  const double c = cos(yaw);
+  const double s = sin(yaw);
+  drive(world, body, traction, {c * forward - s * sideways, s * forward + c * sideways, omega}, dt);
+}
+
 void advance_motion(World& world, b2Body* body, TwistMotion& motion, double dt) {
   const double forward = motion.velocity[0] =
       motion.linear.step(motion.velocity[0], motion.target[0], dt);
   const double omega = motion.velocity[2] =
       motion.angular.step(motion.velocity[2], motion.target[2], dt);
-  const double yaw = pose_of(*body)[2];
-  const double c = cos(yaw);
-  const double s = sin(yaw);
   if (!motion.is_holonomic) {
-    // Without the terms of a sideways velocity of 0, which could change the sign of a zero.
-    drive(world, body, motion.traction, {forward * c, forward * s, omega}, dt);
+    // The terms of a sideways velocity of 0 are omitted: they could change the sign of a zero.
+    const double yaw = pose_of(*body)[2];
+    drive(world, body, motion.traction, {forward * cos(yaw), forward * sin(yaw), omega}, dt);
     return;
   }
   const double sideways = motion.velocity[1] =
       motion.linear.step(motion.velocity[1], motion.target[1], dt);
-  drive(world, body, motion.traction,
-        {c * forward - s * sideways, s * forward + c * sideways, omega}, dt);
+  drive_in_body_frame(world, body, motion.traction, {forward, sideways, omega}, dt);
 }
 
-// sqrt(x^2 + y^2), correctly rounded in all but a few cases, as math.hypot of Python; that of the C
-// library is not.
+// Returns sqrt(x^2 + y^2), correctly rounded in all but a few cases, like math.hypot of Python. The
+// function of the C library has a greater error.
 double exact_hypot(double x, double y) {
   x = fabs(x);
   y = fabs(y);
@@ -62,13 +69,13 @@ double exact_hypot(double x, double y) {
   const double high = xx + yy;
   const double rest = xx > yy ? (xx - high) + yy : (yy - high) + xx;
   const double low = rest + fma(x, x, -xx) + fma(y, y, -yy);
-  // One Newton step from the rounded root.
+  // The rounded root is corrected by one Newton step.
   const double root = sqrt(high);
   return ldexp(root + (fma(-root, root, high) + low) / (2.0 * root), exponent);
 }
 
 // Turns a wheel towards an angle within the limits. Returns whether joints have to be set.
-bool turn_wheel(SteeredWheel& motion, double target, double dt) {
+bool turn_wheel(SteeredMotion& motion, double target, double dt) {
   const double remaining = target - motion.angle;
   const double acceleration = motion.angular.acceleration;
   double velocity = remaining / dt;
@@ -119,12 +126,20 @@ double steer_for_twist(World& world, TricycleMotion& motion, double dt) {
   // A command to stop keeps the steering angle.
   steer(world, motion, motion.target_angle, dt);
   const double speed = copysign(exact_hypot(v, across), v != 0.0 ? v : 1.0);
-  // The robot waits for a front wheel that points elsewhere.
+  // The robot does not move before the front wheel has turned to the new direction.
   return speed * greater(0.0, cos(motion.target_angle - motion.angle));
 }
 
+// Drives with a velocity of the rear center, which moves straight ahead, and a yaw rate. The
+// velocity of the origin follows.
+void drive_rear_center(World& world, b2Body* body, SteeredMotion& motion, double speed,
+                       double omega, double dt) {
+  const Vec center = motion.rear_center;
+  drive_in_body_frame(world, body, motion.traction,
+                      {speed + omega * center.y, -omega * center.x, omega}, dt);
+}
+
 void advance_motion(World& world, b2Body* body, TricycleMotion& motion, double dt) {
-  const double yaw = pose_of(*body)[2];
   double speed = motion.target[0];
   if (motion.takes_twist) {
     speed = steer_for_twist(world, motion, dt);
@@ -133,13 +148,7 @@ void advance_motion(World& world, b2Body* body, TricycleMotion& motion, double d
   }
   const double v = motion.speed = motion.linear.step(motion.speed, speed, dt);
   const double omega = v * sin(motion.angle) / motion.wheelbase;
-  // The rear center moves straight ahead; the velocity of the origin follows, body frame.
-  const double forward = v * cos(motion.angle) + omega * motion.rear_center[1];
-  const double sideways = -omega * motion.rear_center[0];
-  const double c = cos(yaw);
-  const double s = sin(yaw);
-  drive(world, body, motion.traction,
-        {c * forward - s * sideways, s * forward + c * sideways, omega}, dt);
+  drive_rear_center(world, body, motion, v * cos(motion.angle), omega, dt);
 }
 
 // Returns the steering angle for a velocity of the rear center and a yaw rate.
@@ -161,13 +170,7 @@ void advance_motion(World& world, b2Body* body, AckermannMotion& motion, double 
   }
   const double v = motion.speed = motion.linear.step(motion.speed, motion.target[0], dt);
   const double omega = v * tan(motion.angle) / motion.wheelbase;
-  const double yaw = pose_of(*body)[2];
-  const double forward = v + omega * motion.rear_center[1];
-  const double sideways = -omega * motion.rear_center[0];
-  const double c = cos(yaw);
-  const double s = sin(yaw);
-  drive(world, body, motion.traction,
-        {c * forward - s * sideways, s * forward + c * sideways, omega}, dt);
+  drive_rear_center(world, body, motion, v, omega, dt);
 }
 
 void set_progress(TweenMotion& motion, double progress) {
@@ -177,8 +180,8 @@ void set_progress(TweenMotion& motion, double progress) {
 
 void advance_progress(TweenMotion& motion, double step) {
   using Mode = TweenMotion::Mode;
-  // Difference at which the 32-bit progress is corrected to the exact one, and progress below which
-  // a backward motion is complete.
+  // The difference at which the 32-bit progress is replaced by the exact progress, and the progress
+  // below which a backward motion is complete.
   constexpr double kTolerance = 1e-5;
   if (motion.mode == Mode::kTrigger) {
     motion.is_forward = motion.is_triggered;
@@ -189,8 +192,8 @@ void advance_progress(TweenMotion& motion, double step) {
   }
   const double signed_step = motion.is_forward ? step : -step;
   // The reference accumulates 32-bit floats, whose rounding decides in which of two steps the
-  // motion ends; the same sum is used here. Unlike the reference: an additional exact sum corrects
-  // it where the steps are too small or too many for 32 bits.
+  // motion ends. The same sum is used here. Unlike the reference: an additional exact sum corrects
+  // the 32-bit sum if the steps are too small or too many for 32 bits.
   motion.progress += static_cast<float>(signed_step);
   motion.exact_progress += signed_step;
   if (fabs(static_cast<double>(motion.progress) - motion.exact_progress) > kTolerance) {
@@ -204,10 +207,10 @@ void advance_progress(TweenMotion& motion, double step) {
 }
 
 void hold_motion(World& world, b2Body* body, const TweenMotion& motion) {
-  // Also wakes the body: Box2D puts bodies without velocity to sleep and then finds no new contacts
-  // for them.
+  // This wakes the body, too. Box2D puts bodies without velocity to sleep, and finds no new
+  // contacts of sleeping bodies.
   set_pose(world, body, motion.pose);
-  // A dynamic body would keep the velocity from contacts and act like a conveyor belt.
+  // A dynamic body would keep velocity from contacts, and would act like a conveyor belt.
   if (motion.is_dynamic) set_velocity(body, {0.0, 0.0, 0.0});
 }
 
@@ -219,7 +222,8 @@ void advance_motion(World& world, b2Body* body, TweenMotion& motion, double dt) 
 }
 
 void advance_motion(World& world, b2Body* body, OmniMotion& motion, double dt) {
-  advance_omni(world, body, motion, dt);
+  advance_omni(motion, dt);
+  drive_in_body_frame(world, body, motion.traction, motion.velocity, dt);
 }
 
 void advance_motion(World&, b2Body* body, PathMotion& motion, double dt) {
@@ -231,7 +235,8 @@ void advance_motion(World&, b2Body*, RollingWheels&, double) {}
 }  // namespace
 
 std::array<double, 2> ackermann_angles(double angle, double wheelbase, double track) {
-  // The centre of rotation is at a distance L cos / sin to the left of the rear axle's centre.
+  // The centre of rotation is to the left of the centre of the rear axle, at the distance
+  // L cos(angle) / sin(angle).
   const double across = wheelbase * sin(angle);
   const double along = wheelbase * cos(angle);
   const double shift = 0.5 * track * sin(angle);

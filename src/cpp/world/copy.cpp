@@ -1,11 +1,11 @@
 // Exact copies of worlds: `World::become_copy_of`.
 //
-// The results of Box2D depend on the order of bodies, fixtures, joints and contacts in its lists,
-// on the nodes of the broad phase and on the impulses of the last step. All lists of Box2D have the
-// newest object first, and destroying objects keeps the order of the others: that of the contacts
-// of a body, for example, is the order of the same contacts in the list of the world. Each list is
-// therefore copied from its front, with the lists of bodies in the order of those of the world.
-// Nothing depends on addresses.
+// The results of Box2D depend on the order of bodies, fixtures, joints and contacts in lists, on
+// the nodes of the broad phase and on the impulses of the last step. In all lists of Box2D, the
+// newest object is the first one, and the removal of an object does not change the order of the
+// others. The contacts of a body, for example, have the same order as in the list of the world.
+// Each list is therefore copied from the front, and the lists of the bodies in the order of the
+// lists of the world. No result depends on addresses.
 #include <box2d/b2_circle_shape.h>
 #include <box2d/b2_edge_shape.h>
 #include <box2d/b2_polygon_shape.h>
@@ -26,14 +26,14 @@ namespace {
 using members::assign;
 using members::get;
 
-// Copies the objects of one Box2D world to another one, which is empty.
+// Copies the objects of one Box2D world to another, empty world.
 class EngineCopier {
  public:
   using Bodies = SlotMap<b2Body*, IdKind::kBody>;
   using Fixtures = SlotMap<b2Fixture*, IdKind::kFixture>;
   using Joints = SlotMap<JointRecord, IdKind::kJoint>;
 
-  // The maps are copies of those of the source, whose values are replaced.
+  // The maps of ids are copies of the maps of the source, in which the values are replaced.
   EngineCopier(const b2World& source, b2World& target, Bodies& bodies, Fixtures& fixtures,
                Joints& joints)
       : source_(source),
@@ -61,7 +61,7 @@ class EngineCopier {
   }
 
  private:
-  // Returns a copy in the memory of the target world, which releases it.
+  // Returns a copy in memory that the target world owns.
   template <typename Object>
   Object* duplicate(const Object& object) {
     return new (allocator_.Allocate(sizeof(Object))) Object(object);
@@ -206,7 +206,7 @@ class EngineCopier {
     }
   }
 
-  // Gives an array of Box2D another size; its contents are lost.
+  // Changes the size of an array of Box2D. The contents are lost.
   template <typename Element>
   static void resize(Element*& elements, int32& capacity, int32 size) {
     if (size == capacity) return;
@@ -244,19 +244,19 @@ void World::become_copy_of(World& source) {
   ContactRecorder contacts = source.contacts_;
   contacts.replace_contacts(copier.contacts());
   contacts.touches.exclude_ids_of(contacts_.touches);
-  StepPlan plan = source.plan_;
-  plan.exclude_ids_of(plan_);
+  JobQueue jobs = source.jobs_;
+  jobs.exclude_ids_of(jobs_);
   std::vector<Id> invalid = source.invalid_;
   rays_.become_copy_of(
       source.rays_, [&](const b2Body* body) { return copier.copy_of(body); },
       [&](const b2Fixture* fixture) { return copier.copy_of(fixture); });
-  // Nothing below fails.
+  // The statements below cannot fail.
   engine_ = std::move(engine);
   bodies_ = std::move(bodies);
   fixtures_ = std::move(fixtures);
   joints_ = std::move(joints);
   contacts_ = std::move(contacts);
-  plan_ = std::move(plan);
+  jobs_ = std::move(jobs);
   invalid_ = std::move(invalid);
   last_step_time_ = source.last_step_time_;
   listen();
@@ -273,7 +273,7 @@ void World::clear() {
   joints.exclude_ids_of(joints_);
   ContactRecorder contacts;
   contacts.touches.exclude_ids_of(contacts_.touches);
-  plan_.remove_all();
+  jobs_.clear();
   rays_.clear();
   engine_ = std::move(engine);
   bodies_ = std::move(bodies);

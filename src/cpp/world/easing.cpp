@@ -55,7 +55,7 @@ double elastic(double p, double period) {
 // The parabolas of a bouncing ball, in units of 1 / 2.75 of the duration.
 double bounce(double p) {
   struct Parabola {
-    double end, top, drop;  // end time, time of the apex, its drop below that of the first one
+    double end, top, drop;  // end time, time of the apex, drop of the apex below the first apex
   };
   constexpr Parabola kParabolas[] = {{1.0, 0.0, 0.0}, {2.0, 1.5, 0.75}, {2.5, 2.25, 0.9375}};
   const double t = 2.75 * (1.0 - p);
@@ -69,7 +69,7 @@ double bounce(double p) {
   return 1.0 - (pow(t - found.top, 2.0) + found.drop);
 }
 
-// The In curve, or the one from which the InOut curve is joined.
+// Returns the In curve, or the curve of which the InOut curve consists.
 double ease_in(Family family, bool is_half, double p) {
   switch (family) {
     case Family::kLinear:
@@ -99,12 +99,12 @@ double ease_in(Family family, bool is_half, double p) {
 }  // namespace
 
 double Easing::operator()(double p) const {
-  // Some formulas only approximate the ends.
+  // Some formulas are inexact at the ends.
   if (p <= 0.0) return 0.0;
   if (p >= 1.0) return 1.0;
   if (shape == Shape::kIn) return ease_in(family, false, p);
   if (shape == Shape::kOut) return 1.0 - ease_in(family, false, 1.0 - p);
-  // Its scaled copy, then the mirror image of that.
+  // The first half is a scaled copy of the In curve, the second half the mirror image of the first.
   if (p < 0.5) return ease_in(family, true, 2.0 * p) / 2.0;
   return 1.0 - ease_in(family, true, 2.0 - 2.0 * p) / 2.0;
 }

@@ -6,7 +6,7 @@
 namespace flatland {
 namespace {
 
-// False for NaN.
+// Returns false for NaN.
 bool in_range(double value) { return std::abs(value) <= kMaxMagnitude; }
 
 [[noreturn]] void throw_out_of_range(double value, const std::string& what) {
@@ -45,8 +45,8 @@ b2Vec2 checked_vector(double x, double y, const std::string& what) {
 void check_all_finite(const float* values, std::size_t count, std::size_t width,
                       const std::string& what) {
   constexpr float limit = static_cast<float>(kMaxMagnitude);
-  // The first pass has no branches, so that the compiler can vectorize it. The second one finds the
-  // index of the invalid element.
+  // The first pass has no branches, so that the compiler can vectorize the loop. The second pass
+  // finds the index of the invalid element.
   bool all = true;
   for (std::size_t i = 0; i < count; ++i) all &= std::abs(values[i]) <= limit;
   if (all) return;

@@ -1,8 +1,8 @@
 // Exception types of the engine, and checks of the arguments of Box2D functions.
 //
-// The Debian package of Box2D is built with assertions: an invalid argument aborts the process, and
-// so does a NaN that results from an overflow in the solver. All numbers are therefore checked
-// before they are passed to Box2D.
+// The Debian package of Box2D is built with assertions: an invalid argument aborts the process, as
+// does a NaN that results from an overflow in the solver. All numbers are therefore checked before
+// they are passed to Box2D.
 #pragma once
 
 #include <box2d/b2_math.h>
@@ -30,8 +30,8 @@ class WorldLockedError : public PhysicsError {
   using PhysicsError::PhysicsError;
 };
 
-// Largest magnitude of numbers passed to the engine; its square and cube are in the range of a
-// float.
+// The largest magnitude of numbers that are passed to the engine. The square and the cube of this
+// number are in the range of a float.
 inline constexpr double kMaxMagnitude = 1e9;
 
 // Returns the number in up to 9 significant digits, for error messages.

@@ -18,8 +18,8 @@ Definition joint_definition(World& world, const JointBodies& bodies) {
   if (definition.bodyA == definition.bodyB) {
     throw std::invalid_argument("a joint must connect two different bodies");
   }
-  definition.localAnchorA = checked_vector(bodies.anchor_a_x, bodies.anchor_a_y, "anchor_a");
-  definition.localAnchorB = checked_vector(bodies.anchor_b_x, bodies.anchor_b_y, "anchor_b");
+  definition.localAnchorA = checked_vector(bodies.anchor_a.x, bodies.anchor_a.y, "anchor_a");
+  definition.localAnchorB = checked_vector(bodies.anchor_b.x, bodies.anchor_b.y, "anchor_b");
   definition.collideConnected = bodies.collide_connected;
   return definition;
 }

@@ -4,6 +4,7 @@
 #include <optional>
 #include <utility>
 
+#include "vec.h"
 #include "world/world.h"
 
 namespace flatland {
@@ -11,7 +12,7 @@ namespace flatland {
 // Two bodies with the anchor points in their local frames.
 struct JointBodies {
   Id body_a, body_b;
-  double anchor_a_x, anchor_a_y, anchor_b_x, anchor_b_y;
+  Vec anchor_a, anchor_b;
   bool collide_connected;
 };
 
@@ -20,7 +21,7 @@ using AngleLimits = std::pair<double, double>;
 // Both functions throw std::invalid_argument if a number is invalid or the bodies are identical.
 Id create_revolute_joint(World& world, const JointBodies& bodies,
                          const std::optional<AngleLimits>& limits);
-// Creates a rigid joint if the frequency is 0, otherwise an angular spring.
+// Creates a weld joint: rigid if the frequency is 0, otherwise with an angular spring.
 Id create_weld_joint(World& world, const JointBodies& bodies, double reference_angle,
                      double frequency, double damping_ratio);
 

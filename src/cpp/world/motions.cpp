@@ -5,7 +5,7 @@
 namespace flatland {
 namespace {
 
-// Box2D derives the sweep of a body from its transform, with rounding, and has no access to it.
+// Box2D has no access to the sweep of a body. SetTransform would compute the sweep with rounding.
 using members::BodySleepTime;
 using members::BodySweep;
 using members::BodyTransform;
@@ -39,7 +39,7 @@ void restore_motions(World& world, const std::vector<SavedMotion>& motions) {
     if (is_moved(*body, motion)) body->SetTransform(motion.transform.p, motion.sweep.a);
     get<BodyTransform>(*body) = motion.transform;
     get<BodySweep>(*body) = motion.sweep;
-    // A change of the velocity wakes the body; sleep sets it to 0, as it was.
+    // A change of the velocity wakes the body. The velocity of a sleeping body is 0.
     body->SetLinearVelocity(motion.linear_velocity);
     body->SetAngularVelocity(motion.angular_velocity);
     body->SetAwake(motion.awake);

@@ -1,4 +1,4 @@
-// The motions of all bodies, saved to undo changes of poses exactly.
+// The motions of all bodies, which are saved to undo changes of poses exactly.
 #pragma once
 
 #include <vector>
@@ -7,7 +7,7 @@
 
 namespace flatland {
 
-// Pose, velocity and sleep of a body, as Box2D stores them.
+// Pose, velocity and sleep of a body in the numbers of Box2D.
 struct SavedMotion {
   Id body = 0;
   b2Transform transform;
@@ -20,8 +20,8 @@ struct SavedMotion {
 
 std::vector<SavedMotion> saved_motions(const World& world);
 
-// Restores the motions bit by bit. Bodies that were destroyed in the meantime are ignored, bodies
-// that were created keep theirs.
+// Restores the motions bit by bit. Bodies that were destroyed in the meantime are ignored; the
+// motion of bodies that were created in the meantime does not change.
 void restore_motions(World& world, const std::vector<SavedMotion>& motions);
 
 }  // namespace flatland

@@ -2,15 +2,15 @@
 
 #include <algorithm>
 #include <cmath>
-
-#include "world/bodies.h"
+#include <cstddef>
 
 namespace flatland {
 namespace {
 
 double dot(const Triple& a, const Triple& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
 
-// Returns the target, reduced in all components alike so that no limit is exceeded.
+// Returns the target, with all components multiplied by the same factor so that no limit is
+// exceeded.
 Triple limited_target(const OmniMotion& motion) {
   double share = 1.0;
   const auto reduce = [&](double value, double limit) {
@@ -30,7 +30,7 @@ double share_of_step(const OmniMotion& motion, const Triple& target, double dt) 
   };
   for (std::size_t i = 0; i < 3; ++i) {
     SpeedLimits limits = i < 2 ? motion.linear : motion.angular;
-    limits.velocity = 0.0;  // The target is within the limits already.
+    limits.velocity = 0.0;  // The target is already within the limits of the velocity.
     reduce(limits.step(motion.velocity[i], target[i], dt) - motion.velocity[i],
            target[i] - motion.velocity[i]);
   }
@@ -45,19 +45,13 @@ double share_of_step(const OmniMotion& motion, const Triple& target, double dt) 
 
 }  // namespace
 
-void advance_omni(World& world, b2Body* body, OmniMotion& motion, double dt) {
+void advance_omni(OmniMotion& motion, double dt) {
   const Triple target = limited_target(motion);
   const double share = share_of_step(motion, target, dt);
   for (std::size_t i = 0; i < 3; ++i) {
     motion.velocity[i] =
         share < 1.0 ? motion.velocity[i] + share * (target[i] - motion.velocity[i]) : target[i];
   }
-  const double yaw = pose_of(*body)[2];
-  const double c = std::cos(yaw);
-  const double s = std::sin(yaw);
-  const auto [forward, sideways, omega] = motion.velocity;
-  drive(world, body, motion.traction,
-        {c * forward - s * sideways, s * forward + c * sideways, omega}, dt);
 }
 
 }  // namespace flatland

@@ -81,7 +81,7 @@ float separation_along_normals(const Hull& first, const Hull& second) {
 bool are_closer(const Hull& a, const Hull& b, float least_gap) {
   const float least = least_gap + a.radius + b.radius;
   const float separation = std::max(separation_along_normals(a, b), separation_along_normals(b, a));
-  if (separation >= least) return false;  // a lower bound of the distance
+  if (separation >= least) return false;  // the separation is a lower bound of the distance
   // The separation is exact if a polygon overlaps; otherwise the distance of corners can be
   // greater.
   if (separation <= 0.0F && std::max(a.count, b.count) > 2) return true;
@@ -112,7 +112,7 @@ bool bodies_collide(const b2Body* probe, const b2Body& other) {
   return true;
 }
 
-// Finds all bodies that a part of a probe overlaps, or only the first one.
+// Finds all bodies that a part of a probe overlaps, or only the first body.
 class FindOverlaps final : public b2QueryCallback {
  public:
   FindOverlaps(const Probe& probe, bool all) : probe_(probe), all_(all) {}

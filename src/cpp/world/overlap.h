@@ -1,4 +1,4 @@
-// Tests of which bodies a set of shapes would overlap at given poses.
+// Finds the bodies that a set of shapes would overlap at given poses.
 //
 // Only pairs of fixtures that can collide are considered: neither is a sensor, their filter bits
 // match, at least one body is dynamic, and no joint prevents the collision. The distance of two
@@ -36,7 +36,7 @@ struct Hull {
 struct ProbePart {
   Hull hull;
   b2Filter filter;
-  const b2Body* body;  // null for a shape without a body; it collides like a dynamic one
+  const b2Body* body;  // null for a shape without a body, which collides like a dynamic body
 };
 
 // A rigid set of shapes, and the bodies that they may overlap.

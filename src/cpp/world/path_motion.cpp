@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "angles.h"
+#include "split_mix.h"
 #include "world/bodies.h"
 
 namespace flatland {
@@ -12,24 +13,17 @@ double shortest_turn(double from, double to) { return std::remainder(to - from, 
 
 double inverse(double limit) { return limit == 0.0 ? 0.0 : 1.0 / limit; }
 
-// SplitMix64 (G. Steele, D. Lea, C. Flood, Fast splittable pseudorandom number generators, 2014).
-std::uint64_t random_bits(std::uint64_t key, std::uint64_t counter) {
-  std::uint64_t z = key + (counter + 1) * 0x9E3779B97F4A7C15ULL;
-  z = (z ^ (z >> 30U)) * 0xBF58476D1CE4E5B9ULL;
-  z = (z ^ (z >> 27U)) * 0x94D049BB133111EBULL;
-  return z ^ (z >> 31U);
-}
-
 void choose_next(PathMotion& motion) {
   const std::size_t count = motion.path->waypoints.size();
   switch (motion.path->mode) {
     case Path::Mode::kLoop:
       motion.next = (motion.waypoint + 1) % count;
       break;
-    case Path::Mode::kRandom:
-      motion.next =
-          (motion.waypoint + 1 + random_bits(motion.key, motion.legs) % (count - 1)) % count;
+    case Path::Mode::kRandom: {
+      const std::uint64_t word = split_mix(motion.key + motion.legs * kSplitMixStep);
+      motion.next = (motion.waypoint + 1 + word % (count - 1)) % count;
       break;
+    }
     default:
       if (motion.waypoint + 1 == count) motion.is_forward = false;
       if (motion.waypoint == 0) motion.is_forward = true;
@@ -52,14 +46,14 @@ void begin_leg(PathMotion& motion, double wait) {
     motion.to[2] = distance > 0.0 ? std::atan2(dy, dx) : motion.from[2];
   }
   const double turn = shortest_turn(motion.from[2], motion.to[2]);
-  // The angle of the end is exact; that of the start may differ by a full turn.
+  // The angle of the end is exact. The angle of the start may differ by a full turn.
   motion.from[2] = motion.to[2] - turn;
   if (path.faces_forward) {
     motion.turn = Trapezoid::over(std::abs(turn), path.angular);
     motion.drive = Trapezoid::over(distance, path.linear);
     return;
   }
-  // Translation and rotation start and end together; the slower one determines the time.
+  // Translation and rotation start and end together. The slower motion determines the time.
   SpeedLimits limits;
   const auto reduce = [](double& limit, double other) {
     if (other != 0.0 && (limit == 0.0 || other < limit)) limit = other;
@@ -115,8 +109,8 @@ bool may_start(const PathMotion& motion) {
 }
 
 void advance_time(PathMotion& motion, double dt) {
-  double wait = 0.0;  // A body that stood still starts at once.
-  // All waypoints may be at one place; then the time of a round is zero.
+  double wait = 0.0;  // A body at rest starts without waiting.
+  // If all waypoints are at one place, the time of a round is zero.
   for (std::size_t i = 0; i <= motion.path->waypoints.size(); ++i) {
     if (!motion.is_moving) {
       if (!may_start(motion)) return;
@@ -126,7 +120,7 @@ void advance_time(PathMotion& motion, double dt) {
       ++motion.legs;
     }
     const double remaining = duration_of(motion) - motion.time;
-    // Sums of steps that end at a waypoint end there, in spite of rounding.
+    // A sum of steps that reaches the waypoint except for rounding counts as having arrived.
     constexpr double kRounding = 1e-9;
     if (dt < remaining - kRounding) {
       motion.time += dt;
@@ -173,7 +167,7 @@ void advance_path(b2Body* body, PathMotion& motion, double dt) {
   advance_time(motion, dt);
   motion.velocity = {(motion.pose[0] - before[0]) / dt, (motion.pose[1] - before[1]) / dt,
                      shortest_turn(before[2], motion.pose[2]) / dt};
-  // Bodies that are pushed away get this velocity; the pose after the step is exact in any case.
+  // Other bodies are pushed with this velocity. The pose after the step is exact in any case.
   set_velocity(body, motion.velocity);
 }
 

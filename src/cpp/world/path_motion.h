@@ -19,49 +19,51 @@ class World;
 // and falls to zero.
 struct Trapezoid {
   double distance = 0.0;
-  double peak = 0.0;    // speed
+  double peak = 0.0;    // greatest speed
   double rise = 0.0;    // duration of the acceleration [s]
-  double cruise = 0.0;  // at the peak speed [s]
-  double fall = 0.0;    // [s]
+  double cruise = 0.0;  // duration of the motion at the peak speed [s]
+  double fall = 0.0;    // duration of the deceleration [s]
 
-  // The limit of the speed is above 0; a limit of 0 of acceleration or deceleration is none.
+  // Returns the fastest motion. The limit of the speed must be positive; an acceleration or
+  // deceleration of 0 stands for no limit.
   static Trapezoid over(double distance, const SpeedLimits& limits);
   double duration() const { return rise + cruise + fall; }
   // Returns the distance travelled after t seconds.
   double at(double t) const;
 };
 
-// Waypoints, the first of which is the pose of the body at the start, and limits; shared by copies.
+// The waypoints and the limits of a motion, which copies of a world share. The first waypoint is
+// the initial pose of the body.
 struct Path {
   enum class Mode : std::uint8_t { kLoop, kOnce, kThereAndBack, kRandom };
 
   std::vector<Triple> waypoints;  // world frame [m, rad]
   Mode mode = Mode::kLoop;
-  bool faces_forward = false;  // turns towards the next waypoint first, and drives forwards
+  bool faces_forward = false;  // whether the body turns towards the next waypoint, then drives
   SpeedLimits linear, angular;
-  double wait = 0.0;  // at each waypoint [s]
+  double wait = 0.0;  // time at each waypoint [s]
 };
 
 struct PathMotion {
   std::shared_ptr<const Path> path;
-  std::uint64_t key = 0;     // of the random numbers of mode kRandom
-  bool is_dynamic = false;   // whether the body is
+  std::uint64_t key = 0;     // key of the random numbers of mode kRandom
+  bool is_dynamic = false;   // whether the body is dynamic
   bool is_started = true;    // otherwise, the body stops at the next waypoint
   std::uint64_t starts = 0;  // number of commands to start
 
-  std::size_t waypoint = 0;  // of the last one that was reached
-  std::size_t next = 0;      // where the body drives to, or was to drive to
+  std::size_t waypoint = 0;  // index of the last waypoint that was reached
+  std::size_t next = 0;      // index of the waypoint of the current or the next motion
   bool is_forward = true;    // the direction along the waypoints
-  bool is_moving = false;    // including the time of waiting
-  bool is_finished = false;  // with mode kOnce: at the end of the path
+  bool is_moving = false;    // whether a motion has begun, including the time of waiting
+  bool is_finished = false;  // whether the body reached the end of the path in mode kOnce
   std::uint64_t legs = 0;    // number of motions between waypoints that have begun
   std::uint64_t used_starts = 0;
 
   double time = 0.0;  // since the beginning of this leg [s]
-  double wait = 0.0;  // at its beginning [s]
+  double wait = 0.0;  // time of waiting at the beginning of this leg [s]
   Triple from{}, to{};
-  Trapezoid turn;   // before the drive
-  Trapezoid drive;  // as a share of the way if the body does not face forward
+  Trapezoid turn;   // turn before the drive
+  Trapezoid drive;  // as a share of the leg if the body does not face forward
   Triple pose{};
   Triple velocity{};
 };

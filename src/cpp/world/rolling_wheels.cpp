@@ -10,11 +10,11 @@
 namespace flatland {
 namespace {
 
-// Returns how far a wheel rolls for a displacement or a velocity (dx, dy) of its centre.
-double rolled(const Wheel& wheel, double dx, double dy, double yaw) {
+// Returns how far a wheel rolls for a displacement or a velocity of its centre.
+double rolled(const Wheel& wheel, Vec change, double yaw) {
   const double c = std::cos(yaw + wheel.heading);
   const double s = std::sin(yaw + wheel.heading);
-  return c * dx + s * dy - wheel.slide * (c * dy - s * dx);
+  return c * change.x + s * change.y - wheel.slide * (c * change.y - s * change.x);
 }
 
 // Returns the factor from the chord of an arc to its length.
@@ -29,9 +29,9 @@ double displacement(const Wheel& wheel, const Triple& from, const Triple& to) {
   const double s0 = std::sin(from[2]);
   const double c1 = std::cos(to[2]);
   const double s1 = std::sin(to[2]);
-  const double dx = to[0] - from[0] + (c1 - c0) * wheel.x - (s1 - s0) * wheel.y;
-  const double dy = to[1] - from[1] + (s1 - s0) * wheel.x + (c1 - c0) * wheel.y;
-  return arc_of_chord(turn) * rolled(wheel, dx, dy, from[2] + 0.5 * turn);
+  const double dx = to[0] - from[0] + (c1 - c0) * wheel.position.x - (s1 - s0) * wheel.position.y;
+  const double dy = to[1] - from[1] + (s1 - s0) * wheel.position.x + (c1 - c0) * wheel.position.y;
+  return arc_of_chord(turn) * rolled(wheel, {dx, dy}, from[2] + 0.5 * turn);
 }
 
 }  // namespace
@@ -49,10 +49,8 @@ void measure_wheels(World& world, RollingWheels& wheels) {
     state.is_measured = true;
     state.pose = pose;
     const b2Vec2 velocity = body->GetLinearVelocityFromLocalPoint(
-        {static_cast<float>(wheel.x), static_cast<float>(wheel.y)});
-    state.speed =
-        rolled(wheel, static_cast<double>(velocity.x), static_cast<double>(velocity.y), pose[2]) /
-        wheel.radius;
+        {static_cast<float>(wheel.position.x), static_cast<float>(wheel.position.y)});
+    state.speed = rolled(wheel, to_vec(velocity), pose[2]) / wheel.radius;
   }
 }
 

@@ -4,6 +4,7 @@
 #include <memory>
 #include <vector>
 
+#include "vec.h"
 #include "world/slot_map.h"
 #include "world/triple.h"
 
@@ -14,10 +15,10 @@ class World;
 // A wheel on the ground.
 struct Wheel {
   Id body = 0;
-  double x = 0.0, y = 0.0;  // in the frame of the body [m]
-  double heading = 0.0;     // direction in which the wheel rolls, body frame [rad]
-  double radius = 1.0;      // [m]
-  double slide = 0.0;       // cotangent of the angle from the heading to the free direction
+  Vec position;          // in the frame of the body [m]
+  double heading = 0.0;  // direction in which the wheel rolls, body frame [rad]
+  double radius = 1.0;   // [m]
+  double slide = 0.0;    // cotangent of the angle from the heading to the free direction
 };
 
 struct RollingWheels {
@@ -25,7 +26,7 @@ struct RollingWheels {
     double angle = 0.0;  // [rad]
     double speed = 0.0;  // [rad/s]
     bool is_measured = false;
-    Triple pose{};  // of the body at the last measurement
+    Triple pose{};  // pose of the body at the last measurement
   };
 
   std::shared_ptr<const std::vector<Wheel>> wheels;

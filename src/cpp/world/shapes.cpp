@@ -13,10 +13,11 @@
 namespace flatland {
 namespace {
 
-// Bound of the rounding error of an area or a moment of inertia, relative to the largest summand.
+// A bound of the rounding error of an area or a moment of inertia, relative to the largest summand.
 constexpr float kRounding = 4.0F * b2_epsilon;
 
-// Returns the points that Box2D keeps: it drops points closer to an earlier one than half its slop.
+// Returns the points that Box2D keeps. Box2D drops a point that is closer to an earlier point than
+// half of the linear slop.
 std::vector<b2Vec2> weld_points(const std::vector<b2Vec2>& points) {
   constexpr float min_distance = 0.5F * b2_linearSlop;
   std::vector<b2Vec2> kept;
@@ -123,7 +124,7 @@ void check_mass_with(const b2Body& body, const b2Shape& shape, float density) {
     center += data.mass * data.center;
     inertia += data.I;
   };
-  // In the order of summation of Box2D, the newest fixture first.
+  // The sum has the order of Box2D, the newest fixture first.
   add(shape, density);
   for (const b2Fixture* fixture = body.GetFixtureList(); fixture; fixture = fixture->GetNext()) {
     if (fixture->GetDensity() != 0.0F) add(*fixture->GetShape(), fixture->GetDensity());

@@ -11,7 +11,7 @@ class b2Body;
 
 namespace flatland {
 
-// Box2D cannot compute the direction of shorter edges, so nothing can collide with them.
+// Box2D cannot compute the direction of shorter edges, and finds no collisions with such edges.
 inline constexpr float kMinEdgeLength = b2_epsilon;
 
 // Returns a circle; a circle of radius 0 is a point. Throws std::invalid_argument.
@@ -25,8 +25,8 @@ b2PolygonShape make_polygon(const std::vector<b2Vec2>& points);
 // Sets a two-sided edge. Returns false if it is shorter than kMinEdgeLength.
 bool make_edge(const float* x1_y1_x2_y2, b2EdgeShape* edge);
 
-// Throws std::invalid_argument if the mass or the moment of inertia of a body with this additional
-// shape would be outside the range in which Box2D can compute.
+// Throws std::invalid_argument if, with this additional shape, the mass or the moment of inertia of
+// a body would be outside the range in which Box2D can compute.
 void check_mass_with(const b2Body& body, const b2Shape& shape, float density);
 
 }  // namespace flatland

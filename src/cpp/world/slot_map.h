@@ -19,7 +19,7 @@ enum class IdKind : std::uint64_t {
   kFixture = 2,
   kJoint = 3,
   kController = 4,
-  kRecord = 5,
+  kCallback = 5,
   kTouches = 6,
   kCrowd = 7
 };

@@ -10,20 +10,22 @@
 #include <cmath>
 #include <exception>
 
+#include "world/bodies.h"
 #include "world/contacts.h"
 
 namespace flatland {
 namespace {
 
-// How often the handling of impacts may update one contact in a step. With room to move it is three
-// times at most; a contact that is updated more often is updated until Box2D's own limit stops it.
-// The first steps of a jam may cost more, so that bodies that overlap can be pushed apart.
+// The number of times that the handling of impacts may update one contact in a step. The contact of
+// a body with room to move is updated three times at most. A contact that is updated more often
+// would be updated until Box2D reaches its own limit. The first steps of a jam have a greater
+// limit, so that overlapping bodies can be pushed apart.
 constexpr int kMostUpdates = 6;
 constexpr int kMostUpdatesAtFirst = 20;
 constexpr std::uint64_t kFirstSteps = 10;
 
-// Contacts cannot add energy, but the solver is approximate. A body on its own that gets faster
-// than this is in a jam, and so is a group of bodies; speeds are compared, not energies.
+// Limits of the gain of speed in a step. Contacts cannot add energy, but the solver is approximate.
+// A body or a group of bodies that gains more speed is jammed.
 constexpr double kGainAlone = 1.01;
 constexpr double kSlackAlone = 0.01;  // m/s
 constexpr double kGainOfGroup = 2.0;
@@ -31,19 +33,15 @@ constexpr double kSlackOfGroup = 0.1;  // m/s
 
 bool is_dynamic(const b2Body* body) { return body->GetType() == b2_dynamicBody; }
 
-float inertia_about_center(const b2Body* body) {
-  return body->GetInertia() - body->GetMass() * body->GetLocalCenter().LengthSquared();
-}
-
-// The kinetic energy [J] of a body that was faster by these speeds [m/s, rad/s].
+// Returns the kinetic energy [J] of a body whose velocity is increased by speeds [m/s, rad/s].
 double energy_of(const b2Body* body, float speed = 0.0F, float spin = 0.0F) {
   const double v = static_cast<double>(body->GetLinearVelocity().Length() + speed);
   const double w = static_cast<double>(std::abs(body->GetAngularVelocity()) + spin);
   return 0.5 * (static_cast<double>(body->GetMass()) * v * v +
-                static_cast<double>(inertia_about_center(body)) * w * w);
+                static_cast<double>(inertia_about_center<float>(*body)) * w * w);
 }
 
-// Box2D's stored impulses, which the next step starts from.
+// Removes the impulses that Box2D stores for the warm start of the next step.
 void forget_impulses(b2Contact* contact) {
   b2Manifold* manifold = contact->GetManifold();
   for (int32 i = 0; i < manifold->pointCount; ++i) {
@@ -52,7 +50,7 @@ void forget_impulses(b2Contact* contact) {
   }
 }
 
-// The energy [J] that the spring of a weld joint can release, as far as it is one.
+// Returns the energy that the spring of a weld joint can release [J]; 0 for other joints.
 double spring_energy(const b2Joint* joint) {
   if (joint->GetType() != e_weldJoint) return 0.0;
   const auto* weld = static_cast<const b2WeldJoint*>(joint);
@@ -62,7 +60,7 @@ double spring_energy(const b2Joint* joint) {
   return 0.5 * static_cast<double>(weld->GetStiffness()) * turned * turned;
 }
 
-// How fast the surface of a kinematic body moves [m/s] about as far away as another body.
+// Returns an upper bound of the speed of the surface of a kinematic body at another body [m/s].
 double surface_speed(const b2Body* kinematic, const b2Body* other) {
   float reach = (other->GetWorldCenter() - kinematic->GetWorldCenter()).Length();
   for (const b2Fixture* f = other->GetFixtureList(); f != nullptr; f = f->GetNext()) {
@@ -75,7 +73,7 @@ double surface_speed(const b2Body* kinematic, const b2Body* other) {
 }  // namespace
 
 bool is_finite(const b2Body* body) {
-  // The sum is finite only if all of its terms are.
+  // The sum is finite only if all terms are finite.
   const b2Vec2& center = body->GetWorldCenter();
   const b2Vec2& velocity = body->GetLinearVelocity();
   return std::isfinite(center.x + center.y + body->GetAngle() + velocity.x + velocity.y +
@@ -107,7 +105,8 @@ void StepGuard::begin(b2World& world, float dt) {
     if (start.last_jam + 1 != step_) start.jammed_steps = 0;
     if (is_dynamic(body)) {
       mass += body->GetMass();
-      // The impulses that this step starts from were computed in the previous one.
+      // This step starts from impulses of the previous step, whose energy is therefore allowed,
+      // too.
       const double earlier = start.energy;
       start.energy = energy_of(body, dt * start.acceleration, dt * start.angular_acceleration);
       start.allowed = std::max(start.energy, earlier);
@@ -116,9 +115,9 @@ void StepGuard::begin(b2World& world, float dt) {
       start.angle = body->GetAngle();
     }
   }
-  // An impulse that would make all bodies together move at Box2D's largest speed.
+  // This impulse accelerates all bodies together to the largest speed of Box2D.
   largest_impulse_ = mass * b2_maxTranslation / dt;
-  // Box2D writes this time after it updated all contacts, before it handles impacts.
+  // Box2D writes this time after the update of all contacts and before the handling of impacts.
   const_cast<b2Profile&>(world.GetProfile()).collide = -1.0F;
 }
 
@@ -126,7 +125,7 @@ void StepGuard::pre_solve(b2Contact* contact) noexcept {
   b2Manifold* manifold = contact->GetManifold();
   for (int32 i = 0; i < manifold->pointCount; ++i) {
     const b2ManifoldPoint& point = manifold->points[i];
-    // Written so that NaN is too large.
+    // The comparisons are written so that NaN is too large.
     if (!(point.normalImpulse <= largest_impulse_ &&
           std::abs(point.tangentImpulse) <= largest_impulse_)) {
       forget_impulses(contact);
@@ -144,7 +143,7 @@ void StepGuard::pre_solve(b2Contact* contact) noexcept {
     const bool is_first =
         std::max(start_of(body_a).jammed_steps, start_of(body_b).jammed_steps) < kFirstSteps;
     if (is_first && updates <= kMostUpdatesAtFirst) return;
-    // The bodies go on without this contact until the next step, which updates all contacts.
+    // The contact has no effect until the next step, which updates all contacts.
     contact->SetEnabled(false);
   } catch (const std::exception&) {
     failed_ = true;
@@ -187,7 +186,7 @@ StepReport StepGuard::end(b2World& world) {
 }
 
 void StepGuard::examine_group(b2Body* first) {
-  // All bodies that could pass energy to each other in this step, by touching or by a joint.
+  // The group contains all bodies that can exchange energy in this step, by contacts or joints.
   group_.assign(1, first);
   start_of(first).step = step_;
   const auto add = [&](b2Body* body) {
@@ -198,7 +197,7 @@ void StepGuard::examine_group(b2Body* first) {
   double before = 0.0;
   double after = 0.0;
   double mass = 0.0;
-  double pushing_speed = 0.0;  // of what moves whatever meets it: kinematic bodies, conveyor belts
+  double pushing_speed = 0.0;  // greatest speed of surfaces: kinematic bodies, conveyor belts
   double restitution = 1.0;
   bool has_joints = false;
   for (std::size_t i = 0; i < group_.size(); ++i) {
@@ -243,7 +242,7 @@ void StepGuard::examine_group(b2Body* first) {
 }
 
 void StepGuard::restore_static(b2Body* body) {
-  // Box2D leaves the velocity of a static body alone, unless the body becomes one.
+  // Box2D sets the velocity of a body to zero only when the body becomes static.
   body->SetType(b2_kinematicBody);
   body->SetType(b2_staticBody);
   const Start& start = start_of(body);

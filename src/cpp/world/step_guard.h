@@ -1,10 +1,12 @@
-// Keeps a step stable and cheap where bodies overlap walls for which they have no room.
+// Keeps a step stable and fast if bodies are jammed: they overlap walls and have no room to move
+// away.
 //
-// Box2D 2.4 re-evaluates contacts at intermediate positions while it handles times of impact. In a
-// gap narrower than the body that drops the stored impulse of one side and keeps that of the other,
-// and warm starting applies the difference: it can grow until it overflows. The same body causes
-// hundreds of times of impact in each step. The guard limits both, and never changes a step that
-// stays within its limits.
+// While Box2D 2.4 handles times of impact, contacts are evaluated again at intermediate positions.
+// In a gap that is narrower than the body, this removes the stored impulse of one side of the body
+// and keeps the impulse of the other side. Warm starting applies the difference, which can grow
+// until the velocity overflows. The same body causes hundreds of times of impact in each step. The
+// guard limits the impulses and the number of impacts, and does not change a step within the
+// limits.
 #pragma once
 
 #include <box2d/b2_body.h>
@@ -20,42 +22,42 @@ class b2World;
 
 namespace flatland {
 
-// Whether the pose and the velocity of a body are finite.
+// Returns whether the pose and the velocity of a body are finite.
 bool is_finite(const b2Body* body);
 
-// The bodies for which the last step needed the guard.
+// The bodies that the guard has limited or found to be invalid in the last step.
 struct StepReport {
-  std::vector<Id> limited;  // their contacts or velocities were limited
-  std::vector<Id> invalid;  // their pose or velocity is not finite
+  std::vector<Id> limited;  // bodies whose contacts or velocities were limited
+  std::vector<Id> invalid;  // bodies whose pose or velocity is not finite
 
   bool empty() const { return limited.empty() && invalid.empty(); }
 };
 
 class StepGuard {
  public:
-  // Adds to the speed [m/s or rad/s] that one second of the forces on a body may cause in the next
-  // step.
+  // Adds an acceleration that forces may cause in the next step [m/s², rad/s²].
   void add_acceleration(Id body, float linear, float angular);
 
-  // Called before and after b2World::Step.
+  // Must be called before and after b2World::Step.
   void begin(b2World& world, float dt);
   StepReport end(b2World& world);
 
-  // Called for each contact that is about to be solved, after any other hook.
+  // Must be called before each contact is solved, after any other hook.
   void pre_solve(b2Contact* contact) noexcept;
 
  private:
-  // What a body had before the step, and what it may have after it, by the slot of its id.
+  // The state of a body before the step, and the energy that is allowed after the step, by the slot
+  // of the id.
   struct Start {
-    double energy = 0.0;   // kinetic [J], including what forces may add
-    double allowed = 0.0;  // the larger one of this energy and that before the previous step
+    double energy = 0.0;   // kinetic energy, including the energy that forces may add [J]
+    double allowed = 0.0;  // maximum of `energy` before this step and before the previous step [J]
     float acceleration = 0.0F;
     float angular_acceleration = 0.0F;
-    b2Vec2 position{0.0F, 0.0F};  // of static bodies only
+    b2Vec2 position{0.0F, 0.0F};  // set only for static bodies, like `angle`
     float angle = 0.0F;
-    std::uint64_t step = 0;          // in which the body was examined last
-    std::uint64_t last_jam = 0;      // the latest step in which it was limited
-    std::uint64_t jammed_steps = 0;  // in succession, up to that one
+    std::uint64_t step = 0;          // latest step in which the body was examined
+    std::uint64_t last_jam = 0;      // latest step in which the body was limited
+    std::uint64_t jammed_steps = 0;  // number of consecutive such steps up to `last_jam`
   };
 
   Start& start_of(const b2Body* body);
@@ -66,7 +68,7 @@ class StepGuard {
   const b2World* world_ = nullptr;
   float largest_impulse_ = 0.0F;
   bool has_accelerations_ = false;
-  bool failed_ = false;  // for want of memory: contacts are not counted any more in this step
+  bool failed_ = false;  // whether counting contacts failed for lack of memory in this step
   std::uint64_t step_ = 0;
   std::vector<Start> starts_;
   std::vector<b2Body*> group_;

@@ -41,7 +41,6 @@ Id TouchCollectors::add(const TouchCollector& collector, const std::vector<Conta
 void TouchCollectors::remove(Id id) {
   TouchCollector* collector = collectors_.find(id);
   if (collector == nullptr) return;
-  set_ends_runs(*collector, false);
   for (const Id body : collector->bodies) {
     const auto of_body = by_body_.find(body);
     if (of_body == by_body_.end()) continue;
@@ -52,17 +51,9 @@ void TouchCollectors::remove(Id id) {
   collectors_.erase(id);
 }
 
-void TouchCollectors::set_ends_runs(TouchCollector& collector, bool ends_runs) {
-  if (collector.ends_runs == ends_runs) return;
-  collector.ends_runs = ends_runs;
-  const auto count = static_cast<std::int64_t>(collector.touches.size());
-  ending_ += ends_runs ? count : -count;
-  ending_collectors_ += ends_runs ? 1 : -1;
-}
-
 void TouchCollectors::set_owned(Id body, bool is_owned) {
   if (is_owned) {
-    owned_[body] = true;
+    owned_.insert(body);
   } else {
     owned_.erase(body);
   }
@@ -85,7 +76,6 @@ void TouchCollectors::begin_in(TouchCollector& collector, const ContactRow& row)
   touch.is_a = is_a;
   collector.touches.push_back(touch);
   collector.was_touched = true;
-  if (collector.ends_runs) ++ending_;
 }
 
 void TouchCollectors::end(std::uint64_t contact_id, Id body_a, Id body_b) {
@@ -94,9 +84,7 @@ void TouchCollectors::end(std::uint64_t contact_id, Id body_a, Id body_b) {
     const auto found = std::find_if(touches.begin(), touches.end(), [&](const Touch& touch) {
       return touch.contact_id == contact_id;
     });
-    if (found == touches.end()) return;
-    touches.erase(found);
-    if (collector.ends_runs) --ending_;
+    if (found != touches.end()) touches.erase(found);
   });
 }
 
@@ -115,9 +103,9 @@ void TouchCollectors::post_solve(const ContactRow& row, std::uint64_t step) {
       for (std::size_t i = 0; i < row.point_count; ++i) {
         touch.normal_impulses[i] += static_cast<double>(row.normal_impulses[i]);
         touch.tangent_impulses[i] += static_cast<double>(row.tangent_impulses[i]);
-        std::copy_n(row.points[i], 2, touch.points[i]);
+        touch.points[i] = row.points[i];
       }
-      std::copy_n(row.normal, 2, touch.normal);
+      touch.normal = row.normal;
       return;
     }
   });

@@ -53,6 +53,19 @@ class WakeDynamicBodies final : public b2QueryCallback {
   }
 };
 
+void check_step(double dt, int velocity_iterations, int position_iterations) {
+  // Outside these bounds, 1 / dt or sums in the solver can exceed the range of a float.
+  if (!(dt >= 1e-6 && dt <= 1e3)) {
+    throw std::invalid_argument("dt must be from 1e-6 to 1000 s, got " + to_text(dt));
+  }
+  for (const int iterations : {velocity_iterations, position_iterations}) {
+    if (iterations < 0) {
+      throw std::invalid_argument("iterations must not be negative, got " +
+                                  std::to_string(iterations));
+    }
+  }
+}
+
 }  // namespace
 
 World::World() : engine_(std::make_unique<b2World>(b2Vec2(0.0F, 0.0F))) {
@@ -77,26 +90,9 @@ void World::close() {
   joints_.clear();
   contacts_ = ContactRecorder();
   invalid_.clear();
-  plan_.clear();
+  jobs_.clear();
   engine_.reset();
 }
-
-namespace {
-
-void check_step(double dt, int velocity_iterations, int position_iterations) {
-  // Outside these bounds, 1 / dt or sums in the solver can exceed the range of a float.
-  if (!(dt >= 1e-6 && dt <= 1e3)) {
-    throw std::invalid_argument("dt must be from 1e-6 to 1000 s, got " + to_text(dt));
-  }
-  for (const int iterations : {velocity_iterations, position_iterations}) {
-    if (iterations < 0) {
-      throw std::invalid_argument("iterations must not be negative, got " +
-                                  std::to_string(iterations));
-    }
-  }
-}
-
-}  // namespace
 
 StepReport World::step(double dt, int velocity_iterations, int position_iterations,
                        PreSolveHook* hook) {
@@ -126,52 +122,91 @@ StepReport World::step_unchecked(double dt, int velocity_iterations, int positio
   return report;
 }
 
-RunResult World::run(std::int64_t k, std::int64_t n, double dt, int velocity_iterations,
-                     int position_iterations, bool only_physics) {
-  using End = RunResult::End;
+void Run::check() const {
   check_step(dt, velocity_iterations, position_iterations);
+  // Sums of times do not overflow.
+  constexpr std::int64_t kMost = std::int64_t{1} << 61;
+  if (n < 0 || n > kMost || time < 0 || time > kMost || step < 1 || step > kMost) {
+    throw std::invalid_argument("times and numbers of steps must be from 0 to 2^61");
+  }
+}
+
+RunResult World::run(const Run& run) {
+  run.check();
   const auto start = Clock::now();
   // Reading the wall time takes about as long as a step of one body.
   constexpr std::int64_t kMostUntimed = 16;
   std::int64_t untimed = 0;
+  std::int64_t time = run.time;
   RunResult result;
-  while (result.steps < n) {
-    if (interrupted_.load(std::memory_order_relaxed)) {
-      result.end = End::kStopped;
-      break;
-    }
-    if (++untimed > kMostUntimed || last_step_time_ > kLongRun / kMostUntimed) {
-      untimed = 0;
-      if (result.steps > 0 && Clock::now() - start > std::chrono::duration<double>(kLongRun)) {
-        result.end = End::kStopped;
-        break;
+  if (!run.continues) stage_ = Stage::kStart;
+  while (result.steps < run.n) {
+    if (stage_ == Stage::kStart) {
+      if (interrupted_.load(std::memory_order_relaxed)) break;
+      if (++untimed > kMostUntimed || last_step_time_ > kLongRun / kMostUntimed) {
+        untimed = 0;
+        const std::chrono::duration<double> elapsed = Clock::now() - start;
+        if (result.steps > 0 && elapsed.count() > kLongRun) break;
       }
     }
-    if (plan_.calls_due(k) != 0) {
-      result.end = End::kCall;
-      break;
-    }
-    plan_.begin(k);
-    plan_.carry_out(*this, Phase::kBefore, StepPlan::kEnd, dt);
-    if (plan_.has_failed()) {
-      result.end = End::kFailed;
-      break;
-    }
-    result.report = step_unchecked(dt, velocity_iterations, position_iterations, nullptr);
-    if (only_physics || !result.report.empty() || contacts_.has_rows() ||
-        contacts_.touches.end_run()) {
-      result.end = End::kPhysics;
-      break;
-    }
-    plan_.carry_out(*this, Phase::kAfter, StepPlan::kEnd, dt);
+    if (!perform(run, time, result)) break;
     ++result.steps;
-    ++k;
+    time += run.step;
   }
   const double elapsed = std::chrono::duration<double>(Clock::now() - start).count();
-  const bool is_partial = result.end == End::kPhysics;
-  const std::int64_t made = result.steps + (is_partial ? 1 : 0);
-  if (made > 0) last_step_time_ = elapsed / static_cast<double>(made);
+  if (result.physics_steps > 0) {
+    last_step_time_ = elapsed / static_cast<double>(result.physics_steps);
+  }
   return result;
+}
+
+double World::expected_time(const Run& run) {
+  const bool is_one = run.continues || jobs_.calls_at(run.time, run.step);
+  return last_step_time_ * static_cast<double>(is_one ? 1 : run.n);
+}
+
+bool World::perform(const Run& run, std::int64_t time, RunResult& result) {
+  using End = RunResult::End;
+  if (stage_ == Stage::kStart) {
+    jobs_.begin(time, run.step);
+    stage_ = Stage::kBefore;
+  }
+  if (stage_ == Stage::kBefore) {
+    if (hand_back(Phase::kBefore, result, run.dt)) {
+      result.end = End::kBefore;
+      return false;
+    }
+    stage_ = Stage::kPhysics;
+    if (run.calls_physics) {
+      stage_ = Stage::kAfter;
+      result.end = End::kPhysics;
+      return false;
+    }
+  }
+  if (stage_ == Stage::kPhysics) {
+    result.report =
+        step_unchecked(run.dt, run.velocity_iterations, run.position_iterations, nullptr);
+    ++result.physics_steps;
+    stage_ = Stage::kAfter;
+    if (!result.report.empty() || contacts_.has_rows()) {
+      result.end = End::kAfterPhysics;
+      return false;
+    }
+  }
+  if (hand_back(Phase::kAfter, result, run.dt)) {
+    const bool is_last = jobs_.is_complete(Phase::kAfter);
+    result.end = is_last ? End::kLastCalls : End::kAfter;
+    if (is_last) stage_ = Stage::kStart;
+    return false;
+  }
+  stage_ = Stage::kStart;
+  return true;
+}
+
+bool World::hand_back(Phase phase, RunResult& result, double dt) {
+  result.calls = jobs_.carry_out(*this, phase, dt);
+  result.failed = jobs_.take_failed();
+  return !result.calls.empty() || !result.failed.empty();
 }
 
 void World::interrupt() {
@@ -308,7 +343,7 @@ void World::destroy_body(Id id) {
   rays_.remove_body(body);
   engine_->DestroyBody(body);  // calls SayGoodbye for its fixtures and joints
   bodies_.erase(id);
-  plan_.remove_body(id);
+  jobs_.remove_body(id);
   contacts_.record_body(id, 0);
   contacts_.touches.set_owned(id, false);
 }

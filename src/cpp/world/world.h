@@ -25,8 +25,8 @@
 #include "parallel/thread_pool.h"
 #include "rays/ray_scene.h"
 #include "world/contacts.h"
+#include "world/job_queue.h"
 #include "world/slot_map.h"
-#include "world/step_plan.h"
 
 namespace flatland {
 
@@ -37,19 +37,38 @@ struct JointRecord {
   float damping_ratio = 0.0F;
 };
 
-// How many steps a call of `World::run` performed, and why it ended.
+// Steps to be performed by `World::run`.
+struct Run {
+  std::int64_t time = 0;  // simulated time at which the next step begins, or has begun [ns]
+  std::int64_t step = 1;  // simulated time of a step [ns]
+  std::int64_t n = 0;     // number of steps, including one that has begun
+  double dt = 0.0;        // simulated time of a step [s]
+  int velocity_iterations = 0;
+  int position_iterations = 0;
+  bool continues = false;      // whether a step that was handed back is completed, and no other one
+  bool calls_physics = false;  // whether the physics step is performed by the caller
+
+  void check() const;  // throws std::invalid_argument if a number is out of range
+};
+
+// How many steps `World::run` completed, and what is to be done outside of the core now. A step in
+// which there is something to do is not complete; `Run::continues` completes it.
 struct RunResult {
   enum class End : std::uint8_t {
-    kDone,     // all steps were performed
-    kCall,     // code is to be called in the next step, which has not begun
-    kFailed,   // the next step has begun, and a controller has failed before the physics step
-    kPhysics,  // the next step has begun, and its physics step was performed, but nothing after it
-    kStopped,  // `interrupt` was called, or the run reached its time limit
+    kDone,          // nothing; all steps were completed, or the run was interrupted
+    kBefore,        // calls before the physics step
+    kPhysics,       // the physics step itself
+    kAfterPhysics,  // the report of the physics step and the contacts are to be examined
+    kAfter,         // calls after the physics step
+    kLastCalls,     // the same, and nothing is left to be done in this step afterwards
   };
 
-  std::int64_t steps = 0;  // complete steps
+  std::int64_t steps = 0;
   End end = End::kDone;
   StepReport report;
+  std::vector<Id> calls;          // callbacks
+  std::vector<FailedJob> failed;  // since the last result
+  std::int64_t physics_steps = 0;
 };
 
 class World final : private b2DestructionListener {
@@ -74,11 +93,10 @@ class World final : private b2DestructionListener {
   // Advances the world by dt > 0 seconds. The hook may be null. The caller has exclusive use of the
   // world. While a body is invalid the world does not advance, and the report names the body again.
   StepReport step(double dt, int velocity_iterations, int position_iterations, PreSolveHook* hook);
-  // Performs up to n steps without calling code, from step k (counted from time 0) on. Ends early
-  // as described in RunResult; with `only_physics`, after the first physics step. The caller has
-  // exclusive use of the world.
-  RunResult run(std::int64_t k, std::int64_t n, double dt, int velocity_iterations,
-                int position_iterations, bool only_physics);
+  // Performs steps with their jobs, until something is to be done outside of the core, after an
+  // interrupt, and after some time, so that Python can handle signals. The caller has exclusive use
+  // of the world.
+  RunResult run(const Run& run);
   // Makes `run` return after the current step, and `wait_until` at once; safe from any thread. It
   // has an effect until `clear_interrupt` is called.
   void interrupt();
@@ -89,6 +107,8 @@ class World final : private b2DestructionListener {
 
   // Duration of the last step in wall time [s], an estimate of that of the next one.
   double last_step_time() const { return last_step_time_; }
+  // Returns the expected wall time of a run up to its first call [s].
+  double expected_time(const Run& run);
 
   // Access to objects by id. Throw StaleHandleError if the object was destroyed or the world is
   // closed, and WorldLockedError if the world is in use. Pointers are valid until the next change.
@@ -131,8 +151,8 @@ class World final : private b2DestructionListener {
   ContactRecorder& contacts() { return contacts_; }
   const ContactRecorder& contacts() const { return contacts_; }
   RayScene& rays() { return rays_; }
-  StepPlan& plan() { return plan_; }
-  // Null if the object was destroyed; for the steps of a plan.
+  JobQueue& jobs() { return jobs_; }
+  // Null if the object was destroyed; for jobs.
   b2Body* find_body(Id id) {
     b2Body* const* body = bodies_.find(id);
     return body == nullptr ? nullptr : *body;
@@ -184,8 +204,15 @@ class World final : private b2DestructionListener {
   std::vector<Id> still_invalid() const;
   StepReport step_unchecked(double dt, int velocity_iterations, int position_iterations,
                             PreSolveHook* hook);
+  // Performs the current step from the current stage on. Returns whether it is complete; otherwise,
+  // the result contains what is to be done.
+  bool perform(const Run& run, std::int64_t time, RunResult& result);
+  bool hand_back(Phase phase, RunResult& result, double dt);
   [[noreturn]] void throw_locked() const;
   void wait_for_readers() const;
+
+  // What comes next in a step.
+  enum class Stage : std::uint8_t { kStart, kBefore, kPhysics, kAfter };
 
   static constexpr int kExclusive = -1;
 
@@ -195,7 +222,8 @@ class World final : private b2DestructionListener {
   SlotMap<JointRecord, IdKind::kJoint> joints_;
   ContactRecorder contacts_;
   RayScene rays_{fixtures_};
-  StepPlan plan_;
+  JobQueue jobs_;
+  Stage stage_ = Stage::kStart;
   ThreadPool threads_;
   double last_step_time_ = 1.0;  // the first step may be long
   std::vector<Id> invalid_;      // bodies that the last step left so

@@ -267,6 +267,7 @@ def test_adapter_without_functions_raises() -> None:
         register_adapter(int, String)
 
 
-def test_adapter_that_only_serializes_raises() -> None:
-    with pytest.raises(ValueError, match="an adapter for int needs to_message for serialize"):
-        register_adapter(int, String, from_message=len, serialize=bytes)
+def test_adapter_that_only_serializes_converts_to_messages_too() -> None:
+    text = b"\5\0\0\0seven"
+    register_adapter(complex, String, serialize=lambda _value: text)
+    assert sent(7j).data == "seven"

@@ -8,7 +8,6 @@ import signal
 import socket
 import sys
 import threading
-import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
@@ -22,7 +21,7 @@ from sensor_msgs.msg import LaserScan
 from std_msgs.msg import String
 from std_srvs.srv import Empty, Trigger
 from tcpros import ServiceClient, is_closed
-from waiting import wait_until
+from waiting import TIMEOUT, wait_until
 
 from flatland.srv import DeleteModel
 
@@ -34,9 +33,9 @@ plugins:
      angle: {min: -2, max: 2, increment: 0.0004}}
 """
 SCAN_SIZE = 80_000  # bytes, about: ranges and intensities of 10 001 beams
-CLIENTS = 50
-CALLS = 200  # of each client
-CONNECTIONS = 10_000
+CLIENTS = 20
+CALLS = 50  # of each client
+CONNECTIONS = 2000
 MAX_FILES = 300  # of the node in the test with many connections
 
 
@@ -193,28 +192,14 @@ def test_killed_subscriber_leaves_nothing_behind(
     node.assert_serves()
 
 
-def test_subscriber_that_never_reads_costs_neither_memory_nor_speed(node: Node, ros: Any) -> None:
-    clock = ros.topic("/clock", Clock)
-
-    def rate(steps: int) -> float:
-        """Returns the rate of the simulation [Hz] over some steps."""
-        clock.drop()
-        first, start = clock.next().clock.to_sec(), time.monotonic()
-        clock.until(lambda message: message.clock.to_sec() >= first + steps * 0.005)
-        return steps / (time.monotonic() - start)
-
-    reader = ros.topic("/scan", LaserScan)
-    rate(20)
-    usual = rate(200)
-    memory = node.status("VmRSS")
+def test_subscriber_that_never_reads_costs_no_memory(node: Node, ros: Any) -> None:
     stuck = tcpros.Subscriber(ros.master, "/scan", LaserScan)
-    with_stuck = rate(400)
+    ros.step(1.0)
+    memory = node.status("VmRSS")
+    ros.step(2.0)  # The call would not return if the publisher waited.
     grown = node.status("VmRSS") - memory
     sent = 400 * SCAN_SIZE // 1024
     assert grown < sent / 4, f"{grown} kB for {sent} kB of messages"
-    # Other programs use the machine as well; a publisher that waits would stop the simulation.
-    assert with_stuck > usual / 3
-    assert reader.next()
     stuck.socket.close()
     node.assert_serves()
 
@@ -374,10 +359,11 @@ def test_many_connections_that_are_left_open(
         f"_world_path:={write_world()}",
         "__name:=crowded",
         "delete_model:=/crowded/delete_model",
+        f"_shutdown_timeout:={TIMEOUT}",
     )
     process.wait_for_line("loaded")
     wait_until(
-        "the node", lambda: ros.registered("/crowded")["services"] >= {"/crowded/delete_model"}
+        "the node", lambda: ros.registered_now("/crowded")["services"] >= {"/crowded/delete_model"}
     )
     tcpros_address = tcpros.service_address(ros.master, "/crowded/delete_model")
     xmlrpc_address = tcpros.xmlrpc_address(ros.master, "/crowded")

@@ -1,9 +1,8 @@
-"""The ROS master is killed and restarted, and two simulators have one name."""
+"""The ROS master is killed and restarted."""
 
 from __future__ import annotations
 
 import os
-import re
 import signal
 import socket
 import sys
@@ -17,11 +16,10 @@ import rosgraph
 import tcpros
 from geometry_msgs.msg import Pose2D
 from rosgraph_msgs.msg import Clock
-from std_srvs.srv import Empty
 from tcpros import ServiceClient
-from waiting import wait_until
+from waiting import TIMEOUT, wait_until
 
-from flatland.srv import SetRate, SpawnModel
+from flatland.srv import SetRate, SpawnModel, WaitUntilReady
 
 NODE = "/flatland_server"
 PLUGIN = """
@@ -132,17 +130,15 @@ def core(launcher: Any) -> Core:
 
 
 def start_server(core: Core, launcher: Any, server_path: str, world: Path) -> Any:
-    """Starts a node that publishes debug markers and waits for the topics opened last."""
-    server = launcher.program(
-        server_path, f"_world_path:={world}", "_show_viz:=true", "_custom:=value"
-    )
-    wait_until(
-        "the interactive markers",
-        lambda: (
-            "/interactive_model_markers/feedback" in registered(core.master)[1]
-            and f"{NODE}/debug/model/robot" in registered(core.master)[0]
-        ),
-    )
+    """Starts a node that publishes debug markers, and waits until all its topics are registered."""
+    arguments = (f"_world_path:={world}", "_show_viz:=true", "_custom:=value")
+    server = launcher.program(server_path, *arguments, f"_shutdown_timeout:={TIMEOUT}")
+    service = "/wait_until_ready"
+    wait_until("its services", lambda: service in registered(core.master)[2])
+    address = tcpros.service_address(core.master, service)
+    client = ServiceClient(address, service, WaitUntilReady, persistent=False)
+    answer = client.call([], TIMEOUT)
+    assert answer.success, answer.message
     return server
 
 
@@ -187,18 +183,16 @@ def test_node_registers_again_with_a_new_master(
         rf"\[WARN\].*the ROS master at {core.uri} is back: registered \d+ topics, "
         r"\d+ subscriptions and \d+ services again"
     )
-    wait_until("the topics of the new model", lambda: "/late/talk" in registered(core.master)[0])
     late = {"/late/talk", "/late/odometry/ground_truth", f"{NODE}/debug/model/late"}
+    wait_until("the topics of the new model", lambda: late <= registered(core.master)[0])
     wait_until(
         "all registrations",
         lambda: (
-            {name for name in registered(core.master)[0] if "/late" not in name} >= before[0]
-            and late <= registered(core.master)[0]
+            [{name for name in names if "late" not in name} for names in registered(core.master)]
+            == before
         ),
     )
-    after = registered(core.master)
-    assert [{name for name in names if "late" not in name} for names in after] == before
-    assert core.master.getParam(f"{NODE}/update_rate") == 210.0
+    wait_until("the rate", lambda: core.master.getParam(f"{NODE}/update_rate") == 210.0)
     assert core.master.getParam(f"{NODE}/custom") == "value"
     assert core.master.getParam("/use_sim_time") is True
     # The old client finds the service again; a new one finds the topics in both directions.
@@ -220,21 +214,3 @@ def test_node_registers_again_with_a_new_master(
     core.kill()
     assert server.stop() == 0
     assert "Traceback" not in server.output
-
-
-def test_the_second_simulator_takes_the_name(
-    launcher: Any, ros: Any, write_world: Callable[..., Path]
-) -> None:
-    world = write_world("[{name: robot, model: robot.model.yaml}]")
-    first = launcher.server(world)
-    second = launcher.start(world_path=world)
-    assert first.wait() == 1
-    (line,) = (line for line in first.lines if "[FATAL]" in line)
-    assert re.search(
-        rf'another node has taken the name "{NODE}" on the ROS master at \S+: this one ends$', line
-    )
-    assert "Traceback" not in first.output
-    second.wait_for_line("loaded")
-    wait_until("the services", lambda: "/toggle_pause" in ros.registered()["services"])
-    ros.call("/toggle_pause", Empty)
-    assert second.stop() == 0

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import math
 import threading
 import time
@@ -13,7 +12,7 @@ from typing import Any
 import pytest
 from geometry_msgs.msg import Point, Pose, Quaternion
 from nav_msgs.msg import Odometry
-from rosgraph_msgs.msg import Clock
+from std_msgs.msg import Bool
 from std_srvs.srv import Empty
 from visualization_msgs.msg import (
     InteractiveMarker,
@@ -23,19 +22,13 @@ from visualization_msgs.msg import (
     InteractiveMarkerUpdate,
     Marker,
 )
-from waiting import wait_until
 
 SERVER = "/interactive_model_markers"
 NAN = math.nan
-LONGER_THAN_A_DRAG = 0.3  # s; a drag ends after 0.1 s without feedback
 
 DRIVER = """
 bodies: [{name: base, footprints: [{type: circle, radius: 0.2, density: 1}]}]
 plugins: [{type: DiffDrive, name: drive, body: base, pub_rate: 50}]
-"""
-SHUTTLE = """
-bodies: [{name: base, type: kinematic, footprints: []}]
-plugins: [{type: Tween, name: tween, body: base, delta: [3, 0, 0], duration: 5, mode: yoyo}]
 """
 
 
@@ -133,8 +126,9 @@ def client(ros: Any) -> Client:
 
 
 @pytest.fixture
-def clock(ros: Any) -> Any:
-    return ros.topic("/clock", Clock)
+def paused(ros: Any) -> Any:
+    """Whether the world is paused."""
+    return ros.topic("/flatland_server/paused", Bool)
 
 
 @pytest.fixture
@@ -144,7 +138,10 @@ def truth(ros: Any) -> Any:
 
 
 def updates(ros: Any) -> Any:
-    return ros.topic(f"{SERVER}/update", InteractiveMarkerUpdate)
+    """Subscribes to updates; further ones are received as soon as there is a first one."""
+    topic = ros.topic(f"{SERVER}/update", InteractiveMarkerUpdate)
+    topic.next()
+    return topic
 
 
 def full_state(ros: Any, namespace: str = "") -> dict[str, InteractiveMarker]:
@@ -155,27 +152,13 @@ def full_state(ros: Any, namespace: str = "") -> dict[str, InteractiveMarker]:
     return {marker.name: marker for marker in message.markers}
 
 
-def assert_paused(clock: Any) -> None:
-    """Waits, as a busy machine may hold up a client until its drag is over."""
-
-    def silent() -> bool:
-        clock.drop()
-        time.sleep(0.1)  # The absence of messages is no event.
-        return not clock.rest(0.001)
-
-    wait_until("a pause", silent)
-
-
-def assert_running(clock: Any) -> None:
-    clock.drop()
-    clock.take(3)
-
-
-def assert_not_moved(truth: Any) -> None:
-    """Checks that the model has its initial pose."""
-    truth.drop()
-    pose = truth.take(3)[-1].pose.pose
-    assert planar(pose) == pytest.approx((1, 2, 0.5), abs=1e-5)
+def assert_moves_straight(truth: Any, pose: tuple[float, float, float]) -> None:
+    """Checks that the model is at its initial pose until it is at another one."""
+    is_there, is_at_start = moved(*pose), moved(1, 2, 0.5)
+    message = truth.next()
+    while not is_there(message):
+        assert is_at_start(message), planar(message.pose.pose)
+        message = truth.next()
 
 
 def moved(x: float, y: float, theta: float) -> Callable[[Odometry], bool]:
@@ -186,6 +169,11 @@ def moved(x: float, y: float, theta: float) -> Callable[[Odometry], bool]:
 
 
 def test_fields_of_a_marker(ros: Any) -> None:
+    ros.wait_until_ready()
+    types = ros.types()
+    assert types[f"{SERVER}/update"] == "visualization_msgs/InteractiveMarkerUpdate"
+    assert types[f"{SERVER}/update_full"] == "visualization_msgs/InteractiveMarkerInit"
+    assert types[f"{SERVER}/feedback"] == "visualization_msgs/InteractiveMarkerFeedback"
     message = ros.topic(f"{SERVER}/update_full", InteractiveMarkerInit).next()
     assert message.server_id == "/flatland_server"
     assert message._connection_header["latching"] == "1"
@@ -221,16 +209,8 @@ def test_fields_of_a_marker(ros: Any) -> None:
     assert entry.command_type == entry.FEEDBACK
 
 
-def test_topic_names_and_types(ros: Any) -> None:
-    types = ros.types()
-    assert types[f"{SERVER}/update"] == "visualization_msgs/InteractiveMarkerUpdate"
-    assert types[f"{SERVER}/update_full"] == "visualization_msgs/InteractiveMarkerInit"
-    assert types[f"{SERVER}/feedback"] == "visualization_msgs/InteractiveMarkerFeedback"
-
-
 def test_models_are_added_moved_and_deleted(ros: Any) -> None:
     update = updates(ros)
-    update.next()
     assert ros.spawn("ball.model.yaml", "ball", "", (-1, -2, 0)).success
     message = update.until(lambda message: message.markers)
     (marker,) = message.markers
@@ -263,7 +243,7 @@ def test_sequence_numbers_of_updates_have_no_gaps(ros: Any) -> None:
     """RViz reinitializes when a number is missing, and initially waits for a matching state."""
     update = updates(ros)
     full = ros.topic(f"{SERVER}/update_full", InteractiveMarkerInit)
-    numbers = [update.next().seq_num]
+    numbers = [update.next().seq_num]  # of a keep-alive message
     for i in range(3):
         assert ros.move("rob", (i, 0, 0)).success
         numbers.append(update.until(lambda message: message.poses).seq_num)
@@ -282,236 +262,73 @@ def test_keep_alive_messages_are_published_while_paused(ros: Any) -> None:
     assert time.monotonic() - before_the_first > 2 * 0.5 - 0.1
 
 
-# -- drags ---------------------------------------------------------------------------------
+# -- feedback ------------------------------------------------------------------------------
 
 
-def test_drag_pauses_and_release_moves(client: Client, clock: Any, truth: Any) -> None:
-    assert_running(clock)
+def test_drag_pauses_and_release_moves(client: Client, paused: Any, truth: Any) -> None:
     client.press()
     with ContinuousDrag(client, 0, -1, 1.5):
-        assert_paused(clock)
+        paused.until(lambda message: message.data)
         client.release(-1, -2, 2.5)
     # Feedback after the release starts another drag, which times out.
     truth.until(moved(-1, -2, 2.5))
     twist = truth.next().twist.twist
     assert (twist.linear.x, twist.linear.y, twist.angular.z) == pytest.approx((0, 0, 0), abs=1e-6)
-    assert_running(clock)
+    paused.until(lambda message: not message.data)
 
 
-def test_release_without_a_drag_moves(client: Client, clock: Any, truth: Any) -> None:
-    client.release(-2, -1, -0.5)
-    truth.until(moved(-2, -1, -0.5))
-    assert_running(clock)
-
-
-def test_click_does_not_move(client: Client, clock: Any, truth: Any) -> None:
+def test_click_does_not_move_and_release_without_a_drag_does(client: Client, truth: Any) -> None:
     client.press()
     client.release(1, 2, 0.5)
-    assert_running(clock)
-    assert_not_moved(truth)
+    client.release(-2, -1, -0.5)
+    # From the initial pose straight to the last one.
+    assert_moves_straight(truth, (-2, -1, -0.5))
 
 
 def test_model_does_not_move_during_a_drag(
-    client: Client, ros: Any, clock: Any, truth: Any
+    client: Client, ros: Any, paused: Any, truth: Any
 ) -> None:
     update = updates(ros)
     with ContinuousDrag(client, -3, -3, 1):
         # Other clients receive the pose of the drag.
         update.until(lambda m: m.poses and planar(m.poses[0].pose) == pytest.approx((-3, -3, 1)))
-        assert_paused(clock)
-        late = full_state(ros)["rob"]
-        assert planar(late.pose) == pytest.approx((-3, -3, 1))
+        paused.until(lambda message: message.data)
+        assert planar(full_state(ros)["rob"].pose) == pytest.approx((-3, -3, 1))
     # The drag timed out without a release: the marker returns to the model.
     message = update.until(lambda m: m.poses and m.poses[0].pose.position.x > 0)
     assert planar(message.poses[0].pose) == pytest.approx((1, 2, 0.5), abs=1e-5)
-    assert_running(clock)
-    assert_not_moved(truth)
+    paused.until(lambda message: not message.data)
+    client.release(-2, -1, -0.5)
+    assert_moves_straight(truth, (-2, -1, -0.5))
 
 
-def drag_and_stop_sending(client: Client, clock: Any) -> None:
-    """Drags without a release until a pause of the length that ends such a drag is observed."""
-
-    def longest_gap() -> float:
-        clock.drop()
-        client.press()
-        client.drag(0, 0, 0)
-        times = [time.monotonic()]
-        for _ in range(50):  # 0.25 s of simulated time, in which the drag arrives
-            clock.next()
-            times.append(time.monotonic())
-        return max(after - before for before, after in itertools.pairwise(times))
-
-    # On a busy machine the clock may arrive so late that the gap closes.
-    wait_until("a pause", lambda: longest_gap() > 0.09)
-
-
-def test_drag_without_feedback_times_out(client: Client, clock: Any) -> None:
-    drag_and_stop_sending(client, clock)
-    assert_running(clock)
-
-
-def test_drag_continues_after_an_interruption(client: Client, clock: Any, truth: Any) -> None:
-    drag_and_stop_sending(client, clock)
-    assert_running(clock)
-    with ContinuousDrag(client, 0, 0, 0):
-        assert_paused(clock)
-    client.release(-1, 0, 0)
-    truth.until(moved(-1, 0, 0))
-
-
-def test_keep_alive_feedback_continues_a_drag(client: Client, clock: Any) -> None:
-    def kept() -> bool:
-        client.press()
-        for _ in range(10):
-            client.send(InteractiveMarkerFeedback.KEEP_ALIVE)
-            time.sleep(0.03)  # The rate of the feedback is under test.
-        clock.drop()
-        client.send(InteractiveMarkerFeedback.KEEP_ALIVE)
-        return clock.rest(0.05) == []
-
-    # A busy machine may hold up the client for too long.
-    assert any(kept() for _ in range(20))
-    assert_running(clock)
-
-
-def test_world_paused_by_the_user_remains_paused(
-    client: Client, ros: Any, clock: Any, truth: Any
-) -> None:
-    ros.call("/pause", Empty)
-    assert_paused(clock)
-    client.press()
-    client.drag(0, 0, 0)
-    client.release(-1, -1, 1)
-    assert_paused(clock)
-    client.press()  # without a release
-    time.sleep(LONGER_THAN_A_DRAG)
-    assert_paused(clock)
-    ros.call("/resume", Empty)
-    truth.until(moved(-1, -1, 1))
-
-
-def test_only_one_client_can_drag_a_marker(
-    client: Client, ros: Any, clock: Any, truth: Any
-) -> None:
-    other = Client(ros, "/other_rviz/Markers")
-    with ContinuousDrag(client, 0, 0, 0):
-        assert_paused(clock)
-        other.press()
-        other.drag(3, 3, 3)
-        other.release(3, 3, 3)
-        other.send(InteractiveMarkerFeedback.MENU_SELECT, menu_entry_id=1)
-        assert_paused(clock)
-    client.release(0, 1, 1)
-    truth.until(moved(0, 1, 1))
-    other.release(1, 0, 1)
-    truth.until(moved(1, 0, 1))
-
-
-def test_menu_deletes_the_model(client: Client, ros: Any, clock: Any) -> None:
-    assert ros.spawn("robot.model.yaml", "victim", "victim").success
-    entry = full_state(ros)["victim"].menu_entries[0].id
+def test_menu_deletes_the_model(client: Client, ros: Any) -> None:
     update = updates(ros)
+    assert ros.spawn("robot.model.yaml", "victim", "victim").success
+    update.until(lambda message: message.markers)
+    entry = full_state(ros)["victim"].menu_entries[0].id
     client.send(InteractiveMarkerFeedback.MENU_SELECT, marker="victim", menu_entry_id=entry)
     assert update.until(lambda message: message.erases).erases == ["victim"]
     assert not ros.delete("victim").success
     assert set(full_state(ros)) == {"rob"}
-    assert_running(clock)
 
 
-def test_model_is_deleted_during_a_drag(client: Client, ros: Any, clock: Any) -> None:
-    assert ros.spawn("ball.model.yaml", "victim").success
-    client.press(marker="victim")
-    client.send(InteractiveMarkerFeedback.MENU_SELECT, marker="victim", menu_entry_id=1)
-    client.drag(1, 1, 1, marker="victim")
-    client.release(1, 1, 1, marker="victim")
-    assert_running(clock)
-    assert not ros.delete("victim").success
-
-
-@pytest.mark.parametrize(
-    "pose",
-    [
-        pose_message(NAN, 0, 0),
-        pose_message(0, math.inf, 0),
-        pose_message(0, 0, NAN),
-        Pose(),  # zero quaternion
-        pose_message(1e30, 0, 0),  # out of range
-    ],
-    ids=["nan", "inf", "nan angle", "zero", "far"],
-)
-def test_invalid_poses_are_ignored(
-    client: Client, clock: Any, truth: Any, server: Any, pose: Pose
-) -> None:
-    for event in (
-        InteractiveMarkerFeedback.MOUSE_DOWN,
-        InteractiveMarkerFeedback.POSE_UPDATE,
-        InteractiveMarkerFeedback.MOUSE_UP,
-        InteractiveMarkerFeedback.KEEP_ALIVE,
-        InteractiveMarkerFeedback.BUTTON_CLICK,
-        77,
-    ):
-        client.send(event, pose)
-    assert_running(clock)
-    assert_not_moved(truth)
-    assert server.running
-
-
-def test_unknown_markers_menu_entries_and_frames_are_ignored(
-    client: Client, ros: Any, clock: Any, truth: Any, server: Any
-) -> None:
+def test_invalid_feedback_is_ignored(client: Client, ros: Any, truth: Any, server: Any) -> None:
+    for pose in (pose_message(NAN, 0, 0), Pose(), pose_message(1e30, 0, 0)):
+        for event in (
+            InteractiveMarkerFeedback.MOUSE_DOWN,
+            InteractiveMarkerFeedback.POSE_UPDATE,
+            InteractiveMarkerFeedback.MOUSE_UP,
+            InteractiveMarkerFeedback.KEEP_ALIVE,
+            77,
+        ):
+            client.send(event, pose)
     client.press(marker="ghost")
     client.release(0, 0, 0, marker="ghost")
     client.send(InteractiveMarkerFeedback.MENU_SELECT, marker="ghost", menu_entry_id=1)
     client.send(InteractiveMarkerFeedback.MENU_SELECT, menu_entry_id=99)
     client.release(0, 0, 0, frame="base_link")
     server.wait_for_line('WARN.*"rob": ignoring a pose in frame "base_link"')
-    assert_running(clock)
-    assert_not_moved(truth)
-    assert set(full_state(ros)) == {"rob"}
     client.release(1, 1, 1, frame="/map")
-    truth.until(moved(1, 1, 1))
-
-
-# -- rate of updates -----------------------------------------------------------------------
-
-
-def test_no_updates_are_published_when_nothing_moves(ros: Any, clock: Any) -> None:
-    update = updates(ros)
-    full = ros.topic(f"{SERVER}/update_full", InteractiveMarkerInit)
-    update.until(lambda message: message.type == InteractiveMarkerUpdate.KEEP_ALIVE)
-    assert_running(clock)
-    full.drop()
-    assert {message.type for message in update.take(3)} == {InteractiveMarkerUpdate.KEEP_ALIVE}
-    assert full.rest() == []
-
-
-def test_rate_of_updates_is_limited_to_30_hz(
-    ros: Any, launcher: Any, write_world: Callable[..., Path]
-) -> None:
-    world = write_world("[{name: shuttle, model: shuttle.model.yaml}]", shuttle=SHUTTLE)
-    launcher.server(world, "__ns:=/fast", update_rate=0)
-    before_the_first = time.monotonic()
-    update = ros.topic(f"/fast{SERVER}/update", InteractiveMarkerUpdate)
-    for _ in range(60):
-        message = update.until(lambda message: message.type == InteractiveMarkerUpdate.UPDATE)
-        assert [pose.name for pose in message.poses] == ["shuttle"]
-    # A period between two of them, however late they arrive.
-    assert time.monotonic() - before_the_first > 59 / 30
-
-
-def test_no_updates_are_created_without_clients(
-    ros: Any, launcher: Any, write_world: Callable[..., Path]
-) -> None:
-    models = "[{name: shuttle, model: shuttle.model.yaml}, {name: rob, model: driver.model.yaml}]"
-    launcher.server(write_world(models, shuttle=SHUTTLE, driver=DRIVER), "__ns:=/alone")
-
-    def next_number() -> int:
-        update = ros.topic(f"/alone{SERVER}/update", InteractiveMarkerUpdate)
-        number = update.until(lambda message: message.poses).seq_num
-        update.close()
-        return int(number)
-
-    before, start = next_number(), time.monotonic()
-    ros.topic("/alone/odometry/ground_truth", Odometry).take(100)  # 2 s
-    # 30 a second with a client; a few are created while a client connects or disconnects.
-    assert next_number() - before < 10 * (time.monotonic() - start)
+    assert_moves_straight(truth, (1, 1, 1))
+    assert set(full_state(ros)) == {"rob"}

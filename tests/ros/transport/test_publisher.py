@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import socket
 import struct
+import threading
 from collections.abc import Callable, Iterator
 from io import BytesIO
 from typing import Any
@@ -11,10 +13,11 @@ import pytest
 from geometry_msgs.msg import PointStamped
 from raw_subscriber import RawSubscriber
 from std_msgs.msg import Int32
-from waiting import TIMEOUT
+from waiting import TIMEOUT, wait_until
 
 from flatland.ros.transport.publisher import Publisher
 from flatland.ros.transport.registrar import Registrar
+from flatland.ros.transport.ros_transport import RosTransport
 
 STAMPED = "/flatland_tests/stamped"
 PLAIN = "/flatland_tests/plain"
@@ -51,9 +54,13 @@ def advertise(
         publisher = Publisher(registrar, topic, message_type, queue_size=100)
         publishers.append(publisher)
         assert registrar.flush(TIMEOUT)
-        for name in ("/first", "/second"):
+        for count, name in enumerate(("/first", "/second"), 1):
             subscribers.append(RawSubscriber(ros.master, topic, message_type, name=name))
-        eventually("two connections", lambda: len(publisher._publisher.impl.connections) == 2)
+            # One after the other, so that they are listed in this order.
+            eventually(
+                "the connection",
+                lambda count=count: len(publisher._publisher.impl.connections) == count,
+            )
         return publisher, subscribers
 
     subscribers: list[RawSubscriber] = []
@@ -69,6 +76,20 @@ def test_all_subscribers_receive_serialized_messages(advertise: Any) -> None:
         publisher.publish_serialized(struct.pack("<i", number))
     for subscriber in subscribers:
         assert [subscriber.next().data for _ in range(3)] == [0, 1, 2]
+
+
+def test_messages_are_not_delayed_after_disable_delay(advertise: Any, registrar: Registrar) -> None:
+    """Nagle's algorithm would hold back small messages beyond the response of step_world."""
+    publisher, _ = advertise(PLAIN, Int32)
+
+    def undelayed() -> list[int]:
+        connections = publisher._publisher.impl.connections
+        option = (socket.IPPROTO_TCP, socket.TCP_NODELAY)
+        return [connection.socket.getsockopt(*option) for connection in connections]
+
+    assert undelayed() == [0, 0]
+    RosTransport(registrar).disable_delay()
+    assert undelayed() == [1, 1]
 
 
 def test_sequence_numbers_continue_those_of_message_objects(advertise: Any) -> None:
@@ -97,9 +118,37 @@ def test_a_broken_connection_is_closed_and_the_others_receive_the_message(advert
     publisher.publish_serialized(struct.pack("<i", 8))
     assert first.done
     assert publisher._publisher.impl.connections == [second]
-    # Connections are listed in the order in which they were made.
     assert [subscribers[1].next().data for _ in range(2)] == [7, 8]
     assert subscribers[0].socket.recv(1) == b""
+
+
+def test_a_topic_is_ready_after_its_owner_was_notified(registrar: Registrar, ros: Any) -> None:
+    polled, ready = threading.Event(), threading.Event()
+    early: list[bool] = []
+
+    def notify(connected: bool) -> None:
+        if connected:
+            assert polled.wait(TIMEOUT)
+            early.append(ready.wait(0.1))
+
+    def is_connected() -> bool:
+        polled.set()
+        return registrar.is_connected(PLAIN)
+
+    def poll() -> None:
+        wait_until("a ready topic", is_connected)
+        ready.set()
+
+    publisher = Publisher(registrar, PLAIN, Int32, on_connection=notify)
+    assert registrar.flush(TIMEOUT)
+    thread = threading.Thread(target=poll)
+    subscriber = RawSubscriber(ros.master, PLAIN, Int32)
+    thread.start()
+    thread.join(TIMEOUT)
+    subscriber.close()
+    publisher.close()
+    assert ready.is_set()
+    assert early == [False]
 
 
 def test_nothing_is_serialized_without_subscribers(registrar: Registrar) -> None:

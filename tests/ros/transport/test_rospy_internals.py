@@ -9,7 +9,6 @@ from __future__ import annotations
 import inspect
 import socket
 import struct
-import subprocess
 import sys
 from collections.abc import Callable, Iterator
 from io import BytesIO
@@ -20,12 +19,13 @@ import rosgraph.xmlrpc
 import rospy
 import rospy.impl.rosout
 from geometry_msgs.msg import PointStamped
+from programs import run_program
 from rospy.impl import registration, tcpros_base
 from rospy.impl.paramserver import ParamServerCache
 from rospy.impl.tcpros_base import TCPROSTransport
 from rospy.impl.tcpros_pubsub import TCPROSHandler, TCPROSPub
 from rospy.msg import serialize_message
-from rospy.topics import _PublisherImpl, _TopicManager
+from rospy.topics import _PublisherImpl, _SubscriberImpl, _TopicImpl, _TopicManager
 from std_msgs.msg import Header, String
 
 
@@ -84,7 +84,8 @@ assert woken.wait(60)
 
 def test_ros_time_is_a_variable_with_a_condition() -> None:
     # In a process of its own, since the time belongs to the process.
-    done = subprocess.run([sys.executable, "-c", RUN_CLOCK], capture_output=True, text=True)
+    command = [sys.executable, "-c", RUN_CLOCK]
+    done = run_program(command)
     assert done.returncode == 0, done.stderr
 
 
@@ -207,6 +208,19 @@ def test_connections_have_the_attributes_that_an_outbox_uses(connect: Any) -> No
     transport.close()
     assert transport.done
     assert closed == [transport]
+
+
+@pytest.mark.parametrize("impl_type", [_PublisherImpl, _SubscriberImpl])
+def test_a_closed_topic_adds_no_connection_to_its_poller(impl_type: Any, connect: Any) -> None:
+    """`unregister` closes the poller with the lock that `add_connection` holds."""
+    impl = impl_type("/pinned", String)
+    with impl.c_lock:
+        assert impl.connection_poll.poller.fileno() >= 0
+    impl.close()
+    impl.connection_poll.poller.close()
+    transport, _ = connect()
+    assert _TopicImpl.add_connection(impl, transport) is False
+    _TopicImpl.remove_connection(impl, transport)
 
 
 def test_shutdown_can_be_queried() -> None:

@@ -1,4 +1,4 @@
-"""State topics; the publisher is in this process, the subscribers in others."""
+"""State topics; the publisher and the subscribers are in this process."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from concurrent.futures import Future
 from typing import Any
 
 import pytest
+from raw_subscriber import RawSubscriber
 from std_msgs.msg import Int32
 from waiting import TIMEOUT
 
@@ -63,13 +64,18 @@ def topic(registrar: Registrar, state: State) -> Iterator[StateTopic]:
 
 
 @pytest.fixture
-def echo(launcher: Any) -> Callable[..., Any]:
-    """Starts a subscriber in another process."""
+def subscribe(ros: Any) -> Iterator[Callable[[], RawSubscriber]]:
+    """Connects subscribers, each of them as a node of its own."""
+    opened: list[RawSubscriber] = []
 
-    def start(*options: str) -> Any:
-        return launcher.program("rostopic", "echo", *options, TOPIC)
+    def connect() -> RawSubscriber:
+        name = f"/subscriber{len(opened)}"
+        opened.append(RawSubscriber(ros.master, TOPIC, Int32, name=name))
+        return opened[-1]
 
-    return start
+    yield connect
+    for subscriber in opened:
+        subscriber.close()
 
 
 def test_no_message_is_created_without_subscribers(topic: StateTopic, state: State) -> None:
@@ -80,53 +86,47 @@ def test_no_message_is_created_without_subscribers(topic: StateTopic, state: Sta
 
 
 def test_new_subscriber_receives_the_current_state(
-    topic: StateTopic, state: State, echo: Callable[..., Any]
+    topic: StateTopic, state: State, subscribe: Callable[[], RawSubscriber]
 ) -> None:
     state.value = 1
-    first = echo()
-    first.wait_for_line("data: 1")
+    first = subscribe()
+    assert first.next().data == 1
     assert state.created == 1
     state.value = 2  # Not published.
-    second = echo("-n", "1")
-    second.wait_for_line("data: 2")
-    assert second.wait() == 0
+    assert subscribe().next().data == 2
     state.value = 3
     topic.send()
-    first.wait_for_line("data: 3")
-    assert [line for line in first.lines if "data" in line] == ["data: 1", "data: 3"]
+    assert first.next().data == 3
     assert state.created == 3
     assert state.connections[0] is False
     assert True in state.connections
 
 
 def test_no_message_is_stored_for_late_subscribers(
-    topic: StateTopic, state: State, echo: Callable[..., Any], eventually: Any
+    topic: StateTopic, state: State, subscribe: Callable[[], RawSubscriber], eventually: Any
 ) -> None:
-    first = echo("-n", "1")
-    first.wait_for_line("data: 0")
-    assert first.wait() == 0
+    first = subscribe()
+    assert first.next().data == 0
+    first.close()
     eventually("no subscribers", lambda: not topic.connected)
     state.value = 5
     topic.send()
     assert state.created == 1
-    second = echo("-n", "1")
-    second.wait_for_line("data: 5")
-    assert second.wait() == 0
+    assert subscribe().next().data == 5
 
 
 def test_replaced_state_is_published(
-    topic: StateTopic, state: State, echo: Callable[..., Any]
+    topic: StateTopic, subscribe: Callable[[], RawSubscriber]
 ) -> None:
-    subscriber = echo()
-    subscriber.wait_for_line("data: 0")
+    subscriber = subscribe()
+    assert subscriber.next().data == 0
     topic.replace(lambda: Int32(77))
-    subscriber.wait_for_line("data: 77")
-    late = echo("-n", "1")
-    late.wait_for_line("data: 77")
+    assert subscriber.next().data == 77
+    assert subscribe().next().data == 77
 
 
 def test_topic_is_connected_before_the_first_message(
-    topic: StateTopic, echo: Callable[..., Any]
+    topic: StateTopic, subscribe: Callable[[], RawSubscriber]
 ) -> None:
     connected_when_made = []
 
@@ -135,21 +135,23 @@ def test_topic_is_connected_before_the_first_message(
         return Int32(4)
 
     topic.replace(make)
-    echo().wait_for_line("data: 4")
+    assert subscribe().next().data == 4
     assert connected_when_made == [True]
 
 
 def test_second_topic_of_the_same_name_publishes_to_existing_subscribers(
-    topic: StateTopic, registrar: Registrar, state: State, echo: Callable[..., Any]
+    topic: StateTopic,
+    registrar: Registrar,
+    state: State,
+    subscribe: Callable[[], RawSubscriber],
 ) -> None:
-    subscriber = echo()
-    subscriber.wait_for_line("data: 0")
+    subscriber = subscribe()
+    assert subscriber.next().data == 0
     second = StateTopic(registrar, TOPIC, Int32, lambda: Int32(9), state.post)
     topic.close()
-    subscriber.wait_for_line("data: 9")
+    assert subscriber.next().data == 9
     assert registrar.flush(TIMEOUT)
-    late = echo("-n", "1")
-    late.wait_for_line("data: 9")
+    assert subscribe().next().data == 9
     second.send()
     second.close()
     second.send()

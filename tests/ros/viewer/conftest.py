@@ -181,33 +181,39 @@ def viewer(
     viewer.close()
 
 
-def _hue(colors: Any) -> tuple[Any, Any]:
-    """Returns the hue of each colour, and its strength relative to grey."""
-    colored = colors - colors.min(axis=-1, keepdims=True).astype(float)
-    strength = colored.max(axis=-1)
-    return colored / np.maximum(strength, 1.0)[..., None], strength
-
-
 class Picture:
-    """A screenshot in the coordinates of the room [m], which it derives from the magenta walls."""
+    """A screenshot in the coordinates of the room [m], which it derives from the magenta walls.
+
+    Attributes:
+        image: The colours, shape (height, width, 3).
+        pixels_per_metre: Scale.
+        center: Pixel (column, row) at the centre of the room.
+    """
 
     def __init__(self, image: Any, area: Mapping[str, int] | None = None) -> None:
         left, top = (area["x"], area["y"]) if area else (0, 0)
         bottom, right = (top + area["height"], left + area["width"]) if area else image.shape[:2]
-        self.image = np.full_like(image, 0)
-        self.image[top:bottom, left:right] = image[top:bottom, left:right]
-        rows, columns = np.nonzero(self.mask(MAGENTA))
+        self.image = image
+        # Most pixels are grey, so that only the hues of the others are computed.
+        red, green, blue = (image[top:bottom, left:right, channel] for channel in range(3))
+        lowest = np.minimum(np.minimum(red, green), blue)
+        strength = np.maximum(np.maximum(red, green), blue) - lowest
+        rows, columns = np.nonzero(strength > _LEAST_STRENGTH)
+        colors = image[rows + top, columns + left] - lowest[rows, columns, None].astype(float)
+        self._hues = colors / strength[rows, columns, None]
+        self._rows, self._columns = rows + top, columns + left
+        rows, columns = self.pixels(MAGENTA)
         assert len(columns) > 50, "the walls of the room are not visible"
         left, right, top, bottom = columns.min(), columns.max(), rows.min(), rows.max()
         self.pixels_per_metre = (right - left) / 10.0
         self.center = ((left + right) / 2.0, (top + bottom) / 2.0)
         assert (bottom - top) / 10.0 == pytest.approx(self.pixels_per_metre, abs=0.2)
 
-    def mask(self, color: tuple[int, int, int]) -> Any:
-        """Returns which pixels have the hue of a colour; thin lines blend with the background."""
-        wanted, strength = _hue(np.array(color))
-        found, strength = _hue(self.image)
-        return (strength > _LEAST_STRENGTH) & (np.abs(found - wanted).max(axis=-1) < 0.15)
+    def pixels(self, color: tuple[int, int, int]) -> tuple[Any, Any]:
+        """Returns rows and columns with the hue of a colour; thin lines blend with the ground."""
+        wanted = np.array(color, float) - min(color)
+        found = np.abs(self._hues - wanted / wanted.max()).max(axis=1) < 0.15
+        return self._rows[found], self._columns[found]
 
     def at(self, x: float, y: float) -> tuple[float, float]:
         """Returns the pixel (column, row) at a point of the room [m]."""
@@ -218,7 +224,7 @@ class Picture:
 
     def places(self, color: tuple[int, int, int]) -> Any:
         """Returns the points of the room [m] that have a colour, shape (n, 2)."""
-        rows, columns = np.nonzero(self.mask(color))
+        rows, columns = self.pixels(color)
         x = (columns - self.center[0]) / self.pixels_per_metre
         y = (self.center[1] - rows) / self.pixels_per_metre
         return np.column_stack([x, y])

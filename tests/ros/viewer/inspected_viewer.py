@@ -1,8 +1,8 @@
 """The viewer with a socket for queries of its visible widgets: their areas, texts and states.
 
 The path of the socket is the first argument. A query is one line with the name or the class of
-widgets; the reply is one line of JSON. The viewer itself is unmodified, and is controlled through
-the X server.
+widgets; the reply is one line of JSON. The viewer is controlled through the X server. Only its
+frame rate is changed, since the processor draws the screen.
 """
 
 from __future__ import annotations
@@ -17,7 +17,10 @@ from typing import Any
 from PyQt5.QtCore import QObject, QPoint, pyqtSignal
 from PyQt5.QtWidgets import QApplication, QWidget
 
+from flatland.viewer import rviz_panel
 from flatland.viewer.app import main
+
+rviz_panel._CONFIG = rviz_panel._CONFIG.replace("Frame Rate: 30", "Frame Rate: 8")
 
 
 class Inspector(QObject):

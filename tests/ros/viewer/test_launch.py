@@ -75,6 +75,7 @@ def test_rviz_displays_everything_without_user_input(
         x, y = picture.at(4, 4)
         assert np.abs(picture.image[int(y), int(x)].astype(int) - 48).max() < 40
         ring = picture.places(BLUE)
+        assert len(ring) > 0
         assert np.median(ring, axis=0) == pytest.approx((-2, 1), abs=0.1)
         return True
 
@@ -114,7 +115,6 @@ def test_all_displays_are_enabled_in_the_rviz_configuration(ros: Any, checkout: 
         assert (display["Enabled"], display["Value"]) == (True, True), display["Name"]
 
 
-@pytest.mark.parametrize("package", ["flatland", "flatland_server"])
 def test_viewer_starts_with_the_simulator_and_can_be_closed_alone(
     on_screen: Any,
     ros: Any,
@@ -122,10 +122,10 @@ def test_viewer_starts_with_the_simulator_and_can_be_closed_alone(
     screen: Any,
     screenshot: Callable[..., Any],
     eventually: Callable[..., Any],
-    package: str,
 ) -> None:
-    # The types of the debug topics are those of flatland or flatland_msgs.
-    launch = on_screen.launch(package, "server.launch", f"world_path:={room}")
+    # With the names of the reference, so that the types of the debug topics are those of
+    # flatland_msgs.
+    launch = on_screen.launch("flatland_server", "server.launch", f"world_path:={room}")
     screenshot(lambda picture: len(picture.places(BLUE)) > 10)
     assert "/flatland_viz" in nodes()
 
@@ -137,35 +137,14 @@ def test_viewer_starts_with_the_simulator_and_can_be_closed_alone(
         )
 
     eventually("end of the viewer", has_ended, poll_period=1.0)
-    clock = ros.topic("/clock", Clock)
-    assert clock.take(20)
+    assert ros.topic("/clock", Clock).take(20)
     assert launch.stop() == 0
 
 
-@pytest.mark.parametrize(
-    ("package", "number"), [("flatland", signal.SIGINT), ("flatland_viz", signal.SIGTERM)]
-)
-def test_viewer_exits_on_a_signal(
-    on_screen: Any,
-    ros: Any,
-    running_room: Any,
-    screenshot: Callable[..., Any],
-    package: str,
-    number: signal.Signals,
-) -> None:
-    viewer = on_screen.program("rosrun", package, "flatland_viz")
-    screenshot(lambda picture: len(picture.places(BLUE)) > 10)
-    viewer.send(number)
-    assert viewer.wait() == 0
-    assert "Traceback" not in viewer.output
-    assert running_room.running
-
-
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_viewer_exits_on_a_signal_during_start(on_screen: Any, number: signal.Signals) -> None:
+def test_viewer_exits_on_a_signal_during_start(on_screen: Any) -> None:
     viewer = on_screen.program("rosrun", "flatland", "flatland_viz", XDG_RUNTIME_DIR="")
     viewer.wait_for_line("XDG_RUNTIME_DIR not set")  # logged by Qt just before RViz starts
-    viewer.send(number)
+    viewer.send(signal.SIGTERM)
     assert viewer.wait() == 0
     assert "Traceback" not in viewer.output
 
@@ -186,43 +165,24 @@ def test_a_signal_is_not_lost_while_rviz_starts(
     assert viewer.wait() == 0
 
 
-def test_viewer_starts_again_after_a_crash(
-    on_screen: Any, ros: Any, running_room: Any, screenshot: Callable[..., Any]
+def test_viewer_starts_again_after_a_crash_and_exits_on_a_signal(
+    on_screen: Any, ros: Any, room: Path, screenshot: Callable[..., Any]
 ) -> None:
-    viewer = on_screen.program("rosrun", "flatland", "flatland_viz")
+    del ros
+    server = on_screen.server(room, show_viz=True)
+    viewer = on_screen.program("rosrun", "flatland_viz", "flatland_viz")
     screenshot(lambda picture: len(picture.places(BLUE)) > 10)
     (crashed,) = viewer.children
     os.kill(crashed, signal.SIGSEGV)
     viewer.wait_for_line(r"RViz or OpenGL has crashed \(SIGSEGV\); the viewer starts again")
     screenshot(lambda picture: viewer.children != [crashed] and len(picture.places(BLUE)) > 10)
-    assert viewer.stop() == 0
-    assert running_room.running
+    viewer.send(signal.SIGTERM)
+    assert viewer.wait() == 0
+    assert "Traceback" not in viewer.output
+    assert server.running
 
 
-def test_viewer_exits_silently_if_the_simulator_fails(on_screen: Any) -> None:
-    launch = on_screen.launch("flatland", "server.launch", "world_path:=/no/such/world.yaml")
-    launch.wait_for_line("FATAL.*no/such/world.yaml")
-    launch.wait()
-    assert "Traceback" not in launch.output
-
-
-@pytest.fixture
-def running_room(on_screen: Any, room: Path) -> Any:
-    return on_screen.server(room, show_viz=True)
-
-
-def test_simulator_continues_without_a_display(launcher: Any, ros: Any, room: Path) -> None:
-    launcher.environment = {k: v for k, v in launcher.environment.items() if k != "DISPLAY"}
-    launch = launcher.launch("flatland", "server.launch", f"world_path:={room}")
-    launch.wait_for_line(r"the viewer cannot start: there is no display \(DISPLAY is not set\)")
-    launch.wait_for_line(r"flatland_viz-\d+. process has died")
-    assert ros.topic("/clock", Clock).take(20)
-    assert launch.stop() == 0
-
-
-def test_viewer_reports_why_it_cannot_start(
-    launcher: Any, ros_environment: dict[str, str], screen: Any, tmp_path: Path
-) -> None:
+def test_viewer_reports_why_it_cannot_start(launcher: Any, screen: Any, tmp_path: Path) -> None:
     def error_of(**environment: str) -> str:
         viewer = launcher.program("rosrun", "flatland", "flatland_viz", **environment)
         assert viewer.wait() == 1
@@ -232,8 +192,6 @@ def test_viewer_reports_why_it_cannot_start(
     assert "the display :4711 cannot be opened" in error_of(DISPLAY=":4711")
     no_master = error_of(ROS_MASTER_URI="http://127.0.0.1:1", DISPLAY=screen.display)
     assert "no ROS master at http://127.0.0.1:1" in no_master
-    invalid_uri = error_of(ROS_MASTER_URI="nonsense", DISPLAY=screen.display)
-    assert "invalid master URI: nonsense (from ROS_MASTER_URI)" in invalid_uri
     without_glx = type(screen)(640, 480, "-extension", "GLX")
     try:
         reason = f"the display {without_glx.display} has no OpenGL"

@@ -378,7 +378,7 @@ def test_model_is_below_the_mouse_in_a_rotated_view(
         screen.move(*mouse)
 
         def is_below_the_mouse(picture: Any, mouse: tuple[float, float] = mouse) -> bool:
-            rows, columns = np.nonzero(picture.mask(CYAN))
+            rows, columns = picture.pixels(CYAN)
             return len(rows) > 30 and math.dist((columns.mean(), rows.mean()), mouse) < 6
 
         screenshot(is_below_the_mouse, panel)

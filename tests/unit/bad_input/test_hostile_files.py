@@ -1,6 +1,7 @@
-"""Files that are no files, huge, cyclic or programs: each ends within 2 s and 500 MB.
+"""Files that are no files, huge, cyclic or programs: each ends, with at most 500 MB.
 
-They are loaded in one process without privileges, whose address space is limited. More expressions
+They are loaded in one process without privileges, whose address space and processor time per file
+are limited. More expressions
 are in tests/unit/config/test_lua.py.
 """
 
@@ -10,7 +11,6 @@ import json
 import os
 import shutil
 import struct
-import subprocess
 import sys
 import tempfile
 import zlib
@@ -21,11 +21,11 @@ from typing import Any
 
 import hostile_inputs
 import pytest
+from programs import run_program
 from waiting import TIMEOUT
 
 import flatland
 
-MAX_SECONDS = 2.0
 MAX_MEBIBYTES = 500
 LARGE = 100 * 10**6
 NOT_A_FILE = "it is not a regular file"
@@ -130,22 +130,6 @@ BOMB = "a: &a [x, x, x, x, x, x, x, x, x, x]\n" + "".join(
     f"{b}: &{b} [{', '.join([f'*{a}'] * 10)}]\n"
     for a, b in zip("abcdefgh", "bcdefghi", strict=True)
 )
-LUA = 'Flatland YAML: Failed to evaluate "{0}", {1} [{{path}}:1]'
-
-
-def lua(expression: str, why: str) -> Hostile:
-    """Returns a model file whose bodies are the value of an expression."""
-    escaped = expression.replace("{", "{{").replace("}", "}}")
-    return Hostile("model", content(f"bodies: $eval {expression}\n"), LUA.format(escaped, why))
-
-
-def not_a_list(expression: str) -> Hostile:
-    """Returns a model file with an expression whose value is nil."""
-    return Hostile(
-        "model",
-        content(f"bodies: $eval {expression}\n"),
-        'Flatland YAML: Entry "bodies" must be a list (in model "new") [{path}:1]',
-    )
 
 
 def slow_expressions(path: Path) -> None:
@@ -153,52 +137,12 @@ def slow_expressions(path: Path) -> None:
     path.write_text("".join(f"k{i}: $eval {loop}\n" for i in range(50)))
 
 
-def chain_of_includes(path: Path) -> None:
-    """Creates files each of which includes the next one twice."""
-    for number in range(40):
-        name = path if number == 0 else path.with_name(f"chain{number}.yaml")
-        name.write_text(f"[$include chain{number + 1}.yaml, $include chain{number + 1}.yaml]\n")
-    path.with_name("chain40.yaml").write_text("[]\n")
-
-
 HOSTILE: dict[str, Hostile] = {
     **dict(special_files()),
-    "world: not UTF-8": Hostile(
-        "world",
-        content(b"layers: []\nproperties: {\xff: 1}\n"),
-        'Flatland YAML: Malformatted file, path="{path}", line 2 col 14, byte 0xff is not valid '
-        "UTF-8",
-    ),
-    "model: not UTF-8": Hostile(
-        "model",
-        content(b"bodies: \xc3\x28\n"),
-        'Flatland YAML: Malformatted file, path="{path}", line 1 col 9, byte 0xc3 is not valid '
-        "UTF-8",
-    ),
-    "model: null bytes": Hostile(
-        "model",
-        content(b"bodies: \0\n"),
-        'Flatland YAML: Malformatted file, path="{path}", line 1 col 9, character U+0000 is not '
-        "allowed",
-    ),
-    "world: zero bytes": Hostile(
-        "world", content(""), 'Flatland YAML: Entry "properties" does not exist [{path}:1]'
-    ),
     "model: zero bytes": Hostile(
         "model",
         content(""),
         'Flatland YAML: Entry "bodies" does not exist (in model "new") [{path}:1]',
-    ),
-    "map: zero bytes": Hostile(
-        "map",
-        content(""),
-        'Flatland YAML: Entry must be a map (in layer "2d") [{path}:1]',
-    ),
-    "model: deep nesting": Hostile(
-        "model",
-        content("[" * 100_000),
-        'Flatland YAML: Malformatted file, path="{path}", line 1 col 101, nested deeper than 100 '
-        "levels",
     ),
     "model: alias bomb": Hostile(
         "model",
@@ -225,33 +169,11 @@ HOSTILE: dict[str, Hostile] = {
         ),
         'Flatland YAML: Entry contains unrecognized entry(s) {{"layer"}} [{path}:13]',
     ),
-    "model: alias of itself": Hostile(
-        "model",
-        content("bodies: &b [*b]\n"),
-        'Flatland YAML: Malformatted file, path="{path}", line 1 col 13, alias "b" refers to a '
-        "node that contains it",
-    ),
-    "model: includes itself": Hostile(
-        "model",
-        content("bodies: $include self.yaml\n"),
-        "Flatland YAML: File includes itself, {path} -> {folder}/self.yaml -> {path} "
-        "[{folder}/self.yaml:1]",
-    ),
-    "model: exponential includes": Hostile(
-        "model",
-        chain_of_includes,
-        "Flatland YAML: More than 5000 files are included [{folder}/chain38.yaml:1]",
-    ),
     "model: slow expressions": Hostile(
         "model",
         slow_expressions,
         'Flatland YAML: Failed to evaluate "local stop = os.clock() + 0.3 while os.clock() < stop '
         'do end return 1", all expressions together exceed the time limit of 1 s [{path}:4]',
-    ),
-    "image: truncated": Hostile(
-        "image",
-        content(png(400, 400, 400)[:200]),
-        'Flatland YAML: Failed to load "{path}" in layer "2d" [{folder}/map.yaml:1]',
     ),
     "image: only a header of 60 000 x 60 000": Hostile(
         "image",
@@ -263,88 +185,12 @@ HOSTILE: dict[str, Hostile] = {
         content(png(1, 2_000_000_000, 1)),
         'Flatland YAML: Failed to load "{path}" in layer "2d" [{folder}/map.yaml:1]',
     ),
-    "image: size 0": Hostile(
-        "image",
-        content(png(0, 0, 0)),
-        'Flatland YAML: Failed to load "{path}" in layer "2d" [{folder}/map.yaml:1]',
-    ),
-    "image: zero bytes": Hostile(
-        "image",
-        content(""),
-        'Flatland YAML: Failed to load "{path}" in layer "2d" [{folder}/map.yaml:1]',
-    ),
-    "image: text": Hostile(
-        "image",
-        content("no image"),
-        'Flatland YAML: Failed to load "{path}" in layer "2d" [{folder}/map.yaml:1]',
-    ),
-    "image: PGM header only": Hostile(
-        "image",
-        content("P5\n60000 60000\n255\n"),
-        'Flatland YAML: Failed to load "{path}" in layer "2d" [{folder}/map.yaml:1]',
-    ),
-    "data: not numbers": Hostile(
-        "data",
-        content("0 0 1 1\n# comment\n0 0 one 1\n"),
-        'Flatland File: Failed to read line segment from line 3, in file "hostile.data" [{path}:3]',
-        "MapFileError",
-    ),
-    "data: too few numbers": Hostile(
-        "data",
-        content("0 0 1\n"),
-        'Flatland File: Failed to read line segment from line 1, in file "hostile.data" [{path}:1]',
-        "MapFileError",
-    ),
-    "data: NaN": Hostile(
-        "data",
-        content("0 0 1 1\n0 0 nan 1\n"),
-        'Flatland File: Failed to read line segment from line 2, in file "hostile.data" [{path}:2]',
-        "MapFileError",
-    ),
     "data: 100 MB of numbers": Hostile(
         "data",
         numbers,
         'Flatland File: Failed to load "{path}" [{folder}/map.yaml:2]',
         "MapFileError",
     ),
-    "data: numbers beyond a 32-bit float": Hostile(
-        "data",
-        content("0 0 1e308 1\n"),
-        'Flatland YAML: Invalid "scale", a coordinate does not fit a 32-bit float (in layer "2d") '
-        "[{folder}/map.yaml:3]",
-    ),
-    "lua: loop": lua("while true do end return 1", "the time limit of 1 s is exceeded"),
-    "lua: loop in pcall": lua(
-        "return pcall(function() while true do end end)", "the time limit of 1 s is exceeded"
-    ),
-    "lua: string.rep": lua("return string.rep('x', 1e9):len()", "$eval:1: not enough memory"),
-    "lua: nested tables": lua(
-        "local t = {} while true do t = {t, {t}} end return 1", "not enough memory"
-    ),
-    "lua: backtracking": lua(
-        "return string.find(string.rep('x', 1e3), 'x*x*x*y')",
-        "the pattern may take too long for a text of 1000 characters",
-    ),
-    "lua: os.execute": lua(
-        "return os.execute('id')", "$eval:1: attempt to call field 'execute' (a nil value)"
-    ),
-    "lua: io": lua(
-        "return io.open('/etc/passwd')", "$eval:1: attempt to index global 'io' (a nil value)"
-    ),
-    "lua: debug": lua(
-        "return debug.getregistry()", "$eval:1: attempt to index global 'debug' (a nil value)"
-    ),
-    "lua: require": lua(
-        "return require('os')", "$eval:1: attempt to call global 'require' (a nil value)"
-    ),
-    "lua: python": lua(
-        "return python.eval('1')", "$eval:1: attempt to index global 'python' (a nil value)"
-    ),
-    "lua: a function": lua("return print", "the result is a function, not a value"),
-    "lua: a table": lua("return {}", "the result is a table, not a value"),
-    "lua: no Lua": lua("return (", "$eval:1: unexpected symbol near '<eof>'"),
-    "lua: bytecode": not_a_list("return loadstring(string.dump(function() return 1 end))"),
-    "lua: bytecode by load": not_a_list("return (load('\\27Lua'))"),
 }
 
 
@@ -378,26 +224,22 @@ def results() -> Iterator[dict[str, tuple[Path, dict[str, Any]]]]:
         root.chmod(0o755)
         good = root / "good.yaml"
         good.write_text("properties: {}\nlayers: []\nmodels: [{name: m, model: m.model.yaml}]\n")
-        (root / "m.model.yaml").write_text("bodies: [{name: b, footprints: []}]\n")
+        # The expression loads the Lua sandbox while the process can still read a checkout in /root.
+        (root / "m.model.yaml").write_text("bodies: [{name: $eval \"'b'\", footprints: []}]\n")
         paths, cases = {}, []
         for number, (name, hostile) in enumerate(HOSTILE.items()):
             folder = root / str(number)
             folder.mkdir()
             path = paths[name] = folder / f"hostile.{hostile.role}"
             hostile.create(path)
-            if name == "model: includes itself":
-                (folder / "self.yaml").write_text(f"$include {path.name}\n")
             kind, file = roles(folder, path, hostile.role)
             cases.append({"name": name, "kind": kind, "path": str(file)})
         package = str(Path(flatland.__file__).resolve().parents[1])
-        done = subprocess.run(
+        done = run_program(
             [sys.executable, hostile_inputs.__file__],
             input=json.dumps({"world": str(good), "cases": cases}),
             env={**os.environ, "PYTHONPATH": f"{package}:{os.environ.get('PYTHONPATH', '')}"},
-            capture_output=True,
-            text=True,
-            check=False,
-            timeout=4 * TIMEOUT,
+            silence=4 * TIMEOUT,
         )
         assert done.returncode == 0, done.stdout[-3000:] + done.stderr[-3000:]
         found = [json.loads(line) for line in done.stdout.splitlines()]
@@ -413,6 +255,5 @@ def test_a_hostile_file(results: dict[str, tuple[Path, dict[str, Any]]], name: s
     text = hostile.text.format(path=path, folder=path.parent, name=path.name)
     assert result["text"] == text
     assert result["class"] == hostile.error_class
-    assert result["seconds"] < MAX_SECONDS
     assert result["memory"] < MAX_MEBIBYTES
     assert result["unchanged"]

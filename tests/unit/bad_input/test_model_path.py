@@ -48,6 +48,38 @@ def test_only_later_models_are_restricted(world_file: Path, outside: Path, uncha
             )
 
 
+@pytest.mark.parametrize("key", ["image", "data"])
+def test_nothing_is_said_about_other_files_of_a_map(
+    world_file: Path, outside: Path, key: str
+) -> None:
+    """The reason why an image cannot be read, and similar names, would tell what is there."""
+    (outside / "map.png").write_text("version https://git-lfs.example/spec/v1\n")
+    map_file = world_file.parent / "allowed" / "map.yaml"
+    keys = "resolution: 1\norigin: [0, 0, 0]\noccupied_thresh: 0.5\n"
+    if key == "data":
+        keys = "type: line_segments\nscale: 1\norigin: [0, 0, 0]\n"
+    map_file.write_text(f"{key}: {outside}/map.png\n{keys}")
+    world_file.write_text("properties: {}\nlayers: [{name: walls}]\n")
+    allowed = map_file.parent
+    with flatland.World.from_yaml(world_file, seed=1, model_path=[allowed]) as world:
+        with pytest.raises(flatland.FlatlandError) as caught:
+            world.set_layer_map("walls", str(map_file))
+        why = f"the file cannot be read: it is outside the folders of model_path, {allowed}"
+        assert caught.value.hint == (why if key == "image" else "")
+
+
+def test_a_reset_is_not_restricted(world_file: Path, outside: Path) -> None:
+    (outside / "good.yaml").write_text("bodies: $include bodies.yaml\n")
+    (outside / "bodies.yaml").write_text("[{name: base, footprints: []}]\n")
+    with flatland.World.from_yaml(
+        world_file, seed=1, model_path=[world_file.parent / "allowed"]
+    ) as world:
+        world.reset()
+        assert [model.name for model in world.models] == ["m"]
+        with pytest.raises(flatland.YamlError, match="outside the folders of model_path"):
+            world.spawn_model(outside / "good.yaml", "b")
+
+
 def test_by_default_nothing_is_restricted(world_file: Path, outside: Path) -> None:
     with flatland.World.from_yaml(world_file, seed=1) as world:
         world.spawn_model(outside / "good.yaml", "a")

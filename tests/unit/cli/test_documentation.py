@@ -4,18 +4,13 @@ from __future__ import annotations
 
 import re
 import shlex
-import subprocess
 import sys
 from pathlib import Path
 
 import pytest
 from flatland_command import main
-from waiting import TIMEOUT
-
-_BLOCK = re.compile(
-    r"(?:^File `(?P<file>[^`]+)`:\n\n)?^```(?P<language>\w+)\n(?P<text>.*?)^```$",
-    re.MULTILINE | re.DOTALL,
-)
+from pages import pattern_of, read_page
+from programs import run_program
 
 
 def run_block(text: str, capsys: pytest.CaptureFixture[str]) -> str:
@@ -28,9 +23,7 @@ def run_block(text: str, capsys: pytest.CaptureFixture[str]) -> str:
             output += capsys.readouterr().out
         else:
             assert command == "python3"
-            code = subprocess.run(
-                [sys.executable, *words], capture_output=True, timeout=TIMEOUT
-            ).returncode
+            code = run_program([sys.executable, *words]).returncode
         assert code == (1 if "# exits with 1" in line else 0), f"{line}\n{output}"
     return output
 
@@ -39,17 +32,16 @@ def test_the_commands_of_the_page_print_what_it_says(checkout, tmp_path, monkeyp
     monkeypatch.chdir(tmp_path)
     (tmp_path / "worlds").mkdir()
     (tmp_path / "worlds" / "office").symlink_to(checkout / "worlds" / "office")
-    page = (checkout / "docs" / "command_line.md").read_text()
     output, compared = "", 0
-    for block in _BLOCK.finditer(page):
-        text = block["text"]
-        if block["file"]:
-            Path(block["file"]).write_text(text)
-        elif block["language"] == "bash":
-            output = run_block(text, capsys)
-        elif "-> apt-get" not in text:  # that of `flatland doctor` depends on the machine
-            pattern = ".*".join(re.escape(part) for part in text.split("..."))
-            assert re.search(pattern, output, re.DOTALL), f"{text}\nis not in\n{output}"
+    for block in read_page(checkout / "docs" / "command_line.md"):
+        if block.kind == "file":
+            Path(block.path).write_text(block.text)
+        elif block.kind == "run":
+            output = run_block(block.text, capsys)
+        elif "-> apt-get" not in block.text:  # that of `flatland doctor` depends on the machine
+            assert re.search(pattern_of(block.text), output, re.DOTALL), (
+                f"{block.text}\nis not in\n{output}"
+            )
             compared += 1
     assert compared == 5
 

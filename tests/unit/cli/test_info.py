@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-import ast
 import json
 import math
-from pathlib import Path
 from typing import Any
 
 import pytest
 from flatland_command import main
 
-from flatland.cli.info import NODE_SERVICES, frame_tree
+from flatland.cli.info import frame_tree
 
 ROBOT = """
 bodies:
@@ -69,6 +67,16 @@ def test_layers_and_models(robot_world, capsys):
     ]
 
 
+def test_the_poses_are_those_of_the_file(files, capsys):
+    """The body moves in the steps that are needed to find the frames."""
+    tween = "{type: Tween, name: t, body: base, delta: [5, 0, 0], duration: 0.01}"
+    files.write("m.yaml", f"bodies: [{{name: base, footprints: []}}]\nplugins: [{tween}]")
+    models = "[{name: m, model: m.yaml, pose: [1, -0.0, -0.00001]}]"
+    path = files.write("w.yaml", f"{{properties: {{}}, layers: [], models: {models}}}")
+    assert main("info", path) == 0
+    assert "  m      1 0 0 " in capsys.readouterr().out
+
+
 def test_topics_and_frames(robot_world, capsys):
     contents = info(robot_world, capsys)
     topics = {topic["topic"]: topic for topic in contents["topics"]}
@@ -119,16 +127,28 @@ def test_an_invalid_file_is_an_error(files, capsys):
     assert '"layers" must be a list' in capsys.readouterr().err
 
 
-def test_services_are_those_of_the_node(checkout: Path):
-    tree = ast.parse((checkout / "flatland/ros/services.py").read_text())
-    rows = []
-    for row in ast.walk(tree):
-        match row:
-            case ast.Tuple([ast.Constant(name), ast.Name(kind), _]):
-                rows.append((name, kind))
-            case ast.Tuple([ast.Constant(name), ast.Call(args=[ast.Constant(kind)]), _]):
-                rows.append((name, kind))
-    assert rows == [(name, kind.split("/")[1]) for name, kind in NODE_SERVICES.items()]
+def test_all_services_of_the_node(robot_world, capsys):
+    services = {
+        service["name"]: service["type"] for service in info(robot_world, capsys)["services"]
+    }
+    assert services == {
+        "spawn_model": "flatland/SpawnModel",
+        "delete_model": "flatland/DeleteModel",
+        "move_model": "flatland/MoveModel",
+        "spawn_models": "flatland/SpawnModels",
+        "move_models": "flatland/MoveModels",
+        "delete_models": "flatland/DeleteModels",
+        "get_model_states": "flatland/GetModelStates",
+        "set_appearance": "flatland/SetAppearance",
+        "set_layer_map": "flatland/SetLayerMap",
+        "set_rate": "flatland/SetRate",
+        "step_world": "flatland/StepWorld",
+        "reset_world": "flatland/ResetWorld",
+        "wait_until_ready": "flatland/WaitUntilReady",
+        "pause": "std_srvs/Empty",
+        "resume": "std_srvs/Empty",
+        "toggle_pause": "std_srvs/Empty",
+    }
 
 
 @pytest.mark.parametrize(

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import subprocess
 import sys
 import xml.etree.ElementTree as ElementTree
 from pathlib import Path
@@ -11,7 +10,7 @@ from typing import Any
 
 import pytest
 from flatland_command import main
-from waiting import TIMEOUT
+from programs import run_program
 
 import flatland
 from flatland import worldgen
@@ -55,12 +54,9 @@ def test_world(folder: Path, capsys: Any) -> None:
 
 def test_the_test_of_a_plugin_passes() -> None:
     assert main("new", "plugin", "speed_meter") == 0
-    done = subprocess.run(
-        # Without bytecode, which Python reuses if a file changes within a second.
-        [sys.executable, "-BW", "error", "-m", "unittest", "discover", "-s", "speed_meter/test"],
-        capture_output=True,
-        text=True,
-        timeout=TIMEOUT,
+    # Without bytecode, which Python reuses if a file changes within a second.
+    done = run_program(
+        [sys.executable, "-BW", "error", "-m", "unittest", "discover", "-s", "speed_meter/test"]
     )
     assert done.returncode == 0, done.stderr
     assert "Ran 1 test" in done.stderr
@@ -69,7 +65,7 @@ def test_the_test_of_a_plugin_passes() -> None:
     text = plugin.read_text()
     assert "class SpeedMeter" in text
     plugin.write_text(text.replace("forward, left", "left, forward"))
-    done = subprocess.run(done.args, capture_output=True, text=True, timeout=TIMEOUT)
+    done = run_program(done.args)
     assert done.returncode == 1
 
 

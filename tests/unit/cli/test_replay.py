@@ -6,6 +6,7 @@ import re
 import signal
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +14,7 @@ import pytest
 from flatland_command import main
 from waiting import TIMEOUT, wait_until
 
-from flatland.recording import log_file
+from flatland.recording import Replay, log_file
 
 ROBOT = """
 bodies:
@@ -117,18 +118,26 @@ def test_a_run_that_was_killed_is_repeated(world: str, capsys: pytest.CaptureFix
     assert second == "the recording has no end: the program that wrote it was killed"
 
 
-def test_a_signal_ends_the_replay(world: str, recording: Path) -> None:
-    assert main("run", world, "--duration", "600", "--record", "long.flog") == 0
-    process = subprocess.Popen(
-        [sys.executable, "-m", "flatland", "replay", "long.flog", "--bag", "long.bag"],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.DEVNULL,
-        text=True,
-    )
-    wait_until("the bag", Path("long.part.bag").exists)
-    process.send_signal(signal.SIGINT)
-    output, _ = process.communicate(timeout=TIMEOUT)
-    assert process.returncode == 130, output
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_ends_the_replay(
+    recording: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    number: signal.Signals,
+) -> None:
+    run = Replay.run
+
+    def run_into_signal(replay: Replay, on_step: Callable[[int], None]) -> object:
+        def step(number_of_steps: int) -> None:
+            if number_of_steps == 5:
+                signal.raise_signal(number)
+            on_step(number_of_steps)
+
+        return run(replay, step)
+
+    monkeypatch.setattr(Replay, "run", run_into_signal)
+    assert main("replay", recording) == 128 + number
+    assert re.match(r"interrupted after \d+ steps \(0\.02\d* s\)", capsys.readouterr().out)
 
 
 def test_an_mcap_file_contains_the_messages_of_the_bag(world: str) -> None:
@@ -144,17 +153,3 @@ def test_an_mcap_file_contains_the_messages_of_the_bag(world: str) -> None:
     ]
     assert sorted(messages) == sorted(expected)
     assert len({topic for topic, _, _ in messages}) == 4
-
-
-def test_a_missing_mcap_package_is_named(world: str) -> None:
-    code = (
-        "import sys; sys.modules['mcap_ros1'] = None; sys.modules['mcap_ros1.writer'] = None\n"
-        "from flatland.cli import main\n"
-        f"sys.exit(main(['run', {world!r}, '--duration', '1', '--mcap', 'run.mcap']))"
-    )
-    done = subprocess.run(
-        [sys.executable, "-c", code], capture_output=True, text=True, timeout=TIMEOUT, check=False
-    )
-    assert done.returncode == 1
-    assert "pip install mcap mcap-ros1-support" in done.stderr
-    assert not list(Path().glob("run*.mcap"))

@@ -11,13 +11,14 @@ import struct
 import subprocess
 import sys
 import termios
+import threading
 from pathlib import Path
 from typing import Any
 
 import cv2
 import numpy as np
 import pytest
-from flatland_command import main, run
+from flatland_command import main
 from waiting import TIMEOUT, wait_until
 
 import flatland
@@ -73,12 +74,24 @@ class TestSimulation:
         assert main("run", robot_world, "--duration", "0.05", *step) == 0
         assert capsys.readouterr().out.startswith("simulated 0.06 s in ")
 
-    def test_a_progress_bar_on_a_terminal_shows_the_real_time_factor(self, robot_world):
+    def test_a_progress_bar_shows_the_real_time_factor_and_no_ros_is_imported(
+        self, robot_world, tmp_path
+    ):
+        blocked = tmp_path / "blocked"
+        blocked.mkdir()
+        for module in ("rospy", "genpy", "rosgraph", "std_msgs", "rosbag"):
+            (blocked / f"{module}.py").write_text(f"raise RuntimeError('{module} was imported')")
+        paths = [str(blocked), str(Path(flatland.__file__).parents[1])]
+        environment = {**os.environ, "PYTHONPATH": os.pathsep.join(paths)}
         controller, terminal = pty.openpty()
         fcntl.ioctl(terminal, termios.TIOCSWINSZ, struct.pack("HHHH", 24, 100, 0, 0))
-        command = [sys.executable, "-m", "flatland", "run", robot_world, "--duration", "30"]
+        command = [sys.executable, "-m", "flatland", "run", robot_world, "--duration", "3"]
+        process = subprocess.Popen(
+            command, stdout=subprocess.DEVNULL, stderr=terminal, env=environment
+        )
+        limit = threading.Timer(TIMEOUT, process.kill)
+        limit.start()
         try:
-            process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=terminal)
             os.close(terminal)
             text = b""
             while True:
@@ -87,10 +100,11 @@ class TestSimulation:
                 except OSError:  # the terminal was closed by the process
                     break
                 text += part
-            assert process.wait(TIMEOUT) == 0
+            assert process.wait(TIMEOUT) == 0, text.decode()
         finally:
+            limit.cancel()
             os.close(controller)
-        assert re.search(r"100%.*30\.0/30\.0 s.*\d+\.\dx real time", text.decode())
+        assert re.search(r"100%.*3\.0/3\.0 s.*\d+\.\dx real time", text.decode())
 
     def test_an_exception_of_a_plugin_is_an_error_with_its_time(
         self, robot_world, files, monkeypatch, capsys
@@ -180,15 +194,6 @@ class TestBag:
             newest = max(t.header.stamp.to_sec() for t in message.transforms)
             assert time == pytest.approx(newest, abs=2e-9)
 
-    def test_without_rosbag_the_error_names_the_package(
-        self, robot_world, tmp_path, capsys, monkeypatch
-    ):
-        monkeypatch.setitem(sys.modules, "rosbag", None)
-        monkeypatch.delitem(sys.modules, "flatland.ros.bag", raising=False)
-        assert main("run", robot_world, "--duration", "1", "--bag", "a.bag") == 1
-        assert "apt-get install python3-rosbag" in capsys.readouterr().err
-        assert not list(tmp_path.glob("*.bag"))
-
     @pytest.mark.parametrize("name", ["no/a.bag", "no/a.mp4"])
     def test_a_folder_that_does_not_exist(self, robot_world, capsys, name):
         option = "--bag" if name.endswith("bag") else "--video"
@@ -216,17 +221,16 @@ class TestBag:
 
 
 class TestInterruption:
-    @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-    def test_files_contain_what_was_simulated(self, robot_world, tmp_path, number):
+    def test_files_contain_what_was_simulated(self, robot_world, tmp_path):
         command = [sys.executable, "-m", "flatland", "run", robot_world, "--duration", "1e6"]
         process = subprocess.Popen(
             [*command, "--bag", "a.bag"], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
         )
         part = tmp_path / "a.part.bag"
         wait_until("messages", lambda: part.exists() and part.stat().st_size > 100_000)
-        process.send_signal(number)
+        process.send_signal(signal.SIGTERM)
         out, error = process.communicate(timeout=TIMEOUT)
-        assert process.returncode == 128 + number, error
+        assert process.returncode == 128 + signal.SIGTERM, error
         end = re.match(r"interrupted after (\S+) s in ", out)
         assert end
         messages = read_bag(tmp_path / "a.bag")
@@ -242,7 +246,9 @@ class TestVideo:
         assert "wrote a.mp4: 20 frames\n" in capsys.readouterr().out
         video = cv2.VideoCapture("a.mp4")
         assert video.get(cv2.CAP_PROP_FPS) == 10
-        assert int(video.get(cv2.CAP_PROP_FOURCC)).to_bytes(4, "little") == b"avc1"
+        # OpenCV 4.6 reads the code in the file, OpenCV 4.10 returns the name of the codec.
+        codec = int(video.get(cv2.CAP_PROP_FOURCC)).to_bytes(4, "little")
+        assert codec in {b"avc1", b"h264"}
         frames = []
         while (image := video.read())[0]:
             frames.append(image[1][:, :, ::-1].astype(int))
@@ -289,15 +295,3 @@ class TestVideo:
             layer.add_edges(np.array([[2, 2, 8, 8]], np.float32))
             world.layer_changed(layer)
             assert (renderer.picture() != before).any()
-
-
-def test_without_ros_a_world_runs(robot_world, tmp_path):
-    """Neither a simulation nor a video imports ROS."""
-    blocked = tmp_path / "blocked"
-    blocked.mkdir()
-    for module in ("rospy", "genpy", "rosgraph", "std_msgs", "rosbag"):
-        (blocked / f"{module}.py").write_text(f"raise RuntimeError('{module} was imported')")
-    paths = [str(blocked), str(Path(flatland.__file__).parents[1])]
-    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(paths)}
-    done = run("run", robot_world, "--duration", "1", env=environment)
-    assert done.returncode == 0, done.stderr

@@ -7,7 +7,7 @@ from typing import Any
 
 import cv2
 import pytest
-from flatland_command import main, run
+from flatland_command import main
 
 import flatland
 
@@ -25,35 +25,58 @@ def is_picture(path: Path, expected: Any) -> bool:
     return pixels.shape == expected.shape and bool((pixels == expected).all())
 
 
-def test_draws_the_world(world_file, tmp_path):
-    path = tmp_path / "picture.png"
-    done = run("show", world_file, "-o", path, cwd=tmp_path.parent)
-    assert (done.returncode, done.stdout) == (0, ""), done.stderr
-    assert done.stderr == ""
-    assert is_picture(path, drawn(world_file))
+OPTIONS: list[tuple[list[str], dict[str, Any]]] = [
+    (["--steps", "200"], {"steps": 200}),
+    (["--size", "400x300"], {"size": (400, 300)}),
+    (["--dpi", "60"], {"dpi": 60}),
+    (["--view", "-1", "2", "5", "6"], {"view": (-1, 2, 5, 6)}),
+    (["--layer", "empty"], {"layers": ["empty"]}),
+    (["--names"], {"names": True}),
+    (["--no-scans"], {"scans": False}),
+    (["--no-axes"], {"axes": False}),
+    (["--param", "/radius=1.5"], {"params": {"/radius": 1.5}}),
+]
 
 
-@pytest.mark.parametrize(
-    ("arguments", "options"),
-    [
-        (["--steps", "200"], {"steps": 200}),
-        (["--size", "400x300"], {"size": (400, 300)}),
-        (["--dpi", "50"], {"dpi": 50}),
-        (["--view", "-1", "2", "5", "6"], {"view": (-1, 2, 5, 6)}),
-        (["--layer", "empty"], {"layers": ["empty"]}),
-        (["--layer", "empty", "--layer", "3d"], {"layers": ["3d"]}),
-        (["--names"], {"names": True}),
-        (["--no-scans"], {"scans": False}),
-        (["--no-axes"], {"axes": False}),
-        (["--param", "/radius=1.5"], {"params": {"/radius": 1.5}}),
-    ],
-)
-def test_options(world_file, tmp_path, arguments, options):
+def test_options(world_file, tmp_path):
     path = tmp_path / "picture.png"
-    assert main("show", world_file, "-o", path, *arguments) == 0
-    assert is_picture(path, drawn(world_file, **options))
-    if arguments[-1] != "3d":
-        assert not is_picture(path, drawn(world_file))
+    small = ["show", world_file, "-o", path, "--dpi", "40"]
+    default = drawn(world_file, dpi=40)
+    for arguments, options in OPTIONS:
+        assert main(*small, *arguments) == 0
+        assert is_picture(path, drawn(world_file, **{"dpi": 40, **options})), arguments
+        assert not is_picture(path, default), arguments
+    assert main(*small, "--layer", "empty", "--layer", "3d") == 0
+    assert is_picture(path, drawn(world_file, dpi=40, layers=["3d"]))
+
+
+def test_draws_a_model(files: Any, tmp_path: Path) -> None:
+    body = "{name: base, footprints: [{type: circle, radius: 0.2, density: 1, layers: [any]}]}"
+    path = files.write("robot.model.yaml", f"bodies: [{body}]")
+    picture = tmp_path / "picture.png"
+    assert main("show", path, "-o", picture) == 0
+    with flatland.World(seed=0) as world:
+        any_layer = path.replace("robot", "all")
+        Path(any_layer).write_text(f"bodies: [{body.replace('[any]', '[all]')}]")
+        world.spawn_model(any_layer, "robot")
+        assert is_picture(picture, world.draw())
+
+
+def test_a_line_says_that_transparent_walls_are_drawn(
+    files: Any, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    files.write_map("room", ["...", ".#.", "..."])
+    layers = ", ".join(
+        f"{{name: {name}, map: {file}, color: [1, 1, 1, {alpha}]}}"
+        for name, file, alpha in (("a", "room.yaml", 0), ("b", "room.yaml", 1), ("c", "''", 0))
+    )
+    path = files.write("w.yaml", f"{{properties: {{}}, layers: [{layers}]}}")
+    for arguments, line in (
+        ((), 'layer "a" is drawn faintly, because the alpha of its color is 0\n'),
+        (("--layer", "b"), ""),
+    ):
+        assert main("show", path, "-o", tmp_path / "a.png", *arguments) == 0
+        assert capsys.readouterr().out == line
 
 
 def test_seed_makes_noise_repeatable(world_file, tmp_path):
@@ -67,10 +90,11 @@ def test_seed_makes_noise_repeatable(world_file, tmp_path):
     assert a == b != c
 
 
-def test_an_existing_picture_is_overwritten(world_file, tmp_path):
+def test_an_existing_picture_is_overwritten(world_file, tmp_path, capsys):
     path = tmp_path / "picture.png"
     path.write_text("old")
     assert main("show", world_file, "-o", path) == 0
+    assert capsys.readouterr() == ("", "")
     assert is_picture(path, drawn(world_file))
 
 
@@ -99,13 +123,13 @@ def test_invalid_arguments_exit_with_2(
     assert not (tmp_path / "a.png").exists()
 
 
-def test_invalid_files_exit_with_1_and_one_line_of_error(world_file, tmp_path):
-    done = run("show", "nowhere.yaml", "-o", "a.png", cwd=tmp_path)
-    assert done.returncode == 1
-    path = tmp_path / "nowhere.yaml"
+def test_invalid_files_exit_with_1_and_one_line_of_error(world_file, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert main("show", "wordl.yaml", "-o", "a.png") == 1
+    path = tmp_path / "wordl.yaml"
     hint = '(hint: did you mean "world.yaml"?)'
     expected = f'flatland: Flatland YAML: File does not exist, path="{path}" {hint}\n'
-    assert done.stderr == expected
+    assert capsys.readouterr() == ("", expected)
 
 
 def test_a_picture_that_cannot_be_written_is_an_error(world_file, tmp_path, capsys):

@@ -2,20 +2,18 @@
 
 from __future__ import annotations
 
-import os
-import stat
-import time
 from pathlib import Path
 
 import pytest
 
 from flatland.config.documents import load_documents, parse_documents
+from flatland.config.inputs import Inputs
 from flatland.config.node import MAX_NESTING, ListNode, MapNode, Node, NullNode, ScalarNode, Source
 from flatland.errors import YamlError
 
 
 def parse(text: str) -> list[Node]:
-    return parse_documents(text, Source("w.yaml", "/folder"))
+    return parse_documents(text, Source("w.yaml", "/folder"), Inputs())
 
 
 def parse_map(text: str) -> MapNode:
@@ -210,18 +208,20 @@ def test_blank_lines_with_tabs_do_not_change_line_numbers() -> None:
     assert (root.key_lines, inner.key_lines) == ({"a": 1, "b": 4}, {"c": 6})
 
 
-@pytest.mark.parametrize("line", ["\t" * 1_000_000 + "x", "-\t" * 500_000, " -" * 500_000 + "\t#"])
+@pytest.mark.parametrize(
+    "line",
+    ["\t" * 1_000_000 + "x", "-\t" * 500_000, " -" * 500_000 + "\t#"],
+    ids=["tabs", "dashes and tabs", "dashes and a comment"],
+)
 def test_long_lines_of_white_space_are_read_in_linear_time(line: str) -> None:
     # A slower algorithm exceeds the time limit of the test suite.
     assert "Malformatted" in failure(f"a:\n{line}\n")
 
 
 @pytest.mark.parametrize("opening", ["[", "- ", "? ", "{a: "])
-def test_deep_nesting_is_rejected_quickly(opening: str) -> None:
-    start = time.process_time()
+def test_deep_nesting_is_rejected(opening: str) -> None:
     message = failure(opening * 50_000)
     assert f"nested deeper than {MAX_NESTING} levels" in message or "scalar" in message
-    assert time.process_time() - start < 1
 
 
 def test_the_nesting_limit() -> None:
@@ -237,15 +237,14 @@ def test_the_nesting_limit_includes_aliases() -> None:
 
 def test_nested_aliases_are_shared_not_copied() -> None:
     lines = ["a0: &a0 [x, x]"] + [f"a{i}: &a{i} [*a{i - 1}, *a{i - 1}]" for i in range(1, 60)]
-    start = time.process_time()
+    # Copies would not fit into memory.
     assert len(parse_map("\n".join(lines)).entries) == 60
-    assert time.process_time() - start < 1
 
 
 def test_the_source_of_a_file_has_its_path_and_folder(tmp_path: Path) -> None:
     file = tmp_path / "w.yaml"
     file.write_text("a: 1\n")
-    (root,) = load_documents(str(file))
+    (root,) = load_documents(str(file), Inputs())
     assert root.source == Source(str(file), str(tmp_path))
 
 
@@ -255,7 +254,7 @@ def test_a_relative_path_is_kept_for_messages(
     monkeypatch.chdir(tmp_path)
     (tmp_path / "sub").mkdir()
     (tmp_path / "sub" / "w.yaml").write_text("a: 1\n")
-    (root,) = load_documents("sub/w.yaml")
+    (root,) = load_documents("sub/w.yaml", Inputs())
     assert root.source == Source("sub/w.yaml", str(tmp_path / "sub"))
 
 
@@ -263,7 +262,7 @@ def test_a_relative_path_is_kept_for_messages(
 def test_supported_encodings(tmp_path: Path, encoding: str) -> None:
     file = tmp_path / "w.yaml"
     file.write_bytes("name: Rübe 🐢\n".encode(encoding))
-    (root,) = load_documents(str(file))
+    (root,) = load_documents(str(file), Inputs())
     assert isinstance(root, MapNode)
     node = root.entries["name"]
     assert isinstance(node, ScalarNode)
@@ -275,14 +274,14 @@ def test_windows_line_endings(tmp_path: Path) -> None:
     file.write_bytes(b"a: 1\r\nb: x\r\nc: \xff\r\n")
     assert "line 3 col 4, byte 0xff is not valid UTF-8" in file_failure(file)
     file.write_bytes(b"a: 1\r\nb: x\r\n")
-    (root,) = load_documents(str(file))
+    (root,) = load_documents(str(file), Inputs())
     assert isinstance(root, MapNode)
     assert root.entries["b"].line == 2
 
 
 def file_failure(path: Path | str) -> str:
     with pytest.raises(YamlError) as caught:
-        load_documents(str(path))
+        load_documents(str(path), Inputs())
     return str(caught.value)
 
 
@@ -302,7 +301,7 @@ def test_undecodable_bytes_are_allowed_in_comments_only(tmp_path: Path) -> None:
     file.write_bytes(
         b"# caf\xe9 \x80\na: Gr\xc3\xb6\xc3\x9fe # \xff\r\nb: |  # \xfc\n  one\n  two\n# \xe4\n"
     )
-    (root,) = load_documents(str(file))
+    (root,) = load_documents(str(file), Inputs())
     assert isinstance(root, MapNode)
     assert [node.text for node in root.entries.values() if isinstance(node, ScalarNode)] == [
         "Größe",
@@ -322,30 +321,3 @@ def test_a_file_that_does_not_exist_is_an_error(tmp_path: Path) -> None:
         assert file_failure(path) == f'Flatland YAML: File does not exist, path="{path}"'
     (tmp_path / "file").touch()
     assert "File does not exist" in file_failure(tmp_path / "file" / "w.yaml")
-
-
-def test_a_path_that_is_not_a_regular_file_is_an_error(tmp_path: Path) -> None:
-    assert file_failure(tmp_path) == (
-        f'Flatland YAML: Failed to read file, path="{tmp_path}", it is not a regular file'
-    )
-    os.mkfifo(tmp_path / "pipe")
-    assert "not a regular file" in file_failure(tmp_path / "pipe")
-    assert "not a regular file" in file_failure("/dev/zero")
-
-
-def test_a_file_without_read_permission_is_an_error(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    file = tmp_path / "w.yaml"
-    file.write_text("a: 1\n")
-    if os.geteuid() == 0:  # the superuser can read any file
-
-        def refuse(*_: object) -> None:
-            raise PermissionError(13, "Permission denied")
-
-        monkeypatch.setattr(Path, "open", refuse)
-    else:
-        file.chmod(stat.S_IWUSR)
-    assert file_failure(file) == (
-        f'Flatland YAML: Failed to read file, path="{file}", Permission denied'
-    )

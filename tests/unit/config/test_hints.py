@@ -61,6 +61,23 @@ def test_choices():
     assert hints.choice("dinamic", ["static", "dynamic"]) == 'did you mean "dynamic"?'
 
 
+@pytest.mark.parametrize(
+    ("word", "hint"),
+    [
+        ("odom_pubb", 'did you mean "odom_pub"?'),  # a typing mistake: no others
+        ("twist_topic", 'did you mean "twist_pub" or "twist_sub"?'),
+        ("xyz", "keys: odom_pub, twist_sub, twist_pub"),
+    ],
+)
+def test_near_names(word: str, hint: str) -> None:
+    known = ["odom_pub", "twist_sub", "twist_pub"]
+    assert hints.did_you_mean(word, known, "keys") == hint
+
+
+def test_no_names() -> None:
+    assert hints.did_you_mean("a", [], "layers of the world") == "layers of the world: none"
+
+
 def test_similar_files(tmp_path: Path):
     (tmp_path / "room.yaml").touch()
     assert hints.similar_file(str(tmp_path / "rom.yaml")) == 'did you mean "room.yaml"?'

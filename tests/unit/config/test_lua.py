@@ -5,15 +5,13 @@ from __future__ import annotations
 import gc
 import json
 import os
-import subprocess
 import sys
-import time
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
-from waiting import TIMEOUT
+from programs import run_program
 
 from flatland.config import lua
 from flatland.config.lua import EvalError, evaluate
@@ -46,19 +44,19 @@ REMOVED = [
 ]  # fmt: skip
 
 
-@pytest.mark.parametrize("name", REMOVED)
-def test_unsafe_functions_are_removed(runtime: str, name: str) -> None:
-    assert run(f"return type({name})") == "nil", runtime
+KEPT = [
+    "math.sin", "string.format", "table.concat", "os.time", "os.clock", "os.date", "os.getenv",
+    "pairs", "ipairs", "pcall", "xpcall", "load", "loadstring", "setmetatable", "unpack",
+    "coroutine.create", "tonumber", "env", "param",
+]  # fmt: skip
 
 
-@pytest.mark.parametrize(
-    "name",
-    ["math.sin", "string.format", "table.concat", "os.time", "os.clock", "os.date", "os.getenv",
-     "pairs", "ipairs", "pcall", "xpcall", "load", "loadstring", "setmetatable", "unpack",
-     "coroutine.create", "tonumber", "env", "param"],
-)  # fmt: skip
-def test_safe_functions_are_kept(runtime: str, name: str) -> None:
-    assert run(f"return type({name})") == "function", runtime
+def test_unsafe_functions_are_removed_and_others_are_kept(runtime: str) -> None:
+    for names, expected in ((REMOVED, "nil"), (KEPT, "function")):
+        kinds = " .. ' ' .. ".join(f"type({name})" for name in names)
+        found = run(f"return {kinds}").split()
+        wrong = {name: kind for name, kind in zip(names, found, strict=True) if kind != expected}
+        assert wrong == {}, runtime
 
 
 def test_no_python_object_is_reachable(runtime: str) -> None:
@@ -90,29 +88,24 @@ def test_no_python_object_is_reachable(runtime: str) -> None:
     assert run(walk, {"a": 1}) == "", runtime
 
 
-@pytest.mark.parametrize(
-    "code",
-    [
+def test_loaded_code_runs_in_the_sandbox(runtime: str) -> None:
+    for code in (
         "return loadstring('return io')()",
         "text = 'return io' return load(function() local s = text; text = nil; return s end)()",
         "return setfenv(loadstring('return io'), getfenv(0))()",
         "return coroutine.wrap(function() return io or debug or python end)()",
         "return select(2, pcall(function() return os.execute end))",
         "local t = setmetatable({}, {__index = _G}) return t.io",
-    ],
-)
-def test_loaded_code_runs_in_the_sandbox(runtime: str, code: str) -> None:
-    assert run(code) == "", runtime
+    ):
+        assert run(code) == "", (runtime, code)
 
 
-@pytest.mark.parametrize(
-    "code", ["return 1 + 1", "local a = 3; return a", "return ('a'):upper() == 'A' and 2"]
-)
-def test_load_and_loadstring_evaluate_text(runtime: str, code: str) -> None:
-    direct = run(code)
-    assert run(f'return loadstring("{code}")()') == direct, runtime
+def test_load_and_loadstring_evaluate_text(runtime: str) -> None:
+    code = "local a = ('a'):upper() == 'A' and 2; return a + 1"
+    assert run(code) == "3", runtime
+    assert run(f'return loadstring("{code}")()') == "3", runtime
     pieces = "local i = 0 return load(function() i = i + 1 return ({[1]=%s})[i] end)()"
-    assert run(pieces % f'"{code}"') == direct
+    assert run(pieces % f'"{code}"') == "3", runtime
 
 
 def test_load_and_loadstring_return_syntax_errors(runtime: str) -> None:
@@ -175,7 +168,7 @@ ENDLESS = {
     "collector": "while true do collectgarbage() end return 1",
     "stopped collector": "collectgarbage('stop') while true do end return 1",
     "strings": "local s = ('x'):rep(4e6) while true do pcall(string.upper, s) end return 1",
-    "patterns": "while true do pcall(string.find, ('x'):rep(600), 'x*x*y') end return 1",
+    "patterns": "while true do pcall(string.find, ('x'):rep(200), 'x*x*y') end return 1",
 }
 
 
@@ -183,16 +176,8 @@ ENDLESS = {
 def test_endless_expressions_are_stopped(
     runtime: str, code: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(lua, "TIME_LIMIT", 0.05)
-    start = time.process_time()
-    assert failure(code) in ("the time limit of 0.05 s is exceeded", "not enough memory"), runtime
-    assert time.process_time() - start < 3
-
-
-def test_the_time_limit_is_one_second() -> None:
-    start = time.process_time()
-    assert failure("while true do end return 1") == "the time limit of 1 s is exceeded"
-    assert 0.9 < time.process_time() - start < 2
+    monkeypatch.setattr(lua, "TIME_LIMIT", 0.01)
+    assert failure(code) in ("the time limit of 0.01 s is exceeded", "not enough memory"), runtime
 
 
 def test_reading_parameters_does_not_reset_the_time_limit(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -203,9 +188,7 @@ def test_reading_parameters_does_not_reset_the_time_limit(monkeypatch: pytest.Mo
         for i = 1, 100 do param("p" .. i) end
         return 1
     """
-    start = time.process_time()
     assert "the time limit of 0.2 s is exceeded" in failure(code)
-    assert time.process_time() - start < 2
 
 
 HUGE = {
@@ -232,7 +215,7 @@ from flatland.config import lua
 
 runtime, huge = json.loads(sys.stdin.read())
 lua._RUNTIMES = (runtime,)
-lua.TIME_LIMIT = 0.5
+lua.TIME_LIMIT = 0.1
 peak = lambda: resource.getrusage(resource.RUSAGE_SELF).ru_maxrss // 1024
 before = peak()
 for code in huge:
@@ -248,20 +231,16 @@ print(peak() - before)
 def test_memory_is_bounded(runtime: str) -> None:
     """Runs in a separate process: Lua can abort it if memory runs out outside a protected call."""
     folders = [str(Path(lua.__file__).parents[2]), os.environ.get("PYTHONPATH", "")]
-    done = subprocess.run(
+    done = run_program(
         [sys.executable, "-c", MEASURE],
         input=json.dumps([runtime, list(HUGE.values())]),
         env={**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, folders))},
-        capture_output=True,
-        text=True,
-        check=False,
-        timeout=TIMEOUT,
     )
     assert done.returncode == 0, done.stdout + done.stderr
     *answers, grown = done.stdout.splitlines()
     assert len(answers) == len(HUGE)
     for name, answer in zip(HUGE, answers, strict=True):
-        assert answer.endswith(("not enough memory", "the time limit of 0.5 s is exceeded")), (
+        assert answer.endswith(("not enough memory", "the time limit of 0.1 s is exceeded")), (
             name,
             answer,
         )
@@ -276,9 +255,8 @@ def test_deep_recursion_raises_an_error(runtime: str) -> None:
                                  "return t[k .. 'x'] end}) return t.x")  # fmt: skip
 
 
-@pytest.mark.parametrize(
-    ("text", "pattern"),
-    [
+def test_patterns_of_excessive_cost_are_rejected(runtime: str) -> None:
+    cases = [
         ("('x'):rep(5e4)", "'x*y'"),
         ("('x'):rep(1e3)", "'x*x*x*y'"),
         ("('x'):rep(40)", "('x?'):rep(40) .. ('x'):rep(40)"),
@@ -286,11 +264,11 @@ def test_deep_recursion_raises_an_error(runtime: str) -> None:
         ("('x'):rep(1e3)", "'(x*)(x*)%1%2y'"),
         ("('x'):rep(1e3)", "'[x]*[%]x]*[^]y]*[]x]*z'"),
         ("('x'):rep(1e3)", "'.-.-.-.-y'"),
-    ],
-)
-def test_patterns_of_excessive_cost_are_rejected(runtime: str, text: str, pattern: str) -> None:
-    for call in ("find({0}, {1})", "match({0}, {1})", "gsub({0}, {1}, '')", "gmatch({0}, {1})()"):
-        code = "return string." + call.format(text, pattern)
+    ]
+    calls = ["find({0}, {1})", "match({0}, {1})", "gsub({0}, {1}, '')", "gmatch({0}, {1})()"]
+    # The calls share the estimate of the cost: each pattern with one call, and one with all.
+    for case, call in [*zip(cases, calls * 2, strict=False), *((cases[0], call) for call in calls)]:
+        code = "return string." + call.format(*case)
         assert "may take too long for a text of" in failure(code), (runtime, code)
 
 
@@ -301,50 +279,45 @@ def test_long_patterns_are_rejected(runtime: str) -> None:
     )
 
 
-@pytest.mark.parametrize(
-    ("code", "result"),
-    [
-        ("('key = value'):match('^%s*(%S+)%s*=%s*(%S+)%s*$')", "key"),
-        ("('a,b,c'):gsub(',', ';')", "a;b;c"),
-        ("('a,b,c'):gsub(',', ';', 1)", "a;b,c"),
-        ("('abc'):gsub('%w', {a = 1})", "1bc"),
-        ("('a.b'):find('.', 1, true)", "2"),
-        ("('aXb'):find('%u', 2)", "2"),
-        ("('x'):rep(10000):gsub('x', '')", ""),
-        ("('x'):rep(3):gsub('x', function(x) return x .. 'y' end)", "xyxyxy"),
-        ("('a b c'):gmatch('%a+')()", "a"),
-        ("('f(a(b)c)'):match('%b()')", "(a(b)c)"),
-        ("(12345):rep(2)", None),
-        ("string.rep(12, 2)", "1212"),
-        ("string.find(123, 2)", "2"),
-        ("('x'):rep(0) .. ('x'):rep(-1) .. (''):rep(1e18)", ""),
-        ("(function(t) table.sort(t) return table.concat(t) end)({3, 1, 2})", "123"),
-        ("(function(t) table.sort(t, function(a, b) return a > b end) return t[1] end)({1, 3})", "3"),  # noqa: E501
-        ("(function(t) table.insert(t, 4) table.insert(t, 1, 5) return t[1] end)({6})", "5"),
-        ("select('#', unpack({1, nil, 3}, 1, 3))", "3"),
-        ("select('#', unpack({}))", "0"),
-        ("table.concat({unpack({'a', 'b', 'c'}, 2)})", "bc"),
-        ("select('#', xpcall(function() return 1, 2 end, print))", "3"),
-        ("select(2, xpcall(function() error('a', 0) end, function(e) return e .. 'b' end))", "ab"),
-        ("select(2, pcall(error, 'a'))", "a"),
-        ("coroutine.wrap(function(a) local b = coroutine.yield(a) return b end)(5)", "5"),
-        ("select(2, pcall(coroutine.wrap(function() error('a', 0) end)))", "a"),
-        ("coroutine.status(coroutine.create(function() end))", "suspended"),
-        ("select('#', coroutine.resume(coroutine.create(function() return nil, nil end)))", "3"),
-    ],
-)  # fmt: skip
-def test_guarded_functions_return_the_usual_results(
-    runtime: str, code: str, result: str | None
-) -> None:
-    if result is None:
-        assert "number" in failure(code), runtime
-    else:
-        assert run("return " + code) == result, runtime
+RESULTS = [
+    ("('key = value'):match('^%s*(%S+)%s*=%s*(%S+)%s*$')", "key"),
+    ("('a,b,c'):gsub(',', ';')", "a;b;c"),
+    ("('a,b,c'):gsub(',', ';', 1)", "a;b,c"),
+    ("('abc'):gsub('%w', {a = 1})", "1bc"),
+    ("('a.b'):find('.', 1, true)", "2"),
+    ("('aXb'):find('%u', 2)", "2"),
+    ("('x'):rep(10000):gsub('x', '')", ""),
+    ("('x'):rep(3):gsub('x', function(x) return x .. 'y' end)", "xyxyxy"),
+    ("('a b c'):gmatch('%a+')()", "a"),
+    ("('f(a(b)c)'):match('%b()')", "(a(b)c)"),
+    ("string.rep(12, 2)", "1212"),
+    ("string.find(123, 2)", "2"),
+    ("('x'):rep(0) .. ('x'):rep(-1) .. (''):rep(1e18)", ""),
+    ("(function(t) table.sort(t) return table.concat(t) end)({3, 1, 2})", "123"),
+    ("(function(t) table.sort(t, function(a, b) return a > b end) return t[1] end)({1, 3})", "3"),
+    ("(function(t) table.insert(t, 4) table.insert(t, 1, 5) return t[1] end)({6})", "5"),
+    ("select('#', unpack({1, nil, 3}, 1, 3))", "3"),
+    ("select('#', unpack({}))", "0"),
+    ("table.concat({unpack({'a', 'b', 'c'}, 2)})", "bc"),
+    ("select('#', xpcall(function() return 1, 2 end, print))", "3"),
+    ("select(2, xpcall(function() error('a', 0) end, function(e) return e .. 'b' end))", "ab"),
+    ("select(2, pcall(error, 'a'))", "a"),
+    ("coroutine.wrap(function(a) local b = coroutine.yield(a) return b end)(5)", "5"),
+    ("select(2, pcall(coroutine.wrap(function() error('a', 0) end)))", "a"),
+    ("coroutine.status(coroutine.create(function() end))", "suspended"),
+    ("select('#', coroutine.resume(coroutine.create(function() return nil, nil end)))", "3"),
+]  # fmt: skip
 
 
-@pytest.mark.parametrize(
-    ("code", "why"),
-    [
+def test_guarded_functions_return_the_usual_results(runtime: str) -> None:
+    found = [(code, run("return " + code)) for code, _ in RESULTS]
+    assert found == RESULTS, runtime
+    assert "number" in failure("(12345):rep(2)"), runtime
+
+
+def test_indices_that_overflow_are_rejected(runtime: str) -> None:
+    """Lua 5.1 crashes on some of them or runs for minutes."""
+    for code, why in (
         ("unpack({}, -2^31, 2^31 - 2)", "too many results to unpack"),
         ("unpack({}, 2^31, -2^53)", "too many results to unpack"),
         ("unpack({}, 1, 1e5)", "too many results to unpack"),
@@ -352,11 +325,8 @@ def test_guarded_functions_return_the_usual_results(
         ("table.insert({}, -2^31 + 5, 1)", "position out of bounds"),
         ("table.insert({}, 2^31, 1)", "position out of bounds"),
         ("table.insert({}, 0/0, 1)", "position out of bounds"),
-    ],
-)
-def test_indices_that_overflow_are_rejected(runtime: str, code: str, why: str) -> None:
-    """Lua 5.1 crashes on some of them or runs for minutes."""
-    assert why in failure(code), runtime
+    ):
+        assert why in failure(code), (runtime, code)
 
 
 def test_large_inputs_are_rejected_before_evaluation() -> None:
@@ -416,14 +386,14 @@ def test_the_memory_of_states_is_released() -> None:
     def resident() -> int:
         return int(Path("/proc/self/statm").read_text().split()[1]) * 4096
 
-    for _ in range(100):
+    for _ in range(20):
         run("#('x'):rep(1e5)")
     gc.collect()
     before = resident()
-    for _ in range(200):
+    for _ in range(40):
         run("#('x'):rep(1e6)")
     gc.collect()
-    assert resident() - before < 50e6
+    assert resident() - before < 20e6
 
 
 # -- random numbers ------------------------------------------------------------------------
@@ -440,10 +410,10 @@ def test_random_numbers_depend_on_the_seed_alone(runtime: str) -> None:
 
 
 def test_random_numbers_of_different_seeds_are_uniform() -> None:
-    sample = sorted(numbers("math.random()", range(1000)))
+    sample = sorted(numbers("math.random()", range(500)))
     assert all(0.0 <= number < 1.0 for number in sample)
     # The Kolmogorov-Smirnov distance of a uniform sample exceeds this with a probability of 1e-6.
-    assert max(abs(number - i / 1000) for i, number in enumerate(sample)) < 2.69 / 1000**0.5
+    assert max(abs(number - i / 500) for i, number in enumerate(sample)) < 2.69 / 500**0.5
 
 
 @pytest.mark.parametrize(
@@ -451,12 +421,12 @@ def test_random_numbers_of_different_seeds_are_uniform() -> None:
     [("6", range(1, 7)), ("-2, 1", range(-2, 2)), ("3, 3", [3]), ("2.9", [1, 2]), ("'2'", [1, 2])],
 )
 def test_random_integers_are_in_the_interval(arguments: str, values: range) -> None:
-    assert set(numbers(f"math.random({arguments})", range(100))) == set(values)
+    assert set(numbers(f"math.random({arguments})", range(60))) == set(values)
 
 
-@pytest.mark.parametrize("arguments", ["0", "3, 1", "0/0", "'a'", "1, 0/0"])
-def test_an_empty_interval_is_an_error(runtime: str, arguments: str) -> None:
-    assert "interval is empty" in failure(f"math.random({arguments})"), runtime
+def test_an_empty_interval_is_an_error(runtime: str) -> None:
+    for arguments in ("0", "3, 1", "0/0", "'a'", "1, 0/0"):
+        assert "interval is empty" in failure(f"math.random({arguments})"), (runtime, arguments)
 
 
 @pytest.mark.parametrize("seed", ["7", "-1e300", "0/0", "'x'", ""])

@@ -59,10 +59,10 @@ def test_an_episode_depends_on_the_seed_and_the_actions_only(make: Make) -> None
     def create() -> FlatlandEnv:
         return make(world="navigate", ending=Arrived(), max_steps=60)
 
-    actions = [random_actions(k, 60) for k in range(6)]
-    expected = [run(create(), k, actions[k]) for k in range(6)]
+    actions = [random_actions(k, 60) for k in range(3)]
+    expected = [run(create(), k, actions[k]) for k in range(3)]
     env = create()
-    for k in (3, 0, 5, 5, 1, 2, 4, 0):
+    for k in (2, 0, 1, 1, 0):
         assert run(env, k, actions[k]) == expected[k]
 
 
@@ -316,3 +316,15 @@ def test_a_place_that_is_taken_is_refused(
         env.step(AHEAD)
     env.reset(seed=0)
     env.step(AHEAD)
+
+
+def test_the_highest_velocity_is_the_limit_of_the_drive(make: Make, room: Path) -> None:
+    path = room.parent / "robot.model.yaml"
+    limits = "linear_dynamics: {velocity_limit: 0.7}, angular_dynamics: {velocity_limit: 1.3}"
+    path.write_text(path.read_text().replace("body: base}", f"body: base, {limits}}}", 1))
+    env = make(world=room)
+    env.reset(seed=0)
+    for action, velocity in (((1, 1), (0.7, 1.3)), ((-1, -1), (0.0, -1.3))):
+        env.step(np.array(action, np.float32))
+        command = env.world.command("/cmd_vel").value
+        assert (command.linear_x, command.angular_z) == pytest.approx(velocity)

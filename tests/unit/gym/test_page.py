@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-import re
 from pathlib import Path
 
 import pytest
+from pages import code_blocks
 
 PAGE = Path(__file__).resolve().parents[3] / "docs" / "learning.md"
 # The program for RLlib requires a cluster; tests/learning/test_sweep.py tests its environment.
 PROGRAMS = [
-    program
-    for program in re.findall(r"```python\n(.*?)```", PAGE.read_text(), re.DOTALL)
-    if "import ray" not in program
+    program for program in code_blocks(PAGE.read_text(), "python") if "import ray" not in program
 ]
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import subprocess
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -11,29 +10,12 @@ from typing import Any
 import gymnasium
 import numpy as np
 import pytest
+from programs import run_program
 
 import flatland.gym
 from flatland.gym import FlatlandEnv, FlatlandVectorEnv
 
 Make = Callable[..., Any]
-
-# Imports a module in a Python that lacks another one.
-WITHOUT = """
-import importlib.abc, importlib.util, sys
-hidden = sys.argv[1]
-find_spec = importlib.util.find_spec
-class Hide(importlib.abc.MetaPathFinder):
-    def find_spec(self, name, path=None, target=None):
-        if name == hidden or name.startswith(hidden + "."):
-            raise ModuleNotFoundError(f"No module named {name!r}", name=name)
-sys.meta_path.insert(0, Hide())
-importlib.util.find_spec = lambda name, package=None: None if name == hidden else find_spec(name)
-try:
-    import flatland.gym
-    flatland.gym.make_parallel()
-except ImportError as error:
-    print(error)
-"""
 
 
 def test_names_are_registered_with_gymnasium(make: Make) -> None:
@@ -55,7 +37,7 @@ def test_names_are_registered_with_gymnasium(make: Make) -> None:
 
 def test_gymnasium_imports_the_package_by_name() -> None:
     program = "import gymnasium; gymnasium.make('flatland.gym:flatland/Corridor-v0').close()"
-    subprocess.run([sys.executable, "-c", program], check=True)
+    run_program([sys.executable, "-c", program], check=True)
 
 
 def test_vectors_are_made_by_name(make: Make) -> None:
@@ -71,20 +53,6 @@ def test_the_fleet_is_no_environment_of_gymnasium() -> None:
     for make in (gymnasium.make, flatland.gym.make_vec):
         with pytest.raises(gymnasium.error.UnsupportedMode, match=r"make_parallel\("):
             make("flatland/Fleet-v0")
-
-
-@pytest.mark.parametrize(
-    ("module", "message"),
-    [
-        ("gymnasium", "flatland.gym requires Gymnasium"),
-        ("pettingzoo", "environments with several robots require PettingZoo"),
-    ],
-)
-def test_a_missing_extra_is_named_with_the_command(module: str, message: str) -> None:
-    output = subprocess.run(
-        [sys.executable, "-c", WITHOUT, module], check=True, capture_output=True, text=True
-    ).stdout
-    assert output == f'{message}, which is not installed: pip install "flatland-sim[gym]"\n'
 
 
 def test_an_image_shows_the_goal(make: Make) -> None:

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from typing import Any
 
-import pytest
-
 import flatland
 from flatland import Material
 
@@ -53,35 +51,3 @@ def test_classes(files: Any) -> None:
     world = files.load(WORLD.format(", class: wall"))
     assert world.layer("2d").class_name == "wall"
     assert files.load(WORLD.format("")).layer("2d").body.class_name == "2d"
-
-
-ERRORS = {
-    ", material: glass": 'Entry "material" must be a map',
-    ", material: {transmission: 1.5}": 'Invalid "transmission", must be from 0 to 1, got 1.5',
-    ", material: {reflectance: -1}": 'Invalid "reflectance", must be from 0 to 1, got -1',
-    ", material: {specular: .nan}": 'Invalid "specular", must be',
-    ", material: {transmission: 0.5, specular: 0.6}": (
-        'Invalid "specular", transmission + specular must be at most 1, got 0.5 + 0.6'
-    ),
-    ", material: {colour: 1}": 'Entry "material" contains unrecognized entry(s) {"colour"}',
-    ", class: ''": 'Invalid "class", must not be empty',
-}
-
-
-@pytest.mark.parametrize("text", ERRORS)
-def test_errors_name_the_file_and_the_place(files: Any, text: str) -> None:
-    with pytest.raises(flatland.YamlError) as caught:
-        files.load(WORLD.format(text))
-    assert ERRORS[text] in str(caught.value)
-    assert "world.yaml:2" in str(caught.value)
-    if "class" in text:
-        return
-    files.write("thing.model.yaml", MODEL.format("", "", text))
-    world = files.load(WORLD.format(""))
-    with pytest.raises(flatland.YamlError) as caught:
-        world.spawn_model("thing.model.yaml", "thing1")
-    assert ERRORS[text] in str(caught.value)
-    assert "thing.model.yaml:1" in str(caught.value)
-    assert 'body "base"' in str(caught.value)
-    assert world.models == []
-    assert world.physics.object_counts().fixtures == 0

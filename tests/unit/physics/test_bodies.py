@@ -256,7 +256,7 @@ def test_properties_of_fixtures(world: PhysicsWorld) -> None:
     assert polygon.center == pytest.approx((1, 1))
     assert polygon.radius == 0
     a, b, c = polygon.vertices
-    assert np.cross(b - a, c - a) > 0, "corners come counter-clockwise"
+    assert np.linalg.det([b - a, c - a]) > 0, "corners come counter-clockwise"
     assert edge.vertices.tolist() == [[0, 0], [2, 4]]
     assert (edge.center, edge.density, edge.friction) == ((1, 2), 0, 0.5)
     assert edge.body == body

@@ -299,6 +299,16 @@ def test_invalid_values_are_rejected_in_pre_solve(world: PhysicsWorld) -> None:
         assert all(isinstance(error, ValueError) and name in str(error) for error in errors)
 
 
+def test_a_closed_world_and_a_copy_have_no_pre_solve(world: PhysicsWorld) -> None:
+    world.pre_solve = lambda *_: None
+    copy = world.copy()
+    assert copy.pre_solve is None
+    assert copy.take_pre_solve_errors() == []
+    assert world.pre_solve is not None
+    world.close()
+    assert world.pre_solve is None
+
+
 def test_errors_in_pre_solve_are_returned_after_the_step(world: PhysicsWorld) -> None:
     wall = add_wall(world)
     disc = add_disc(world, -1, speed=2)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import gc
 import weakref
 from collections.abc import Callable
@@ -170,6 +171,52 @@ def test_handles_are_compared_by_world_and_id() -> None:
     assert fixture != fixture.id
     for world in worlds:
         world.close()
+
+
+def test_a_deep_copy_refers_to_the_copied_world_if_there_is_one() -> None:
+    class Named(PhysicsBody):
+        __slots__ = ("names",)
+
+        def __init__(self, body: PhysicsBody, names: list[str]) -> None:
+            super().__init__(body.world, body.id)
+            self.names = names
+
+    world = PhysicsWorld()
+    body = world.create_body("dynamic", (1, 2, 0))
+    named = Named(body, ["hull"])
+    assert copy.deepcopy(body) is copy.copy(body) is body
+    copied = world.copy()
+    memo: dict[int, object] = {id(world): copied}
+    twin = copy.deepcopy([body, named, named], memo)
+    assert [type(handle) for handle in twin] == [PhysicsBody, Named, Named]
+    assert all(handle == copied.body(body.id) for handle in twin)
+    assert twin[1] is twin[2]
+    assert twin[1].names == ["hull"]
+    assert twin[1].names is not named.names
+    twin[0].set_pose(5, 0, 0)
+    assert (named.pose, twin[1].pose) == ((1, 2, 0), (5, 0, 0))
+
+
+def test_objects_of_another_world_are_refused() -> None:
+    world, other = PhysicsWorld(), PhysicsWorld()
+    stranger = other.create_body("dynamic", (0, 0, 0))
+    with pytest.raises(ValueError, match="belongs to another physics world"):
+        world.motions([stranger])
+    with pytest.raises(TypeError, match="expected bodies"):
+        world.motions([None])  # type: ignore[list-item]
+
+
+def test_a_world_in_a_reference_cycle_is_freed() -> None:
+    class Tracked(PhysicsWorld):
+        """A world that supports weak references."""
+
+    world = Tracked()
+    body = world.create_body("static", (0, 0, 0))
+    world.pre_solve = lambda *_, body=body: body.pose
+    reference = weakref.ref(world)
+    del world, body
+    gc.collect()
+    assert reference() is None
 
 
 def test_handles_keep_their_world_alive() -> None:

@@ -70,55 +70,6 @@ def test_gap_between_squares(pose: Pose, expected: float) -> None:
     assert gap(world, body, pose) == pytest.approx(expected, abs=1e-5)
 
 
-@pytest.mark.parametrize(
-    ("x", "y", "expected"),
-    [
-        (2.0, 0.0, 1.2),  # face at 0.5, radius 0.3
-        (0.8, 0.0, 0.0),
-        (0.5 + 3.0, 0.5 + 4.0, 4.7),  # to the corner
-        (0.0, 0.4, -0.4),  # center 0.1 below the face
-        (0.0, 0.0, -0.8),
-    ],
-)
-def test_gap_between_disc_and_square(x: float, y: float, expected: float) -> None:
-    world = PhysicsWorld()
-    box(world, (0, 0, 0))
-    assert gap(world, disc(world, 9, 9, 0.3), (x, y, 1.0)) == pytest.approx(expected, abs=1e-5)
-
-
-@pytest.mark.parametrize(
-    ("x", "y", "expected"),
-    [
-        (0.0, 1.0, 0.7),
-        (0.0, -1.0, 0.7),  # from the other side
-        (0.5, 0.1, -0.2),
-        (1.0, 0.0, -0.3),  # on the end point
-        (4.0, 4.0, 4.7),  # beyond the end point: 3, 4, 5
-        (2.0, 0.0, 0.7),  # on the line, beyond the end point
-    ],
-)
-def test_gap_between_disc_and_edge(x: float, y: float, expected: float) -> None:
-    world = PhysicsWorld()
-    wall(world, (-1, 0, 1, 0))
-    assert gap(world, disc(world, 9, 9, 0.3), (x, y, 0)) == pytest.approx(expected, abs=1e-5)
-
-
-@pytest.mark.parametrize(
-    ("x", "y", "expected"), [(0.0, 2.0, 1.5), (0.0, 0.4, -0.1), (0.0, -0.4, -0.1), (4.5, 4.5, 5.0)]
-)
-def test_gap_between_square_and_edge(x: float, y: float, expected: float) -> None:
-    world = PhysicsWorld()
-    wall(world, (-1, 0, 1, 0))
-    assert gap(world, box(world, (9, 9, 0)), (x, y, 0)) == pytest.approx(expected, abs=1e-5)
-
-
-@pytest.mark.parametrize(("x", "expected"), [(2.0, 1.2), (0.8, 0.0), (0.0, -0.8)])
-def test_gap_between_discs(x: float, expected: float) -> None:
-    world = PhysicsWorld()
-    disc(world, 0, 0, 0.5)
-    assert gap(world, disc(world, 9, 9, 0.3), (x, 0, 0)) == pytest.approx(expected, abs=1e-5)
-
-
 def test_a_closed_loop_of_edges_has_no_interior() -> None:
     world = PhysicsWorld()
     wall(world, (-2, -2, 2, -2), (2, -2, 2, 2), (2, 2, -2, 2), (-2, 2, -2, -2))
@@ -270,7 +221,7 @@ def add_shapes(rng: np.random.Generator, body: PhysicsBody, may_be_edge: bool) -
             body.create_edges(rng.uniform(-2, 2, (3, 4)))
 
 
-@settings(max_examples=40, derandomize=True)
+@settings(max_examples=12, derandomize=True)
 @given(seed=st.integers(0, 2**32), least_gap=st.sampled_from([-0.1, -0.005, 0.0, 0.3]))
 def test_queries_agree_with_the_minkowski_difference(seed: int, least_gap: float) -> None:
     rng = np.random.default_rng(seed)
@@ -283,7 +234,7 @@ def test_queries_agree_with_the_minkowski_difference(seed: int, least_gap: float
     bodies = [world.create_body("dynamic", (9, 9, 1)), world.create_body("dynamic", (9.5, 9, 2))]
     for body in bodies:
         add_shapes(rng, body, may_be_edge=False)
-    poses = np.column_stack((rng.uniform(-3, 3, (20, 2)), rng.uniform(-4, 4, 20)))
+    poses = np.column_stack((rng.uniform(-3, 3, (8, 2)), rng.uniform(-4, 4, 8)))
     is_free = world.free_poses(bodies, poses, least_gap=least_gap)
     found = [world.overlapping_bodies(bodies, tuple(p), least_gap=least_gap) for p in poses]
     assert is_free.tolist() == [not overlapped for overlapped in found]

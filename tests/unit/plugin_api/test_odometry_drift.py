@@ -71,7 +71,7 @@ def check_covariance(samples: npt.NDArray[np.float64], expected: npt.NDArray[np.
 class TestMoments:
     def test_straight_line(self) -> None:
         a2, a3, n = 0.002, 0.01, 10
-        samples = errors((0.5, a2, a3, 0.5), arc(1.0, 0.0, n * SEGMENT_LENGTH, 10 * n))
+        samples = errors((0.5, a2, a3, 0.5), arc(1.0, 0.0, n * SEGMENT_LENGTH, 4 * n))
         length, total = SEGMENT_LENGTH, n * SEGMENT_LENGTH
         # Each segment adds a rotation, of which the lateral error is that at its middle.
         levers = total - (np.arange(n) + 0.5) * length
@@ -85,7 +85,7 @@ class TestMoments:
     @pytest.mark.parametrize("side", [1.0, -1.0])
     def test_turn_in_place(self, side: float) -> None:
         a1, a4, n = 0.01, 0.0004, 6
-        samples = errors((a1, 0.5, 0.5, a4), arc(0.0, side, n * SEGMENT_ANGLE, 10 * n))
+        samples = errors((a1, 0.5, 0.5, a4), arc(0.0, side, n * SEGMENT_ANGLE, 4 * n))
         ends = side * np.arange(n + 1) * SEGMENT_ANGLE
         # A segment adds a translation along the headings in it.
         moves = np.stack([np.diff(np.sin(ends)), -np.diff(np.cos(ends))])
@@ -97,7 +97,7 @@ class TestMoments:
 
     def test_reported_covariance_on_an_arc(self) -> None:
         parameters = (0.005, 0.002, 0.005, 0.002)
-        poses = arc(0.6, 0.5, 8.0, 200)
+        poses = arc(0.6, 0.5, 8.0, 60)
         samples = errors(parameters, poses)
         turned = np.eye(3)
         c, s = math.cos(START[2]), math.sin(START[2])
@@ -114,9 +114,9 @@ class TestMoments:
 
     def test_backward_motion_has_the_errors_of_forward_motion(self) -> None:
         parameters = (0.0, 0.002, 0.01, 0.0)
-        ahead, back = (errors(parameters, arc(v, 0.0, 1.0, 50)) for v in (1.0, -1.0))
+        ahead, back = (errors(parameters, arc(v, 0.0, 1.1, 12)) for v in (1.0, -1.0))
         assert np.std(ahead, axis=0) == pytest.approx(np.std(back, axis=0), rel=0.03)
-        assert back[:, 0].mean() == pytest.approx(-1.0, abs=0.01)
+        assert back[:, 0].mean() == pytest.approx(-1.1, abs=0.01)
 
 
 class TestEstimate:
@@ -125,12 +125,11 @@ class TestEstimate:
     def test_does_not_depend_on_the_step_size(self) -> None:
         ends = [
             follow(drift(self.PARAMETERS), arc(0.6, 0.5, 10.0, steps)).pose
-            for steps in (400, 4000, 40000)
+            for steps in (400, 10000)
         ]
         truth = arc(0.6, 0.5, 10.0, 1)[0]
         # The steps in which segments end differ.
-        for end in ends[1:]:
-            assert end == pytest.approx(ends[0], abs=0.03)
+        assert ends[1] == pytest.approx(ends[0], abs=0.03)
         assert math.dist(ends[0], truth) > 0.2
 
     def test_parameters_of_zero_yield_the_true_pose(self) -> None:
@@ -155,8 +154,8 @@ class TestEstimate:
     def test_tiny_motions_accumulate(self) -> None:
         start = (0.0, 0.0, 0.0)
         estimator = drift((0.0, 0.0, 0.05, 0.0), start=start)
-        for k in range(1, 100_001):
-            estimator.advance((k * 1e-5, 0.0, 0.0))
+        for k in range(1, 20_001):
+            estimator.advance((k * 5e-5, 0.0, 0.0))
         coarse = follow(drift((0.0, 0.0, 0.05, 0.0), start=start), arc(1.0, 0.0, 1.0, 50, start))
         assert estimator.pose == pytest.approx(coarse.pose, abs=0.01)
         assert abs(estimator.pose[0] - 1.0) > 0.01

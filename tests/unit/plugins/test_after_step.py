@@ -153,11 +153,12 @@ def test_the_last_value_of_a_step_has_the_time_after_it(
 @pytest.mark.parametrize(
     "plugin", [LASER, DIFF, TF], ids=["Laser", "DiffDrive", "ModelTfPublisher"]
 )
-def test_without_the_parameter_there_is_no_hook_after_the_step(
+def test_without_the_parameter_nothing_is_called_after_the_step(
     plugin_world: Any, plugin: str
 ) -> None:
     world = plugin_world(f"- {{{plugin}}}")
-    assert not world.plugin_host.hooks.of_step("after_physics_step")
+    updates = [update for each in world.model("robot").plugins for update in each.updates]
+    assert [update.phase for update in updates] == ["before"]
     assert "after_step" in plugin_world.error(f"- {{{plugin}, after_step: 3}}")
 
 

@@ -192,15 +192,3 @@ def test_a_late_subscriber_does_not_receive_a_past_contact(plugin_world: Any, fi
     output = world.output("/bool_sensor")
     world.step()
     assert output.latest is False
-
-
-@pytest.mark.parametrize(
-    ("entry", "text"),
-    [
-        ("body: nose", 'Body with name "nose" does not exist'),
-        ("update_rate: .nan", 'Invalid "update_rate", must not be negative or NaN'),
-        ("rate: 3", 'unrecognized entry(s) {"rate"}'),
-    ],
-)
-def test_invalid_parameters_are_errors(plugin_world: Any, entry: str, text: str) -> None:
-    assert text in plugin_world.error(f"[{{type: BoolSensor, name: switch, {entry}}}]")

@@ -7,20 +7,19 @@ import math
 import numpy as np
 import pytest
 
-from flatland.physics.crowd import (
-    HalfPlane,
-    avoid,
+from flatland._core import (
+    crowd_avoid,
+    crowd_repulsion,
+    crowd_wall_repulsion,
     leg_offset,
     nearest_point,
-    repulsion,
     step_length,
-    wall_repulsion,
 )
 
 
 def test_a_person_who_stands_repels_with_the_gradient_of_a_round_potential() -> None:
     # V0 / sigma exp(-d / sigma), away from the other person.
-    x, y = repulsion((0.6, 0.8), (0.0, 0.0), strength=2.1, range=0.3)
+    x, y = crowd_repulsion((0.6, 0.8), (0.0, 0.0), {"strength": 2.1, "range": 0.3})
     assert math.hypot(x, y) == pytest.approx(7.0 * math.exp(-1.0 / 0.3))
     assert y / x == pytest.approx(0.8 / 0.6)
 
@@ -39,11 +38,11 @@ def test_the_repulsion_is_the_gradient_of_the_elliptic_potential() -> None:
         -(potential(x, y + h) - potential(x, y - h)) / (2 * h),
     )
     numbers = {"strength": strength, "range": sigma, "look_ahead": look_ahead}
-    assert repulsion((x, y), velocity, **numbers) == pytest.approx(expected, rel=1e-6)
+    assert crowd_repulsion((x, y), velocity, numbers) == pytest.approx(expected, rel=1e-6)
 
 
 def test_a_wall_repels_exponentially_with_the_distance_from_the_circumference() -> None:
-    x, y = wall_repulsion((0.0, -0.5), 0.2, wall_strength=5.0, wall_range=0.1)
+    x, y = crowd_wall_repulsion((0.0, -0.5), 0.2, {"wall_strength": 5.0, "wall_range": 0.1})
     assert (x, y) == pytest.approx((0.0, -5.0 * math.exp(-3.0)))
 
 
@@ -51,26 +50,26 @@ def test_two_discs_share_the_change_of_velocity_that_avoids_a_head_on_collision(
     # Both move at 1 m/s; the gap of 3 m lasts for the horizon of 2 s at a relative speed of 1.5.
     left = ((0.0, 0.0), (1.0, 0.0), 0.5)
     right = ((4.0, 0.0), (-1.0, 0.0), 0.5)
-    plane = avoid(left, right, horizon=2.0, share=0.5, dt=0.05)
-    mirrored = avoid(right, left, horizon=2.0, share=0.5, dt=0.05)
+    normal, offset = crowd_avoid(left, right, horizon=2.0, share=0.5, dt=0.05)
+    mirrored_normal, mirrored_offset = crowd_avoid(right, left, horizon=2.0, share=0.5, dt=0.05)
     # The nearest velocity outside the cone touches its side, at asin(r / d) from its axis.
     half_angle = math.asin(1.0 / 4.0)
-    assert abs(plane.normal[1]) == pytest.approx(math.cos(half_angle))
-    assert plane.normal[0] == pytest.approx(-math.sin(half_angle))
+    assert abs(normal[1]) == pytest.approx(math.cos(half_angle))
+    assert normal[0] == pytest.approx(-math.sin(half_angle))
     change = 2.0 * math.sin(half_angle)  # of the relative velocity, which lies on the axis
-    assert plane.offset == pytest.approx(plane.normal[0] * 1.0 + change / 2)
+    assert offset == pytest.approx(normal[0] * 1.0 + change / 2)
     # Point-symmetric: both move to their right, or both to their left.
-    assert mirrored.normal == pytest.approx((-plane.normal[0], -plane.normal[1]))
-    assert mirrored.offset == pytest.approx(plane.offset)
+    assert mirrored_normal == pytest.approx((-normal[0], -normal[1]))
+    assert mirrored_offset == pytest.approx(offset)
 
 
 def test_discs_that_stand_apart_need_no_change() -> None:
-    plane = avoid(
+    normal, offset = crowd_avoid(
         ((0.0, 0.0), (0.0, 0.0), 0.2), ((2.0, 0.0), (0.0, 0.0), 0.2), horizon=2.0, share=0.5, dt=0.1
     )
     # At rest, half of the gap may be closed within the horizon.
-    assert plane.normal == (-1.0, 0.0)
-    assert plane.offset == pytest.approx(-(1.6 / 2.0) / 2)
+    assert normal == (-1.0, 0.0)
+    assert offset == pytest.approx(-(1.6 / 2.0) / 2)
 
 
 def test_the_nearest_point_of_half_planes_is_that_of_an_exhaustive_search() -> None:
@@ -83,8 +82,7 @@ def test_the_nearest_point_of_half_planes_is_that_of_an_exhaustive_search() -> N
         normals = np.stack([np.cos(angles), np.sin(angles)], axis=1)
         offsets = rng.uniform(-0.6, 0.3, 4)
         planes = [
-            HalfPlane((float(n[0]), float(n[1])), float(o))
-            for n, o in zip(normals, offsets, strict=True)
+            ((float(n[0]), float(n[1])), float(o)) for n, o in zip(normals, offsets, strict=True)
         ]
         preferred = rng.uniform(-1, 1, 2)
         found = np.array(nearest_point(planes, (preferred[0], preferred[1]), radius=1.0))

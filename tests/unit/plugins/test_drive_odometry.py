@@ -12,7 +12,6 @@ import tricycle
 
 import flatland
 from flatland.geometry import Pose, compose, invert
-from flatland.plugin_api.noise import NoiseStream
 
 Collect = Callable[[flatland.World, str], list[Any]]
 Load = Callable[..., flatland.World]
@@ -21,7 +20,6 @@ TRUTH, ODOMETRY = "/odometry/ground_truth", "/odometry/filtered"
 DRIFT = "odom_drift: [0.05, 0.02, 0.05, 0.02]"
 START = (1.0, 2.0, 0.5)
 
-TRICYCLE = (tricycle.BODIES, tricycle.JOINTS)
 _DIFF = "- {name: base, footprints: [{type: circle, radius: 0.2, density: 1}]}"
 
 
@@ -98,15 +96,6 @@ class TestDrift:
         assert end("pub_rate: 10") == alone
         assert end("", 200, (TRUTH,)) == alone
 
-    def test_is_determined_by_the_seed(self, robot: Load) -> None:
-        def end(seed: int) -> Pose:
-            world = robot(DRIFT, seed=seed)
-            world.step(200)
-            return transform(world)
-
-        assert end(3) == end(3)
-        assert end(3) != end(4)
-
     def test_transform_and_odometry_agree(self, robot: Load, collect: Collect) -> None:
         world = robot(f"{DRIFT}, odom_pose_noise: [0.01, 0.01, 0.01]")
         odometry = collect(world, ODOMETRY)
@@ -163,26 +152,6 @@ class TestDrift:
         world.step(100)
         assert odometry[-1].pose_covariance.ravel().tolist() == pose
         assert odometry[-1].twist_covariance.ravel().tolist() == twist
-
-    def test_parameters_of_zero_draw_nothing(
-        self, robot: Load, collect: Collect, monkeypatch: pytest.MonkeyPatch
-    ) -> None:
-        monkeypatch.setattr(NoiseStream, "rng", property(lambda _: pytest.fail("drawn")))
-        world = robot("odom_drift: [0, 0, 0, 0]")
-        truths, odometry = collect(world, TRUTH), collect(world, ODOMETRY)
-        world.step(20)
-        assert poses(truths) == poses(odometry)
-        assert "after_physics_step" not in vars(world.model("robot").plugin("drive"))
-
-    @pytest.mark.parametrize("value", ["[0, 0, -1, 0]", "[0, .nan, 0, 0]", "[.inf, 0, 0, 0]"])
-    def test_invalid_parameters(self, robot: Load, value: str) -> None:
-        with pytest.raises(flatland.PluginError, match='Invalid "odom_drift", must be finite'):
-            robot(f"odom_drift: {value}")
-
-    @pytest.mark.parametrize("value", ["[0, 0, 0]", "0.1", "[a, b, c, d]"])
-    def test_parameters_must_be_four_numbers(self, robot: Load, value: str) -> None:
-        with pytest.raises(flatland.PluginError, match="odom_drift"):
-            robot(f"odom_drift: {value}")
 
 
 def robot_end(robot: Load) -> Pose:

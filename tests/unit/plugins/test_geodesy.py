@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 
 import numpy as np
@@ -31,9 +32,8 @@ def surface(latitude: float, longitude: float) -> np.ndarray:
 
 
 @pytest.mark.parametrize("height", [0.0, 30.0, 1e4, 1e6])
-@pytest.mark.parametrize("latitude", LATITUDES)
-def test_inverse_of_the_forward_conversion(latitude: float, height: float) -> None:
-    for longitude in LONGITUDES:
+def test_inverse_of_the_forward_conversion(height: float) -> None:
+    for latitude, longitude in itertools.product(LATITUDES, LONGITUDES):
         point = surface(latitude, longitude) + height * up(latitude, longitude)
         phi, lam = geodetic_from_ecef(*point)
         assert math.degrees(phi) == pytest.approx(latitude, abs=TOLERANCE)

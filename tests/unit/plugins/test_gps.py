@@ -125,21 +125,3 @@ def test_no_transform_without_broadcast_tf(plugin_world: Any) -> None:
     world.step()
     assert world.transforms == {}
     assert output.latest is not None
-
-
-@pytest.mark.parametrize(
-    ("entry", "text"),
-    [
-        ("", 'Entry "body" does not exist'),
-        ("body: nose", 'Body with name "nose" does not exist'),
-        ("body: base, ref_lat: 91", 'Invalid "ref_lat", must be from -90 to 90, got 91'),
-        ("body: base, ref_lat: .nan", 'Invalid "ref_lat", must be finite'),
-        ("body: base, ref_lon: .inf", 'Invalid "ref_lon", must be finite'),
-        ("body: base, origin: [0, 0]", 'Entry "origin" must have size of exactly 3'),
-        ("body: base, update_rate: -2", 'Invalid "update_rate", must not be negative'),
-        # The reference does not check the keys of this plugin.
-        ("body: base, lat: 3", 'unrecognized entry(s) {"lat"}'),
-    ],
-)
-def test_invalid_parameters_are_errors(plugin_world: Any, entry: str, text: str) -> None:
-    assert text in plugin_world.error(f"[{{type: Gps, name: gps, {entry}}}]".replace(", }", "}"))

@@ -10,7 +10,9 @@ import pytest
 
 import flatland
 from flatland.errors import StaleHandleError
+from flatland.plugins import laser as laser_module
 from flatland.plugins.laser import cast_scans, compute_scans
+from flatland.runtime.plugin_costs import PluginCosts
 
 ROOM = ["#" * 12, *["#" + "." * 10 + "#"] * 10, "#" * 12]
 LAYERS = "[{name: 2d}, {name: reflectance, map: room.yaml}]"
@@ -121,55 +123,57 @@ def test_a_failed_batch_changes_nothing(robots: Robots) -> None:
 
 
 class TestEmittedScans:
-    def emitted(self, world: flatland.World, lasers: list[Any], *, together: bool) -> list[Any]:
-        """Emits three scans of each laser, alone or with all others."""
-        outputs = [world.ports.find_output(laser._scan.topic) for laser in lasers]
+    def emitted(self, lasers: list[Any]) -> list[Any]:
+        """Subscribes to the scans of lasers."""
         found: list[Any] = []
-        for output in outputs:
-            output.subscribe(found.append)
-        for _ in range(3):
-            due = [laser for laser in lasers if laser.begin_update(world.timekeeper)]
-            for group in [due] if together else [[laser] for laser in due]:
-                cast_scans(group, num_threads=2)
-            for laser in due:
-                laser.compute_ranges()  # has no effect on what is emitted
-                laser.emit_scan(world.timekeeper)
+        for laser in lasers:
+            laser._output.subscribe(found.append)
         return found
 
-    def test_scans_that_are_cast_together_equal_single_ones(self, robots: Robots) -> None:
+    def test_scans_that_are_cast_together_equal_single_ones(
+        self, robots: Robots, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        calls: list[int] = []
+
+        def count(requests: Any, *arguments: Any) -> Any:
+            calls.append(len(requests))
+            return perform(requests, *arguments)
+
+        perform = laser_module._perform
+        monkeypatch.setattr(laser_module, "_perform", count)
         found = []
         for together in (True, False):
             world = robots.world()
-            scans = self.emitted(world, robots.lasers(world), together=together)
+            scans = self.emitted(robots.lasers(world))
+            # Wall times are attributed to each plugin, so that nothing is done together.
+            world.plugin_host.costs = None if together else PluginCosts()
+            calls.clear()
+            for _ in range(3):
+                world.step()
+                for laser in robots.lasers(world):
+                    laser.compute_ranges()  # has no effect on what is emitted
             assert len(scans) == 27
+            assert calls.count(9) == (3 if together else 0)
             found.append([(s.frame_id, s.ranges.tobytes(), s.intensities.tobytes()) for s in scans])
         assert found[0] == found[1]
 
-    def test_they_equal_those_of_the_hook(self, robots: Robots) -> None:
-        world, other = robots.world(), robots.world()
-        lasers, others = robots.lasers(world), robots.lasers(other)
-        by_hook: list[Any] = []
-        for laser in others:
-            other.ports.find_output(laser._scan.topic).subscribe(by_hook.append)
-        for _ in range(3):
-            for laser in others:
-                laser.before_physics_step(other.timekeeper)
-        by_hand = self.emitted(world, lasers, together=True)
-        assert [s.ranges.tobytes() for s in by_hook] == [s.ranges.tobytes() for s in by_hand]
-
-    def test_nothing_is_cast_without_subscribers(self, robots: Robots) -> None:
+    def test_only_wanted_scans_are_cast(self, robots: Robots) -> None:
         world = robots.world()
-        assert not any(laser.begin_update(world.timekeeper) for laser in robots.lasers(world))
+        first = robots.lasers(world)[0]
+        world.output(first._output.topic)
+        world.step(3)
+        assert first.last_scan is not None
+        assert all(laser.last_scan is None for laser in robots.lasers(world)[1:])
 
-    def test_a_scan_is_emitted_once(self, robots: Robots) -> None:
+    def test_an_error_of_one_laser_does_not_affect_the_others(self, robots: Robots) -> None:
         world = robots.world()
-        laser = robots.lasers(world)[0]
-        with pytest.raises(RuntimeError, match="no scan was cast"):
-            laser.emit_scan(world.timekeeper)
-        cast_scans([laser])
-        laser.emit_scan(world.timekeeper)
-        with pytest.raises(RuntimeError, match="no scan was cast"):
-            laser.emit_scan(world.timekeeper)
+        scans = self.emitted(robots.lasers(world))
+        broken = robots.lasers(world)[4]
+        broken._finder = None
+        with pytest.raises(AttributeError) as caught:
+            world.step()
+        assert f'Model Plugin "{broken.name}"' in caught.value.__notes__[0]
+        assert len(scans) == 8
 
 
 def test_random_seeds_differ(robots: Robots) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import math
 from collections.abc import Callable
 from typing import Any
@@ -12,7 +11,6 @@ import pytest
 
 import flatland
 from flatland.plugins.laser import Laser, compute_scans
-from flatland.recording import Replay
 
 LASER = "{type: Laser, name: l, body: base, range: 9, angle: {min: -0.5, max: 0.5, increment: 0.01}"
 BODIES = "[{name: base, footprints: [{type: circle, radius: 0.2, density: 1, layers: []}]}]"
@@ -120,23 +118,6 @@ def test_paused_worlds_snapshots_clones_and_resets(glass_world: Any, collect: Co
     world.spawn_model("pane.model.yaml", "pane", pose=(8, 6, 0))
     world.step(40)
     assert contents(scans[-5:]) == expected
-
-
-def test_recordings_are_repeated(glass_world: Any, tmp_path: Any) -> None:
-    world = glass_world(spawn=False)
-    world.output("/scan")
-    recorder = world.record(tmp_path / "run.log")
-    world.step(5)
-    world.spawn_model("pane.model.yaml", "pane", pose=(8, 6, 0))
-    world.step(5)
-    recorder.close()
-    with contextlib.closing(Replay(tmp_path / "run.log")) as repeated:
-        scan = repeated.world.output("/scan")
-        assert repeated.run() is None
-        repeated.world.step()
-        world.step()
-        assert contents([scan.latest]) == contents([world.output("/scan").latest])
-        assert len(scan.latest.intensities) == 101
 
 
 def test_computed_scans_differ_from_call_to_call(glass_world: Any) -> None:

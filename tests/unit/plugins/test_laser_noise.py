@@ -192,14 +192,6 @@ class TestDeterminism:
         world.step(5 - first)
         return scans
 
-    def test_scans_are_determined_by_the_seed(self, eye: Eye, model: str) -> None:
-        first, second, other = (
-            self.scans(eye.world(model, seed, self.FAN), 0) for seed in (3, 3, 4)
-        )
-        assert first == second
-        assert first != other
-        assert len(set(first)) == 5
-
     def test_scans_do_not_depend_on_when_a_subscriber_connects(self, eye: Eye, model: str) -> None:
         early = self.scans(eye.world(model, 3, self.FAN), 0)
         assert self.scans(eye.world(model, 3, self.FAN), 2) == early[2:]
@@ -231,7 +223,6 @@ class TestDeterminism:
         ),
         ("noise_model: beam, z_rand: 1.5", 'Invalid "z_rand", must be from 0 to 1, got 1.5'),
         ("noise_model: beam, z_max: -0.5", 'Invalid "z_max", must be from 0 to 1, got -0.5'),
-        ("noise_model: beam, z_hit: .nan", 'Invalid "z_hit", must be from 0 to 1, got nan'),
         (
             "noise_model: beam, z_hit: 0.95, z_max: 0.1",
             'Invalid "z_hit", z_hit + z_short + z_max + z_rand must be 1, '

@@ -104,21 +104,6 @@ def test_update_rate(tf: Any) -> None:
     assert sorted(set(stamps)) == [0, 20_000_000, 40_000_000, 60_000_000, 80_000_000]
 
 
-@pytest.mark.parametrize(
-    ("extra", "message"),
-    [
-        ("reference: nose", 'Body with name "nose" does not exist'),
-        ("exclude: [arm, tail]", 'Body with name "tail" does not exist'),
-        ("update_rate: -1", 'Invalid "update_rate", must not be negative'),
-        ("rate: 1", "rate"),
-    ],
-)
-def test_invalid_parameters_are_errors(plugin_world: Any, extra: str, message: str) -> None:
-    text = plugin_world.error(f"- {{type: ModelTfPublisher, name: tf, {extra}}}", bodies=BODIES)
-    assert 'Model Plugin "tf" type "ModelTfPublisher" model "robot": ' in text
-    assert message in text
-
-
 @pytest.mark.parametrize("extra", ["", "publish_tf_world: true", "update_rate: 30"])
 def test_transforms_that_nobody_wanted_are_those_of_the_last_update(tf: Any, extra: str) -> None:
     def transforms(observers: list[flatland.WorldObserver]) -> list[dict[Any, flatland.Transform]]:

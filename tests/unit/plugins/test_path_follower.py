@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 
 import flatland
-from flatland.plugins.path_follower import PathFollower
 
 KINEMATIC = """
 - name: base
@@ -56,6 +55,14 @@ def trapezoid(t: float, length: float, v: float, a: float, b: float) -> float:
 
 
 class TestMotion:
+    @pytest.mark.parametrize("target", [(3.0, 0.0, 0.0), (0.0, 0.0, 3.0)])
+    def test_default_speeds_are_one_metre_and_one_radian_per_second(
+        self, follow: Any, target: Point
+    ) -> None:
+        world = follow(f"waypoints: [{list(target)}], mode: once")
+        world.step(150)
+        assert pose(world) == pytest.approx([value / 2 for value in target], abs=1e-3)
+
     @pytest.mark.parametrize("length", [0.2, 3.0], ids=["triangle", "trapezoid"])
     def test_profile(self, follow: Any, length: float) -> None:
         world = follow(
@@ -239,36 +246,18 @@ bodies:
     assert world.model("crate").pose[0] > 1.29
 
 
-def test_python_steps_equal_those_of_the_core(follow: Any, monkeypatch: pytest.MonkeyPatch) -> None:
-    text = "waypoints: [[1, 0.3, 0.4], [0.2, 0.7]], speed: 0.7, acceleration: 0.4, wait: 0.2"
-    core = follow(text)
-    core.step(600)
-    for hook in ("before_physics_step", "after_physics_step"):
-        method = getattr(PathFollower, hook)
-        # Without the mark of `when_due`, the hook is called in every step.
-        monkeypatch.setattr(PathFollower, hook, lambda self, t, method=method: method(self, t))
-    python = follow(text)
-    python.step(600)
-    assert pose(core) == pose(python)
-    assert plugin(core).state() == plugin(python).state()
-
-
 @pytest.mark.parametrize(
     ("text", "message"),
     [
         ("waypoints: []", 'Invalid "waypoints", must not be empty'),
-        ("mode: loop", "waypoints"),
         ("waypoints: [[1]]", "must be [x, y] or [x, y, theta]"),
         ("waypoints: [[1, 0, 0]], heading: forward", "must be [x, y]"),
         ("waypoints: [[.nan, 0]]", "finite"),
         ("waypoints: [[1, 0]], speed: 0", 'Invalid "speed", must be greater than 0, got 0.0'),
         ("waypoints: [[1, 0]], angular_speed: -1", 'Invalid "angular_speed"'),
-        ("waypoints: [[1, 0]], acceleration: -1", "acceleration"),
-        ("waypoints: [[1, 0]], wait: .inf", "wait"),
         ("waypoints: [[1, 0]], mode: zigzag", "must be one of: loop, once, there_and_back, random"),
         ("waypoints: [[1, 0]], frame: map", "must be one of: start, world, got map"),
         ("waypoints: [[1, 0]], start: false", '"start: false" requires a "start_topic"'),
-        ("waypoints: [[1, 0]], spede: 1", "spede"),
     ],
 )
 def test_errors(plugin_world: Any, text: str, message: str) -> None:

@@ -141,6 +141,50 @@ def test_pause_drag_and_deletion_of_people(files: WorldFiles) -> None:
     assert people.spawn("a", 2) == ["a_6", "a_7"]
 
 
+def test_people_who_are_removed_leave_nothing_in_the_state(files: WorldFiles) -> None:
+    groups = (
+        "[{name: a, count: 0}, {name: b, count: 0, together: 2, waypoints: [{at: [2, 2]},"
+        " {at: [8, 4], queue: true, wait: [1, 2]}]}]"
+    )
+    world = load(files, groups)
+    people = people_of(world)
+    numbers: Any = people.state()
+    for _ in range(5):
+        people.remove(people.spawn("a", 3) + people.spawn("b", 3))
+        world.step(25)
+        people.spawn("b", 2)
+        world.step(25)
+        world.delete_models(people.people.names)
+    now: Any = people.state()
+    assert len(now[0]) == len(numbers[0])
+
+
+def test_the_end_of_a_party_does_not_affect_the_next_one(files: WorldFiles) -> None:
+    groups = (
+        "[{name: a, count: 6, together: 3, waypoints:"
+        " [{at: [2, 2], wait: [0.1, 2]}, {at: [8, 4], wait: [0.1, 2]}], order: random}]"
+    )
+    worlds = [load(files, groups, FULL) for _ in range(2)]
+    for world, order in zip(worlds, (1, -1), strict=True):
+        people = people_of(world)
+        first_party, rest = people.people.names[:3], people.people.names[3:]
+        world.step(100)
+        people.remove(first_party[::order])
+        world.step(2000)
+        assert people.people.names == rest
+    assert worlds[0].state_hash() == worlds[1].state_hash()
+    poses = people.people.poses[:, :2]
+    assert np.hypot(*(poses - poses.mean(axis=0)).T).max() < 2.0
+
+
+def test_the_names_of_new_people_are_not_those_of_models(files: WorldFiles) -> None:
+    world = load(files, CROWD)
+    world.spawn_model("minimal.model.yaml", "a_7", pose=(5.0, 3.0, 0.0), if_blocked="allow")
+    people = people_of(world)
+    assert people.spawn("a", 2) == ["a_6", "a_8"]
+    assert people.spawn("a", 1) == ["a_9"]
+
+
 def test_the_outputs_carry_the_people(files: WorldFiles) -> None:
     world = load(files, CROWD, "pub_rate: 5, ")
     output, states = world.output("/people"), world.output("/people/states")
@@ -150,15 +194,35 @@ def test_the_outputs_carry_the_people(files: WorldFiles) -> None:
     assert times == [200_000_000 * k for k in range(1, 6)]
     assert output.latest is not None
     assert states.latest is not None
+    assert output.latest.frame_id == "map"
+    assert output.latest.names == people_of(world).people.names
     assert output.latest.poses.shape == (12, 3)
     assert states.latest.groups == ("a",) * 6 + ("b",) * 4 + ("c",) * 2
     assert states.latest.velocities.shape == (12, 3)
 
 
+def test_the_markers_name_people_who_were_removed(files: WorldFiles) -> None:
+    world = load(files, "[{name: a, count: 3, color: [1, 0, 0, 1]}]")
+    world.step()
+    markers = world.output("/people/markers")
+    world.step(100)
+    first = markers.latest
+    assert first is not None
+    assert first.names == ("a_0", "a_1", "a_2")
+    assert first.group_names == ("a",)
+    assert first.colors == ((1.0, 0.0, 0.0, 1.0),)
+    assert len(set(first.ids)) == 3
+    people_of(world).remove(["a_1"])
+    world.step(100)
+    assert markers.latest is not None
+    assert markers.latest.names == ("a_0", "a_2")
+    assert set(markers.latest.ids) < set(first.ids)
+
+
 def test_failed_requests_change_nothing(files: WorldFiles) -> None:
     world = load(files, CROWD)
     people = people_of(world)
-    before = [model.name for model in world.models]
+    before = world.state_hash()
     for request, text in (
         (lambda: people.spawn("x"), 'group "x" does not exist; groups: a, b, c'),
         (lambda: people.spawn("a", 5000), "free places"),
@@ -168,7 +232,7 @@ def test_failed_requests_change_nothing(files: WorldFiles) -> None:
     ):
         with pytest.raises((WorldError, ValueError), match=text):
             request()
-    assert [model.name for model in world.models] == before
+        assert world.state_hash() == before
     with pytest.raises(WorldError, match="does not exist"):
         world.call_plugin(people, "on_shutdown", {})
 
@@ -192,7 +256,7 @@ def test_failed_requests_change_nothing(files: WorldFiles) -> None:
         ("[{name: a, count: 1, waypoints: [{at: [2, 2], wait: [3, 1]}]}]", "", 'Invalid "wait"'),
         ("[{name: a, count: 900}]", "", 'group "a": found only'),
         ("[{name: a, count: 1, colour: 1}]", "", "colour"),
-        ("[{name: a, count: 1}]", "model: sfm, ", 'must be one of: social_force, orca, got "sfm"'),
+        ("[{name: a, count: 1}]", "model: sfm, ", "must be one of: social_force, orca, got sfm"),
         ("[{name: a, count: 1}]", "robot_awareness: 2, ", "from 0 to 1"),
         ("[{name: a, count: 1}]", "layers: [x], ", "layer(s) does not exist"),
         ("[{name: a, count: 1}]", "social_force: {mass: 1}, ", "mass"),

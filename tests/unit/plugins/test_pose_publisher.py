@@ -99,25 +99,3 @@ def test_a_moved_model_has_its_new_pose_at_once(plugin_world: Any, collect: Coll
     world.move_model("robot", (3, 4, 1))
     world.step()
     assert poses[-1].pose == pytest.approx((3, 4, 1), abs=1e-6)
-
-
-def test_snapshots_resets_and_clones_repeat_the_same_poses(
-    plugin_world: Any, collect: Collect
-) -> None:
-    world = plugin_world("[{type: PosePublisher, name: truth, update_rate: 60}]")
-    poses = collect(world, "/pose")
-    world.step(5)
-    snapshot = world.snapshot()
-    world.step(20)
-    expected = poses[-5:]
-    world.restore(snapshot)
-    world.step(20)
-    assert poses[-5:] == expected
-    world.restore(snapshot)
-    with world.clone() as clone:
-        values = collect(clone, "/pose")
-        clone.step(20)
-        assert values[-5:] == expected
-    world.reset()
-    world.step(25)
-    assert poses[-5:] == expected

@@ -10,6 +10,7 @@ import pytest
 
 import flatland
 from flatland.values import Odometry
+from tests.support.steps import control_bodies
 
 Collect = Callable[[flatland.World, str], list[Any]]
 
@@ -92,7 +93,7 @@ class TestMotion:
     def test_velocities_of_the_bicycle_model(self, trike: Any) -> None:
         world = trike(pose=(0.0, 0.0, 0.7))
         command(world, 0.6, 0.5)
-        plugin(world).before_physics_step(world.timekeeper)
+        control_bodies(world)
         omega = 0.6 * math.sin(0.5) / 1.0
         vx, vy, rate = base(world).velocity
         assert rate == pytest.approx(omega, abs=1e-5)
@@ -110,7 +111,7 @@ class TestMotion:
         geometry = plugin(world).geometry
         assert geometry.rear_center == pytest.approx((-2.0, 0.6), abs=1e-6)
         assert geometry.wheelbase == pytest.approx(math.hypot(2.0, 0.6), abs=1e-6)
-        plugin(world).before_physics_step(world.timekeeper)
+        control_bodies(world)
         vx, vy, omega = base(world).velocity
         assert omega == pytest.approx(0.6 * math.sin(0.5) / math.hypot(2.0, 0.6), abs=1e-5)
         c, s = math.cos(0.7), math.sin(0.7)
@@ -186,11 +187,12 @@ class TestSteering:
     def test_steering_deceleration_starts_at_the_stopping_distance(self, trike: Any) -> None:
         world = trike("angular_dynamics: {acceleration_limit: 4.0}")
         drive = plugin(world)
-        drive.steering_velocity = 1.0  # the stopping distance is 0.125 rad
+        controller = drive._controller
+        controller.state = (0.0, 1.0, 0.0, 0.0)  # the stopping distance is 0.125 rad
         command(world, 0.0, 0.125)
         world.step()
         assert drive.steering_velocity == pytest.approx(1.0 + 4.0 * 0.005)
-        drive.steering_velocity, drive.steering_angle = 1.0, 0.0
+        controller.state = (0.0, 1.0, 0.0, 0.125)
         command(world, 0.0, 0.1249)
         world.step()
         assert drive.steering_velocity == pytest.approx(1.0 - 4.0 * 0.005)
@@ -352,7 +354,7 @@ class TestTwistCommand:
     ) -> None:
         world = trike("command: twist", pose=(0.0, 0.0, 0.7))
         command(world, v, omega)
-        plugin(world).before_physics_step(world.timekeeper)
+        control_bodies(world)
         assert plugin(world).steering_angle == pytest.approx(angle)
         assert plugin(world).front_velocity == pytest.approx(speed)
         assert self.rear(world) == pytest.approx((v, 0.0, omega), abs=1e-5)
@@ -365,7 +367,7 @@ class TestTwistCommand:
         bodies = BODIES.replace("[-1, ", "[-0.5, ")
         world = plugin_world(drive("command: twist"), bodies=bodies, joints=moved)
         command(world, 0.6, 0.8)
-        plugin(world).before_physics_step(world.timekeeper)
+        control_bodies(world)
         assert plugin(world).steering_angle == pytest.approx(math.atan2(0.5 * 0.8, 0.6))
         assert base(world).velocity[2] == pytest.approx(0.8, abs=1e-5)
 
@@ -385,7 +387,7 @@ class TestTwistCommand:
     def test_beyond_the_steering_limit_the_speed_is_kept(self, trike: Any, sign: float) -> None:
         world = trike("command: twist, max_steer_angle: 0.5")
         command(world, sign * 0.6, 2.0)
-        plugin(world).before_physics_step(world.timekeeper)
+        control_bodies(world)
         assert plugin(world).steering_angle == pytest.approx(sign * 0.5)
         assert self.rear(world) == pytest.approx((sign * 0.6, 0.0, 0.6 * math.tan(0.5)), abs=1e-5)
 
@@ -407,19 +409,19 @@ class TestTwistCommand:
     def test_a_limit_of_the_speed_keeps_the_curvature(self, trike: Any) -> None:
         world = trike("command: twist, linear_dynamics: {velocity_limit: 0.25}")
         command(world, 0.6, 0.8)
-        plugin(world).before_physics_step(world.timekeeper)
+        control_bodies(world)
         assert self.rear(world) == pytest.approx((0.15, 0.0, 0.2), abs=1e-5)
 
     def test_the_robot_waits_for_its_front_wheel(self, trike: Any) -> None:
         world = trike("command: twist, angular_dynamics: {velocity_limit: 1.0}")
         command(world, 0.0, 1.0)
         for _ in range(200):
-            plugin(world).before_physics_step(world.timekeeper)
+            control_bodies(world)
             angle = plugin(world).steering_angle
             assert plugin(world).front_velocity == pytest.approx(math.sin(angle), abs=1e-9)
         # More than 90 degrees from the target.
         command(world, 0.3, -0.9)
-        plugin(world).before_physics_step(world.timekeeper)
+        control_bodies(world)
         assert plugin(world).front_velocity == 0.0
 
     def test_a_command_to_stop_keeps_the_steering_angle(self, trike: Any) -> None:
@@ -435,7 +437,7 @@ class TestTwistCommand:
         for extra in ("", "command: steering"):
             world = trike(extra)
             command(world, 0.6, 0.8)
-            plugin(world).before_physics_step(world.timekeeper)
+            control_bodies(world)
             assert plugin(world).steering_angle == 0.8
             assert plugin(world).front_velocity == 0.6
 
@@ -461,18 +463,6 @@ class TestErrors:
         assert 'Model Plugin "wheels" type "TricycleDrive" model "robot": ' in text
         assert "robot.model.yaml:" in text
         return text
-
-    @pytest.mark.parametrize(
-        "key",
-        ["body", "front_wheel_joint", "rear_left_wheel_joint", "rear_right_wheel_joint"],
-    )
-    def test_required_parameters(self, plugin_world: Any, key: str) -> None:
-        text = drive().replace(f"{key}:", "unused:")
-        assert f'"{key}"' in self.error(plugin_world, text)
-
-    def test_unknown_body(self, plugin_world: Any) -> None:
-        text = self.error(plugin_world, drive().replace("body: base", "body: nose"))
-        assert 'Body with name "nose" does not exist' in text
 
     @pytest.mark.parametrize("name", ["front_j", "left_j", "right_j"])
     def test_unknown_joint(self, plugin_world: Any, name: str) -> None:
@@ -544,16 +534,6 @@ class TestErrors:
     @pytest.mark.parametrize(
         ("extra", "message"),
         [
-            ("max_steer_angle: -1", 'Invalid "max_steer_angle", must not be negative'),
-            ("max_angular_velocity: -1", 'Invalid "max_angular_velocity", must not be negative'),
-            (
-                "max_steer_acceleration: .nan",
-                'Invalid "max_steer_acceleration", must not be negative',
-            ),
-            ("pub_rate: -1", 'Invalid "pub_rate", must not be negative'),
-            ("odom_pose_noise: [-1, 0, 0]", 'Invalid "odom_pose_noise", must be finite'),
-            ("angular_dynamics: {top: 1}", "top"),
-            ("linear_dynamics: {velocity_limit: -1}", 'Invalid "velocity_limit"'),
             ("command: rate", 'Invalid "command", must be one of: steering, twist, got rate'),
             ("command: 3", "must be one of: steering, twist, got 3"),
             ("twist_pub: t", "twist_pub"),

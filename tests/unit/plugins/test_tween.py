@@ -279,25 +279,3 @@ def test_a_moved_model_returns_to_its_path(plugin_world: Any) -> None:
     world.step()
     world.move_model("robot", (5, 5, 5))
     assert poses(world, 1)[0] == pytest.approx((0.5, 0, 0), abs=1e-6)
-
-
-@pytest.mark.parametrize(
-    ("entry", "text"),
-    [
-        ("", 'Entry "body" does not exist'),
-        ("body: nose", 'Body with name "nose" does not exist'),
-        ("body: base, mode: sometimes", "Mode sometimes does not exist"),
-        ("body: base, easing: slowly", "Easing slowly does not exist"),
-        ("body: base, easing: CubicIn", "Easing CubicIn does not exist"),
-        ("body: base, duration: 0", 'Invalid "duration", must be greater than 0, got 0'),
-        ("body: base, duration: -1", 'Invalid "duration", must be greater than 0, got -1'),
-        ("body: base, duration: .inf", 'Invalid "duration", must be finite'),
-        ("body: base, delta: [1, 2]", 'Entry "delta" must have size of exactly 3'),
-        ("body: base, delta: [1, .nan, 0]", 'Invalid "delta", must be finite'),
-        ("body: base, delta: [1, 0, -1e30]", 'Invalid "delta", must be finite and from -100'),
-        ("body: base, rate: 3", 'unrecognized entry(s) {"rate"}'),
-    ],
-)
-def test_invalid_parameters_are_errors(plugin_world: Any, entry: str, text: str) -> None:
-    error = plugin_world.error(f"[{{type: Tween, name: tween, {entry}}}]".replace(", }", "}"))
-    assert text in error

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import re
 from pathlib import Path
 
 import pytest
+from pages import code_blocks
 
 import flatland
 
@@ -13,8 +13,7 @@ import flatland
 def test_the_programs_of_the_documentation_run(
     checkout: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    text = (checkout / "docs" / "reliability.md").read_text()
-    programs = re.findall(r"^```python\n(.*?)^```", text, re.DOTALL | re.MULTILINE)
+    programs = code_blocks((checkout / "docs" / "reliability.md").read_text(), "python")
     assert len(programs) == 3
     (tmp_path / "worlds").symlink_to(checkout / "worlds")
     monkeypatch.chdir(tmp_path)

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import logging
 import os
-import signal
-import subprocess
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -122,38 +120,6 @@ def test_a_recording_does_not_change_the_run(world_files: Any) -> None:
     assert recorded.state_hash() == expected
 
 
-def test_a_run_that_was_killed_is_repeated_to_its_last_record(
-    world_files: Any, tmp_path: Path
-) -> None:
-    world_files.write("world.yaml", WORLD)
-    code = f"""
-import os, signal
-import flatland
-world = flatland.World.from_yaml({str(world_files.folder / "world.yaml")!r}, seed=1)
-world.record({str(tmp_path / "run.flog")!r})
-world.step(450)
-world.command("/cmd_vel").set(flatland.Twist(linear_x=0.7))
-os.kill(os.getpid(), signal.SIGKILL)
-"""
-    done = subprocess.run([sys.executable, "-c", code], check=False)
-    assert done.returncode == -signal.SIGKILL
-    result = replay(tmp_path / "run.flog")
-    assert (result.difference, result.last_step) == (None, 450)
-
-
-def test_the_recording_survives_a_cut_at_every_byte_of_a_request(run: Path) -> None:
-    content = run.read_bytes()
-    lines = content.splitlines(keepends=True)
-    last = next(i for i, line in enumerate(lines) if b'"spawn_model"' in line)
-    before = b"".join(lines[:last])
-    for length in range(len(lines[last]) + 1):
-        run.write_bytes(before + lines[last][:length])
-        # Without running it: 190 runs would take long, and the records decide.
-        assert len(read_recording(run).records) == last + (length == len(lines[last]))
-    result = replay(run)
-    assert (result.difference, result.last_step) == (None, 150)
-
-
 # -- differences ---------------------------------------------------------------------------
 
 
@@ -262,6 +228,49 @@ def test_changes_made_by_plugins_are_repeated_by_the_plugins(
     records = read_recording(path).records[1:]
     assert [record["kind"] for record in records] == ["spawn_model", "result", "end"]
     assert replay(path).difference is None
+
+
+class FileReader(ModelPlugin):
+    """Reads a file of its own next to the model file."""
+
+    def on_initialize(self, config: Any) -> None:
+        path = config.resolve_path(config.get("file", "string"))
+        self.speed = self.read_yaml(path).get("speed", "float")
+
+    def state(self) -> object:
+        return self.speed
+
+
+def test_a_file_that_a_plugin_reads_is_part_of_recordings_and_resets(
+    world_files: Any, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setitem(sys.modules, "reader_of_replay", SimpleNamespace(FileReader=FileReader))
+    manifest = world_files.write(
+        "reader.xml",
+        """
+        <library path=".">
+          <class type="reader_of_replay.FileReader" name="tests::FileReader"
+                 base_class_type="flatland::ModelPlugin"/>
+        </library>
+        """,
+    )
+    monkeypatch.setenv("FLATLAND_PLUGIN_PATH", manifest)
+    plugins = "plugins: [{type: 'tests::FileReader', name: reader, file: speed.yaml}]\n"
+    world_files.write("reader.model.yaml", BALL + plugins)
+    own = Path(world_files.write("speed.yaml", 'speed: $eval param("speed", 1)'))
+    world = world_files.load(
+        WORLD + "  - {name: reader, model: reader.model.yaml}", params={"speed": 3}
+    )
+    world.record(tmp_path / "run.flog")
+    own.write_text("speed: 2")
+    before = world.state_hash()
+    world.reset()
+    assert world.state_hash() == before
+    world.close()
+    with pytest.raises(RecordingError, match=r'files have changed .*speed\.yaml"$'):
+        Replay(tmp_path / "run.flog")
+    own.write_text('speed: $eval param("speed", 1)')
+    assert replay(tmp_path / "run.flog").difference is None
 
 
 def test_a_replay_keeps_the_odometry_of_moved_models(world_files: Any, tmp_path: Path) -> None:
@@ -426,3 +435,18 @@ def test_a_snapshot_from_before_the_recording_cannot_be_restored_in_a_replay(
         "the snapshot was taken before the recording started",
     )
     result.close()
+
+
+def test_a_replay_that_fails_at_its_start_leaves_no_world(
+    run: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    worlds: list[World] = []
+
+    def fail(world: World) -> str:
+        worlds.append(world)
+        raise WorldError("no hash")
+
+    monkeypatch.setattr(World, "state_hash", fail)
+    with pytest.raises(WorldError, match="no hash"):
+        Replay(run)
+    assert [world.closed for world in worlds] == [True]

@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 import flatland
-from flatland.drawing.capture import capture_scene
 from flatland.recording import Replay
+from flatland.scene.world_scene import describe_world
 
 WORLD = """
 properties: {}
@@ -108,15 +108,15 @@ def test_a_hidden_body_is_not_drawn_but_hit(world: Any) -> None:
     assert ahead(world) == pytest.approx(2, abs=1e-5)
     shown = world.draw()
     world.set_appearance("box", "base", visible=False)
-    scene = capture_scene(world, None, scans=False)
-    assert [len(model.outlines) for model in scene.models] == [1, 2]
-    assert scene.models[1].center is None
-    assert scene.joints == []
+    scene = describe_world(world, None, scans=False)
+    shapes = [len(b.visible_shapes) for model in scene.models for b in model.bodies]
+    assert shapes == [1, 0, 2]
+    assert scene.models[1].joints == []
     assert not np.array_equal(world.draw(), shown)
     assert ahead(world) == pytest.approx(2, abs=1e-5)
     world.set_appearance("box", visible=True)
     world.model("box").set_pose(3, 0, 0)
-    assert len(capture_scene(world, None, scans=False).joints) == 1
+    assert len(describe_world(world, None, scans=False).models[1].joints) == 1
 
 
 def test_layers_change_what_lasers_detect(world: Any) -> None:

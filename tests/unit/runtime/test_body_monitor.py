@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 import flatland
-from flatland.runtime.body_monitor import FREE_TIME, JAM_STEPS
+from flatland.runtime.body_monitor import JAM_STEPS
 
 # The narrow room: a robot of radius 0.2 between two walls that are 0.3 m apart.
 ROOM = """
@@ -87,12 +87,12 @@ def test_model_that_was_free_for_long_is_logged_again(
     body = room.model("r1").bodies[0]
     # By hand, since `move_model` forgets the jam.
     body.set_pose(0, -3, 0)
-    room.step(int(FREE_TIME / 2 / 0.005))
+    room.step(int(4.9 / 0.005))
     body.set_pose(*pose)
     room.step(500)
     assert len(jam_lines(caplog)) == 1
     body.set_pose(0, -3, 0)
-    room.step(int(FREE_TIME / 0.005) + 10)
+    room.step(int(5.1 / 0.005))
     body.set_pose(*pose)
     room.step(500)
     assert len(jam_lines(caplog)) == 2

@@ -59,14 +59,6 @@ def row(files: Any, monkeypatch: pytest.MonkeyPatch) -> Any:
     return run
 
 
-def test_plugins_receive_the_contacts_of_their_own_model_only(row: Any) -> None:
-    for index, recorder in enumerate(row(5)):
-        neighbors = [other for other in (index - 1, index + 1) if 0 <= other < 5]
-        expected = [{str(index), str(other)} for other in neighbors]
-        for hook in HOOKS:
-            assert sorted(recorder.calls[hook], key=sorted) == sorted(expected, key=sorted), hook
-
-
 @pytest.mark.parametrize("count", [2, 10, 40])
 def test_the_number_of_calls_is_proportional_to_the_number_of_contacts(
     row: Any, count: int

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import pytest
 
+import flatland
+
 DRIVE = "{name: drive, type: DiffDrive, body: base}"
 TF = "{name: tf, type: ModelTfPublisher, publish_tf_world: true}"
 
@@ -28,10 +30,12 @@ def warnings(caplog):
 def test_a_drive_and_a_tf_publisher_of_one_model_conflict(files, empty_world, caplog):
     empty_world.spawn_model(model(files, "m", DRIVE, TF), "m")
     empty_world.step(50)
+    place = f"[{files.folder / 'm.yaml'}:5]"
     assert warnings(caplog) == [
         'TF frame "base" has two parents, "odom" from Model Plugin "drive" type "DiffDrive" '
-        'model "m" and "map" from Model Plugin "tf" type "ModelTfPublisher" model "m"; give the '
-        "frames different names, or disable one of the senders"
+        f'model "m" {place} and "map" from Model Plugin "tf" type "ModelTfPublisher" model "m" '
+        f"{place}; give the frames different names, or disable one of the senders "
+        '("enable_odom_tf_pub: false" of "drive" or "publish_tf_world: false" of "tf")'
     ]
     assert caplog.records[0].levelname == "WARNING"
 
@@ -74,6 +78,22 @@ def test_no_warning_if_each_frame_has_one_parent(files, empty_world, caplog, plu
     empty_world.step(3)
     assert warnings(caplog) == []
     assert empty_world.transforms
+
+
+def test_a_model_without_a_namespace_that_sends_the_same_frames_conflicts(
+    files, empty_world, caplog
+):
+    empty_world.spawn_model(model(files, "m", DRIVE), "a")
+    empty_world.spawn_model("m.yaml", "b", pose=(2, 0, 0))
+    (text,) = [record.getMessage() for record in caplog.records]
+    place = f"[{files.folder / 'm.yaml'}:5]"
+    assert text == (
+        'TF frame "base" is sent with two poses in "odom", by Model Plugin "drive" type "DiffDrive"'
+        f' model "a" {place} and by Model Plugin "drive" type "DiffDrive" model "b" {place}; give '
+        "the frames different names or the models different namespaces, or disable one of the "
+        'senders ("enable_odom_tf_pub: false" of "drive")'
+    )
+    assert caplog.records[0].place == flatland.Place(str(files.folder / "m.yaml"), 5)
 
 
 def test_a_removed_sender_causes_no_conflict(files, empty_world, caplog):

@@ -10,7 +10,7 @@ import numpy.typing as npt
 import pytest
 
 from flatland.errors import WorldError
-from flatland.runtime.free_space import FreeSpace
+from flatland.runtime.free_space import FreeSpace, Spread
 
 DoubleArray = npt.NDArray[np.float64]
 BoolArray = npt.NDArray[np.bool_]
@@ -94,6 +94,33 @@ def test_a_slanted_passage_connects() -> None:
     assert (np.hypot(*(found - (start + 7 * along)).T) < 0.1).any()
 
 
+def test_a_diagonal_passage_connects() -> None:
+    """Only the cells on the diagonal are wide enough, which touch at their corners."""
+    half = math.hypot(0.3, 0.05 * math.sqrt(0.5)) + 0.001
+    sides = [half * math.sqrt(0.5) * np.array([-side, side] * 2) for side in (-1, 1)]
+    walls = np.array([np.array([1.025, 1.025, 4.025, 4.025]) + side for side in sides])
+    free_space = space(walls, 0.3)
+    found = places(free_space, (1.025, 1.025))
+    for k in np.arange(1.0, 4.0, 0.5):
+        assert (np.hypot(*(found - k).T) < 0.1).any()
+    assert free_space.is_connected_within((1.525, 1.525), (3.525, 3.525), 0.0)
+    assert free_space.size == 200 * 120
+
+
+def test_a_connection_stays_near_the_points() -> None:
+    """The points are on both sides of a wall with a door 2 m from them."""
+    free_space = space(two_rooms(0.9), 0.3)
+    ends = (4.0, 5.0), (6.0, 5.0)
+    assert free_space.is_connected_within(*ends, 2.1)
+    assert free_space.is_connected_within(*ends[::-1], 2.1)
+    assert not free_space.is_connected_within(*ends, 1.7)
+    assert not free_space.is_connected_within(ends[0], (5.0, 5.0), 3.0)  # in the wall
+    assert not free_space.is_connected_within(ends[0], (4.0, 6.1), 3.0)  # out of bounds
+    closed = space(two_rooms(0.5), 0.3)
+    assert not closed.is_connected_within(*ends, 9.0)
+    assert closed.is_connected_within(ends[0], (1.0, 1.0), 0.0)
+
+
 def test_connected_places_have_a_path() -> None:
     """Each place in random mazes is reached by a search with steps of 1 cm."""
     for seed in range(3):
@@ -172,3 +199,17 @@ def test_large_areas_have_larger_cells() -> None:
 def test_an_invalid_start_raises(point: tuple[float, float], text: str) -> None:
     with pytest.raises(WorldError, match=text):
         space(two_rooms(1.0), 0.3).cells(point)
+
+
+def test_a_spread_takes_each_candidate_that_is_distant_from_those_before() -> None:
+    candidates = np.random.default_rng(2).uniform(-3, 3, (400, 2))
+    spread = Spread(0.5)
+    assert not spread.fill(candidates, 400)
+    expected: list[tuple[float, float]] = []
+    for x, y in candidates.tolist():
+        if all(math.hypot(x - a, y - b) >= 0.5 for a, b in expected):
+            expected.append((x, y))
+    assert spread.places == expected
+    few = Spread(0.5)
+    assert few.fill(candidates, 3)
+    assert few.places == expected[:3]

@@ -53,3 +53,12 @@ def test_the_search_radius_is_limited(distance: float, is_found: bool) -> None:
 
 def test_none_is_returned_without_a_free_place() -> None:
     assert nearest_offset(lambda o: np.zeros(len(o), bool)) is None
+
+
+def test_offset_into_a_small_disc() -> None:
+    rng = np.random.default_rng(1)
+    for angle, distance, radius in rng.uniform((0, 0.2, 0.06), (math.tau, 2.0, 0.2), (40, 3)):
+        center = (distance + radius) * np.array([math.cos(angle), math.sin(angle)])
+        offset = nearest_offset(lambda o, c=center, r=radius: np.hypot(*(o - c).T) <= r)
+        assert offset is not None
+        assert math.hypot(*offset) == pytest.approx(distance, abs=0.005)

@@ -261,14 +261,6 @@ def test_each_overlapping_model_of_a_world_file_is_logged_once(
 # -- included worlds and worlds of the reference ------------------------------------------------
 
 
-@pytest.mark.parametrize("name", ["office", "simple"])
-def test_included_worlds_have_no_overlaps(
-    checkout: Path, name: str, caplog: pytest.LogCaptureFixture
-) -> None:
-    with flatland.World.from_yaml(checkout / "worlds" / name / "world.yaml", seed=1):
-        assert warnings_of(caplog) == []
-
-
 # -- is_free ------------------------------------------------------------------------------------
 
 

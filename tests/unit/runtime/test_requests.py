@@ -8,6 +8,7 @@ from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 import pytest
+from waiting import TIMEOUT
 
 import flatland
 from flatland import WorldError
@@ -64,6 +65,54 @@ def test_a_change_within_a_hook_is_deferred_and_its_failure_logged(
     assert "division: division by zero" in caplog.text
 
 
+@pytest.mark.parametrize("kind", [KeyboardInterrupt, SystemExit])
+def test_an_interrupt_in_an_action_reaches_the_caller_of_step(files: Any, kind: type) -> None:
+    world = files.load(EMPTY)
+
+    def interrupt() -> None:
+        raise kind
+
+    interrupted, later = world.post(interrupt), world.post(lambda: 7)
+    with pytest.raises(kind):
+        world.step()
+    assert isinstance(interrupted.exception(timeout=0), kind)
+    world.step()
+    assert later.result(timeout=0) == 7
+
+
+def test_a_step_whose_requests_close_the_world_raises(files: Any) -> None:
+    world = files.load(EMPTY)
+    world.post(world.close)
+    with pytest.raises(WorldError, match="the world is closed"):
+        world.step()
+
+
+def test_requests_are_carried_out_while_another_thread_steps(files: Any) -> None:
+    world, ended = files.load(EMPTY), threading.Event()
+
+    def step() -> None:
+        while not ended.is_set():
+            world.step(100)
+
+    with ThreadPoolExecutor(5) as pool:
+        steps = pool.submit(step)
+        reads = [pool.submit(world.between_steps, threading.get_ident) for _ in range(500)]
+        for read in reads:
+            read.result(TIMEOUT)
+        ended.set()
+        steps.result(TIMEOUT)
+
+
+def test_a_waiting_thread_runs_its_action_when_the_lock_is_released() -> None:
+    posted = threading.Event()
+    requests = Requests(posted.set)
+    with ThreadPoolExecutor(1) as pool:
+        with requests.lock:  # as during the last step of a program
+            waiting = pool.submit(requests.run, threading.get_ident)
+            assert posted.wait(TIMEOUT)
+        assert waiting.result(TIMEOUT) == pool.submit(threading.get_ident).result(TIMEOUT)
+
+
 def test_without_a_server_the_thread_that_waits_runs_its_action(files: Any) -> None:
     world = files.load(EMPTY)
     with ThreadPoolExecutor(1) as pool:
@@ -91,7 +140,7 @@ def test_while_a_simulation_runs_all_requests_run_in_its_thread(
     world.add_observer(Recorder())
     with ThreadPoolExecutor(5) as pool:
         loop = pool.submit(lambda: (simulation.run(), threading.get_ident())[1])
-        assert running.wait(60)
+        assert running.wait(TIMEOUT)
 
         def spawn(number: int) -> None:
             for turn in range(20):
@@ -99,9 +148,9 @@ def test_while_a_simulation_runs_all_requests_run_in_its_thread(
                 world.spawn_model("minimal.model.yaml", f"{number}-{turn}", pose=pose)
 
         for spawned in [pool.submit(spawn, number) for number in range(4)]:
-            spawned.result(60)
+            spawned.result(TIMEOUT)
         simulation.stop()
-        server = loop.result(60)
+        server = loop.result(TIMEOUT)
     assert set(threads) == {server}
     assert len(threads) == 80
 
@@ -111,15 +160,15 @@ def test_a_request_that_is_queued_when_the_simulation_ends_runs(files: Any) -> N
     simulation = Simulation(world, 0)
     entered, release = threading.Event(), threading.Event()
     with ThreadPoolExecutor(2) as pool:
-        world.post(lambda: (entered.set(), release.wait(60), simulation.stop()))
+        world.post(lambda: (entered.set(), release.wait(TIMEOUT), simulation.stop()))
         loop = pool.submit(simulation.run, 0.0)
-        loop.result(60)  # ends at once, before any action
+        loop.result(TIMEOUT)  # ends at once, before any action
         loop = pool.submit(simulation.run)
-        assert entered.wait(60)
+        assert entered.wait(TIMEOUT)
         late = pool.submit(world.spawn_model, "minimal.model.yaml", "late")
         release.set()
-        loop.result(60)
-        assert late.result(60) is world.model("late")
+        loop.result(TIMEOUT)
+        assert late.result(TIMEOUT) is world.model("late")
 
 
 def test_a_world_cannot_be_run_by_two_simulations(files: Any) -> None:

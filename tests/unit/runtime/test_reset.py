@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from observations import observations
 
 import flatland
 from flatland import PluginError, StaleHandleError, Twist, World, WorldError, YamlError
@@ -76,26 +77,21 @@ def use(world: World) -> None:
     world.step(100)
 
 
-def run(world: World, steps: int = 600) -> list[object]:
-    found: list[object] = []
+def run(world: World) -> list[object]:
     world.command("/cmd_vel").set(Twist(linear_x=1.0, angular_z=0.3))
     world.command("/b/cmd_vel").set(Twist(linear_x=-1.0, angular_z=0.3))
     topics = ("scan", "range", "semantic_scan", "joint_states", "pose", "hitched")
-    outputs = [world.output(f"/b/{topic}") for topic in topics]
-    for _ in range(steps):
-        world.step()
-        latest = [repr(output.latest) for output in outputs]
-        found.append((world.state_hash(), latest, world.transforms))
-    found.append(world.sample_free(2, 0.1).tolist())
-    return found
+    for topic in topics:
+        world.output(f"/b/{topic}")
+    return [*observations(world), world.sample_free(2, 0.1).tolist()]
 
 
-@pytest.mark.parametrize("seed", [None, 1, 7])
+@pytest.mark.parametrize("seed", [None, 7])
 def test_the_state_is_that_after_loading(world: World, seed: int | None) -> None:
     with fresh(world, 1 if seed is None else seed) as other:
         first = world.state_hash()
         expected_hash = other.state_hash()
-        assert (first == expected_hash) == (seed in (None, 1))
+        assert (first == expected_hash) == (seed is None)
         expected = run(other)
         for _ in range(2):
             use(world)
@@ -103,19 +99,6 @@ def test_the_state_is_that_after_loading(world: World, seed: int | None) -> None
             assert (world.time, world.seed) == (0.0, other.seed)
             assert world.state_hash() == expected_hash
             assert run(world) == expected
-
-
-def test_five_thousand_steps_after_a_reset_are_those_after_loading(world: World) -> None:
-    use(world)
-    world.reset()
-    with fresh(world, 1) as other:
-        for each in (world, other):
-            each.command("/cmd_vel").set(Twist(linear_x=0.5, angular_z=0.2))
-        for _ in range(5000):
-            world.step()
-            other.step()
-            assert world.physics.body_states().tobytes() == other.physics.body_states().tobytes()
-        assert world.state_hash() == other.state_hash()
 
 
 def test_the_time_can_continue(world: World) -> None:
@@ -131,13 +114,13 @@ def test_the_time_can_continue(world: World) -> None:
 def test_files_and_parameters_are_not_read_again(
     world: World, params: dict[str, object], files: Any
 ) -> None:
-    before, files_before = world.state_hash(), list(world.inputs.files)
+    before, files_before = world.state_hash(), list(world.source.inputs.files)
     params.clear()
     for path in Path(files.folder).iterdir():
         path.unlink()
     world.reset()
     assert world.state_hash() == before
-    assert list(world.inputs.files) == files_before
+    assert list(world.source.inputs.files) == files_before
     with pytest.raises(YamlError, match="File does not exist"):
         world.spawn_model("minimal.model.yaml", "newer")
 
@@ -347,8 +330,8 @@ def test_errors(world: World) -> None:
 def test_a_snapshot_can_be_restored_after_a_reset(world: World) -> None:
     world.step(10)
     snapshot = world.snapshot()
-    expected = run(world, 50)
+    expected = run(world)
     world.reset(seed=5)
     world.step(3)
     world.restore(snapshot)
-    assert run(world, 50) == expected
+    assert run(world) == expected

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
 import random
 import threading
@@ -10,12 +11,14 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from waiting import TIMEOUT, wait_until
 
 import flatland
-from flatland.physics import PhysicsWorld
+from flatland.physics import PhysicsWorld, Run, RunEnd
 from flatland.plugin_api.update_timer import UpdateTimer
 from flatland.runtime.batch import step_worlds
 from flatland.runtime.observer import WorldObserver
+from flatland.simulation import Simulation
 from tests.support import python_plugins
 
 MANIFEST = """<library path=".">
@@ -229,8 +232,7 @@ class TestUnwantedUpdates:
         world = room(files, {"a": CART.format(drive="DiffDrive")})
         world.step(10)  # the first update is always called
         calls: list[int] = []
-        host = world.plugin_host
-        monkeypatch.setattr(host, "call_step_hooks", lambda *arguments: calls.append(1))
+        monkeypatch.setattr(world.plugin_host, "call_updates", calls.append)
         world.step(200)
         assert not calls
         assert world.timekeeper.sim_time_ns == 210 * 5_000_000
@@ -246,11 +248,11 @@ class TestUnwantedUpdates:
                 calls.append(timekeeper.sim_time_ns)
                 self.body.set_velocity(0.25, 0.0, 0.0)
 
-        world.plugin_host.hooks.remove(plugin)
         plugin.__class__ = Slow
-        plugin._controllers[:] = [plugin.body.control_velocity(holonomic=False)]
-        plugin._controller = plugin._controllers[0]
-        world.plugin_host.hooks.add(plugin)
+        world.plugin_host.jobs.remove(plugin)
+        plugin._controller = plugin.body.control_velocity(holonomic=False)
+        plugin._jobs, plugin._is_initialized = [plugin._controller], False
+        world.plugin_host.jobs.add(plugin)
         world.command("/a/cmd_vel").set(flatland.Twist(linear_x=1.0))
         world.step(20)
         assert len(calls) == 20
@@ -261,20 +263,31 @@ class TestUnwantedUpdates:
 class TestInterruptions:
     def test_a_request_of_another_thread_runs_between_two_steps_of_a_run(self, files: Any) -> None:
         world = room(files, MIXED)
-        times: list[int] = []
-        posted = threading.Event()
 
-        def request() -> None:
-            world.post(lambda: times.append(world.timekeeper.sim_time_ns))
-            posted.set()
+        def is_processed_within_a_run() -> bool:
+            started = threading.Event()
+            times: list[int] = []
 
-        thread = threading.Thread(target=request)
-        thread.start()
-        world.step(200_000)
-        thread.join()
-        assert posted.is_set()
-        assert len(times) == 1
-        assert times[0] < world.timekeeper.sim_time_ns
+            class Start(WorldObserver):
+                def step_started(self) -> None:
+                    started.set()
+
+            def request() -> None:
+                assert started.wait(TIMEOUT)
+                world.post(lambda: times.append(world.timekeeper.sim_time_ns))
+
+            before = world.timekeeper.sim_time_ns
+            start = Start()
+            world.add_observer(start)
+            thread = threading.Thread(target=request)
+            thread.start()
+            world.step(50_000)
+            thread.join()
+            world.remove_observer(start)
+            return before < times[0] < world.timekeeper.sim_time_ns
+
+        # On a busy machine, the thread may post its request after the run.
+        wait_until("a request is processed within a run", is_processed_within_a_run)
 
     def test_an_observer_of_time_is_notified_in_each_step(self, files: Any) -> None:
         class Clock(WorldObserver):
@@ -342,6 +355,7 @@ class TestTouches:
         world = room(files, {"a": SENSORS})
         model = world.model("a")
         touches = model.watch_contacts()
+        assert touches  # although there are none
         assert not touches.touched
         world.command("/a/cmd_vel").set(flatland.Twist(linear_x=-1.0))
         world.step(600)
@@ -362,17 +376,187 @@ class TestTouches:
         assert world.model("a").watch_contacts().touched
 
 
-@pytest.mark.parametrize("rate", [0.0, math.inf, 50.0, 10.0, 33.3, 0.1, 199.9, 7e-3, 1e9])
-@pytest.mark.parametrize("step_size", [0.005, 0.001, 0.0166])
-def test_the_clock_of_the_core_agrees_with_the_timer(rate: float, step_size: float) -> None:
+RATES = [0.0, math.inf, 50.0, 10.0, 33.3, 0.1, 160.0, 192.0, 199.9, 7e-3, 1 / 3, 1e9, 1e-300]
+
+
+@pytest.mark.parametrize("step_size", [0.005, 0.001, 0.0166, 1e-6, 1000.0])
+@pytest.mark.parametrize("is_after", [False, True])
+def test_the_clock_of_the_core_agrees_with_the_timer(step_size: float, is_after: bool) -> None:
     timekeeper = flatland.Timekeeper(step_size)
-    timer, plan = UpdateTimer(rate), PhysicsWorld().plan
-    clock = timer.clock(timekeeper.step_size_ns)
-    assert clock is not None
-    plan.set_calls(plan.add_clock(False, *clock), True)
-    for step in [*range(3000), 10**9, 10**9 + 1, 10**12 + 7]:
-        timekeeper.sim_time_ns = step * timekeeper.step_size_ns
-        assert bool(plan.begin_step(step)) == UpdateTimer(rate).check_update(timekeeper)
+    step = timekeeper.step_size_ns
+    # Steps one by one, jumps, and times that are no multiples of the step size.
+    numbers = [*range(250), 10**4, 10**4 + 1, 10**6 + 7]
+    times = [*(number * step for number in numbers), 3, step + 1, 2 * step + 1, 5 * step - 1]
+    for rate in RATES:
+        jobs, timer = PhysicsWorld().jobs, UpdateTimer(rate)
+        callback = jobs.add_callback((1, 0), timer.clock(step), is_after=is_after)
+        for time in times:
+            timekeeper.sim_time_ns = time + step * is_after
+            run = Run(time, step, 1, timekeeper.step_size, 1, 1, calls_physics=True)
+            result = jobs.run(*run)
+            if result[1] == RunEnd.PHYSICS:
+                result = jobs.run(*run._replace(continues=True))
+            is_due = UpdateTimer(rate).check_update(timekeeper)
+            assert (result[2] == [callback]) == is_due, (rate, time)
+
+
+def test_every_rate_has_a_clock_in_every_step_size() -> None:
+    """Random rates and step sizes, among them rates of about one update in each step."""
+    rng = random.Random(1)
+    jobs = PhysicsWorld().jobs
+    for _ in range(5_000):
+        step_size = rng.choice([0.005, 0.001, 1 / rng.randint(1, 2000), 10 ** rng.uniform(-6, 3)])
+        timekeeper = flatland.Timekeeper(max(step_size, 1e-6))
+        rate = rng.choice(
+            [
+                rng.randint(1, 4000) / 8,
+                10 ** rng.uniform(-12, 6),
+                rng.uniform(0.3, 1.1) / timekeeper.step_size,
+            ]
+        )
+        step = timekeeper.step_size_ns
+        callback = jobs.add_callback((1, 0), UpdateTimer(rate).clock(step), is_after=False)
+        number = rng.randint(0, 2000)
+        timekeeper.sim_time_ns = number * step
+        run = Run(number * step, step, 1, timekeeper.step_size, 1, 1, calls_physics=True)
+        is_due = UpdateTimer(rate).check_update(timekeeper)
+        assert (jobs.run(*run)[1] == RunEnd.BEFORE) == is_due, (rate, step_size, number)
+        jobs.remove_callback(callback)
+
+
+class Log(WorldObserver):
+    """Records its notifications."""
+
+    def __init__(self, watches_steps: bool) -> None:
+        self.events: list[tuple[str, int]] = []
+        self._watches_steps = watches_steps
+        self._time = 0
+
+    def attached(self, world: flatland.World) -> None:
+        self._timekeeper = world.timekeeper
+
+    @property
+    def watches_steps(self) -> bool:
+        return self._watches_steps
+
+    def step_started(self) -> None:
+        self.events.append(("started", self._timekeeper.sim_time_ns))
+
+    def time_advanced(self, time_ns: int) -> None:
+        self.events.append(("time", time_ns))
+
+    def transforms_sent(self, transforms: Any) -> None:
+        self.events.append(("transforms", len(transforms)))
+
+    def step_finished(self) -> None:
+        self.events.append(("finished", self._timekeeper.sim_time_ns))
+
+
+def step_plainly(world: flatland.World, n: int, tmp_path: Path) -> None:
+    world.step(n)
+
+
+def step_in_a_batch(world: flatland.World, n: int, tmp_path: Path) -> None:
+    other = world.clone()
+    step_worlds([other, world], n)
+    assert other.state_hash() == world.state_hash()
+    other.close()
+
+
+def step_with_a_rate(world: flatland.World, n: int, tmp_path: Path) -> None:
+    Simulation(world, 2000.0).run(n * world.timekeeper.step_size)
+
+
+def step_recorded(world: flatland.World, n: int, tmp_path: Path) -> None:
+    with contextlib.closing(world.record(tmp_path / "run.log")):
+        world.step(n)
+
+
+WAYS = [step_plainly, step_in_a_batch, step_with_a_rate, step_recorded]
+EYE = CART.format(drive="DiffDrive, pub_rate: 40") + (
+    "  - {type: Laser, name: eye, body: base, range: 5, update_rate: 23, noise_std_dev: 0.1,"
+    " angle: {min: -1, max: 1, increment: 0.5}}\n  - {type: Bumper, name: bumper}\n"
+)
+
+
+class TestOnePath:
+    """All ways to step have the same results."""
+
+    @pytest.mark.parametrize("way", WAYS)
+    @pytest.mark.parametrize("wants", [False, True])
+    def test_states_messages_and_notifications(
+        self, files: Any, tmp_path: Path, way: Any, wants: bool
+    ) -> None:
+        results = []
+        for step in (step_plainly, way):
+            log = Log(watches_steps=True)
+            world = room(files, {"a": EYE, "b": EYE}, observers=[log])
+            messages: list[Any] = []
+            if wants:
+                for output in list(world.ports.outputs.values()):
+                    output.subscribe(messages.append)
+            step(world, 150, tmp_path)
+            results.append((world.state_hash(), list(map(repr, messages)), log.events))
+            assert [time for kind, time in log.events if kind == "time"] == [
+                5_000_000 * (index + 1) for index in range(150)
+            ]
+            world.close()
+        assert results[0] == results[1]
+
+    @pytest.mark.parametrize("way", WAYS)
+    def test_an_observer_that_watches_no_single_steps_is_notified_of_each_run(
+        self, files: Any, tmp_path: Path, way: Any
+    ) -> None:
+        log = Log(watches_steps=False)
+        world = room(files, {"a": EYE}, observers=[log])
+        scans: list[int] = []
+        world.ports.find_output("/a/scan").subscribe(lambda scan: scans.append(len(log.events)))
+        way(world, 150, tmp_path)
+        kinds = [kind for kind, _ in log.events if kind in ("started", "finished")]
+        assert kinds == ["started", "finished"] * (len(kinds) // 2)
+        # Each scan is emitted between the start and the end of a run, at the time notified last.
+        assert len(scans) == 18
+        for place in scans:
+            kinds = [kind for kind, _ in log.events[:place]]
+            assert kinds.count("started") == kinds.count("finished") + 1
+        times = [time for kind, time in log.events if kind == "time"]
+        assert times == sorted(times)
+        assert times[-1] == 150 * 5_000_000
+
+
+def test_a_removed_plugin_leaves_no_clock(files: Any) -> None:
+    """After many plugins with distinct rates, a further one is not called in every step."""
+    world = room(files, {"a": CART.format(drive="DiffDrive")})
+    for number in range(200):
+        gps = f"  - {{type: Gps, name: gps, body: base, update_rate: {1 + number / 7}}}\n"
+        world.spawn_model("\n" + CART.format(drive="DiffDrive") + gps, "b")
+        world.step()
+        world.delete_model("b")
+    calls: list[int] = []
+    world.output("/a/odometry/filtered").subscribe(lambda odometry: calls.append(odometry.stamp))
+    gps = "  - {type: Gps, name: gps, body: base, update_rate: 1.25}\n"
+    world.spawn_model("\n" + CART.format(drive="DiffDrive, pub_rate: 0.5") + gps, "c")
+    world.output("/gps/fix").subscribe(lambda fix: calls.append(fix.stamp))
+    world.step(800)
+    assert len(calls) <= 806
+
+
+def test_a_failure_after_the_physics_step_is_reported_in_the_same_step(files: Any) -> None:
+    world = room(files, {})
+    path = """
+bodies:
+  - {name: base, footprints: [{type: circle, radius: 0.2, density: 5}]}
+plugins:
+  - {type: PathFollower, name: path, body: base, waypoints: [[1.0e+8, 0]], speed: 1.0e+6}
+"""
+    world.spawn_model(path, "far", "", (9.999e8, 0.0, 0.0))
+    with pytest.raises(ValueError, match=r"within \+-1e\+09, got \(1.00000") as caught:
+        world.step(100)
+    assert caught.value.__notes__ == [
+        'raised by Model Plugin "path" type "PathFollower" model "far": after_physics_step'
+    ]
+    # From 9.999e8 to 1e9 m at 1e6 m/s; the limit is passed in the step that raises.
+    assert world.time == pytest.approx(0.1)
 
 
 def test_what_a_function_before_a_step_raises_is_a_fault_of_its_plugin(files: Any) -> None:
@@ -393,3 +577,12 @@ def test_a_command_to_a_model_that_is_deleted_before_the_next_step(files: Any) -
     world.delete_model("a")
     world.step(100)
     assert world.model("b").bodies[0].velocity[0] > 0.1
+
+
+def test_updates_and_controllers_are_declared_in_on_initialize(files: Any) -> None:
+    world = room(files, {"a": CART.format(drive="DiffDrive")})
+    plugin = world.model("a").plugin("drive")
+    with pytest.raises(flatland.PluginError, match="on_update must be called in on_initialize"):
+        plugin.on_update(print)
+    with pytest.raises(flatland.PluginError, match="control must be called in on_initialize"):
+        plugin.control(plugin.body.control_velocity())

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from flatland.physics.boundaries import boundary_edges
+from flatland.physics import boundary_edges
 from flatland.tools.wall_segments import WallBoundary, find_wall_segments
 
 SCALES = [1.05, 1.5, 2.0]
@@ -22,16 +22,24 @@ def edges_of(mask: npt.NDArray[np.bool_]) -> npt.NDArray[np.float64]:
     return edges
 
 
+def distances(
+    points: npt.NDArray[np.float64], segments: npt.NDArray[np.float64]
+) -> npt.NDArray[np.float64]:
+    """Returns the distance of each point from the nearest segment."""
+    start, extent = segments[:, :2], segments[:, 2:] - segments[:, :2]
+    square = np.maximum((extent**2).sum(axis=1), 1e-12)
+    nearest = []
+    for some in np.array_split(points, 1 + len(points) // 100):
+        offsets = some[:, None] - start
+        t = np.clip((offsets * extent).sum(axis=2) / square, 0, 1)
+        apart = offsets - t[..., None] * extent
+        nearest.append(np.hypot(apart[..., 0], apart[..., 1]).min(axis=1))
+    return np.concatenate(nearest)
+
+
 def distance(points: npt.NDArray[np.float64], segments: npt.NDArray[np.float64]) -> float:
     """Returns the largest distance of points from the nearest segment."""
-    worst = 0.0
-    for point in points:
-        start, extent = segments[:, :2], segments[:, 2:] - segments[:, :2]
-        square = np.maximum((extent**2).sum(axis=1), 1e-12)
-        t = np.clip(((point - start) * extent).sum(axis=1) / square, 0, 1)
-        nearest = start + t[:, None] * extent
-        worst = max(worst, float(np.hypot(*(nearest - point).T).min()))
-    return worst
+    return float(distances(points, segments).max())
 
 
 def samples(segments: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
@@ -61,14 +69,13 @@ def test_segments_are_within_a_pixel_of_the_walls(scale: float) -> None:
     assert distance(samples(segments), edges_of(mask)) <= 1.0
 
 
-@pytest.mark.parametrize("scale", SCALES)
-def test_noisy_walls(scale: float) -> None:
+def test_noisy_walls() -> None:
     rng = np.random.default_rng(3)
     mask = sample_mask()
     # Every tenth pixel at a wall is flipped.
     walls = cv2.morphologyEx(mask.astype(np.uint8), cv2.MORPH_GRADIENT, np.ones((3, 3))) > 0
     mask ^= walls & (rng.random(mask.shape) < 0.1)
-    segments = find_wall_segments(mask, scale)
+    segments = find_wall_segments(mask, SCALES[0])
     assert distance(samples(segments), edges_of(mask)) <= 1.0
     assert len(segments) < len(edges_of(mask))
 
@@ -125,10 +132,9 @@ def test_offsets_agree_with_a_search_over_all_edges() -> None:
     points = rng.uniform((-3, -3), (20, 15), (500, 2))
     offsets = WallBoundary(mask).offsets(points)
     edges = edges_of(mask)
-    for point, offset in zip(points, offsets, strict=True):
-        expected = distance(point[None], edges)
-        if expected <= 2.0:
-            assert math.hypot(*offset) == pytest.approx(expected, abs=1e-9)
-            assert distance((point + offset)[None], edges) == pytest.approx(0.0, abs=1e-9)
-        else:
-            assert np.isinf(offset).all()
+    expected = distances(points, edges)
+    near = expected <= 2.0
+    assert 50 < near.sum() < 450
+    assert np.hypot(*offsets[near].T) == pytest.approx(expected[near], abs=1e-9)
+    assert distance(points[near] + offsets[near], edges) == pytest.approx(0.0, abs=1e-9)
+    assert np.isinf(offsets[~near]).all()

@@ -10,8 +10,9 @@ import pytest
 from raw_web_client import RawWebClient
 from waiting import wait_until
 
+from flatland.runtime import file_reads
 from flatland.simulation import Simulation
-from flatland.web import commands
+from flatland.web import WebViewer, commands
 
 
 @pytest.fixture
@@ -106,9 +107,38 @@ class TestModels:
         assert error in reply["error"]
         assert [model.name for model in world.models] == ["robot"]
 
+    def test_a_file_that_blocks_delays_only_its_request(
+        self, client, world, files, block_file, monkeypatch: pytest.MonkeyPatch
+    ):
+        files.write("slow.model.yaml", "bodies: [{name: b, footprints: []}]")
+        release = block_file("slow.model.yaml")
+        spawn = client.send("spawn", file="slow.model.yaml", name="slow", pose=[6, 6, 0])
+        client.ask("spawn", file="box.model.yaml", name="box", pose=[2, 2, 0])
+        before = world.time
+        wait_until("steps", lambda: world.time > before)
+        assert [model.name for model in world.models] == ["robot", "box"]
+        monkeypatch.setattr(file_reads, "TIME_LIMIT", 0.01)
+        reply = client.reply("preview", file="slow.model.yaml")
+        assert "the files were not read within 0.01 s" in reply["error"]
+        release.set()
+        assert client.wait("reply", lambda message: message["id"] == spawn)["ok"]
+
+    def test_a_read_only_viewer_previews_listed_files_only(self, files, world):
+        outside = files.folder.parent / "outside.model.yaml"
+        outside.write_text("bodies: [{name: b, footprints: []}]")
+        with WebViewer(port=0, read_only=True) as viewer:
+            viewer.add_world(world)
+            with RawWebClient(viewer.url) as client:
+                client.wait_model("robot")
+                for file in (str(outside), "/no/such/file.yaml"):
+                    error = client.reply("preview", file=file)["error"]
+                    assert "a read-only viewer previews only the listed model files" in error
+                box = client.ask("files")[0]
+                assert client.reply("preview", file=box["path"])["ok"]
+
     def test_files_outside_the_allowed_folders_are_refused(self, files, world, viewer, tmp_path):
         inside = files.write("models/in.model.yaml", "bodies: [{name: b, footprints: []}]")
-        world.model_path = (str(files.folder / "models"),)
+        world.source.inputs.folders = (str(files.folder / "models"),)
         viewer.add_world(world)
         with RawWebClient(viewer.url) as client:
             client.wait_model("robot")
@@ -317,8 +347,9 @@ class TestSeries:
         client.ask("look", series=["/odometry/ground_truth/pose/0"])
         client.wait("values")
         client.ask("pause")
-        client.receive_for(0.2)
-        received = client.receive_for(0.3)
+        client.wait("status", lambda message: message["paused"])
+        client.receive_until("status")
+        received = client.receive_until("status")
         assert not [m for m in received if isinstance(m, dict) and m["type"] == "values"]
 
 
@@ -328,5 +359,4 @@ def test_frames(client):
     poses = {(frame["parent"], frame["child"]): frame["pose"] for frame in frames}
     np.testing.assert_allclose(poses["base", "eye"], [0.2, 0, 0])
     assert ("odom", "base") in poses
-    messages = [m for m in client.receive_for(1.0) if isinstance(m, dict)]
-    assert 1 <= sum(message["type"] == "frames" for message in messages) <= 11
+    client.wait("frames")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import subprocess
 import sys
 import threading
 import types
@@ -13,6 +12,7 @@ from xml.etree import ElementTree
 
 import aiohttp
 import pytest
+from programs import run_program
 from web_client import WebClient
 
 import flatland
@@ -156,8 +156,6 @@ def test_an_invalid_argument_is_an_error(world: World, arguments: dict[str, int]
 
 def test_a_program_ends_although_the_view_is_open(path: Path) -> None:
     code = "import sys, flatland; flatland.World.from_yaml(sys.argv[1]).view(); print('end')"
-    done = subprocess.run(
-        [sys.executable, "-c", code, path], capture_output=True, text=True, check=True, timeout=60
-    )
+    done = run_program([sys.executable, "-c", code, path], check=True)
     assert done.stdout == "end\n"
     assert "Traceback" not in done.stderr

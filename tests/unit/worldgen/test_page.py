@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import re
 import shlex
 from pathlib import Path
 
 import pytest
 from flatland_command import main
+from pages import code_blocks
 
 
 @pytest.fixture
@@ -18,7 +18,7 @@ def page(checkout: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str
 
 
 def test_the_commands_succeed(page: str, capsys: pytest.CaptureFixture[str]) -> None:
-    [commands] = re.findall(r"```bash\n(.*?)```", page, re.DOTALL)
+    [commands] = code_blocks(page, "bash")
     for line in commands.splitlines():
         program, *words = shlex.split(line)
         assert program == "flatland"
@@ -26,7 +26,7 @@ def test_the_commands_succeed(page: str, capsys: pytest.CaptureFixture[str]) -> 
 
 
 def test_the_program_runs(page: str, capsys: pytest.CaptureFixture[str]) -> None:
-    [program] = re.findall(r"```python\n(.*?)```", page, re.DOTALL)
+    [program] = code_blocks(page, "python")
     names: dict[str, object] = {}
     exec(compile(program, "random_worlds.md", "exec"), names)
     assert capsys.readouterr().out.startswith("(400, 600) (")

@@ -6,7 +6,7 @@
 /** Limits of the scale [CSS pixels per metre]. */
 const MIN_ZOOM = 0.05;
 const MAX_ZOOM = 20_000;
-/** Share of the view that a fitted scene fills. */
+/** Share of the view that a fitted area fills. */
 const FIT_SHARE = 0.92;
 
 /** The part of the plane that a viewport displays. Pixels are CSS pixels, relative to the viewport. */
@@ -61,7 +61,7 @@ export class Camera {
   }
 
   /**
-   * Moves the scene by a distance on the screen.
+   * Moves the world by a distance on the screen.
    *
    * @param {number} dx  [pixels]
    * @param {number} dy  [pixels]

@@ -1,28 +1,30 @@
 import { Emitter } from "./events.js";
-import { SUBPROTOCOL, WRONG_TOKEN, decodeBinary } from "./protocol.js";
+import { decodeBinary, SUBPROTOCOL, WRONG_TOKEN } from "./protocol.js";
 
-/** Delays before the attempts to reconnect [ms]; the last one repeats. */
+/** Delays before the attempts to reconnect [ms]; the last delay is repeated. */
 const RECONNECT_DELAYS = [250, 500, 1000, 2000, 3000];
 /** Time limit of a reply [ms]. */
 const REPLY_TIMEOUT = 20_000;
-/** Time limit of the reply that shows that a connection is still open after a sleep [ms]. */
+/** Time limit of the reply to the check whether the connection is open after a sleep [ms]. */
 const PROBE_TIMEOUT = 4000;
 
 /** The server rejected a request, or the connection was lost before its reply. */
 export class RequestError extends Error {}
 
 /**
+ * @typedef {import("./protocol.js").Requests} Requests
+ *
  * @typedef {"connecting" | "connected" | "reconnecting" | "refused"} ConnectionState
  *
  * @typedef {object} ConnectionEvents
  * @property {ConnectionState} state
  * @property {string} reason  why the server closed the connection
- * @property {{type: string} & Record<string, any>} message
+ * @property {import("./protocol.js").StateMessage} message
  * @property {NonNullable<ReturnType<typeof decodeBinary>>} data
  */
 
 /**
- * A WebSocket that reconnects, with requests that are answered by replies.
+ * A WebSocket that reconnects, with requests that have replies.
  *
  * @extends {Emitter<ConnectionEvents>}
  */
@@ -37,9 +39,11 @@ export class Connection extends Emitter {
     this.socket = null;
     this.attempts = 0;
     this.nextId = 1;
+    /** Number of messages received. */
+    this.received = 0;
     /** @type {number | undefined} */
     this.timer = undefined;
-    /** @type {Map<number, {resolve: (result: any) => void, reject: (error: Error) => void, timer: number}>} */
+    /** @type {Map<number, {resolve: (result: unknown) => void, reject: (error: Error) => void, timer: number}>} */
     this.pending = new Map();
   }
 
@@ -47,7 +51,12 @@ export class Connection extends Emitter {
   open() {
     clearTimeout(this.timer);
     if (this.state === "refused") return;
-    if (this.socket && this.socket.readyState <= WebSocket.OPEN) return;
+    if (this.socket) {
+      if (this.socket.readyState <= WebSocket.OPEN) return;
+      // The server has closed the connection, but the browser has not reported that yet.
+      this.lose(this.socket, "");
+      clearTimeout(this.timer);
+    }
     const socket = new WebSocket(this.url, [SUBPROTOCOL]);
     socket.binaryType = "arraybuffer";
     this.socket = socket;
@@ -62,7 +71,7 @@ export class Connection extends Emitter {
     };
   }
 
-  /** Closes the connection of a page that is left; `open` opens it again. */
+  /** Closes the connection of a page that the user has left; `open` opens it again. */
   close() {
     if (this.socket) this.lose(this.socket, "");
     clearTimeout(this.timer);
@@ -71,17 +80,16 @@ export class Connection extends Emitter {
   /**
    * Sends a request.
    *
-   * @param {string} type
-   * @param {Record<string, any>} [fields]
+   * @template {keyof Requests} Type
+   * @param {Type} type
+   * @param {Requests[Type]["fields"] & {world?: number}} fields
    * @param {number} [timeout]  [ms]
-   * @returns {Promise<any>} result of the request
+   * @returns {Promise<Requests[Type]["result"]>} result of the request
    * @throws {RequestError} if it is rejected, if there is no connection, or without a reply
    */
-  request(type, fields = {}, timeout = REPLY_TIMEOUT) {
-    const socket = this.socket;
-    if (!socket || socket.readyState !== WebSocket.OPEN) {
-      return Promise.reject(new RequestError("not connected to the simulator"));
-    }
+  async request(type, fields, timeout = REPLY_TIMEOUT) {
+    const { socket } = this;
+    if (socket?.readyState !== WebSocket.OPEN) throw new RequestError("not connected to the simulator");
     const id = this.nextId++;
     return new Promise((resolve, reject) => {
       const timer = window.setTimeout(() => {
@@ -94,26 +102,24 @@ export class Connection extends Emitter {
   }
 
   /**
-   * Reconnects unless a request is answered soon: a computer that slept may hold a dead connection.
+   * Reconnects unless the server replies soon: the connection may be dead after a sleep.
    *
-   * @param {string} type
-   * @param {Record<string, any>} fields
+   * @template {keyof Requests} Type
+   * @param {Type} type
+   * @param {Requests[Type]["fields"]} fields
    */
   async probe(type, fields) {
-    const socket = this.socket;
-    if (!socket || socket.readyState !== WebSocket.OPEN) {
+    const { socket, received: before } = this;
+    if (socket?.readyState !== WebSocket.OPEN) {
       this.open();
       return;
     }
-    const before = this.received;
     try {
       await this.request(type, fields, PROBE_TIMEOUT);
     } catch {
       if (this.socket === socket && this.received === before) this.lose(socket, "");
     }
   }
-
-  received = 0;
 
   /** @param {string | ArrayBuffer} data */
   receive(data) {
@@ -123,6 +129,7 @@ export class Connection extends Emitter {
       if (decoded) this.emit("data", decoded);
       return;
     }
+    /** @type {import("./protocol.js").StateMessage | import("./protocol.js").ReplyMessage} */
     const message = JSON.parse(data);
     if (message.type !== "reply") {
       this.emit("message", message);

@@ -3,14 +3,38 @@
 /**
  * Returns the element with an id.
  *
- * @template {HTMLElement} [T=HTMLElement]
+ * @overload
  * @param {string} id
- * @returns {T}
+ * @returns {HTMLElement}
  */
-export function byId(id) {
+/**
+ * Returns the element with an id, which has a certain class.
+ *
+ * @template {HTMLElement} Kind
+ * @overload
+ * @param {string} id
+ * @param {new () => Kind} kind
+ * @returns {Kind}
+ */
+/**
+ * @param {string} id
+ * @param {new () => HTMLElement} kind
+ */
+export function byId(id, kind = HTMLElement) {
   const found = document.getElementById(id);
-  if (!found) throw new Error(`the page has no element #${id}`);
-  return /** @type {T} */ (found);
+  if (!(found instanceof kind)) throw new Error(`the page has no ${kind.name} #${id}`);
+  return found;
+}
+
+/**
+ * Returns the first child of an element.
+ *
+ * @param {Element} parent
+ */
+export function firstChild(parent) {
+  const found = parent.firstElementChild;
+  if (!(found instanceof HTMLElement)) throw new Error("the element has no children");
+  return found;
 }
 
 /**
@@ -50,7 +74,7 @@ export function icon(name) {
 /**
  * Sets the text of an element if it has changed.
  *
- * @param {HTMLElement} target
+ * @param {Element} target
  * @param {string} text
  */
 export function setText(target, text) {
@@ -58,7 +82,7 @@ export function setText(target, text) {
 }
 
 /**
- * Marks a toggle button as pressed or not.
+ * Sets whether a toggle button is pressed.
  *
  * @param {HTMLElement} button
  * @param {boolean} pressed
@@ -68,7 +92,19 @@ export function setPressed(button, pressed) {
 }
 
 /**
- * Offers a file to save.
+ * Returns the context that draws on a canvas.
+ *
+ * @param {HTMLCanvasElement} canvas
+ * @param {CanvasRenderingContext2DSettings} [options]
+ */
+export function context2d(canvas, options) {
+  const context = canvas.getContext("2d", options);
+  if (!context) throw new Error("the browser cannot draw on a canvas");
+  return context;
+}
+
+/**
+ * Makes the browser save a file.
  *
  * @param {Blob} blob
  * @param {string} name
@@ -80,7 +116,7 @@ export function saveFile(blob, name) {
 }
 
 /**
- * Returns whether keys typed into an element belong to it.
+ * Returns whether an element receives text, so that typed keys have no other effect.
  *
  * @param {EventTarget | null} target
  */

@@ -1,27 +1,24 @@
 /**
  * Events with typed payloads.
  *
- * @template {Record<string, any>} Events
+ * @template {object} Events
  */
 export class Emitter {
   constructor() {
-    /** @type {Map<keyof Events, Set<(payload: any) => void>>} */
-    this.listeners = new Map();
+    /** @type {{[Name in keyof Events]?: Set<(payload: Events[Name]) => void>}} */
+    this.listeners = {};
   }
 
   /**
-   * Calls a listener at each event of a name.
+   * Registers a listener for the events of a name.
    *
    * @template {keyof Events} Name
    * @param {Name} name
    * @param {(payload: Events[Name]) => void} listener
-   * @returns {() => void} removes the listener
    */
   on(name, listener) {
-    let group = this.listeners.get(name);
-    if (!group) this.listeners.set(name, (group = new Set()));
-    group.add(listener);
-    return () => group.delete(listener);
+    this.listeners[name] ??= new Set();
+    this.listeners[name].add(listener);
   }
 
   /**
@@ -32,6 +29,6 @@ export class Emitter {
    * @param {Events[Name]} payload
    */
   emit(name, payload) {
-    for (const listener of [...(this.listeners.get(name) ?? [])]) listener(payload);
+    for (const listener of [...(this.listeners[name] ?? [])]) listener(payload);
   }
 }

@@ -1,5 +1,5 @@
 /**
- * Returns a number in a form for reading: fixed decimals, a real minus sign, no negative zero.
+ * Returns a number as text for users: fixed decimals, a typographic minus sign, no negative zero.
  *
  * @param {number | null | undefined} value
  * @param {number} [decimals]
@@ -25,15 +25,15 @@ export function significant(value, digits = 4) {
 /**
  * Returns the value of a topic as text with a line for each field.
  *
- * @param {any} value
+ * @param {import("./protocol.js").Json} value
  */
 export function describeValue(value) {
   if (value === null || typeof value !== "object" || Array.isArray(value)) return brief(value);
   return Object.entries(value)
-    .map(
-      ([key, item]) =>
-        `${key}: ${key === "stamp" && Number.isInteger(item) ? `${item / 1e9} s` : brief(item)}`,
-    )
+    .map(([key, item]) => {
+      const isStamp = key === "stamp" && typeof item === "number";
+      return `${key}: ${isStamp ? `${item / 1e9} s` : brief(item)}`;
+    })
     .join("\n");
 }
 
@@ -43,7 +43,7 @@ const REST = /^… (\d+) items$/;
 /**
  * Returns a long list as its length and first items.
  *
- * @param {any[]} list
+ * @param {import("./protocol.js").Json[]} list
  */
 function briefList(list) {
   const rest = REST.exec(String(list.at(-1)));
@@ -54,13 +54,13 @@ function briefList(list) {
 /**
  * Returns any value of a message as short text.
  *
- * @param {any} value
+ * @param {import("./protocol.js").Json | undefined} value
  * @param {number} [limit]  largest number of characters
  * @returns {string}
  */
 export function brief(value, limit = 160) {
   let text;
-  if (typeof value === "number") text = Number.isInteger(value) ? String(value) : significant(value);
+  if (typeof value === "number") text = Number.isInteger(value) ? fixed(value, 0) : significant(value);
   else if (typeof value === "string") text = value;
   else if (value === null || value === undefined) text = "–";
   else if (Array.isArray(value) && value.length > 2 && Array.isArray(value[0])) {

@@ -7,12 +7,12 @@ import { shapeEdges } from "./shapes.js";
  */
 
 /**
- * Returns the model at a point. Of several models, it is the smallest.
+ * Returns the smallest model at a point.
  *
  * @param {WorldState} world
  * @param {number} x  [m]
  * @param {number} y  [m]
- * @param {number} tolerance  distance up to which a model is hit [m]
+ * @param {number} tolerance  distance from the point up to which a model counts as hit [m]
  * @returns {Model | null}
  */
 export function modelAt(world, x, y, tolerance) {
@@ -22,7 +22,7 @@ export function modelAt(world, x, y, tolerance) {
   for (const body of world.bodies.values()) {
     const pose = world.bodyPose(body);
     if (!pose || Math.hypot(x - pose[0], y - pose[1]) > body.radius + tolerance) continue;
-    // A model without shapes is hit at its origin, but any other one takes precedence.
+    // A model without shapes is hit at its origin, but models with shapes take precedence.
     const size = body.radius > 0 ? body.radius : 1e9;
     if (size < foundSize && isHit(body, inversePoint(pose, x, y), tolerance)) {
       found = body.model;

@@ -110,7 +110,7 @@ export class Hotkeys {
   }
 
   /**
-   * Enter on the canvas clicks at the centre of the view.
+   * Clicks at the centre of the view: the effect of Enter on the canvas.
    *
    * @param {KeyboardEvent} event
    */
@@ -172,8 +172,8 @@ export class Hotkeys {
     /** @type {[string, string][]} */
     const others = [
       ["Click", "Select a model"],
-      ["Drag a model", "Move it; the world is paused meanwhile"],
-      ["Drag its ring", "Turn it"],
+      ["Drag a model", "Move the model; the world is paused during the drag"],
+      ["Drag the ring of a model", "Turn the model"],
       ["Drag elsewhere", "Move the view; also middle button, Shift"],
       ["Right drag", "Turn the view"],
       ["Wheel, pinch", "Zoom"],

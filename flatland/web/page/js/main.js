@@ -40,11 +40,12 @@ function socketAddress() {
 
 const connection = new Connection(socketAddress());
 const session = new Session(connection);
-const stage = new Stage(/** @type {HTMLCanvasElement} */ (byId("canvas")), session, isDark());
+const stage = new Stage(byId("canvas", HTMLCanvasElement), session, isDark());
 
+const selectTool = new SelectTool(session, stage);
 const spawnTool = new SpawnTool(session, stage);
 const tools = new ToolBox({
-  select: new SelectTool(session, stage),
+  select: selectTool,
   pan: new PanTool(),
   measure: new MeasureTool(stage),
   spawn: spawnTool,
@@ -69,7 +70,7 @@ const timeBar = new TimeBar(session);
 const plots = new Plots(session, isDark);
 const spawnDialog = new SpawnDialog(session, tools, spawnTool);
 const menu = new ModelMenu();
-const help = /** @type {HTMLDialogElement} */ (byId("help-dialog"));
+const help = byId("help-dialog", HTMLDialogElement);
 
 const hotkeys = new Hotkeys(stage, session, tools, drive, {
   togglePause: () => timeBar.togglePause(),
@@ -85,8 +86,7 @@ hotkeys.createHelp();
 byId("help").addEventListener("click", () => help.showModal());
 
 new PointerInput(stage, session, tools, (spot, event) => {
-  const select = /** @type {SelectTool} */ (tools.tools.select);
-  const model = select.modelUnder(spot);
+  const model = selectTool.modelUnder(spot);
   if (!model) return;
   session.select(model.name);
   const pose = session.world?.modelPose(model);
@@ -100,7 +100,7 @@ new PointerInput(stage, session, tools, (spot, event) => {
 });
 
 stage.overlay = (batch, labels, viewport, palette) => {
-  tools.tools.select.draw(batch, labels, viewport, palette);
+  selectTool.draw(batch, labels, viewport, palette);
   if (tools.name !== "select") tools.active.draw(batch, labels, viewport, palette);
   hotkeys.drawAim(batch, viewport, palette);
 };
@@ -123,7 +123,7 @@ createShare(session, new ViewLink(session, stage));
 exposeScripting(session, stage);
 
 document.addEventListener("visibilitychange", () => session.setHidden(document.hidden));
-// The browser may keep a page that is left, with its connection, to return to it.
+// The browser may keep a page that the user has left, with its connection, for a later return.
 window.addEventListener("pagehide", () => connection.close());
 window.addEventListener("pageshow", () => connection.open());
 window.addEventListener("online", () => connection.open());

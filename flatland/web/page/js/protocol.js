@@ -5,46 +5,81 @@
  * @typedef {import("./geometry.js").Pose} Pose
  * @typedef {import("./geometry.js").Bounds} Bounds
  *
- * @typedef {{kind: "circle", center: Point, radius: number, layers?: string[]}} CircleShape
- * @typedef {{kind: "polygon", points: Point[], layers?: string[]}} PolygonShape
- * @typedef {{kind: "edges", points: Point[], layers?: string[]}} EdgesShape
- * @typedef {(CircleShape | PolygonShape | EdgesShape) & {sensor?: boolean}} Shape
+ * @typedef {null | boolean | number | string | Json[] | {[key: string]: Json}} Json
  *
- * @typedef {{id: number, name: string, color: number[], type?: string, shapes: Shape[]}} BodyInfo
+ * @typedef {{kind: "circle", center: Point, radius: number}} CircleShape
+ * @typedef {{kind: "polygon" | "edges", points: Point[]}} LineShape
+ * @typedef {CircleShape | LineShape} Shape
+ *
+ * @typedef {{id: number, name: string, color: number[], shapes: Shape[]}} BodyInfo
  * @typedef {{id: number, topic: string, body: number, origin: Pose, angle_min: number,
  *   angle_increment: number, count: number, range_max: number}} LaserInfo
- * @typedef {{name: string, color: number[], bodies: number[], anchors: Point[]}} JointInfo  anchors
- *   in the frames of the two bodies
- * @typedef {{id: number, name: string, namespace?: string, file?: string|null, bodies: BodyInfo[],
- *   lasers: LaserInfo[], joints: JointInfo[], commands: string[], outputs: string[]}} ModelInfo
+ * @typedef {{name: string, color: number[], bodies: [number, number],
+ *   anchors: [Point, Point]}} JointInfo  anchors in the frames of the two bodies
+ * @typedef {{id: number, name: string, file: string | null, bodies: BodyInfo[], lasers: LaserInfo[],
+ *   joints: JointInfo[], commands: string[]}} ModelInfo
  * @typedef {{name: string, color: number[], edges: number}} LayerInfo
  * @typedef {{label: string, path: string}} ModelFile
- * @typedef {{world: number, name: string}} WorldName
  * @typedef {{parent: string, child: string, pose: Pose}} FrameInfo
- * @typedef {{topic: string, type: string, time: number|null, value: any, kind?: string}} TopicValue
- * @typedef {{name: string, type: string, parameters: Record<string, any>}} PluginInfo
- *
- * @typedef {{version: string|number, title: string, read_only: boolean, worlds: WorldName[],
- *   limits?: Record<string, number>}} HelloMessage
- * @typedef {{world: number, name: string, revision: number, bounds: Bounds|null, step_size: number,
- *   lockstep: boolean, layers: LayerInfo[], model_files: ModelFile[]}} WorldMessage
- * @typedef {{world: number, revision: number, complete: boolean,
- *   models: ModelInfo[], removed: number[]}} ModelsMessage
- * @typedef {{world: number, time: number, paused: boolean, rate: number|null,
- *   real_time_factor: number|null, lockstep?: boolean, stale?: number}} StatusMessage
- * @typedef {{world: number, model: number, pose: Pose, velocity: number[]|null, mass: number,
- *   inertia: number, contacts: string[], plugins: PluginInfo[], topics: TopicValue[]}} DetailsMessage
+ * @typedef {{topic: string, type: string, time: number | null, value: Json, kind: string}} TopicValue
+ * @typedef {{name: string, type: string, parameters: Record<string, Json>}} PluginInfo
  * @typedef {{color: number[], pose: Pose, shapes: Shape[]}} PreviewBody
- * @typedef {{world: number, time: number, series: Record<string, number>}} ValuesMessage
- * @typedef {{world: number, frames: FrameInfo[]}} FramesMessage
+ * @typedef {"info" | "warning" | "error"} Level  of a notice
  *
- * @typedef {{kind: "edges", world: number, revision: number, time: number, layer: number,
+ * Text messages of the server:
+ *
+ * @typedef {{type: "hello", title: string, read_only: boolean,
+ *   worlds: {world: number, name: string}[]}} HelloMessage
+ * @typedef {{type: "world", world: number, name: string, bounds: Bounds | null, step_size: number,
+ *   layers: LayerInfo[]}} WorldMessage
+ * @typedef {{type: "models", world: number, complete: boolean, models: ModelInfo[],
+ *   removed: number[]}} ModelsMessage
+ * @typedef {{type: "status", world: number, time: number, paused: boolean, rate: number | null,
+ *   real_time_factor: number | null, stale: number}} StatusMessage
+ * @typedef {{type: "details", world: number, model: number, velocity: [number, number, number] | null,
+ *   mass: number, inertia: number, contacts: string[], plugins: PluginInfo[],
+ *   topics: TopicValue[]}} DetailsMessage
+ * @typedef {{type: "values", world: number, time: number, series: Record<string, number>}} ValuesMessage
+ * @typedef {{type: "frames", world: number, frames: FrameInfo[]}} FramesMessage
+ * @typedef {{type: "gone", world: number}} GoneMessage
+ * @typedef {{type: "notice", level: Level, text: string}} NoticeMessage
+ * @typedef {{type: "reply", id: number, ok: true, result: unknown}
+ *   | {type: "reply", id: number, ok: false, error: string}} ReplyMessage
+ * @typedef {WorldMessage | ModelsMessage | StatusMessage | DetailsMessage | ValuesMessage
+ *   | FramesMessage | GoneMessage} MessageOfWorld
+ * @typedef {HelloMessage | NoticeMessage | MessageOfWorld} StateMessage
+ *
+ * Binary messages of the server:
+ *
+ * @typedef {{kind: "edges", world: number, time: number, layer: number,
  *   edges: Float32Array}} EdgesData  four numbers for each edge
- * @typedef {{kind: "poses", world: number, revision: number, time: number, ids: Uint32Array|null,
+ * @typedef {{kind: "poses", world: number, time: number, ids: Uint32Array | null,
  *   poses: Float32Array}} PosesData  three numbers for each body; without ids, the bodies are those
  *   of the previous poses
  * @typedef {{id: number, pose: Pose, ranges: Float32Array}} Scan
- * @typedef {{kind: "scans", world: number, revision: number, time: number, scans: Scan[]}} ScansData
+ * @typedef {{kind: "scans", world: number, time: number, scans: Scan[]}} ScansData
+ *
+ * @typedef {{worlds: number[], scans: boolean, frames: boolean, inspect: number | null,
+ *   series: string[], hidden: boolean}} Demands  fields of `look`
+ *
+ * The requests of the page by type, with their fields and results.
+ *
+ * @typedef {object} Requests
+ * @property {{fields: Demands, result: unknown}} look
+ * @property {{fields: object, result: unknown}} pause
+ * @property {{fields: object, result: unknown}} resume
+ * @property {{fields: {n: number}, result: unknown}} step
+ * @property {{fields: {rate: number}, result: unknown}} set_rate
+ * @property {{fields: {model: number, pose: Pose}, result: unknown}} move
+ * @property {{fields: {model: number}, result: unknown}} hold
+ * @property {{fields: {model: number}, result: unknown}} release
+ * @property {{fields: {file: string, name: string, pose: Pose, namespace: string}, result: unknown}} spawn
+ * @property {{fields: {file: string}, result: {bodies: PreviewBody[]}}} preview
+ * @property {{fields: {model: number}, result: unknown}} delete
+ * @property {{fields: {model: number, command: string, linear: Point, angular: number},
+ *   result: unknown}} drive
+ * @property {{fields: object, result: ModelFile[]}} files
+ * @property {{fields: object, result: string[]}} describe_series
  */
 
 /** Name of the WebSocket subprotocol. */
@@ -59,9 +94,9 @@ const HEADER_SIZE = 16;
  * Returns the content of a binary message. The arrays are views of the buffer.
  *
  * @param {ArrayBuffer} buffer
- * @returns {EdgesData | PosesData | ScansData | null} null for a kind that is not known
+ * @returns {EdgesData | PosesData | ScansData | null} null for an unknown kind
  * @throws {RangeError} if the message is shorter than its counts state
- * @throws {Error} if its version is not supported
+ * @throws {Error} if the version of the message is not supported
  */
 export function decodeBinary(buffer) {
   const view = new DataView(buffer);
@@ -70,7 +105,6 @@ export function decodeBinary(buffer) {
   if (version !== BINARY_VERSION) throw new Error(`unsupported version ${version} of a binary message`);
   const header = {
     world: view.getUint16(2, true),
-    revision: view.getUint32(4, true),
     time: view.getFloat64(8, true),
   };
   const first = view.getUint32(HEADER_SIZE, true);

@@ -3,7 +3,7 @@ import { WorldState } from "./world_state.js";
 
 /**
  * @typedef {"layers" | "models" | "scans" | "frames" | "names" | "trails"} Display
- * @typedef {import("./world_state.js").Model} Model
+ * @typedef {import("./protocol.js").Requests} Requests
  *
  * @typedef {object} SessionEvents
  * @property {void} hello  the server has sent the list of worlds
@@ -13,17 +13,27 @@ import { WorldState } from "./world_state.js";
  * @property {void} current  another world, or all worlds, are displayed
  * @property {void} selection
  * @property {void} displays
- * @property {void} redraw  something that is drawn has changed
+ * @property {void} redraw  something that is displayed has changed
  * @property {import("./protocol.js").DetailsMessage} details
  * @property {import("./protocol.js").ValuesMessage} values
- * @property {{level: string, text: string, topic?: string}} notice  replaces those of the same topic
+ * @property {{level: import("./protocol.js").Level, text: string, topic: string}} notice  replaces
+ *   those of its topic
  */
 
 /** @type {Display[]} */
 export const DISPLAYS = ["layers", "models", "scans", "frames", "names", "trails"];
 
 /**
- * The worlds of the server and what the user looks at.
+ * Returns the text of an error for users.
+ *
+ * @param {unknown} error
+ */
+export function errorText(error) {
+  return error instanceof Error ? error.message : String(error);
+}
+
+/**
+ * The worlds of the server, and the view and selection of the user.
  *
  * @extends {Emitter<SessionEvents>}
  */
@@ -70,35 +80,37 @@ export class Session extends Emitter {
   /**
    * Sends a request about the displayed world.
    *
-   * @param {string} type
-   * @param {Record<string, any>} [fields]
+   * @template {keyof Requests} Type
+   * @param {Type} type
+   * @param {Requests[Type]["fields"] & {world?: number}} fields
    */
-  request(type, fields = {}) {
+  request(type, fields) {
     return this.connection.request(type, { world: this.currentIndex ?? 0, ...fields });
   }
 
   /**
    * Sends a request about the displayed world and shows its error as a notice.
    *
-   * @param {string} type
-   * @param {Record<string, any>} [fields]
-   * @returns {Promise<{result: any} | null>} null after an error
+   * @template {keyof Requests} Type
+   * @param {Type} type
+   * @param {Requests[Type]["fields"] & {world?: number}} fields
+   * @returns {Promise<{result: Requests[Type]["result"]} | null>} null after an error
    */
-  async attempt(type, fields = {}) {
+  async attempt(type, fields) {
     try {
       return { result: await this.request(type, fields) };
     } catch (error) {
-      this.notify("error", error instanceof Error ? error.message : String(error));
+      this.notify("error", errorText(error));
       return null;
     }
   }
 
   /**
-   * @param {"info" | "warning" | "error"} level
+   * @param {import("./protocol.js").Level} level
    * @param {string} text
    * @param {string} [topic]  earlier notices of the same topic are removed
    */
-  notify(level, text, topic) {
+  notify(level, text, topic = text) {
     this.emit("notice", { level, text, topic });
   }
 
@@ -109,7 +121,7 @@ export class Session extends Emitter {
    */
   show(index) {
     if (index === this.currentIndex) return;
-    // The address may name a model before the server has listed the worlds.
+    // The address may contain the name of a model before the server has listed the worlds.
     if (this.currentIndex !== null) this.selectedName = null;
     this.currentIndex = index;
     this.emit("current", undefined);
@@ -150,7 +162,7 @@ export class Session extends Emitter {
     else if (this.ready) this.connection.request("look", this.demands()).catch(() => {});
   }
 
-  /** Sends what is displayed to the server, once for all changes of a task. */
+  /** Sends the request `look` to the server, once for all changes of a task. */
   look() {
     if (this.lookScheduled) return;
     this.lookScheduled = true;
@@ -163,6 +175,7 @@ export class Session extends Emitter {
     });
   }
 
+  /** @returns {import("./protocol.js").Demands} */
   demands() {
     const shown = this.world ? [this.world] : [...this.worlds.values()];
     return {
@@ -175,25 +188,21 @@ export class Session extends Emitter {
     };
   }
 
-  /** @param {{type: string} & Record<string, any>} message */
+  /** @param {import("./protocol.js").StateMessage} message */
   receive(message) {
-    if (message.type === "hello") {
-      this.applyHello(/** @type {any} */ (message));
-      return;
+    if (message.type === "hello") this.applyHello(message);
+    else if (message.type === "notice") this.notify(message.level, message.text);
+    else {
+      const world = this.worlds.get(message.world);
+      if (world) this.receiveWorld(world, message);
     }
-    if (message.type === "notice") {
-      this.emit("notice", { level: message.level, text: message.text });
-      return;
-    }
-    const world = this.worlds.get(message.world);
-    if (world) this.receiveWorld(world, message);
   }
 
   /** @param {import("./protocol.js").HelloMessage} message */
   applyHello(message) {
     this.title = message.title;
     this.readOnly = message.read_only;
-    // The first one of a connection: ids of an earlier connection have no meaning any more.
+    // The first message of a connection: ids of an earlier connection are invalid.
     const before = this.ready ? this.worlds : new Map();
     this.ready = true;
     this.worlds = new Map();
@@ -205,7 +214,7 @@ export class Session extends Emitter {
     this.look();
   }
 
-  /** Displays the only world, or all worlds if the displayed one does not exist any more. */
+  /** Displays the only world, or all worlds if the displayed world does not exist any more. */
   showExisting() {
     const present = [...this.worlds.keys()];
     if (present.length === 1) this.show(present[0]);
@@ -221,17 +230,17 @@ export class Session extends Emitter {
 
   /**
    * @param {WorldState} world
-   * @param {{type: string} & Record<string, any>} message
+   * @param {import("./protocol.js").MessageOfWorld} message
    */
   receiveWorld(world, message) {
     switch (message.type) {
       case "world":
-        world.applyWorld(/** @type {any} */ (message));
+        world.applyWorld(message);
         this.emit("world", world);
         break;
       case "models": {
         const inspected = this.selected?.id;
-        world.applyModels(/** @type {any} */ (message));
+        world.applyModels(message);
         if (world === this.world && this.selected?.id !== inspected) {
           this.emit("selection", undefined);
           this.look();
@@ -240,18 +249,17 @@ export class Session extends Emitter {
         break;
       }
       case "status":
-        world.status = /** @type {any} */ (message);
-        world.lockstep = message.lockstep ?? world.lockstep;
+        world.status = message;
         this.emit("status", world);
         return;
       case "frames":
         world.frames = message.frames;
         break;
       case "details":
-        if (world === this.world) this.emit("details", /** @type {any} */ (message));
+        if (world === this.world) this.emit("details", message);
         return;
       case "values":
-        if (world === this.world) this.emit("values", /** @type {any} */ (message));
+        if (world === this.world) this.emit("values", message);
         return;
       case "gone":
         this.removeWorld(world);

@@ -1,10 +1,10 @@
-/** Preferences that survive a reload of the page. */
+/** Preferences that are kept when the page is reloaded. */
 
 const PREFIX = "flatland.";
 
 /**
  * @param {string} name
- * @returns {string | null} null if it is not set, or if the browser denies access
+ * @returns {string | null} null if the preference is not set, or if the browser denies access
  */
 export function loadSetting(name) {
   try {
@@ -22,6 +22,6 @@ export function saveSetting(name, value) {
   try {
     window.localStorage.setItem(PREFIX + name, value);
   } catch {
-    // A page in a frame or in a private window may not store anything; it works without.
+    // The browser may deny storage to a page in a frame or in a private window.
   }
 }

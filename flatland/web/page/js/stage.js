@@ -12,12 +12,12 @@ import { tilePlaces } from "./tile_places.js";
 /** Duration of an animated change of the view [ms]. */
 const GLIDE_TIME = 220;
 const MAX_PIXEL_RATIO = 2;
-/** What the view of an empty world shows [m].
+/** Area that the view of an empty world shows [m].
  * @type {import("./geometry.js").Bounds} */
 const EMPTY_BOUNDS = [-5, -5, 5, 5];
 
 /**
- * The canvas: decides what is drawn where, and draws when something has changed.
+ * The canvas: places the views of the worlds, and draws a frame when something has changed.
  *
  * @extends {Emitter<{view: void, frame: void}>}
  */
@@ -45,7 +45,7 @@ export class Stage extends Emitter {
     this.overlay = null;
     /** @type {WeakMap<WorldState, Camera>} */
     this.tileCameras = new WeakMap();
-    /** What each camera was fitted to last.
+    /** Area that each camera was fitted to last.
      * @type {WeakMap<Camera, {world: WorldState, key: string, bounds: import("./geometry.js").Bounds}>} */
     this.fitted = new WeakMap();
     this.dark = dark;
@@ -103,7 +103,7 @@ export class Stage extends Emitter {
     this.camera.width = Math.max(1, clientWidth);
     this.camera.height = Math.max(1, clientHeight);
     this.invalidate();
-    // Drawn at once: a canvas that changes its size is cleared.
+    // Drawn immediately, because a change of the size clears the canvas.
     this.draw();
   }
 
@@ -153,7 +153,7 @@ export class Stage extends Emitter {
     this.emit("view", undefined);
   }
 
-  /** Moves the camera according to what it follows. */
+  /** Moves the camera to the followed model, or fits the view. */
   updateCamera() {
     const { camera, session, glide } = this;
     const { world } = session;
@@ -173,8 +173,8 @@ export class Stage extends Emitter {
   }
 
   /**
-   * Fits a view to a world. While the view and the shapes of the world stay the same, models that
-   * move only enlarge the area, so that the view is steady.
+   * Fits a view to a world. While the size of the view and the shapes in the world stay the same,
+   * moving models only enlarge the area, so that the view is steady.
    *
    * @param {Camera} camera
    * @param {WorldState} world

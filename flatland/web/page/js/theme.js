@@ -3,7 +3,7 @@ import { loadSetting, saveSetting } from "./settings.js";
 
 const preference = window.matchMedia("(prefers-color-scheme: dark)");
 
-/** Returns whether the theme is dark: as chosen, otherwise as the system prefers. */
+/** Returns whether the theme is dark: as the user has selected, or else as the system prefers. */
 export function isDark() {
   const chosen = loadSetting("theme");
   return chosen === null ? preference.matches : chosen === "dark";

@@ -19,6 +19,9 @@ export class ViewLink {
     /** @type {number | undefined} */
     this.timer = undefined;
     this.written = "";
+    /** World of the address, as long as the server has not listed the world.
+     * @type {number | null} */
+    this.wantedWorld = null;
     this.defaults = { ...session.displays };
     this.read();
     window.addEventListener("hashchange", () => {
@@ -31,10 +34,6 @@ export class ViewLink {
     session.on("current", schedule);
     session.on("hello", () => this.showWantedWorld());
   }
-
-  /** World of the address that the server has not listed yet.
-   * @type {number | null} */
-  wantedWorld = null;
 
   showWantedWorld() {
     const { session, wantedWorld } = this;
@@ -62,7 +61,8 @@ export class ViewLink {
         camera.zoom = zoom;
         camera.zoomAt(1, camera.width / 2, camera.height / 2);
       });
-    }
+    } else stage.fit();
+    stage.follow(values.get("follow"));
     for (const display of DISPLAYS) {
       const isShown = values.get("show")?.split(",").includes(display);
       const isHidden = values.get("hide")?.split(",").includes(display);
@@ -71,8 +71,7 @@ export class ViewLink {
     }
     this.wantedWorld = number("world");
     this.showWantedWorld();
-    if (values.has("select")) session.select(values.get("select"));
-    if (values.has("follow")) stage.follow(values.get("follow"));
+    session.select(values.get("select"));
   }
 
   schedule() {
@@ -104,7 +103,7 @@ export class ViewLink {
     return text ? `#${text}` : "";
   }
 
-  /** Writes the current view into the address, without a new entry of the history. */
+  /** Writes the current view into the address without adding an entry to the history. */
   write() {
     window.clearTimeout(this.timer);
     this.written = this.hash();

@@ -14,13 +14,11 @@ import { Trails } from "./trails.js";
  *
  * @typedef {object} Body
  * @property {number} id
- * @property {string} name
  * @property {number[]} color
- * @property {string} type
  * @property {Shape[]} shapes
  * @property {number} slot  index of the pose in `WorldState.poses`
  * @property {Model} model
- * @property {number} radius  of the circle around the origin that contains all shapes [m]
+ * @property {number} radius  radius of the circle around the origin that contains all shapes [m]
  *
  * @typedef {object} Model
  * @property {number} id
@@ -30,8 +28,7 @@ import { Trails } from "./trails.js";
  * @property {import("./protocol.js").LaserInfo[]} lasers
  * @property {import("./protocol.js").JointInfo[]} joints
  * @property {string[]} commands  topics of velocity commands
- * @property {string[]} outputs
- * @property {number} index  position in the order of arrival, which determines its colour
+ * @property {number} index  position in the order of arrival; selects the colour
  *
  * @typedef {object} LaserState
  * @property {import("./protocol.js").LaserInfo} info
@@ -41,8 +38,11 @@ import { Trails } from "./trails.js";
  */
 
 const INITIAL_SLOTS = 256;
+/** State of a laser before its first scan.
+ * @type {{pose: Pose, ranges: null}} */
+const NO_SCAN = { pose: [0, 0, 0], ranges: null };
 
-/** Everything that the page knows about a world. Renderers compare the version counters. */
+/** Everything that the page has received about a world. Renderers compare the version counters. */
 export class WorldState {
   /**
    * @param {number} index
@@ -51,32 +51,20 @@ export class WorldState {
   constructor(index, name) {
     this.index = index;
     this.name = name;
+    /** Whether the server has described the world. */
+    this.present = false;
     this.layersVersion = 0;
     this.shapesVersion = 0;
     this.posesVersion = 0;
     this.scansVersion = 0;
-    /** Bodies of the last poses. */
-    this.movedIds = new Uint32Array(0);
-    this.slots = 0;
-    this.arrivals = 0;
-    /** Pose of each slot: x, y, heading, 1 if it is known. */
-    this.poses = new Float32Array(4 * INITIAL_SLOTS);
-    this.trails = new Trails();
-    this.clear();
-  }
-
-  /** Removes all contents, for example when the server replaces the world. */
-  clear() {
-    this.present = false;
-    this.revision = 0;
+    /** Bodies of the last poses.
+     * @type {Uint32Array} */
+    this.movedIds = new Uint32Array();
     /** @type {Bounds | null} */
     this.bounds = null;
     this.stepSize = 0;
-    this.lockstep = false;
     /** @type {Layer[]} */
     this.layers = [];
-    /** @type {import("./protocol.js").ModelFile[]} */
-    this.modelFiles = [];
     /** @type {Map<number, Model>} */
     this.models = new Map();
     /** @type {Map<number, Body>} */
@@ -88,16 +76,14 @@ export class WorldState {
     /** @type {import("./protocol.js").StatusMessage | null} */
     this.status = null;
     this.time = 0;
+    /** Pose of each slot: x, y, heading, 1 if it is known. */
     this.poses = new Float32Array(4 * INITIAL_SLOTS);
     this.slots = 0;
     /** @type {number[]} */
     this.freeSlots = [];
+    /** Number of models that have ever arrived. */
     this.arrivals = 0;
     this.trails = new Trails();
-    this.layersVersion++;
-    this.shapesVersion++;
-    this.posesVersion++;
-    this.scansVersion++;
   }
 
   /** @param {import("./protocol.js").WorldMessage} message */
@@ -105,11 +91,8 @@ export class WorldState {
     const before = this.layers;
     this.present = true;
     this.name = message.name;
-    this.revision = message.revision;
     this.bounds = message.bounds;
     this.stepSize = message.step_size;
-    this.lockstep = message.lockstep;
-    this.modelFiles = message.model_files ?? [];
     // The server sends the edges of a layer again only if they have changed.
     this.layers = message.layers.map(({ name, color }, index) => ({
       name,
@@ -130,7 +113,7 @@ export class WorldState {
 
   /** @param {import("./protocol.js").ModelsMessage} message */
   applyModels(message) {
-    const removed = message.removed ?? [];
+    const removed = [...message.removed];
     if (message.complete) {
       const sent = new Set(message.models.map((info) => info.id));
       removed.push(...[...this.models.keys()].filter((id) => !sent.has(id)));
@@ -138,25 +121,26 @@ export class WorldState {
     for (const id of removed) this.removeModel(id);
     for (const info of message.models) {
       const before = this.models.get(info.id);
-      const index = before?.index ?? this.arrivals++;
       /** @type {Model} */
       const model = {
         id: info.id,
         name: info.name,
         file: info.file ?? "",
         bodies: [],
-        lasers: info.lasers ?? [],
-        joints: info.joints ?? [],
-        commands: info.commands ?? [],
-        outputs: info.outputs ?? [],
-        index,
+        lasers: info.lasers,
+        joints: info.joints,
+        commands: info.commands,
+        index: before?.index ?? this.arrivals++,
       };
       const kept = new Set(info.bodies.map((body) => body.id));
       for (const body of before?.bodies ?? []) if (!kept.has(body.id)) this.removeBody(body);
       model.bodies = info.bodies.map((body) => this.addBody(body, model));
+      // The server does not send the last scans again if only the appearance of a model has changed.
+      const scans = new Map(model.lasers.map((laser) => [laser.id, this.lasers.get(laser.id)]));
       for (const laser of before?.lasers ?? []) this.lasers.delete(laser.id);
       for (const laser of model.lasers) {
-        this.lasers.set(laser.id, { info: laser, model, pose: [0, 0, 0], ranges: null });
+        const { pose, ranges } = scans.get(laser.id) ?? NO_SCAN;
+        this.lasers.set(laser.id, { info: laser, model, pose, ranges });
       }
       this.models.set(info.id, model);
     }
@@ -176,8 +160,8 @@ export class WorldState {
       this.poses = grown;
     }
     const radius = shapesRadius(info.shapes);
-    const { id, name, color, shapes } = info;
-    const body = { id, name, color, shapes, type: info.type ?? "", slot, model, radius };
+    const { id, color, shapes } = info;
+    const body = { id, color, shapes, slot, model, radius };
     this.bodies.set(id, body);
     return body;
   }
@@ -232,7 +216,7 @@ export class WorldState {
   }
 
   /**
-   * Returns the pose of a body, null before the first one has arrived.
+   * Returns the pose of a body, null before the first pose has arrived.
    *
    * @param {Body | undefined} body
    * @returns {Pose | null}

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from concurrent.futures import Future
 from io import BytesIO
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -33,6 +34,13 @@ class NoRegistrar:
         pass
 
 
+def _handle(_model: object, name: str) -> InteractiveMarker:
+    marker = InteractiveMarker(name=name, description=f"marker {name}", scale=2.0)
+    marker.header.frame_id = "map"
+    marker.pose.orientation.w = 1.0
+    return marker
+
+
 class Setup:
     """A server with clients, and what it publishes."""
 
@@ -41,15 +49,12 @@ class Setup:
         self.poses: dict[str, tuple[float, float, float]] = {}
         self.sent: list[Message] = []
         monkeypatch.setattr(marker_server.time, "monotonic", lambda: self.now)
+        monkeypatch.setattr(marker_server, "model_handle", _handle)
         registrar: Any = NoRegistrar()
-        self.server = MarkerServer(
-            registrar,
-            "handles",
-            lambda _action: Future(),
-            pose_of=self.poses.__getitem__,
-            receive=lambda _feedback, _now: None,
-            on_connection=lambda: None,
+        source: Any = SimpleNamespace(
+            pose_of=self.poses.__getitem__, connection_changed=lambda: None
         )
+        self.server = MarkerServer(registrar, lambda _action: Future(), source)
         for topic, message_type in (
             (self.server._init, InteractiveMarkerInit),
             (self.server._update, InteractiveMarkerUpdate),
@@ -69,10 +74,8 @@ class Setup:
 
     def insert(self, name: str, x: float = 0.0) -> None:
         self.poses[name] = (x, 0.0, 0.0)
-        marker = InteractiveMarker(name=name, description=f"marker {name}", scale=2.0)
-        marker.header.frame_id = "map"
-        marker.pose.orientation.w = 1.0
-        self.server.insert(marker)
+        model: Any = None
+        self.server.insert(model, name)
 
     def move(self, name: str, x: float) -> None:
         self.poses[name] = (x, 0.0, 0.0)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import logging
 import sys
-from io import BytesIO
 from typing import Any
 
 import numpy as np
@@ -12,9 +11,12 @@ import pytest
 
 pytest.importorskip("visualization_msgs", reason="ROS is not installed")
 
+from visualization_msgs.msg import Marker, MarkerArray
+
 from flatland.entities.layer import Layer
 from flatland.physics import PhysicsWorld
 from flatland.ros.markers.layer_markers import LayerMarkers
+from flatland.ros.markers.packed_markers import PackedMarkers
 
 
 def make_layer(properties: dict[str, Any], edges: np.ndarray | None = None) -> Layer:
@@ -26,8 +28,13 @@ def make_layer(properties: dict[str, Any], edges: np.ndarray | None = None) -> L
     )  # fmt: skip
 
 
+def markers_of(message: PackedMarkers) -> list[Marker]:
+    received: list[Marker] = MarkerArray().deserialize(message.packed).markers
+    return received
+
+
 def heights(properties: dict[str, Any]) -> tuple[float, float]:
-    (marker,) = LayerMarkers(make_layer(properties)).walls(0).markers
+    (marker,) = markers_of(LayerMarkers(make_layer(properties)).walls(0))
     z = [point.z for point in marker.points]
     return min(z), max(z)
 
@@ -74,8 +81,8 @@ def test_invalid_heights_are_logged_and_ignored(
 
 def test_layer_without_edges_has_no_marker() -> None:
     markers = LayerMarkers(make_layer({}, np.empty((0, 4), np.float32)))
-    assert markers.lines(0).markers == []
-    assert markers.walls(0).markers == []
+    assert markers_of(markers.lines(0)) == []
+    assert markers_of(markers.walls(0)) == []
 
 
 def executed_lines(edge_count: int) -> int:
@@ -93,7 +100,7 @@ def executed_lines(edge_count: int) -> int:
     try:
         markers = LayerMarkers(layer)
         for message in (markers.lines(0), markers.walls(0)):
-            message.serialize(BytesIO())
+            assert message.packed
     finally:
         sys.settrace(None)
     return count

@@ -6,12 +6,11 @@ from io import BytesIO
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
 from visualization_msgs.msg import Marker, MarkerArray
 
 import flatland
-from flatland.ros.markers.marker_geometry import joint_lines, joint_points
+import flatland.geometry
 from flatland.ros.markers.model_markers import ModelMarkers
 
 MODEL = """
@@ -48,7 +47,7 @@ def markers_of(message: Any) -> list[Marker]:
 
 def by_genpy(message: Any) -> bytes:
     buffer = BytesIO()
-    MarkerArray(message.markers).serialize(buffer)
+    MarkerArray(markers_of(message)).serialize(buffer)
     return buffer.getvalue()
 
 
@@ -69,10 +68,16 @@ def test_joints_connect_the_origins_and_the_anchors(model: Any) -> None:
     cached.message(0)
     model.bodies[1].set_pose(-4.0, 0.5, 2.0)
     lines, cubes = markers_of(cached.message(STAMP))[-2:]
-    joint = model.joints[0]
-    expected = joint_points(*(body.pose for body in joint.bodies), joint.anchors)
-    np.testing.assert_array_equal([[p.x, p.y, p.z] for p in cubes.points], expected)
-    np.testing.assert_array_equal([[p.x, p.y, p.z] for p in lines.points], joint_lines(expected))
+    arm, base = model.bodies[1].pose, model.bodies[0].pose
+    anchor_a, anchor_b = (
+        flatland.geometry.compose(pose, (*anchor, 0.0))
+        for pose, anchor in zip((arm, base), model.joints[0].anchors, strict=True)
+    )
+    expected = [(*pose[:2], 0.0) for pose in (arm, anchor_a, base, anchor_b)]
+    found = [(p.x, p.y, p.z) for p in cubes.points]
+    assert found == expected
+    found = [(p.x, p.y, p.z) for p in lines.points]
+    assert found == [expected[i] for i in (0, 1, 2, 3, 1, 3)]
 
 
 def test_changed_footprints_and_colors_are_rebuilt(model: Any) -> None:

@@ -28,7 +28,7 @@ export class Capture {
   }
 
   saveScreenshot() {
-    // Drawn in the same task: the browser clears the canvas afterwards.
+    // Drawn in the same task, because the browser clears the canvas at its end.
     this.stage.draw();
     this.stage.canvas.toBlob((blob) => {
       if (!blob) {
@@ -68,7 +68,7 @@ export class Capture {
     recorder.start(1000);
     this.recorder = recorder;
     this.showState(true);
-    // A canvas that does not change has no frames; the first one is drawn for a paused world.
+    // The video of a paused world has only this frame, because nothing else changes the canvas.
     this.stage.invalidate();
     this.session.notify("info", "Recording; press the button again to stop");
   }

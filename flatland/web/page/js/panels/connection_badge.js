@@ -1,7 +1,7 @@
 import { byId, setText } from "../dom.js";
 
 /**
- * Shows the state of the connection, and a message while there is nothing to draw.
+ * Shows the state of the connection, and a message while there is no world to draw.
  *
  * @param {import("../session.js").Session} session
  * @param {import("../stage.js").Stage} stage
@@ -20,7 +20,7 @@ export function createConnectionBadge(session, stage) {
   const messageText = () => {
     if (!stage.isSupported) {
       return (
-        "This browser does not offer WebGL 2, which the view needs. Enable hardware acceleration, " +
+        "This browser does not support WebGL 2, which is required. Enable hardware acceleration, " +
         "or use a current version of Firefox, Chrome, Edge or Safari."
       );
     }

@@ -1,29 +1,27 @@
-import { byId, element } from "../dom.js";
+import { byId, element, firstChild } from "../dom.js";
 import { css } from "../renderer/palette.js";
+import { DISPLAYS } from "../session.js";
 
 /**
- * Connects the check boxes of the displays, and creates one for each layer of the map.
+ * Connects the check boxes of the displays, and creates a check box for each layer of the map.
  *
  * @param {import("../session.js").Session} session
  */
 export function createDisplays(session) {
-  /** @type {NodeListOf<HTMLInputElement>} */
-  const boxes = document.querySelectorAll("input[data-display]");
-  const layerList = byId("layer-list");
-  const update = () => {
-    for (const box of boxes) {
-      box.checked = session.displays[/** @type {import("../session.js").Display} */ (box.dataset.display)];
-    }
-  };
-  for (const box of boxes) {
-    box.addEventListener("change", () => {
-      session.setDisplay(/** @type {import("../session.js").Display} */ (box.dataset.display), box.checked);
-    });
+  for (const display of DISPLAYS) {
+    const box = byId(`toggle-${display}`, HTMLInputElement);
+    const update = () => {
+      box.checked = session.displays[display];
+    };
+    box.addEventListener("change", () => session.setDisplay(display, box.checked));
+    session.on("displays", update);
+    update();
   }
 
+  const layerList = byId("layer-list");
+  const legend = firstChild(layerList);
   const updateLayers = () => {
     const layers = session.world?.layers ?? [];
-    const legend = /** @type {HTMLElement} */ (layerList.firstElementChild);
     layerList.hidden = layers.length < 2;
     layerList.replaceChildren(
       legend,
@@ -40,10 +38,8 @@ export function createDisplays(session) {
       }),
     );
   };
-  session.on("displays", update);
   session.on("world", updateLayers);
   session.on("current", updateLayers);
   session.on("hello", updateLayers);
-  update();
   updateLayers();
 }

@@ -1,4 +1,4 @@
-import { byId, element, icon, setText } from "../dom.js";
+import { byId, element, firstChild, icon, setText } from "../dom.js";
 import { brief, describeValue, fixed, significant } from "../format.js";
 
 /** Time between two updates of the pose from the view [ms]. */
@@ -21,9 +21,9 @@ export class Inspector {
     /** @type {HTMLInputElement[]} */
     this.fields = [];
     this.isEdited = false;
-    /** Whether the fields have contained a pose, which arrives after a new model. */
+    /** Whether the fields have contained a pose, which arrives later than the model. */
     this.isFilled = false;
-    this.empty = /** @type {HTMLElement} */ (this.root.firstElementChild);
+    this.empty = firstChild(this.root);
     session.on("selection", () => this.rebuild());
     session.on("models", () => {
       if (this.shownId !== (session.selected?.id ?? null)) this.rebuild();
@@ -106,19 +106,21 @@ export class Inspector {
     const { session } = this;
     if (session.readOnly || this.shownId === null) return;
     const pose = this.fields.map((field) => parseNumber(field.value));
-    this.fields.forEach((field, i) => field.setAttribute("aria-invalid", String(Number.isNaN(pose[i]))));
+    for (const [i, field] of this.fields.entries()) {
+      field.setAttribute("aria-invalid", String(Number.isNaN(pose[i])));
+    }
     if (pose.some(Number.isNaN)) {
       session.notify("error", "The coordinates must be numbers");
       return;
     }
     this.isEdited = false;
-    await session.attempt("move", { model: this.shownId, pose });
+    await session.attempt("move", { model: this.shownId, pose: [pose[0], pose[1], pose[2]] });
   }
 
-  /** Shows the pose of the view, unless the user edits it. */
+  /** Shows the pose of the model in the view, unless the user is editing the pose. */
   updatePose() {
     const now = performance.now();
-    const isFocused = this.fields.includes(/** @type {any} */ (document.activeElement));
+    const isFocused = this.fields.some((field) => field === document.activeElement);
     if (this.isFilled && (this.isEdited || isFocused || now - this.poseTime < POSE_PERIOD)) return;
     const { selected, world } = this.session;
     const pose = selected && world?.modelPose(selected);
@@ -148,7 +150,10 @@ export class Inspector {
       ["Contacts", contacts],
     ];
     let list = root.querySelector("dl.facts");
-    if (!list) root.append((list = element("dl", { class: "facts" })));
+    if (!list) {
+      list = element("dl", { class: "facts" });
+      root.append(list);
+    }
     renderFacts(list, facts);
     this.updateTopics(root, details.topics);
     this.updatePlugins(root, details.plugins);
@@ -160,18 +165,18 @@ export class Inspector {
    */
   updateTopics(root, topics) {
     const section = subsection(root, "topics", `Topics (${topics.length})`, true);
+    while (section.children.length > topics.length + 1) section.lastElementChild?.remove();
+    while (section.children.length < topics.length + 1) {
+      section.append(
+        element("div", { class: "topic" }, element("code"), element("span", { class: "value" })),
+      );
+    }
     topics.forEach(({ topic, type, value, kind }, i) => {
-      let row = /** @type {HTMLElement | undefined} */ (section.children[i + 1]);
-      if (!row) {
-        row = element("div", { class: "topic" }, element("code"), element("span", { class: "value" }));
-        section.append(row);
-      }
-      const [name, text] = /** @type {any} */ (row.children);
+      const [name, text] = section.children[i + 1].children;
       setText(name, topic);
-      name.title = kind ? `${type}, ${kind}` : type;
+      name.setAttribute("title", `${type}, ${kind}`);
       setText(text, describeValue(value));
     });
-    while (section.children.length > topics.length + 1) section.lastElementChild?.remove();
   }
 
   /**
@@ -183,7 +188,7 @@ export class Inspector {
     const key = JSON.stringify(plugins);
     if (section.dataset.key === key) return;
     section.dataset.key = key;
-    const summary = /** @type {Element} */ (section.firstElementChild);
+    const summary = firstChild(section);
     const parts = plugins.map(({ name, type, parameters }) => {
       const list = element("dl", { class: "facts" });
       renderFacts(
@@ -209,13 +214,13 @@ function renderFacts(list, facts) {
   while (list.children.length > 2 * facts.length) list.lastElementChild?.remove();
   while (list.children.length < 2 * facts.length) list.append(element("dt"), element("dd"));
   facts.forEach(([name, value], i) => {
-    setText(/** @type {HTMLElement} */ (list.children[2 * i]), name);
-    setText(/** @type {HTMLElement} */ (list.children[2 * i + 1]), value);
+    setText(list.children[2 * i], name);
+    setText(list.children[2 * i + 1], value);
   });
 }
 
 /**
- * Returns a collapsible part of the inspector, which is created the first time.
+ * Returns a collapsible part of the inspector; creates the part at the first call.
  *
  * @param {HTMLElement} root
  * @param {string} name
@@ -223,17 +228,17 @@ function renderFacts(list, facts) {
  * @param {boolean} open
  */
 function subsection(root, name, title, open) {
-  let found = /** @type {HTMLElement | null} */ (root.querySelector(`[data-part="${name}"]`));
+  let found = [...root.querySelectorAll("details")].find(({ dataset }) => dataset.part === name);
   if (!found) {
     found = element("details", { class: "sub", "data-part": name, open }, element("summary"));
     root.append(found);
   }
-  setText(/** @type {HTMLElement} */ (found.firstElementChild), title);
+  setText(firstChild(found), title);
   return found;
 }
 
 /**
- * Returns the number in a field; NaN for anything else.
+ * Returns the number in a field, NaN for any other text.
  *
  * @param {string} text
  */

@@ -1,18 +1,18 @@
 import { byId, element, setText } from "../dom.js";
 import { css } from "../renderer/palette.js";
 
-/** Largest number of models in the list; the filter finds the others. */
+/** Largest number of models in the list; the others are found by the filter. */
 const MAX_SHOWN = 200;
 
 /**
- * Shows the names of the models, by which they are selected.
+ * Shows the names of the models; a click selects a model.
  *
  * @param {import("../session.js").Session} session
  * @param {import("../stage.js").Stage} stage
  */
 export function createModelList(session, stage) {
   const list = byId("model-list");
-  const filter = /** @type {HTMLInputElement} */ (byId("model-filter"));
+  const filter = byId("model-filter", HTMLInputElement);
   let scheduled = false;
 
   /** @param {import("../world_state.js").Model} model */

@@ -1,6 +1,7 @@
 import { byId, element, icon } from "../dom.js";
 
-/** Time after which a notice disappears [ms]. */
+/** Time after which a notice disappears [ms].
+ * @type {Record<import("../protocol.js").Level, number>} */
 const LIFETIME = { info: 5000, warning: 9000, error: 12_000 };
 const MAX_NOTICES = 4;
 
@@ -11,7 +12,7 @@ const MAX_NOTICES = 4;
  */
 export function createNotices(session) {
   const list = byId("notices");
-  session.on("notice", ({ level, text, topic = text }) => {
+  session.on("notice", ({ level, text, topic }) => {
     for (const old of [...list.children]) if (old.getAttribute("data-topic") === topic) old.remove();
     const close = element(
       "button",
@@ -27,7 +28,6 @@ export function createNotices(session) {
     close.addEventListener("click", () => notice.remove());
     list.append(notice);
     while (list.children.length > MAX_NOTICES) list.firstElementChild?.remove();
-    const lifetime = LIFETIME[/** @type {"info"} */ (level)] ?? LIFETIME.info;
-    window.setTimeout(() => notice.remove(), lifetime);
+    window.setTimeout(() => notice.remove(), LIFETIME[level]);
   });
 }

@@ -1,3 +1,4 @@
+import { context2d } from "../dom.js";
 import { significant } from "../format.js";
 import { createPalette, css } from "../renderer/palette.js";
 
@@ -9,7 +10,7 @@ export class PlotCanvas {
   /** @param {HTMLCanvasElement} canvas */
   constructor(canvas) {
     this.canvas = canvas;
-    this.context = /** @type {CanvasRenderingContext2D} */ (canvas.getContext("2d"));
+    this.context = context2d(canvas);
   }
 
   /**

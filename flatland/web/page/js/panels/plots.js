@@ -16,7 +16,7 @@ const DRAW_PERIOD = 100;
  * @property {PlotCanvas} canvas
  */
 
-/** Plots over time of numbers that the world publishes. */
+/** Plots of published numbers over time. */
 export class Plots {
   /**
    * @param {import("../session.js").Session} session
@@ -27,8 +27,8 @@ export class Plots {
     this.isDark = isDark;
     this.panel = byId("plots");
     this.list = byId("plot-list");
-    this.select = /** @type {HTMLSelectElement} */ (byId("plot-series"));
-    this.window = /** @type {HTMLSelectElement} */ (byId("plot-window"));
+    this.select = byId("plot-series", HTMLSelectElement);
+    this.window = byId("plot-window", HTMLSelectElement);
     /** @type {Map<string, Plot>} */
     this.plots = new Map();
     this.time = 0;
@@ -37,7 +37,7 @@ export class Plots {
     byId("plots-close").addEventListener("click", () => this.setOpen(false));
     this.select.addEventListener("focus", () => this.refreshNames());
     byId("plot-add").addEventListener("click", () => this.addSelected());
-    // Not at "change": a typed name selects every number whose name begins with what is typed so far.
+    // Not at "change", because each typed character selects the first number with a matching name.
     this.select.addEventListener("keydown", (event) => {
       if (event.key !== "Enter" || !this.select.value) return;
       event.preventDefault();
@@ -64,11 +64,11 @@ export class Plots {
     } else if (document.activeElement === document.body) byId("plots-toggle").focus();
   }
 
-  /** Asks for the names of all numbers that can be plotted. */
+  /** Requests the names of all numbers that can be plotted. */
   async refreshNames() {
     if (!this.session.world) return;
     try {
-      this.showNames(await this.session.request("describe_series"));
+      this.showNames(await this.session.request("describe_series", {}));
     } catch {
       this.showNames([]);
     }

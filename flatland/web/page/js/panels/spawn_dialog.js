@@ -1,13 +1,14 @@
-import { byId, element, setText } from "../dom.js";
+import { byId, context2d, element, setText } from "../dom.js";
 import { transformPoint } from "../geometry.js";
 import { css } from "../renderer/palette.js";
-import { spawnModel } from "../tools/spawn_tool.js";
+import { errorText } from "../session.js";
 import { shapePoints } from "../shapes.js";
+import { spawnModel } from "../tools/spawn_tool.js";
 import { parseNumber } from "./inspector.js";
 
 /** @typedef {import("../protocol.js").PreviewBody} PreviewBody */
 
-/** The dialog that selects a model file, and begins to place the model. */
+/** The dialog that selects a model file and starts the placement of the model. */
 export class SpawnDialog {
   /**
    * @param {import("../session.js").Session} session
@@ -18,13 +19,13 @@ export class SpawnDialog {
     this.session = session;
     this.tools = tools;
     this.tool = tool;
-    this.dialog = /** @type {HTMLDialogElement} */ (byId("spawn-dialog"));
-    this.file = /** @type {HTMLSelectElement} */ (byId("spawn-file"));
-    this.path = /** @type {HTMLInputElement} */ (byId("spawn-path"));
-    this.name = /** @type {HTMLInputElement} */ (byId("spawn-name"));
-    this.number = /** @type {HTMLInputElement} */ (byId("spawn-number"));
-    this.namespace = /** @type {HTMLInputElement} */ (byId("spawn-namespace"));
-    this.byNumbers = /** @type {HTMLInputElement} */ (byId("spawn-by-numbers"));
+    this.dialog = byId("spawn-dialog", HTMLDialogElement);
+    this.file = byId("spawn-file", HTMLSelectElement);
+    this.path = byId("spawn-path", HTMLInputElement);
+    this.name = byId("spawn-name", HTMLInputElement);
+    this.number = byId("spawn-number", HTMLInputElement);
+    this.namespace = byId("spawn-namespace", HTMLInputElement);
+    this.byNumbers = byId("spawn-by-numbers", HTMLInputElement);
     /** @type {PreviewBody[] | null} */
     this.bodies = null;
     /** @type {Promise<void>} */
@@ -35,7 +36,7 @@ export class SpawnDialog {
     this.path.addEventListener("change", () => this.selectFile());
     this.path.addEventListener("keydown", (event) => {
       if (event.key !== "Enter") return;
-      event.preventDefault(); // The outline is shown before the model is placed.
+      event.preventDefault(); // The model is placed first, with its outline.
       this.selectFile();
     });
     for (const id of ["spawn-by-pointer", "spawn-by-numbers"]) {
@@ -50,13 +51,11 @@ export class SpawnDialog {
 
   async open() {
     if (this.session.readOnly || !this.session.world || this.dialog.open) return;
-    const reply = await this.session.attempt("files");
+    const reply = await this.session.attempt("files", {});
     if (!reply) return;
     const before = this.file.selectedOptions[0]?.value;
     this.file.replaceChildren(
-      ...reply.result.map((/** @type {import("../protocol.js").ModelFile} */ { label, path }) =>
-        element("option", { value: path }, label),
-      ),
+      ...reply.result.map(({ label, path }) => element("option", { value: path }, label)),
       element("option", { value: "" }, "Other file…"),
     );
     if ([...this.file.options].some((option) => option.value === before)) this.file.value = before;
@@ -97,11 +96,11 @@ export class SpawnDialog {
       this.bodies = bodies;
       this.drawPreview(bodies);
     } catch (error) {
-      if (this.selectedPath() === path) this.setError(error instanceof Error ? error.message : String(error));
+      if (this.selectedPath() === path) this.setError(errorText(error));
     }
   }
 
-  /** Returns the name of the next model, with a number if it is in use. */
+  /** Returns the name of the next model, with a number if the name is in use. */
   nextName() {
     const name = this.name.value.trim();
     const { world } = this.session;
@@ -117,11 +116,11 @@ export class SpawnDialog {
       return;
     }
     await this.preview;
-    if (!this.dialog.open || !this.bodies) return; // An error is shown.
+    if (!this.dialog.open || !this.bodies) return; // The dialog shows an error.
     const namespace = this.namespace.value.trim();
     if (this.byNumbers.checked) {
       const pose = ["spawn-x", "spawn-y", "spawn-theta"].map((id) =>
-        parseNumber(/** @type {HTMLInputElement} */ (byId(id)).value),
+        parseNumber(byId(id, HTMLInputElement).value),
       );
       if (pose.some(Number.isNaN)) {
         this.setError("The coordinates must be numbers");
@@ -145,13 +144,13 @@ export class SpawnDialog {
 
   /** @param {PreviewBody[]} bodies */
   drawPreview(bodies) {
-    const canvas = /** @type {HTMLCanvasElement} */ (byId("spawn-preview"));
-    const context = canvas.getContext("2d");
-    if (!context) return;
-    // This also clears it.
+    const canvas = byId("spawn-preview", HTMLCanvasElement);
+    const context = context2d(canvas);
+    // Also clears the canvas.
     const ratio = window.devicePixelRatio;
     canvas.width = Math.round(canvas.clientWidth * ratio);
     canvas.height = Math.round(canvas.clientHeight * ratio);
+    canvas.setAttribute("aria-label", "Outline of the model");
     const polygons = bodies.flatMap(({ pose, color, shapes }) =>
       shapes.map((shape) => ({
         color,

@@ -1,7 +1,7 @@
 import { byId, element, setText } from "../dom.js";
 
 /**
- * Labels of the small views of several worlds; a click enlarges one.
+ * Labels of the small views of several worlds; a click enlarges a view.
  *
  * @param {import("../session.js").Session} session
  * @param {import("../stage.js").Stage} stage
@@ -18,8 +18,8 @@ export function createTiles(session, stage) {
   const arrange = () => {
     if (session.world) return;
     stage.tiles().forEach((tile, i) => {
-      const button = /** @type {HTMLElement | undefined} */ (root.children[i]);
-      if (!button) return;
+      const button = root.children[i];
+      if (!(button instanceof HTMLElement)) return;
       button.style.left = `${tile.left}px`;
       button.style.top = `${tile.top}px`;
       button.style.width = `${tile.width}px`;
@@ -60,7 +60,7 @@ export function createTiles(session, stage) {
   session.on("status", (world) => {
     const index = [...session.worlds.values()].indexOf(world);
     const text = root.children[index]?.firstElementChild;
-    if (text && !session.world) setText(/** @type {HTMLElement} */ (text), label(world));
+    if (text && !session.world) setText(text, label(world));
   });
   new ResizeObserver(arrange).observe(stage.canvas);
   rebuild();

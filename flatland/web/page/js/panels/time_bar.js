@@ -1,7 +1,7 @@
-import { byId, icon, setText } from "../dom.js";
+import { byId, element, icon, setText } from "../dom.js";
 import { fixed, significant } from "../format.js";
 
-/** Ends of the rate slider [times real time]; its last position is as fast as possible. */
+/** Ends of the rate slider [times real time]; the last position means as fast as possible. */
 const SLOWEST = 0.05;
 const FASTEST = 50;
 const POSITIONS = 100;
@@ -10,7 +10,7 @@ const SETTLE_TIME = 1500;
 const SEND_PERIOD = 120;
 
 /**
- * Returns the rate of a position of the slider, as a factor of real time.
+ * Returns the factor of real time at a position of the slider.
  *
  * @param {number} position
  */
@@ -19,7 +19,7 @@ export function factorOf(position) {
 }
 
 /**
- * Returns the position of a factor of real time.
+ * Returns the position of the slider for a factor of real time.
  *
  * @param {number} factor
  */
@@ -34,8 +34,8 @@ export class TimeBar {
   constructor(session) {
     this.session = session;
     this.pauseButton = byId("pause");
-    this.stepButton = /** @type {HTMLButtonElement} */ (byId("step"));
-    this.slider = /** @type {HTMLInputElement} */ (byId("rate"));
+    this.stepButton = byId("step", HTMLButtonElement);
+    this.slider = byId("rate", HTMLInputElement);
     this.touched = -Infinity;
     /** @type {number | undefined} */
     this.timer = undefined;
@@ -51,7 +51,7 @@ export class TimeBar {
     this.update();
   }
 
-  /** The world of the readouts: the displayed one, otherwise the first. */
+  /** The world whose time and rate are shown: the displayed world, or the first one of the grid. */
   get statusWorld() {
     return this.session.world ?? this.session.worlds.values().next().value ?? null;
   }
@@ -67,8 +67,9 @@ export class TimeBar {
   }
 
   /**
-   * @param {string} type
-   * @param {Record<string, any>} fields
+   * @template {"pause" | "resume" | "step" | "set_rate"} Type
+   * @param {Type} type
+   * @param {import("../protocol.js").Requests[Type]["fields"]} fields
    */
   forEachWorld(type, fields) {
     const { session } = this;
@@ -121,9 +122,7 @@ export class TimeBar {
       this.pauseButton.dataset.action = label;
       this.pauseButton.title = `${label} (Space)`;
       this.pauseButton.setAttribute("aria-label", label);
-      const text = document.createElement("span");
-      text.className = "text";
-      text.textContent = label;
+      const text = element("span", { class: "text" }, label);
       this.pauseButton.replaceChildren(icon(isPaused ? "play" : "pause"), text);
     }
     const rate = status?.rate;

@@ -25,7 +25,7 @@ export function createToolbar(session, stage, tools, actions) {
   tools.on("hint", (text) => setText(byId("hint"), text));
   updateTools();
 
-  const follow = /** @type {HTMLButtonElement} */ (byId("follow"));
+  const follow = byId("follow", HTMLButtonElement);
   const updateFollow = () => {
     follow.disabled = session.selected === null && stage.followed === null;
     setPressed(follow, stage.followed !== null);
@@ -42,7 +42,7 @@ export function createToolbar(session, stage, tools, actions) {
 
   const updateWorld = () => {
     for (const id of [...Object.keys(names), "spawn", "fit", "zoom-in", "zoom-out"]) {
-      /** @type {HTMLButtonElement} */ (byId(id)).disabled = session.world === null;
+      byId(id, HTMLButtonElement).disabled = session.world === null;
     }
   };
   session.on("current", updateWorld);
@@ -65,7 +65,7 @@ export function createToolbar(session, stage, tools, actions) {
 
   const updateReadOnly = () => {
     for (const part of document.querySelectorAll("[data-writes]:not(#drive)")) {
-      /** @type {HTMLElement} */ (part).hidden = session.readOnly;
+      part.toggleAttribute("hidden", session.readOnly);
     }
   };
   session.on("hello", updateReadOnly);

@@ -2,9 +2,9 @@ import { Camera } from "../camera.js";
 import { createNearestTexture, createProgram } from "./gl.js";
 import { copyFragment, copyVertex } from "./shaders.js";
 
-/** Space around the view in the kept picture, by which the view moves without a new one [CSS pixels]. */
+/** Width of the part of the picture around the view, within which the view moves [CSS pixels]. */
 const MARGIN = 128;
-/** Displacement of the picture that is not worth a new one [device pixels]. */
+/** Displacement of the view up to which the picture is not drawn again [device pixels]. */
 const EXACT = 0.02;
 
 /**
@@ -12,9 +12,9 @@ const EXACT = 0.02;
  */
 
 /**
- * Keeps a picture of what does not move in the world, somewhat larger than the view. While the view
- * rests, or moves without being scaled or turned, a frame copies the picture, which takes the same
- * time for any number of edges.
+ * Keeps a picture of everything that does not move in the world, somewhat larger than the view.
+ * While the view is not scaled or turned, a frame copies the picture, which takes the same time for
+ * any number of edges.
  */
 export class Backdrop {
   /** @param {WebGL2RenderingContext} gl */
@@ -25,25 +25,25 @@ export class Backdrop {
     this.program = createProgram(gl, copyVertex, copyFragment, []);
     this.width = 0;
     this.height = 0;
-    /** View of the picture, and what else it depends on. */
+    /** View of the picture, and the key of everything else that the picture depends on. */
     this.camera = new Camera();
     this.state = "";
-    /** The same of the last frame. */
+    /** View and key of the last frame. */
     this.seenState = "";
     this.seenX = NaN;
     this.seenY = NaN;
   }
 
-  /** Discards the picture, of which the key is used for something else. */
+  /** Discards the picture, so that the next frame draws a new one. */
   forget() {
     this.state = this.seenState = "";
   }
 
   /**
-   * Draws what does not move.
+   * Draws everything that does not move.
    *
    * @param {Viewport} viewport
-   * @param {string} key  of everything except the view that the picture depends on
+   * @param {string} key  changes with everything that the picture depends on, except the view
    * @param {(viewport: Viewport) => void} paint  draws the picture
    * @returns {Viewport} the viewport for the rest of the frame, which is displaced by less than a
    *   pixel while the view moves
@@ -55,7 +55,7 @@ export class Backdrop {
     this.seenX = camera.x;
     this.seenY = camera.y;
     if (state !== this.seenState) {
-      // If it changes with each frame, a picture would not be used again.
+      // A picture whose key changes with each frame would not be used again.
       this.seenState = state;
       paint(viewport);
       return viewport;

@@ -7,8 +7,8 @@ import {
   bodyDiscsVertex,
   bodyEdgesVertex,
   bodyFillVertex,
-  colorFragment,
   coloredEdgesFragment,
+  colorFragment,
 } from "./shaders.js";
 import { lineWeight, useProgram } from "./view.js";
 

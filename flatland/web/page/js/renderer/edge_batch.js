@@ -9,7 +9,7 @@ const STRIDE = 4 * EDGE_WORDS;
 const QUAD_WORDS = 4 * EDGE_WORDS;
 
 /**
- * Returns the program that draws edges with colours of their own.
+ * Returns the program that draws edges of which each has its own colour.
  *
  * @param {WebGL2RenderingContext} gl
  */

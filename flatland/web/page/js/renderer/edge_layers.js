@@ -7,7 +7,7 @@ import { lineWeight, useProgram } from "./view.js";
 
 /** Width of the edges of a layer [CSS pixels]. */
 const WIDTH = 1.6;
-/** Number of edges from which a view from far away draws lines of one pixel. */
+/** Number of edges above which a view from far away draws lines of one pixel. */
 const MANY_EDGES = 20_000;
 
 /**

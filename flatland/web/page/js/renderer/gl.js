@@ -10,7 +10,7 @@
  * Returns the WebGL 2 context of a canvas.
  *
  * @param {HTMLCanvasElement} canvas
- * @returns {WebGL2RenderingContext | null} null if the browser does not support it
+ * @returns {WebGL2RenderingContext | null} null if the browser does not support WebGL 2
  */
 export function createContext(canvas) {
   return canvas.getContext("webgl2", {
@@ -39,7 +39,8 @@ export function createProgram(gl, vertex, fragment, attributes) {
     [gl.FRAGMENT_SHADER, fragment],
   ];
   for (const [kind, source] of sources) {
-    const shader = /** @type {WebGLShader} */ (gl.createShader(kind));
+    const shader = gl.createShader(kind);
+    if (!shader) throw new Error("the browser cannot create a shader");
     gl.shaderSource(shader, source);
     gl.compileShader(shader);
     gl.attachShader(handle, shader);
@@ -47,7 +48,7 @@ export function createProgram(gl, vertex, fragment, attributes) {
       throw new Error(`shader: ${gl.getShaderInfoLog(shader)}`);
     }
   }
-  attributes.forEach((name, location) => gl.bindAttribLocation(handle, location, name));
+  for (const [location, name] of attributes.entries()) gl.bindAttribLocation(handle, location, name);
   gl.linkProgram(handle);
   if (!gl.getProgramParameter(handle, gl.LINK_STATUS) && !gl.isContextLost()) {
     throw new Error(`shader program: ${gl.getProgramInfoLog(handle)}`);

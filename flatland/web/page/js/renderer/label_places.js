@@ -1,4 +1,4 @@
-/** Height of a line of text, with the space to the next [CSS pixels]. */
+/** Height of a line of text, including the space to the next line [CSS pixels]. */
 export const LINE_HEIGHT = 15;
 
 /** Finds places for labels that do not cover each other. */

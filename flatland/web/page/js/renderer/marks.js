@@ -13,7 +13,7 @@ import { readable } from "./palette.js";
 
 /** Smallest distance of lines of the grid [CSS pixels]. */
 const GRID_SPACING = 28;
-/** Number of lines among which the name of a frame finds a free one. */
+/** Number of lines that are tried for the name of a frame. */
 const FRAME_LINES = 8;
 
 /**
@@ -104,7 +104,7 @@ export function resolveFrames(frames) {
     const known = resolved.get(name);
     if (known) return known;
     const frame = byChild.get(name);
-    // A loop of parents ends at the number of frames.
+    // Limited to the number of frames, in case the parents form a loop.
     /** @type {import("../geometry.js").Pose} */
     const pose =
       !frame || depth > frames.length
@@ -144,7 +144,7 @@ export function addFrames(batch, labels, places, { camera }, world, palette) {
 }
 
 /**
- * Adds a label below a point unless it would cover others.
+ * Adds a label below a point unless the label would cover others.
  *
  * @param {import("./text_labels.js").TextLabels} labels
  * @param {LabelPlaces} places
@@ -181,7 +181,7 @@ export function addNames(labels, places, { camera }, world) {
 }
 
 /**
- * Adds crosses for models without shapes, which would be invisible.
+ * Adds crosses for models without shapes, which would otherwise be invisible.
  *
  * @param {EdgeBatch} batch
  * @param {Viewport} viewport

@@ -2,7 +2,7 @@ import { composePoses, inversePoint, transformPoint } from "../geometry.js";
 import { shapeEdges } from "../shapes.js";
 
 /**
- * What tools draw of models that they move or place.
+ * Outlines of models that a tool moves or places.
  *
  * @typedef {import("./edge_batch.js").EdgeBatch} EdgeBatch
  */

@@ -67,10 +67,9 @@ export function readable(color, palette) {
   const own = luminance(color);
   const ground = luminance(palette.background);
   const alpha = Math.max(color[3] ?? 1, 0.35);
-  const missing = CONTRAST - Math.abs(own - ground);
-  if (missing <= 0) return [color[0], color[1], color[2], alpha];
+  if (Math.abs(own - ground) >= CONTRAST) return [color[0], color[1], color[2], alpha];
   if (palette.dark) {
-    const share = Math.min(1, missing / Math.max(1 - own, 1e-6) + 0.05);
+    const share = Math.min(1, (ground + CONTRAST - own) / Math.max(1 - own, 1e-6) + 0.05);
     return [mix(color[0], 1, share), mix(color[1], 1, share), mix(color[2], 1, share), alpha];
   }
   const scale = Math.max(0, (ground - CONTRAST) / Math.max(own, 1e-6));

@@ -7,7 +7,7 @@ import { addAttributes } from "./gl.js";
  * @property {number} count
  */
 
-/** Points in the world frame with few different colours, which are replaced as a whole. */
+/** Points in the world frame with few different colours; replaced all at once. */
 export class PointBuffer {
   /** @param {WebGL2RenderingContext} gl */
   constructor(gl) {
@@ -46,7 +46,7 @@ export class PointBuffer {
   }
 
   /**
-   * Ends a span, which contains the points since the end of the last one.
+   * Ends a span, which contains all points since the end of the previous span.
    *
    * @param {number} color  index in the series of the palette
    */

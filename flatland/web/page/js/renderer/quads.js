@@ -4,8 +4,9 @@ const INDICES = [0, 1, 2, 2, 1, 3];
 const INITIAL_CAPACITY = 1024;
 
 /**
- * Draws buffers of quads; the four vertices of a quad have the same record of data, and the shader
- * tells them apart by their number. Unlike instances of four vertices, this is fast on all drivers.
+ * Draws buffers of quads. The four vertices of a quad have the same record of data; the shader
+ * distinguishes the vertices by their index. Unlike instances of four vertices, this is fast on all
+ * drivers.
  */
 export class Quads {
   /** @param {WebGL2RenderingContext} gl */

@@ -1,6 +1,6 @@
 import { Backdrop } from "./backdrop.js";
 import { BodyPrograms } from "./body_shapes.js";
-import { EdgeBatch, createColoredEdgeProgram } from "./edge_batch.js";
+import { createColoredEdgeProgram, EdgeBatch } from "./edge_batch.js";
 import { EdgeProgram } from "./edge_layers.js";
 import { LabelPlaces } from "./label_places.js";
 import { addFrames, addGrid, addJoints, addNames, addShapelessModels } from "./marks.js";
@@ -14,11 +14,11 @@ import { WorldGraphics } from "./world_graphics.js";
  * @typedef {import("../world_state.js").WorldState} WorldState
  * @typedef {import("./view.js").Viewport} Viewport
  *
- * Draws what tools display in the enlarged world: selection, handles, outlines, measurements.
+ * Draws the marks of tools in the enlarged world: selection, handles, outlines, measurements.
  * @typedef {(batch: EdgeBatch, labels: TextLabels, viewport: Viewport,
  *   palette: import("./palette.js").Palette) => void} Overlay
  *
- * @typedef {object} Scene
+ * @typedef {object} Frame
  * @property {{world: WorldState, viewport: Viewport}[]} views
  * @property {Record<import("../session.js").Display, boolean>} displays
  * @property {import("../world_state.js").Model | null} selected
@@ -73,20 +73,20 @@ export class Renderer {
     }
   }
 
-  /** @param {Scene} scene */
-  draw(scene) {
+  /** @param {Frame} frame */
+  draw(frame) {
     const { gl, palette } = this;
     gl.disable(gl.SCISSOR_TEST);
-    if (scene.isGrid) {
+    if (frame.isGrid) {
       gl.clearColor(...palette.gaps, 1);
       gl.clear(gl.COLOR_BUFFER_BIT);
       gl.enable(gl.SCISSOR_TEST);
     }
-    for (const { world, viewport } of scene.views) {
+    for (const { world, viewport } of frame.views) {
       const { left, bottom, width, height } = viewport;
       gl.viewport(left, bottom, width, height);
       gl.scissor(left, bottom, width, height);
-      this.drawWorld(world, viewport, scene);
+      this.drawWorld(world, viewport, frame);
     }
     gl.bindVertexArray(null);
   }
@@ -94,16 +94,19 @@ export class Renderer {
   /**
    * @param {WorldState} world
    * @param {Viewport} viewport
-   * @param {Scene} scene
+   * @param {Frame} frame
    */
-  drawWorld(world, viewport, scene) {
+  drawWorld(world, viewport, frame) {
     const { batch, labels, palette } = this;
-    const { displays, selected, overlay, isGrid } = scene;
+    const { displays, selected, overlay, isGrid } = frame;
     let graphics = this.graphics.get(world);
-    if (!graphics) this.graphics.set(world, (graphics = new WorldGraphics(this.gl, this.programs)));
+    if (!graphics) {
+      graphics = new WorldGraphics(this.gl, this.programs);
+      this.graphics.set(world, graphics);
+    }
     graphics.update(world, palette);
     labels.begin(viewport.ratio);
-    viewport = this.drawGround(world, graphics.layers, viewport, scene);
+    viewport = this.drawGround(world, graphics.layers, viewport, frame);
     if (displays.scans) graphics.scans.drawAreas(viewport, world, palette, selected);
     if (displays.trails) graphics.trails.draw(viewport, world.trails);
     if (displays.models) {
@@ -127,7 +130,7 @@ export class Renderer {
    * @param {WorldState} world
    * @param {import("./edge_layers.js").EdgeLayers} layers
    * @param {Viewport} viewport
-   * @param {Scene} scene
+   * @param {Frame} frame
    * @returns {Viewport} the viewport for the rest of the world
    */
   drawGround(world, layers, viewport, { displays, isGrid }) {

@@ -5,9 +5,9 @@ import { lineWeight, useProgram } from "./view.js";
 
 /** Diameter of a point [CSS pixels]. */
 const POINT_SIZE = 3.2;
-/** Distance of the drawn points of a scan, as a share of their diameter; they cover those between. */
+/** Least distance of the drawn points of a scan, as a share of their diameter. */
 const SPACING = 0.35;
-/** Change of the scale of the view from which the points to draw are selected again. */
+/** Change of the scale of the view after which the points to draw are selected again. */
 const SCALE_STEP = 1.25;
 const AREA_OPACITY = 0.09;
 /** Number of lasers up to which the areas of all scans are drawn, not only of the selected model. */
@@ -33,8 +33,8 @@ export class ScanPrograms {
 }
 
 /**
- * The points and the areas of the latest scans of a world. They are computed when scans arrive, which
- * is less often than they are drawn.
+ * The points and the areas of the latest scans of a world. They are computed when scans arrive,
+ * which is less frequent than drawing.
  */
 export class ScanClouds {
   /**
@@ -134,7 +134,7 @@ export class ScanClouds {
   }
 
   /**
-   * Sets the areas that the lasers have seen, as fans around the lasers.
+   * Sets the areas that the beams cover, as fans around the lasers.
    *
    * @param {LaserState[]} lasers
    * @param {Model | null} selected
@@ -156,7 +156,7 @@ export class ScanClouds {
   }
 
   /**
-   * Returns where the beams of a scan end: at a hit, or at the largest range.
+   * Returns the end points of the beams of a scan: at a hit, or at the largest range.
    *
    * @param {LaserState} laser
    * @param {Float32Array} ranges
@@ -207,7 +207,7 @@ export class ScanClouds {
 }
 
 /**
- * Returns whether a beam has hit something; without a hit, its range is the largest one, inf or NaN.
+ * Returns whether a beam has hit something. Otherwise, its range is the largest range, inf or NaN.
  *
  * @param {number} range  [m]
  * @param {number} maximum  largest range of the laser [m]

@@ -139,7 +139,7 @@ out vec4 color;
 void main() {
   float d = length(v_local) - v_radius;
   float line = clamp(0.5 * u_width - abs(d) + 0.5, 0.0, 1.0);
-  // A disc of a few pixels is opaque, to be seen from far away.
+  // A disc of a few pixels is opaque, so that it is visible from far away.
   float fill = clamp(0.5 - d, 0.0, 1.0) * mix(1.0, u_opacity, clamp((v_radius - 2.0) / 6.0, 0.0, 1.0));
   color = v_color * max(line, fill);
 }`;

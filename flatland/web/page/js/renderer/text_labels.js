@@ -1,3 +1,4 @@
+import { context2d } from "../dom.js";
 import { addAttributes, createNearestTexture, createProgram } from "./gl.js";
 import { forCorners } from "./quads.js";
 import { textFragment, textVertex } from "./shaders.js";
@@ -34,8 +35,7 @@ export class TextLabels {
     quads.attach(this.array);
     const canvas = document.createElement("canvas");
     canvas.width = canvas.height = ATLAS_SIZE;
-    const options = { willReadFrequently: true };
-    this.context = /** @type {CanvasRenderingContext2D} */ (canvas.getContext("2d", options));
+    this.context = context2d(canvas, { willReadFrequently: true });
     /** @type {Map<string, Sprite>} */
     this.sprites = new Map();
     this.ratio = 0;
@@ -72,7 +72,7 @@ export class TextLabels {
    * Returns the picture of a text.
    *
    * @param {string} text
-   * @returns {Sprite | null} null if the atlas is full; it is emptied before the next frame
+   * @returns {Sprite | null} null if the atlas is full; the atlas is emptied before the next frame
    */
   sprite(text) {
     const known = this.sprites.get(text);

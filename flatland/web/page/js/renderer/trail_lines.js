@@ -1,5 +1,5 @@
 import { TRAIL_CAPACITY, TRAIL_LIFETIME } from "../trails.js";
-import { EDGE_WORDS, createColoredEdgeArray, packColor } from "./edge_batch.js";
+import { createColoredEdgeArray, EDGE_WORDS, packColor } from "./edge_batch.js";
 import { forCorners } from "./quads.js";
 import { useProgram } from "./view.js";
 

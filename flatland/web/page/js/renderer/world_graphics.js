@@ -26,7 +26,7 @@ export class WorldGraphics {
   }
 
   /**
-   * Uploads what has changed.
+   * Uploads everything that has changed.
    *
    * @param {import("../world_state.js").WorldState} world
    * @param {import("./palette.js").Palette} palette

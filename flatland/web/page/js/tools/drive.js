@@ -1,4 +1,5 @@
 import { Emitter } from "../events.js";
+import { errorText } from "../session.js";
 
 /** Time between two commands while a robot is driven [ms]. */
 const COMMAND_PERIOD = 50;
@@ -18,8 +19,8 @@ const KEYS = new Map([
 ]);
 
 /**
- * Drives the selected robot while keys or the stick are held. A release stops it, as does the loss
- * of the focus, a hidden page and another selection.
+ * Drives the selected robot while keys or the stick are held. The robot stops on release, and when
+ * the page loses the focus, is hidden, or another model is selected.
  *
  * @extends {Emitter<{active: boolean}>}
  */
@@ -55,7 +56,7 @@ export class Drive extends Emitter {
   }
 
   /**
-   * Begins to drive by a key.
+   * Starts to drive by a key.
    *
    * @param {string} code  of a keyboard event
    * @returns {boolean} whether the key drives
@@ -90,10 +91,12 @@ export class Drive extends Emitter {
     this.update();
   }
 
-  /** Returns the velocity that keys and stick request: forward, left, turn. */
+  /** Returns the velocity that the keys and the stick request: forward, left, turn. */
   velocity() {
     const sum = [this.stick[0], 0, this.stick[1]];
-    for (const key of this.keys) KEYS.get(key)?.forEach((part, i) => (sum[i] += part));
+    for (const key of this.keys) {
+      for (const [i, part] of (KEYS.get(key) ?? []).entries()) sum[i] += part;
+    }
     const [forward, left, turn] = sum.map((part) => Math.max(-1, Math.min(1, part)));
     return [forward * this.limits.speed, left * this.limits.speed, turn * this.limits.turn];
   }
@@ -122,12 +125,14 @@ export class Drive extends Emitter {
    * @param {import("../world_state.js").Model} model
    * @param {number[]} velocity
    */
-  command(model, [vx, vy, angular]) {
-    const fields = { model: model.id, command: model.commands[0], linear: [vx, vy], angular };
-    this.session.request("drive", fields).catch((error) => {
+  async command(model, [vx, vy, angular]) {
+    try {
+      const { id, commands } = model;
+      await this.session.request("drive", { model: id, command: commands[0], linear: [vx, vy], angular });
+    } catch (error) {
       if (this.model !== model) return;
-      this.session.notify("error", error.message);
+      this.session.notify("error", errorText(error));
       this.stop();
-    });
+    }
   }
 }

@@ -8,7 +8,7 @@ const HOLD_PERIOD = 1000;
  * @typedef {import("../world_state.js").Model} Model
  */
 
-/** A model that is being moved or turned. The world is paused meanwhile. */
+/** The drag of a model, which moves or turns the model. The world is paused during a drag. */
 export class ModelDrag {
   /**
    * @param {import("../session.js").Session} session
@@ -50,7 +50,7 @@ export class ModelDrag {
     await this.release();
   }
 
-  /** Leaves the model where it is. */
+  /** Ends the drag without moving the model. */
   async cancel() {
     window.clearInterval(this.timer);
     await this.held;

@@ -3,7 +3,7 @@
  * @typedef {import("./tool_box.js").ToolBox} ToolBox
  */
 
-/** Movement from which a press is not a click any more [CSS pixels]. */
+/** Movement above which a press is not a click [CSS pixels]. */
 const CLICK_DISTANCE = 4;
 const TOUCH_CLICK_DISTANCE = 9;
 const WHEEL_SPEED = 0.0016;
@@ -26,7 +26,7 @@ export class PointerInput {
     /** Pressed pointers by id.
      * @type {Map<number, {px: number, py: number}>} */
     this.pointers = new Map();
-    /** What the movement of a single pointer does.
+    /** Effect of the movement of a single pointer.
      * @type {"tool" | "pan" | "turn" | null} */
     this.action = null;
     this.moved = false;
@@ -119,7 +119,7 @@ export class PointerInput {
   /**
    * Zooms, moves and turns the view by two fingers.
    *
-   * @param {number} id  of the finger that moves
+   * @param {number} id  id of the finger that moves
    * @param {Spot} spot
    */
   pinch(id, spot) {
@@ -168,7 +168,7 @@ export class PointerInput {
     const speed = event.ctrlKey ? 6 * WHEEL_SPEED : WHEEL_SPEED;
     const delta = Math.max(-240, Math.min(240, event.deltaY * lines));
     const { camera } = this.stage;
-    // While the view follows a model, it stays in the centre.
+    // While the view follows a model, the model stays in the centre.
     const isFollowing = this.stage.followed !== null;
     this.stage.moveView((view) => {
       view.zoomAt(

@@ -12,10 +12,10 @@ import { ModelDrag } from "./model_drag.js";
 /** Distance up to which a click hits a model or a handle [CSS pixels]. */
 const TOLERANCE = 6;
 const TOUCH_TOLERANCE = 16;
-/** Distance of the ring around a model from its shapes [CSS pixels]. */
+/** Distance between the ring around a model and the shapes of the model [CSS pixels]. */
 const RING_DISTANCE = 14;
 const LEAST_RING = 26;
-/** Movement from which a click becomes a drag [CSS pixels]. */
+/** Movement above which a click becomes a drag [CSS pixels]. */
 const DRAG_DISTANCE = 4;
 
 /**
@@ -80,7 +80,7 @@ export class SelectTool {
       return true;
     }
     if (!under) return false;
-    // With a finger, only the selected model moves: another one may just be in the way.
+    // A finger moves only the selected model, so that other models do not move by mistake.
     const canMove = !readOnly && (!spot.isTouch || under === selected);
     if (!canMove) return false;
     this.pressed = { model: under, mode: "move", spot };
@@ -115,7 +115,8 @@ export class SelectTool {
     if (drag) {
       this.settling = drag;
       drag.drop().finally(() => {
-        this.settling = null;
+        // Another model may have been dropped since.
+        if (this.settling === drag) this.settling = null;
         this.stage.invalidate();
       });
     } else if (!moved) this.session.select(this.modelUnder(spot)?.name ?? null);

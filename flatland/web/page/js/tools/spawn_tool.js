@@ -10,17 +10,17 @@ import { addArrow, addOutline } from "../renderer/outlines.js";
  * @typedef {object} Plan  what is spawned
  * @property {string} file
  * @property {() => string} nextName  returns a name that is not in use
- * @property {string} namespace  empty for the name
+ * @property {string} namespace  empty to use the name
  * @property {PreviewBody[]} bodies
  */
 
-/** Movement from which a click becomes a drag [CSS pixels]. */
+/** Movement above which a click becomes a drag [CSS pixels]. */
 const DRAG_DISTANCE = 6;
 /** Time of a double click [ms]. */
 const DOUBLE_CLICK = 400;
 
 /**
- * Places a new model: its outline follows the pointer, first its position, then its heading.
+ * Places a new model. The pointer sets first the position of the outline, then the heading.
  *
  * @implements {Tool}
  * @typedef {import("./tool_box.js").Tool} Tool
@@ -53,7 +53,7 @@ export class SpawnTool {
   }
 
   /**
-   * Shows the outline in the centre of the view, where it is without a mouse.
+   * Shows the outline in the centre of the view, for users without a mouse.
    *
    * @param {Plan} plan
    */
@@ -157,7 +157,7 @@ export class SpawnTool {
  * @param {import("../session.js").Session} session
  * @param {string} file
  * @param {string} name
- * @param {string} namespace  empty for the name
+ * @param {string} namespace  empty to use the name
  * @param {Pose} pose
  */
 export async function spawnModel(session, file, name, namespace, pose) {

@@ -1,8 +1,8 @@
-import { byId } from "../dom.js";
+import { byId, firstChild } from "../dom.js";
 import { fixed } from "../format.js";
 
 /**
- * Connects the on-screen stick with the drive, and shows it while a robot is selected.
+ * Connects the stick on the screen with the drive, and shows the stick while a robot is selected.
  *
  * @param {import("../session.js").Session} session
  * @param {import("./drive.js").Drive} drive
@@ -10,7 +10,7 @@ import { fixed } from "../format.js";
 export function createStick(session, drive) {
   const box = byId("drive");
   const stick = byId("stick");
-  const knob = /** @type {HTMLElement} */ (stick.firstElementChild);
+  const knob = firstChild(stick);
   /** @type {number | null} */
   let pointer = null;
 
@@ -55,6 +55,8 @@ export function createStick(session, drive) {
   for (const name of /** @type {const} */ (["pointerup", "pointercancel", "lostpointercapture"])) {
     stick.addEventListener(name, release);
   }
+  // A finger that rests on the stick opens no menu, which would end the drive.
+  stick.addEventListener("contextmenu", (event) => event.preventDefault());
   drive.on("active", (active) => {
     if (active) return;
     pointer = null;
@@ -65,9 +67,9 @@ export function createStick(session, drive) {
     ["drive-speed", "speed", "m/s"],
     ["drive-turn", "turn", "rad/s"],
   ])) {
-    const slider = byId(id);
+    const slider = byId(id, HTMLInputElement);
     const show = () => {
-      drive.limits[key] = Number(/** @type {HTMLInputElement} */ (slider).value);
+      drive.limits[key] = Number(slider.value);
       byId(`${id}-text`).textContent = `${fixed(drive.limits[key], 1)} ${unit}`;
     };
     slider.addEventListener("input", show);

@@ -11,13 +11,13 @@ import { Emitter } from "../events.js";
  * @property {boolean} isTouch
  *
  * @typedef {object} Tool
- * @property {string} hint  what to do next; empty for nothing
- * @property {(spot: Spot) => boolean} down  returns whether the tool takes the drag; otherwise the
- *   drag moves the view
+ * @property {string} hint  next action of the user; may be empty
+ * @property {(spot: Spot) => boolean} down  returns whether the tool handles the drag; otherwise
+ *   the drag moves the view
  * @property {(spot: Spot) => void} drag
- * @property {(spot: Spot, moved: boolean) => void} up  also called without movement: a click
+ * @property {(spot: Spot, moved: boolean) => void} up  also called for a click
  * @property {(spot: Spot) => string} hover  returns the name of a cursor
- * @property {() => boolean} cancel  ends what has begun; returns whether there was anything
+ * @property {() => boolean} cancel  cancels the current action; returns whether there was one
  * @property {() => void} leave  called when another tool becomes active
  * @property {import("../renderer/renderer.js").Overlay} draw
  *
@@ -53,7 +53,7 @@ export class ToolBox extends Emitter {
     this.updateHint();
   }
 
-  /** Ends what the active tool has begun, otherwise returns to the selection. */
+  /** Cancels the action of the active tool; without an action, activates the selection tool. */
   cancel() {
     if (!this.active.cancel()) this.use("select");
     this.updateHint();

@@ -1,0 +1,172 @@
+"""The worlds of an environment, with their agents, episodes and pictures."""
+
+from __future__ import annotations
+
+import importlib
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import ExitStack
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+import numpy.typing as npt
+from gymnasium.error import ClosedEnvironmentError
+
+from flatland.drawing.render import MATPLOTLIB_LOCK, make_figure
+from flatland.gym.episodes import Episodes
+from flatland.gym.live_view import EpisodeView, check_live_view
+
+if TYPE_CHECKING:
+    from flatland.geometry import Vector2
+    from flatland.gym.agents import Agent
+    from flatland.gym.settings import Settings
+    from flatland.world import World
+
+Image = npt.NDArray[np.uint8]
+
+RENDER_MODES: Final = ("rgb_array", "human")
+_SIZE: Final = (800, 600)  # pixels
+_DPI: Final = 80.0
+
+
+class Stage:
+    """The part that all environments share.
+
+    Attributes:
+        worlds: Equal worlds; each contains the same number of agents.
+        episodes: The episodes of the agents of all worlds, in this order.
+        metadata: What Gymnasium and PettingZoo read from an environment.
+    """
+
+    def __init__(
+        self,
+        settings: Settings,
+        names: Sequence[str],
+        find_agents: Callable[[World], list[Agent]],
+        *,
+        render_mode: str | None,
+        web_port: int | None,
+        metadata: Mapping[str, Any],
+        num_threads: int = 1,
+    ) -> None:
+        """Loads the world and copies it.
+
+        Args:
+            settings: The arguments of the environment.
+            names: Name of each world for users.
+            find_agents: Returns the agents of a world.
+            render_mode: `rgb_array`, `human` or None.
+            web_port: Port of the viewer of the render mode `human`, see `FlatlandEnv`.
+            metadata: Metadata of the class of the environment.
+            num_threads: Number of threads that step and scan, 0 for one per core.
+
+        Raises:
+            DependencyNotInstalled: `human` requires aiohttp.
+            FlatlandError: A file is missing or invalid, or a model cannot be an agent; no world is
+                left open.
+            ValueError: An argument is out of range.
+        """
+        if render_mode is not None and render_mode not in RENDER_MODES:
+            raise ValueError(
+                f"render_mode must be None or one of {', '.join(RENDER_MODES)}, got {render_mode!r}"
+            )
+        if render_mode == "human":
+            check_live_view(web_port)
+        self.metadata = {**metadata, "render_fps": round(1 / settings.dt) or 1}
+        self._render_mode = render_mode
+        with ExitStack() as undo:
+            first = undo.enter_context(settings.load())
+            self.worlds = [first]
+            self.worlds += [undo.enter_context(first.clone()) for _ in names[1:]]
+            agents = [agent for world in self.worlds for agent in find_agents(world)]
+            self.episodes = Episodes(agents, settings, num_threads)
+            self._snapshots = [world.snapshot() for world in self.worlds]
+            self._view = EpisodeView(self.worlds, names, settings.dt, web_port)
+            undo.pop_all()
+
+    @property
+    def goals(self) -> list[list[Vector2]]:
+        """The goals in each world, in the world frame [m]."""
+        goals = [(x, y) for x, y in self.episodes.situation.goals.tolist()]
+        count = len(goals) // len(self.worlds)
+        return [goals[start : start + count] for start in range(0, len(goals), count)]
+
+    def restore(self, number: int, rng: np.random.Generator) -> None:
+        """Returns a world to its state before any episode, with new random numbers of all plugins.
+
+        Args:
+            number: Index of the world.
+            rng: Source of the seeds; the noise is a function of its state.
+        """
+        world = self.worlds[number]
+        world.restore(self._snapshots[number])
+        for model in world.models:
+            for plugin in model.plugins:
+                plugin.reseed(rng)
+        for world_plugin in world.plugins:
+            world_plugin.reseed(rng)
+
+    def render(self) -> list[Image] | None:
+        """Returns an image of each world for `rgb_array`; for `human`, shows all in the browser.
+
+        Raises:
+            ClosedEnvironmentError: The environment is closed.
+            FlatlandError: The viewer cannot listen on its port, or matplotlib is missing.
+        """
+        self.check_open()
+        radius = self.episodes.task.goal_radius
+        if self._render_mode == "rgb_array":
+            pairs = zip(self.worlds, self.goals, strict=True)
+            return [_draw(world, goals, radius) for world, goals in pairs]
+        if self._render_mode == "human":
+            self._view.show(self.goals, radius)
+        return None
+
+    def check_open(self) -> None:
+        """Checks that the environment is open.
+
+        Raises:
+            ClosedEnvironmentError: The environment is closed.
+        """
+        if self.worlds[0].closed:
+            raise ClosedEnvironmentError("the environment is closed")
+
+    def image(self) -> Image | None:
+        """Returns what `render` of an environment with one world returns; see `render`."""
+        images = self.render()
+        return None if images is None else images[0]
+
+    def show(self) -> None:
+        """Shows the worlds in the browser, in the render mode `human`."""
+        if self._render_mode == "human":
+            self.render()
+
+    def close(self) -> None:
+        """Closes all worlds and their view; further calls have no effect."""
+        with ExitStack() as closing:
+            for world in reversed(self.worlds):
+                closing.callback(world.close)
+            self._view.close()
+
+
+def _draw(world: World, goals: Iterable[Vector2], radius: float) -> Image:
+    """Draws a world with goals.
+
+    Args:
+        world: The world.
+        goals: Goals in the world frame [m].
+        radius: Distance at which an agent has arrived [m].
+
+    Returns:
+        RGB image, top row first, shape (height, width, 3).
+
+    Raises:
+        FlatlandError: matplotlib is missing.
+    """
+    figure = make_figure(world, size=_SIZE, dpi=_DPI)
+    patches = importlib.import_module("matplotlib.patches")
+    with MATPLOTLIB_LOCK:
+        for goal in goals:
+            figure.axes[0].add_patch(patches.Circle(goal, radius, color="tab:green", alpha=0.6))
+        figure.canvas.draw()
+        pixels = np.asarray(figure.canvas.buffer_rgba())
+    return np.ascontiguousarray(pixels[:, :, :3])

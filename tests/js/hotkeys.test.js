@@ -1,0 +1,145 @@
+import assert from "node:assert/strict";
+import { test } from "node:test";
+import { Hotkeys } from "../../flatland/web/page/js/hotkeys.js";
+import { Drive } from "../../flatland/web/page/js/tools/drive.js";
+import { MeasureTool } from "../../flatland/web/page/js/tools/measure_tool.js";
+import { PanTool } from "../../flatland/web/page/js/tools/pan_tool.js";
+import { SelectTool } from "../../flatland/web/page/js/tools/select_tool.js";
+import { SpawnTool } from "../../flatland/web/page/js/tools/spawn_tool.js";
+import { ToolBox } from "../../flatland/web/page/js/tools/tool_box.js";
+import { dispatch, openPage } from "./fake_page.js";
+import { createStage, showRoom } from "./fake_server.js";
+
+const ACTIONS = [
+  "togglePause",
+  "step",
+  "openSpawn",
+  "deleteSelected",
+  "toggleFollow",
+  "togglePlots",
+  "showAll",
+  "openHelp",
+];
+
+function open(options) {
+  const elements = openPage();
+  const { connection, session } = showRoom(options);
+  const stage = createStage(session);
+  const tools = new ToolBox({
+    select: new SelectTool(session, stage),
+    pan: new PanTool(),
+    measure: new MeasureTool(stage),
+    spawn: new SpawnTool(session, stage),
+  });
+  const drive = new Drive(session);
+  const calls = [];
+  const actions = Object.fromEntries(ACTIONS.map((name) => [name, () => calls.push(name)]));
+  const hotkeys = new Hotkeys(stage, session, tools, drive, actions);
+  return { elements, connection, session, stage, tools, drive, calls, hotkeys };
+}
+
+/** Presses a key; the event is at an element of the page. */
+function press(key, fields = {}, target = document.body) {
+  const event = new Event("keydown", { cancelable: true });
+  for (const [name, value] of Object.entries({ key, code: "", target, ...fields })) {
+    Object.defineProperty(event, name, { value });
+  }
+  document.dispatchEvent(event);
+  return event.defaultPrevented;
+}
+
+test("keys run their actions", () => {
+  const { calls, tools } = open();
+  for (const key of [" ", ".", "n", "Delete", "T", "p", "g", "?"]) assert.ok(press(key), key);
+  assert.deepEqual(calls, [
+    "togglePause",
+    "step",
+    "openSpawn",
+    "deleteSelected",
+    "toggleFollow",
+    "togglePlots",
+    "showAll",
+    "openHelp",
+  ]);
+  press("m");
+  assert.equal(tools.name, "measure");
+  press("Escape");
+  assert.equal(tools.name, "select");
+  assert.ok(!press("x"));
+});
+
+test("a read-only page has no keys that change the world", () => {
+  const { calls } = open({ readOnly: true });
+  for (const key of [" ", ".", "n", "Delete", "Backspace"]) assert.ok(!press(key), key);
+  press("p");
+  assert.deepEqual(calls, ["togglePlots"]);
+});
+
+test("typed text, shortcuts of the browser and dialogs have no effect", () => {
+  const { calls, elements } = open();
+  press("n", { ctrlKey: true });
+  press("n", {}, elements["model-filter"]);
+  press(" ", {}, elements.pause);
+  elements["help-dialog"].showModal();
+  press("n");
+  assert.deepEqual(calls, []);
+  elements["help-dialog"].close();
+  press("n", {}, elements["toggle-names"]);
+  assert.deepEqual(calls, ["openSpawn"], "a check box takes no text");
+});
+
+test("a held key repeats only steps and movements of the view", () => {
+  const { calls, stage } = open();
+  press(".", { repeat: true });
+  press(" ", { repeat: true });
+  assert.deepEqual(calls, ["step"]);
+  press("ArrowRight", { repeat: true });
+  assert.ok(stage.camera.x > 0);
+});
+
+test("arrows and signs move, zoom and turn the view", () => {
+  const { stage } = open();
+  const { camera } = stage;
+  press("ArrowUp");
+  press("ArrowLeft");
+  assert.deepEqual(
+    [camera.x, camera.y].map((value) => value.toFixed(2)),
+    ["-2.40", "2.40"],
+  );
+  press("=");
+  assert.equal(camera.zoom, 25);
+  press("-");
+  assert.equal(camera.zoom, 20);
+  press("[");
+  assert.ok(camera.angle > 0);
+});
+
+test("keys drive the selected robot; with Shift, they move the view", () => {
+  const { session, stage, drive } = open();
+  session.select("robot");
+  assert.ok(press("ArrowUp", { code: "ArrowUp" }));
+  assert.deepEqual(drive.velocity(), [0.8, 0, 0]);
+  drive.stop();
+  press("ArrowUp", { code: "ArrowUp", shiftKey: true });
+  assert.deepEqual(drive.velocity(), [0, 0, 0]);
+  assert.ok(stage.camera.y > 0);
+});
+
+test("Enter clicks at the centre of the view", () => {
+  const { session, stage, tools } = open();
+  stage.moveView((camera) => Object.assign(camera, { x: 2.1, y: -2 }));
+  dispatch(stage.canvas, "keydown", { key: "Enter" });
+  assert.equal(session.selectedName, "crate");
+  tools.use("measure");
+  dispatch(stage.canvas, "keydown", { key: "Enter" });
+  press("ArrowRight");
+  assert.match(tools.active.hint, /^2.400 m/, "the centre acts as the pointer");
+});
+
+test("the help lists each key once", () => {
+  const { hotkeys, elements } = open();
+  hotkeys.createHelp();
+  const names = elements["help-content"].querySelectorAll("kbd").map((key) => key.textContent);
+  assert.ok(names.includes("Space") && names.includes("Esc"));
+  assert.equal(names.length, new Set(names).size);
+});

@@ -1,0 +1,57 @@
+import assert from "node:assert/strict";
+import { test } from "node:test";
+import { createConnectionBadge } from "../../../flatland/web/page/js/panels/connection_badge.js";
+import { openPage } from "../fake_page.js";
+import { showRoom, status } from "../fake_server.js";
+
+function open(isSupported = true) {
+  const elements = openPage();
+  const { connection, session } = showRoom();
+  const notices = [];
+  session.on("notice", ({ text }) => notices.push(text));
+  createConnectionBadge(session, { isSupported });
+  const change = (state) => {
+    connection.state = state;
+    connection.emit("state", state);
+  };
+  return { elements, connection, notices, change };
+}
+
+test("the state of the connection is displayed, and its loss is a notice", () => {
+  const { elements, notices, change } = open();
+  assert.equal(elements.connection.textContent, "connected");
+  change("reconnecting");
+  assert.deepEqual(
+    [elements.connection.textContent, elements.connection.dataset.state],
+    ["reconnecting", "reconnecting"],
+  );
+  change("connected");
+  assert.deepEqual(notices, ["Connection lost; reconnecting", "Connected again"]);
+});
+
+test("a simulator that does not answer is displayed", () => {
+  const { elements, connection } = open();
+  connection.emit("message", status({ stale: 3.7 }));
+  assert.equal(elements.connection.textContent, "connected, no answer for 3 s");
+  assert.equal(elements.connection.dataset.state, "stale");
+});
+
+test("the reasons of the server are notices, each once in a row", () => {
+  const { connection, notices } = open();
+  for (const reason of ["not JSON", "not JSON", "too many clients"]) connection.emit("reason", reason);
+  assert.deepEqual(notices, [
+    "The server closed the connection: not JSON",
+    "The server closed the connection: too many clients",
+  ]);
+});
+
+test("a message explains why there is no world", () => {
+  const { elements, connection, change } = open();
+  assert.ok(elements.message.hidden);
+  connection.emit("message", { type: "gone", world: 0 });
+  assert.equal(elements.message.textContent, "Waiting for a world…");
+  change("refused");
+  assert.match(elements.message.textContent, /token is missing or wrong/);
+  assert.equal(elements.connection.textContent, "access denied");
+  assert.match(open(false).elements.message.textContent, /WebGL 2/);
+});

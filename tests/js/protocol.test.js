@@ -1,0 +1,68 @@
+import assert from "node:assert/strict";
+import { test } from "node:test";
+import { decodeBinary } from "../../flatland/web/page/js/protocol.js";
+
+/** Returns a message: header, then numbers of 32 bits. */
+function message(kind, words, { version = 1, world = 3, time = 2.5 } = {}) {
+  const view = new DataView(new ArrayBuffer(16 + 4 * words.length));
+  view.setUint8(0, kind);
+  view.setUint8(1, version);
+  view.setUint16(2, world, true);
+  view.setUint32(4, 9, true);
+  view.setFloat64(8, time, true);
+  for (const [i, word] of words.entries()) {
+    if (typeof word === "number") view.setUint32(16 + 4 * i, word, true);
+    else view.setFloat32(16 + 4 * i, word[0], true);
+  }
+  return view.buffer;
+}
+
+/** Marks a number as a float. */
+const f = (...values) => values.map((value) => [value]);
+
+test("edges of a layer", () => {
+  const { edges, ...rest } = decodeBinary(message(1, [2, 1, ...f(1, 2, 3, 4)]));
+  assert.deepEqual(rest, { kind: "edges", world: 3, time: 2.5, layer: 2 });
+  assert.deepEqual([...edges], [1, 2, 3, 4]);
+});
+
+test("poses with and without ids", () => {
+  const named = decodeBinary(message(2, [2, 7, 8, ...f(1, 2, 3, 4, 5, 6)]));
+  assert.equal(named.kind, "poses");
+  assert.deepEqual([...named.ids], [7, 8]);
+  assert.deepEqual([...named.poses], [1, 2, 3, 4, 5, 6]);
+  const same = decodeBinary(message(4, [1, ...f(1, 2, 3)]));
+  assert.equal(same.kind, "poses");
+  assert.equal(same.ids, null);
+  assert.deepEqual([...same.poses], [1, 2, 3]);
+});
+
+test("scans in groups of the same number of beams", () => {
+  const first = [2, 1, 5, 6, ...f(1, 2, 3, 4, 5, 6), ...f(0.5, 0.25)];
+  const second = [1, 2, 7, ...f(7, 8, 9), ...f(1.5, -Infinity)];
+  const { scans } = decodeBinary(message(3, [2, ...first, ...second]));
+  assert.deepEqual(
+    scans.map(({ id, pose, ranges }) => [id, pose, [...ranges]]),
+    [
+      [5, [1, 2, 3], [0.5]],
+      [6, [4, 5, 6], [0.25]],
+      [7, [7, 8, 9], [1.5, -Infinity]],
+    ],
+  );
+});
+
+test("a message of an unknown kind is ignored", () => {
+  assert.equal(decodeBinary(message(99, [0])), null);
+});
+
+test("another version and a short message are errors", () => {
+  assert.throws(() => decodeBinary(message(1, [0, 0], { version: 2 })), /unsupported version 2/);
+  for (const [kind, words] of [
+    [1, [0, 5]],
+    [2, [5]],
+    [3, [1, 5, 5]],
+    [4, [5]],
+  ]) {
+    assert.throws(() => decodeBinary(message(kind, words)), RangeError);
+  }
+});

@@ -1,0 +1,38 @@
+import assert from "node:assert/strict";
+import { test } from "node:test";
+import { Camera } from "../../../flatland/web/page/js/camera.js";
+import { addGrid, gridStep, resolveFrames } from "../../../flatland/web/page/js/renderer/marks.js";
+import { createPalette } from "../../../flatland/web/page/js/renderer/palette.js";
+
+test("the lines of the grid have round distances of at least 28 pixels", () => {
+  assert.deepEqual([28, 27, 20, 10, 1000, 0.01].map(gridStep), [1, 2, 2, 5, 0.05, 5000]);
+});
+
+test("the grid covers the view", () => {
+  const camera = Object.assign(new Camera(), { x: 3, zoom: 30, width: 300, height: 300 });
+  const lines = [];
+  addGrid({ add: (...values) => lines.push(values) }, { camera }, createPalette(true));
+  const vertical = lines.filter(([x1, , x2]) => x1 === x2).map(([x]) => x);
+  assert.ok(Math.min(...vertical) <= -2 && Math.max(...vertical) >= 8);
+  assert.deepEqual(vertical, vertical.map(Math.round));
+});
+
+test("frames are resolved from their parents", () => {
+  const frames = resolveFrames([
+    { parent: "base", child: "laser", pose: [1, 0, 0] },
+    { parent: "map", child: "base", pose: [2, 3, Math.PI / 2] },
+  ]);
+  assert.deepEqual(frames.get("map"), [0, 0, 0]);
+  assert.deepEqual(
+    frames.get("laser").map((value) => value.toFixed(6)),
+    ["2.000000", "4.000000", "1.570796"],
+  );
+});
+
+test("a loop of parents ends", () => {
+  const frames = resolveFrames([
+    { parent: "a", child: "b", pose: [1, 0, 0] },
+    { parent: "b", child: "a", pose: [1, 0, 0] },
+  ]);
+  assert.deepEqual([...frames.keys()].sort(), ["a", "b"]);
+});

@@ -1,0 +1,99 @@
+import assert from "node:assert/strict";
+import { test } from "node:test";
+import { openPage } from "./fake_page.js";
+import { createStage, poses, showRoom } from "./fake_server.js";
+
+function open(options) {
+  openPage();
+  const shown = showRoom(options);
+  return { ...shown, stage: createStage(shown.session) };
+}
+
+test("the view is fitted to the world until the user moves it", () => {
+  const { stage } = open();
+  stage.fit();
+  stage.updateCamera();
+  assert.equal(stage.camera.zoom.toFixed(2), "9.20", "10 m in 100 pixels, less a margin");
+  stage.moveView((camera) => camera.pan(20, 0));
+  const { x } = stage.camera;
+  stage.updateCamera();
+  assert.equal(stage.camera.x, x);
+});
+
+test("a fitted view is only enlarged while models move", () => {
+  const { connection, stage, world } = open();
+  world.layers[0].edges = null;
+  stage.fit();
+  stage.updateCamera();
+  const { zoom } = stage.camera;
+  connection.emit("data", poses({ 10: [-30, 1, 0] }));
+  stage.updateCamera();
+  assert.ok(stage.camera.zoom < zoom);
+  const { zoom: least } = stage.camera;
+  connection.emit("data", poses({ 10: [-2, 1, 0] }));
+  stage.updateCamera();
+  assert.equal(stage.camera.zoom, least);
+  stage.fit();
+  stage.updateCamera();
+  assert.equal(stage.camera.zoom, zoom);
+});
+
+test("the view follows a model until the view is fitted or centred elsewhere", () => {
+  const { connection, stage } = open();
+  const views = [];
+  stage.on("view", () => views.push(stage.followed));
+  stage.follow("robot");
+  connection.emit("data", poses({ 10: [3, 4, 0] }));
+  stage.updateCamera();
+  assert.deepEqual([stage.camera.x, stage.camera.y], [3, 4]);
+  stage.centerOn(1, 1);
+  stage.follow("robot");
+  stage.fit();
+  assert.deepEqual(views, ["robot", null, "robot", null]);
+});
+
+test("the view glides to a new centre", (t) => {
+  let now = 1000;
+  t.mock.method(performance, "now", () => now);
+  const { stage } = open();
+  stage.centerOn(4, -2);
+  const seen = [0, 110, 220].map((time) => {
+    now = 1000 + time;
+    stage.updateCamera();
+    return [stage.camera.x, stage.camera.y];
+  });
+  assert.deepEqual(seen, [
+    [0, 0],
+    [2, -1],
+    [4, -2],
+  ]);
+  assert.equal(stage.glide, null);
+});
+
+test("the view does not glide if the user prefers reduced motion", () => {
+  const { stage } = open();
+  window.matchMedia = () => ({ matches: true });
+  stage.centerOn(4, -2);
+  assert.deepEqual([stage.camera.x, stage.camera.y], [4, -2]);
+});
+
+test("one world fills the canvas, several worlds are tiles with own cameras", () => {
+  const { stage } = open();
+  assert.deepEqual(stage.viewport(stage.tiles()[0]).camera, stage.camera);
+  const { session, stage: grid } = open({ worlds: 4 });
+  const tiles = grid.tiles();
+  assert.deepEqual(
+    tiles.map(({ world }) => world.index),
+    [0, 1, 2, 3],
+  );
+  const viewports = tiles.map((tile) => grid.viewport(tile));
+  assert.equal(new Set(viewports.map(({ camera }) => camera)).size, 4);
+  assert.ok(viewports.every(({ bottom, height }) => bottom >= 0 && bottom + height <= 100));
+  assert.equal(grid.viewport(tiles[1]).camera, viewports[1].camera, "the camera is kept");
+  session.show(1);
+  assert.equal(grid.tiles().length, 1);
+});
+
+test("a browser without WebGL 2 is not supported", () => {
+  assert.equal(open().stage.isSupported, false);
+});

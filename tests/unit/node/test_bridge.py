@@ -1,0 +1,106 @@
+"""Outputs and commands of plugins as topics, without ROS."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+import flatland
+from flatland.node.bridge import Bridge
+from flatland.node.clock import SimulatedClock
+
+STEP_NS = 5_000_000
+ROBOT = """
+bodies: [{name: base, footprints: [{type: circle, radius: 0.2, density: 1}]}]
+plugins:
+  - {type: DiffDrive, name: drive, body: base, pub_rate: 50, enable_odom_tf_pub: true}
+  - {type: Laser, name: laser, body: base, range: 20, update_rate: 100,
+     angle: {min: 0, max: 1, increment: 1}}
+"""
+WORLD = "{properties: {}, layers: [{name: 2d}], models: [{name: r, model: robot.model.yaml}]}"
+
+
+@pytest.fixture
+def node(serve: Any, files: Any) -> Any:
+    files.write("robot.model.yaml", ROBOT)
+    return serve(WORLD, lockstep=True)
+
+
+def step(node: Any, duration: float) -> None:
+    assert node.call("step_world", duration=duration).success
+
+
+def test_a_value_is_published_while_its_topic_has_a_subscriber(node: Any) -> None:
+    scans = node.transport.topics["scan"]
+    # A part of the program wants the output, so that it is computed without a subscriber.
+    values: list[flatland.LaserScan] = []
+    node.run(lambda: node.world.output("/scan").subscribe(values.append))
+    converted: list[object] = []
+    topic = node.served._bridge._outputs[node.world.output("/scan")]
+    topic._convert = lambda value: converted.append(value) or value
+    step(node, 0.02)
+    assert len(values) == 2
+    assert converted == scans.sent == []
+    scans.connect()
+    step(node, 0.02)
+    assert scans.sent == converted == values[2:]
+    scans.connected = False
+    step(node, 0.02)
+    assert len(values) == 6
+    assert len(converted) == len(scans.sent) == 2
+
+
+def test_an_output_without_a_subscriber_is_not_computed(node: Any) -> None:
+    scans = node.transport.topics["scan"]
+    step(node, 0.02)
+    scans.connect()
+    step(node, 0.02)
+    assert [scan.stamp for scan in scans.sent] == [4 * STEP_NS, 6 * STEP_NS]
+
+
+def test_the_messages_of_a_step_follow_its_time_and_its_transforms(node: Any) -> None:
+    order: list[str] = []
+    for name in ("scan", "odometry/filtered", "/tf", "/clock"):
+        topic = node.transport.topics[name]
+        topic.connect()
+        topic.send = topic.publish = lambda *_, name=name: order.append(name)
+    step(node, 0.0)
+    assert order == ["/clock", "/tf", "odometry/filtered", "scan"]
+
+
+def test_the_last_of_several_commands_is_in_effect(node: Any) -> None:
+    receive = node.transport.callbacks["cmd_vel"]
+    for number in range(100):
+        receive(flatland.Twist(0.0, 0.0, float(number)))
+    receive(flatland.Twist(0.0, 0.0, -0.5))
+    step(node, 0.1)
+    states = node.call("get_model_states", names=["r"]).states
+    assert states.velocities[0].tolist() == pytest.approx([0.0, 0.0, -0.5])
+
+
+def test_the_topic_of_a_deleted_model_is_closed(node: Any) -> None:
+    scans = node.transport.topics["scan"]
+    scans.connect()
+    assert node.call("delete_model", name="r").success
+    assert scans.closed
+    step(node, 0.02)
+    assert scans.sent == []
+
+
+def test_a_model_that_returns_has_topics_of_its_own(files: Any, transport: Any) -> None:
+    drive = "plugins: [{type: DiffDrive, name: drive, body: base}]"
+    base = "bodies: [{name: base, footprints: [{type: circle, radius: 0.2, density: 1}]}]"
+    bridge = Bridge(transport, SimulatedClock(transport))
+    world = files.load_model(f"{base}\n{drive}\n", observers=[bridge])
+    before = transport.topics["odometry/filtered"]
+    before.connect()
+    snapshot = world.snapshot()
+    world.delete_model("robot")
+    assert before.closed
+    world.restore(snapshot)
+    after = transport.topics["odometry/filtered"]
+    after.connect()
+    world.step(2)
+    assert len(after.sent) == 2
+    assert before.sent == []

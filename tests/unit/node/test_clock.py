@@ -1,0 +1,145 @@
+"""The time of the node: stamps of wall time, with a fake wall clock, and simulated time."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+from waiting import wait_until
+
+from flatland.node.clock import SimulatedClock, WallClock, stamp
+
+START = 1_700_000_000_000_000_000  # ns
+STEP = 5_000_000  # ns
+MS = 1_000_000
+
+
+class Wall:
+    """The wall time, and a clock that uses it."""
+
+    def __init__(self) -> None:
+        self.now = START
+        self.clock = WallClock(lambda: self.now)
+        self.time = 0
+
+    def step(self, until_advance: int = 2 * MS, rest: int = 3 * MS) -> tuple[int, int]:
+        """Steps; returns the stamps of the times before and after the step."""
+        self.clock.step_started(self.time)
+        before = stamp(self.time)
+        self.now += until_advance
+        self.time += STEP
+        self.clock.time_advanced(self.time)
+        # Transforms are converted at the end of the step.
+        assert stamp(self.time - STEP) == before
+        after = stamp(self.time)
+        self.now += rest
+        return before, after
+
+
+@pytest.fixture
+def wall() -> Iterator[Wall]:
+    wall = Wall()
+    yield wall
+    wall.clock.close()
+    assert stamp(STEP) == STEP
+
+
+def test_stamps_are_the_wall_times_at_which_times_are_reached(wall: Wall) -> None:
+    assert wall.step() == (START, START + 2 * MS)
+    assert wall.step() == (START + 2 * MS, START + 7 * MS)
+    assert stamp(wall.time) == START + 7 * MS
+    assert stamp(wall.time - STEP) == START + 2 * MS
+
+
+@pytest.mark.parametrize("rest", [0, 3 * MS, 90 * MS, 101 * MS, 2000 * MS])
+def test_stamps_increase_are_not_in_the_future_and_close_to_the_current_time(
+    wall: Wall, rest: int
+) -> None:
+    stamps = []
+    for _ in range(20):
+        start = wall.now
+        before, after = wall.step(rest=rest)
+        assert start - 100 * MS <= before <= start
+        assert after == wall.now - rest
+        stamps += [before, after]
+    assert stamps == sorted(stamps)
+    assert len(set(stamps)) > 20
+
+
+def test_stamps_increase_although_the_clock_stands_still_or_is_corrected(wall: Wall) -> None:
+    wall.step()
+    stamps = [wall.step(until_advance=0, rest=0)[1] for _ in range(3)]
+    wall.now -= 10 * MS
+    stamps += [wall.step(until_advance=0, rest=0)[1] for _ in range(3)]
+    assert stamps == sorted(set(stamps))
+
+
+def test_stamps_follow_a_clock_that_is_set_back(wall: Wall) -> None:
+    wall.step()
+    wall.now -= 3_600_000 * MS
+    before, after = wall.step(rest=0)
+    assert before == wall.now - 2 * MS
+    assert after == wall.now
+
+
+def test_other_times_are_stamped_relative_to_the_last_ones(wall: Wall) -> None:
+    wall.step()
+    before, after = wall.step(rest=0)
+    assert stamp(wall.time + 40 * MS) == after + 40 * MS
+    assert stamp(wall.time - STEP + 1) == before + 1
+    assert stamp(wall.time - STEP - 7) == before - 7
+
+
+# -- simulated time ---------------------------------------------------------------------------
+
+
+def test_a_limited_clock_publishes_the_last_time(transport: Any) -> None:
+    rate = 20.0
+    clock = SimulatedClock(transport, rate)
+    topic = transport.topics["/clock"]
+    start = time.monotonic()
+    try:
+        topic.connect()
+        for number in range(200):
+            clock.time_advanced(number * STEP)
+        wait_until("the last time", lambda: topic.sent[-1] == 199 * STEP)
+        # Besides one message a period: two for the connection.
+        assert len(topic.sent) <= 3 + (time.monotonic() - start) * rate
+        assert topic.sent == sorted(topic.sent)
+    finally:
+        clock.close()
+    assert transport.time_ns == 199 * STEP
+
+
+def test_the_simulated_time_is_published_with_each_step(transport: Any) -> None:
+    clock = SimulatedClock(transport)
+    topic = transport.topics["/clock"]
+    clock.time_advanced(STEP)
+    assert topic.sent == []
+    topic.connect()
+    clock.time_advanced(2 * STEP)
+    clock.time_advanced(3 * STEP)
+    clock.flush()
+    assert topic.sent == [STEP, 2 * STEP, 3 * STEP]
+    assert transport.time_ns == 3 * STEP
+    assert (clock.watches_steps, clock.watches_time) == (True, False)
+    clock.close()
+    assert topic.closed
+
+
+def test_with_a_limited_rate_a_time_is_published_once(transport: Any) -> None:
+    clock = SimulatedClock(transport, rate=0.001)
+    topic = transport.topics["/clock"]
+    topic.connect()
+    wait_until("the first tick", lambda: len(topic.sent) == 2)
+    for number in range(1, 4):
+        clock.time_advanced(number * STEP)
+    assert topic.sent == [0, 0]
+    assert transport.time_ns == 3 * STEP
+    clock.flush()
+    clock.flush()
+    assert topic.sent == [0, 0, 3 * STEP]
+    assert (clock.watches_steps, clock.watches_time) == (False, True)
+    clock.close()

@@ -1,0 +1,192 @@
+"""The measurements of /diagnostics, which must not interfere with those of the loop."""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import Any
+
+import pytest
+
+from flatland.node.diagnostics import DiagnosticsTopic, _Costs, _Drops, _Rate
+from flatland.node.values import Level
+from flatland.runtime.plugin_costs import PluginCosts
+from flatland.simulation import Simulation
+
+WORLD = "{properties: {}, layers: [{name: 2d}], models: [{name: r, model: robot.model.yaml}]}"
+ROBOT = """
+bodies: [{name: base, footprints: [{type: circle, radius: 0.2, density: 1}]}]
+plugins: [{type: DiffDrive, name: drive, body: base}]
+"""
+DRIVE = 'Model Plugin "drive" type "DiffDrive" model "r" [%]'
+
+
+@pytest.fixture
+def world(files: Any) -> Any:
+    files.write("robot.model.yaml", ROBOT)
+    return files.load(WORLD)
+
+
+def keys(costs: _Costs) -> list[str]:
+    return list(costs.status().values)
+
+
+def test_the_rate_in_lockstep_is_not_judged(world: Any) -> None:
+    status = _Rate(Simulation(world, lockstep=True)).status(1.0)
+    assert status.level == Level.OK
+    assert status.text.startswith("lockstep: ")
+    assert status.values["update rate [Hz]"] == "on request"
+    assert "target real-time factor" not in status.values
+
+
+def test_costs_of_the_measured_time_are_reported(world: Any) -> None:
+    costs = _Costs(world)
+    assert costs.status().text == "no data"
+    costs.begin(0.0)
+    world.step()
+    costs.end(0.2)
+    world.step()
+    assert keys(costs) == [DRIVE, "all of type DiffDrive [%]"]
+    assert world.plugin_host.costs is None
+
+
+def test_a_measurement_of_the_loop_is_not_replaced(world: Any) -> None:
+    costs, of_loop = _Costs(world), PluginCosts()
+    world.plugin_host.costs = of_loop
+    costs.begin(0.0)
+    world.step()
+    costs.end(0.2)
+    assert world.plugin_host.costs is of_loop
+    assert of_loop.seconds
+    assert keys(costs) == []
+
+
+def test_a_measurement_replaced_by_the_loop_is_discarded(world: Any) -> None:
+    costs, of_loop = _Costs(world), PluginCosts()
+    costs.begin(0.0)
+    world.plugin_host.costs = of_loop
+    world.step()
+    costs.end(0.2)
+    assert world.plugin_host.costs is of_loop
+    assert keys(costs) == []
+
+
+def test_nothing_is_measured_while_paused(world: Any) -> None:
+    costs = _Costs(world)
+    world.pause()
+    costs.begin(0.0)
+    assert world.plugin_host.costs is None
+
+
+def test_a_reset_ends_the_measurement(world: Any) -> None:
+    costs = _Costs(world)
+    costs.begin(0.0)
+    world.step()
+    costs.reset()
+    assert world.plugin_host.costs is None
+    assert keys(costs) == []
+
+
+def test_costs_are_shares_of_the_wall_time(
+    world: Any, fake_time: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    measurement = partial(PluginCosts, fake_time.clock)
+    monkeypatch.setattr("flatland.node.diagnostics.PluginCosts", measurement)
+    costs = _Costs(world)
+    (plugin,) = world.model("r").plugins
+    for seconds in (0.02, 0.06):
+        costs.begin(0.0)
+        world.plugin_host.costs.timed(plugin, fake_time.spend)(seconds)
+        costs.end(0.2)
+    status = costs.status()
+    assert status.values == {DRIVE: "20.00", "all of type DiffDrive [%]": "20.00"}
+    assert status.text == "20.0 % of the wall time"
+
+
+@pytest.mark.parametrize(
+    ("lost", "level", "text"),
+    [
+        (0.0, Level.OK, "50.0 steps per second"),
+        (0.01, Level.OK, "50.0 steps per second"),
+        (0.03, Level.WARN, "the update rate of 100 Hz cannot be held: 50.0 steps per second"),
+    ],
+)
+def test_the_rate_since_the_previous_message(
+    world: Any, lost: float, level: Level, text: str
+) -> None:
+    simulation = Simulation(world, 100.0)
+    rate = _Rate(simulation)
+    rate.status(1.0)
+    for _ in range(50):
+        world.step()
+    simulation.lost_time = lost
+    status = rate.status(2.0)
+    assert (status.level, status.text) == (level, text)
+    expected = {
+        "steps per second": "50.0",
+        "update rate [Hz]": "100",
+        "real-time factor": "0.250",
+        "target real-time factor": "0.5",
+        "lost time [s]": f"{lost:.3f}",
+        "simulated time [s]": "0.250",
+        "paused": "False",
+        "models": "1",
+    }
+    assert status.values == expected
+
+
+def test_the_rate_while_paused_and_without_a_limit(world: Any) -> None:
+    simulation = Simulation(world, 0.0)
+    world.pause()
+    status = _Rate(simulation).status(1.0)
+    assert status.text == "paused"
+    assert status.values["paused"] == "True"
+    assert status.values["update rate [Hz]"] == "inf"
+    assert status.values["target real-time factor"] == "inf"
+
+
+def test_nothing_is_measured_without_a_subscriber(world: Any, transport: Any) -> None:
+    diagnostics = DiagnosticsTopic(transport, Simulation(world))
+    topic = transport.topics["/diagnostics"]
+    try:
+        assert not diagnostics._tick(0.0)
+        assert world.plugin_host.costs is None
+        topic.connected = True
+        for _ in range(11):
+            assert diagnostics._tick(0.0)
+        assert world.plugin_host.costs is not None
+        assert len(topic.sent) == 2  # one of five ticks; the first tick only starts
+        topic.connected = False
+        assert not diagnostics._tick(0.0)
+        assert world.plugin_host.costs is None
+    finally:
+        diagnostics.close()
+
+
+def test_the_rate_starts_again_with_a_reset(world: Any) -> None:
+    rate = _Rate(Simulation(world, 100.0))
+    rate.status(10.0)
+    world.step(50)
+    rate.status(10.5)
+    world.reset(seed=1)
+    world.step(2)
+    assert rate.status(10.6).text == "20.0 steps per second"
+
+
+def test_in_lockstep_there_is_no_rate_to_hold(world: Any) -> None:
+    rate = _Rate(Simulation(world, 100.0, lockstep=True))
+    status = rate.status(1.0)
+    assert status.text == "lockstep: 0.0 steps per second"
+    assert status.values["update rate [Hz]"] == "on request"
+    assert "target real-time factor" not in status.values
+
+
+def test_subscribers_that_do_not_keep_up_are_named(transport: Any) -> None:
+    drops = _Drops(transport)
+    transport.lost.update({("/scan", "/rviz"): 3, ("/clock", "/rviz"): 4})
+    status = drops.status()
+    assert (status.level, status.text) == (
+        Level.WARN,
+        "subscribers do not keep up: /scan to /rviz",
+    )
+    assert status.values["/scan to /rviz"] == "3 messages dropped"
+    assert (drops.status().level, drops.status().text) == (Level.OK, "all keep up")

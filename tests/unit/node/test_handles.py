@@ -1,0 +1,171 @@
+"""Drags of handles, which pause the world, without ROS."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from concurrent.futures import Future
+from typing import Any
+
+import pytest
+
+from flatland.node.handles import DELETE_ENTRY, DRAG_TIMEOUT, Event, Feedback, Handles
+from flatland.node.ticker import TickerThread
+from flatland.node.values import ReceivedPose
+from flatland.simulation import Simulation
+
+WORLD = """
+properties: {}
+layers: [{name: 2d}]
+models: [{name: a, model: ball.model.yaml}, {name: b, model: ball.model.yaml, pose: [5, 0, 0]}]
+"""
+BALL = "bodies: [{name: base, footprints: [{type: circle, radius: 0.2, density: 1}]}]"
+
+
+class FakeServer:
+    """Records the changes of handles."""
+
+    connected = True
+
+    def __init__(self) -> None:
+        self.handles: set[str] = set()
+        self.moved: list[str] = []
+        self.inserted: list[str] = []
+
+    def insert(self, _model: object, name: str) -> None:
+        self.handles.add(name)
+        self.inserted.append(name)
+
+    def erase(self, name: str) -> None:
+        self.handles.discard(name)
+
+    def move(self, name: str) -> None:
+        self.moved.append(name)
+
+    def apply_changes(self) -> None:
+        pass
+
+    def keep_alive(self) -> None:
+        pass
+
+
+class Setup:
+    """The handles of two models, and feedback of clients."""
+
+    def __init__(self, world: Any) -> None:
+        self.world = world
+        self.server = FakeServer()
+        self.simulation = Simulation(world)
+        thread = TickerThread("handles", lambda _action: Future())  # The test ticks itself.
+        self.handles = Handles(self.simulation, thread, lambda _post, _handles: self.server)
+
+    def send(
+        self,
+        name: str,
+        event: Event,
+        x: float = 1.0,
+        *,
+        client: str = "rviz",
+        time: float = 0.0,
+        frame: str = "map",
+        entry: int = 0,
+    ) -> None:
+        pose = ReceivedPose(frame, (x, 2.0, 0.0))
+        self.handles.receive(Feedback(name, client, event, entry, pose, time))
+
+
+@pytest.fixture
+def setup(files: Any) -> Iterator[Setup]:
+    files.write("ball.model.yaml", BALL)
+    setup = Setup(files.load(WORLD))
+    yield setup
+    setup.handles.close()
+
+
+def test_the_world_is_paused_until_the_last_drag_ends(setup: Setup) -> None:
+    setup.send("a", Event.PRESS)
+    setup.send("b", Event.MOVE, client="other")
+    assert setup.world.paused
+    setup.send("a", Event.RELEASE, 3.0)
+    assert setup.world.paused
+    assert setup.world.model("a").pose == (3.0, 2.0, 0.0)
+    setup.send("b", Event.RELEASE, client="other")
+    assert not setup.world.paused
+
+
+def test_a_model_can_be_dragged_onto_another_one(
+    setup: Setup, caplog: pytest.LogCaptureFixture
+) -> None:
+    setup.world.move_model("b", (3.0, 2.0, 0.0))
+    setup.send("a", Event.PRESS)
+    setup.send("a", Event.RELEASE, 3.0)
+    assert setup.world.model("a").pose == (3.0, 2.0, 0.0)
+    assert "overlaps" not in caplog.text
+
+
+def test_a_world_paused_before_a_drag_remains_paused(setup: Setup) -> None:
+    setup.world.pause()
+    setup.send("a", Event.PRESS)
+    setup.send("a", Event.RELEASE)
+    assert setup.world.paused
+
+
+def test_a_pause_by_other_means_during_a_drag_remains(setup: Setup) -> None:
+    setup.send("a", Event.PRESS)
+    setup.world.resume()
+    setup.handles._tick(0.05)
+    setup.world.pause()
+    setup.send("a", Event.RELEASE)
+    assert setup.world.paused
+
+
+def test_a_drag_without_feedback_ends_and_the_model_does_not_move(setup: Setup) -> None:
+    setup.send("a", Event.PRESS, time=1.0)
+    setup.send("a", Event.KEEP_ALIVE, time=2.0)
+    assert setup.handles._tick(2.0 + 0.9 * DRAG_TIMEOUT)
+    assert setup.world.paused
+    assert setup.handles.pose_of("a") == (1.0, 2.0, 0.0)
+    setup.handles._tick(2.0 + 1.1 * DRAG_TIMEOUT)
+    assert not setup.world.paused
+    assert setup.handles.pose_of("a") == (0.0, 0.0, 0.0)
+    assert setup.server.moved[-1] == "a"
+
+
+def test_a_drag_by_another_client_is_ignored(setup: Setup) -> None:
+    setup.send("a", Event.PRESS)
+    setup.send("a", Event.RELEASE, 4.0, client="other")
+    assert setup.world.paused
+    assert setup.world.model("a").pose == (0.0, 0.0, 0.0)
+
+
+def test_a_pose_in_another_frame_is_ignored(setup: Setup, caplog: pytest.LogCaptureFixture) -> None:
+    setup.send("a", Event.PRESS, frame="odom")
+    assert not setup.world.paused
+    assert 'ignoring a pose in frame "odom", expected frame "map"' in caplog.text
+
+
+def test_the_menu_deletes_a_model_whose_drag_ends(setup: Setup) -> None:
+    setup.send("a", Event.PRESS)
+    setup.send("a", Event.MENU, entry=DELETE_ENTRY)
+    assert setup.server.handles == {"b"}
+    assert not setup.world.paused
+    setup.send("a", Event.PRESS)  # There is no such handle.
+    assert not setup.world.paused
+
+
+def test_poses_are_published_once_and_only_with_clients(setup: Setup) -> None:
+    setup.world.move_model("a", (3.0, 0.0, 0.0))
+    setup.server.connected = False
+    assert setup.handles._tick(1.0) is False
+    assert setup.server.moved == []
+    setup.server.connected = True
+    assert setup.handles._tick(2.0)
+    assert setup.server.moved == ["a"]
+    assert setup.handles._tick(3.0)
+    assert setup.server.moved == ["a"]
+
+
+def test_the_handle_of_a_model_with_other_colors_is_replaced(setup: Setup) -> None:
+    assert setup.server.inserted == ["a", "b"]
+    setup.world.set_appearance("b", color=(1.0, 0.0, 0.0, 1.0))
+    assert setup.server.inserted == ["a", "b", "b"]
+    assert setup.server.handles == {"a", "b"}

@@ -1,0 +1,70 @@
+"""Reports of plugins that block the simulation."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import pytest
+from waiting import wait_until
+
+import flatland
+from flatland.node.hook_watchdog import LIMIT, HookWatchdog
+
+
+class Blocking(flatland.ModelPlugin):
+    """A plugin whose hook returns at the end of an action."""
+
+    def hook(self, action: Callable[[], None]) -> None:
+        action()
+
+
+@pytest.fixture
+def watchdog(empty_world: flatland.World, monkeypatch: pytest.MonkeyPatch) -> HookWatchdog:
+    """A watchdog whose checks the test makes itself."""
+    monkeypatch.setattr(HookWatchdog, "_run", lambda _self: None)
+    return HookWatchdog(empty_world)
+
+
+def test_a_call_that_does_not_return_is_reported_once(
+    empty_world: flatland.World, watchdog: HookWatchdog, caplog: pytest.LogCaptureFixture
+) -> None:
+    requests = empty_world.requests
+
+    def wait() -> None:
+        for now in (0.0, 1.0, 0.9 + LIMIT):
+            watchdog._check(now)
+        assert requests.blocked_by == ""
+        for now in (1.1 + LIMIT, 8.0):
+            watchdog._check(now)
+        assert requests.blocked_by == "Blocking: hook"
+
+    Blocking().hook(wait)
+    (error,) = caplog.records
+    assert error.getMessage().startswith("Blocking: hook has not returned for 5 s, the simulation")
+    assert "in wait" in error.getMessage()
+    watchdog._check(9.0)
+    assert requests.blocked_by == ""
+    assert "Blocking: hook has returned after 8 s" in caplog.text
+
+
+def test_calls_while_the_time_advances_are_not_reported(
+    empty_world: flatland.World, watchdog: HookWatchdog, caplog: pytest.LogCaptureFixture
+) -> None:
+    def work() -> None:
+        for now in (0.0, 10.0, 20.0):
+            empty_world.timekeeper.sim_time_ns += 5_000_000
+            watchdog._check(now)
+
+    Blocking().hook(work)
+    assert caplog.records == []
+
+
+def test_the_thread_of_the_simulation_is_watched(
+    empty_world: flatland.World, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for name in ("LIMIT", "_POLL_PERIOD"):
+        monkeypatch.setattr(f"flatland.node.hook_watchdog.{name}", 0.01)
+    watchdog = HookWatchdog(empty_world)
+    Blocking().hook(lambda: wait_until("the report", lambda: empty_world.requests.blocked_by))
+    wait_until("the end", lambda: not empty_world.requests.blocked_by)
+    watchdog.close()

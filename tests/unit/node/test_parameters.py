@@ -1,0 +1,266 @@
+"""The parameters of the node: defaults, accepted values and errors."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from flatland.node.parameters import (
+    NodeParameters,
+    ParameterError,
+    read_parameters,
+)
+
+
+def read(**given: Any) -> NodeParameters:
+    return read_parameters({"world_path": "world.yaml", **given}.get)
+
+
+def test_defaults() -> None:
+    assert read() == NodeParameters(
+        world_path="world.yaml",
+        update_rate=200.0,
+        max_lag=0.1,
+        step_size=0.005,
+        lockstep=False,
+        show_viz=False,
+        viz_pub_rate=30.0,
+        simplify_map=0,
+        seed=None,
+        benchmark_duration=None,
+        plugin_timeout=60.0,
+        shutdown_timeout=2.0,
+        if_blocked="warn",
+        move_keeps_odometry=False,
+        initialpose_model="",
+        record="",
+        record_mcap="",
+        use_sim_time=True,
+        clock_rate=0.0,
+        model_states_rate=50.0,
+        publish_map="",
+        map_frame="map",
+        map_resolution=0.05,
+        msgs_package="flatland",
+        model_path=None,
+        web=False,
+        web_host="127.0.0.1",
+        web_port=8000,
+        web_token=None,
+        web_read_only=False,
+    )
+
+
+VALID: list[tuple[str, object, object]] = [
+    ("update_rate", 0, 0.0),
+    ("update_rate", math.inf, 0.0),
+    ("update_rate", "inf", 0.0),  # roslaunch passes it as text
+    ("update_rate", "1e3", 1000.0),
+    ("update_rate", 0.5, 0.5),
+    ("max_lag", 0, 0.0),
+    ("max_lag", "0.5", 0.5),
+    ("step_size", 1, 1.0),
+    ("step_size", "1e-3", 0.001),
+    ("step_size", "1e-6", 1e-6),
+    ("step_size", 1000, 1000.0),
+    ("show_viz", True, True),
+    ("show_viz", "True", True),
+    ("show_viz", "false", False),
+    ("viz_pub_rate", 10, 10.0),
+    ("simplify_map", 2, 2),
+    ("simplify_map", "1", 1),
+    ("seed", 0, 0),
+    ("seed", "12345678901", 12345678901),  # too large for XML-RPC
+    ("benchmark_duration", 2.5, 2.5),
+    ("plugin_timeout", 2, 2.0),
+    ("plugin_timeout", "0.5", 0.5),
+    ("plugin_timeout", math.inf, None),
+    ("plugin_timeout", "inf", None),
+    ("shutdown_timeout", "0.5", 0.5),
+    ("shutdown_timeout", math.inf, None),
+    ("if_blocked", "allow", "allow"),
+    ("if_blocked", "nearest", "nearest"),
+    ("move_keeps_odometry", True, True),
+    ("move_keeps_odometry", "true", True),
+    ("initialpose_model", "robot", "robot"),
+    ("initialpose_model", 7, "7"),
+    ("initialpose_model", " ", ""),
+    ("record", "/tmp/a.flog", "/tmp/a.flog"),
+    ("record", " ", ""),
+    ("record_mcap", "/tmp/a.mcap", "/tmp/a.mcap"),
+    ("record_mcap", "~/a.mcap", str(Path("~/a.mcap").expanduser())),
+    ("record", "a.flog", str(Path("a.flog").absolute())),
+    ("use_sim_time", False, False),
+    ("use_sim_time", "true", True),
+    ("clock_rate", 100, 100.0),
+    ("clock_rate", "inf", 0.0),
+    ("publish_map", "walls", "walls"),
+    ("publish_map", "", ""),
+    ("publish_map", " ", ""),
+    ("publish_map", 2, "2"),
+    ("publish_map", False, None),
+    ("map_frame", "r1/map", "r1/map"),
+    ("map_frame", "/map", "map"),
+    ("map_resolution", "0.1", 0.1),
+    ("map_resolution", 1, 1.0),
+    ("msgs_package", "flatland", "flatland"),
+    ("msgs_package", "flatland_msgs", "flatland_msgs"),
+    ("web", "true", True),
+    ("web_host", "0.0.0.0", "0.0.0.0"),
+    ("web_host", " ", "127.0.0.1"),
+    ("web_port", "0", 0),
+    ("web_token", 7, "7"),
+    ("web_token", " ", None),
+    ("web_read_only", True, True),
+    ("model_path", " ", None),
+    ("model_path", "/usr:/tmp", ("/usr", "/tmp")),
+    ("model_path", ["/usr", "/tmp"], ("/usr", "/tmp")),
+]
+
+
+def test_valid_values() -> None:
+    for name, value, expected in VALID:
+        got = getattr(read(**{name: value}), name)
+        assert (got, type(got)) == (expected, type(expected)), (name, value)
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "update_rate",
+        "max_lag",
+        "step_size",
+        "viz_pub_rate",
+        "benchmark_duration",
+        "plugin_timeout",
+        "shutdown_timeout",
+        "clock_rate",
+        "model_states_rate",
+        "map_resolution",
+    ],
+)
+def test_invalid_numbers(name: str) -> None:
+    invalid: list[Any] = [math.nan, "nan", -1, -1e-300, "fast", "", True, [1], {"a": 1}]
+    for value in invalid:
+        with pytest.raises(ParameterError) as error:
+            read(**{name: value})
+        assert str(error.value).startswith(f'Invalid parameter "~{name}": it must be ')
+        assert f"got {float(value) if value in (-1, -1e-300) else value!r}" in str(error.value)
+
+
+INVALID: list[tuple[str, object]] = [
+    ("max_lag", math.inf),
+    ("max_lag", "inf"),
+    ("step_size", 0),
+    ("step_size", math.inf),
+    ("step_size", 1e-10),
+    ("step_size", 0.9e-6),
+    ("step_size", 1001),
+    ("step_size", 10**400),
+    ("viz_pub_rate", 0),
+    ("map_resolution", 0),
+    ("map_resolution", math.inf),
+    ("map_frame", ""),
+    ("map_frame", "/"),
+    ("map_frame", 1),
+    ("publish_map", True),
+    ("publish_map", 1.5),
+    ("publish_map", ["walls"]),
+    ("benchmark_duration", 0),
+    ("plugin_timeout", 0),
+    ("shutdown_timeout", 0),
+    ("show_viz", 1),
+    ("show_viz", "yes"),
+    ("lockstep", 1),
+    ("lockstep", "on"),
+    ("simplify_map", 3),
+    ("simplify_map", -1),
+    ("simplify_map", 1.0),
+    ("simplify_map", True),
+    ("seed", -1),
+    ("seed", 1.5),
+    ("seed", "a"),
+    ("seed", False),
+    ("use_sim_time", "maybe"),
+    ("if_blocked", "stop"),
+    ("if_blocked", ""),
+    ("if_blocked", True),
+    ("if_blocked", ["warn"]),
+    ("move_keeps_odometry", 1),
+    ("initialpose_model", True),
+    ("initialpose_model", ["robot"]),
+    ("initialpose_model", 1.5),
+    ("record", 1),
+    ("record_mcap", ["a"]),
+    ("msgs_package", "std_msgs"),
+    ("msgs_package", ""),
+    ("msgs_package", True),
+    ("msgs_package", ["flatland"]),
+    ("world_path", 5),
+    ("world_path", ["a"]),
+    ("model_path", "relative/path"),
+    ("model_path", "/nowhere/at/all"),
+    ("model_path", "/usr:"),
+    ("model_path", "/etc/passwd"),
+    ("model_path", []),
+    ("model_path", [""]),
+    ("model_path", ["/usr", 1]),
+    ("model_path", True),
+    ("model_path", {"a": "/usr"}),
+    ("web", "yes"),
+    ("web_host", True),
+    ("web_port", -1),
+    ("web_port", 65536),
+    ("web_port", "http"),
+    ("web_port", 80.5),
+    ("web_token", ["a"]),
+    ("web_read_only", 1),
+]
+
+
+def error_of(name: str, value: object) -> str:
+    """Returns the error that a value causes."""
+    try:
+        read(**{name: value})
+    except ParameterError as error:
+        return str(error)
+    return "no error"
+
+
+def test_invalid_values() -> None:
+    for name, value in INVALID:
+        start = f'Invalid parameter "~{name}": it must be '
+        assert error_of(name, value).startswith(start), (name, value)
+
+
+def test_the_choices_are_named() -> None:
+    with pytest.raises(ParameterError) as error:
+        read(if_blocked="Warn")
+    assert str(error.value) == (
+        'Invalid parameter "~if_blocked": it must be one of allow, warn, refuse, nearest, '
+        "got 'Warn'"
+    )
+
+
+def test_lockstep_excludes_a_benchmark() -> None:
+    with pytest.raises(ParameterError, match=r'Invalid parameter "~lockstep": it must be false'):
+        read(lockstep=True, benchmark_duration=1)
+
+
+def test_empty_seed_is_no_seed() -> None:
+    assert read(seed="").seed is None
+
+
+@pytest.mark.parametrize("path", [None, ""])
+def test_world_path_is_required(path: str | None) -> None:
+    with pytest.raises(ParameterError, match=r"^No world_path parameter given!$"):
+        read(world_path=path)
+
+
+def test_every_parameter_has_a_meaning_for_those_who_list_them() -> None:
+    for field in dataclasses.fields(NodeParameters):
+        assert field.metadata["meaning"].endswith("."), field.name

@@ -1,0 +1,201 @@
+"""Optional packages that are not installed, and an installed flatland that a clone hides."""
+
+from __future__ import annotations
+
+import shutil
+import sys
+from importlib.machinery import ModuleSpec
+from pathlib import Path
+
+import pytest
+from programs import run_program
+
+from flatland import requirements
+
+BLOCKED = """
+import sys
+
+class Blocker:
+    def find_spec(self, name, path=None, target=None):
+        if name.partition(".")[0] in sys.argv[1].split(","):
+            raise ModuleNotFoundError(f"No module named {name!r}", name=name)
+
+sys.meta_path.insert(0, Blocker())
+"""
+CLI = "from flatland.cli import main; sys.exit(main({arguments!r}))"
+WORLD = "import flatland\nwith flatland.World() as world: world.step(); world.{call}"
+
+# The missing module, the program or arguments of `flatland`, the error, and the command.
+ENTRIES: list[tuple[str, str | list[str], str, str]] = [
+    ("cv2", ["run", "{world}", "--video", "a.mp4"], "videos need OpenCV", "python3-opencv"),
+    (
+        "cv2",
+        "from flatland.tools.map_to_lines import main; sys.exit(main(['{map}', '.']))",
+        "the detection of line segments needs OpenCV",
+        "python3-opencv",
+    ),
+    ("matplotlib", ["show", "{world}", "-o", "a.png"], "drawing needs", "python3-matplotlib"),
+    ("matplotlib", ["run", "{world}", "--video", "a.mp4"], "drawing", "python3-matplotlib"),
+    ("matplotlib", WORLD.format(call="draw()"), "drawing needs", "python3-matplotlib"),
+    ("aiohttp", ["view", "{world}", "--no-browser"], "the viewer needs", "python3-aiohttp"),
+    ("aiohttp", WORLD.format(call="view()"), "the viewer needs", "python3-aiohttp"),
+    (
+        "aiohttp",
+        "from flatland.gym import FlatlandEnv; FlatlandEnv('corridor', render_mode='human')",
+        'render_mode "human" requires',
+        "python3-aiohttp",
+    ),
+    ("gymnasium", "import flatland.gym", "flatland.gym requires Gymnasium", "flatland-sim[gym]"),
+    (
+        "pettingzoo",
+        "import flatland.gym; flatland.gym.make_parallel()",
+        "environments with several robots require PettingZoo",
+        "flatland-sim[gym]",
+    ),
+    (
+        "mcap_ros1",
+        ["run", "{world}", "--mcap", "a.mcap"],
+        "MCAP files need mcap-ros1-support",
+        "flatland-sim[mcap]",
+    ),
+    ("rosbag", ["run", "{world}", "--bag", "a.bag"], "bags need rosbag", "python3-rosbag"),
+    ("tf2_msgs", ["run", "{world}", "--bag", "a.bag"], "bags need the messages", "tf2-msgs"),
+    ("tf2_msgs", ["run", "{world}", "--mcap", "a.mcap"], "MCAP files need", "tf2-msgs"),
+]
+
+
+@pytest.fixture
+def worlds(checkout: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """The folder of the included worlds; the current folder is empty."""
+    monkeypatch.chdir(tmp_path)
+    return checkout / "worlds"
+
+
+@pytest.mark.parametrize(("module", "entry", "error", "command"), ENTRIES)
+def test_a_missing_package_is_one_line_with_the_command(
+    worlds: Path, module: str, entry: str | list[str], error: str, command: str
+) -> None:
+    paths = {"world": worlds / "simple" / "world.yaml", "map": worlds / "office" / "office.yaml"}
+    if isinstance(entry, list):
+        duration = ["--duration", "0.1"] if entry[0] == "run" else []
+        program = CLI.format(arguments=[part.format(**paths) for part in entry] + duration)
+    else:
+        program = entry.format(**paths)
+    done = run_program([sys.executable, "-c", BLOCKED + program, module])
+    assert done.returncode == 1
+    lines = [line for line in done.stderr.splitlines() if not line.startswith("hint: ")]
+    assert error in lines[-1]
+    assert "No module named" in lines[-1]
+    assert command in lines[-1].rpartition("): ")[2]
+    assert len(lines) == 1 or not isinstance(entry, list)
+    assert not list(Path().glob("a.*"))
+
+
+def test_default_features_need_no_optional_package(worlds: Path) -> None:
+    program = f"""
+import gymnasium
+import flatland
+from flatland import worldgen
+from flatland.cli import main
+import flatland.gym
+
+for simplify in (0, 1, 2):
+    with flatland.World.from_yaml({str(worlds / "office" / "world.yaml")!r}, seed=1,
+                                  simplify_map=simplify) as world:
+        world.step(2)
+        assert world.sample_free(3, 0.3, connected_to=None).shape == (3, 3)
+env = gymnasium.make("flatland/Navigate-v0")
+env.reset(seed=1)
+env.step(env.action_space.sample())
+env.close()
+assert main(["new", "world", "floor", "--maze", "--seed", "7"]) == 0
+print("done")
+"""
+    blocked = "cv2,matplotlib,scipy,mcap_ros1,rosbag,rospy,PyQt5"
+    done = run_program([sys.executable, "-c", BLOCKED + program, blocked])
+    assert done.stdout.endswith("done\n"), done.stderr
+
+
+@pytest.mark.parametrize(
+    ("way", "module", "command"),
+    [
+        (requirements.DEBIAN, "matplotlib", "apt-get install python3-matplotlib"),
+        (requirements.CATKIN, "matplotlib", "apt-get install python3-matplotlib"),
+        (requirements.WHEEL, "matplotlib", 'pip install "flatland-sim[draw]"'),
+        (requirements.WHEEL, "cv2", 'pip install "flatland-sim[opencv]"'),
+        (requirements.WHEEL, "numpy", "pip install numpy"),
+        (requirements.WHEEL, "rosbag", "apt-get install python3-rosbag"),
+        (requirements.DEBIAN, "gymnasium", 'pip install "flatland-sim[gym]"'),
+        (requirements.CATKIN, "gymnasium", "pip install gymnasium"),
+        (requirements.DEBIAN, "flatland._core", "make setup in the clone of flatland"),
+        (requirements.CATKIN, "flatland._core", "catkin_make in the workspace"),
+    ],
+)
+def test_the_command_depends_on_the_installation(
+    monkeypatch: pytest.MonkeyPatch, way: str, module: str, command: str
+) -> None:
+    monkeypatch.setattr(requirements, "installation", lambda: way)
+    assert requirements.install_command(module) == command
+
+
+@pytest.mark.parametrize(
+    ("file", "has_ros", "way"),
+    [
+        ("clone/pyproject.toml", False, requirements.DEBIAN),
+        ("clone/lib/python3/site-packages/x", True, requirements.DEBIAN),
+        ("clone/lib/python3/site-packages/x", False, requirements.WHEEL),
+        ("devel/.catkin", True, requirements.CATKIN),
+    ],
+)
+def test_the_installation_is_recognized(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, file: str, has_ros: bool, way: str
+) -> None:
+    path = tmp_path / file
+    path.parent.mkdir(parents=True)
+    path.touch()
+    folder = path.parent / "lib/python3/dist-packages" if file.endswith("catkin") else path.parent
+    flatland = ModuleSpec("flatland", None, origin=str(folder / "flatland" / "__init__.py"))
+    specs = {"flatland": flatland, "rospy": ModuleSpec("rospy", None) if has_ros else None}
+    monkeypatch.setattr(requirements.importlib.util, "find_spec", specs.get)
+    assert requirements.installation() == way
+
+
+def test_the_extras_are_those_of_the_project(checkout: Path) -> None:
+    project = (checkout / "pyproject.toml").read_text()
+    for package in requirements.PACKAGES.values():
+        assert not package.extra or f"\n{package.extra} = [" in project
+
+
+@pytest.fixture
+def clone(tmp_path: Path, checkout: Path) -> Path:
+    """The beginning of a clone without the extension."""
+    clone = tmp_path / "clone"
+    (clone / "flatland").mkdir(parents=True)
+    for name in ("__init__.py", "requirements.py", "version.py"):
+        shutil.copy(checkout / "flatland" / name, clone / "flatland" / name)
+    return clone
+
+
+def test_a_clone_without_extension_names_what_it_hides(clone: Path, checkout: Path) -> None:
+    command = [sys.executable, "-c", "import flatland; print(flatland.__file__)"]
+    done = run_program(command, cwd=clone)
+    assert done.returncode == 1
+    last = done.stderr.splitlines()[-1]
+    assert last.startswith(f"ImportError: {clone / 'flatland'} has no extension")
+    assert "hides the installed " in last
+    assert "run Python in another folder or as python -P, or run make setup in this one" in last
+    command.insert(1, "-P")
+    done = run_program(command, cwd=clone, check=True)
+    assert done.stdout.startswith(str(checkout)) or "site-packages" in done.stdout
+
+
+def test_workers_of_a_sweep_find_the_installed_package_in_a_clone(
+    clone: Path, checkout: Path
+) -> None:
+    program = (
+        "import sys; sys.path[:0] = ['', sys.argv[1]]; import flatland_sweep.episode, flatland;"
+        "print(flatland.__file__)"
+    )
+    command = [sys.executable, "-c", program, checkout / "examples" / "sweep"]
+    done = run_program(command, cwd=clone, check=True)
+    assert str(clone) not in done.stdout
