@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import asyncio
 import socket
-from typing import Final
+from typing import Any, Final
 
 from aiohttp import web
 
@@ -27,6 +27,8 @@ MAX_OF_ADDRESS: Final = 128
 HEADER_TIMEOUT: Final = 5.0
 """Time from the connection of a client to the end of the header of its first request [s]."""
 
+_Peer = tuple[Any, ...]  # host, port and, for IPv6, more
+
 
 class Acceptor:
     """Accepts the connections of a server; all methods are called in the thread of the loop."""
@@ -41,7 +43,7 @@ class Acceptor:
         self._loop = asyncio.get_running_loop()
         # Connections without a request, the oldest first, and when each is closed.
         self._silent: dict[asyncio.Transport, asyncio.TimerHandle] = {}
-        self._starting: dict[asyncio.Task[None], str] = {}  # addresses
+        self._starting: dict[asyncio.Task[None], _Peer] = {}
         self._log = LimitedLog()
         self._closed = False
 
@@ -80,22 +82,23 @@ class Acceptor:
                     self._log.warn(f"web viewer: cannot accept a connection: {error}")
                     self._pause()
                 return
-            if not self._admits(address[0]):
+            if not self._admits(address):
                 connection.close()
                 continue
             task = self._loop.create_task(self._serve(connection))
-            self._starting[task] = address[0]
+            self._starting[task] = address
             task.add_done_callback(self._starting.pop)
 
-    def _admits(self, address: str) -> bool:
+    def _admits(self, peer: _Peer) -> bool:
         """Returns whether to accept a connection; closes another one for it if necessary."""
-        others = list(self._starting.values())
-        others += [
-            handler.transport.get_extra_info("peername", ("",))[0]
-            for handler in self._server.connections
-            if handler.transport is not None
-        ]
-        if others.count(address) >= MAX_OF_ADDRESS:
+        # A set, since a connection that has just started is in both.
+        others: set[_Peer] = {*self._starting.values()}
+        for handler in self._server.connections:
+            if handler.transport is not None:
+                # None if the client had disconnected before.
+                others.add(handler.transport.get_extra_info("peername") or ("",))
+        address = peer[0]
+        if sum(other[0] == address for other in others) >= MAX_OF_ADDRESS:
             self._log.warn(f"web viewer: too many connections from {address}")
             return False
         if len(others) >= connection_limit(MAX_CONNECTIONS):

@@ -63,6 +63,17 @@ test("a link that is opened in the same tab replaces view, selection and display
   assert.deepEqual([stage.isFitting, session.selectedName, session.displays.frames], [true, null, true]);
 });
 
+test("a link that is opened while a change waits to be written replaces the view", (t) => {
+  const { stage } = open(t);
+  stage.moveView((camera) => {
+    camera.x = 1;
+  });
+  window.location.hash = "#x=3&y=2&zoom=30";
+  t.mock.timers.tick(300);
+  dispatch(window, "hashchange");
+  assert.deepEqual([stage.camera.x, window.location.hash], [3, "#x=3&y=2&zoom=30"]);
+});
+
 test("the page does not read what it has written", (t) => {
   const { session, stage, link } = open(t);
   stage.moveView((camera) => {

@@ -195,9 +195,15 @@ class Chromium:
 
     def until(self, expression: str, *arguments: Any) -> Any:
         """Waits until an expression of JavaScript is true, and returns its value."""
-        return wait_until(
-            expression, lambda: self.evaluate(expression, *arguments), poll_period=0.02
-        )
+        try:
+            return wait_until(
+                expression, lambda: self.evaluate(expression, *arguments), poll_period=0.02
+            )
+        except BaseException as error:
+            path = self.downloads / "not_fulfilled.png"
+            path.write_bytes(self.driver.get_screenshot_as_png())
+            error.add_note(f"the page is {self.driver.current_url}, see {path}")
+            raise
 
     def resize(self, width: int, height: int, *, touch: bool = False) -> None:
         """Sets the size of the page [CSS pixels], and whether it has a touch screen."""

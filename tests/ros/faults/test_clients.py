@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import os
 import resource
 import signal
 import socket
@@ -65,6 +66,10 @@ class Node:
     def files(self) -> int:
         """Returns the number of open files."""
         return count_files(self.pid)
+
+    def open_files(self) -> list[str]:
+        """Returns what is open, for the message of a failure."""
+        return [os.readlink(path) for path in Path(f"/proc/{self.pid}/fd").iterdir()]
 
     def connections(self) -> str:
         """Returns the connections of all topics, with the names of the other nodes."""
@@ -179,14 +184,14 @@ def test_killed_subscriber_leaves_nothing_behind(
         wait_until("its connections", lambda: "/killed" in node.connections())
         subscriber.send(signal.SIGKILL)
         subscriber.wait()
-        wait_until(
-            "files and threads as before",
-            lambda: (
-                "/killed" not in node.connections()
-                and node.files() <= before[0]
-                and node.status("Threads") <= before[1]
-            ),
-        )
+
+        def is_as_before() -> bool:
+            assert "/killed" not in node.connections()
+            assert node.files() <= before[0], node.open_files()
+            assert node.status("Threads") <= before[1]
+            return True
+
+        wait_until("files and threads as before", is_as_before)
     finally:
         ros.call("/resume", Empty)
     node.assert_serves()

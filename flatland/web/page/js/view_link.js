@@ -18,14 +18,15 @@ export class ViewLink {
     this.stage = stage;
     /** @type {number | undefined} */
     this.timer = undefined;
-    this.written = "";
+    /** The hash of the address when it was read or written last. */
+    this.known = "";
     /** World of the address, as long as the server has not listed the world.
      * @type {number | null} */
     this.wantedWorld = null;
     this.defaults = { ...session.displays };
     this.read();
     window.addEventListener("hashchange", () => {
-      if (window.location.hash !== this.written) this.read();
+      if (window.location.hash !== this.known) this.read();
     });
     const schedule = () => this.schedule();
     stage.on("view", schedule);
@@ -47,7 +48,8 @@ export class ViewLink {
   /** Applies the hash of the address. */
   read() {
     const { session, stage } = this;
-    const values = new URLSearchParams(window.location.hash.slice(1));
+    this.known = window.location.hash;
+    const values = new URLSearchParams(this.known.slice(1));
     /** @type {(name: string) => number | null} */
     const number = (name) => {
       const text = values.get(name);
@@ -106,9 +108,12 @@ export class ViewLink {
   /** Writes the current view into the address without adding an entry to the history. */
   write() {
     window.clearTimeout(this.timer);
-    this.written = this.hash();
-    if (this.written === window.location.hash) return;
-    const { pathname, search } = window.location;
-    window.history.replaceState(null, "", `${pathname}${search}${this.written}`);
+    const { pathname, search, hash } = window.location;
+    // The user has opened another link, and the browser reports it next.
+    if (hash !== this.known) return;
+    const written = this.hash();
+    if (written === hash) return;
+    window.history.replaceState(null, "", `${pathname}${search}${written}`);
+    this.known = window.location.hash;
   }
 }
