@@ -44,7 +44,8 @@ LOAD := 0
 
 .PHONY: test-repeat
 test-repeat: setup-dev  ## run all tests repeatedly, list those that ever failed: make test-repeat [N=20] [LOAD=2]
-	@. ./setup.bash && python tools/repeat_tests.py --runs $(N) --load $(LOAD) $(PYTEST_OPTIONS) $(ARGS)
+	@. ./setup.bash && python tools/repeat_tests.py --runs $(N) --load $(LOAD) $(PYTEST_OPTIONS) \
+		--hypothesis-profile=random $(ARGS)
 
 .PHONY: test-learning
 test-learning: setup-dev  ## install PyTorch and Ray in build/learning, test examples/learning and examples/sweep

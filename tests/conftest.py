@@ -10,15 +10,18 @@ from pathlib import Path
 import pytest
 from hypothesis import HealthCheck, settings
 
-# How fast a loaded machine is says nothing about the code. The examples are new in each run, also
-# in CI: a failure prints the blob that reproduces it, and belongs into the test as an @example.
-settings.register_profile(
-    "flatland",
-    deadline=None,
-    derandomize=False,
-    print_blob=True,
-    suppress_health_check=[HealthCheck.too_slow],
-)
+# How fast a loaded machine is says nothing about the code. The examples are the same in each run,
+# so that a change that fails has caused it; `--hypothesis-profile=random`, which
+# `make test-repeat` selects, draws new ones. A failure prints the blob that reproduces it, and
+# belongs into the test as an @example.
+for _name in ("flatland", "random"):
+    settings.register_profile(
+        _name,
+        deadline=None,
+        derandomize=_name == "flatland",
+        print_blob=True,
+        suppress_health_check=[HealthCheck.too_slow],
+    )
 settings.load_profile("flatland")
 
 _TESTS = Path(__file__).resolve().parent

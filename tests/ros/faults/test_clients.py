@@ -69,7 +69,11 @@ class Node:
 
     def open_files(self) -> list[str]:
         """Returns what is open, for the message of a failure."""
-        return [os.readlink(path) for path in Path(f"/proc/{self.pid}/fd").iterdir()]
+        opened = []
+        for path in Path(f"/proc/{self.pid}/fd").iterdir():
+            with contextlib.suppress(FileNotFoundError):
+                opened.append(os.readlink(path))
+        return opened
 
     def connections(self) -> str:
         """Returns the connections of all topics, with the names of the other nodes."""
@@ -167,6 +171,16 @@ rospy.spin()
 """
 
 
+def _kill_subscriber(node: Node, launcher: Any, program: str) -> None:
+    """Kills a subscriber that is connected, and waits until the node has closed its connections."""
+    subscriber = launcher.program(sys.executable, "-c", program)
+    subscriber.wait_for_line("connected")
+    wait_until("its connections", lambda: "/killed" in node.connections())
+    subscriber.send(signal.SIGKILL)
+    subscriber.wait()
+    wait_until("their end", lambda: "/killed" not in node.connections())
+
+
 @pytest.mark.parametrize("paused", [False, True])
 def test_killed_subscriber_leaves_nothing_behind(
     node: Node, launcher: Any, ros: Any, paused: bool
@@ -178,15 +192,12 @@ def test_killed_subscriber_leaves_nothing_behind(
             program = KILLED.replace('("/clock", Clock), ("/scan", LaserScan), ', "")
         else:
             program = KILLED
+        # The first one has lasting effects: connections of XML-RPC that are kept for later calls.
+        _kill_subscriber(node, launcher, program)
         before = node.settled()
-        subscriber = launcher.program(sys.executable, "-c", program)
-        subscriber.wait_for_line("connected")
-        wait_until("its connections", lambda: "/killed" in node.connections())
-        subscriber.send(signal.SIGKILL)
-        subscriber.wait()
+        _kill_subscriber(node, launcher, program)
 
         def is_as_before() -> bool:
-            assert "/killed" not in node.connections()
             assert node.files() <= before[0], node.open_files()
             assert node.status("Threads") <= before[1]
             return True
@@ -237,22 +248,21 @@ def test_rubbish_on_the_port_of_tcpros(
 
 
 @pytest.fixture(scope="module")
-def incomplete() -> Iterator[list[socket.socket]]:
+def incomplete(node: Node) -> Iterator[list[socket.socket]]:
     """Connections with incomplete headers, which stay open for the other tests."""
-    opened: list[socket.socket] = []
-    yield opened
-    for connection in opened:
-        connection.close()
+    header = tcpros.header({"topic": "/clock", "callerid": "/half"})
+    with contextlib.ExitStack() as stack:
+        opened = []
+        for size in (0, 1, 4, 5, len(header) - 1):
+            opened.append(stack.enter_context(tcpros.connect(node.tcpros)))
+            opened[-1].sendall(header[:size])
+        yield opened
 
 
 def test_half_headers_block_no_other_client(
     node: Node, incomplete: list[socket.socket], connections: list[socket.socket]
 ) -> None:
-    header = tcpros.header({"topic": "/clock", "callerid": "/half"})
     request = b"POST / HTTP/1.1\r\nHost: node\r\nContent-Length: 1000\r\n\r\n<?xml"
-    for size in (0, 1, 4, 5, len(header) - 1):
-        incomplete.append(tcpros.connect(node.tcpros))
-        incomplete[-1].sendall(header[:size])
     for size in (0, 1, 20, len(request)):
         connections.append(tcpros.connect(node.xmlrpc))
         connections[-1].sendall(request[:size])
@@ -388,7 +398,6 @@ def test_incomplete_headers_are_closed_after_some_time(
     node: Node, incomplete: list[socket.socket]
 ) -> None:
     """Last, because the time limit is 10 s."""
-    assert incomplete
     for connection in incomplete:
         assert is_closed(connection)
     node.process.wait_for_line(r"\[WARN\].*closed a connection from .*: its header is not complete")
