@@ -350,6 +350,8 @@ class RandomCalls(ControllerCalls):
             self._require(is_physics or bool(failed), "ends without a reason")
             if report is not None:
                 self.invalid = set(report[1])
+            if end == RunEnd.LAST_CALLS:
+                break
             _, end, _, failed, report = self.world.jobs.run(*run._replace(n=1, continues=True))
         self._require(self.invalid <= set(self.objects.fixtures), "reports unknown bodies")
 
