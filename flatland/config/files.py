@@ -33,12 +33,31 @@ IMAGE_SUFFIXES: Final = frozenset(
 )
 LFS_START: Final = b"version https://git-lfs"
 LFS_HINT: Final = 'the file is a pointer of Git LFS; "git lfs pull" downloads its content'
-_IMAGE_STARTS: Final = (
-    *(b"\x89PNG", b"\xff\xd8\xff", b"GIF8", b"BM", b"II*\0", b"MM\0*", b"RIFF"),
-    *(b"P%d%c" % (number, space) for number in range(1, 7) for space in b" \t\r\n"),
+# The names of the formats in Pillow, by the first bytes of a file.
+_IMAGE_FORMATS: Final = (
+    (re.compile(rb"\x89PNG"), "Png"),
+    (re.compile(rb"P[1-6][\s#]"), "Ppm"),
+    (re.compile(rb"\xff\xd8\xff"), "Jpeg"),
+    (re.compile(rb"BM.*\0", re.S), "Bmp"),  # Without a null byte, it may be a text.
+    (re.compile(rb"II[*+]\0|MM\0[*+]"), "Tiff"),
+    (re.compile(rb"RIFF....WEBP", re.S), "WebP"),
+    (re.compile(rb"\xff\x4f\xff\x51|\0\0\0\x0cjP  \r\n\x87\n"), "Jpeg2K"),
+    (re.compile(rb"\x59\xa6\x6a\x95"), "Sun"),
+    (re.compile(rb"GIF8[79]a"), "Gif"),
 )
+SIGNATURE_SIZE: Final = 32  # bytes that decide about the format
 _NUMBER: Final = re.compile(rb"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?")
 _MAX_START: Final = 4096  # bytes in which a line segment is searched
+
+
+def image_format(content: bytes) -> str | None:
+    """Returns the name of the format of an image in Pillow, None if it is not an image.
+
+    Args:
+        content: The content of the file, or its first 32 bytes.
+    """
+    signature = content[:SIGNATURE_SIZE]
+    return next((name for pattern, name in _IMAGE_FORMATS if pattern.match(signature)), None)
 
 
 def foreign_kind(content: bytes) -> Literal["image", "data"] | None:
@@ -50,7 +69,7 @@ def foreign_kind(content: bytes) -> Literal["image", "data"] | None:
     Returns:
         `image`; `data` for a file of line segments; otherwise None.
     """
-    if content.startswith(_IMAGE_STARTS) and (content[:2] != b"BM" or b"\0" in content[:32]):
+    if image_format(content) is not None:
         return "image"
     lines = (line.strip() for line in content[:_MAX_START].splitlines())
     words = next((line for line in lines if line and not line.startswith(b"#")), b"").split()

@@ -9,7 +9,6 @@ from __future__ import annotations
 import contextlib
 import importlib
 import mmap
-import re
 import struct
 import threading
 from collections.abc import Callable
@@ -18,7 +17,7 @@ from typing import Any, BinaryIO, Final
 import numpy as np
 import numpy.typing as npt
 
-from flatland.config.files import open_regular
+from flatland.config.files import SIGNATURE_SIZE, image_format, open_regular
 
 GreyImage = npt.NDArray[np.uint8]
 Pixels = npt.NDArray[Any]
@@ -26,21 +25,6 @@ Pixels = npt.NDArray[Any]
 MAX_SIDE: Final = 2**20  # pixels
 MAX_PIXELS = 2**30
 _STRIP_PIXELS: Final = 2**20
-
-# The names of the formats in Pillow, by the first bytes of a file. `Image.open` would import the
-# modules of all formats for some of them, and warn about images of more than 90 million pixels.
-_FORMATS: Final = (
-    (re.compile(rb"\x89PNG\r\n\x1a\n"), "Png"),
-    (re.compile(rb"P[1-6][\s#]"), "Ppm"),
-    (re.compile(rb"\xff\xd8\xff"), "Jpeg"),
-    (re.compile(rb"BM"), "Bmp"),
-    (re.compile(rb"II[*+]\0|MM\0[*+]"), "Tiff"),
-    (re.compile(rb"RIFF....WEBP", re.S), "WebP"),
-    (re.compile(rb"\xff\x4f\xff\x51|\0\0\0\x0cjP  \r\n\x87\n"), "Jpeg2K"),
-    (re.compile(rb"\x59\xa6\x6a\x95"), "Sun"),
-    (re.compile(rb"GIF8[79]a"), "Gif"),
-)
-_SIGNATURE_SIZE: Final = 12
 # Weights of red, green and blue; the sums are powers of two.
 _OF_GREY: Final = (4899, 9617, 1868)  # in decoders of OpenCV that return grey
 _OF_COLORS: Final = (9798, 19235, 3735)  # in its conversion of colours
@@ -77,8 +61,9 @@ def read_grey_image(path: str) -> GreyImage:
 
 
 def _read(file: BinaryIO) -> GreyImage:
-    signature = file.read(_SIGNATURE_SIZE)
-    kind = next((kind for pattern, kind in _FORMATS if pattern.match(signature)), None)
+    # `PIL.Image.open` would import the modules of all formats for some of them, and warn about
+    # images of more than 90 million pixels.
+    kind = image_format(file.read(SIGNATURE_SIZE))
     if kind is None:
         raise ValueError("its format is unknown")
     if kind != "Tiff":

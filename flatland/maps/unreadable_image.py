@@ -42,7 +42,8 @@ def why_unreadable(path: str, error: OSError) -> str:
         return "the file is not an image"
     if _is_truncated(head, tail, size):
         return f"the image is truncated after {size} bytes; copy or download the file again"
-    return "the image is damaged, or its format is not supported"
+    detail = f" ({error.__cause__})" if str(error.__cause__ or "") else ""
+    return f"the image is damaged, or its format is not supported{detail}"
 
 
 def _is_truncated(head: bytes, tail: bytes, size: int) -> bool:

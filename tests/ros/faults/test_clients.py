@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import os
 import resource
 import signal
 import socket
@@ -72,7 +71,7 @@ class Node:
         opened = []
         for path in Path(f"/proc/{self.pid}/fd").iterdir():
             with contextlib.suppress(FileNotFoundError):
-                opened.append(os.readlink(path))
+                opened.append(str(path.readlink()))
         return opened
 
     def connections(self) -> str:

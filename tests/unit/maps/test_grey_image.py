@@ -17,6 +17,7 @@ from programs import run_program
 
 from flatland.maps import grey_image
 from flatland.maps.grey_image import read_grey_image
+from flatland.maps.unreadable_image import why_unreadable
 
 Pixels = npt.NDArray[Any]
 
@@ -272,24 +273,29 @@ def test_neither_opencv_nor_other_formats_are_imported(tmp_path: Path) -> None:
     assert result.stderr == ""
 
 
+DAMAGED = "the image is damaged, or its format is not supported"
+
+
 @pytest.mark.parametrize(
-    ("name", "reason"),
+    ("name", "reason", "hint"),
     [
-        ("nothing", "No such file"),
-        ("folder", "not a regular file"),
-        ("text", "its format is unknown"),
-        ("empty", "its format is unknown"),
-        ("cut png", "truncated"),
-        ("cut pgm", "truncated"),
-        ("cut jpg", "truncated"),
-        ("cut tif", ""),
-        ("large", "200000 x 200000 pixels"),
-        ("broad", "2000000 x 1 pixels"),
-        ("broken tif", ""),
-        ("float tif", "in mode F"),
+        ("nothing", "No such file", "the file does not exist"),
+        ("folder", "not a regular file", "the file cannot be read: it is not a regular file"),
+        ("text", "its format is unknown", "the file is not an image"),
+        ("empty", "its format is unknown", "the file is empty"),
+        ("cut png", "truncated", "the image is truncated after 600 bytes"),
+        ("cut pgm", "truncated", "the image is truncated after 600 bytes"),
+        ("cut jpg", "truncated", "the image is truncated after 600 bytes"),
+        ("cut tif", "", DAMAGED),
+        ("large", "200000 x 200000 pixels", "the image is truncated"),
+        ("cut jp2", "", DAMAGED),
+        ("png with other line ends", "", DAMAGED),
+        ("broad bmp", "2000000 x 1 pixels", f"{DAMAGED} (2000000 x 1 pixels are more"),
+        ("broken tif", "", DAMAGED),
+        ("float tif", "in mode F", f"{DAMAGED} (TIFF with pixels of (32,) bits in mode F)"),
     ],
 )
-def test_invalid_images(tmp_path: Path, name: str, reason: str) -> None:
+def test_invalid_images(tmp_path: Path, name: str, reason: str, hint: str) -> None:
     path = tmp_path / name
     contents = {
         "text": b"no image\n",
@@ -299,7 +305,10 @@ def test_invalid_images(tmp_path: Path, name: str, reason: str) -> None:
         "cut jpg": FILES["JPEG L"][:600],
         "cut tif": FILES["TIFF L"][:600],
         "large": b"P5\n200000 200000\n255\n",
-        "broad": b"P5\n2000000 1\n255\n",
+        "cut jp2": b"\xff\x4f\xff\x51" + bytes(20),
+        "png with other line ends": FILES["PNG L"].replace(b"\r\n", b"\n"),
+        "broad bmp": b"BM"
+        + struct.pack("<IIIIiiHHIIIIII", 80, 0, 54, 40, 2000000, 1, 1, 24, *[0] * 6),
         "broken tif": b"II*\0\xff\xff\xff\xff",
         "float tif": saved(Pillow.fromarray(GREY.astype(np.float32)), "TIFF"),
     }
@@ -307,5 +316,6 @@ def test_invalid_images(tmp_path: Path, name: str, reason: str) -> None:
         path.mkdir()
     elif name in contents:
         path.write_bytes(contents[name])
-    with pytest.raises(OSError, match=rf"(?s){reason}.*{name}|{name}.*{reason}"):
+    with pytest.raises(OSError, match=rf"(?s){reason}.*{name}|{name}.*{reason}") as caught:
         read_grey_image(str(path))
+    assert why_unreadable(str(path), caught.value).startswith(hint)
