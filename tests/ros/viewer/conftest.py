@@ -236,26 +236,36 @@ class Picture:
 
 
 @pytest.fixture
-def screenshot(screen: Any, tmp_path: Path) -> Callable[..., Picture]:
-    """Takes screenshots until one is accepted, and returns it; the check may assert."""
+def screenshot(screen: Any, tmp_path: Path) -> Callable[..., Picture | None]:
+    """Takes screenshots until one is accepted, and returns it; the check may assert.
+
+    Returns None if the program has ended, which is asked before each screenshot.
+    """
 
     def screenshot(
-        accept: Callable[[Picture], Any], area: Mapping[str, int] | None = None
-    ) -> Picture:
+        accept: Callable[[Picture], Any],
+        area: Mapping[str, int] | None = None,
+        *,
+        has_ended: Callable[[], bool] = lambda: False,
+    ) -> Picture | None:
         image = None
+        accepted: Picture | None = None
 
-        def accepted() -> Picture | None:
-            nonlocal image
+        def is_done() -> bool:
+            nonlocal image, accepted
+            if has_ended():
+                return True
             image = screen.picture()
             picture = Picture(image, area)
-            return picture if accept(picture) else None
+            accepted = picture if accept(picture) else None
+            return accepted is not None
 
         path = tmp_path / "screen.png"
         try:
-            picture: Picture = wait_until(f"the picture {path}", accepted, poll_period=0.1)
+            wait_until(f"the picture {path}", is_done, poll_period=0.1)
         except pytest.fail.Exception:
             cv2.imwrite(str(path), image[:, :, ::-1])
             raise
-        return picture
+        return accepted
 
     return screenshot

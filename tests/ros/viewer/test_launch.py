@@ -39,7 +39,9 @@ def subscriptions(node: str) -> set[str]:
     return {topic for topic, names in subscribers if node in names}
 
 
-def launch_rviz(on_screen: Any, room: Path, eventually: Callable[..., Any]) -> Any:
+def launch_rviz(
+    on_screen: Any, room: Path, screenshot: Callable[..., Any], eventually: Callable[..., Any]
+) -> Any:
     """Starts the simulator and RViz, again if RViz crashes, as it does in 1 of 100 starts."""
     wanted = {
         *("/tf", "/scan", "/odometry/filtered", "/interactive_model_markers/update"),
@@ -51,10 +53,10 @@ def launch_rviz(on_screen: Any, room: Path, eventually: Callable[..., Any]) -> A
         return re.search(r"rviz-\d+. process has died", launch.output) is not None
 
     eventually("all subscriptions of RViz", lambda: has_died() or subscriptions("/rviz") >= wanted)
-    if not has_died():
+    if screenshot(lambda picture: True, RVIZ_PANEL, has_ended=has_died) is not None:
         return launch
     launch.stop()
-    return launch_rviz(on_screen, room, eventually)
+    return launch_rviz(on_screen, room, screenshot, eventually)
 
 
 def test_rviz_displays_everything_without_user_input(
@@ -65,7 +67,7 @@ def test_rviz_displays_everything_without_user_input(
     screenshot: Callable[..., Any],
     eventually: Callable[..., Any],
 ) -> None:
-    launch = launch_rviz(on_screen, room, eventually)
+    launch = launch_rviz(on_screen, room, screenshot, eventually)
 
     def shows_scan_and_robot(picture: Any) -> bool:
         # Seen from above, the scan is on the walls and the robot is at its pose.
