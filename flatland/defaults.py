@@ -14,6 +14,8 @@ WEB_HOST: Final = "127.0.0.1"
 """Default of the address that the viewer for the browser listens on."""
 WEB_PORT: Final = 8000
 """Default of its port."""
+WEB_MIN_TOKEN: Final = 16
+"""Smallest number of characters of a token of that viewer."""
 
 IfBlocked = Literal["allow", "warn", "refuse", "nearest"]
 """What happens to a model that is placed at a pose that is not free."""

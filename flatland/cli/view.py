@@ -18,7 +18,7 @@ from flatland.cli.arguments import (
     positive,
 )
 from flatland.cli.progress import StopSignals
-from flatland.defaults import WEB_HOST, WEB_PORT
+from flatland.defaults import WEB_HOST, WEB_MIN_TOKEN, WEB_PORT
 from flatland.simulation import Simulation
 
 if TYPE_CHECKING:
@@ -61,6 +61,12 @@ def add(commands: Commands) -> None:
         "--token",
         type=_token,
         help="secret that browsers must send (default: none for this machine, else random)",
+    )
+    parser.add_argument(
+        "--view-token",
+        type=_token,
+        metavar="TOKEN",
+        help="another secret, with which browsers cannot change the world; its address is printed",
     )
     parser.add_argument("--read-only", action="store_true", help="browsers cannot change the world")
     parser.add_argument(
@@ -105,6 +111,8 @@ def _run(options: argparse.Namespace) -> int:
             simulation = Simulation(world, rate)
             viewer.add_world(world, simulation=simulation)
             print(f"{options.path} is shown at {viewer.url}", flush=True)
+            if viewer.view_url is not None:
+                print(f"for viewers: {viewer.view_url}", flush=True)
             if not options.no_browser and _has_display():
                 threading.Thread(target=_open_browser, args=[viewer.url], daemon=True).start()
             ended = threading.Event()
@@ -125,6 +133,7 @@ def _create_viewer(options: argparse.Namespace) -> WebViewer:
         options.host,
         options.port,
         token=options.token,
+        view_token=options.view_token,
         read_only=options.read_only,
         title=f"{options.path.parent.name}/{options.path.name}".lstrip("/"),
     )
@@ -157,8 +166,10 @@ def _port(text: str) -> int:
 
 
 def _token(text: str) -> str:
-    if not text or not text.isprintable():
-        raise argparse.ArgumentTypeError("must not be empty or contain control characters")
+    if len(text) < WEB_MIN_TOKEN or not text.isprintable():
+        raise argparse.ArgumentTypeError(
+            f"must have at least {WEB_MIN_TOKEN} characters, and no control characters"
+        )
     return text
 
 

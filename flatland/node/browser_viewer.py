@@ -80,6 +80,8 @@ class BrowserViewer:
                 if not self._closing.is_set():
                     self._viewer = viewer
                     _LOG.info("viewer in the browser: %s", viewer.url)
+                    if viewer.view_url is not None:
+                        _LOG.info("for viewers: %s", viewer.view_url)
                     return
             viewer.close()
 
@@ -97,6 +99,7 @@ class BrowserViewer:
             parameters.web_host,
             parameters.web_port,
             token=parameters.web_token,
+            view_token=parameters.web_view_token,
             read_only=parameters.web_read_only,
         )
         try:

@@ -271,6 +271,11 @@ class NodeParameters:
     web_token: str | None = _row(
         _token, None, "Text that the address of the viewer must contain; None: see docs/viewer.md."
     )
+    web_view_token: str | None = _row(
+        _token,
+        None,
+        "Text in the address of viewers, who cannot change the world; None: none.",
+    )
     web_read_only: bool = _row(_boolean, False, "Whether the page only displays the world.")
 
 

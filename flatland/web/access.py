@@ -1,4 +1,4 @@
-"""Access control: the token, and the origin of the page that opens a connection."""
+"""Access control: tokens, and the origin of the page that opens a connection."""
 
 from __future__ import annotations
 
@@ -9,6 +9,8 @@ import socket
 from dataclasses import dataclass
 from urllib.parse import quote, urlsplit
 
+from flatland.defaults import WEB_MIN_TOKEN
+
 
 @dataclass(frozen=True, slots=True)
 class Access:
@@ -17,23 +19,52 @@ class Access:
     Attributes:
         host: Address that the server listens on.
         token: Token that clients must send, None if no token is required.
+        view_token: Another token, for clients that cannot change a world; None if there is none.
+        read_only: Whether no client can change a world.
     """
 
     host: str
     token: str | None
+    view_token: str | None = None
+    read_only: bool = False
 
     @classmethod
-    def for_host(cls, host: str, token: str | None) -> Access:
-        """Returns the access for an address, with a random token if one is required and missing."""
-        if token is None and not is_loopback(host):
+    def for_host(
+        cls,
+        host: str,
+        token: str | None,
+        view_token: str | None = None,
+        *,
+        read_only: bool = False,
+    ) -> Access:
+        """Returns the access for an address, with a random token if one is required and missing.
+
+        Raises:
+            ValueError: A token is too short, or both are equal.
+        """
+        for given in (token, view_token):
+            if given is not None and len(given) < WEB_MIN_TOKEN:
+                raise ValueError(
+                    f"a token must have at least {WEB_MIN_TOKEN} characters, got {len(given)}"
+                )
+        if view_token is not None and view_token == token:
+            raise ValueError("the token of viewers must differ from the other token")
+        if token is None and (view_token is not None or not is_loopback(host)):
             token = secrets.token_urlsafe(16)
-        return cls(host, token)
+        return cls(host, token, view_token, read_only)
 
     def allows_token(self, token: str) -> bool:
         """Returns whether a token is valid; takes the same time for all invalid tokens."""
         if self.token is None:
             return True
-        return hmac.compare_digest(token.encode("utf-8", "replace"), self.token.encode())
+        return _equal(token, self.token) | self._is_view_token(token)
+
+    def is_read_only(self, token: str) -> bool:
+        """Returns whether a client with a valid token cannot change a world."""
+        return self.read_only or self._is_view_token(token)
+
+    def _is_view_token(self, token: str) -> bool:
+        return self.view_token is not None and _equal(token, self.view_token)
 
     def allows_host(self, host: str) -> bool:
         """Returns whether the header `Host` of a request is accepted.
@@ -58,12 +89,16 @@ class Access:
             f"https://{host.lower()}",
         )
 
-    def url(self, port: int) -> str:
-        """Returns the address of the page."""
+    def url(self, port: int, token: str | None) -> str:
+        """Returns the address of the page, with a token if it is given."""
         name = _reachable_name(self.host)
         name = f"[{name}]" if ":" in name else name
-        query = "" if self.token is None else f"?token={quote(self.token, safe='')}"
+        query = "" if token is None else f"?token={quote(token, safe='')}"
         return f"http://{name}:{port}/{query}"
+
+
+def _equal(given: str, token: str) -> bool:
+    return hmac.compare_digest(given.encode("utf-8", "replace"), token.encode())
 
 
 def is_loopback(host: str) -> bool:

@@ -24,18 +24,27 @@ class Client:
     """One connection: what the client looks at, and what the client has received.
 
     Attributes:
+        read_only: Whether the client cannot change a world.
         waiting: Number of requests of the client without a reply.
         connected: Whether the connection has not ended.
         notify: Makes the client send the messages that are new.
     """
 
-    def __init__(self, socket: web.WebSocketResponse, feeds: Mapping[int, WorldFeed]) -> None:
+    def __init__(
+        self,
+        socket: web.WebSocketResponse,
+        feeds: Mapping[int, WorldFeed],
+        *,
+        read_only: bool,
+    ) -> None:
         """Creates a client that looks at no world.
 
         Args:
             socket: The connection.
             feeds: The worlds by index; may change.
+            read_only: Whether the client cannot change a world.
         """
+        self.read_only = read_only
         self.waiting = 0
         self.connected = True
         self._socket = socket

@@ -34,13 +34,8 @@ _Drive = tuple["Client", WorldFeed, str]  # the last part is the topic
 class Commands:
     """Performs the requests of clients; all methods are called in the thread of the loop."""
 
-    def __init__(self, read_only: bool) -> None:
-        """Creates an object without holds and moving robots.
-
-        Args:
-            read_only: Whether clients see only those model files that the list contains.
-        """
-        self._read_only = read_only
+    def __init__(self) -> None:
+        """Creates an object without holds and moving robots."""
         self._newest = _Newest()
         self._holds: dict[_Hold, float] = {}  # wall time at which each hold ends [s]
         self._drives: dict[_Drive, float] = {}  # wall time at which each robot stops [s]
@@ -118,7 +113,7 @@ class Commands:
 
     async def _preview(self, client: Client, feed: WorldFeed, fields: Any) -> dict[str, Any]:
         # An error of another file would tell whether it exists.
-        if self._read_only and all(
+        if client.read_only and all(
             file["path"] != fields["file"] for file in await self._files(client, feed, fields)
         ):
             raise WorldError("a read-only viewer previews only the listed model files")

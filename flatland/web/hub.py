@@ -30,17 +30,15 @@ class Hub:
         commands: Performs the requests of clients.
     """
 
-    def __init__(self, title: str, read_only: bool) -> None:
+    def __init__(self, title: str) -> None:
         """Creates a hub without worlds.
 
         Args:
             title: Title of the page.
-            read_only: Whether to refuse all requests that change a world.
         """
         self.feeds: dict[int, WorldFeed] = {}
         self.clients: set[Client] = set()
-        self.commands = Commands(read_only)
-        self._read_only = read_only
+        self.commands = Commands()
         self._title = title
         self._tasks: dict[WorldFeed, asyncio.Task[None]] = {}
         self._jobs: set[asyncio.Task[None]] = set()
@@ -52,7 +50,7 @@ class Hub:
         self.feeds[feed.index] = feed
         self._tasks[feed] = asyncio.create_task(self._run(feed))
         for client in self.clients:
-            client.send(self._hello())
+            client.send(self._hello(client))
             client.update_feeds()
 
     async def _run(self, feed: WorldFeed) -> None:
@@ -83,13 +81,13 @@ class Hub:
 
     # -- clients ---------------------------------------------------------------------------
 
-    def _hello(self) -> dict[str, Any]:
+    def _hello(self, client: Client) -> dict[str, Any]:
         """Returns the first message of a connection; sent again when a world is added."""
         return {
             "type": "hello",
             "version": VERSION,
             "title": self._title,
-            "read_only": self._read_only,
+            "read_only": client.read_only,
             "worlds": [{"world": n, "name": feed.name} for n, feed in sorted(self.feeds.items())],
             "limits": {"message_size": MAX_SIZE, "messages_per_second": MAX_MESSAGES_PER_SECOND},
         }
@@ -97,7 +95,7 @@ class Hub:
     async def serve(self, client: Client) -> None:
         """Serves a connection until it ends."""
         self.clients.add(client)
-        client.send(self._hello())
+        client.send(self._hello(client))
         await client.run(self.receive, self.forget)
 
     def forget(self, client: Client) -> None:
@@ -133,7 +131,7 @@ class Hub:
         """
         if client.waiting > MAX_WAITING:
             raise FlatlandError("too many requests wait for the simulator")
-        if self._read_only and message.type not in READ_ONLY_TYPES:
+        if client.read_only and message.type not in READ_ONLY_TYPES:
             raise FlatlandError("this viewer is read-only")
         if message.type == "look":
             client.look(message)

@@ -125,13 +125,15 @@ class Server:
         if not socket.can_prepare(request):
             return web.Response(status=400, text="a WebSocket is expected\n")
         await socket.prepare(request)
-        if not self._access.allows_token(request.query.get("token", "")):
+        token = request.query.get("token", "")
+        if not self._access.allows_token(token):
             await asyncio.sleep(0.5)  # slows down attempts to guess the token
             await socket.close(code=WRONG_TOKEN, message=b"the token is missing or wrong")
         elif len(self._hub.clients) >= MAX_CLIENTS:
             await socket.close(code=WSCloseCode.TRY_AGAIN_LATER, message=b"too many clients")
         else:
-            await self._hub.serve(Client(socket, self._hub.feeds))
+            read_only = self._access.is_read_only(token)
+            await self._hub.serve(Client(socket, self._hub.feeds, read_only=read_only))
         return socket
 
 

@@ -63,6 +63,7 @@ class WebViewer:
         port: int = WEB_PORT,
         *,
         token: str | None = None,
+        view_token: str | None = None,
         read_only: bool = False,
         title: str = "flatland",
         embeddable: bool = False,
@@ -72,26 +73,26 @@ class WebViewer:
         Args:
             host: Address to listen on; `0.0.0.0` for all addresses of the machine.
             port: TCP port; 0 for any free one.
-            token: Token that clients must send. None for no token if `host` is a loopback address,
-                otherwise for a random token.
+            token: Token that clients must send, of at least 16 characters. None for no token if
+                `host` is a loopback address and there is no `view_token`, otherwise for a random
+                token.
+            view_token: Another token, for clients that cannot change a world.
             read_only: Whether to refuse all requests of clients that change a world.
             title: Title of the page.
             embeddable: Whether pages of all other sites may show the page in a frame; otherwise
                 only pages of this machine, if `host` is a loopback address.
 
         Raises:
-            ValueError: The port is out of range, or the token is empty.
+            ValueError: The port is out of range, a token is too short, or both are equal.
         """
         if not 0 <= port <= 65535:
             raise ValueError(f"port must be from 0 to 65535, got {port}")
-        if token is not None and not token:
-            raise ValueError("token must not be empty")
-        self._access = Access.for_host(host, token)
+        self._access = Access.for_host(host, token, view_token, read_only=read_only)
         self._port = port
         self._embeddable = embeddable
         self._loop: asyncio.AbstractEventLoop | None = None
         self._before_start: list[Callable[[], object]] = []
-        self._hub = Hub(title, read_only)
+        self._hub = Hub(title)
         self._ids = itertools.count(1)  # of models, bodies and lasers of all worlds
         self._shown: dict[WorldHandle, tuple[WorldFeed, WorldObserver]] = {}
         self._thread: threading.Thread | None = None
@@ -111,7 +112,13 @@ class WebViewer:
     @property
     def url(self) -> str:
         """Address of the page, with the token if there is one."""
-        return self._access.url(self.port)
+        return self._access.url(self.port, self.token)
+
+    @property
+    def view_url(self) -> str | None:
+        """Address of the page with the token of viewers, None without such a token."""
+        token = self._access.view_token
+        return None if token is None else self._access.url(self.port, token)
 
     @property
     def port(self) -> int:

@@ -25,6 +25,7 @@ VALUES: dict[str, object] = {
     "web_host": "0.0.0.0",
     "web_port": 0,
     "web_token": "secret",
+    "web_view_token": "other secret",
     "web_read_only": True,
     "simplify_map": 1,
     "seed": 7,

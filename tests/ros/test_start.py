@@ -155,6 +155,7 @@ def test_server_launch_passes_all_parameters(launcher: Any, ros: Any, world: Pat
         "web_host": "127.0.0.1",
         "web_port": 8000,
         "web_token": "",
+        "web_view_token": "",
         "web_read_only": False,
     }
     assert ros.master.getParam("/use_sim_time") is True

@@ -14,12 +14,12 @@ from flatland import Twist
 
 
 def test_the_page_requires_the_token(browser: Chromium, tmp_path: Path) -> None:
-    with viewed_room(tmp_path, token="a-secret-token") as room:
+    with viewed_room(tmp_path, token="the-secret-token") as room:
         url = room.viewer.url
-        assert "a-secret-token" in url
+        assert "the-secret-token" in url
         page = ViewerPage(browser)
         page.open(url)
-        browser.open(url.replace("a-secret-token", "another-token"))
+        browser.open(url.replace("the-secret-token", "another-token"))
         browser.until("document.querySelector('#message').innerText.includes('token')")
         assert browser.evaluate("flatland.state.worlds") == []
         browser.open("about:blank")

@@ -61,12 +61,14 @@ def test_the_options(world_file):
         "50",
         "--read-only",
         "--token",
-        "sesame",
+        "open the sesame!",
+        "--view-token",
+        "sesame for viewers",
         "--step-size",
         "0.01",
     ]
     with shown(world_file, *options) as (process, url):
-        assert url.endswith("/?token=sesame")
+        assert url.endswith("/?token=open%20the%20sesame%21")
         with RawWebClient(url, look=False) as client:
             assert client.wait("hello")["read_only"]
             client.ask("look", worlds=[0])
@@ -77,7 +79,8 @@ def test_the_options(world_file):
             process.send_signal(signal.SIGTERM)
             assert client.wait_closed()[0] == 1001
         output, errors = process.communicate(timeout=TIMEOUT)
-        assert (process.returncode, output, errors) == (143, "", "")
+        assert (process.returncode, errors) == (143, "")
+        assert re.fullmatch(r"for viewers: \S+/\?token=sesame%20for%20viewers\n", output)
 
 
 def test_it_ends_after_the_duration(world_file, capsys):
@@ -126,7 +129,8 @@ def test_an_invalid_world_is_an_error(capsys):
     [
         (("--port", "70000"), "must be an integer from 0 to 65535, got '70000'"),
         (("--port", "x"), "must be an integer from 0 to 65535, got 'x'"),
-        (("--token", ""), "must not be empty or contain control characters"),
+        (("--token", 15 * "a"), "must have at least 16 characters, and no control characters"),
+        (("--view-token", 16 * "\n"), "and no control characters"),
         (("--rate", "-1"), "must be a number above 0, got '-1'"),
         (("--step-size", "0"), "must be a number above 0, got '0'"),
     ],

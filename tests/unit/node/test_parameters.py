@@ -51,6 +51,7 @@ def test_defaults() -> None:
         web_host="127.0.0.1",
         web_port=8000,
         web_token=None,
+        web_view_token=None,
         web_read_only=False,
     )
 
@@ -115,6 +116,7 @@ VALID: list[tuple[str, object, object]] = [
     ("web_port", "0", 0),
     ("web_token", 7, "7"),
     ("web_token", " ", None),
+    ("web_view_token", "a token", "a token"),
     ("web_read_only", True, True),
     ("model_path", " ", None),
     ("model_path", "/usr:/tmp", ("/usr", "/tmp")),

@@ -105,10 +105,10 @@ def test_a_notebook_shows_the_page_in_a_frame(
 
 def test_a_further_call_replaces_the_view(world: World) -> None:
     first = world.view()
-    second = world.view(token="known", read_only=True)
+    second = world.view(token="a known token of a view", read_only=True)
     assert first.closed
     assert "closed" in repr(first)
-    assert second.url.endswith("?token=known")
+    assert second.url.endswith("?token=a%20known%20token%20of%20a%20view")
     assert second.url in repr(second)
     with pytest.raises(aiohttp.ClientConnectorError):
         WebClient(first.url)

@@ -206,6 +206,6 @@ class TestAccess:
         assert Access("127.0.0.1", "token").allows_host(host)
 
     def test_addresses(self):
-        assert Access("::1", None).url(80) == "http://[::1]:80/"
-        assert Access("localhost", "a b").url(80) == "http://localhost:80/?token=a%20b"
-        assert "0.0.0.0" not in Access.for_host("0.0.0.0", None).url(80)
+        assert Access("::1", None).url(80, None) == "http://[::1]:80/"
+        assert Access("localhost", None).url(80, "a b") == "http://localhost:80/?token=a%20b"
+        assert "0.0.0.0" not in Access.for_host("0.0.0.0", None).url(80, None)

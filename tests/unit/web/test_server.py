@@ -17,6 +17,8 @@ from flatland.errors import FlatlandError
 from flatland.web import WebViewer
 from flatland.web.access import Access
 
+TOKEN = "open-the-sesame-now"
+
 
 def get(url: str, **options: Any) -> tuple[int, Any, bytes]:
     """Returns the status, the headers and the body of an answer."""
@@ -44,9 +46,9 @@ class TestFiles:
     @pytest.mark.parametrize(
         ("options", "ancestors"),
         [
-            ({"token": "sesame"}, "'self' http://localhost:* http://127.0.0.1:*"),
-            ({"host": "0.0.0.0", "token": "sesame"}, "'self'"),
-            ({"host": "0.0.0.0", "token": "sesame", "embeddable": True}, "*"),
+            ({"token": TOKEN}, "'self' http://localhost:* http://127.0.0.1:*"),
+            ({"host": "0.0.0.0", "token": TOKEN}, "'self'"),
+            ({"host": "0.0.0.0", "token": TOKEN, "embeddable": True}, "*"),
         ],
     )
     def test_the_sites_that_may_show_the_page_in_a_frame(self, options, ancestors):
@@ -99,20 +101,48 @@ class TestAccess:
             assert get(viewer.url, headers={"Host": name})[0] == 200
 
     def test_a_token_is_required_if_the_viewer_has_one(self):
-        with WebViewer(port=0, token="sesame & co") as viewer:
-            assert viewer.url.endswith("/?token=sesame%20%26%20co")
+        with WebViewer(port=0, token="open, sesame & co") as viewer:
+            assert viewer.url.endswith("/?token=open%2C%20sesame%20%26%20co")
+            assert viewer.view_url is None
             with RawWebClient(viewer.url, look=False) as client:
                 client.wait("hello")
             plain = viewer.url.partition("?")[0]
             for wrong in (
                 plain,
                 f"{plain}?token=",
-                f"{plain}?token=Sesame",
+                f"{plain}?token=Open%2C%20sesame%20%26%20co",
                 f"{plain}?token=%c3%a4",
             ):
                 with RawWebClient(wrong, look=False) as client:
                     assert client.wait_closed() == (4401, "the token is missing or wrong")
                     assert client.received == []
+
+    def test_the_second_token_is_that_of_viewers(self, world, simulation):
+        with WebViewer(port=0, view_token=TOKEN) as viewer:
+            viewer.add_world(world, simulation=simulation)
+            assert viewer.view_url == f"http://127.0.0.1:{viewer.port}/?token={TOKEN}"
+            assert len(viewer.token or "") >= 20
+            with RawWebClient(viewer.view_url, look=False) as client:
+                assert client.wait("hello")["read_only"]
+                reply = client.reply("pause")
+                assert (reply["ok"], reply["error"]) == (False, "this viewer is read-only")
+            with RawWebClient(viewer.url, look=False) as client:
+                assert not client.wait("hello")["read_only"]
+                assert client.reply("pause")["ok"]
+            with RawWebClient(f"http://127.0.0.1:{viewer.port}/", look=False) as client:
+                assert client.wait_closed()[0] == 4401
+
+    @pytest.mark.parametrize(
+        ("tokens", "error"),
+        [
+            ({"token": 15 * "a"}, "a token must have at least 16 characters, got 15"),
+            ({"view_token": ""}, "a token must have at least 16 characters, got 0"),
+            ({"token": TOKEN, "view_token": TOKEN}, "the token of viewers must differ"),
+        ],
+    )
+    def test_invalid_tokens(self, tokens, error):
+        with pytest.raises(ValueError, match=error):
+            WebViewer(port=0, **tokens)
 
     def test_other_hosts_get_a_random_token(self):
         tokens = {Access.for_host("0.0.0.0", None).token for _ in range(3)}
