@@ -38,7 +38,8 @@ class FileStore:
 
     Attributes:
         contents: Contents of files by absolute path.
-        parsed: Results of `Inputs.parsed`, or its exceptions, by path and key.
+        parsed: Results of `Inputs.parsed`, or its exceptions, by path and key; and those of
+            `Inputs.made`.
         documents: Documents of YAML files by absolute path, and of YAML texts by the text itself,
             or the error of each. Each list can be used once, since preprocessing changes it.
         values: Values of parameters.
@@ -219,6 +220,17 @@ class Inputs:
         if isinstance(found, Exception):
             raise found
         return cast("T", found)
+
+    def made(self, source: Hashable, make: Callable[[], T]) -> T:
+        """Returns what the store of `using` has for a source that is not a file.
+
+        Args:
+            source: The source.
+            make: Returns the result if the store has none.
+        """
+        if self._ahead is None or self._is_loading or source not in self._ahead.parsed:
+            return make()
+        return cast("T", self._ahead.parsed[source])
 
     def note_file(self, path: str) -> None:
         """Adds a file to `files`.

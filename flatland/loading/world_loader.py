@@ -18,7 +18,6 @@ from flatland.geometry import IDENTITY
 from flatland.graph_names import resolve_topic
 from flatland.loading.materials import read_class, read_color, read_material
 from flatland.loading.world_source import WorldSource
-from flatland.maps.grid_map import grid_map
 from flatland.maps.map_file import LayerMap
 from flatland.plugin_api.missing_plugins import (
     MissingPluginsError,
@@ -222,7 +221,7 @@ def _load_layer(world: LoadedWorld, reader: YamlReader) -> None:
                 map_topic,
             )
         else:
-            layer_map = grid_map(grid, world.source.simplify_map)
+            layer_map = world.source.grid_map(grid)
     elif map_path:
         with reader.collect_errors():
             layer_map = _load_map(world.source, reader, map_path, names[0])

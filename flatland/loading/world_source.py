@@ -21,6 +21,7 @@ from flatland.config.node import Source
 from flatland.config.preprocessor import included_files, preprocess_text
 from flatland.config.reader import ReadYaml, YamlReader, read_yaml
 from flatland.errors import FlatlandError
+from flatland.maps.grid_map import grid_map
 from flatland.maps.map_file import LayerMap, load_map
 
 if TYPE_CHECKING:
@@ -161,6 +162,26 @@ class WorldSource:
         with made.inputs.using(store), suppress(FlatlandError):
             made.load_map(path, "")
         return store
+
+    def convert_grid_ahead(self, grid: OccupancyGrid) -> FileStore:
+        """Converts a grid that is about to become the map of a layer, in any thread.
+
+        `using` the result, `grid_map` only returns the geometry.
+
+        Raises:
+            MapFileError: The grid is invalid.
+        """
+        store = FileStore()
+        store.parsed[grid] = grid_map(grid, self.simplify_map)
+        return store
+
+    def grid_map(self, grid: OccupancyGrid) -> LayerMap:
+        """Returns the geometry of a grid; see `flatland.maps.grid_map.grid_map`.
+
+        Raises:
+            MapFileError: The grid is invalid.
+        """
+        return self.inputs.made(grid, lambda: grid_map(grid, self.simplify_map))
 
     def load_map(self, path: str, layer_name: str) -> LayerMap:
         """Reads a map file and its image or data file; see `flatland.maps.map_file.load_map`.

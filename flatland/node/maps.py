@@ -158,12 +158,15 @@ def _receive_layer(transport: Transport, simulation: Simulation, name: str, topi
     message_type, convert = transport.receivable(OccupancyGrid)
 
     def receive(message: Any) -> None:
+        world = simulation.world
         try:
             grid = convert(message)
+            store = world.source.convert_grid_ahead(grid)
         except FlatlandError as error:
             _log_failure(name, topic, error)
             return
-        done = simulation.post(lambda: simulation.world.set_layer_map(name, grid))
+        set_map = world.source.inputs.using(store)(world.set_layer_map)
+        done = simulation.post(lambda: set_map(name, grid))
         done.add_done_callback(lambda done: _log_result(name, topic, grid, done))
 
     transport.subscribe(topic, message_type, receive)

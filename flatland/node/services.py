@@ -332,7 +332,7 @@ class Services:
         has_grid = len(request.grid.data) > 0
         if has_grid == bool(request.map_path):
             raise CallError("exactly one of map_path and grid must be given")
-        layer, path = request.layer, request.map_path
+        layer, path, source = request.layer, request.map_path, self._world.source
         if not has_grid:
             return self._silent(
                 self._with_files(
@@ -342,9 +342,11 @@ class Services:
             )
         try:
             grid = self._transport.receivable(OccupancyGrid)[1](request.grid)
+            store = source.convert_grid_ahead(grid)
         except FlatlandError as error:
             raise CallError(error.text_with_hint) from error
-        return self._silent(lambda: self._world.set_layer_map(layer, grid))
+        set_map = source.inputs.using(store)(self._world.set_layer_map)
+        return self._silent(lambda: set_map(layer, grid))
 
     # -- results ---------------------------------------------------------------------------
 

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 
 from flatland.entities.layer import Layer
 from flatland.errors import WorldError
-from flatland.maps.grid_map import grid_map
 from flatland.maps.map_file import LayerMap
 from flatland.values import OccupancyGrid
 
@@ -124,7 +123,7 @@ class LayerSet:
 
     def _load(self, layer: Layer, source: str | OccupancyGrid) -> LayerMap:
         if isinstance(source, OccupancyGrid):
-            return grid_map(source, self._source.simplify_map)
+            return self._source.grid_map(source)
         if not source:
             raise WorldError(f'failed to set the map of layer "{layer.name}", the path is empty')
         return self._source.load_map(source, layer.name)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import threading
 from types import SimpleNamespace
 from typing import Any
 
@@ -11,6 +12,7 @@ import pytest
 from waiting import wait_until
 
 from flatland.errors import FlatlandError
+from flatland.maps.map_image import image_edges
 from flatland.maps.occupancy_grid import OccupancyGrid
 from flatland.node.parameters import ParameterError
 from flatland.node.transport import CallError
@@ -160,6 +162,26 @@ def test_a_layer_waits_for_its_map(start: Any, caplog: pytest.LogCaptureFixture)
     assert node.call("reset_world", seed=-1, keep_time=False).success
     assert ahead(node) == pytest.approx(4, abs=1e-5)
     assert 'Layer "2d": cannot use the map of topic "site/map"' in caplog.text
+
+
+def test_grids_are_converted_in_the_threads_that_receive_them(
+    start: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    threads = []
+
+    def convert(*arguments: Any) -> Any:
+        threads.append(threading.current_thread())
+        return image_edges(*arguments)
+
+    monkeypatch.setattr("flatland.maps.grid_map.image_edges", convert)
+    node = start(WAITING)
+    node.transport.callbacks["site/map"](box(9))
+    assert ahead(node) == pytest.approx(3, abs=1e-5)
+    node.transport.receivable = lambda _type: (OccupancyGrid, lambda _grid: box(11))
+    grid = SimpleNamespace(data=[0])
+    assert node.call("set_layer_map", layer="2d", map_path="", grid=grid).success
+    assert ahead(node) == pytest.approx(4, abs=1e-5)
+    assert threads == [threading.current_thread()] * 2
 
 
 def test_a_large_map_is_replaced(start: Any) -> None:
