@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import asyncio
 import re
+import time
 from collections.abc import Awaitable, Callable, Hashable
 from functools import partial
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, TypeVar
 
 from flatland.errors import WorldError
 from flatland.plugin_api.plugin import describe
@@ -23,6 +24,10 @@ if TYPE_CHECKING:
 HOLD_TIMEOUT: Final = 5.0  # s of wall time after which a hold that is not repeated ends
 DRIVE_TIMEOUT: Final = 0.5  # s of wall time after which a robot that is not commanded stops
 _CHECK_PERIOD: Final = 0.1  # s between two searches for such holds and robots
+READING_SHARE: Final = 0.05
+"""Largest share of a processor that previews and lists of files of all clients use on average."""
+
+T = TypeVar("T")
 
 _SUPERSEDED: Final = {"superseded": True}
 _NAME: Final = re.compile(r"[A-Za-z0-9_./ ()+-]+")
@@ -40,6 +45,8 @@ class Commands:
         self._holds: dict[_Hold, float] = {}  # wall time at which each hold ends [s]
         self._drives: dict[_Drive, float] = {}  # wall time at which each robot stops [s]
         self._active = asyncio.Event()
+        self._reading_due = 0.0  # wall time at which files may be read next for a preview [s]
+        self._reading_period = 0.0  # time between two such reads [s]
 
     async def perform(self, client: Client, feed: WorldFeed, message: Message) -> Any:
         """Performs a request for a world, and returns the result for the reply.
@@ -112,20 +119,45 @@ class Commands:
         return {"name": name}
 
     async def _preview(self, client: Client, feed: WorldFeed, fields: Any) -> dict[str, Any]:
-        # An error of another file would tell whether it exists.
-        if client.read_only and all(
-            file["path"] != fields["file"] for file in await self._files(client, feed, fields)
-        ):
-            raise WorldError("a read-only viewer previews only the listed model files")
-        return await read_in_time_async(lambda: preview(feed.world, fields["file"]))
+        def read() -> dict[str, Any]:
+            # An error of another file would tell whether it exists.
+            if client.read_only and all(
+                file["path"] != fields["file"] for file in model_files(feed.world)
+            ):
+                raise WorldError("a read-only viewer previews only the listed model files")
+            return preview(feed.world, fields["file"])
+
+        return await self._paced(read)
 
     async def _delete(self, _client: Client, feed: WorldFeed, fields: Any) -> None:
         number = fields["model"]
         await feed.requests.run(lambda: feed.controller.delete(feed.find_model(number).name))
 
     async def _files(self, _client: Client, feed: WorldFeed, _fields: Any) -> list[dict[str, str]]:
-        feed.contents.model_files = await read_in_time_async(lambda: model_files(feed.world))
+        feed.contents.model_files = await self._paced(lambda: model_files(feed.world))
         return feed.contents.model_files
+
+    async def _paced(self, read: Callable[[], T]) -> T:
+        """Returns the result of a function that reads files, called in another thread.
+
+        Calls wait so that all of them use `READING_SHARE` at most: parsing in another thread slows
+        down the simulation as well.
+        """
+
+        def timed() -> T:
+            start = time.thread_time()
+            try:
+                return read()
+            finally:
+                self._reading_period = (time.thread_time() - start) / READING_SHARE
+
+        while (left := self._reading_due - _now()) > 0:
+            await asyncio.sleep(left)
+        self._reading_due = _now() + self._reading_period
+        try:
+            return await read_in_time_async(timed)
+        finally:
+            self._reading_due = max(self._reading_due, _now() + self._reading_period)
 
     # -- velocity commands -----------------------------------------------------------------
 

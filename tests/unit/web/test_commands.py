@@ -123,6 +123,15 @@ class TestModels:
         release.set()
         assert client.wait("reply", lambda message: message["id"] == spawn)["ok"]
 
+    def test_many_previews_wait_for_each_other(self, client, monkeypatch: pytest.MonkeyPatch):
+        monkeypatch.setattr(commands, "READING_SHARE", 1e-9)
+        client.ask("preview", file="box.model.yaml")
+        waiting = [client.send("preview", file="box.model.yaml"), client.send("files")]
+        client.ask("pause")
+        client.ask("spawn", file="box.model.yaml", name="box", pose=[6, 6, 0])
+        replies = {m["id"] for m in client.received if isinstance(m, dict) and "id" in m}
+        assert not replies & set(waiting)
+
     def test_a_read_only_viewer_previews_listed_files_only(self, files, world):
         outside = files.folder.parent / "outside.model.yaml"
         outside.write_text("bodies: [{name: b, footprints: []}]")
