@@ -14,6 +14,7 @@ import socket
 import struct
 import threading
 import time
+import weakref
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from typing import Any, Final
@@ -39,6 +40,7 @@ _LOG = logging.getLogger("flatland")
 HANDSHAKE_TIMEOUT: Final = 10.0  # s from the connection to its complete header
 REQUEST_TIMEOUT: Final = 30.0  # s between two parts of a request of XML-RPC
 MAX_CONNECTIONS: Final = 256  # with an incomplete header, and as many of XML-RPC
+MAX_CLIENTS: Final = 16_384  # connections of subscribers and service clients
 MAX_HEADER_SIZE: Final = 1 << 20  # bytes
 MAX_REQUEST_SIZE: Final = 1 << 24  # bytes, of XML-RPC
 _MAX_FILES: Final = 65_536  # file descriptors that are requested from the system
@@ -119,7 +121,8 @@ class TcprosServer(rospy.impl.tcpros_base.TCPServer):  # type: ignore[misc]
 
     Headers are read as they arrive. A connection is closed if its header is not complete within
     `HANDSHAKE_TIMEOUT`, or, as the oldest one, if more than `MAX_CONNECTIONS` headers are
-    incomplete or no file descriptors are left.
+    incomplete or no file descriptors are left. A connection with a complete header is refused if
+    there are `MAX_CLIENTS` others.
     """
 
     def _create_server_sock(self) -> socket.socket:
@@ -134,6 +137,8 @@ class TcprosServer(rospy.impl.tcpros_base.TCPServer):  # type: ignore[misc]
         self._warnings = LimitedLog()
         self._pending: dict[int, _Handshake] = {}  # by file descriptor, the oldest first
         self._max_pending = connection_limit(MAX_CONNECTIONS)
+        self._clients: weakref.WeakSet[socket.socket] = weakref.WeakSet()
+        self._max_clients = connection_limit(MAX_CLIENTS)
         self._poll = select.epoll()
         server = self.server_sock.fileno()
         self._poll.register(server, select.EPOLLIN)
@@ -195,9 +200,13 @@ class TcprosServer(rospy.impl.tcpros_base.TCPServer):  # type: ignore[misc]
         """Passes a connection to the topic or service that its header names."""
         connection, address = handshake.socket, handshake.address
         connection.setblocking(True)
+        client = header.get("callerid", address[0])
         handlers = self.inbound_handler.__self__
         try:
-            if "topic" in header:
+            if self._is_full():
+                refusal = f"the node has {self._max_clients} connections already"
+                client = address[0]  # The log would not recognize the same warning for others.
+            elif "topic" in header:
                 refusal = handlers.topic_connection_handler(connection, address, header)
             elif "service" in header:
                 refusal = handlers.service_connection_handler(connection, address, header)
@@ -207,14 +216,21 @@ class TcprosServer(rospy.impl.tcpros_base.TCPServer):  # type: ignore[misc]
                 if rospy.core.is_shutdown_requested():
                     refusal = "node shutting down"
                 else:
-                    client = header.get("callerid", address[0])
                     self._warnings.warn(f"refused a connection of {client}: {refusal}")
                 write_ros_handshake_header(connection, {"error": refusal})
                 connection.close()
+            else:
+                self._clients.add(connection)
         except Exception as error:
             connection.close()
             if not rospy.core.is_shutdown_requested():
                 self._warnings.warn(f"a connection from {address[0]} failed: {error}")
+
+    def _is_full(self) -> bool:
+        if len(self._clients) >= self._max_clients:
+            is_open = [client for client in self._clients if client.fileno() >= 0]
+            self._clients = weakref.WeakSet(is_open)
+        return len(self._clients) >= self._max_clients
 
     def _forget(self, handshake: _Handshake) -> None:
         number = handshake.socket.fileno()

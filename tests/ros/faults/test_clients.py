@@ -389,6 +389,29 @@ def test_many_connections_that_are_left_open(
     code, _, pid = ServerProxy(uri).getPid("/test")
     assert code == 1
     assert count_files(pid) <= MAX_FILES
+
+    # So are those with a complete header.
+    for connection in connections:
+        connection.close()
+    subscribers = [
+        tcpros.Subscriber(ros.master, "/clock", Clock, node="/crowded", callerid=f"/client_{n}")
+        for n in range(100)
+    ]
+    connections += [subscriber.socket for subscriber in subscribers]
+    refused = [s for s in subscribers if b"the node has 75 connections already" in s.response]
+    assert len(refused) >= 25
+    assert process.output.count("connections already") < len(refused)
+    for connection in connections:
+        connection.close()
+    client.close()
+
+    def is_served() -> bool:
+        client = ServiceClient(
+            tcpros_address, "/crowded/delete_model", DeleteModel, persistent=False
+        )
+        return 'model with name "nobody" does not exist' in client.call("nobody").message
+
+    wait_until("a call", is_served)
     assert "Traceback" not in process.output
     assert process.stop() == 0
 
