@@ -69,6 +69,8 @@ def test_the_options(world_file):
     ]
     with shown(world_file, *options) as (process, url):
         assert url.endswith("/?token=open%20the%20sesame%21")
+        line = process.stdout.readline()
+        assert re.fullmatch(r"for viewers: \S+/\?token=sesame%20for%20viewers\n", line)
         with RawWebClient(url, look=False) as client:
             assert client.wait("hello")["read_only"]
             client.ask("look", worlds=[0])
@@ -79,8 +81,7 @@ def test_the_options(world_file):
             process.send_signal(signal.SIGTERM)
             assert client.wait_closed()[0] == 1001
         output, errors = process.communicate(timeout=TIMEOUT)
-        assert (process.returncode, errors) == (143, "")
-        assert re.fullmatch(r"for viewers: \S+/\?token=sesame%20for%20viewers\n", output)
+        assert (process.returncode, output, errors) == (143, "", "")
 
 
 def test_it_ends_after_the_duration(world_file, capsys):
