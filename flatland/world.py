@@ -559,6 +559,20 @@ class World:
 
     # -- free places ---------------------------------------------------------------------------
 
+    def describe_overlap(self, model: str) -> str:
+        """Returns which walls and other models a model overlaps, as a text.
+
+        Args:
+            model: Name of the model.
+
+        Returns:
+            Such as `overlaps layer "walls" at (1.000, 2.000, 0.000)`; empty if there are none.
+
+        Raises:
+            WorldError: The model does not exist, or the world is closed.
+        """
+        return self.between_steps(lambda: self._placement.describe_overlap(self.model(model)))
+
     def is_free(
         self,
         pose: Sequence[float],

@@ -121,9 +121,13 @@ class Placement:
 
     def warn_if_blocked(self, model: Model) -> None:
         """Logs one line if a model overlaps walls or other models."""
-        overlap = self._overlap(model, model.pose)
-        if overlap is not None:
+        overlap = self.describe_overlap(model)
+        if overlap:
             _LOG.warning('model "%s" %s', model.name, overlap)
+
+    def describe_overlap(self, model: Model) -> str:
+        """Returns what a model overlaps; see `World.describe_overlap`."""
+        return self._overlap(model, model.pose) or ""
 
     def _overlap(self, model: Model, pose: Pose) -> str | None:
         """Returns a description of the overlaps of a model at a pose, None if there are none."""

@@ -83,8 +83,10 @@ class Commands:
         if hold in self._holds:
             self._holds[hold] = _now() + HOLD_TIMEOUT
 
-        def move() -> None:
-            feed.controller.move(feed.find_model(number).name, pose)
+        def move() -> dict[str, str]:
+            name = feed.find_model(number).name
+            feed.controller.move(name, pose)
+            return {"overlap": feed.world.describe_overlap(name)}
 
         return await self._newest.run(("move", *hold), lambda: feed.requests.run(move))
 

@@ -1,6 +1,6 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
-import { byId, element, saveFile, setText, takesKeys } from "../../flatland/web/page/js/dom.js";
+import { byId, element, saveFile, setText, takesKey } from "../../flatland/web/page/js/dom.js";
 import { openPage } from "./fake_page.js";
 
 test("a missing element is an error", () => {
@@ -23,15 +23,16 @@ test("a text is set only if it has changed", (t) => {
   assert.equal(set.mock.callCount(), 0);
 });
 
-test("fields and menus take keys, buttons do not", () => {
+test("fields and menus take keys, buttons do not, and sliders only theirs", () => {
   const elements = openPage();
   assert.deepEqual(
     ["model-filter", "rate", "plot-series", "spawn-ok", "toggle-names", "pause", "canvas"].map((id) =>
-      takesKeys(elements[id]),
+      takesKey(elements[id], "w"),
     ),
-    [true, true, true, true, false, false, false],
+    [true, false, true, true, false, false, false],
   );
-  assert.ok(!takesKeys(null));
+  for (const key of ["ArrowUp", "ArrowLeft", "Home", "PageDown"]) assert.ok(takesKey(elements.rate, key));
+  assert.ok(!takesKey(null, "w"));
 });
 
 test("a saved file is released later", (t) => {

@@ -50,6 +50,7 @@ export class FakeElement extends EventTarget {
 
   removeAttribute(name) {
     this.attributes.delete(name);
+    if (name.startsWith("data-")) delete this.dataset[name.slice(5)];
   }
 
   toggleAttribute(name, on) {

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import signal
 from pathlib import Path
 from urllib.parse import urlsplit
 
@@ -56,6 +57,25 @@ def test_a_sleeping_browser_does_not_hold_up_the_simulation(
         browser.thaw()
     browser.until("flatland.state.worlds[0].time > arguments[0]", start + 0.5)
     page.wait_for_connection("connected")
+
+
+def test_a_simulator_that_does_not_respond_is_shown(browser: Chromium, tmp_path: Path) -> None:
+    program = ViewProgram(write_room(tmp_path), "--port", "0")
+    page = ViewerPage(browser)
+    try:
+        page.open(program.url)
+        program.process.send_signal(signal.SIGSTOP)
+        page.wait_for_connection("no response")
+        assert browser.evaluate("document.querySelector('#message').checkVisibility()")
+        browser.until("getComputedStyle(document.querySelector('#canvas')).opacity < 0.5")
+        program.process.send_signal(signal.SIGCONT)
+        page.wait_for_connection("connected")
+        browser.until("getComputedStyle(document.querySelector('#canvas')).opacity === '1'")
+    finally:
+        program.process.send_signal(signal.SIGCONT)
+        program.stop()
+        browser.open("about:blank")
+        browser.console()
 
 
 def test_the_page_survives_a_restart_of_the_simulator(browser: Chromium, tmp_path: Path) -> None:

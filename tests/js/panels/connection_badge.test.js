@@ -1,7 +1,7 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 import { createConnectionBadge } from "../../../flatland/web/page/js/panels/connection_badge.js";
-import { openPage } from "../fake_page.js";
+import { dispatch, openPage } from "../fake_page.js";
 import { showRoom, status } from "../fake_server.js";
 
 function open(isSupported = true) {
@@ -34,6 +34,32 @@ test("a simulator that does not answer is displayed", () => {
   connection.emit("message", status({ stale: 3.7 }));
   assert.equal(elements.connection.textContent, "connected, no answer for 3 s");
   assert.equal(elements.connection.dataset.state, "stale");
+});
+
+test("a state that is not renewed is stale, unless the page is hidden", (t) => {
+  t.mock.timers.enable({ apis: ["setInterval"] });
+  const { elements, connection, change } = open();
+  const shown = () => [elements.connection.textContent, elements.message.hidden];
+  const wait = (time) => t.mock.timers.tick(time);
+  wait(1000);
+  assert.deepEqual(shown(), ["connected", true]);
+  wait(1000);
+  assert.deepEqual(shown(), ["no response", false]);
+  assert.ok(document.body.hasAttribute("data-silent"));
+  connection.emit("message", status({}));
+  assert.deepEqual(shown(), ["connected", true]);
+  assert.ok(!document.body.hasAttribute("data-silent"));
+  wait(2000);
+  change("reconnecting");
+  change("connected");
+  assert.deepEqual(shown(), ["connected", true]);
+  document.hidden = true;
+  wait(5000);
+  assert.deepEqual(shown(), ["connected", true]);
+  document.hidden = false;
+  dispatch(document, "visibilitychange");
+  wait(1000);
+  assert.deepEqual(shown(), ["connected", true]);
 });
 
 test("the reasons of the server are notices, each once in a row", () => {

@@ -28,6 +28,7 @@ test("positions of the slider are factors of real time", () => {
     ["0.0500", "50.0000"],
   );
   for (let position = 0; position < 100; position++) assert.equal(positionOf(factorOf(position)), position);
+  for (const factor of [0.1, 1, 2, 10]) assert.equal(factorOf(positionOf(factor)), factor);
   assert.deepEqual([positionOf(1e-9), positionOf(1e9)], [0, 99]);
 });
 

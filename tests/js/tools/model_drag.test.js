@@ -39,6 +39,19 @@ test("a turn is around the origin of the model, and wrapped", (t) => {
   assert.equal(heading.toFixed(6), (3 + Math.PI / 2 - 2 * Math.PI).toFixed(6));
 });
 
+test("the user learns what the model overlaps", async (t) => {
+  const { connection, session, drag } = begin(t);
+  const notices = [];
+  session.on("notice", ({ text }) => notices.push(text));
+  connection.replies.move = { overlap: 'overlaps layer "walls" at (1.000, 2.000, 0.000)' };
+  await drag.drop();
+  const place = 'overlaps layer "walls" at (1.000, 2.000, 0.000)';
+  assert.deepEqual(notices, [`Model "crate" ${place}; the physics separates them`]);
+  connection.replies.move = { overlap: "" };
+  await session.move(CRATE, [0, 0, 0]);
+  assert.equal(notices.length, 1);
+});
+
 test("errors are shown, and the world is released all the same", async (t) => {
   const { connection, session, drag } = begin(t);
   const notices = [];

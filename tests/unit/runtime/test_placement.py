@@ -82,6 +82,15 @@ def test_warn_is_the_default_and_names_all_overlapped_models_and_layers(
     assert model.displacement == (0.0, 0.0)
 
 
+def test_the_overlap_of_a_model_is_a_text(world: flatland.World) -> None:
+    spawn(world, "crate", "crate", (0, 0, 0))
+    assert world.describe_overlap("crate") == ""
+    world.move_model("crate", (4.8, 0, 0), if_blocked="allow")
+    assert world.describe_overlap("crate") == 'overlaps layer "walls" at (4.800, 0.000, 0.000)'
+    with pytest.raises(WorldError, match="does not exist"):
+        world.describe_overlap("nothing")
+
+
 def test_allow_logs_nothing(world: flatland.World, caplog: pytest.LogCaptureFixture) -> None:
     model = spawn(world, "minimal", "m", (5, 0, 0), if_blocked="allow")
     world.move_model("m", (-5, 0, 0), if_blocked="allow")

@@ -175,8 +175,10 @@ class TestModels:
         assert not client.reply("preview", file="world.yaml")["ok"]
 
     def test_move(self, client, robot, world):
-        client.ask("move", model=robot, pose=[6, 7, 0.5])
+        assert client.ask("move", model=robot, pose=[6, 7, 0.5]) == {"overlap": ""}
         np.testing.assert_allclose(world.models[0].pose, [6, 7, 0.5], atol=1e-5)
+        overlap = client.ask("move", model=robot, pose=[1.1, 7, 0])["overlap"]
+        assert overlap.startswith('overlaps layer "walls" at (1.100, 7.000, ')
 
     def test_delete(self, client, robot, world):
         client.ask("delete", model=robot)

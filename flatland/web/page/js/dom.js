@@ -115,14 +115,22 @@ export function saveFile(blob, name) {
   window.setTimeout(() => URL.revokeObjectURL(url), 10_000);
 }
 
+/** Keys that move a slider. */
+const SLIDER_KEYS = [
+  ...["ArrowUp", "ArrowDown", "ArrowLeft", "ArrowRight"],
+  ...["Home", "End", "PageUp", "PageDown"],
+];
+
 /**
- * Returns whether an element receives text, so that typed keys have no other effect.
+ * Returns whether an element uses a key, so that the key has no other effect.
  *
  * @param {EventTarget | null} target
+ * @param {string} key  value of `KeyboardEvent.key`
  */
-export function takesKeys(target) {
+export function takesKey(target, key) {
   if (!(target instanceof HTMLElement)) return false;
   if (target.closest("dialog, [role=menu]")) return true;
+  if (target.matches("input[type=range]")) return SLIDER_KEYS.includes(key);
   return (
     target.matches("input, select, textarea, [contenteditable]") && !target.matches("input[type=checkbox]")
   );

@@ -1,4 +1,4 @@
-import { byId, element, takesKeys } from "./dom.js";
+import { byId, element, takesKey } from "./dom.js";
 import { packColor } from "./renderer/edge_batch.js";
 
 /** Distance by which an arrow key moves the view [CSS pixels]. */
@@ -90,7 +90,7 @@ export class Hotkeys {
   /** @param {KeyboardEvent} event */
   press(event) {
     if (event.defaultPrevented || event.ctrlKey || event.metaKey || event.altKey) return;
-    if (takesKeys(event.target) || document.querySelector("dialog[open]")) return;
+    if (takesKey(event.target, event.key) || document.querySelector("dialog[open]")) return;
     if (
       event.key === " " &&
       event.target instanceof Element &&

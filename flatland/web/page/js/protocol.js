@@ -70,7 +70,7 @@
  * @property {{fields: object, result: unknown}} resume
  * @property {{fields: {n: number}, result: unknown}} step
  * @property {{fields: {rate: number}, result: unknown}} set_rate
- * @property {{fields: {model: number, pose: Pose}, result: unknown}} move
+ * @property {{fields: {model: number, pose: Pose}, result: {overlap?: string}}} move
  * @property {{fields: {model: number}, result: unknown}} hold
  * @property {{fields: {model: number}, result: unknown}} release
  * @property {{fields: {file: string, name: string, pose: Pose, namespace: string}, result: unknown}} spawn

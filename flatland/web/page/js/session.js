@@ -106,6 +106,19 @@ export class Session extends Emitter {
   }
 
   /**
+   * Moves a model, and reports what it overlaps at its new pose.
+   *
+   * @param {number} model  id
+   * @param {import("./geometry.js").Pose} pose
+   */
+  async move(model, pose) {
+    const name = this.world?.models.get(model)?.name;
+    const answer = await this.attempt("move", { model, pose });
+    const overlap = answer?.result?.overlap;
+    if (overlap) this.notify("warning", `Model "${name}" ${overlap}; the physics separates them`, "overlap");
+  }
+
+  /**
    * @param {import("./protocol.js").Level} level
    * @param {string} text
    * @param {string} [topic]  earlier notices of the same topic are removed

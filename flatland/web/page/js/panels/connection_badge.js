@@ -1,7 +1,12 @@
 import { byId, setText } from "../dom.js";
 
+const CHECK_PERIOD = 500; // ms
+/** Checks without the state of a world, which arrives 5 times per second, after which it is stale. */
+const SILENT_CHECKS = 3;
+
 /**
- * Shows the state of the connection, and a message while there is no world to draw.
+ * Shows the state of the connection, and a message while there is no world to draw or its state is
+ * stale.
  *
  * @param {import("../session.js").Session} session
  * @param {import("../stage.js").Stage} stage
@@ -11,9 +16,25 @@ export function createConnectionBadge(session, stage) {
   const message = byId("message");
   const { connection } = session;
 
+  // Counted, because a time would include stalls of the browser.
+  let checks = 0;
+  /** Whether nothing arrives, although the connection is open. A hidden page receives nothing. */
+  const isSilent = () =>
+    connection.state === "connected" &&
+    !document.hidden &&
+    [...session.worlds.values()].some((world) => world.status) &&
+    checks > SILENT_CHECKS;
+  const wait = () => {
+    checks = 0;
+  };
+  document.addEventListener("visibilitychange", wait);
+  connection.on("state", wait);
+  session.on("status", wait);
+
   const stateText = () => {
     const stale = session.world?.status?.stale ?? 0;
     if (connection.state === "refused") return "access denied";
+    if (isSilent()) return "no response";
     if (connection.state !== "connected" || stale < 1) return connection.state;
     return `connected, no answer for ${Math.floor(stale)} s`;
   };
@@ -28,12 +49,15 @@ export function createConnectionBadge(session, stage) {
       return "The access token is missing or wrong. Open the complete address that the simulator printed.";
     }
     const isLoaded = [...session.worlds.values()].some((world) => world.present);
+    if (isSilent()) return "The simulator does not respond. The picture shows its last state.";
     if (isLoaded) return "";
     return connection.state === "connected" ? "Waiting for a world…" : "Connecting to the simulator…";
   };
   const update = () => {
     setText(badge, stateText());
-    badge.dataset.state = (session.world?.status?.stale ?? 0) >= 1 ? "stale" : connection.state;
+    const isStale = isSilent() || (session.world?.status?.stale ?? 0) >= 1;
+    badge.dataset.state = isStale ? "stale" : connection.state;
+    document.body.toggleAttribute("data-silent", isSilent());
     const text = messageText();
     setText(message, text);
     message.hidden = text === "";
@@ -52,5 +76,9 @@ export function createConnectionBadge(session, stage) {
     lastReason = reason;
   });
   for (const name of /** @type {const} */ (["hello", "world", "status", "current"])) session.on(name, update);
+  window.setInterval(() => {
+    checks += 1;
+    update();
+  }, CHECK_PERIOD);
   update();
 }

@@ -114,7 +114,7 @@ export class Inspector {
       return;
     }
     this.isEdited = false;
-    await session.attempt("move", { model: this.shownId, pose: [pose[0], pose[1], pose[2]] });
+    await session.move(this.shownId, [pose[0], pose[1], pose[2]]);
   }
 
   /** Shows the pose of the model in the view, unless the user is editing the pose. */

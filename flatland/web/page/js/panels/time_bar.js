@@ -5,6 +5,8 @@ import { fixed, significant } from "../format.js";
 const SLOWEST = 0.05;
 const FASTEST = 50;
 const POSITIONS = 100;
+/** Factors that have a position of their own. */
+const EXACT = [0.1, 0.2, 0.5, 1, 2, 5, 10, 20];
 /** Time after an input during which the slider ignores the state of the world [ms]. */
 const SETTLE_TIME = 1500;
 const SEND_PERIOD = 120;
@@ -15,7 +17,8 @@ const SEND_PERIOD = 120;
  * @param {number} position
  */
 export function factorOf(position) {
-  return SLOWEST * (FASTEST / SLOWEST) ** (position / (POSITIONS - 1));
+  const exact = EXACT.find((factor) => positionOf(factor) === position);
+  return exact ?? SLOWEST * (FASTEST / SLOWEST) ** (position / (POSITIONS - 1));
 }
 
 /**

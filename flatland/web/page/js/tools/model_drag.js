@@ -46,7 +46,7 @@ export class ModelDrag {
   async drop() {
     window.clearInterval(this.timer);
     await this.held;
-    await this.session.attempt("move", { model: this.model.id, pose: this.pose });
+    await this.session.move(this.model.id, this.pose);
     await this.release();
   }
 
