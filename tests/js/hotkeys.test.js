@@ -65,12 +65,12 @@ test("keys run their actions", () => {
   assert.equal(tools.name, "measure");
   press("Escape");
   assert.equal(tools.name, "select");
-  assert.ok(!press("x"));
+  for (const key of ["x", "Backspace"]) assert.ok(!press(key), key);
 });
 
 test("a read-only page has no keys that change the world", () => {
   const { calls } = open({ readOnly: true });
-  for (const key of [" ", ".", "n", "Delete", "Backspace"]) assert.ok(!press(key), key);
+  for (const key of [" ", ".", "n", "Delete"]) assert.ok(!press(key), key);
   press("p");
   assert.deepEqual(calls, ["togglePlots"]);
 });

@@ -195,7 +195,7 @@ def test_signal_while_a_large_map_loads(launcher: Any, ros: Any, tmp_path: Path)
     process.wait_for_line('Layer "small"')
     process.send(signal.SIGTERM)
     assert_was_ended(
-        process, ros, r"MainThread: .*/flatland/loading/\w+\.py:\d+ in ", timeout="0.01"
+        process, ros, r"MainThread: .*/flatland/(loading|maps)/\w+\.py:\d+ in ", timeout="0.01"
     )
 
 

@@ -58,7 +58,7 @@ export class Hotkeys {
       { keys: ["."], shown: ".", text: "Single step", run: actions.step, writes: true },
       { keys: ["n"], shown: "N", text: "Spawn a model", run: actions.openSpawn, writes: true },
       {
-        keys: ["delete", "backspace"],
+        keys: ["delete"],
         shown: "Delete",
         text: "Delete the selected model",
         run: actions.deleteSelected,
