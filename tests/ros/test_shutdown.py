@@ -194,9 +194,7 @@ def test_signal_while_a_large_map_loads(launcher: Any, ros: Any, tmp_path: Path)
     process = launcher.start(world_path=map_of_noise(tmp_path, 2000), shutdown_timeout=0.01)
     process.wait_for_line('Layer "small"')
     process.send(signal.SIGTERM)
-    assert_was_ended(
-        process, ros, r"MainThread: .*/flatland/\w+/\w+\.py:\d+ in ", timeout="0.01"
-    )
+    assert_was_ended(process, ros, r"MainThread: .*/flatland/\w+/\w+\.py:\d+ in ", timeout="0.01")
     assert ': loaded "' not in process.output
 
 

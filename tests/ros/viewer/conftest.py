@@ -59,7 +59,10 @@ def screen(checkout: Path) -> Iterator[Any]:
         except ImportError:
             missing.append(f"Python's {module}")
     if missing:
-        pytest.skip(f"not installed: {', '.join(missing)} (make setup-dev installs them)")
+        pytest.skip(
+            f"not installed: {', '.join(missing)} (make setup-dev installs them on Debian 12; RViz "
+            "of Debian 13 has no Python bindings that can be imported)"
+        )
     screen = virtual_screen.VirtualScreen()
     yield screen
     screen.close()
