@@ -8,9 +8,9 @@ from pathlib import Path
 from textwrap import dedent
 from typing import Any
 
-import cv2
 import numpy as np
 import pytest
+from PIL import Image
 from waiting import TIMEOUT
 
 import flatland
@@ -41,7 +41,7 @@ class WorldFiles:
     def write_map(self, name: str, rows: list[str], **keys: object) -> str:
         """Writes a map file and its image, drawn from text; `#` is a wall. Returns the path."""
         pixels = np.array([[0 if c == "#" else 255 for c in row] for row in rows], np.uint8)
-        cv2.imwrite(str(self.folder / f"{name}.png"), pixels)
+        Image.fromarray(pixels).save(self.folder / f"{name}.png")
         values: dict[str, object] = {
             "image": f"{name}.png",
             "resolution": 1.0,
