@@ -36,7 +36,7 @@ test: setup-dev  ## run all tests, in three processes: make test [ARGS="-k laser
 
 .PHONY: test-quick
 test-quick: setup-dev  ## run the tests that need no ROS master, browser or build: make test-quick [ARGS="-k laser"]
-	@. ./setup.bash && pytest --numprocesses 2 --dist loadgroup -m "not ros and not web and not build" $(ARGS)
+	@. ./setup.bash && pytest --numprocesses 3 --dist loadgroup -m "not ros and not web and not build" $(ARGS)
 
 # Runs, and busy processes beside them.
 N := 20
