@@ -60,7 +60,12 @@ _ROOMS = {
     ),
     "loading": Room(
         ("flatland/loading/*.py",),
-        ("tests/unit/loading", "tests/unit/plugin_api/test_missing_plugins.py"),
+        (
+            "tests/unit/loading",
+            "tests/unit/plugin_api/test_missing_plugins.py",
+            "tests/unit/bad_input",
+            "tests/unit/cli/test_check_mistakes.py",
+        ),
     ),
     "node": Room(("flatland/node/*.py",), ("tests/unit/node", "tests/unit/web/test_live_view.py")),
     "physics": Room(
