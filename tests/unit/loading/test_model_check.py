@@ -36,6 +36,20 @@ def test_warnings_are_left_to_the_one_who_loads_the_file(
     assert caplog.records == []
 
 
+def test_the_world_of_an_invalid_file_is_closed(files: Any) -> None:
+    created = []
+
+    class Recorded(flatland.World):
+        def __init__(self, **options: Any) -> None:
+            super().__init__(**options)
+            created.append(self)
+
+    with pytest.raises(YamlError):
+        load_model_alone(Recorded, Path(files.write("cart.model.yaml", "bodies: []")), {})
+    (world,) = created
+    assert world.closed
+
+
 def test_layers_are_those_that_the_model_refers_to(files: Any) -> None:
     footprints = ", ".join(FOOTPRINT.format(layers) for layers in ("2d, 3d", "2d", "all"))
     path = files.write("cart.model.yaml", f"bodies: [{{name: base, footprints: [{footprints}]}}]")

@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 import flatland
+from flatland.config.documents import load_documents
+from flatland.config.inputs import Inputs
 from flatland.errors import FlatlandError
+from flatland.loading import world_source
 from flatland.loading.world_source import WorldSource
 from flatland.scene.description import describe_body
 
@@ -16,8 +20,11 @@ def test_the_result_of_save_is_restored() -> None:
     source = WorldSource()
     saved = source.save()
     source.map_layer, source.commands_received = "2d", 3
+    source.inputs.note_file("/w/other.yaml")
     source.restore(saved)
     assert (source.map_layer, source.commands_received) == ("", 0)
+    assert list(source.inputs.files) == []
+    assert source.simplify_map == 0
 
 
 def test_a_copy_is_independent() -> None:
@@ -84,6 +91,19 @@ def test_a_model_that_was_read_ahead_is_spawned_without_its_files(folder: Path) 
         )
         with pytest.raises(FlatlandError, match="does not exist"):
             world.spawn_model("m.yaml", "second")
+
+
+def test_a_file_is_read_ahead_once(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    loaded = []
+
+    def load(path: str, inputs: Inputs) -> Any:
+        loaded.append(Path(path).name)
+        return load_documents(path, inputs)
+
+    monkeypatch.setattr(world_source, "load_documents", load)
+    with flatland.World.from_yaml(folder / "world.yaml", seed=1) as world:
+        world.source.read_models_ahead(["m.yaml", "m.yaml"])
+    assert sorted(loaded) == ["m.yaml", "shape.yaml"]
 
 
 def test_a_text_that_was_read_ahead_is_not_parsed_again(folder: Path) -> None:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -199,6 +201,21 @@ def test_members_of_a_party_stay_together(files: WorldFiles) -> None:
         world.step(200)
         (ax, ay, _), (bx, by, _) = people.people.poses
         assert math.hypot(ax - bx, ay - by) < 2.0
+
+
+def test_the_service_answers_with_names_or_an_error(files: WorldFiles) -> None:
+    world = load(files, ONE % "[8, 3]", CALM)
+    people = people_of(world)
+
+    def spawn(group: str, count: int) -> Any:
+        return people._serve_spawn(SimpleNamespace(group=group, count=count, poses=[]))
+
+    success, message, names = spawn("", 2)
+    assert (success, message, len(names)) == (True, "", 2)
+    success, message, names = spawn("nobody", 1)
+    assert not success
+    assert "nobody" in message
+    assert names == []
 
 
 def test_people_queue_and_are_served_one_by_one(files: WorldFiles) -> None:

@@ -579,6 +579,24 @@ def test_a_command_to_a_model_that_is_deleted_before_the_next_step(files: Any) -
     assert world.model("b").bodies[0].velocity[0] > 0.1
 
 
+@pytest.mark.parametrize("last", ["DiffDrive", "PythonDrive"])
+def test_jobs_of_the_core_and_of_python_are_in_the_order_of_the_plugins(
+    files: Any, last: str
+) -> None:
+    drives = {
+        "DiffDrive": "{type: DiffDrive, name: core, body: base, twist_sub: other}",
+        "PythonDrive": "{type: 'test::PythonDrive', name: python, body: base}",
+    }
+    listed = [text for name, text in drives.items() if name != last] + [drives[last]]
+    body = "{name: base, footprints: [{type: circle, radius: 0.2, density: 5}]}"
+    world = room(files, {"a": f"bodies: [{body}]\nplugins: [{', '.join(listed)}]"})
+    world.command("/a/other").set(flatland.Twist(linear_x=0.2))
+    world.command("/a/cmd_vel").set(flatland.Twist(linear_x=0.1))
+    world.step(2)
+    speed = 0.2 if last == "DiffDrive" else 0.1
+    assert world.model("a").bodies[0].velocity[:2] == pytest.approx((speed, 0.0))
+
+
 def test_updates_and_controllers_are_declared_in_on_initialize(files: Any) -> None:
     world = room(files, {"a": CART.format(drive="DiffDrive")})
     plugin = world.model("a").plugin("drive")
