@@ -24,12 +24,12 @@ export function createConnectionBadge(session, stage) {
     !document.hidden &&
     [...session.worlds.values()].some((world) => world.status) &&
     checks > SILENT_CHECKS;
-  const wait = () => {
+  const restart = () => {
     checks = 0;
   };
-  document.addEventListener("visibilitychange", wait);
-  connection.on("state", wait);
-  session.on("status", wait);
+  document.addEventListener("visibilitychange", restart);
+  connection.on("state", restart);
+  session.on("status", restart);
 
   const stateText = () => {
     const stale = session.world?.status?.stale ?? 0;
