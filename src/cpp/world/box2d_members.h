@@ -44,6 +44,13 @@ FLATLAND_EXPOSE(b2Body, b2ContactEdge*, m_contactList, BodyContacts);
 FLATLAND_EXPOSE(b2Body, b2Transform, m_xf, BodyTransform);
 FLATLAND_EXPOSE(b2Body, b2Sweep, m_sweep, BodySweep);
 FLATLAND_EXPOSE(b2Body, float, m_sleepTime, BodySleepTime);
+FLATLAND_EXPOSE(b2Body, uint16, m_flags, BodyFlags);
+FLATLAND_EXPOSE(b2Body, b2Vec2, m_linearVelocity, BodyVelocity);
+FLATLAND_EXPOSE(b2Body, float, m_angularVelocity, BodyOmega);
+FLATLAND_EXPOSE(b2Body, b2Vec2, m_force, BodyForce);
+FLATLAND_EXPOSE(b2Body, float, m_torque, BodyTorque);
+FLATLAND_EXPOSE(b2Body, float, m_invMass, BodyInverseMass);
+FLATLAND_EXPOSE(b2Body, float, m_invI, BodyInverseInertia);
 
 FLATLAND_EXPOSE(b2Fixture, b2Fixture*, m_next, FixtureNext);
 FLATLAND_EXPOSE(b2Fixture, b2Body*, m_body, FixtureBody);
@@ -58,6 +65,7 @@ FLATLAND_EXPOSE(b2Joint, b2JointEdge, m_edgeB, JointEdgeB);
 FLATLAND_EXPOSE(b2Joint, b2Body*, m_bodyA, JointBodyA);
 FLATLAND_EXPOSE(b2Joint, b2Body*, m_bodyB, JointBodyB);
 
+FLATLAND_EXPOSE(b2Contact, uint32, m_flags, ContactFlags);
 FLATLAND_EXPOSE(b2Contact, b2Contact*, m_prev, ContactPrevious);
 FLATLAND_EXPOSE(b2Contact, b2Contact*, m_next, ContactNext);
 FLATLAND_EXPOSE(b2Contact, b2ContactEdge, m_nodeA, ContactEdgeA);
@@ -86,6 +94,23 @@ struct ContactFactory {
   friend Pointer expose(ContactFactory);
 };
 template struct Expose<ContactFactory, &b2Contact::Create>;
+
+template <typename Tag, int value>
+struct ExposeFlag {
+  friend int expose(Tag) { return value; }
+};
+
+// `expose(Tag{})` returns a private constant.
+#define FLATLAND_EXPOSE_FLAG(Class, flag, Tag) \
+  struct Tag {                                 \
+    friend int expose(Tag);                    \
+  };                                           \
+  template struct ExposeFlag<Tag, Class::flag>
+
+FLATLAND_EXPOSE_FLAG(b2Body, e_awakeFlag, BodyAwakeFlag);
+FLATLAND_EXPOSE_FLAG(b2Contact, e_filterFlag, ContactFilterFlag);
+
+#undef FLATLAND_EXPOSE_FLAG
 
 template <typename Tag, typename Object>
 auto& get(Object& object) {

@@ -114,7 +114,11 @@ StepReport World::step_unchecked(double dt, int velocity_iterations, int positio
   guard.begin(*engine_, seconds);
   contacts_.hook = hook;
   contacts_.begin_step();
-  engine_->Step(seconds, velocity_iterations, position_iterations);
+  // A hook is called within the step, and may read the state of any body.
+  const bool is_done =
+      hook == nullptr && free_motion_.begin(*engine_, seconds, position_iterations);
+  if (!is_done) engine_->Step(seconds, velocity_iterations, position_iterations);
+  if (hook == nullptr) free_motion_.end();
   contacts_.hook = nullptr;
   StepReport report = guard.end(*engine_);
   invalid_ = report.invalid;

@@ -25,6 +25,7 @@
 #include "parallel/thread_pool.h"
 #include "rays/ray_scene.h"
 #include "world/contacts.h"
+#include "world/free_motion.h"
 #include "world/job_queue.h"
 #include "world/slot_map.h"
 
@@ -221,6 +222,7 @@ class World final : private b2DestructionListener {
   SlotMap<b2Fixture*, IdKind::kFixture> fixtures_;
   SlotMap<JointRecord, IdKind::kJoint> joints_;
   ContactRecorder contacts_;
+  FreeMotion free_motion_;
   RayScene rays_{fixtures_};
   JobQueue jobs_;
   Stage stage_ = Stage::kStart;

@@ -1,0 +1,175 @@
+"""Bodies that nothing can touch are moved without the solver of Box2D, with the same results.
+
+A world with a hook `pre_solve` leaves all bodies to Box2D, here with a hook for no body.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+import random
+from collections.abc import Callable
+
+import numpy as np
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from flatland.physics import PhysicsBody, PhysicsWorld
+
+# `make fuzz` compares the results of this number of other worlds.
+EXAMPLES = int(os.environ.get("FLATLAND_FUZZ", "0"))
+PROPERTY = settings(
+    max_examples=EXAMPLES or 30,
+    deadline=None,
+    derandomize=not EXAMPLES,
+    suppress_health_check=list(HealthCheck),
+)
+ROUNDS = 25  # of changes and steps of a world
+SIDE = 12.0  # m, of the room
+
+
+class Pair:
+    """Two worlds that receive the same calls; only one of them leaves all bodies to Box2D."""
+
+    def __init__(self, seed: int) -> None:
+        self.rng = random.Random(seed)
+        self.worlds = (PhysicsWorld(), PhysicsWorld())
+        self.worlds[1].pre_solve = lambda *_: None
+        for world in self.worlds:
+            world.record_contacts = True
+        self.bodies: list[tuple[PhysicsBody, ...]] = []
+        walls = self._walls()
+        self.both(
+            lambda world: world.create_body("static", (0, 0, 0)).create_edges(
+                walls, category_bits=3
+            )
+        )
+        for _ in range(self.rng.randrange(1, 14)):
+            self.add_body()
+
+    def both(self, call: Callable[[PhysicsWorld], object]) -> None:
+        for world in self.worlds:
+            call(world)
+
+    def _walls(self) -> np.ndarray:
+        half = SIDE / 2
+        rows = [
+            (-half, -half, half, -half),
+            (half, -half, half, half),
+            (half, half, -half, half),
+            (-half, half, -half, -half),
+        ]
+        for _ in range(self.rng.randrange(30)):
+            x, y = self.place()
+            angle, length = self.rng.uniform(0, math.tau), self.rng.uniform(0.1, 2)
+            rows.append((x, y, x + length * math.cos(angle), y + length * math.sin(angle)))
+        return np.array(rows, np.float32)
+
+    def place(self) -> tuple[float, float]:
+        return self.rng.uniform(-SIDE / 2, SIDE / 2), self.rng.uniform(-SIDE / 2, SIDE / 2)
+
+    def add_body(self) -> None:
+        rng = self.rng
+        kind = rng.choice(["dynamic"] * 6 + ["kinematic"])
+        pose = (*self.place(), rng.uniform(-9, 9))
+        damping = rng.choice([0.0, 0.3])
+        shapes = [
+            (rng.random() < 0.5, rng.uniform(-0.4, 0.4), rng.uniform(0.05, 0.3), rng.random() < 0.1)
+            for _ in range(rng.choice([1, 1, 1, 2, 3, 9]))
+        ]
+        made = []
+        for world in self.worlds:
+            body = world.create_body(kind, pose, linear_damping=damping, angular_damping=damping)
+            for is_circle, offset, size, is_sensor in shapes:
+                if is_circle:
+                    body.create_circle((offset, 0), size, density=1, is_sensor=is_sensor)
+                else:
+                    box = [(offset, -size), (offset + size, -size), (offset + size, size)]
+                    body.create_polygon(box, density=2, is_sensor=is_sensor)
+            made.append(body)
+        self.bodies.append(tuple(made))
+        self.push()
+
+    def push(self) -> None:
+        rng = self.rng
+        pair = rng.choice(self.bodies)
+        scale = rng.choice([0.0, 0.01, 1.0, 1.0, 1.0, 30.0])
+        numbers = [scale * rng.uniform(-1, 1) for _ in range(3)]
+        for body in pair:
+            body.set_velocity(*numbers)
+
+    def force(self) -> None:
+        rng = self.rng
+        pair = rng.choice(self.bodies)
+        if pair[0].type != "dynamic":
+            return
+        force, torque = (rng.uniform(-5, 5), rng.uniform(-5, 5)), rng.uniform(-1, 1)
+        for body in pair:
+            body.apply_force(force, body.world_center)
+            body.apply_torque(torque)
+
+    def move(self) -> None:
+        pair = self.rng.choice(self.bodies)
+        pose = (*self.place(), self.rng.uniform(-9, 9))
+        for body in pair:
+            body.set_pose(*pose)
+
+    def join(self) -> None:
+        first, second = self.rng.choice(self.bodies), self.rng.choice(self.bodies)
+        if first is second or "dynamic" not in (first[0].type, second[0].type):
+            return
+        for world, a, b in zip(self.worlds, first, second, strict=True):
+            world.create_revolute_joint(a, b, (0.5, 0.0), (-0.5, 0.0))
+
+    def part(self) -> None:
+        joints = [pair for pair in self.bodies if pair[0].joints]
+        if joints:
+            for body in self.rng.choice(joints):
+                body.joints[0].destroy()
+
+    def sense(self) -> None:
+        pair = self.rng.choice(self.bodies)
+        value = self.rng.random() < 0.5
+        for body in pair:
+            body.fixtures[0].is_sensor = value
+
+    def filter(self) -> None:
+        pair = self.rng.choice(self.bodies)
+        mask = self.rng.choice([1, 2, 0xFFFF])
+        for body in pair:
+            body.fixtures[0].mask_bits = mask
+
+    def step(self) -> None:
+        steps = (self.rng.choice([0.005, 0.005, 0.005, 0.05]), 10, self.rng.choice([10, 10, 10, 0]))
+        self.both(lambda world: world.step(*steps))
+
+    def check(self) -> None:
+        ours, theirs = (world.body_states().tobytes() for world in self.worlds)
+        assert ours == theirs
+        ours, theirs = (
+            [
+                (e.kind, e.contact_id, e.fixture_a, e.fixture_b, e.normal_impulses.tobytes())
+                for e in world.take_contact_events()
+            ]
+            for world in self.worlds
+        )
+        assert ours == theirs
+
+    @property
+    def is_valid(self) -> bool:
+        return bool(np.isfinite(self.worlds[0].body_states()).all())
+
+
+@PROPERTY
+@given(seed=st.integers(0, 2**32 - 1))
+def test_all_states_and_contacts_are_those_of_the_solver(seed: int) -> None:
+    pair = Pair(seed)
+    changes = (pair.push, pair.force, pair.move, pair.join, pair.part, pair.sense, pair.filter)
+    for _ in range(ROUNDS):
+        for _ in range(pair.rng.choice([0, 0, 1, 2])):
+            pair.rng.choice((*changes, pair.push, pair.force, pair.force))()
+        for _ in range(pair.rng.randrange(1, 20)):
+            pair.step()
+            pair.check()
+            if not pair.is_valid:  # The world does not advance any more.
+                return
