@@ -1826,6 +1826,65 @@ def run_worlds(
         What `JobQueue.run` returns or raises, for each world.
     """
 
+class AgentBatch:
+    """Driven bodies with range finders, each in a world of its own, which advance in parallel."""
+    def __init__(
+        self, agents: Sequence[tuple[PhysicsBody, Controller, Touches, RangeFinder]]
+    ) -> None:
+        """Creates a batch of n agents.
+
+        Args:
+            agents: For each agent a body, the controller of its velocity, the collector of its contacts,
+                and a range finder.
+
+        Raises:
+            ValueError: Two agents have the same world, their numbers of readings differ, or a range finder
+                measures intensities.
+        """
+    def perform(
+        self,
+        run: tuple[int, int, int, float, int, int, bool, bool],
+        steps: npt.ArrayLike,
+        observes: npt.ArrayLike,
+        velocities: npt.ArrayLike,
+        times: npt.ArrayLike,
+        noises: npt.ArrayLike,
+        poses: npt.ArrayLike,
+        pose_rates: npt.ArrayLike,
+        sensor_poses: npt.ArrayLike,
+        ranges: npt.ArrayLike,
+        touched: npt.ArrayLike,
+        num_threads: int,
+    ) -> list[Any]:
+        """Sets the commands of agents, performs steps of their worlds, and observes them.
+
+        All arrays are C-contiguous, with a row for each agent. The results do not depend on the number of
+        threads.
+
+        Args:
+            run: The steps, as `Run`; each world has a time of its own.
+            steps: Whether the world of the agent steps, shape (n,).
+            observes: Whether the agent is observed, after its steps, shape (n,).
+            velocities: Commanded forward speed and yaw rate [m/s, rad/s], shape (n, 2).
+            times: Simulated times of the worlds [ns], shape (n,).
+            noises: Stream and number of the update of each scan, shape (n, 2).
+            poses: Receives (x, y, theta) of the bodies in the world frame, shape (n, 3).
+            pose_rates: Receives the velocities of their origins (vx, vy, omega), shape (n, 3).
+            sensor_poses: Receives the poses of the range finders in the world frame, shape (n, 3).
+            ranges: Receives the readings [m], shape (n, readings), float32.
+            touched: Receives whether an agent touched anything in its steps, shape (n,).
+            num_threads: Maximum number of threads; 0 for one per core.
+
+        Returns:
+            Agents whose steps are not complete, with what `JobQueue.run` returns or raises. They are not
+            observed.
+
+        Raises:
+            ValueError: An array has another shape, or a number is out of range.
+            StaleHandleError: A world is closed.
+            WorldLockedError: A world is in use.
+        """
+
 def boundary_edges(mask: npt.ArrayLike, resolution: float) -> npt.NDArray[np.float32]:
     """Returns the exact boundary between the on and off pixels of a bitmap as straight edges.
 

@@ -5,22 +5,30 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from flatland.entities.body import Body
 from flatland.entities.model import Model
 from flatland.errors import WorldError
-from flatland.physics import Touches
+from flatland.physics import Controller, Touches
 from flatland.plugin_api.dynamics_limits import DynamicsLimits
 from flatland.plugin_api.plugin import describe
 from flatland.plugin_api.ports import Command
+from flatland.plugins.ackermann_drive import AckermannDrive
+from flatland.plugins.diff_drive import DiffDrive
 from flatland.plugins.laser import Laser
+from flatland.plugins.omni_drive import OmniDrive
+from flatland.plugins.tricycle_drive import TricycleDrive
 from flatland.values import Twist
 
 if TYPE_CHECKING:
     from flatland.world import World
+
+
+# Their subclasses may do something else with a command.
+_DRIVES = (AckermannDrive, DiffDrive, OmniDrive, TricycleDrive)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -33,6 +41,8 @@ class Agent:
         body: Its first body, which defines the pose of the agent.
         laser: The laser that is observed.
         command: The velocity command that actions set.
+        controller: The controller to which the drive passes commands, and does nothing else with
+            them; None for other drives.
         touches: Whether the model touches anything.
         radius: Radius of the smallest disc around the origin of the first body that contains all
             solid footprints of the model [m].
@@ -46,6 +56,7 @@ class Agent:
     body: Body
     laser: Laser
     command: Command[Twist]
+    controller: Controller | None
     touches: Touches
     radius: float
     bits: int
@@ -76,6 +87,7 @@ def find_agent(world: World, name: str, laser: str | None, command: str | None) 
         model.bodies[0],
         _find_laser(model, laser),
         velocity,
+        source.controller if type(source) in _DRIVES else None,
         model.watch_contacts(),
         radius,
         bits,
@@ -95,7 +107,7 @@ def _find_laser(model: Model, name: str | None) -> Laser:
     raise WorldError(f'model "{model.name}" has no Laser "{name}"; its lasers: {known}')
 
 
-def _find_command(model: Model, topic: str | None) -> tuple[Command[Twist], object]:
+def _find_command(model: Model, topic: str | None) -> tuple[Command[Twist], Any]:
     """Returns the command and the plugin that opened it."""
     known = []
     for plugin in model.plugins:

@@ -123,8 +123,7 @@ class FlatlandEnv(gymnasium.Env[Any, FloatArray]):
         if not self._running:
             raise ResetNeeded("call reset() before step(): no episode has begun, or it has ended")
         actions = checked_actions(action, None)
-        self._episodes.advance(actions)
-        self._episodes.look()
+        self._episodes.step(actions)
         rewards, terminated, truncated = self._episodes.judge()
         ended = bool(terminated[0]), bool(truncated[0])
         self._running = not any(ended)

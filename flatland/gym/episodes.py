@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 from flatland.errors import WorldError
 from flatland.geometry import BoolArray, DoubleArray, FloatArray, Pose, Vector2, finite_pose
+from flatland.gym.batch import Batch
 from flatland.gym.situation import Rows, Situation
 from flatland.gym.tasks import Occupied
 from flatland.plugins.laser import compute_scans
@@ -61,6 +62,9 @@ class Episodes:
         self.situation = Situation(n, beams, first.laser.range, low, high)
         self.observations: FloatArray = np.zeros((n, self.layout.size), np.float32)
         self._lasers = [agent.laser for agent in agents]
+        self._batch = None
+        if Batch.is_possible(agents, low, high):
+            self._batch = Batch(agents, self.situation, num_threads)
         self._all = np.arange(n)
 
     def begin(
@@ -100,8 +104,8 @@ class Episodes:
         )[0]:
             raise WorldError(f"the goal ({goal[0]:g}, {goal[1]:g}) is not free")
 
-    def advance(self, actions: DoubleArray, rows: Rows | None = None) -> None:
-        """Carries out actions for one step of the environment.
+    def step(self, actions: DoubleArray, rows: Rows | None = None) -> None:
+        """Carries out actions for one step of the environment, and observes all agents.
 
         Args:
             actions: Actions in [-1, 1] of all agents, shape (n, 2).
@@ -109,19 +113,31 @@ class Episodes:
         """
         s = self.situation
         chosen = self._all if rows is None else rows
-        commands = (s.low + (actions[chosen] + 1.0) * (0.5 * (s.high - s.low))).tolist()
+        commands = s.low + (actions + 1.0) * (0.5 * (s.high - s.low))
         s.previous_actions[chosen] = s.actions[chosen]
         s.actions[chosen] = actions[chosen]
         s.previous_distance[chosen] = s.distance[chosen]
         s.steps[chosen] += 1
-        agents = [self.agents[row] for row in chosen.tolist()]
-        for agent, (v, omega) in zip(agents, commands, strict=True):
+        if self._batch is None:
+            self._step_worlds(commands, chosen)
+            self.look()
+            return
+        acting = np.ones(len(s), np.bool_)
+        if rows is not None:
+            acting[:] = False
+            acting[rows] = True
+        self._measure(self._batch.perform(commands, acting, self._settings.physics_steps))
+        self._observe()
+
+    def _step_worlds(self, commands: DoubleArray, rows: Rows) -> None:
+        agents = [self.agents[row] for row in rows.tolist()]
+        for agent, (v, omega) in zip(agents, commands[rows].tolist(), strict=True):
             agent.command.set(Twist(v, 0.0, omega))
             agent.touches.clear()
         # Agents may share a world.
         worlds = list({id(agent.world): agent.world for agent in agents}.values())
         step_worlds(worlds, self._settings.physics_steps, self._num_threads)
-        s.collided[chosen] = [agent.touches.touched for agent in agents]
+        self.situation.collided[rows] = [agent.touches.touched for agent in agents]
 
     def look(self, rows: Rows | None = None) -> None:
         """Performs scans and computes the observations.
@@ -129,24 +145,39 @@ class Episodes:
         Args:
             rows: Agents whose observations are computed; None for all.
         """
-        s, goal_radius = self.situation, self.task.goal_radius
-        chosen = self._all if rows is None else rows
-        bodies = [self.agents[row].body for row in chosen.tolist()]
-        s.poses[chosen] = [body.pose for body in bodies]
-        s.velocities[chosen] = [body.velocity for body in bodies]
+        s = self.situation
         if rows is None:
-            compute_scans(self._lasers, s.ranges, self._num_threads)
-            s.locate(goal_radius)
-            self.layout.write(s, self.observations)
+            self._measure(self._all)
+            self._observe()
             return
-        lasers = [self._lasers[row] for row in rows.tolist()]
+        self._measure(rows)
         part = s.take(rows)
-        compute_scans(lasers, part.ranges, self._num_threads)
-        part.locate(goal_radius)
+        part.locate(self.task.goal_radius)
         observations = np.empty((len(rows), self.layout.size), np.float32)
         self.layout.write(part, observations)
         self.observations[rows] = observations
         s.put(rows, part)
+
+    def _measure(self, rows: Rows) -> None:
+        """Reads poses and velocities of some agents, and performs scans."""
+        if not len(rows):
+            return
+        s = self.situation
+        bodies = [self.agents[row].body for row in rows.tolist()]
+        s.poses[rows] = [body.pose for body in bodies]
+        s.velocities[rows] = [body.velocity for body in bodies]
+        if len(rows) == len(s):
+            compute_scans(self._lasers, s.ranges, self._num_threads)
+            return
+        lasers = [self._lasers[row] for row in rows.tolist()]
+        ranges = np.empty((len(rows), s.ranges.shape[1]), np.float32)
+        compute_scans(lasers, ranges, self._num_threads)
+        s.ranges[rows] = ranges
+
+    def _observe(self) -> None:
+        """Computes the observations of all agents."""
+        self.situation.locate(self.task.goal_radius)
+        self.layout.write(self.situation, self.observations)
 
     def judge(self) -> tuple[DoubleArray, BoolArray, BoolArray]:
         """Returns rewards, which episodes terminated and which were truncated, (n,) each."""

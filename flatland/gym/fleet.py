@@ -176,8 +176,7 @@ class FleetEnv(ParallelEnv[str, Any, FloatArray]):  # type: ignore[misc, unused-
         rows = np.array([self._row_of[name] for name in live])
         numbers = np.zeros((len(self._agents), 2))
         numbers[rows] = checked_actions([actions[name] for name in live], len(live))
-        self._episodes.advance(numbers, rows)
-        self._episodes.look()
+        self._episodes.step(numbers, rows)
         rewards, terminated, truncated = self._episodes.judge()
         ended = terminated | truncated
         for name in live:

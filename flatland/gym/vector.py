@@ -165,10 +165,9 @@ class FlatlandVectorEnv(VectorEnv[Any, Any, Any]):
         fresh = self._has_ended.copy()
         if fresh.any():
             self._begin(np.flatnonzero(fresh), {})
-            self._episodes.advance(numbers, np.flatnonzero(~fresh))
+            self._episodes.step(numbers, np.flatnonzero(~fresh))
         else:
-            self._episodes.advance(numbers)
-        self._episodes.look()
+            self._episodes.step(numbers)
         rewards, terminated, truncated = self._episodes.judge()
         rewards[fresh] = 0.0
         terminated[fresh] = truncated[fresh] = False

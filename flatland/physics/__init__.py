@@ -13,6 +13,7 @@ be finite and within +-1e9. Box2D computes in single precision.
 from flatland._core import (
     BOX2D_VERSION,
     AckermannController,
+    AgentBatch,
     BeamFan,
     ContactEvent,
     ContactInfo,
@@ -75,6 +76,7 @@ __all__ = [
     "ALL_BITS",
     "BOX2D_VERSION",
     "AckermannController",
+    "AgentBatch",
     "BeamFan",
     "Clock",
     "ContactEvent",

@@ -42,6 +42,11 @@ class BodyDrive(ModelPlugin):
     _twist: Output[TwistWithCovariance] | None
     _moves_sideways = False
 
+    @property
+    def controller(self) -> DriveController:
+        """The controller of the core that moves the body."""
+        return self._controller
+
     def read_limits(self, config: YamlReader) -> None:
         """Reads `linear_dynamics` and `angular_dynamics`; for `on_initialize`.
 

@@ -219,6 +219,11 @@ class Command(Generic[T]):
         if self.on_change is not None:
             self.on_change()
 
+    def assign(self, value: T) -> None:
+        """Sets a valid value that was passed to the plugin already."""
+        self._value = value
+        self.received += 1
+
     def renew(self, new: Command[T]) -> None:
         """Becomes equal to a new command of the same topic; `on_set` remains."""
         self.name, self.owner, self.accept = new.name, new.owner, new.accept

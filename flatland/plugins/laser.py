@@ -170,6 +170,36 @@ class Laser(RangeSensor):
         self.last_scan = (scan.pose, scan.ranges)
         self.intensities = _no_intensities() if scan.intensities is None else scan.intensities
 
+    @property
+    def finder(self) -> RangeFinder:
+        """The beams, for scans in the core."""
+        return self._finder
+
+    @property
+    def has_noise(self) -> bool:
+        """Whether ranges have noise."""
+        return self._has_noise
+
+    @property
+    def measures_intensities(self) -> bool:
+        """Whether scans have intensities, at least in a world without materials."""
+        return self.world.collision_filter.layer_id(REFLECTANCE_LAYER) >= 0
+
+    @property
+    def next_computed(self) -> tuple[int, int]:
+        """Key of the random numbers of the next scan on request, and its number in the stream."""
+        return self._computed.key, self._computed.updates + self._has_noise
+
+    def count_computed(self, pose: Pose, ranges: FloatArray) -> None:
+        """Counts a scan on request that the core has computed with the numbers `next_computed`.
+
+        Args:
+            pose: Pose of the sensor in the world frame.
+            ranges: Range of each beam [m], shape (n,), float32.
+        """
+        self._computed.begin_update(self._has_noise)
+        self.last_scan = (pose, ranges)
+
     def cast_without_noise(self) -> tuple[Pose, FloatArray]:
         """Casts the beams from the current pose without changing the state of the laser.
 

@@ -153,6 +153,11 @@ class ContactReporter:
         """Returns the body of a model or layer by its physics body, None if it has no owner."""
         return self._bodies.get(physics_body.id)
 
+    @property
+    def is_pending(self) -> bool:
+        """Whether `update` has something to do for the next step."""
+        return self._is_stale
+
     def update(self) -> None:
         """Adapts to changes of bodies and hooks; to be called before each step."""
         if not self._is_stale:

@@ -139,6 +139,11 @@ class Jobs:
         self._is_stale = True
         self._queue.interrupt()
 
+    @property
+    def is_pending(self) -> bool:
+        """Whether `refresh` has something to do for the next step."""
+        return self._is_stale or bool(self._later)
+
     def refresh(self, transforms_wanted: bool) -> None:
         """Prepares the next step: passes new commands, and finds out which updates are wanted.
 

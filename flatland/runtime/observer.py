@@ -200,6 +200,11 @@ class Observers:
         self._notify("layer_changed", layer_name)
 
     @property
+    def watch_any(self) -> bool:
+        """Whether an observer is to be notified of steps, single or several at once."""
+        return bool(self._of_steps)
+
+    @property
     def watch_steps(self) -> bool:
         """Whether an observer is to be notified of each step."""
         # A generator expression takes longer than a short step.

@@ -98,6 +98,11 @@ class Requests:
         """Whether a thread serves the queue at the moment."""
         return self._server is not None
 
+    @property
+    def in_use(self) -> bool:
+        """Whether a thread runs actions, hooks or other code of plugins at the moment."""
+        return bool(self._uses)
+
     def hooks(self) -> AbstractContextManager[None]:
         """Marks the current thread as running hooks of plugins, for the duration of the block."""
         return self._as_hook

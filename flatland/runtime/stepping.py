@@ -41,6 +41,10 @@ class SteppedWorld(Protocol):
     def paused(self) -> bool:
         """Whether steps have no effect."""
 
+    @property
+    def closed(self) -> bool:
+        """Whether the world is closed."""
+
     def check_open(self) -> None:
         """Raises `WorldError` if the world is closed."""
 
@@ -142,7 +146,56 @@ class Stepping:
 
         return perform(self.run(n), run_paced)
 
-    def run(self, n: int, *, while_paused: bool = False) -> StepRun:
+    def begin_unattended(self) -> bool:
+        """Prepares steps that the core performs without any code in between.
+
+        Returns:
+            Whether this is possible: nothing observes the world, no request waits, and no plugin
+            has to be called first. Then the world is locked, and `end_unattended` must follow.
+        """
+        requests, host = self._requests, self._host
+        if (
+            requests.actions
+            or requests.in_use
+            or host.jobs.is_pending
+            or host.contacts.is_pending
+            or self._observers.watch_any
+            or self.change_log is not None
+            or self._faults.first is not None
+            or self._world.paused
+            or self._world.closed
+            or self._physics.pre_solve is not None
+        ):
+            return False
+        return bool(requests.lock.acquire(blocking=False))
+
+    def end_unattended(self, n: int, result: RunResult | Exception | None) -> None:
+        """Ends what `begin_unattended` has begun, and performs the steps that remain.
+
+        Args:
+            n: Number of steps.
+            result: What the core returned or raised if it did not complete the steps; else None.
+
+        Raises:
+            Exception: As `World.step`.
+        """
+        try:
+            if result is None:
+                self._timekeeper.sim_time_ns += n * self._timekeeper.step_size_ns
+                return
+            made = perform(self.run(n, begun=result), self._queue.run)
+        finally:
+            self._requests.lock.release()
+        if made < n:
+            self.step(n - made)
+
+    def run(
+        self,
+        n: int,
+        *,
+        while_paused: bool = False,
+        begun: RunResult | Exception | None = None,
+    ) -> StepRun:
         """Performs up to n steps, at least one unless another thread interrupts.
 
         A run ends after a step in which code was called, and after an interrupt. Observers are
@@ -152,6 +205,8 @@ class Stepping:
         Args:
             n: Maximum number of steps, at least 1.
             while_paused: Whether to step a paused world.
+            begun: What the core returned or raised if it has performed the first part of the run;
+                else None.
 
         Returns:
             The run, to be driven by `perform` or `step_worlds`; its result is 1 for a paused world.
@@ -164,16 +219,17 @@ class Stepping:
         requests.refuse_in_plugin("step")
         with requests.lock:
             self._world.check_open()
-            self._queue.clear_interrupt()
-            if requests.actions:
-                requests.process()
-                self._world.check_open()  # A request may have closed it.
+            if begun is None:
+                self._queue.clear_interrupt()
+                if requests.actions:
+                    requests.process()
+                    self._world.check_open()  # A request may have closed it.
             made = 1
             if while_paused or not self._world.paused:
                 with requests.hooks():
                     self._observers.step_started()
                     try:
-                        made = yield from self._steps(n)
+                        made = yield from self._steps(n, begun)
                     finally:
                         self._observers.step_finished()
             if requests.actions:
@@ -182,10 +238,11 @@ class Stepping:
             self._faults.raise_first()
         return made
 
-    def _steps(self, n: int) -> StepRun:
+    def _steps(self, n: int, begun: RunResult | Exception | None) -> StepRun:
         world, host, timekeeper = self._world, self._host, self._timekeeper
-        host.contacts.update()
-        host.jobs.refresh(self._observers.want_transforms)
+        if begun is None:
+            host.contacts.update()
+            host.jobs.refresh(self._observers.want_transforms)
         is_single = self._observers.watch_steps or self.change_log is not None
         start, step = timekeeper.sim_time_ns, timekeeper.step_size_ns
         run = Run(
@@ -198,7 +255,9 @@ class Stepping:
             False,
             self._physics.pre_solve is not None,
         )
-        steps, end, calls, failed, report = yield run
+        if isinstance(begun, Exception):
+            raise begun
+        steps, end, calls, failed, report = begun or (yield run)
         while end != _DONE:
             is_after = end >= _AFTER
             self._set_time(start + (steps + is_after) * step)

@@ -16,6 +16,7 @@
 #include <vector>
 
 #include "bindings/bindings.h"
+#include "bindings/runs.h"
 #include "bindings/tuples.h"
 #include "bindings/values.h"
 #include "world/errors.h"
@@ -80,23 +81,7 @@ std::vector<PySkipped> take_skipped(const PyJobs& jobs) {
   return rows;
 }
 
-// The members of a Run, in order.
-using PyRun = std::tuple<std::int64_t, std::int64_t, std::int64_t, double, int, int, bool, bool>;
-using PyRunResult = std::tuple<std::int64_t, int, std::vector<Id>,
-                               std::vector<std::pair<Id, std::string>>, std::optional<PyReport>>;
 using PyPacedResult = std::tuple<PyRunResult, PyWorkTimes>;
-
-Run to_run(const PyRun& run) {
-  const auto& [time, step, n, dt, velocity, position, continues, calls_physics] = run;
-  return {time, step, n, dt, velocity, position, continues, calls_physics};
-}
-
-PyRunResult result_tuple(const RunResult& result) {
-  std::vector<std::pair<Id, std::string>> failed;
-  for (const FailedJob& job : result.failed) failed.emplace_back(job.controller, job.error);
-  return {result.steps, static_cast<int>(result.end), result.calls, std::move(failed),
-          to_python(result.report)};
-}
 
 RunResult perform(World& world, const Run& run) {
   // Safe without the GIL: the world is in exclusive use by this thread, and the run accesses no
@@ -280,22 +265,6 @@ class Runs {
   }
 
  private:
-  // Converts an exception to an instance of the Python class that pybind11 would raise.
-  static py::object error_of(const std::exception_ptr& error) {
-    const auto errors = py::module_::import("flatland.errors");
-    try {
-      std::rethrow_exception(error);
-    } catch (const StaleHandleError& stale) {
-      return errors.attr("StaleHandleError")(stale.what());
-    } catch (const WorldLockedError& locked) {
-      return errors.attr("WorldLockedError")(locked.what());
-    } catch (const std::invalid_argument& invalid) {
-      return py::module_::import("builtins").attr("ValueError")(invalid.what());
-    } catch (const std::exception& other) {
-      return py::module_::import("builtins").attr("MemoryError")(other.what());
-    }
-  }
-
   std::vector<World*> worlds_;
   std::vector<Run> runs_;
   std::vector<std::unique_ptr<World::ExclusiveUse>> uses_;

@@ -11,6 +11,7 @@
 #include "bindings/arrays.h"
 #include "bindings/bindings.h"
 #include "bindings/tuples.h"
+#include "world/bodies.h"
 #include "world/errors.h"
 #include "world/overlap.h"
 

@@ -9,6 +9,7 @@
 #include "bindings/tuples.h"
 #include "bindings/values.h"
 #include "rays/raycast.h"
+#include "world/bodies.h"
 #include "world/errors.h"
 
 namespace py = pybind11;

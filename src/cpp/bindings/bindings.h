@@ -34,6 +34,7 @@ void bind_raycast(WorldClass& world);
 void bind_overlap(WorldClass& world);
 void bind_range_finder(pybind11::module_& module);
 void bind_jobs(pybind11::module_& module, Classes& classes);
+void bind_agents(pybind11::module_& module);
 void bind_map_edges(pybind11::module_& module);
 
 // Calls work() and ends the use of the world, even if work() throws.

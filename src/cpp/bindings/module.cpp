@@ -26,6 +26,7 @@ PYBIND11_MODULE(_core, module) {
   flatland::bind_raycast(classes.world);
   flatland::bind_overlap(classes.world);
   flatland::bind_jobs(module, classes);
+  flatland::bind_agents(module);
   flatland::bind_map_edges(module);
   flatland::bind_masks(module);
 }

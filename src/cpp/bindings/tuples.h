@@ -23,12 +23,6 @@ using PyPose = Numbers<3>;
 inline b2Vec2 checked_point(const PyPoint& point, const char* what) {
   return checked_vector(point[0], point[1], what);
 }
-inline b2Transform checked_pose(const Triple& pose) {
-  b2Transform transform;
-  transform.p = checked_vector(pose[0], pose[1], "pose");
-  transform.q.Set(checked_finite(pose[2], "pose angle"));
-  return transform;
-}
 
 // Results: tuples.
 using PyPair = std::tuple<double, double>;

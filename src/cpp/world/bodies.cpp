@@ -70,6 +70,13 @@ Id create_body(World& world, b2BodyType type, const Triple& pose, double linear_
   return world.add_body(definition);
 }
 
+b2Transform checked_pose(const Triple& pose) {
+  b2Transform transform;
+  transform.p = checked_vector(pose[0], pose[1], "pose");
+  transform.q.Set(checked_finite(pose[2], "pose angle"));
+  return transform;
+}
+
 Triple pose_of(const World& world, Id body_id) { return pose_of(*world.read_body(body_id)); }
 
 Triple pose_of(const b2Body& body) {
@@ -90,10 +97,13 @@ void set_pose(World& world, b2Body* body, const Triple& pose) {
 }
 
 Triple velocity_of(const World& world, Id body_id) {
-  const b2Body* body = world.read_body(body_id);
-  const b2Vec2 velocity = body->GetLinearVelocityFromWorldPoint(body->GetPosition());
+  return velocity_of(*world.read_body(body_id));
+}
+
+Triple velocity_of(const b2Body& body) {
+  const b2Vec2 velocity = body.GetLinearVelocityFromWorldPoint(body.GetPosition());
   return {static_cast<double>(velocity.x), static_cast<double>(velocity.y),
-          static_cast<double>(body->GetAngularVelocity())};
+          static_cast<double>(body.GetAngularVelocity())};
 }
 
 void set_velocity(World& world, Id body_id, const Triple& velocity) {

@@ -23,6 +23,8 @@ struct FixtureOptions {
 Id create_body(World& world, b2BodyType type, const Triple& pose, double linear_damping,
                double angular_damping);
 
+b2Transform checked_pose(const Triple& pose);
+
 Triple pose_of(const World& world, Id body);
 Triple pose_of(const b2Body& body);
 // Wakes the body, or the adjacent dynamic bodies if it is static.
@@ -31,6 +33,7 @@ void set_pose(World& world, b2Body* body, const Triple& pose);
 
 // Returns the velocity of the origin of a body, not of the center of mass.
 Triple velocity_of(const World& world, Id body);
+Triple velocity_of(const b2Body& body);
 void set_velocity(World& world, Id body, const Triple& velocity);
 void set_velocity(b2Body* body, const Triple& velocity);
 

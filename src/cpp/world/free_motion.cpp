@@ -23,7 +23,7 @@ constexpr std::size_t kMostFixtures = 8;
 // at distances of up to a quarter of its slop.
 constexpr float kClearance = b2_linearSlop;
 
-struct Motion {
+struct FreeState {
   b2Vec2 center;
   float angle = 0.0F;
   b2Vec2 velocity;
@@ -48,45 +48,45 @@ bool is_moving(const b2Body& body) {
 
 // Returns the state after a step without contacts and joints, in the operations of b2Island::Solve.
 // There is no gravity.
-Motion integrate(b2Body& body, float dt) {
-  Motion motion;
-  motion.center = get<members::BodySweep>(body).c;
-  motion.angle = get<members::BodySweep>(body).a;
-  motion.velocity = body.GetLinearVelocity();
-  motion.omega = body.GetAngularVelocity();
+FreeState integrate(b2Body& body, float dt) {
+  FreeState state;
+  state.center = get<members::BodySweep>(body).c;
+  state.angle = get<members::BodySweep>(body).a;
+  state.velocity = body.GetLinearVelocity();
+  state.omega = body.GetAngularVelocity();
   if (body.GetType() == b2_dynamicBody) {
     const b2Vec2 no_gravity(0.0F, 0.0F);
-    motion.velocity +=
+    state.velocity +=
         dt * get<members::BodyInverseMass>(body) *
         (body.GetGravityScale() * body.GetMass() * no_gravity + get<members::BodyForce>(body));
-    motion.omega += dt * get<members::BodyInverseInertia>(body) * get<members::BodyTorque>(body);
-    motion.velocity *= 1.0F / (1.0F + dt * body.GetLinearDamping());
-    motion.omega *= 1.0F / (1.0F + dt * body.GetAngularDamping());
+    state.omega += dt * get<members::BodyInverseInertia>(body) * get<members::BodyTorque>(body);
+    state.velocity *= 1.0F / (1.0F + dt * body.GetLinearDamping());
+    state.omega *= 1.0F / (1.0F + dt * body.GetAngularDamping());
   }
-  const b2Vec2 translation = dt * motion.velocity;
+  const b2Vec2 translation = dt * state.velocity;
   if (b2Dot(translation, translation) > b2_maxTranslationSquared) {
-    motion.velocity *= b2_maxTranslation / translation.Length();
+    state.velocity *= b2_maxTranslation / translation.Length();
   }
-  const float rotation = dt * motion.omega;
+  const float rotation = dt * state.omega;
   if (rotation * rotation > b2_maxRotationSquared) {
-    motion.omega *= b2_maxRotation / b2Abs(rotation);
+    state.omega *= b2_maxRotation / b2Abs(rotation);
   }
-  motion.center += dt * motion.velocity;
-  motion.angle += dt * motion.omega;
-  return motion;
+  state.center += dt * state.velocity;
+  state.angle += dt * state.omega;
+  return state;
 }
 
 // Sets the time since which the body has been at rest. Returns whether the body stays awake.
-bool stays_awake(b2Body& body, Motion& motion, float dt, int position_iterations) {
+bool stays_awake(b2Body& body, FreeState& state, float dt, int position_iterations) {
   constexpr float kLinear = b2_linearSleepTolerance * b2_linearSleepTolerance;
   constexpr float kAngular = b2_angularSleepTolerance * b2_angularSleepTolerance;
-  if (!body.IsSleepingAllowed() || motion.omega * motion.omega > kAngular ||
-      b2Dot(motion.velocity, motion.velocity) > kLinear) {
-    motion.sleep_time = 0.0F;
+  if (!body.IsSleepingAllowed() || state.omega * state.omega > kAngular ||
+      b2Dot(state.velocity, state.velocity) > kLinear) {
+    state.sleep_time = 0.0F;
     return true;
   }
-  motion.sleep_time = get<members::BodySleepTime>(body) + dt;
-  return motion.sleep_time < b2_timeToSleep || position_iterations < 1;
+  state.sleep_time = get<members::BodySleepTime>(body) + dt;
+  return state.sleep_time < b2_timeToSleep || position_iterations < 1;
 }
 
 // Returns whether the broad phase keeps the box of a fixture, as in b2DynamicTree::MoveProxy.
@@ -133,7 +133,7 @@ float bulge(const b2AABB& box, b2Vec2 center, float rotation) {
 
 // Returns whether a fixture stays clear of the fixtures in its contacts during a step, so that the
 // step changes no contact.
-bool stays_clear(b2Body& body, const Motion& motion, const b2BroadPhase& broad_phase,
+bool stays_clear(b2Body& body, const FreeState& state, const b2BroadPhase& broad_phase,
                  const MovedBoxes& moved) {
   for (b2ContactEdge* edge = body.GetContactList(); edge != nullptr; edge = edge->next) {
     b2Contact& contact = *edge->contact;
@@ -151,9 +151,9 @@ bool stays_clear(b2Body& body, const Motion& motion, const b2BroadPhase& broad_p
     const auto* found = std::find_if(moved.boxes.begin(), moved.boxes.begin() + moved.count,
                                      [&](const MovedBox& each) { return each.proxy == proxy; });
     const b2Sweep& sweep = get<members::BodySweep>(body);
-    const float rotation = motion.angle - sweep.a;
+    const float rotation = state.angle - sweep.a;
     const float gap = kClearance + b2Max(bulge(found->box, sweep.c, rotation),
-                                         bulge(found->box, motion.center, rotation));
+                                         bulge(found->box, state.center, rotation));
     const b2Vec2 margin(gap, gap);
     const b2AABB swept{found->box.lowerBound - margin, found->box.upperBound + margin};
     // Written so that NaN is not clear.
@@ -175,27 +175,27 @@ b2Transform transform_of(b2Rot rotation, b2Vec2 center, b2Vec2 local_center) {
 // Moves a body if it is free. Returns whether it is.
 bool move(b2Body& body, const b2BroadPhase& broad_phase, float dt, int position_iterations) {
   if (body.GetJointList() != nullptr) return false;
-  Motion motion = integrate(body, dt);
-  if (!stays_awake(body, motion, dt, position_iterations)) return false;
+  FreeState state = integrate(body, dt);
+  if (!stays_awake(body, state, dt, position_iterations)) return false;
   b2Sweep& sweep = get<members::BodySweep>(body);
   b2Transform& transform = get<members::BodyTransform>(body);
   // The rotation of the transform is always that of the angle of the sweep.
   const b2Transform from = transform_of(transform.q, sweep.c, sweep.localCenter);
-  const b2Transform to = transform_of(b2Rot(motion.angle), motion.center, sweep.localCenter);
+  const b2Transform to = transform_of(b2Rot(state.angle), state.center, sweep.localCenter);
   MovedBoxes moved;
   if (!sweep_boxes(body, broad_phase, from, to, moved) ||
-      !stays_clear(body, motion, broad_phase, moved)) {
+      !stays_clear(body, state, broad_phase, moved)) {
     return false;
   }
   sweep.c0 = sweep.c;
   sweep.a0 = sweep.a;
   sweep.alpha0 = 0.0F;
-  sweep.c = motion.center;
-  sweep.a = motion.angle;
+  sweep.c = state.center;
+  sweep.a = state.angle;
   transform = to;
-  get<members::BodyVelocity>(body) = motion.velocity;
-  get<members::BodyOmega>(body) = motion.omega;
-  get<members::BodySleepTime>(body) = motion.sleep_time;
+  get<members::BodyVelocity>(body) = state.velocity;
+  get<members::BodyOmega>(body) = state.omega;
+  get<members::BodySleepTime>(body) = state.sleep_time;
   get<members::BodyForce>(body).SetZero();
   get<members::BodyTorque>(body) = 0.0F;
   for (std::size_t i = 0; i < moved.count; ++i) moved.boxes[i].proxy->aabb = moved.boxes[i].box;

@@ -1,0 +1,171 @@
+"""The agents of an environment with a world for each agent, stepped and scanned by the core."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from flatland.physics import AgentBatch, Run
+from flatland.plugin_api.drive import MAX_COMMAND
+from flatland.runtime.batch import step_worlds
+from flatland.values import Twist
+
+if TYPE_CHECKING:
+    from flatland.geometry import BoolArray, DoubleArray
+    from flatland.gym.agents import Agent
+    from flatland.gym.situation import Rows, Situation
+    from flatland.physics import RunResult
+    from flatland.world import World
+
+
+class Batch:
+    """Performs a step of an environment in one call of the core, for all agents that permit it.
+
+    An agent is excluded from a step while something observes its world or waits for its next step,
+    such as a request of a viewer or a plugin that was just reset. Its results are the same then.
+    """
+
+    def __init__(self, agents: Sequence[Agent], situation: Situation, num_threads: int) -> None:
+        """Prepares the agents.
+
+        Args:
+            agents: The agents, for which `is_possible` is true.
+            situation: Receives what the agents observe.
+            num_threads: Number of threads that step and scan, 0 for one per core.
+        """
+        self._agents = agents
+        self._situation = situation
+        self._num_threads = num_threads
+        # Threads that step overlapping sets of worlds lock them in the same order.
+        self._order = sorted(range(len(agents)), key=lambda row: id(agents[row].world))
+        self._core = AgentBatch(
+            [
+                (agent.body.physics, agent.controller, agent.touches, agent.laser.finder)
+                for agent in agents
+                if agent.controller is not None
+            ]
+        )
+        self._noisy = [row for row, agent in enumerate(agents) if agent.laser.has_noise]
+        self._noises = np.zeros((len(agents), 2), np.uint64)  # see `Laser.next_computed`
+        self._sensor_poses = np.zeros((len(agents), 3))
+        self._ranges = list(situation.ranges)  # a view of each row
+
+    @staticmethod
+    def is_possible(agents: Sequence[Agent], low: DoubleArray, high: DoubleArray) -> bool:
+        """Returns whether the core can step agents.
+
+        Args:
+            agents: The agents.
+            low: Lowest velocity command (v, omega) [m/s, rad/s].
+            high: Highest velocity command.
+        """
+        return (
+            len({id(agent.world) for agent in agents}) == len(agents)
+            and all(agent.controller is not None for agent in agents)
+            and not any(agent.laser.measures_intensities for agent in agents)
+            and bool((np.abs([low, high]) <= MAX_COMMAND).all())
+        )
+
+    def perform(self, commands: DoubleArray, acting: BoolArray, n: int) -> Rows:
+        """Carries out commands for some steps of the worlds, and observes all agents.
+
+        Args:
+            commands: Forward speed and yaw rate of each agent [m/s, rad/s], shape (n, 2).
+            acting: Agents that act, shape (n,); the worlds of others are not stepped.
+            n: Number of steps.
+
+        Returns:
+            The agents that remain to be observed.
+
+        Raises:
+            Exception: As `World.step`.
+        """
+        agents = self._agents
+        timekeeper = agents[0].world.timekeeper
+        settings = _iterations(agents[0].world)
+        run = Run(0, timekeeper.step_size_ns, n, timekeeper.step_size, *settings, False, False)
+        steps, observes = acting.copy(), np.ones(len(agents), np.bool_)
+        begun: list[int] = []
+        others: list[int] = []
+        unfinished: dict[int, RunResult | Exception] = {}
+        is_acting, values = acting.tolist(), commands.tolist()
+        try:
+            for row in self._order:
+                if not is_acting[row]:
+                    continue
+                agent = agents[row]
+                if _begin(agent, settings):
+                    begun.append(row)
+                    v, omega = values[row]
+                    agent.command.assign(Twist(v, 0.0, omega))
+                else:
+                    others.append(row)
+            steps[others] = observes[others] = False
+            unfinished = self._call_core(run, commands, steps, observes)
+        finally:
+            _end([agents[row].world for row in begun], n, [unfinished.get(row) for row in begun])
+        for row in others:
+            v, omega = values[row]
+            agents[row].command.set(Twist(v, 0.0, omega))
+            agents[row].touches.clear()
+        step_worlds([agents[row].world for row in others], n, self._num_threads)
+        rest = sorted([*others, *unfinished])
+        self._situation.collided[rest] = [agents[row].touches.touched for row in rest]
+        return np.array(rest, np.intp)
+
+    def _call_core(
+        self, run: Run, commands: DoubleArray, steps: BoolArray, observes: BoolArray
+    ) -> dict[int, RunResult | Exception]:
+        agents, s = self._agents, self._situation
+        for row in self._noisy:
+            self._noises[row] = agents[row].laser.next_computed
+        unfinished = dict(
+            self._core.perform(
+                run,
+                steps,
+                observes,
+                np.ascontiguousarray(commands),
+                np.array([agent.world.timekeeper.sim_time_ns for agent in agents], np.int64),
+                self._noises,
+                s.poses,
+                s.velocities,
+                self._sensor_poses,
+                s.ranges,
+                s.collided,
+                self._num_threads,
+            )
+        )
+        observed = observes.tolist()
+        for row, (x, y, theta) in enumerate(self._sensor_poses.tolist()):
+            if observed[row] and row not in unfinished:
+                agents[row].laser.count_computed((x, y, theta), self._ranges[row])
+        return unfinished
+
+
+def _begin(agent: Agent, settings: tuple[int, int]) -> bool:
+    """Locks the world of an agent if the core can perform its next steps without any other code."""
+    world = agent.world
+    return (
+        agent.command.on_set is None
+        and _iterations(world) == settings
+        and not world.physics.has_materials
+        and world.stepping.begin_unattended()
+    )
+
+
+def _iterations(world: World) -> tuple[int, int]:
+    return world.velocity_iterations, world.position_iterations
+
+
+def _end(worlds: list[World], n: int, results: list[RunResult | Exception | None]) -> None:
+    """Completes the steps of worlds; raises the exception of the first one that fails."""
+    error: BaseException | None = None
+    for world, result in zip(worlds, results, strict=True):
+        try:
+            world.stepping.end_unattended(n, result)
+        except BaseException as raised:
+            error = error or raised
+    if error is not None:
+        raise error

@@ -1,0 +1,70 @@
+// Agents for learning: in each of many worlds, a driven body with a range finder. Their worlds
+// advance in parallel.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <exception>
+#include <memory>
+#include <vector>
+
+#include "rays/range_finder.h"
+#include "world/world.h"
+
+namespace flatland {
+
+// A driven body with a range finder; its world belongs to it alone.
+struct Agent {
+  World* world = nullptr;
+  Id body = 0;
+  Id controller = 0;  // of the body
+  Id touches = 0;     // collector of its contacts
+  std::shared_ptr<const RangeFinder> finder;
+};
+
+// What agents are to do, with an element for each of them.
+struct AgentCommands {
+  const bool* steps;            // whether the world of the agent steps
+  const bool* observes;         // whether the agent is observed, after its steps
+  const double* velocities;     // forward and yaw rate [m/s, rad/s], 2 numbers
+  const std::int64_t* times;    // simulated time of the world [ns]
+  const std::uint64_t* noises;  // key of the random numbers of a scan, and number of the scan
+};
+
+// What is observed, with a row for each agent.
+struct AgentRows {
+  double* poses;         // of the body (x, y, theta) in the world frame
+  double* velocities;    // of the origin of the body (vx, vy, omega) in the world frame
+  double* sensor_poses;  // of the range finder in the world frame
+  float* ranges;
+  bool* touched;  // whether the agent touched anything in its steps
+};
+
+// The steps of an agent that remain to be done outside of the core, or the exception of the core.
+struct UnfinishedRun {
+  std::size_t agent = 0;
+  RunResult result;
+  std::exception_ptr error;
+};
+
+class AgentBatch {
+ public:
+  // The agents have different worlds and equal numbers of readings.
+  explicit AgentBatch(std::vector<Agent> agents) : agents_(std::move(agents)) {}
+
+  const std::vector<Agent>& agents() const { return agents_; }
+  // Returns the expected wall time on one processor [s].
+  double expected_time(const AgentCommands& commands, const Run& run);
+  // Performs the steps of all agents and observes them, on several threads. The caller has
+  // exclusive use of the worlds. An agent with steps that remain is not observed.
+  std::vector<UnfinishedRun> perform(const AgentCommands& commands, const Run& run,
+                                     const AgentRows& rows, std::size_t num_threads);
+
+ private:
+  RunResult step(const Agent& agent, double forward, double omega, const Run& run);
+  void observe(std::size_t i, const AgentCommands& commands, const AgentRows& rows);
+
+  std::vector<Agent> agents_;
+};
+
+}  // namespace flatland

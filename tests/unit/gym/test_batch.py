@@ -1,0 +1,106 @@
+"""Steps that the core performs alone have the results of steps that Python attends."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from gymnasium.vector import AutoresetMode
+
+from flatland.errors import StaleHandleError
+from flatland.gym import FlatlandVectorEnv
+from flatland.gym.endings import Arrived
+from flatland.runtime.observer import WorldObserver
+
+Make = Callable[..., Any]
+COUNT, STEPS = 3, 60
+
+
+class Watcher(WorldObserver):
+    """Its world is stepped by Python."""
+
+    def __init__(self) -> None:
+        self.starts = 0
+
+    def step_started(self) -> None:
+        self.starts += 1
+
+
+def run(env: FlatlandVectorEnv, disturb: Callable[[int], None] | None = None) -> list[Any]:
+    """Returns all results of random episodes, and the hashes of the worlds."""
+    rng = np.random.default_rng(1)
+    results: list[Any] = []
+    env.reset(seed=3)
+    for step in range(STEPS):
+        if disturb is not None:
+            disturb(step)
+        actions = rng.uniform([0.0, -1.0], [1.0, 1.0], (COUNT, 2)).astype(np.float32)
+        observations, rewards, terminated, truncated, infos = env.step(actions)
+        values = [observations, rewards, terminated, truncated, *map(infos.get, sorted(infos))]
+        results.append([np.asarray(value).tobytes() for value in values])
+        results.append([world.state_hash() for world in env._stage.worlds])
+        results.append([world.time for world in env._stage.worlds])
+    return results
+
+
+def create(make: Make, world: str | Path) -> Any:
+    # Robots that hit a wall go on: the core reports bodies that are jammed.
+    return make(
+        FlatlandVectorEnv,
+        COUNT,
+        world,
+        ending=Arrived(),
+        max_steps=25,
+        autoreset_mode=AutoresetMode.NEXT_STEP,
+    )
+
+
+@pytest.mark.parametrize("world", ["room", "corridor"])
+def test_an_observer_does_not_change_results(make: Make, room: Path, world: str) -> None:
+    env = create(make, room if world == "room" else world)
+    watched = create(make, room if world == "room" else world)
+    watcher = Watcher()
+    watched._stage.worlds[1].add_observer(watcher)
+    assert run(watched) == run(env)
+    # The core performs all steps between two calls of code at once.
+    assert watcher.starts >= STEPS - 3
+
+
+def test_requests_and_hooks_are_performed_in_their_step(make: Make, room: Path) -> None:
+    env, other = create(make, room), create(make, room)
+    first, second = env._stage.worlds[0], other._stage.worlds[0]
+
+    def post(step: int) -> None:
+        if step % 7 == 3:
+            first.post(lambda: first.move_model("robot", (3.0, 2.0, 1.0), "allow"))
+
+    def move(step: int) -> None:
+        if step % 7 == 3:
+            second.move_model("robot", (3.0, 2.0, 1.0), "allow")
+
+    assert run(env, post) == run(other, move)
+
+
+def test_a_paused_world_stands_still(make: Make, room: Path) -> None:
+    env = create(make, room)
+    env.reset(seed=0)
+    env._stage.worlds[0].pause()
+    env.step(np.ones((COUNT, 2), np.float32))
+    times = [world.time for world in env._stage.worlds]
+    assert times[0] == 0
+    assert times[1] == times[2] > 0
+
+
+def test_an_exception_of_one_world_ends_the_steps_of_all(make: Make, room: Path) -> None:
+    env = create(make, room)
+    env.reset(seed=0)
+    env.step(np.zeros((COUNT, 2), np.float32))
+    env._stage.worlds[1].delete_model("robot")
+    with pytest.raises(StaleHandleError, match="removed"):
+        env.step(np.ones((COUNT, 2), np.float32))
+    # No world remains locked, and the other worlds have been stepped.
+    assert env._stage.worlds[0].time == env._stage.worlds[2].time == pytest.approx(0.2)
+    assert not env._stage.worlds[1].requests.lock._is_owned()
