@@ -189,6 +189,7 @@ Raises:
         const Material checked = checked_material(material);
         World& world = self.core();
         const b2Body* changed = world.change_body(self.id);
+        world.structure_changed();
         for (const b2Fixture* f = changed->GetFixtureList(); f != nullptr; f = f->GetNext()) {
           world.rays().set_material(f, checked);
         }
@@ -263,6 +264,7 @@ void bind_surface(py::class_<FixtureHandle, Handle>& fixture) {
         const Material checked = checked_material(material);
         World& world = self.core();
         world.rays().set_material(world.change_fixture(self.id), checked);
+        world.structure_changed();
       },
       R"(
 Material of the surface, None for a plain one; can be set, not removed.

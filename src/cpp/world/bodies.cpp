@@ -93,6 +93,7 @@ void set_pose(World& world, b2Body* body, const Triple& pose) {
   const b2Vec2 position = checked_vector(pose[0], pose[1], "pose");
   const float angle = checked_finite(pose[2], "pose angle");
   body->SetTransform(position, angle);
+  if (body->GetType() == b2_staticBody) world.structure_changed();
   wake(world, body);
 }
 

@@ -95,6 +95,13 @@ struct ContactFactory {
 };
 template struct Expose<ContactFactory, &b2Contact::Create>;
 
+// Destroys a contact that is in no list.
+struct ContactDestroyer {
+  using Pointer = void (*)(b2Contact*, b2BlockAllocator*);
+  friend Pointer expose(ContactDestroyer);
+};
+template struct Expose<ContactDestroyer, &b2Contact::Destroy>;
+
 template <typename Tag, int value>
 struct ExposeFlag {
   friend int expose(Tag) { return value; }

@@ -6,6 +6,9 @@
 // others. The contacts of a body, for example, have the same order as in the list of the world.
 // Each list is therefore copied from the front, and the lists of the bodies in the order of the
 // lists of the world. No result depends on addresses.
+//
+// A world that is restored again and again has the objects of the source already: as long as its
+// structure is that of the source, only what moves is copied.
 #include <box2d/b2_circle_shape.h>
 #include <box2d/b2_edge_shape.h>
 #include <box2d/b2_polygon_shape.h>
@@ -13,8 +16,10 @@
 #include <box2d/b2_weld_joint.h>
 
 #include <algorithm>
+#include <memory>
 #include <new>
 #include <unordered_map>
+#include <vector>
 
 #include "world/box2d_members.h"
 #include "world/errors.h"
@@ -48,16 +53,32 @@ class EngineCopier {
     copy_joints();
     copy_contacts();
     copy_broad_phase();
-    assign<members::WorldLastRate>(source_, target_);
-    assign<members::WorldNewContacts>(source_, target_);
-    assign<members::WorldStepComplete>(source_, target_);
-    assign<members::WorldProfile>(source_, target_);
+    set_proxies();
+    copy_times();
   }
 
   b2Body* copy_of(const b2Body* body) { return *bodies_.find(id_of(body)); }
   b2Fixture* copy_of(const b2Fixture* fixture) { return *fixtures_.find(id_of(fixture)); }
   const std::unordered_map<const b2Contact*, const b2Contact*>& contacts() const {
     return contacts_;
+  }
+
+  // Whether the arrays of the broad phases have the same size.
+  bool can_revert() const {
+    return get<members::TreeCapacity>(tree_of(source_)) ==
+           get<members::TreeCapacity>(tree_of(target_));
+  }
+
+  // The same as `copy`, in two parts, for a target with the structure of the source. The second
+  // part cannot fail.
+  void begin_revert() { create_contacts(); }
+  void revert() {
+    destroy_contacts();
+    revert_bodies();
+    revert_joints();
+    link_contacts();
+    copy_broad_phase();
+    copy_times();
   }
 
  private:
@@ -136,9 +157,12 @@ class EngineCopier {
   }
 
   void copy_contacts() {
-    auto& manager = const_cast<b2ContactManager&>(target_.GetContactManager());
-    b2Contact* last = nullptr;
-    Ends<b2ContactEdge> ends;
+    create_contacts();
+    link_contacts();
+  }
+
+  // Creates copies of the contacts that belong to no list yet.
+  void create_contacts() {
     for (const b2Contact* contact = source_.GetContactList(); contact != nullptr;
          contact = contact->GetNext()) {
       b2Fixture* fixture_a = copy_of(contact->GetFixtureA());
@@ -149,11 +173,21 @@ class EngineCopier {
       *copy = *contact;
       get<members::ContactFixtureA>(*copy) = fixture_a;
       get<members::ContactFixtureB>(*copy) = fixture_b;
+      contacts_[contact] = copy;
+      created_.push_back(copy);
+    }
+  }
+
+  void link_contacts() {
+    auto& manager = const_cast<b2ContactManager&>(target_.GetContactManager());
+    b2Contact* last = nullptr;
+    Ends<b2ContactEdge> ends;
+    for (b2Contact* copy : created_) {
       get<members::ContactPrevious>(*copy) = last;
       get<members::ContactNext>(*copy) = nullptr;
       (last == nullptr ? manager.m_contactList : get<members::ContactNext>(*last)) = copy;
-      b2Body* body_a = fixture_a->GetBody();
-      b2Body* body_b = fixture_b->GetBody();
+      b2Body* body_a = copy->GetFixtureA()->GetBody();
+      b2Body* body_b = copy->GetFixtureB()->GetBody();
       b2ContactEdge& edge_a = get<members::ContactEdgeA>(*copy);
       b2ContactEdge& edge_b = get<members::ContactEdgeB>(*copy);
       edge_a = {body_b, copy, nullptr, nullptr};
@@ -161,8 +195,69 @@ class EngineCopier {
       append(edge_a, get<members::BodyContacts>(*body_a), ends[body_a]);
       append(edge_b, get<members::BodyContacts>(*body_b), ends[body_b]);
       ++manager.m_contactCount;
-      contacts_[contact] = copy;
       last = copy;
+    }
+  }
+
+  void destroy_contacts() {
+    auto& manager = const_cast<b2ContactManager&>(target_.GetContactManager());
+    while (b2Contact* contact = manager.m_contactList) {
+      manager.m_contactList = contact->GetNext();
+      expose(members::ContactDestroyer{})(contact, &allocator_);
+    }
+    manager.m_contactCount = 0;
+  }
+
+  // Replaces the state of all bodies of the target, which has the same bodies.
+  void revert_bodies() {
+    b2Body* body = target_.GetBodyList();
+    for (const b2Body* from = source_.GetBodyList(); from != nullptr; from = from->GetNext()) {
+      b2Body* previous = get<members::BodyPrevious>(*body);
+      b2Body* next = get<members::BodyNext>(*body);
+      b2Fixture* fixtures = get<members::BodyFixtures>(*body);
+      b2JointEdge* joints = get<members::BodyJoints>(*body);
+      *body = *from;
+      get<members::BodyWorld>(*body) = &target_;
+      get<members::BodyPrevious>(*body) = previous;
+      get<members::BodyNext>(*body) = next;
+      get<members::BodyFixtures>(*body) = fixtures;
+      get<members::BodyJoints>(*body) = joints;
+      get<members::BodyContacts>(*body) = nullptr;
+      if (body->GetType() != b2_staticBody) revert_boxes(*from, *body);
+      body = next;
+    }
+  }
+
+  static void revert_boxes(const b2Body& from, b2Body& to) {
+    const b2Fixture* source = from.GetFixtureList();
+    for (b2Fixture* f = to.GetFixtureList(); f != nullptr; f = f->GetNext()) {
+      get<members::FixtureProxies>(*f)->aabb = get<members::FixtureProxies>(*source)->aabb;
+      source = source->GetNext();
+    }
+  }
+
+  // Replaces the state of all joints of the target, which has the same joints.
+  void revert_joints() {
+    b2Joint* joint = target_.GetJointList();
+    for (const b2Joint* from = source_.GetJointList(); from != nullptr; from = from->GetNext()) {
+      b2Joint* previous = get<members::JointPrevious>(*joint);
+      b2Joint* next = get<members::JointNext>(*joint);
+      b2Body* body_a = get<members::JointBodyA>(*joint);
+      b2Body* body_b = get<members::JointBodyB>(*joint);
+      const b2JointEdge edge_a = get<members::JointEdgeA>(*joint);
+      const b2JointEdge edge_b = get<members::JointEdgeB>(*joint);
+      if (from->GetType() == e_revoluteJoint) {
+        static_cast<b2RevoluteJoint&>(*joint) = static_cast<const b2RevoluteJoint&>(*from);
+      } else {
+        static_cast<b2WeldJoint&>(*joint) = static_cast<const b2WeldJoint&>(*from);
+      }
+      get<members::JointPrevious>(*joint) = previous;
+      get<members::JointNext>(*joint) = next;
+      get<members::JointBodyA>(*joint) = body_a;
+      get<members::JointBodyB>(*joint) = body_b;
+      get<members::JointEdgeA>(*joint) = edge_a;
+      get<members::JointEdgeB>(*joint) = edge_b;
+      joint = next;
     }
   }
 
@@ -189,15 +284,31 @@ class EngineCopier {
     copy_tree(get<members::BroadPhaseTree>(from), get<members::BroadPhaseTree>(to));
   }
 
+  static const b2DynamicTree& tree_of(const b2World& world) {
+    return get<members::BroadPhaseTree>(world.GetContactManager().m_broadPhase);
+  }
+
+  // Copies all but the proxies of the leaves.
   void copy_tree(const b2DynamicTree& from, b2DynamicTree& to) {
     const int32 capacity = get<members::TreeCapacity>(from);
     b2TreeNode*& nodes = get<members::TreeNodes>(to);
     resize(nodes, get<members::TreeCapacity>(to), capacity);
-    std::copy_n(get<members::TreeNodes>(from), capacity, nodes);
+    const b2TreeNode* from_nodes = get<members::TreeNodes>(from);
+    for (int32 i = 0; i < capacity; ++i) {
+      void* proxy = nodes[i].userData;
+      nodes[i] = from_nodes[i];
+      nodes[i].userData = proxy;
+    }
     assign<members::TreeRoot>(from, to);
     assign<members::TreeNodeCount>(from, to);
     assign<members::TreeFreeList>(from, to);
     assign<members::TreeInsertionCount>(from, to);
+  }
+
+  void set_proxies() {
+    auto& tree = const_cast<b2DynamicTree&>(tree_of(target_));
+    b2TreeNode* nodes = get<members::TreeNodes>(tree);
+    for (int32 i = 0; i < get<members::TreeCapacity>(tree); ++i) nodes[i].userData = nullptr;
     for (b2Body* body = target_.GetBodyList(); body != nullptr; body = body->GetNext()) {
       for (b2Fixture* f = body->GetFixtureList(); f != nullptr; f = f->GetNext()) {
         b2FixtureProxy* proxy = get<members::FixtureProxies>(*f);
@@ -206,12 +317,20 @@ class EngineCopier {
     }
   }
 
+  void copy_times() {
+    assign<members::WorldLastRate>(source_, target_);
+    assign<members::WorldNewContacts>(source_, target_);
+    assign<members::WorldStepComplete>(source_, target_);
+    assign<members::WorldProfile>(source_, target_);
+  }
+
   // Changes the size of an array of Box2D. The contents are lost.
   template <typename Element>
   static void resize(Element*& elements, int32& capacity, int32 size) {
     if (size == capacity) return;
     auto* resized = static_cast<Element*>(b2Alloc(size * static_cast<int32>(sizeof(Element))));
     if (resized == nullptr) throw std::bad_alloc();
+    std::uninitialized_value_construct_n(resized, size);
     b2Free(elements);
     elements = resized;
     capacity = size;
@@ -224,6 +343,7 @@ class EngineCopier {
   Fixtures& fixtures_;
   Joints& joints_;
   std::unordered_map<const b2Contact*, const b2Contact*> contacts_;
+  std::vector<b2Contact*> created_;  // the copies of contacts, in the order of the list
 };
 
 }  // namespace
@@ -231,7 +351,7 @@ class EngineCopier {
 void World::become_copy_of(World& source) {
   source.check_readable();
   check_changeable();
-  if (&source == this) return;
+  if (&source == this || revert_to(source)) return;
   auto engine = std::make_unique<b2World>(b2Vec2(0.0F, 0.0F));
   auto bodies = source.bodies_;
   auto fixtures = source.fixtures_;
@@ -241,12 +361,7 @@ void World::become_copy_of(World& source) {
   bodies.exclude_ids_of(bodies_);
   fixtures.exclude_ids_of(fixtures_);
   joints.exclude_ids_of(joints_);
-  ContactRecorder contacts = source.contacts_;
-  contacts.replace_contacts(copier.contacts());
-  contacts.touches.exclude_ids_of(contacts_.touches);
-  JobQueue jobs = source.jobs_;
-  jobs.exclude_ids_of(jobs_);
-  std::vector<Id> invalid = source.invalid_;
+  OtherParts parts = copy_others(source, copier.contacts());
   rays_.become_copy_of(
       source.rays_, [&](const b2Body* body) { return copier.copy_of(body); },
       [&](const b2Fixture* fixture) { return copier.copy_of(fixture); });
@@ -255,11 +370,36 @@ void World::become_copy_of(World& source) {
   bodies_ = std::move(bodies);
   fixtures_ = std::move(fixtures);
   joints_ = std::move(joints);
-  contacts_ = std::move(contacts);
-  jobs_ = std::move(jobs);
-  invalid_ = std::move(invalid);
-  last_step_time_ = source.last_step_time_;
+  structure_ = source.structure_;
+  replace_others(source, std::move(parts));
   listen();
+}
+
+bool World::revert_to(World& source) {
+  if (structure_ != source.structure_) return false;
+  EngineCopier copier(*source.engine_, *engine_, bodies_, fixtures_, joints_);
+  if (!copier.can_revert()) return false;
+  copier.begin_revert();
+  OtherParts parts = copy_others(source, copier.contacts());
+  // The statements below cannot fail.
+  copier.revert();
+  replace_others(source, std::move(parts));
+  return true;
+}
+
+World::OtherParts World::copy_others(const World& source, const ContactCopies& copies) const {
+  OtherParts parts{source.contacts_, source.jobs_, source.invalid_};
+  parts.contacts.replace_contacts(copies);
+  parts.contacts.touches.exclude_ids_of(contacts_.touches);
+  parts.jobs.exclude_ids_of(jobs_);
+  return parts;
+}
+
+void World::replace_others(const World& source, OtherParts parts) {
+  contacts_ = std::move(parts.contacts);
+  jobs_ = std::move(parts.jobs);
+  invalid_ = std::move(parts.invalid);
+  last_step_time_ = source.last_step_time_;
 }
 
 void World::clear() {
@@ -282,6 +422,7 @@ void World::clear() {
   contacts_ = std::move(contacts);
   invalid_.clear();
   last_step_time_ = 1.0;
+  structure_changed();
   listen();
 }
 

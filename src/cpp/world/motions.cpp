@@ -36,7 +36,10 @@ void restore_motions(World& world, const std::vector<SavedMotion>& motions) {
   for (const SavedMotion& motion : motions) {
     if (!world.has_body(motion.body)) continue;
     b2Body* body = world.change_body(motion.body);
-    if (is_moved(*body, motion)) body->SetTransform(motion.transform.p, motion.sweep.a);
+    if (is_moved(*body, motion)) {
+      body->SetTransform(motion.transform.p, motion.sweep.a);
+      if (body->GetType() == b2_staticBody) world.structure_changed();
+    }
     get<BodyTransform>(*body) = motion.transform;
     get<BodySweep>(*body) = motion.sweep;
     // A change of the velocity wakes the body. The velocity of a sleeping body is 0.

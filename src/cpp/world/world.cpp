@@ -70,6 +70,7 @@ void check_step(double dt, int velocity_iterations, int position_iterations) {
 
 World::World() : engine_(std::make_unique<b2World>(b2Vec2(0.0F, 0.0F))) {
   initialize_contact_table();
+  structure_changed();
   listen();
 }
 
@@ -302,6 +303,7 @@ void World::throw_locked() const {
 
 Id World::add_body(const b2BodyDef& definition) {
   check_changeable();
+  structure_changed();
   b2Body* body = engine_->CreateBody(&definition);
   ensure_mass(body);
   const Id id = bodies_.insert(body);
@@ -310,6 +312,7 @@ Id World::add_body(const b2BodyDef& definition) {
 }
 
 Id World::add_fixture(b2Body* body, const b2FixtureDef& definition) {
+  structure_changed();
   b2Fixture* fixture = body->CreateFixture(&definition);
   ensure_mass(body);
   const Id id = fixtures_.insert(fixture);
@@ -324,6 +327,7 @@ void World::skip_static_fixtures(int32 pending_before) {
 
 Id World::add_joint(const b2JointDef& definition, float frequency, float damping_ratio) {
   check_changeable();
+  structure_changed();
   b2Joint* joint = engine_->CreateJoint(&definition);
   const Id id = joints_.insert({joint, frequency, damping_ratio});
   joint->GetUserData().pointer = id;
@@ -339,6 +343,7 @@ void World::find_new_contacts() {
 
 void World::destroy_body(Id id) {
   b2Body* body = change_body(id);
+  structure_changed();
   // For each destroyed fixture, Box2D searches the list of all fixtures that were created or moved
   // since the last search for new pairs. For a large map that is destroyed before the first step
   // this would take hours. FindNewContacts clears the list.
@@ -354,6 +359,7 @@ void World::destroy_body(Id id) {
 
 void World::destroy_joint(Id id) {
   b2Joint* joint = change_joint(id);
+  structure_changed();
   engine_->DestroyJoint(joint);
   joints_.erase(id);
 }
@@ -374,7 +380,13 @@ void World::wake_neighbours(const b2Body* body) {
   engine_->QueryAABB(&callback, bounds);
 }
 
+void World::structure_changed() {
+  static std::atomic<std::uint64_t> last{0};
+  structure_ = ++last;
+}
+
 void World::fixture_changed(const b2Fixture* fixture) {
+  structure_changed();
   rays_.changed(fixture);
   auto* body = const_cast<b2Body*>(fixture->GetBody());
   body->SetAwake(body->GetType() != b2_staticBody);

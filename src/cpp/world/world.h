@@ -16,10 +16,12 @@
 #include <chrono>
 #include <condition_variable>
 #include <cstddef>
+#include <cstdint>
 #include <memory>
 #include <mutex>
 #include <string>
 #include <thread>
+#include <unordered_map>
 #include <vector>
 
 #include "parallel/thread_pool.h"
@@ -85,7 +87,8 @@ class World final : private b2DestructionListener {
 
   // Makes this world an exact copy of another one, with the same ids; see copy.cpp. Ids of this
   // world that do not exist in the other one become stale and are not used again. If there is not
-  // enough memory, this world is unchanged. The caches of ray casting are shared.
+  // enough memory, this world is unchanged. The caches of ray casting are shared. Takes much less
+  // time if this world is a former copy of the other one whose structure has not changed.
   void become_copy_of(World& source);
   // Destroys all objects except clocks. The results of the same further calls are those of a new
   // world, except for the generations of ids.
@@ -145,6 +148,9 @@ class World final : private b2DestructionListener {
 
   // Wakes the bodies in contact with a body, and the dynamic bodies that its bounding box overlaps.
   void wake_neighbours(const b2Body* body);
+  // To be called after each change of what the world consists of: objects, the properties of
+  // fixtures, and the poses of static bodies.
+  void structure_changed();
   // To be called after a change of the filter or the sensor flag of a fixture.
   void fixture_changed(const b2Fixture* fixture);
 
@@ -198,6 +204,18 @@ class World final : private b2DestructionListener {
   };
 
  private:
+  using ContactCopies = std::unordered_map<const b2Contact*, const b2Contact*>;
+  // The parts of a copy besides the engine and the rays.
+  struct OtherParts {
+    ContactRecorder contacts;
+    JobQueue jobs;
+    std::vector<Id> invalid;
+  };
+
+  // Copies only what moves. Returns false, without any effect, if that is not possible.
+  bool revert_to(World& source);
+  OtherParts copy_others(const World& source, const ContactCopies& copies) const;
+  void replace_others(const World& source, OtherParts parts);
   // Receives the events of a new engine.
   void listen();
   void SayGoodbye(b2Joint* joint) override;
@@ -218,6 +236,7 @@ class World final : private b2DestructionListener {
   static constexpr int kExclusive = -1;
 
   std::unique_ptr<b2World> engine_;
+  std::uint64_t structure_ = 0;  // equal numbers of two worlds: they have the same structure
   SlotMap<b2Body*, IdKind::kBody> bodies_;
   SlotMap<b2Fixture*, IdKind::kFixture> fixtures_;
   SlotMap<JointRecord, IdKind::kJoint> joints_;

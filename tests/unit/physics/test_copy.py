@@ -191,6 +191,27 @@ def step_all(*worlds: PhysicsWorld) -> None:
 
 @PROPERTY
 @given(seed=SEEDS)
+def test_a_world_can_be_reverted_again_and_again(seed: int) -> None:
+    """As long as only poses and velocities change, nothing else is copied."""
+    world = random_world(seed)
+    source = world.copy()
+    calls = Calls(world, seed)
+    for changes in (
+        [calls.push, calls.step, calls.put_to_sleep],
+        [calls.push, calls.step, calls.move],  # static bodies, too
+        [calls.push, calls.step, calls.change_filter, calls.change_sensor],
+        [calls.create_body, calls.destroy_body, calls.create_joint, calls.destroy_joint],
+        [calls.push, calls.step],
+    ):
+        for _ in range(12):
+            calls.rng.choice(changes)()
+        world.become_copy_of(source)
+        assert state_of(world) == state_of(source)
+    step_all(world, source.copy())
+
+
+@PROPERTY
+@given(seed=SEEDS)
 def test_a_copy_steps_like_its_original(seed: int) -> None:
     world = random_world(seed)
     copy = world.copy()
