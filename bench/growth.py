@@ -94,7 +94,7 @@ def _robots() -> Panel:
         times = []
         for count in ROBOT_COUNTS:
             with crowd(slice(count), scans=scans) as world:
-                times.append(1e6 * step_time(world, 10 * PERIOD, 0.5))
+                times.append(1e6 * step_time(world, 10 * PERIOD, 0.5).seconds)
         curves.append(Curve(label, list(ROBOT_COUNTS), times))
     return Panel(
         "A step of robots with a differential drive", "robots", "time of a step [µs]", curves
@@ -111,7 +111,7 @@ def _touching() -> Panel:
                 for topic in world.ports.outputs if wanted else ():
                     world.output(topic)
                 world.step(10)
-                times.append(1e3 * step_time(world, PERIOD, 0.5))
+                times.append(1e3 * step_time(world, PERIOD, 0.5).seconds)
         curves.append(Curve(label, list(TOUCHING_COUNTS), times))
     return Panel(
         "A step of touching robots, Bumper and BoolSensor",

@@ -1,4 +1,4 @@
-"""Environments of flatland.gym: steps a second and memory of flatland/Navigate-v0.
+"""Environments of flatland.gym: time of a step and memory of flatland/Navigate-v0.
 
 `python bench/gym_steps.py FILE.png` draws the speed over the number of environments, beside
 AsyncVectorEnv of Gymnasium.
@@ -10,8 +10,6 @@ import functools
 import os
 import subprocess
 import sys
-import time
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +17,7 @@ import gymnasium
 import numpy as np
 from curves import Curve, Panel, plot
 from table import Row
-from timing import best_of
+from timing import Mean, best_of, mean_of
 
 import flatland.gym
 
@@ -42,25 +40,29 @@ print(int(re.search(r"VmHWM:\\s+(\\d+) kB", open("/proc/self/status").read())[1]
 
 
 def rows(unit: float) -> list[Row]:
-    """Measures environment steps of one and of 64 environments, and the memory of 256."""
-    one, reset = _single()
-    many = 64 / best_of(_stepper(flatland.gym.make_vec(NAME, 64)), 5.0)
+    """Measures steps of one and of many environments with resets, and the memory of 256."""
+    found = []
+    for count, bar in ((1, 0.05), (64, 0.008), (1024, 0.008)):
+        step = _step(flatland.gym.make_vec(NAME, count))
+        name = f"{NAME}, {count} environments in a vector, step of one of them"
+        note = f"{step.rate}, on {os.cpu_count()} cores"
+        found.append(Row(name, step.seconds / unit, "U", bar, note=note))
+    single, reset = _single()
     memory = float(
         subprocess.run(
             [sys.executable, "-c", MEMORY], check=True, capture_output=True, text=True
         ).stdout
     )
-    cores = f"{os.cpu_count()} cores"
     return [
-        Row(f"{NAME}, 1 environment", one, "steps/s", 8000.0, at_least=True),
-        Row(f"{NAME}, 64 environments", many, "steps/s", 50_000.0, at_least=True, note=cores),
+        Row(f"{NAME}, FlatlandEnv, step", single.seconds / unit, "U", 0.05, note=single.rate),
+        *found,
         Row(f"{NAME}, reset", reset / unit, "U", note=f"{reset * 1e6:.0f} µs"),
         Row(f"{NAME}, memory of {MEMORY_ENVS} environments", memory, "MB", 1000.0),
     ]
 
 
-def _single() -> tuple[float, float]:
-    """Returns steps a second of one environment with its resets, and the time of a reset [s]."""
+def _single() -> tuple[Mean, float]:
+    """Returns the time of a step of one environment with its resets, and of a reset [s]."""
     env = flatland.gym.FlatlandEnv()
     env.reset(seed=0)
     actions = _actions(1)
@@ -71,10 +73,10 @@ def _single() -> tuple[float, float]:
             if terminated or truncated:
                 env.reset()
 
-    speed = len(actions) / best_of(steps, 5.0)
+    step = mean_of(steps, 4.0) / len(actions)
     reset = best_of(env.reset, 1.0)
     env.close()
-    return speed, reset
+    return step, reset
 
 
 def _actions(n: int) -> Any:
@@ -82,42 +84,26 @@ def _actions(n: int) -> Any:
     return np.random.default_rng(0).uniform(-1, 1, (200, n, 2)).astype(np.float32)
 
 
-def _stepper(envs: Any) -> Callable[[], None]:
-    """Returns a function that steps environments once, with new actions in each call."""
+def _step(envs: Any) -> Mean:
+    """Returns the time of a step of one of many environments, with all resets [s]."""
     envs.reset(seed=0)
     actions = _actions(envs.num_envs)
-    # The first episodes end at the same time.
+    # The first episodes begin at the same time.
     for action in actions[:100]:
         envs.step(action)
     numbers = iter(range(10**9))
-
-    def step() -> None:
-        envs.step(actions[next(numbers) % len(actions)])
-
-    return step
-
-
-def _speed(envs: Any, seconds: float = 3.0) -> float:
-    """Returns environment steps a second, on average over some seconds, with all resets."""
-    step = _stepper(envs)
-    best = 0.0
-    for _ in range(3):
-        start, n = time.perf_counter(), 0
-        while time.perf_counter() < start + seconds / 3:
-            step()
-            n += 1
-        best = max(best, n * envs.num_envs / (time.perf_counter() - start))
+    mean = mean_of(lambda: envs.step(actions[next(numbers) % len(actions)]), 4.0)
     envs.close()
-    return best
+    return mean / envs.num_envs
 
 
 def panel() -> Panel:
     """Measures the speed over the number of environments."""
-    ours = [_speed(flatland.gym.make_vec(NAME, n)) for n in COUNTS]
+    ours = [1 / _step(flatland.gym.make_vec(NAME, n)).seconds for n in COUNTS]
     theirs = []
     for n in ASYNC_COUNTS:
         make = functools.partial(gymnasium.make, NAME)
-        theirs.append(_speed(gymnasium.vector.AsyncVectorEnv([make] * n)))
+        theirs.append(1 / _step(gymnasium.vector.AsyncVectorEnv([make] * n)).seconds)
     curves = [
         Curve("flatland.gym.make_vec", list(map(float, COUNTS)), ours),
         Curve("AsyncVectorEnv", list(map(float, ASYNC_COUNTS)), theirs),

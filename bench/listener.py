@@ -3,7 +3,8 @@
 With --drive, it publishes a velocity command, so that a robot drives in a circle.
 
 Prints `ready` after all subscriptions, then the arrival time of the first message of each topic on
-the monotonic clock [s], and at exit the number of messages of each topic.
+the monotonic clock [s], `running` with that of the first /clock after 0, and at exit the number of
+messages of each topic.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ import sys
 import threading
 import time
 from collections import Counter
+from typing import Any
 
 import roslib.message
 import rospy
@@ -23,11 +25,14 @@ CIRCLE = Twist(Vector3(0.5, 0.0, 0.0), Vector3(0.0, 0.0, 1.0))  # m/s and rad/s
 counts: Counter[str] = Counter()
 
 
-def count_message(_message: object, topic: str) -> None:
+def count_message(message: Any, topic: str) -> None:
     """Counts a message of a topic, and prints the arrival time of the first one."""
     if not counts[topic]:
         print(f"first {topic} {time.monotonic()}", flush=True)
     counts[topic] += 1
+    if topic == "/clock" and message.clock.to_nsec() > 0 and not counts["running"]:
+        counts["running"] = 1
+        print(f"running {time.monotonic()}", flush=True)
 
 
 def main() -> None:

@@ -11,9 +11,8 @@ from node import SPAWNED
 from ros_session import CHECKOUT, RosSession, ros_session  # isort: skip
 from scenes import benchmark_world_path
 from table import Row
-from timing import best_of
+from timing import Mean, best_of, mean_of
 
-CALLS = 200  # of step_world in one measurement
 MODELS = 200
 CRATE = """
 bodies:
@@ -28,17 +27,18 @@ def rows(unit: float) -> list[Row]:
     del unit
     with ros_session() as session:
         os.environ.update({k: v for k, v in session.environment.items() if k.startswith("ROS_")})
-        steps = _steps_per_second(session, benchmark_world_path())
+        steps = _step_call(session, benchmark_world_path())
         crates = _spawn_many(session, CRATE)
         robots = _spawn_many(session, SPAWNED)
         reset = _reset(session)
     return [
         Row(
             "calls of /step_world, one step, one robot, persistent connection",
-            steps,
+            1 / steps.seconds,
             "1/s",
             2000.0,
             at_least=True,
+            note=steps.rate,
         ),
         Row("call of /reset_world, office, persistent connection", 1e3 * reset, "ms", 20.0),
         Row(f"{MODELS} models in one call of /spawn_models, office", crates, "s", 0.2),
@@ -51,7 +51,7 @@ def rows(unit: float) -> list[Row]:
     ]
 
 
-def _steps_per_second(session: RosSession, world: Path) -> float:
+def _step_call(session: RosSession, world: Path) -> Mean:
     import rospy
 
     from flatland.srv import StepWorld
@@ -60,14 +60,10 @@ def _steps_per_second(session: RosSession, world: Path) -> float:
     rospy.wait_for_service("/step_world", 30.0)
     step_world = rospy.ServiceProxy("/step_world", StepWorld, persistent=True)
 
-    def call_many() -> None:
-        for _ in range(CALLS):
-            step_world(0.0)
-
-    seconds = best_of(call_many, seconds=2.0)
+    mean = mean_of(lambda: step_world(0.0))
     step_world.close()
     session.stop(server)
-    return CALLS / seconds
+    return mean
 
 
 def _spawn_many(session: RosSession, model: str) -> float:

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from scenes import CHECKOUT
 from table import Row
-from timing import best_of
+from timing import mean_of
 
 import flatland
 
@@ -57,14 +57,14 @@ def rows(unit: float) -> list[Row]:
             def run(world: flatland.World = world) -> None:
                 world.step(STEPS)
 
-            seconds = best_of(run, 1.0) / STEPS
+            step = mean_of(run) / STEPS
         results.append(
             Row(
                 f"step with {PEOPLE} people in the office, {model}, {body_type}",
-                seconds / unit,
+                step.seconds / unit,
                 "U",
                 1.0,
-                note=f"{seconds * 1e6:.0f} µs",
+                note=f"{step.seconds * 1e6:.0f} µs, {step.rate}",
             )
         )
     return results

@@ -2,12 +2,66 @@
 
 from __future__ import annotations
 
+import statistics
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, slots=True)
+class Mean:
+    """The mean execution time of an action in real work.
+
+    Attributes:
+        seconds: Mean time [s].
+        spread: Standard deviation of the means of several parts of the work, as a share of the
+            mean.
+    """
+
+    seconds: float
+    spread: float
+
+    @classmethod
+    def of(cls, times: Sequence[float]) -> Mean:
+        """Returns the mean of the times of equal parts of the work [s], at least one."""
+        mean = statistics.fmean(times)
+        return cls(mean, statistics.pstdev(times) / mean)
+
+    def __truediv__(self, count: float) -> Mean:
+        """Returns the mean time of one of `count` equal parts of the action."""
+        return Mean(self.seconds / count, self.spread)
+
+    @property
+    def rate(self) -> str:
+        """How many actions are performed in a second, with the spread."""
+        return f"{1 / self.seconds:,.0f} per second ± {100 * self.spread:.0f} %".replace(",", " ")
+
+
+def mean_of(action: Callable[[], object], seconds: float = 2.0, parts: int = 10) -> Mean:
+    """Returns the mean execution time of an action, for throughputs.
+
+    Each call counts, so that the work must contain everything that belongs to it, such as resets
+    and garbage collection.
+
+    Args:
+        action: The measured function.
+        seconds: Minimum total duration [s].
+        parts: Number of parts of the work, whose means determine the spread.
+    """
+    times, total, calls = [], 0.0, 0
+    for _ in range(parts):
+        start, n = time.perf_counter(), 0
+        while (elapsed := time.perf_counter() - start) < seconds / parts:
+            action()
+            n += 1
+        times.append(elapsed / n)
+        total += elapsed
+        calls += n
+    return Mean(total / calls, Mean.of(times).spread)
 
 
 def best_of(action: Callable[[], object], seconds: float = 0.5, min_runs: int = 5) -> float:
-    """Returns the minimum execution time of an action [s].
+    """Returns the minimum execution time of an action [s], for the cost of one operation.
 
     The minimum is used because disturbances by other programs only increase the time.
 
