@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, TypeVar
 
 import numpy as np
 from gymnasium import spaces
 from gymnasium.error import InvalidAction
 
-from flatland.geometry import DoubleArray
+from flatland.geometry import DoubleArray, FloatArray
 
 if TYPE_CHECKING:
     from flatland.gym.agents import Agent
+
+A = TypeVar("A", DoubleArray, FloatArray)
 
 DEFAULT_SPEED: Final = 1.0  # m/s, for a drive without a limit
 DEFAULT_YAW_RATE: Final = 2.0  # rad/s
@@ -78,8 +80,14 @@ def checked_actions(actions: object, n: int | None) -> DoubleArray:
         raise InvalidAction(f"actions must have the shape {shape}, got {array.shape}")
     if np.isnan(array).any():
         raise InvalidAction(f"actions must not be NaN, got {_first_nan(array)}")
-    bounded: DoubleArray = np.clip(array, -1.0, 1.0).reshape(-1, 2)
-    return bounded
+    return limit_to_unit(np.array(array)).reshape(-1, 2)
+
+
+def limit_to_unit(numbers: A) -> A:
+    """Limits numbers to [-1, 1] in place, and returns them; faster than `numpy.clip`."""
+    np.maximum(numbers, -1.0, out=numbers)
+    np.minimum(numbers, 1.0, out=numbers)
+    return numbers
 
 
 def _first_nan(array: DoubleArray) -> str:

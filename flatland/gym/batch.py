@@ -20,6 +20,9 @@ if TYPE_CHECKING:
     from flatland.world import World
 
 
+_NO_ROWS = np.empty(0, np.intp)
+
+
 class Batch:
     """Performs a step of an environment in one call of the core, for all agents that permit it.
 
@@ -102,10 +105,13 @@ class Batch:
                     agent.command.assign(Twist(v, 0.0, omega))
                 else:
                     others.append(row)
-            steps[others] = observes[others] = False
+            if others:
+                steps[others] = observes[others] = False
             unfinished = self._call_core(run, commands, steps, observes)
         finally:
             _end([agents[row].world for row in begun], n, [unfinished.get(row) for row in begun])
+        if not others and not unfinished:
+            return _NO_ROWS
         for row in others:
             v, omega = values[row]
             agents[row].command.set(Twist(v, 0.0, omega))

@@ -112,14 +112,14 @@ class Episodes:
             rows: Agents that act; None for all. The others stand still.
         """
         s = self.situation
-        chosen = self._all if rows is None else rows
         commands = s.low + (actions + 1.0) * (0.5 * (s.high - s.low))
+        chosen: Rows | slice = slice(None) if rows is None else rows  # A slice is faster.
         s.previous_actions[chosen] = s.actions[chosen]
         s.actions[chosen] = actions[chosen]
         s.previous_distance[chosen] = s.distance[chosen]
         s.steps[chosen] += 1
         if self._batch is None:
-            self._step_worlds(commands, chosen)
+            self._step_worlds(commands, self._all if rows is None else rows)
             self.look()
             return
         acting = np.ones(len(s), np.bool_)

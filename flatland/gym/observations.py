@@ -10,6 +10,7 @@ import numpy as np
 from gymnasium import spaces
 
 from flatland.geometry import FloatArray
+from flatland.gym.actions import limit_to_unit
 
 if TYPE_CHECKING:
     from flatland.gym.situation import Situation
@@ -131,7 +132,7 @@ class Goal(ObservationPart):
         out[:, 1] = situation.goal_ahead / unit
         out[:, 2] = situation.goal_left / unit
         # A quotient may exceed 1 by a rounding error.
-        np.clip(out, -1.0, 1.0, out=out)
+        limit_to_unit(out)
 
 
 class Velocity(ObservationPart):
@@ -148,7 +149,7 @@ class Velocity(ObservationPart):
         limit = np.maximum(np.abs(situation.low), np.abs(situation.high))
         out[:, 0] = situation.speed / limit[0]
         out[:, 1] = situation.yaw_rate / limit[1]
-        np.clip(out, -1.0, 1.0, out=out)
+        limit_to_unit(out)
 
 
 class LastAction(ObservationPart):
