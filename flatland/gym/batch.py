@@ -87,8 +87,11 @@ class Batch:
         """
         agents = self._agents
         timekeeper = agents[0].world.timekeeper
-        settings = _iterations(agents[0].world)
-        run = Run(0, timekeeper.step_size_ns, n, timekeeper.step_size, *settings, False, False)
+        first = agents[0].world
+        velocity, position = first.velocity_iterations, first.position_iterations
+        run = Run(
+            0, timekeeper.step_size_ns, n, timekeeper.step_size, velocity, position, False, False
+        )
         steps, observes = acting.copy(), np.ones(len(agents), np.bool_)
         begun: list[int] = []
         others: list[int] = []
@@ -99,7 +102,14 @@ class Batch:
                 if not is_acting[row]:
                     continue
                 agent = agents[row]
-                if _begin(agent, settings):
+                world = agent.world
+                if (
+                    agent.command.on_set is None
+                    and world.velocity_iterations == velocity
+                    and world.position_iterations == position
+                    and not world.physics.has_materials
+                    and world.stepping.begin_unattended()
+                ):
                     begun.append(row)
                     v, omega = values[row]
                     agent.command.assign(Twist(v, 0.0, omega))
@@ -148,21 +158,6 @@ class Batch:
             if observed[row] and row not in unfinished:
                 agents[row].laser.count_computed((x, y, theta), self._ranges[row])
         return unfinished
-
-
-def _begin(agent: Agent, settings: tuple[int, int]) -> bool:
-    """Locks the world of an agent if the core can perform its next steps without any other code."""
-    world = agent.world
-    return (
-        agent.command.on_set is None
-        and _iterations(world) == settings
-        and not world.physics.has_materials
-        and world.stepping.begin_unattended()
-    )
-
-
-def _iterations(world: World) -> tuple[int, int]:
-    return world.velocity_iterations, world.position_iterations
 
 
 def _end(worlds: list[World], n: int, results: list[RunResult | Exception | None]) -> None:

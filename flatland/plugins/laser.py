@@ -197,7 +197,8 @@ class Laser(RangeSensor):
             pose: Pose of the sensor in the world frame.
             ranges: Range of each beam [m], shape (n,), float32.
         """
-        self._computed.begin_update(self._has_noise)
+        if self._has_noise:
+            self._computed.begin_update()
         self.last_scan = (pose, ranges)
 
     def cast_without_noise(self) -> tuple[Pose, FloatArray]:

@@ -90,7 +90,11 @@ class ContactHook:
 
 
 class ContactReporter:
-    """Records the contacts of a physics world as far as plugins need them."""
+    """Records the contacts of a physics world as far as plugins need them.
+
+    Attributes:
+        is_stale: Whether bodies or hooks have changed since the last `update`.
+    """
 
     def __init__(
         self,
@@ -112,7 +116,7 @@ class ContactReporter:
         self._bodies: dict[int, Body] = {}
         self._is_recording = False
         self._recorded: set[int] = set()  # ids of the bodies whose contacts are recorded
-        self._is_stale = True  # Bodies or hooks have changed since the last step.
+        self.is_stale = True
 
     @property
     def touching(self) -> list[Contact]:
@@ -125,25 +129,25 @@ class ContactReporter:
         bodies = list(bodies)
         self._physics.own_bodies(bodies, True)
         self._bodies.update((body.id, body) for body in bodies)
-        self._is_stale = True
+        self.is_stale = True
 
     def remove_bodies(self, bodies: Iterable[Body]) -> None:
         """Reports the contacts of some bodies no longer; their ids may be stale."""
         for body in bodies:
             self._bodies.pop(body.id, None)
-        self._is_stale = True
+        self.is_stale = True
 
     def add_plugin(self, plugin: FlatlandPlugin) -> None:
         """Reports contacts to a plugin that overrides contact hooks."""
         for hook in self._hooks.values():
             hook.add(plugin)
-        self._is_stale = True
+        self.is_stale = True
 
     def remove_plugin(self, plugin: FlatlandPlugin) -> None:
         """Reports contacts to a plugin no longer."""
         for hook in self._hooks.values():
             hook.remove(plugin)
-        self._is_stale = True
+        self.is_stale = True
 
     def clear(self) -> None:
         """Forgets all bodies; for the end of the world."""
@@ -153,16 +157,11 @@ class ContactReporter:
         """Returns the body of a model or layer by its physics body, None if it has no owner."""
         return self._bodies.get(physics_body.id)
 
-    @property
-    def is_pending(self) -> bool:
-        """Whether `update` has something to do for the next step."""
-        return self._is_stale
-
     def update(self) -> None:
         """Adapts to changes of bodies and hooks; to be called before each step."""
-        if not self._is_stale:
+        if not self.is_stale:
             return
-        self._is_stale = False
+        self.is_stale = False
         kinds: dict[int, int] = {}
         kinds_of_all = 0
         for number, name in enumerate(CONTACT_HOOKS.values()):
