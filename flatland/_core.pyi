@@ -1826,6 +1826,66 @@ def run_worlds(
         What `JobQueue.run` returns or raises, for each world.
     """
 
+class AgentRows:
+    """Computations on the arrays of agents for learning, with a row for each of n agents."""
+    def __init__(
+        self,
+        *,
+        poses: npt.ArrayLike,
+        velocities: npt.ArrayLike,
+        goals: npt.ArrayLike,
+        goal_ahead: npt.ArrayLike,
+        goal_left: npt.ArrayLike,
+        distance: npt.ArrayLike,
+        speed: npt.ArrayLike,
+        yaw_rate: npt.ArrayLike,
+        arrived: npt.ArrayLike,
+        ranges: npt.ArrayLike,
+    ) -> None:
+        """Keeps the arrays, which are those of a `flatland.gym.Situation`.
+
+        Raises:
+            ValueError: An array has another number of rows or columns.
+        """
+    def locate(self, goal_radius: float) -> None:
+        """Computes the arrays that follow from poses, velocities and goals.
+
+        Args:
+            goal_radius: Distance to the goal at which an agent has arrived [m].
+        """
+    def write_scans(self, length: float, half: float, out: npt.ArrayLike) -> None:
+        """Writes scaled ranges, of which each column combines as many neighbours to the nearest one.
+
+        Args:
+            length: Range that is written as 1, as is no hit [m].
+            half: Range that is written as 0.5 [m]; 0 for a linear scale.
+            out: Columns of observations, shape (n, size), float32; `size` divides the number of beams.
+
+        Raises:
+            ValueError: `out` has another shape.
+        """
+    def write_goals(self, scale: float, out: npt.ArrayLike) -> None:
+        """Writes the scaled distance of the goal, and the cosine and sine of its bearing.
+
+        Args:
+            scale: Distance that is written as 1 [m].
+            out: Columns of observations, shape (n, 3), float32.
+
+        Raises:
+            ValueError: `out` has another shape.
+        """
+    def write_velocities(self, max_speed: float, max_yaw_rate: float, out: npt.ArrayLike) -> None:
+        """Writes forward speed and yaw rate, divided by their limits.
+
+        Args:
+            max_speed: Speed that is written as 1 [m/s].
+            max_yaw_rate: Yaw rate that is written as 1 [rad/s].
+            out: Columns of observations, shape (n, 2), float32.
+
+        Raises:
+            ValueError: `out` has another shape.
+        """
+
 class AgentBatch:
     """Driven bodies with range finders, each in a world of its own, which advance in parallel."""
     def __init__(

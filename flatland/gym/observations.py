@@ -10,7 +10,6 @@ import numpy as np
 from gymnasium import spaces
 
 from flatland.geometry import FloatArray
-from flatland.gym.actions import limit_to_unit
 
 if TYPE_CHECKING:
     from flatland.gym.situation import Situation
@@ -82,20 +81,7 @@ class Scan(ObservationPart):
 
     def write(self, situation: Situation, out: FloatArray) -> None:
         """Writes the scaled ranges."""
-        ranges = situation.ranges
-        limit = np.float32(situation.max_range)
-        if self.sectors is not None:
-            # A range of NaN is a beam without a hit.
-            ranges = np.fmin.reduce(ranges.reshape(len(ranges), self.sectors, -1), axis=2)
-        if self.half is None:
-            np.fmin(ranges, limit, out=out)
-            np.maximum(out, np.float32(0.0), out=out)
-            np.divide(out, limit, out=out)
-            return
-        is_hit = ranges < limit
-        np.maximum(ranges, np.float32(0.0), out=out)
-        np.divide(out, out + np.float32(self.half), out=out, where=is_hit)
-        out[~is_hit] = 1.0
+        situation.core.write_scans(situation.max_range, self.half or 0.0, out)
 
 
 class Goal(ObservationPart):
@@ -126,13 +112,7 @@ class Goal(ObservationPart):
 
     def write(self, situation: Situation, out: FloatArray) -> None:
         """Writes the distance and the bearing."""
-        distance = situation.distance
-        unit = np.maximum(distance, 1e-9)
-        out[:, 0] = np.minimum(distance / self.scale, 1.0)
-        out[:, 1] = situation.goal_ahead / unit
-        out[:, 2] = situation.goal_left / unit
-        # A quotient may exceed 1 by a rounding error.
-        limit_to_unit(out)
+        situation.core.write_goals(self.scale, out)
 
 
 class Velocity(ObservationPart):
@@ -147,9 +127,7 @@ class Velocity(ObservationPart):
     def write(self, situation: Situation, out: FloatArray) -> None:
         """Writes both velocities; a robot that is pushed may exceed the bounds, which are kept."""
         limit = np.maximum(np.abs(situation.low), np.abs(situation.high))
-        out[:, 0] = situation.speed / limit[0]
-        out[:, 1] = situation.yaw_rate / limit[1]
-        limit_to_unit(out)
+        situation.core.write_velocities(limit[0], limit[1], out)
 
 
 class LastAction(ObservationPart):

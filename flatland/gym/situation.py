@@ -8,6 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from flatland.geometry import BoolArray, DoubleArray, FloatArray
+from flatland.physics import AgentRows
 
 Rows = npt.NDArray[np.intp]
 
@@ -71,6 +72,25 @@ class Situation:
         self.actions: DoubleArray = np.zeros((n, 2))
         self.previous_actions: DoubleArray = np.zeros((n, 2))
         self.steps: npt.NDArray[np.int64] = np.zeros(n, np.int64)
+        self._core: AgentRows | None = None
+
+    @property
+    def core(self) -> AgentRows:
+        """Computations of the core on these arrays."""
+        if self._core is None:
+            self._core = AgentRows(
+                poses=self.poses,
+                velocities=self.velocities,
+                goals=self.goals,
+                goal_ahead=self.goal_ahead,
+                goal_left=self.goal_left,
+                distance=self.distance,
+                speed=self.speed,
+                yaw_rate=self.yaw_rate,
+                arrived=self.arrived,
+                ranges=self.ranges,
+            )
+        return self._core
 
     def __len__(self) -> int:
         """Returns the number of agents."""
@@ -90,7 +110,7 @@ class Situation:
 
     def _rows(self) -> dict[str, npt.NDArray[Any]]:
         """Returns the arrays with one row per agent by name."""
-        shared = ("max_range", "low", "high")
+        shared = ("max_range", "low", "high", "_core")
         return {name: values for name, values in vars(self).items() if name not in shared}
 
     def locate(self, goal_radius: float) -> None:
@@ -99,14 +119,4 @@ class Situation:
         Args:
             goal_radius: Distance to the goal at which the agent has arrived [m].
         """
-        theta = np.ascontiguousarray(self.poses[:, 2])
-        c, s = np.cos(theta), np.sin(theta)
-        offset = self.goals - self.poses[:, :2]
-        dx, dy = offset[:, 0], offset[:, 1]
-        np.add(dx * c, dy * s, out=self.goal_ahead)
-        np.subtract(dy * c, dx * s, out=self.goal_left)
-        np.sqrt(dx * dx + dy * dy, out=self.distance)
-        np.less_equal(self.distance, goal_radius, out=self.arrived)
-        vx, vy = self.velocities[:, 0], self.velocities[:, 1]
-        np.add(vx * c, vy * s, out=self.speed)
-        self.yaw_rate[:] = self.velocities[:, 2]
+        self.core.locate(goal_radius)

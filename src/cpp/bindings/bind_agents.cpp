@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "agents/agent_batch.h"
+#include "agents/observations.h"
 #include "bindings/bindings.h"
 #include "bindings/runs.h"
 
@@ -124,9 +125,159 @@ class PyAgentBatch {
   std::vector<PyWorld> worlds_;
 };
 
+// Computations on the arrays of a flatland.gym.Situation.
+class PyAgentRows {
+ public:
+  PyAgentRows(Rows<double> poses, Rows<double> velocities, Rows<double> goals,
+              Rows<double> goal_ahead, Rows<double> goal_left, Rows<double> distance,
+              Rows<double> speed, Rows<double> yaw_rate, Rows<bool> arrived, Rows<float> ranges)
+      : poses_(std::move(poses)),
+        velocities_(std::move(velocities)),
+        goals_(std::move(goals)),
+        goal_ahead_(std::move(goal_ahead)),
+        goal_left_(std::move(goal_left)),
+        distance_(std::move(distance)),
+        speed_(std::move(speed)),
+        yaw_rate_(std::move(yaw_rate)),
+        arrived_(std::move(arrived)),
+        ranges_(std::move(ranges)) {
+    if (poses_.ndim() != 2 || ranges_.ndim() != 2) {
+      throw py::value_error("poses and ranges must have two dimensions");
+    }
+    check(poses_, 3, "poses");
+    check(velocities_, 3, "velocities");
+    check(goals_, 2, "goals");
+    check(goal_ahead_, 1, "goal_ahead");
+    check(goal_left_, 1, "goal_left");
+    check(distance_, 1, "distance");
+    check(speed_, 1, "speed");
+    check(yaw_rate_, 1, "yaw_rate");
+    check(arrived_, 1, "arrived");
+    check(ranges_, static_cast<std::size_t>(ranges_.shape(1)), "ranges");
+  }
+
+  void locate(double goal_radius) { flatland::locate(places(), goal_radius); }
+  void write_scans(double length, double half, py::array_t<float>& out) {
+    const ObservationColumns columns = columns_of(out);
+    const auto beams = static_cast<std::size_t>(ranges_.shape(1));
+    if (columns.count == 0 || beams % columns.count != 0) {
+      throw py::value_error("the number of columns must divide the number of beams");
+    }
+    flatland::write_scans(ranges_.data(), count(), beams, static_cast<float>(length),
+                          static_cast<float>(half), columns);
+  }
+  void write_goals(double scale, py::array_t<float>& out) {
+    flatland::write_goals(places(), scale, columns_of(out, 3));
+  }
+  void write_velocities(double max_speed, double max_yaw_rate, py::array_t<float>& out) {
+    flatland::write_velocities(places(), max_speed, max_yaw_rate, columns_of(out, 2));
+  }
+
+ private:
+  std::size_t count() const { return static_cast<std::size_t>(poses_.shape(0)); }
+
+  template <typename Scalar>
+  void check(const Rows<Scalar>& array, std::size_t columns, const char* name) const {
+    if (array.ndim() == 0 || static_cast<std::size_t>(array.shape(0)) != count() ||
+        static_cast<std::size_t>(array.size()) != columns * count()) {
+      throw py::value_error(std::string(name) + " must have a row of " + std::to_string(columns) +
+                            " for each agent");
+    }
+  }
+
+  AgentPlaces places() {
+    return {count(),
+            poses_.data(),
+            velocities_.data(),
+            goals_.data(),
+            goal_ahead_.mutable_data(),
+            goal_left_.mutable_data(),
+            distance_.mutable_data(),
+            speed_.mutable_data(),
+            yaw_rate_.mutable_data(),
+            arrived_.mutable_data()};
+  }
+
+  // A view of columns of a C-contiguous array; `expected` is 0 for any number.
+  ObservationColumns columns_of(py::array_t<float>& out, py::ssize_t expected = 0) const {
+    constexpr auto kSize = static_cast<py::ssize_t>(sizeof(float));
+    const bool fits = out.ndim() == 2 && out.shape(0) == poses_.shape(0) &&
+                      (expected == 0 || out.shape(1) == expected) &&
+                      (out.shape(1) < 2 || out.strides(1) == kSize) && out.strides(0) >= 0 &&
+                      out.strides(0) % kSize == 0;
+    if (!fits) throw py::value_error("out must have a row of float32 for each agent");
+    return {out.mutable_data(), static_cast<std::size_t>(out.strides(0) / kSize),
+            static_cast<std::size_t>(out.shape(1))};
+  }
+
+  Rows<double> poses_, velocities_, goals_, goal_ahead_, goal_left_, distance_, speed_, yaw_rate_;
+  Rows<bool> arrived_;
+  Rows<float> ranges_;
+};
+
+void bind_agent_rows(py::module_& module) {
+  py::class_<PyAgentRows>(module, "AgentRows", R"(
+Computations on the arrays of agents for learning, with a row for each of n agents.
+)")
+      .def(py::init<Rows<double>, Rows<double>, Rows<double>, Rows<double>, Rows<double>,
+                    Rows<double>, Rows<double>, Rows<double>, Rows<bool>, Rows<float>>(),
+           py::kw_only(), py::arg("poses").noconvert(), py::arg("velocities").noconvert(),
+           py::arg("goals").noconvert(), py::arg("goal_ahead").noconvert(),
+           py::arg("goal_left").noconvert(), py::arg("distance").noconvert(),
+           py::arg("speed").noconvert(), py::arg("yaw_rate").noconvert(),
+           py::arg("arrived").noconvert(), py::arg("ranges").noconvert(), R"(
+Keeps the arrays, which are those of a `flatland.gym.Situation`.
+
+Raises:
+    ValueError: An array has another number of rows or columns.
+)")
+      .def("locate", &PyAgentRows::locate, py::arg("goal_radius"), R"(
+Computes the arrays that follow from poses, velocities and goals.
+
+Args:
+    goal_radius: Distance to the goal at which an agent has arrived [m].
+)")
+      .def("write_scans", &PyAgentRows::write_scans, py::arg("length"), py::arg("half"),
+           py::arg("out").noconvert(), R"(
+Writes scaled ranges, of which each column combines as many neighbours to the nearest one.
+
+Args:
+    length: Range that is written as 1, as is no hit [m].
+    half: Range that is written as 0.5 [m]; 0 for a linear scale.
+    out: Columns of observations, shape (n, size), float32; `size` divides the number of beams.
+
+Raises:
+    ValueError: `out` has another shape.
+)")
+      .def("write_goals", &PyAgentRows::write_goals, py::arg("scale"), py::arg("out").noconvert(),
+           R"(
+Writes the scaled distance of the goal, and the cosine and sine of its bearing.
+
+Args:
+    scale: Distance that is written as 1 [m].
+    out: Columns of observations, shape (n, 3), float32.
+
+Raises:
+    ValueError: `out` has another shape.
+)")
+      .def("write_velocities", &PyAgentRows::write_velocities, py::arg("max_speed"),
+           py::arg("max_yaw_rate"), py::arg("out").noconvert(), R"(
+Writes forward speed and yaw rate, divided by their limits.
+
+Args:
+    max_speed: Speed that is written as 1 [m/s].
+    max_yaw_rate: Yaw rate that is written as 1 [rad/s].
+    out: Columns of observations, shape (n, 2), float32.
+
+Raises:
+    ValueError: `out` has another shape.
+)");
+}
+
 }  // namespace
 
 void bind_agents(py::module_& module) {
+  bind_agent_rows(module);
   py::class_<PyAgentBatch>(module, "AgentBatch", R"(
 Driven bodies with range finders, each in a world of its own, which advance in parallel.
 )")

@@ -158,3 +158,58 @@ def test_rows_are_taken_and_put_back(situation: Situation) -> None:
     assert situation.goals[1].tolist() == [5.0, 5.0]
     situation.put(rows, part)
     assert situation.goals.tolist() == [[1.0, 3.0], [7.0, 7.0]]
+
+
+def random_situation(n: int, beams: int) -> Situation:
+    rng = np.random.default_rng(0)
+    situation = Situation(n, beams, 4.0, np.array([-0.5, -2.0]), np.array([1.0, 2.0]))
+    for array in (situation.poses, situation.velocities, situation.goals):
+        array[:] = rng.uniform(-5, 5, array.shape)
+    situation.ranges[:] = rng.uniform(0.0, 6.0, (n, beams))
+    for value in (np.nan, np.inf, -np.inf, 4.0):
+        situation.ranges[rng.random((n, beams)) < 0.1] = value
+    situation.goals[0] = situation.poses[0, :2]  # at the goal
+    return situation
+
+
+def test_observations_are_those_of_their_formulas() -> None:
+    n, beams = 50, 12
+    s = random_situation(n, beams)
+    s.locate(0.8)
+    dx, dy = (s.goals - s.poses[:, :2]).T
+    theta = s.poses[:, 2]
+    ahead, left = dx * np.cos(theta) + dy * np.sin(theta), dy * np.cos(theta) - dx * np.sin(theta)
+    assert s.goal_ahead == pytest.approx(ahead, abs=1e-12)
+    assert s.goal_left == pytest.approx(left, abs=1e-12)
+    assert s.distance == pytest.approx(np.hypot(dx, dy))
+    assert (s.arrived == (np.hypot(dx, dy) <= 0.8)).all()
+    assert 0 < s.arrived.sum() < n
+    vx, vy, omega = s.velocities.T
+    assert s.speed == pytest.approx(vx * np.cos(theta) + vy * np.sin(theta), abs=1e-12)
+    assert (s.yaw_rate == omega).all()
+
+    layout = Observation(Scan(), Goal(3.0), Velocity()).layout(beams)
+    out = np.full((n, layout.size), 9.0, np.float32)
+    layout.write(s, out)
+    scan = np.maximum(np.fmin(s.ranges, np.float32(4.0)), np.float32(0.0)) / np.float32(4.0)
+    assert out[:, :beams].tobytes() == scan.tobytes()
+    unit = np.maximum(s.distance, 1e-9)
+    goal = np.column_stack(
+        (np.minimum(s.distance / 3.0, 1), s.goal_ahead / unit, s.goal_left / unit)
+    )
+    velocity = np.column_stack((s.speed / 1.0, s.yaw_rate / 2.0))
+    rest = np.clip(np.hstack((goal, velocity)).astype(np.float32), -1, 1)
+    assert out[:, beams:].tobytes() == rest.tobytes()
+    assert (out[0, beams : beams + 3] == 0).all()
+
+
+def test_sectors_of_random_scans_have_their_nearest_ranges() -> None:
+    n, beams, sectors = 50, 12, 4
+    s = random_situation(n, beams)
+    out = np.full((n, sectors), 9.0, np.float32)
+    Scan(sectors, half=1.5).write(s, out)
+    nearest = np.fmin.reduce(s.ranges.reshape(n, sectors, -1), axis=2)
+    scaled = np.maximum(nearest, np.float32(0.0))
+    with np.errstate(invalid="ignore"):
+        expected = np.where(nearest < 4.0, scaled / (scaled + np.float32(1.5)), np.float32(1.0))
+    assert out.tobytes() == expected.astype(np.float32).tobytes()
