@@ -95,6 +95,7 @@ void ContactRecorder::PreSolve(b2Contact* contact, const b2Manifold* old_manifol
 }
 
 void ContactRecorder::PostSolve(b2Contact* contact, const b2ContactImpulse* impulse) {
+  guard.post_solve(contact);
   const bool is_collected = touches.concern(body_a_of(contact), body_b_of(contact));
   const bool is_recorded = records(contact, ContactKind::kPostSolve);
   if (!is_collected && !is_recorded) return;

@@ -23,6 +23,9 @@ namespace {
 constexpr int kMostUpdates = 6;
 constexpr int kMostUpdatesAtFirst = 20;
 constexpr std::uint64_t kFirstSteps = 10;
+// In a lasting jam, impacts at touching contacts have no effect, and each of them updates all
+// contacts of the body. Every few steps they are handled, which shows whether there is room again.
+constexpr std::uint64_t kStepsBetweenTrials = 20;
 
 // Limits of the gain of speed in a step. Contacts cannot add energy, but the solver is approximate.
 // A body or a group of bodies that gains more speed is jammed.
@@ -117,8 +120,9 @@ void StepGuard::begin(b2World& world, float dt) {
   }
   // This impulse accelerates all bodies together to the largest speed of Box2D.
   largest_impulse_ = mass * b2_maxTranslation / dt;
-  // Box2D writes this time after the update of all contacts and before the handling of impacts.
-  const_cast<b2Profile&>(world.GetProfile()).collide = -1.0F;
+  // Box2D writes these times after the update of all contacts, and before the handling of impacts.
+  auto& profile = const_cast<b2Profile&>(world.GetProfile());
+  profile.collide = profile.solve = -1.0F;
 }
 
 void StepGuard::pre_solve(b2Contact* contact) noexcept {
@@ -136,18 +140,35 @@ void StepGuard::pre_solve(b2Contact* contact) noexcept {
   try {
     const int updates = ++updates_[contact];
     if (updates <= kMostUpdates) return;
-    b2Body* body_a = contact->GetFixtureA()->GetBody();
-    b2Body* body_b = contact->GetFixtureB()->GetBody();
-    limit(body_a);
-    limit(body_b);
-    const bool is_first =
-        std::max(start_of(body_a).jammed_steps, start_of(body_b).jammed_steps) < kFirstSteps;
-    if (is_first && updates <= kMostUpdatesAtFirst) return;
+    limit_bodies(contact);
+    if (jammed_steps(contact) < kFirstSteps && updates <= kMostUpdatesAtFirst) return;
     // The contact has no effect until the next step, which updates all contacts.
     contact->SetEnabled(false);
   } catch (const std::exception&) {
     failed_ = true;
   }
+}
+
+void StepGuard::post_solve(b2Contact* contact) noexcept {
+  if (world_->GetProfile().solve >= 0.0F) return;  // an impact
+  const std::uint64_t steps = jammed_steps(contact);
+  if (steps < kFirstSteps || steps % kStepsBetweenTrials == 0 || failed_) return;
+  try {
+    limit_bodies(contact);
+    contact->SetEnabled(false);
+  } catch (const std::exception&) {
+    failed_ = true;
+  }
+}
+
+std::uint64_t StepGuard::jammed_steps(b2Contact* contact) {
+  return std::max(start_of(contact->GetFixtureA()->GetBody()).jammed_steps,
+                  start_of(contact->GetFixtureB()->GetBody()).jammed_steps);
+}
+
+void StepGuard::limit_bodies(b2Contact* contact) {
+  limit(contact->GetFixtureA()->GetBody());
+  limit(contact->GetFixtureB()->GetBody());
 }
 
 void StepGuard::limit(b2Body* body) {

@@ -44,6 +44,8 @@ class StepGuard {
 
   // Must be called before each contact is solved, after any other hook.
   void pre_solve(b2Contact* contact) noexcept;
+  // Must be called after each contact is solved.
+  void post_solve(b2Contact* contact) noexcept;
 
  private:
   // The state of a body before the step, and the energy that is allowed after the step, by the slot
@@ -61,6 +63,9 @@ class StepGuard {
   };
 
   Start& start_of(const b2Body* body);
+  // Returns the number of steps for which a body of the contact has been limited.
+  std::uint64_t jammed_steps(b2Contact* contact);
+  void limit_bodies(b2Contact* contact);
   void limit(b2Body* body);
   void examine_group(b2Body* first);
   void restore_static(b2Body* body);
