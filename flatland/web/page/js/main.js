@@ -78,7 +78,7 @@ const hotkeys = new Hotkeys(stage, session, tools, drive, {
   openSpawn: () => spawnDialog.open(),
   deleteSelected,
   toggleFollow,
-  togglePlots: () => plots.setOpen(byId("plots").hasAttribute("hidden")),
+  togglePlots: () => plots.toggle(),
   showAll: () => session.worlds.size > 1 && session.show(null),
   openHelp: () => help.showModal(),
 });
@@ -109,7 +109,7 @@ createNotices(session);
 createConnectionBadge(session, stage);
 createModelList(session, stage);
 createDisplays(session);
-new Inspector(session, stage, { deleteSelected });
+new Inspector(session, stage, { deleteSelected, plot: (name) => plots.show(name) });
 new Capture(stage, session);
 createTiles(session, stage);
 createScaleBar(session, stage);
@@ -117,7 +117,7 @@ createStick(session, drive);
 createToolbar(session, stage, tools, { toggleFollow, zoomIn: hotkeys.zoomIn, zoomOut: hotkeys.zoomOut });
 connectTheme((dark) => {
   stage.setTheme(dark);
-  plots.draw();
+  plots.setTheme(dark);
 });
 createShare(session, new ViewLink(session, stage));
 exposeScripting(session, stage);
