@@ -15,7 +15,7 @@ EBML = b"\x1a\x45\xdf\xa3"  # first bytes of WebM
 
 def test_screenshot(page: ViewerPage) -> None:
     browser = page.browser
-    browser.click("#screenshot")
+    page.menu("#screenshot")
     path = browser.downloaded("flatland-*.png")
     image = cv2.imread(str(path))
     path.unlink()
@@ -29,7 +29,7 @@ def test_recording(room: ViewedWorld, page: ViewerPage) -> None:
     browser = page.browser
     browser.resize(700, 500)  # which is encoded faster
     page.wait_for_frame()
-    browser.click("#record")
+    page.menu("#record")
     browser.until("document.querySelector('#notices').innerText.includes('Recording')")
     before = page.pose("robot")
     room.ask(lambda: room.world.command("/cmd_vel").set(Twist(linear_x=1.0)))
@@ -40,7 +40,7 @@ def test_recording(room: ViewedWorld, page: ViewerPage) -> None:
         frames,
         before[0],
     )
-    browser.click("#record")
+    page.menu("#record")
     path = browser.downloaded("flatland-*.webm")
     browser.resize(1200, 800)
     assert path.read_bytes()[:4] == EBML
@@ -95,3 +95,17 @@ def test_plots_show_published_numbers(room: ViewedWorld, page: ViewerPage) -> No
     browser.click(f'.plot-number[data-series="{other}"]')
     browser.until("document.querySelectorAll('figure.plot').length === 2")
     browser.until("document.querySelectorAll('.chart canvas').length === 2")
+
+
+def test_the_menu_is_closed_by_an_item_and_by_escape(page: ViewerPage) -> None:
+    browser = page.browser
+    shown = "document.querySelector('#page-menu').checkVisibility()"
+    dark = "document.documentElement.dataset.theme === 'dark'"
+    before = browser.evaluate(dark)
+    page.menu("#theme")
+    browser.until(f"({dark}) !== arguments[0] && !{shown}", before)
+    page.menu("#theme")
+    browser.click("#page-menu-toggle")
+    browser.until(shown)
+    browser.key("Escape")
+    browser.until(f"!{shown}")

@@ -4,9 +4,9 @@ import { createModelList } from "../../../flatland/web/page/js/panels/model_list
 import { dispatch, nextFrame, openPage } from "../fake_page.js";
 import { createStage, describeModel, models, poses, showRoom } from "../fake_server.js";
 
-function open() {
+function open(options) {
   const elements = openPage();
-  const { connection, session } = showRoom();
+  const { connection, session } = showRoom(options);
   const stage = createStage(session);
   createModelList(session, stage);
   session.emit("models", session.world);
@@ -29,6 +29,12 @@ test("all models are listed, and a click selects a model", () => {
     rows().map((row) => row.getAttribute("aria-pressed")),
     ["false", "true"],
   );
+});
+
+test("models that can be driven are marked", () => {
+  const marked = (rows) => rows().map((row) => /can be driven/.test(row.textContent));
+  assert.deepEqual(marked(open().rows), [true, false]);
+  assert.deepEqual(marked(open({ readOnly: true }).rows), [false, false]);
 });
 
 test("a model outside of the view is centred", () => {

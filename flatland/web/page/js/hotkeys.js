@@ -90,7 +90,7 @@ export class Hotkeys {
   /** @param {KeyboardEvent} event */
   press(event) {
     if (event.defaultPrevented || event.ctrlKey || event.metaKey || event.altKey) return;
-    if (takesKey(event.target, event.key) || document.querySelector("dialog[open]")) return;
+    if (takesKey(event.target, event.key) || document.querySelector("dialog[open], :popover-open")) return;
     if (
       event.key === " " &&
       event.target instanceof Element &&

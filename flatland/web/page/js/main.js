@@ -4,6 +4,7 @@ import { Hotkeys } from "./hotkeys.js";
 import { Capture } from "./panels/capture.js";
 import { createConnectionBadge } from "./panels/connection_badge.js";
 import { createDisplays } from "./panels/displays.js";
+import { createDriveHint } from "./panels/drive_hint.js";
 import { Inspector } from "./panels/inspector.js";
 import { createModelList } from "./panels/model_list.js";
 import { ModelMenu } from "./panels/model_menu.js";
@@ -114,6 +115,7 @@ new Capture(stage, session);
 createTiles(session, stage);
 createScaleBar(session, stage);
 createStick(session, drive);
+createDriveHint(session, drive);
 createToolbar(session, stage, tools, { toggleFollow, zoomIn: hotkeys.zoomIn, zoomOut: hotkeys.zoomOut });
 connectTheme((dark) => {
   stage.setTheme(dark);

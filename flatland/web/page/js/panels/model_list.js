@@ -1,5 +1,6 @@
-import { byId, element, setText } from "../dom.js";
+import { byId, element, icon, setText } from "../dom.js";
 import { css } from "../renderer/palette.js";
+import { isDrivable } from "../robots.js";
 
 /** Largest number of models in the list; the others are found by the filter. */
 const MAX_SHOWN = 200;
@@ -25,8 +26,12 @@ export function createModelList(session, stage) {
       "button",
       { type: "button", "aria-pressed": String(isSelected), "data-model": model.name },
       swatch,
-      element("span", {}, model.name),
+      element("span", { class: "name" }, model.name),
     );
+    if (isDrivable(model) && !session.readOnly) {
+      button.title = "Can be driven: select it, then W A S D or the stick";
+      button.append(icon("drive"), element("span", { class: "visually-hidden" }, "can be driven"));
+    }
     button.addEventListener("click", () => {
       session.select(model.name);
       const pose = session.world?.modelPose(model);
