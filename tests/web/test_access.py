@@ -101,6 +101,7 @@ def test_the_bar_of_the_time_is_not_crowded(page: ViewerPage) -> None:
 
 
 def test_light_and_dark(browser: Chromium, page: ViewerPage) -> None:
+    page.show("scans", False)  # which have the colour of the robot
     brightness = {}
     for scheme in ("light", "dark"):
         browser.prefer(prefers_color_scheme=scheme)

@@ -27,6 +27,7 @@ def test_screenshot(page: ViewerPage) -> None:
 
 def test_recording(room: ViewedWorld, page: ViewerPage) -> None:
     browser = page.browser
+    page.show("scans", False)  # which have the colour of the robot
     browser.resize(700, 500)  # which is encoded faster
     page.wait_for_frame()
     page.menu("#record")
@@ -64,6 +65,11 @@ def test_the_inspector_shows_the_values_of_the_model(page: ViewerPage) -> None:
     browser.until(f"{inspector}.includes(arguments[0])", f"{1.6 * 0.6:.2f}")  # the mass
     assert browser.evaluate("Number(document.querySelector('#pose-x').value)") == 2
     page.select("robot")
+    # A section does not push the next one out of the window.
+    assert browser.evaluate(
+        "(([a, b]) => a.bottom <= b.bottom)(['#toggle-trails', '#panel']"
+        ".map((each) => document.querySelector(each).getBoundingClientRect()))"
+    )
     for text in ("DiffDrive", "Laser", "/scan", "ranges: 311 values", "pub_rate"):
         browser.until(f"{inspector}.includes(arguments[0])", text)
 

@@ -37,6 +37,25 @@ test("models that can be driven are marked", () => {
   assert.deepEqual(marked(open({ readOnly: true }).rows), [false, false]);
 });
 
+test("models without shapes are hidden behind a switch, unless selected", () => {
+  const { elements, connection, session, rows } = open();
+  assert.ok(elements.shapeless.hidden);
+  const frame = describeModel(8, "map_to_odom", { body: { shapes: [] } });
+  connection.emit("message", models([frame], { complete: false }));
+  nextFrame();
+  assert.deepEqual(names(rows), ["robot", "crate"]);
+  assert.equal(elements["shapeless-text"].textContent, "Models without shapes (1)");
+  session.select("map_to_odom");
+  nextFrame();
+  assert.deepEqual(names(rows), ["robot", "crate", "map_to_odom"]);
+  session.select(null);
+  elements["toggle-shapeless"].checked = true;
+  dispatch(elements["toggle-shapeless"], "change");
+  nextFrame();
+  assert.deepEqual(names(rows), ["robot", "crate", "map_to_odom"]);
+  assert.equal(window.localStorage.getItem("flatland.shapeless"), "shown");
+});
+
 test("a model outside of the view is centred", () => {
   const { connection, stage, rows } = open();
   const centred = [];
