@@ -125,7 +125,13 @@ def test_the_page_fits_a_phone(room: ViewedWorld, page: ViewerPage) -> None:
         browser.touch("Start", (x, y))
         browser.touch("End")
         browser.until("flatland.state.selected === 'robot'")
-        assert browser.evaluate("document.querySelector('#stick').checkVisibility()")
+        stick = "document.querySelector('#stick').checkVisibility()"
+        assert browser.evaluate(stick)
+        for shown in (False, True):
+            x, y = browser.center("#drive-toggle")
+            browser.touch("Start", (x, y))
+            browser.touch("End")
+            browser.until(f"{stick} === arguments[0]", shown)
         browser.click("#panel-toggle")
         browser.until("document.querySelector('#inspector').checkVisibility()")
         browser.until("document.querySelector('#inspector').innerText.includes('robot')")

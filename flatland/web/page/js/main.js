@@ -16,6 +16,7 @@ import { SpawnDialog } from "./panels/spawn_dialog.js";
 import { createTiles } from "./panels/tiles.js";
 import { TimeBar } from "./panels/time_bar.js";
 import { createToolbar } from "./panels/toolbar.js";
+import { createTouchTips } from "./panels/touch_tips.js";
 import { exposeScripting } from "./scripting.js";
 import { Session } from "./session.js";
 import { Stage } from "./stage.js";
@@ -116,6 +117,7 @@ createTiles(session, stage);
 createScaleBar(session, stage);
 createStick(session, drive);
 createDriveHint(session, drive);
+createTouchTips();
 createToolbar(session, stage, tools, { toggleFollow, zoomIn: hotkeys.zoomIn, zoomOut: hotkeys.zoomOut });
 connectTheme((dark) => {
   stage.setTheme(dark);
