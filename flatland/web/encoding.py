@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from flatland.geometry import DoubleArray, FloatArray
-from flatland.web.scan_codes import codes_of, resolution_of
+from flatland.web.scan_codes import codes_of, has_codes
 
 VERSION: Final = 1
 EDGES: Final = 1
@@ -113,12 +113,11 @@ def compact_scan_group(
             shape (k, 3).
         ranges: Range of each beam [m], shape (k, n).
         range_max: Maximum range of each laser [m], shape (k,); all of them have codes, or none,
-            see `resolution_of`.
+            see `has_codes`.
     """
-    resolutions = np.array([resolution_of(length) for length in range_max], np.float32)
     columns: list[npt.NDArray[Any]] = [ids.astype("<u4"), poses.astype("<f4")]
-    if resolutions.all():
-        codes = codes_of(ranges, resolutions, range_max)
+    if has_codes(range_max.max()):
+        codes, resolutions = codes_of(ranges, range_max)
         columns += [resolutions.astype("<f4"), codes.astype("<u2")]
         bits = 16
     else:

@@ -10,7 +10,7 @@ from flatland.geometry import FloatArray
 from flatland.scene.scans import ScanDescription
 from flatland.web import encoding
 from flatland.web.encoding import Head
-from flatland.web.scan_codes import resolution_of
+from flatland.web.scan_codes import has_codes
 from flatland.web.views import Received
 
 
@@ -55,8 +55,8 @@ class LatestScans:
         self._tick = tick
         alike: dict[tuple[int, bool], dict[int, ScanDescription]] = {}
         for laser, scan in scans.items():
-            has_codes = resolution_of(scan.range_max) > 0
-            alike.setdefault((len(scan.ranges), has_codes), {})[laser] = scan
+            kind = (len(scan.ranges), has_codes(scan.range_max))
+            alike.setdefault(kind, {})[laser] = scan
         self._newest = []
         self._shared.clear()
         for same in alike.values():

@@ -20,31 +20,31 @@ MAX_RESOLUTION: Final = 0.001
 maximum range of 65 m; scans of a longer range are sent as float32."""
 
 
-def resolution_of(range_max: float) -> float:
-    """Returns the resolution of the codes of a sensor [m].
+def has_codes(range_max: float) -> bool:
+    """Returns whether the codes of a sensor are as fine as `MAX_RESOLUTION`.
 
     Args:
         range_max: Maximum range of the sensor [m].
-
-    Returns:
-        The range of the code 1, representable as float32; 0 if the ranges have no codes, because
-        they would be coarser than `MAX_RESOLUTION`.
     """
-    resolution = range_max / _STEPS
-    return float(np.float32(resolution)) if resolution <= MAX_RESOLUTION else 0.0
+    return range_max <= MAX_RESOLUTION * _STEPS
 
 
-def codes_of(ranges: FloatArray, resolutions: FloatArray, range_max: DoubleArray) -> Codes:
-    """Returns the codes of ranges: the nearest multiples of the resolution.
+def codes_of(ranges: FloatArray, range_max: DoubleArray) -> tuple[Codes, FloatArray]:
+    """Returns the codes of ranges: the nearest multiples of the resolution of each scan.
 
     Args:
         ranges: Range of each beam [m], shape (k, n).
-        resolutions: Resolution of each scan, returned by `resolution_of` [m], shape (k,).
-        range_max: Maximum range of each scan [m], shape (k,).
+        range_max: Maximum range of each scan [m], for which `has_codes` is true, shape (k,).
+
+    Returns:
+        The codes, shape (k, n), and the resolutions [m], shape (k,).
     """
-    steps = np.rint(ranges / resolutions[:, np.newaxis])
+    resolutions: FloatArray = (range_max / _STEPS).astype(np.float32)
+    steps = ranges * (1 / resolutions)[:, np.newaxis]
+    steps += 0.5  # The conversion to integers rounds down.
+    np.clip(steps, 0, _LARGEST, out=steps)
     # False for NaN. A beam without a hit can have the maximum range, rounded to float32.
     is_hit = ranges < range_max.astype(np.float32)[:, np.newaxis]
-    codes: Codes = np.where(is_hit, np.clip(steps, 0, _LARGEST), NO_HIT).astype(np.uint16)
+    codes: Codes = np.where(is_hit, steps, NO_HIT).astype(np.uint16)
     codes[np.isneginf(ranges)] = TOO_CLOSE
-    return codes
+    return codes, resolutions

@@ -9,25 +9,26 @@ from raw_web_client import Decoder
 from flatland.scene.scans import ScanDescription
 from flatland.web.encoding import Head
 from flatland.web.latest_scans import LatestScans
-from flatland.web.scan_codes import MAX_RESOLUTION, codes_of, resolution_of
+from flatland.web.scan_codes import MAX_RESOLUTION, codes_of, has_codes
 from flatland.web.views import Received
 
 HEAD = Head(0, 1, 0.5)
 
 
-def codes(ranges: list[float], range_max: float) -> list[int]:
-    resolution = np.array([resolution_of(range_max)], np.float32)
-    found = codes_of(np.array([ranges], np.float32), resolution, np.array([range_max]))
-    return [int(code) for code in found[0]]
+def codes(ranges: list[float], range_max: float) -> tuple[list[int], float]:
+    """Returns the codes and the resolution of a scan."""
+    found, resolutions = codes_of(np.array([ranges], np.float32), np.array([range_max]))
+    return [int(code) for code in found[0]], float(resolutions[0])
 
 
 def test_the_error_is_at_most_a_resolution_and_a_hit_remains_a_hit():
     for range_max in (0.1, 8.0, 20.1, 65.0):
-        resolution = resolution_of(range_max)
         ranges = np.linspace(0, range_max, 5000, dtype=np.float32)[:-1]
-        found = np.array(codes(list(ranges), range_max)) * np.float32(resolution)
-        assert np.abs(found - ranges).max() <= 1.01 * resolution
-        assert (found < range_max).all()
+        found, resolution = codes(list(ranges), range_max)
+        decoded = np.array(found) * np.float32(resolution)
+        assert resolution <= MAX_RESOLUTION
+        assert np.abs(decoded - ranges).max() <= 1.01 * resolution
+        assert (decoded < range_max).all()
 
 
 def test_special_values_have_codes():
@@ -42,13 +43,13 @@ def test_special_values_have_codes():
         np.nextafter(np.float32(20.1), np.float32(0)),
     ]
     expected = [65535, 65535, 65535, 65535, 65534, 0, 0, 65533]
-    assert codes(ranges, 20.1) == expected
+    assert codes(ranges, 20.1)[0] == expected
 
 
 @pytest.mark.parametrize("range_max", [66.0, 1e4, 1e300, float("inf")])
 def test_long_ranges_have_no_codes(range_max):
-    assert resolution_of(range_max) == 0
-    assert 0 < resolution_of(65.0) <= MAX_RESOLUTION
+    assert not has_codes(range_max)
+    assert has_codes(65.0)
 
 
 def test_a_message_contains_scans_with_and_without_codes():
