@@ -53,11 +53,18 @@ def test_axe_finds_no_violation(page: ViewerPage, violations: Callable[[], list[
     browser = page.browser
     page.select("robot")
     browser.until("document.querySelector('#inspector').textContent.includes('DiffDrive')")
+    browser.click("#plots-toggle")
+    browser.type("twist")
+    browser.until("document.querySelector('#plot-matches').checkVisibility()")
+    browser.key("Enter")
+    browser.type("twist")
+    browser.until("document.querySelectorAll('.chart canvas').length > 0")
     try:
         for scheme in ("light", "dark"):
             browser.prefer(prefers_color_scheme=scheme)
             page.wait_for_frame()
             assert violations() == []
+        browser.click("#plots-close")
         browser.resize(*PHONE, touch=True)
         page.wait_for_frame()
         assert violations() == []
