@@ -13,14 +13,16 @@ import time
 
 import aiohttp
 
-SCANS = 3  # kind of the message
+SCANS = 5  # kind of the message
 
 
 async def main(url: str) -> None:
     """Counts what arrives, until the input ends."""
     received, at_scan = 0, (0, time.perf_counter())
     async with aiohttp.ClientSession() as session, session.ws_connect(f"{url}ws") as socket:
-        await socket.send_json({"type": "look", "worlds": [0], "scans": True})
+        await socket.send_json(
+            {"type": "look", "worlds": [0], "scans": True, "compact_scans": True}
+        )
 
         async def count() -> None:
             nonlocal received, at_scan

@@ -1,4 +1,5 @@
-"""The page of the browser viewer in a headless Chromium: time to load, frames per second.
+"""The page of the browser viewer in a headless Chromium: time to load, also over a slow network,
+and frames per second.
 
 Chromium draws without a graphics card here (SwiftShader), on the processor that also runs the
 simulation; with a graphics card, both figures are better.
@@ -24,6 +25,10 @@ ROBOTS = 100
 BOXES = 12_500  # of four edges each
 SIDE = 100.0  # m
 LOADS = 5
+STARTS = 3
+# A network with a round trip of 150 ms and 2 Mbit/s in each direction.
+SLOW = {"latency": 150, "downloadThroughput": 250_000, "uploadThroughput": 250_000}
+OFFICE = Path(__file__).parents[1] / "worlds" / "office" / "world.yaml"
 WINDOWS = 5
 WINDOW = 2.0  # s
 
@@ -35,12 +40,12 @@ plugins:
   - {type: Laser, name: laser, body: base, range: 10, update_rate: 10,
      angle: {min: -3.14159, max: 3.14159, increment: 0.0174533}}
 """
-# Sets `loadTime` [ms since the start of the navigation] when all walls and robots were drawn.
+# Sets `loadTime` [ms since the start of the navigation] when all walls and models were drawn.
 WATCH_LOADING = """
 (() => {
   const look = () => {
     const world = window.flatland?.state?.worlds?.[0];
-    if (world && Object.keys(world.models).length === ROBOTS && world.layers[0].edges === EDGES) {
+    if (world && Object.keys(world.models).length === MODELS && world.edges === EDGES) {
       requestAnimationFrame(() => { window.loadTime = performance.now(); });
     } else requestAnimationFrame(look);
   };
@@ -115,13 +120,49 @@ def write_world(folder: Path) -> Path:
     return path
 
 
+def watch_loading(browser: Any, world: World) -> None:
+    """Lets each page that is loaded from now on set `loadTime`."""
+    edges = sum(len(layer.edges) for layer in world.layers)
+    script = WATCH_LOADING.replace("MODELS", str(len(world.models))).replace("EDGES", str(edges))
+    browser.command("Page.addScriptToEvaluateOnNewDocument", source=script)
+    browser.command("Network.enable")
+
+
+def measure_starts(folder: Path) -> dict[str, float]:
+    """Returns the least time to load the office over a slow network [s], cold and warm.
+
+    A warm start finds the files of the page in the cache of the browser.
+    """
+    from chromium import Chromium
+
+    times: dict[str, list[float]] = {"cold": [], "warm": []}
+    with (
+        World.from_yaml(OFFICE, seed=1) as world,
+        WebViewer(port=0) as viewer,
+        Chromium(folder, size=(1280, 800)) as browser,
+    ):
+        viewer.add_world(world, simulation=(simulation := Simulation(world, 200)))
+        watch_loading(browser, world)
+        thread = threading.Thread(target=simulation.run)
+        thread.start()
+        try:
+            browser.command("Network.emulateNetworkConditions", offline=False, **SLOW)
+            for _ in range(STARTS):
+                browser.command("Network.clearBrowserCache")
+                for start in times.values():
+                    browser.open(viewer.url)
+                    start.append(browser.until("window.loadTime") / 1e3)
+        finally:
+            simulation.stop()
+            thread.join()
+    return {kind: min(found) for kind, found in times.items()}
+
+
 def measure(folder: Path) -> tuple[float, float, float, int]:
     """Returns the least time to load [s], the most frames per second, also of an empty canvas.
 
     The last value is the number of edges.
     """
-    # The harness of the tests, which also requires the extra `test`.
-    sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "support"))
     from chromium import Chromium
 
     with (
@@ -134,12 +175,10 @@ def measure(folder: Path) -> tuple[float, float, float, int]:
         edges = len(world.layers[0].edges)
         simulation = Simulation(world, 200)
         viewer.add_world(world, simulation=simulation)
+        watch_loading(browser, world)
         thread = threading.Thread(target=simulation.run)
         thread.start()
         try:
-            script = WATCH_LOADING.replace("ROBOTS", str(ROBOTS)).replace("EDGES", str(edges))
-            browser.command("Page.addScriptToEvaluateOnNewDocument", source=script)
-            browser.command("Network.enable")
             browser.command("Network.setCacheDisabled", cacheDisabled=True)
             times = []
             for _ in range(LOADS):
@@ -175,11 +214,17 @@ def count_frames(browser: Any) -> tuple[list[float], list[float]]:
 
 def rows(_unit: float) -> list[Row]:
     """Measures how fast the page loads and draws."""
+    # The harness of the tests, which also requires the extra `test`.
+    sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "support"))
     with tempfile.TemporaryDirectory() as folder:
+        starts = measure_starts(Path(folder))
         loading, frames, empty, edges = measure(Path(folder))
     note = f"{edges} edges, {ROBOTS} robots; OpenGL without a graphics card"
     share = f"{note}; {frames / empty:.0%} of an empty canvas"
+    network = "the office; round trips of 150 ms, 2 Mbit/s"
     return [
+        Row("start of the page, slow network, empty cache", starts["cold"], "s", 4.0, note=network),
+        Row("start of the page, slow network, again", starts["warm"], "s", 1.5, note=network),
         Row("loading of the page of the browser viewer", loading, "s", 1.0, note=note),
         Row("frames while the view pans", frames, "1/s", 30.0, at_least=True, note=share),
     ]

@@ -69,7 +69,7 @@ def rows(_unit: float) -> list[Row]:
             thread.join()
     what = f"{MAX_ROBOTS} robots with 360 beams at 10 Hz"
     return [
-        Row(f"web: {what}, per client", bandwidth / 1e6, "MB/s", 1.5),
+        Row(f"web: {what}, per client", bandwidth / 1e6, "MB/s", 0.9),
         Row(
             f"web: {what}, share of a core",
             100 * share,

@@ -110,16 +110,11 @@ def _capture_desktop(browser: Chromium, url: str, path: Path) -> None:
 def _choose_series(browser: Chromium, wanted: Sequence[str]) -> None:
     """Adds numbers to the plots."""
     for name in wanted:
+        browser.fill("#plot-series", name)
         browser.until(
-            "[...document.querySelectorAll('#plot-series option')]"
-            ".some((option) => option.value === arguments[0])",
-            name,
+            "document.querySelector('#plot-matches li')?.dataset.name === arguments[0]", name
         )
-        browser.driver.execute_script(
-            "document.querySelector('#plot-series').value = arguments[0];"
-            "document.querySelector('#plot-add').click();",
-            name,
-        )
+        browser.key("Enter")
 
 
 def _drive(browser: Chromium, keys: str, seconds: float) -> None:

@@ -32,10 +32,12 @@ class ScanDescription:
     Attributes:
         pose: Pose of the sensor in the world frame at the time of the scan [m, rad].
         ranges: Range of each beam [m], shape (n,); never modified.
+        range_max: Maximum range, which is the length of a beam [m].
     """
 
     pose: Pose
     ranges: FloatArray
+    range_max: float
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -45,25 +47,23 @@ class LaserDescription:
     Attributes:
         scan: The last scan, or an exact scan from the current pose before the first one.
         beam_ends: End point of each beam of full length in the sensor frame [m], shape (n, 2).
-        range_max: Length of a beam [m].
     """
 
     scan: ScanDescription
     beam_ends: FloatArray
-    range_max: float
 
     def hits(self) -> BoolArray:
         """Returns which beams hit something, shape (n,)."""
         # A beam without a hit reports NaN, infinity or the full range; a beam whose hit is too
         # close reports -inf.
         ranges = self.scan.ranges
-        hits: BoolArray = np.isfinite(ranges) & (ranges != np.float32(self.range_max))
+        hits: BoolArray = np.isfinite(ranges) & (ranges != np.float32(self.scan.range_max))
         return hits
 
     def ends(self) -> DoubleArray:
         """Returns the end point of each beam in the world frame [m], shape (n, 2)."""
         ranges = self.scan.ranges
-        fractions = np.where(self.hits(), ranges.astype(np.float64) / self.range_max, 1.0)
+        fractions = np.where(self.hits(), ranges.astype(np.float64) / self.scan.range_max, 1.0)
         fractions[np.isneginf(ranges)] = 0.0
         return transform_points(self.scan.pose, self.beam_ends * fractions[:, np.newaxis])
 
@@ -109,25 +109,26 @@ class RangingSensor:
             value: A measurement that was returned by `latest`.
         """
         if isinstance(self.plugin, Laser):
-            return _describe_scan(*value)
+            pose, ranges = value
+            return _describe_scan(pose, ranges, self.range_max)
         if hasattr(value, "ranges"):
             ranges = np.asarray(value.ranges, np.float32)
         else:
             ranges = np.full(self.count, value.range, np.float32)
         if ranges.shape != (self.count,):
             return None
-        return ScanDescription(compose(self.body.pose, self.origin), ranges)
+        return ScanDescription(compose(self.body.pose, self.origin), ranges, self.range_max)
 
 
 def describe_laser(laser: Laser) -> LaserDescription:
     """Describes a laser and its last scan; does not change the state of the laser."""
-    scan = _describe_scan(*(laser.last_scan or laser.cast_without_noise()))
-    return LaserDescription(scan, laser.beam_ends, laser.range)
+    pose, ranges = laser.last_scan or laser.cast_without_noise()
+    return LaserDescription(_describe_scan(pose, ranges, laser.range), laser.beam_ends)
 
 
-def _describe_scan(pose: Pose, ranges: FloatArray) -> ScanDescription:
+def _describe_scan(pose: Pose, ranges: FloatArray, range_max: float) -> ScanDescription:
     # A view belongs to an array that a caller of `compute_scans` may overwrite.
-    return ScanDescription(pose, ranges if ranges.base is None else ranges.copy())
+    return ScanDescription(pose, ranges if ranges.base is None else ranges.copy(), range_max)
 
 
 def find_sensor(plugin: ModelPlugin, outputs: Iterable[Output[Any]]) -> RangingSensor | None:

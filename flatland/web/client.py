@@ -114,7 +114,7 @@ class Client:
         fields = message.fields
         self._worlds = fields.get("worlds", self._worlds)
         self._hidden = fields.get("hidden", self._hidden)
-        names = ("scans", "frames", "inspect", "series")
+        names = ("scans", "compact_scans", "frames", "inspect", "series")
         self._view = dataclasses.replace(
             self._view, **{name: fields[name] for name in names if name in fields}
         )

@@ -10,16 +10,19 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from flatland.geometry import FloatArray
+from flatland.geometry import DoubleArray, FloatArray
+from flatland.web.scan_codes import codes_of, has_codes
 
 VERSION: Final = 1
 EDGES: Final = 1
 POSES: Final = 2
 SCANS: Final = 3
 SAME_BODIES: Final = 4
+COMPACT_SCANS: Final = 5
 
 _HEADER: Final = struct.Struct("<BBHId")
 _TWO_COUNTS: Final = struct.Struct("<II")
+_THREE_COUNTS: Final = struct.Struct("<III")
 _COUNT: Final = struct.Struct("<I")
 
 Ids = npt.NDArray[np.uint32]
@@ -73,14 +76,16 @@ def poses_message(head: Head, poses: FloatArray, ids: Ids | None = None) -> byte
     return start + columns + poses.astype("<f4").tobytes()
 
 
-def scans_message(head: Head, groups: Sequence[bytes]) -> bytes:
+def scans_message(head: Head, groups: Sequence[bytes], *, compact: bool = False) -> bytes:
     """Returns the message of some scans.
 
     Args:
         head: Header.
-        groups: Groups of scans, returned by `scan_group`.
+        groups: Groups of scans, returned by `scan_group` or by `compact_scan_group`.
+        compact: Whether the groups are those of `compact_scan_group`.
     """
-    return b"".join((head.packed(SCANS), _COUNT.pack(len(groups)), *groups))
+    kind = COMPACT_SCANS if compact else SCANS
+    return b"".join((head.packed(kind), _COUNT.pack(len(groups)), *groups))
 
 
 def scan_group(ids: Ids, poses: FloatArray, ranges: FloatArray) -> bytes:
@@ -95,3 +100,29 @@ def scan_group(ids: Ids, poses: FloatArray, ranges: FloatArray) -> bytes:
     counts = _TWO_COUNTS.pack(*ranges.shape)
     columns = (ids.astype("<u4"), poses.astype("<f4"), ranges.astype("<f4"))
     return counts + b"".join([column.tobytes() for column in columns])
+
+
+def compact_scan_group(
+    ids: Ids, poses: FloatArray, ranges: FloatArray, range_max: DoubleArray
+) -> bytes:
+    """Returns the part of a compact `scans_message` with scans of the same number of beams.
+
+    Args:
+        ids: Id of each laser, shape (k,).
+        poses: (x, y, theta) of each laser at the time of its scan, world frame [m, rad],
+            shape (k, 3).
+        ranges: Range of each beam [m], shape (k, n).
+        range_max: Maximum range of each laser [m], shape (k,); all of them have codes, or none,
+            see `has_codes`.
+    """
+    columns: list[npt.NDArray[Any]] = [ids.astype("<u4"), poses.astype("<f4")]
+    if has_codes(range_max.max()):
+        codes, resolutions = codes_of(ranges, range_max)
+        columns += [resolutions.astype("<f4"), codes.astype("<u2")]
+        bits = 16
+    else:
+        columns.append(ranges.astype("<f4"))
+        bits = 32
+    data = b"".join([column.tobytes() for column in columns])
+    padding = bytes(-len(data) % 4)
+    return _THREE_COUNTS.pack(*ranges.shape, bits) + data + padding

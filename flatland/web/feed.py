@@ -79,7 +79,7 @@ class WorldFeed:
         message = contents.next_contents(received) or self._status.next_message(received)
         message = message or contents.next_poses(received)
         if message is None and view.scans:
-            message = self._scans.next_message(received, contents.head)
+            message = self._scans.next_message(received, contents.head, compact=view.compact_scans)
         return message or self._optional.next_message(received, view)
 
     def find_model(self, number: int) -> Model:

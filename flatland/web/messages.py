@@ -115,6 +115,7 @@ _FIELDS: Final[dict[str, tuple[dict[str, Check], dict[str, Check]]]] = {
         {
             "worlds": _list(_INDEX, 0, 1024),
             "scans": _boolean,
+            "compact_scans": _boolean,
             "frames": _boolean,
             "inspect": _optional(_ID),
             "series": _list(_text(MAX_PATH), 0, MAX_SERIES),

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import hashlib
 import logging
 import re
 from collections.abc import Awaitable, Callable
@@ -16,6 +15,7 @@ from flatland.web.access import Access, is_loopback
 from flatland.web.client import Client
 from flatland.web.hub import Hub
 from flatland.web.messages import MAX_SIZE
+from flatland.web.page_files import PageFile, PageFiles
 
 _LOG = logging.getLogger("flatland")
 
@@ -27,18 +27,9 @@ WRONG_TOKEN: Final = 4401  # code that closes a connection
 HEARTBEAT: Final = 10.0  # s between two pings; a client that does not reply is disconnected
 MAX_CLIENTS: Final = 64
 
-_TYPES: Final = {
-    ".html": "text/html; charset=utf-8",
-    ".css": "text/css; charset=utf-8",
-    ".js": "text/javascript; charset=utf-8",
-    ".json": "application/json",
-    ".webmanifest": "application/manifest+json",
-    ".svg": "image/svg+xml",
-    ".png": "image/png",
-    ".ico": "image/x-icon",
-}
-# No part begins with a dot, so that a name cannot refer to a file outside the folder.
-_FILE_NAME: Final = re.compile(r"[\w-][\w.-]*(/[\w-][\w.-]*)*", re.ASCII)
+# Never changes, because another version of the page has other paths.
+_KEEP: Final = "public, max-age=31536000, immutable"
+_GZIP: Final = re.compile(r"(^|[\s,])gzip\s*($|,|;\s*q=(1|0\.0*[1-9]))")
 _POLICY: Final = (
     "default-src 'self'; img-src 'self' data: blob:; media-src 'self' blob:; object-src 'none'; "
     "base-uri 'none'; form-action 'none'; frame-ancestors {ancestors}"
@@ -71,6 +62,7 @@ class Server:
         self._hub = hub
         self._access = access
         self._on_request = on_request
+        self._files = PageFiles(PAGE)
         ancestors = _LOCAL_ANCESTORS if is_loopback(access.host) else "'self'"
         if embeddable:
             ancestors = "*"
@@ -78,7 +70,7 @@ class Server:
             "Content-Security-Policy": _POLICY.format(ancestors=ancestors),
             "X-Content-Type-Options": "nosniff",
             "Referrer-Policy": "no-referrer",  # The address contains the token.
-            "Cache-Control": "no-cache",  # Browsers reuse a file only if its ETag is unchanged.
+            "Cache-Control": "no-cache",  # Browsers compare the ETag of the start page.
         }
 
     def application(self) -> web.Application:
@@ -104,17 +96,26 @@ class Server:
         return response
 
     async def _file(self, request: web.Request) -> web.StreamResponse:
-        name = request.match_info["path"] or "index.html"
-        path = PAGE / name
-        kind = _TYPES.get(path.suffix)
-        if kind is None or not _FILE_NAME.fullmatch(name) or not path.is_file():
+        path = request.match_info["path"]
+        if path in ("", "index.html"):
+            return self._answer(request, self._files.index, {})
+        file = self._files.asset(path)
+        if file is None:
             return web.Response(status=404, text="not found\n", headers=self._headers)
-        content = path.read_bytes()
-        tag = hashlib.sha256(content).hexdigest()[:32]
-        headers = {**self._headers, "Content-Type": kind, "ETag": f'"{tag}"'}
-        if any(known.value in (tag, "*") for known in request.if_none_match or ()):
+        return self._answer(request, file, {"Cache-Control": _KEEP})
+
+    def _answer(
+        self, request: web.Request, file: PageFile, more: dict[str, str]
+    ) -> web.StreamResponse:
+        # A weak tag, which the compressed and the plain form share.
+        headers = {**self._headers, **more, "Content-Type": file.kind, "ETag": f'W/"{file.tag}"'}
+        headers["Vary"] = "Accept-Encoding"
+        if any(known.value in (file.tag, "*") for known in request.if_none_match or ()):
             return web.Response(status=304, headers=headers)
-        return web.Response(body=content, headers=headers)
+        if file.compressed is None or not _GZIP.search(request.headers.get("Accept-Encoding", "")):
+            return web.Response(body=file.content, headers=headers)
+        headers["Content-Encoding"] = "gzip"
+        return web.Response(body=file.compressed, headers=headers)
 
     async def _connect(self, request: web.Request) -> web.StreamResponse:
         if not self._access.allows_origin(request.headers.get("Origin"), request.host):

@@ -18,12 +18,14 @@ class View:
 
     Attributes:
         scans: Whether to send laser scans.
+        compact_scans: Whether to send the codes of ranges instead of the ranges.
         frames: Whether to send the transforms of frames.
         inspect: Id of the model that is inspected, None for none.
         series: Names of the numbers that are plotted.
     """
 
     scans: bool = False
+    compact_scans: bool = False
     frames: bool = False
     inspect: int | None = None
     series: tuple[str, ...] = ()

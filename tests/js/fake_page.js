@@ -245,8 +245,8 @@ function parse(html, root) {
 /** Calls the listeners of an event with these fields; returns the event. */
 export function dispatch(target, type, fields = {}) {
   const event = new Event(type, { cancelable: true });
-  Object.defineProperty(event, "target", { value: target });
-  for (const [name, value] of Object.entries(fields)) Object.defineProperty(event, name, { value });
+  const values = { target, ...fields };
+  for (const [name, value] of Object.entries(values)) Object.defineProperty(event, name, { value });
   target.dispatchEvent(event);
   return event;
 }

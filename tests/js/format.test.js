@@ -24,13 +24,27 @@ test("numbers have significant digits", () => {
   assert.equal(significant(-Infinity), "−∞");
 });
 
+/** Returns the lines of a value as text, and the paths of its numbers. */
+function described(value) {
+  const lines = describeValue(value);
+  const paths = lines.flat().flatMap(({ path }) => (path === null ? [] : [path.join("/")]));
+  return [lines.map((parts) => parts.map(({ text }) => text).join("|")), paths];
+}
+
 test("an object has a line for each field, and stamps in seconds", () => {
-  assert.equal(
-    describeValue({ stamp: 1_500_000_000, x: 0.123456, name: "a" }),
-    "stamp: 1.5 s\nx: 0.1235\nname: a",
-  );
-  assert.equal(describeValue(null), "–");
-  assert.equal(describeValue([1, 2]), "[1, 2]");
+  const value = { stamp: 1_500_000_000, x: 0.123456, name: "a" };
+  assert.deepEqual(described(value), [["stamp: 1.5 s", "x: |0.1235", "name: |a"], ["x"]]);
+  assert.deepEqual(described(null), [["–"], []]);
+});
+
+test("the numbers of short lists and of parts of objects can be plotted", () => {
+  assert.deepEqual(described([1, 2]), [["1|2"], ["0", "1"]]);
+  assert.deepEqual(described(2.5), [["2.5"], [""]]);
+  const twist = { twist: { linear: [1, 0], ok: true } };
+  const paths = ["twist/linear/0", "twist/linear/1", "twist/ok"];
+  assert.deepEqual(described(twist), [["twist: |linear: |1|0|ok: |true"], paths]);
+  const ranges = { ranges: Array.from({ length: 9 }, () => 1) };
+  assert.deepEqual(described(ranges), [["ranges: |9 values: 1, 1, 1, …"], []]);
 });
 
 test("lists are short", () => {

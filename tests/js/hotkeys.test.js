@@ -143,3 +143,14 @@ test("the help lists each key once", () => {
   assert.ok(names.includes("Space") && names.includes("Esc"));
   assert.equal(names.length, new Set(names).size);
 });
+
+test("the help begins with what the device has", () => {
+  const first = ({ hotkeys, elements }) => {
+    hotkeys.createHelp();
+    return elements["help-content"].querySelector("h3").textContent;
+  };
+  const opened = open();
+  assert.equal(first(opened), "Keys");
+  Object.assign(window, { matchMedia: () => ({ matches: true }) });
+  assert.equal(first(opened), "Touch");
+});

@@ -51,6 +51,34 @@ test("scans in groups of the same number of beams", () => {
   );
 });
 
+test("compact scans have codes of 16 bits, or ranges", () => {
+  const pair = (low, high) => low + 65536 * high;
+  const codes = [pair(0, 4), pair(65533, 65534), pair(65535, 0)];
+  const first = [1, 5, 16, 8, ...f(1, 2, 3), ...f(0.5), ...codes];
+  const second = [1, 2, 32, 9, ...f(7, 8, 9), ...f(1.5, -Infinity)];
+  const { scans } = decodeBinary(message(5, [2, ...first, ...second]));
+  assert.deepEqual(
+    scans.map(({ id, pose, ranges }) => [id, pose, [...ranges]]),
+    [
+      [8, [1, 2, 3], [0, 2, 32766.5, -Infinity, NaN]],
+      [9, [7, 8, 9], [1.5, -Infinity]],
+    ],
+  );
+  assert.throws(() => decodeBinary(message(5, [1, 1, 1, 8, 8, ...f(1, 2, 3), 0])), /of 8 bits/);
+});
+
+test("the codes of several scans have their own resolutions", () => {
+  const poses = f(0, 0, 0, 1, 1, 1);
+  const { scans } = decodeBinary(message(5, [1, 2, 1, 16, 5, 6, ...poses, ...f(0.5, 0.25), 4 + 65536 * 4]));
+  assert.deepEqual(
+    scans.map(({ id, ranges }) => [id, [...ranges]]),
+    [
+      [5, [2]],
+      [6, [1]],
+    ],
+  );
+});
+
 test("a message of an unknown kind is ignored", () => {
   assert.equal(decodeBinary(message(99, [0])), null);
 });
@@ -62,6 +90,7 @@ test("another version and a short message are errors", () => {
     [2, [5]],
     [3, [1, 5, 5]],
     [4, [5]],
+    [5, [1, 5, 5, 16]],
   ]) {
     assert.throws(() => decodeBinary(message(kind, words)), RangeError);
   }

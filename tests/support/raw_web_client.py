@@ -6,6 +6,7 @@ import asyncio
 import contextlib
 import dataclasses
 import json
+import math
 import struct
 import time
 from collections.abc import Callable
@@ -48,12 +49,27 @@ class Binary:
         found, offset = {}, 4
         for _ in range(groups):
             count, beams = struct.unpack_from("<II", self.payload, offset)
-            ids = np.frombuffer(self.payload, "<u4", count, offset + 8).tolist()
-            offset += 8 + 4 * count
+            offset += 8
+            bits = 32
+            if self.kind == 5:
+                (bits,) = struct.unpack_from("<I", self.payload, offset)
+                offset += 4
+            ids = np.frombuffer(self.payload, "<u4", count, offset).tolist()
+            offset += 4 * count
             poses = np.frombuffer(self.payload, "<f4", 3 * count, offset).reshape(count, 3)
             offset += 12 * count
-            ranges = np.frombuffer(self.payload, "<f4", count * beams, offset)
-            offset += 4 * count * beams
+            if bits == 16:
+                resolutions = np.frombuffer(self.payload, "<f4", count, offset)
+                offset += 4 * count
+                codes = np.frombuffer(self.payload, "<u2", count * beams, offset)
+                ranges = codes * np.repeat(resolutions, beams)
+                ranges[codes == 65534] = -np.inf
+                ranges[codes == 65535] = np.nan
+                offset += 4 * math.ceil(count * beams / 2)
+            else:
+                assert bits == 32
+                ranges = np.frombuffer(self.payload, "<f4", count * beams, offset)
+                offset += 4 * count * beams
             scans = zip(poses, ranges.reshape(count, beams), strict=True)
             found.update(zip(ids, scans, strict=True))
         assert offset == len(self.payload)

@@ -11,6 +11,7 @@ from chromium import Chromium, Image, Point
 _RESET = """
 const [done] = arguments;
 for (const dialog of document.querySelectorAll("dialog[open]")) dialog.close();
+for (const menu of document.querySelectorAll("[popover]")) menu.hidePopover();
 for (const form of document.querySelectorAll("dialog form")) form.reset();
 const buttons = document.querySelectorAll("figure.plot button, #notices button");
 for (const button of buttons) button.click();
@@ -131,6 +132,11 @@ class ViewerPage:
         return part
 
     # -- controls --------------------------------------------------------------------------
+
+    def menu(self, item: str) -> None:
+        """Clicks an item of the menu of pictures, link and theme, given by its CSS selector."""
+        self.browser.click("#page-menu-toggle")
+        self.browser.click(item)
 
     def select(self, name: str) -> None:
         """Selects a model with a click on it, and waits for its details."""

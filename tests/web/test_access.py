@@ -53,11 +53,18 @@ def test_axe_finds_no_violation(page: ViewerPage, violations: Callable[[], list[
     browser = page.browser
     page.select("robot")
     browser.until("document.querySelector('#inspector').textContent.includes('DiffDrive')")
+    browser.click("#plots-toggle")
+    browser.type("twist")
+    browser.until("document.querySelector('#plot-matches').checkVisibility()")
+    browser.key("Enter")
+    browser.type("twist")
+    browser.until("document.querySelectorAll('.chart canvas').length > 0")
     try:
         for scheme in ("light", "dark"):
             browser.prefer(prefers_color_scheme=scheme)
             page.wait_for_frame()
             assert violations() == []
+        browser.click("#plots-close")
         browser.resize(*PHONE, touch=True)
         page.wait_for_frame()
         assert violations() == []
@@ -101,6 +108,7 @@ def test_the_bar_of_the_time_is_not_crowded(page: ViewerPage) -> None:
 
 
 def test_light_and_dark(browser: Chromium, page: ViewerPage) -> None:
+    page.show("scans", False)  # which have the colour of the robot
     brightness = {}
     for scheme in ("light", "dark"):
         browser.prefer(prefers_color_scheme=scheme)
@@ -124,7 +132,13 @@ def test_the_page_fits_a_phone(room: ViewedWorld, page: ViewerPage) -> None:
         browser.touch("Start", (x, y))
         browser.touch("End")
         browser.until("flatland.state.selected === 'robot'")
-        assert browser.evaluate("document.querySelector('#stick').checkVisibility()")
+        stick = "document.querySelector('#stick').checkVisibility()"
+        assert browser.evaluate(stick)
+        for shown in (False, True):
+            x, y = browser.center("#drive-toggle")
+            browser.touch("Start", (x, y))
+            browser.touch("End")
+            browser.until(f"{stick} === arguments[0]", shown)
         browser.click("#panel-toggle")
         browser.until("document.querySelector('#inspector').checkVisibility()")
         browser.until("document.querySelector('#inspector').innerText.includes('robot')")

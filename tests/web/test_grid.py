@@ -41,6 +41,7 @@ def test_all_worlds_are_visible_and_one_is_enlarged(
     page = ViewerPage(browser)
     browser.console()
     page.open(rooms[0].viewer.url)
+    page.show("scans", False)  # which have the colour of the robots
 
     def wait_for_robots(number: int) -> None:
         browser.picture_until(f"{number} robots", lambda image: robots(page, image) == number)

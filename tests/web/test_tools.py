@@ -15,7 +15,7 @@ EBML = b"\x1a\x45\xdf\xa3"  # first bytes of WebM
 
 def test_screenshot(page: ViewerPage) -> None:
     browser = page.browser
-    browser.click("#screenshot")
+    page.menu("#screenshot")
     path = browser.downloaded("flatland-*.png")
     image = cv2.imread(str(path))
     path.unlink()
@@ -27,9 +27,10 @@ def test_screenshot(page: ViewerPage) -> None:
 
 def test_recording(room: ViewedWorld, page: ViewerPage) -> None:
     browser = page.browser
+    page.show("scans", False)  # which have the colour of the robot
     browser.resize(700, 500)  # which is encoded faster
     page.wait_for_frame()
-    browser.click("#record")
+    page.menu("#record")
     browser.until("document.querySelector('#notices').innerText.includes('Recording')")
     before = page.pose("robot")
     room.ask(lambda: room.world.command("/cmd_vel").set(Twist(linear_x=1.0)))
@@ -40,7 +41,7 @@ def test_recording(room: ViewedWorld, page: ViewerPage) -> None:
         frames,
         before[0],
     )
-    browser.click("#record")
+    page.menu("#record")
     path = browser.downloaded("flatland-*.webm")
     browser.resize(1200, 800)
     assert path.read_bytes()[:4] == EBML
@@ -64,6 +65,11 @@ def test_the_inspector_shows_the_values_of_the_model(page: ViewerPage) -> None:
     browser.until(f"{inspector}.includes(arguments[0])", f"{1.6 * 0.6:.2f}")  # the mass
     assert browser.evaluate("Number(document.querySelector('#pose-x').value)") == 2
     page.select("robot")
+    # A section does not push the next one out of the window.
+    assert browser.evaluate(
+        "(([a, b]) => a.bottom <= b.bottom)(['#toggle-trails', '#panel']"
+        ".map((each) => document.querySelector(each).getBoundingClientRect()))"
+    )
     for text in ("DiffDrive", "Laser", "/scan", "ranges: 311 values", "pub_rate"):
         browser.until(f"{inspector}.includes(arguments[0])", text)
 
@@ -72,16 +78,13 @@ def test_plots_show_published_numbers(room: ViewedWorld, page: ViewerPage) -> No
     browser = page.browser
     room.ask(lambda: room.world.command("/cmd_vel").set(Twist(angular_z=0.5)))
     browser.click("#plots-toggle")
-    options = "[...document.querySelector('#plot-series').options].map((option) => option.value)"
-    names = browser.until(f"{options}.length > 1 && {options}")
     name = "/odometry/ground_truth/twist/2"
-    assert name in names
-    # Typed letters would select a name depending on the time between them.
-    browser.evaluate("document.querySelector('#plot-series').value = arguments[0]", name)
-    assert browser.evaluate("document.querySelectorAll('figure.plot').length") == 0
+    browser.type("twist 2 truth")
+    browser.until("document.querySelector('#plot-matches li')?.dataset.name === arguments[0]", name)
     browser.key("Enter")
     browser.until("document.querySelector('figure.plot')?.dataset.series === arguments[0]", name)
     browser.until("parseFloat(document.querySelector('figure.plot output').textContent) === 0.5")
+    browser.until("document.querySelector('figure.plot canvas') !== null")
     x, y, width, height = browser.evaluate(
         "((b) => [b.x, b.y, b.width, b.height].map(Math.round))"
         "(document.querySelector('figure.plot canvas').getBoundingClientRect())"
@@ -92,3 +95,23 @@ def test_plots_show_published_numbers(room: ViewedWorld, page: ViewerPage) -> No
         return int((part.max(axis=-1) - part.min(axis=-1) > 60).sum()) > 20
 
     browser.picture_until("the curve", curve)
+
+    other = "/odometry/ground_truth/twist/0"
+    page.select("robot")
+    browser.click(f'.plot-number[data-series="{other}"]')
+    browser.until("document.querySelectorAll('figure.plot').length === 2")
+    browser.until("document.querySelectorAll('.chart canvas').length === 2")
+
+
+def test_the_menu_is_closed_by_an_item_and_by_escape(page: ViewerPage) -> None:
+    browser = page.browser
+    shown = "document.querySelector('#page-menu').checkVisibility()"
+    dark = "document.documentElement.dataset.theme === 'dark'"
+    before = browser.evaluate(dark)
+    page.menu("#theme")
+    browser.until(f"({dark}) !== arguments[0] && !{shown}", before)
+    page.menu("#theme")
+    browser.click("#page-menu-toggle")
+    browser.until(shown)
+    browser.key("Escape")
+    browser.until(f"!{shown}")

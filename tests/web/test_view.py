@@ -143,7 +143,7 @@ def test_a_link_restores_the_view(page: ViewerPage) -> None:
     browser.wheel(page.screen(1, 1), -360)
     browser.drag(page.screen(0, 2), page.screen(0.5, 2.5))
     page.show("names", False)
-    browser.click("#share")
+    page.menu("#share")
     browser.until("document.querySelector('#notices').innerText.startsWith('Link')")
     url = browser.until("location.hash.includes('zoom') && location.href")
     scale, point = page.scale(), page.screen(1, 1)

@@ -12,14 +12,18 @@ function open(t, options) {
   const { connection, session } = showRoom(options);
   const stage = new Emitter();
   let deleted = 0;
-  const inspector = new Inspector(session, stage, { deleteSelected: () => deleted++ });
+  const plotted = [];
+  const inspector = new Inspector(session, stage, {
+    deleteSelected: () => deleted++,
+    plot: (name) => plotted.push(name),
+  });
   const frame = () => {
     now += 1000;
     stage.emit("frame", undefined);
   };
   const values = () => ["pose-x", "pose-y", "pose-theta"].map((id) => elements[id].value);
   const submit = () => dispatch(elements.inspector.querySelector("form"), "submit");
-  return { elements, connection, session, inspector, frame, values, submit, deleted: () => deleted };
+  return { elements, connection, session, inspector, frame, values, submit, plotted, deleted: () => deleted };
 }
 
 function details(model, fields = {}) {
@@ -109,12 +113,37 @@ test("the properties, topics and plugins of the model are displayed", (t) => {
     "layer walls, crate",
   ]);
   assert.equal(topics.children[0].textContent, "Topics (2)");
-  assert.equal(topics.children[2].children[1].textContent, "ranges: [1, 2, 3]\nstamp: 0.5 s");
+  const lines = topics.children[2].children[1].children;
+  assert.deepEqual(
+    lines.map((line) => line.textContent),
+    ["ranges: 123", "stamp: 0.5 s"],
+  );
   assert.equal(topics.children[1].children[0].title, "Twist, command");
   assert.match(plugins.textContent, /DiffDrive.*pub_rate.*50/);
   connection.emit("message", details(ROBOT, { velocity: null }));
   assert.equal(topics.children.length, 1);
   assert.equal(facts(list)[0], "– m/s");
+});
+
+test("a button beside a number of an output plots the number", (t) => {
+  const { elements, connection, session, plotted } = open(t);
+  session.select("robot");
+  const topics = (speed) => [
+    { topic: "/cmd_vel", type: "Twist", time: 1, value: { linear_x: 1 }, kind: "command" },
+    { topic: "/odom", type: "Odometry", time: 1, value: { pose: [1, speed], frame: "odom" }, kind: "output" },
+  ];
+  connection.emit("message", details(ROBOT, { topics: topics(2) }));
+  const buttons = elements.details.querySelectorAll("button");
+  assert.deepEqual(
+    buttons.map((button) => button.dataset.series),
+    ["/odom/pose/0", "/odom/pose/1"],
+  );
+  buttons[1].focus();
+  connection.emit("message", details(ROBOT, { topics: topics(3) }));
+  assert.equal(document.activeElement, elements.details.querySelectorAll("button")[1]);
+  assert.match(elements.details.textContent, /pose: 13/);
+  buttons[1].click();
+  assert.deepEqual(plotted, ["/odom/pose/1"]);
 });
 
 test("details of another model are ignored", (t) => {

@@ -4,9 +4,9 @@ import { createModelList } from "../../../flatland/web/page/js/panels/model_list
 import { dispatch, nextFrame, openPage } from "../fake_page.js";
 import { createStage, describeModel, models, poses, showRoom } from "../fake_server.js";
 
-function open() {
+function open(options) {
   const elements = openPage();
-  const { connection, session } = showRoom();
+  const { connection, session } = showRoom(options);
   const stage = createStage(session);
   createModelList(session, stage);
   session.emit("models", session.world);
@@ -29,6 +29,31 @@ test("all models are listed, and a click selects a model", () => {
     rows().map((row) => row.getAttribute("aria-pressed")),
     ["false", "true"],
   );
+});
+
+test("models that can be driven are marked", () => {
+  const marked = (rows) => rows().map((row) => /can be driven/.test(row.textContent));
+  assert.deepEqual(marked(open().rows), [true, false]);
+  assert.deepEqual(marked(open({ readOnly: true }).rows), [false, false]);
+});
+
+test("models without shapes are hidden behind a switch, unless selected", () => {
+  const { elements, connection, session, rows } = open();
+  assert.ok(elements.shapeless.hidden);
+  const frame = describeModel(8, "map_to_odom", { body: { shapes: [] } });
+  connection.emit("message", models([frame], { complete: false }));
+  nextFrame();
+  assert.deepEqual(names(rows), ["robot", "crate"]);
+  assert.equal(elements["shapeless-text"].textContent, "Models without shapes (1)");
+  session.select("map_to_odom");
+  nextFrame();
+  assert.deepEqual(names(rows), ["robot", "crate", "map_to_odom"]);
+  session.select(null);
+  elements["toggle-shapeless"].checked = true;
+  dispatch(elements["toggle-shapeless"], "change");
+  nextFrame();
+  assert.deepEqual(names(rows), ["robot", "crate", "map_to_odom"]);
+  assert.equal(window.localStorage.getItem("flatland.shapeless"), "shown");
 });
 
 test("a model outside of the view is centred", () => {

@@ -6,11 +6,38 @@ import { showRoom } from "../fake_server.js";
 
 const NAMES = ["/odom/pose/0", "/odom/pose/1"];
 
+/** Stands for uPlot, which needs a browser; records what is drawn. */
+class RecordedPlot {
+  static all = [];
+
+  constructor(options, _data, parent) {
+    Object.assign(this, { options, parent, width: options.width, isDisposed: false });
+    RecordedPlot.all.push(this);
+  }
+
+  batch(change) {
+    change();
+  }
+
+  setData(data) {
+    this.data = data;
+  }
+
+  setScale(_axis, { min, max }) {
+    this.range = [min, max];
+  }
+
+  destroy() {
+    this.isDisposed = true;
+  }
+}
+
 async function open(options) {
   const elements = openPage();
   const { connection, session } = showRoom(options);
   connection.replies.describe_series = NAMES;
-  const plots = new Plots(session, () => false);
+  RecordedPlot.all = [];
+  const plots = new Plots(session, () => false, options?.load ?? (async () => RecordedPlot));
   elements["plots-toggle"].click();
   await settle();
   const values = (time, series) => connection.emit("message", { type: "values", world: 0, time, series });
@@ -18,28 +45,33 @@ async function open(options) {
     await settle();
     return connection.take("look").at(-1)?.series;
   };
-  return { elements, connection, session, plots, values, wanted };
+  const type = (text) => {
+    elements["plot-series"].value = text;
+    dispatch(elements["plot-series"], "input");
+  };
+  return { elements, connection, session, plots, values, wanted, type };
 }
 
-test("the numbers of the world are listed when the panel opens", async () => {
-  const { elements } = await open();
-  assert.deepEqual(
-    elements["plot-series"].options.map(({ value }) => value ?? ""),
-    ["", ...NAMES],
-  );
+function plotted(elements) {
+  return elements["plot-list"].children.map(({ dataset }) => dataset.series);
+}
+
+test("the field searches the numbers of the world when the panel opens", async () => {
+  const { elements, type } = await open();
+  assert.equal(document.activeElement, elements["plot-series"]);
+  assert.equal(elements["plot-series"].placeholder, "Search 2 numbers");
+  type("pose 1");
+  assert.equal(elements["plot-matches"].textContent, NAMES[1]);
   assert.equal(elements["plots-toggle"].getAttribute("aria-pressed"), "true");
 });
 
-test("a selected number is plotted once, and requested while the panel is open", async () => {
-  const { elements, plots, wanted } = await open();
+test("a picked number is plotted once, and requested while the panel is open", async () => {
+  const { elements, plots, wanted, type } = await open();
   for (let i = 0; i < 2; i++) {
-    elements["plot-series"].value = NAMES[0];
+    type(NAMES[0]);
     dispatch(elements["plot-series"], "keydown", { key: "Enter" });
   }
-  assert.deepEqual(
-    elements["plot-list"].children.map(({ dataset }) => dataset.series),
-    [NAMES[0]],
-  );
+  assert.deepEqual(plotted(elements), [NAMES[0]]);
   assert.equal(elements["plot-series"].value, "");
   assert.deepEqual(await wanted(), [NAMES[0]]);
   elements["plots-close"].click();
@@ -48,7 +80,58 @@ test("a selected number is plotted once, and requested while the panel is open",
   assert.deepEqual(await wanted(), [NAMES[0]]);
   elements["plot-list"].querySelector("button").click();
   assert.equal(plots.plots.size, 0);
+  assert.ok(RecordedPlot.all[0].isDisposed);
   assert.deepEqual(await wanted(), []);
+});
+
+test("a number of the inspector opens the panel", async () => {
+  const { elements, plots, wanted } = await open();
+  elements["plots-close"].click();
+  plots.show(NAMES[1]);
+  assert.deepEqual(plotted(elements), [NAMES[1]]);
+  assert.deepEqual(await wanted(), [NAMES[1]]);
+});
+
+test("the latest times are drawn until the user selects a range", async (t) => {
+  let now = 0;
+  t.mock.method(performance, "now", () => (now += 1000));
+  const { elements, plots, values } = await open();
+  plots.add(NAMES[0]);
+  await settle();
+  const [chart] = RecordedPlot.all;
+  values(40, { [NAMES[0]]: 0.5 });
+  assert.deepEqual(
+    [chart.data, chart.range],
+    [
+      [[40], [0.5]],
+      [10, 40],
+    ],
+  );
+  elements["plot-window"].value = "10";
+  dispatch(elements["plot-window"], "change");
+  assert.deepEqual(chart.range, [30, 40]);
+  Object.assign(chart, {
+    select: { left: 10, width: 20 },
+    setSelect: (select) => Object.assign(chart, { select }),
+    posToVal: (position) => 30 + position / 10,
+  });
+  chart.options.hooks.setSelect[0](chart);
+  assert.equal(chart.select.width, 0);
+  values(41, { [NAMES[0]]: 0.75 });
+  assert.deepEqual([chart.range, elements["plot-latest"].hidden], [[31, 33], false]);
+  elements["plot-latest"].click();
+  assert.deepEqual([chart.range, elements["plot-latest"].hidden], [[31, 41], true]);
+});
+
+test("without uPlot, the panel says so and shows the latest values", async () => {
+  const load = () => Promise.reject(new TypeError("Failed to fetch"));
+  const { elements, plots, values } = await open({ load });
+  assert.ok(elements["plots-missing"].hidden);
+  plots.add(NAMES[0]);
+  await settle();
+  assert.ok(!elements["plots-missing"].hidden);
+  values(1, { [NAMES[0]]: 0.5 });
+  assert.equal(elements["plot-list"].querySelector("output").textContent, "0.5");
 });
 
 test("samples are collected in the order of their time", async () => {
@@ -93,7 +176,7 @@ test("the number of plots is limited", async () => {
 
 test("plots belong to a world", async () => {
   const { elements, session, plots, wanted } = await open({ worlds: 2 });
-  assert.equal(elements["plot-series"].textContent, "Nothing is published");
+  assert.equal(elements["plot-series"].placeholder, "Nothing is published");
   session.show(1);
   plots.add(NAMES[0]);
   assert.deepEqual(await wanted(), [NAMES[0]]);

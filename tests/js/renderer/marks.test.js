@@ -1,8 +1,15 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 import { Camera } from "../../../flatland/web/page/js/camera.js";
-import { addGrid, gridStep, resolveFrames } from "../../../flatland/web/page/js/renderer/marks.js";
+import {
+  addGrid,
+  addSmallRobots,
+  gridStep,
+  resolveFrames,
+} from "../../../flatland/web/page/js/renderer/marks.js";
 import { createPalette } from "../../../flatland/web/page/js/renderer/palette.js";
+import { openPage } from "../fake_page.js";
+import { showRoom } from "../fake_server.js";
 
 test("the lines of the grid have round distances of at least 28 pixels", () => {
   assert.deepEqual([28, 27, 20, 10, 1000, 0.01].map(gridStep), [1, 2, 2, 5, 0.05, 5000]);
@@ -15,6 +22,19 @@ test("the grid covers the view", () => {
   const vertical = lines.filter(([x1, , x2]) => x1 === x2).map(([x]) => x);
   assert.ok(Math.min(...vertical) <= -2 && Math.max(...vertical) >= 8);
   assert.deepEqual(vertical, vertical.map(Math.round));
+});
+
+test("robots of less than 10 pixels are drawn as discs of 10 pixels", () => {
+  openPage();
+  const { world } = showRoom();
+  const discs = (zoom) => {
+    const added = [];
+    const camera = Object.assign(new Camera(), { zoom });
+    addSmallRobots({ add: (...values) => added.push(values) }, { camera }, world, createPalette(false));
+    return added.map(([x, y, , , , width]) => [x, y, width]);
+  };
+  assert.deepEqual(discs(12), [[-2, 1, 10]], "a robot of 0.8 m, not the crate");
+  assert.deepEqual(discs(13), []);
 });
 
 test("frames are resolved from their parents", () => {

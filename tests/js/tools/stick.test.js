@@ -25,6 +25,17 @@ test("the stick is shown while a robot is selected", (t) => {
   assert.ok(elements.drive.hidden);
 });
 
+test("the pad is collapsed, also in the next visit", (t) => {
+  const { elements } = open(t);
+  assert.equal(elements.drive.dataset.open, "true");
+  elements["drive-toggle"].click();
+  assert.equal(elements.drive.dataset.open, "false");
+  assert.equal(elements["drive-toggle"].getAttribute("aria-expanded"), "false");
+  assert.equal(window.localStorage.getItem("flatland.drive-pad"), "closed");
+  elements["drive-toggle"].click();
+  assert.equal(elements.drive.dataset.open, "true");
+});
+
 test("a deflection drives forward and to the left", (t) => {
   const { session, drive, send, knob } = open(t);
   session.select("robot");

@@ -13,7 +13,7 @@ from waiting import TIMEOUT
 
 from flatland.web import WebViewer, acceptor
 
-REQUEST = b"HEAD /icon.svg HTTP/1.1\r\nHost: localhost\r\n\r\n"
+REQUEST = b"HEAD / HTTP/1.1\r\nHost: localhost\r\n\r\n"
 
 
 @pytest.fixture

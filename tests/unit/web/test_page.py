@@ -11,8 +11,9 @@ import pytest
 import flatland.web
 
 PAGE = Path(flatland.web.__file__).parent / "page"
-MODULES = sorted(path.relative_to(PAGE).as_posix() for path in PAGE.rglob("*.js"))
-SHEETS = sorted(path.relative_to(PAGE).as_posix() for path in PAGE.rglob("*.css"))
+# Not those of other projects in vendor/, which are loaded when they are needed.
+MODULES = sorted(path.relative_to(PAGE).as_posix() for path in PAGE.glob("js/**/*.js"))
+SHEETS = sorted(path.relative_to(PAGE).as_posix() for path in PAGE.glob("css/**/*.css"))
 
 
 class Elements(HTMLParser):
@@ -61,6 +62,16 @@ def test_nothing_is_inline(index: Elements) -> None:
         assert tag != "style"
         assert tag != "script" or attributes.get("src")
         assert not [name for name in attributes if name == "style" or name.startswith("on")]
+
+
+def test_files_of_other_projects_have_their_licence() -> None:
+    folders = [path for path in (PAGE / "vendor").iterdir() if path.is_dir()]
+    assert [folder.name for folder in folders] == ["uplot"]
+    for folder in folders:
+        assert "Copyright" in (folder / "LICENSE").read_text()
+    imports = "".join((PAGE / module).read_text() for module in MODULES)
+    for name in re.findall(r"vendor/[\w./-]+", imports):
+        assert (PAGE / name).is_file()
 
 
 def test_ids_are_unique_and_those_of_the_modules_exist(index: Elements) -> None:

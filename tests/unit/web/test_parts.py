@@ -22,6 +22,7 @@ VALID: dict[str, dict[str, Any]] = {
     "look": {
         "worlds": [0, 2],
         "scans": True,
+        "compact_scans": True,
         "frames": False,
         "inspect": None,
         "series": ["/a/b"],

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import asyncio
+import gzip
 import json
+import re
 import socket
 import threading
 from typing import Any
@@ -16,6 +18,7 @@ from waiting import TIMEOUT, wait_until
 from flatland.errors import FlatlandError
 from flatland.web import WebViewer
 from flatland.web.access import Access
+from flatland.web.page_files import PageFiles
 
 TOKEN = "open-the-sesame-now"
 
@@ -23,8 +26,13 @@ TOKEN = "open-the-sesame-now"
 def get(url: str, **options: Any) -> tuple[int, Any, bytes]:
     """Returns the status, the headers and the body of an answer."""
 
+    unpack = options.pop("auto_decompress", True)
+
     async def get() -> tuple[int, Any, bytes]:
-        async with aiohttp.ClientSession() as session, session.get(url, **options) as answer:
+        async with (
+            aiohttp.ClientSession(auto_decompress=unpack) as session,
+            session.get(url, **options) as answer,
+        ):
             return answer.status, answer.headers, await answer.read()
 
     return asyncio.run(get())
@@ -62,6 +70,55 @@ class TestFiles:
         tag = get(viewer.url)[1]["ETag"]
         status, _, body = get(viewer.url, headers={"If-None-Match": tag})
         assert (status, body) == (304, b"")
+
+    def test_assets_are_kept_by_browsers_and_have_paths_of_their_version(self, viewer):
+        _, headers, body = get(viewer.url)
+        assert headers["Cache-Control"] == "no-cache"
+        links = re.findall(r'(?:href|src)="([^"#]+)"', body.decode())
+        assert len(links) > 60
+        [prefix] = {link.partition("/js/")[0] for link in links if "/js/" in link}
+        assert re.fullmatch(r"assets/[0-9a-f]{16}", prefix)
+        for name in ("js/main.js", "css/theme.css", "icon.svg"):
+            assert f"{prefix}/{name}" in links
+            assert get(f"{viewer.url}{name}")[0] == 404, "without a version"
+        for link in [*links, f"{prefix}/vendor/uplot/uPlot.esm.js"]:
+            status, headers, _ = get(f"{viewer.url}{link}")
+            assert status == 200
+            assert headers["Cache-Control"] == "public, max-age=31536000, immutable"
+        assert get(f"{viewer.url}assets/{16 * '0'}/js/main.js")[0] == 404
+
+    def test_the_version_changes_with_each_file(self, tmp_path):
+        (tmp_path / "js").mkdir()
+        (tmp_path / "index.html").write_text('<script src="js/main.js"></script><a href="x.js">')
+        prefixes = set()
+        for name, text in [("main.js", "1"), ("main.js", "2"), ("other.js", "2")]:
+            (tmp_path / "js" / name).write_text(text)
+            files = PageFiles(tmp_path)
+            prefixes.add(files.prefix)
+            expected = f'<script src="{files.prefix}js/main.js"></script><a href="x.js">'
+            assert files.index.content == expected.encode()
+            main = files.asset(f"{files.prefix}js/main.js")
+            assert main is not None
+            assert main.content == (tmp_path / "js" / "main.js").read_bytes()
+        assert len(prefixes) == 3
+
+    @pytest.mark.parametrize(
+        ("accepted", "compressed"),
+        [
+            ("gzip, deflate, br", True),
+            ("br;q=1.0, gzip;q=0.8", True),
+            ("gzip;q=0", False),
+            ("gzip;q=0.0, br", False),
+            ("identity", False),
+            ("x-gzip-old", False),
+        ],
+    )
+    def test_texts_are_compressed_for_browsers_that_accept_it(self, viewer, accepted, compressed):
+        headers = {"Accept-Encoding": accepted}
+        _, sent, body = get(viewer.url, headers=headers, auto_decompress=False)
+        assert sent["Vary"] == "Accept-Encoding"
+        assert (sent.get("Content-Encoding") == "gzip") is compressed
+        assert b"<!doctype html>" in (gzip.decompress(body) if compressed else body)[:100].lower()
 
     @pytest.mark.parametrize(
         "path", ["nothing.js", "../server.py", "%2e%2e/server.py", "..%2fserver.py", "%00.js", "js"]

@@ -189,6 +189,24 @@ class TestScans:
             client.ask("look", scans=False)
             wait_until("the scans are not computed", lambda: wanted(world) == set())
 
+    def test_compact_scans_arrive_beside_exact_ones(self, url, world):
+        with RawWebClient(url) as client, RawWebClient(url) as exact:
+            client.wait("models")
+            laser = client.model("robot")["lasers"][0]
+            resolution = laser["range_max"] / 65534
+            exact.ask("look", scans=True)
+            client.ask("look", scans=True, compact_scans=True)
+            _, ranges = exact.wait(3).scans()[laser["id"]]
+            # The robot is at rest, and the laser has no noise.
+            pose, codes = client.wait(5).scans()[laser["id"]]
+            np.testing.assert_allclose(pose, [3.2, 5, 0], atol=1e-4)
+            hits = ranges < np.float32(laser["range_max"])
+            assert hits.any()
+            np.testing.assert_allclose(codes[hits], ranges[hits], atol=resolution)
+            assert np.isnan(codes[~hits]).all()
+            client.ask("look", compact_scans=False)
+            assert laser["id"] in client.wait(3).scans()
+
     def test_a_scan_is_sent_once(self, url, world):
         with RawWebClient(url) as client:
             client.ask("look", scans=True)

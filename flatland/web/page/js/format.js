@@ -23,18 +23,53 @@ export function significant(value, digits = 4) {
 }
 
 /**
- * Returns the value of a topic as text with a line for each field.
+ * A part of a line: text, and the path of names and indices if it is a number that can be plotted.
+ *
+ * @typedef {{text: string, path: string[] | null}} Part
+ */
+
+/** Largest number of items of a list whose numbers are parts of their own. */
+const MAX_PARTS = 8;
+/** Depth of the numbers of a value that the server can send. */
+const MAX_DEPTH = 4;
+
+/**
+ * Returns the value of a topic as lines of parts, with a line for each field.
  *
  * @param {import("./protocol.js").Json} value
+ * @returns {Part[][]}
  */
 export function describeValue(value) {
-  if (value === null || typeof value !== "object" || Array.isArray(value)) return brief(value);
-  return Object.entries(value)
-    .map(([key, item]) => {
-      const isStamp = key === "stamp" && typeof item === "number";
-      return `${key}: ${isStamp ? `${item / 1e9} s` : brief(item)}`;
-    })
-    .join("\n");
+  if (value === null || typeof value !== "object" || Array.isArray(value)) return [valueParts(value, [])];
+  return Object.entries(value).map(([key, item]) => {
+    if (key === "stamp" && typeof item === "number") {
+      return [{ text: `${key}: ${item / 1e9} s`, path: null }];
+    }
+    return [{ text: `${key}: `, path: null }, ...valueParts(item, [key])];
+  });
+}
+
+/**
+ * Returns the parts of a value; the numbers of long lists and deep values are not parts.
+ *
+ * @param {import("./protocol.js").Json} value
+ * @param {string[]} path
+ * @returns {Part[]}
+ */
+function valueParts(value, path) {
+  const isNumber = typeof value === "number" || typeof value === "boolean";
+  if (isNumber || value === null || typeof value !== "object" || path.length >= MAX_DEPTH) {
+    return [{ text: brief(value), path: isNumber ? path : null }];
+  }
+  if (Array.isArray(value)) {
+    const isPlain = value.length <= MAX_PARTS && value.every((item) => typeof item === "number");
+    if (!isPlain) return [{ text: brief(value), path: null }];
+    return value.map((item, i) => ({ text: brief(item), path: [...path, String(i)] }));
+  }
+  return Object.entries(value).flatMap(([key, item]) => [
+    { text: `${key}: `, path: null },
+    ...valueParts(item, [...path, key]),
+  ]);
 }
 
 /** Last item of a list that the server has shortened. */

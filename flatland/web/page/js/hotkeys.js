@@ -90,7 +90,7 @@ export class Hotkeys {
   /** @param {KeyboardEvent} event */
   press(event) {
     if (event.defaultPrevented || event.ctrlKey || event.metaKey || event.altKey) return;
-    if (takesKey(event.target, event.key) || document.querySelector("dialog[open]")) return;
+    if (takesKey(event.target, event.key) || document.querySelector("dialog[open], :popover-open")) return;
     if (
       event.key === " " &&
       event.target instanceof Element &&
@@ -169,8 +169,16 @@ export class Hotkeys {
         element("dd", {}, text),
       );
     }
-    /** @type {[string, string][]} */
-    const others = [
+    const touch = section("Touch", [
+      ["Tap", "Select a model"],
+      ["Drag the selected model", "Move the model; the world is paused during the drag"],
+      ["Drag the ring of a model", "Turn the model"],
+      ["Drag elsewhere", "Move the view"],
+      ["Two fingers", "Zoom, move and turn the view"],
+      ["Stick", "Drive the selected robot"],
+      ["Long press on a button", "Name of the button"],
+    ]);
+    const mouse = section("Mouse, driving", [
       ["Click", "Select a model"],
       ["Drag a model", "Move the model; the world is paused during the drag"],
       ["Drag the ring of a model", "Turn the model"],
@@ -182,13 +190,21 @@ export class Hotkeys {
       ["Arrows, W A S D", "Drive the selected robot; Q and E sideways"],
       ["Shift, arrows", "Move the view while a robot is selected"],
       ["Enter", "Click at the centre of the view"],
-      ["Touch", "Drag the selected model to move it"],
-    ];
-    const pointer = element("dl");
-    for (const [shown, text] of others) pointer.append(element("dt", {}, shown), element("dd", {}, text));
-    byId("help-content").replaceChildren(
-      element("section", {}, element("h3", {}, "Keys"), keys),
-      element("section", {}, element("h3", {}, "Mouse, touch, driving"), pointer),
-    );
+    ]);
+    const rest = [element("section", {}, element("h3", {}, "Keys"), keys), mouse];
+    const isTouch = window.matchMedia("(pointer: coarse)").matches;
+    byId("help-content").replaceChildren(...(isTouch ? [touch, ...rest] : [...rest, touch]));
   }
+}
+
+/**
+ * Returns a section of the help dialog.
+ *
+ * @param {string} title
+ * @param {[string, string][]} entries  actions of the user, and their effects
+ */
+function section(title, entries) {
+  const list = element("dl");
+  for (const [action, effect] of entries) list.append(element("dt", {}, action), element("dd", {}, effect));
+  return element("section", {}, element("h3", {}, title), list);
 }

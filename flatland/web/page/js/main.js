@@ -4,6 +4,7 @@ import { Hotkeys } from "./hotkeys.js";
 import { Capture } from "./panels/capture.js";
 import { createConnectionBadge } from "./panels/connection_badge.js";
 import { createDisplays } from "./panels/displays.js";
+import { createDriveHint } from "./panels/drive_hint.js";
 import { Inspector } from "./panels/inspector.js";
 import { createModelList } from "./panels/model_list.js";
 import { ModelMenu } from "./panels/model_menu.js";
@@ -15,6 +16,7 @@ import { SpawnDialog } from "./panels/spawn_dialog.js";
 import { createTiles } from "./panels/tiles.js";
 import { TimeBar } from "./panels/time_bar.js";
 import { createToolbar } from "./panels/toolbar.js";
+import { createTouchTips } from "./panels/touch_tips.js";
 import { exposeScripting } from "./scripting.js";
 import { Session } from "./session.js";
 import { Stage } from "./stage.js";
@@ -78,7 +80,7 @@ const hotkeys = new Hotkeys(stage, session, tools, drive, {
   openSpawn: () => spawnDialog.open(),
   deleteSelected,
   toggleFollow,
-  togglePlots: () => plots.setOpen(byId("plots").hasAttribute("hidden")),
+  togglePlots: () => plots.toggle(),
   showAll: () => session.worlds.size > 1 && session.show(null),
   openHelp: () => help.showModal(),
 });
@@ -109,15 +111,17 @@ createNotices(session);
 createConnectionBadge(session, stage);
 createModelList(session, stage);
 createDisplays(session);
-new Inspector(session, stage, { deleteSelected });
+new Inspector(session, stage, { deleteSelected, plot: (name) => plots.show(name) });
 new Capture(stage, session);
 createTiles(session, stage);
 createScaleBar(session, stage);
 createStick(session, drive);
+createDriveHint(session, drive);
+createTouchTips();
 createToolbar(session, stage, tools, { toggleFollow, zoomIn: hotkeys.zoomIn, zoomOut: hotkeys.zoomOut });
 connectTheme((dark) => {
   stage.setTheme(dark);
-  plots.draw();
+  plots.setTheme(dark);
 });
 createShare(session, new ViewLink(session, stage));
 exposeScripting(session, stage);

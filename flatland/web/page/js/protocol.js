@@ -59,7 +59,7 @@
  * @typedef {{id: number, pose: Pose, ranges: Float32Array}} Scan
  * @typedef {{kind: "scans", world: number, time: number, scans: Scan[]}} ScansData
  *
- * @typedef {{worlds: number[], scans: boolean, frames: boolean, inspect: number | null,
+ * @typedef {{worlds: number[], scans: boolean, compact_scans: boolean, frames: boolean, inspect: number | null,
  *   series: string[], hidden: boolean}} Demands  fields of `look`
  *
  * The requests of the page by type, with their fields and results.
@@ -121,7 +121,9 @@ export function decodeBinary(buffer) {
       poses: new Float32Array(buffer, start + 4 * first, 3 * first),
     };
   }
-  if (kind === 3) return { kind: "scans", ...header, scans: decodeScans(view, start, first) };
+  if (kind === 3 || kind === 5) {
+    return { kind: "scans", ...header, scans: decodeScans(view, start, first, kind === 5) };
+  }
   if (kind === 4)
     return { kind: "poses", ...header, ids: null, poses: new Float32Array(buffer, start, 3 * first) };
   return null;
@@ -131,20 +133,31 @@ export function decodeBinary(buffer) {
  * @param {DataView} view
  * @param {number} offset
  * @param {number} groups
+ * @param {boolean} isCompact  whether each group states the size of its ranges
  */
-function decodeScans(view, offset, groups) {
+function decodeScans(view, offset, groups, isCompact) {
   const { buffer } = view;
   /** @type {Scan[]} */
   const scans = [];
   for (let group = 0; group < groups; group++) {
     const count = view.getUint32(offset, true);
     const beams = view.getUint32(offset + 4, true);
-    const ids = new Uint32Array(buffer, offset + 8, count);
-    offset += 8 + 4 * count;
+    const bits = isCompact ? view.getUint32(offset + 8, true) : 32;
+    offset += isCompact ? 12 : 8;
+    const ids = new Uint32Array(buffer, offset, count);
+    offset += 4 * count;
     const poses = new Float32Array(buffer, offset, 3 * count);
     offset += 12 * count;
-    const ranges = new Float32Array(buffer, offset, beams * count);
-    offset += 4 * beams * count;
+    let ranges;
+    if (bits === 16) {
+      const resolutions = new Float32Array(buffer, offset, count);
+      offset += 4 * count;
+      ranges = decodeRanges(new Uint16Array(buffer, offset, beams * count), resolutions, beams);
+      offset += 4 * Math.ceil((beams * count) / 2);
+    } else if (bits === 32) {
+      ranges = new Float32Array(buffer, offset, beams * count);
+      offset += 4 * beams * count;
+    } else throw new Error(`unsupported ranges of ${bits} bits`);
     for (let i = 0; i < count; i++) {
       scans.push({
         id: ids[i],
@@ -154,4 +167,26 @@ function decodeScans(view, offset, groups) {
     }
   }
   return scans;
+}
+
+/** Codes of ranges that are no multiples of the resolution. */
+const NO_HIT = 65_535;
+const TOO_CLOSE = 65_534;
+
+/**
+ * Returns the ranges of codes [m].
+ *
+ * @param {Uint16Array} codes
+ * @param {Float32Array} resolutions  of the scans [m]
+ * @param {number} beams  of each scan
+ */
+function decodeRanges(codes, resolutions, beams) {
+  const ranges = new Float32Array(codes.length);
+  for (let i = 0; i < codes.length; i++) {
+    const code = codes[i];
+    if (code === NO_HIT) ranges[i] = NaN;
+    else if (code === TOO_CLOSE) ranges[i] = -Infinity;
+    else ranges[i] = code * resolutions[Math.floor(i / beams)];
+  }
+  return ranges;
 }

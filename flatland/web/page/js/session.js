@@ -194,6 +194,8 @@ export class Session extends Emitter {
     return {
       worlds: shown.map((world) => world.index),
       scans: this.displays.scans,
+      // The resolution of at most 1 mm is that of a pixel at 1000 pixels per metre.
+      compact_scans: true,
       frames: this.displays.frames && this.world !== null,
       inspect: this.selected?.id ?? null,
       series: this.world ? [...this.series] : [],

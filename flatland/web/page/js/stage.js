@@ -19,7 +19,7 @@ const EMPTY_BOUNDS = [-5, -5, 5, 5];
 /**
  * The canvas: places the views of the worlds, and draws a frame when something has changed.
  *
- * @extends {Emitter<{view: void, frame: void}>}
+ * @extends {Emitter<{view: void, frame: void, theme: void}>}
  */
 export class Stage extends Emitter {
   /**
@@ -88,6 +88,7 @@ export class Stage extends Emitter {
     this.dark = dark;
     this.renderer?.setTheme(dark);
     this.invalidate();
+    this.emit("theme", undefined);
   }
 
   /** Draws a frame as soon as the browser shows one. */

@@ -14,7 +14,7 @@ export class Trails {
     this.segments = new Float32Array(4 * TRAIL_CAPACITY);
     /** Simulated time of each segment [s], relative to `epoch`. */
     this.times = new Float32Array(TRAIL_CAPACITY);
-    /** Index of the colour of each segment. */
+    /** Index of the model of each segment. */
     this.colors = new Uint16Array(TRAIL_CAPACITY);
     /** Number of segments ever added. */
     this.added = 0;
@@ -52,7 +52,7 @@ export class Trails {
    * @param {number} id
    * @param {number} x  [m]
    * @param {number} y  [m]
-   * @param {number} color  index of the colour
+   * @param {number} color  index of the model, which selects the colour
    */
   extend(id, x, y, color) {
     const last = this.last.get(id);

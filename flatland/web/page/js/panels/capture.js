@@ -1,4 +1,4 @@
-import { byId, saveFile, setPressed } from "../dom.js";
+import { byId, saveFile, setPressed, setText } from "../dom.js";
 
 const FRAME_RATE = 30;
 const BIT_RATE = 8_000_000;
@@ -70,13 +70,12 @@ export class Capture {
     this.showState(true);
     // The video of a paused world has only this frame, because nothing else changes the canvas.
     this.stage.invalidate();
-    this.session.notify("info", "Recording; press the button again to stop");
+    this.session.notify("info", "Recording; the same menu stops it");
   }
 
   /** @param {boolean} isRecording */
   showState(isRecording) {
     setPressed(this.button, isRecording);
-    const label = isRecording ? "Stop recording" : "Record a video";
-    this.button.title = label;
+    setText(byId("record-text"), isRecording ? "Stop recording" : "Record a video");
   }
 }

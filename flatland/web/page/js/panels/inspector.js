@@ -1,5 +1,6 @@
 import { byId, element, firstChild, icon, setText } from "../dom.js";
-import { brief, describeValue, fixed, significant } from "../format.js";
+import { brief, fixed, significant } from "../format.js";
+import { renderTopicValue } from "./topic_value.js";
 
 /** Time between two updates of the pose from the view [ms]. */
 const POSE_PERIOD = 200;
@@ -9,7 +10,7 @@ export class Inspector {
   /**
    * @param {import("../session.js").Session} session
    * @param {import("../stage.js").Stage} stage
-   * @param {{deleteSelected: () => void}} actions
+   * @param {{deleteSelected: () => void, plot: (name: string) => void}} actions
    */
   constructor(session, stage, actions) {
     this.session = session;
@@ -167,15 +168,14 @@ export class Inspector {
     const section = subsection(root, "topics", `Topics (${topics.length})`, true);
     while (section.children.length > topics.length + 1) section.lastElementChild?.remove();
     while (section.children.length < topics.length + 1) {
-      section.append(
-        element("div", { class: "topic" }, element("code"), element("span", { class: "value" })),
-      );
+      section.append(element("div", { class: "topic" }, element("code"), element("div", { class: "value" })));
     }
-    topics.forEach(({ topic, type, value, kind }, i) => {
-      const [name, text] = section.children[i + 1].children;
+    topics.forEach((each, i) => {
+      const { topic, type, kind } = each;
+      const [name, value] = section.children[i + 1].children;
       setText(name, topic);
       name.setAttribute("title", `${type}, ${kind}`);
-      setText(text, describeValue(value));
+      renderTopicValue(value, each, this.actions.plot);
     });
   }
 

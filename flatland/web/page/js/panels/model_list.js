@@ -1,5 +1,8 @@
-import { byId, element, setText } from "../dom.js";
-import { css } from "../renderer/palette.js";
+import { byId, element, icon, setText } from "../dom.js";
+import { modelColor } from "../renderer/model_colors.js";
+import { createPalette, css } from "../renderer/palette.js";
+import { hasShapes, isDrivable } from "../robots.js";
+import { loadSetting, saveSetting } from "../settings.js";
 
 /** Largest number of models in the list; the others are found by the filter. */
 const MAX_SHOWN = 200;
@@ -13,20 +16,25 @@ const MAX_SHOWN = 200;
 export function createModelList(session, stage) {
   const list = byId("model-list");
   const filter = byId("model-filter", HTMLInputElement);
+  const shapeless = byId("toggle-shapeless", HTMLInputElement);
+  shapeless.checked = loadSetting("shapeless") === "shown";
   let scheduled = false;
 
   /** @param {import("../world_state.js").Model} model */
   const createRow = (model) => {
     const swatch = element("span", { class: "swatch", "aria-hidden": "true" });
-    const color = model.bodies[0]?.color;
-    if (color) swatch.style.background = css(color);
+    swatch.style.background = css(modelColor(model, createPalette(stage.dark)));
     const isSelected = model.name === session.selectedName;
     const button = element(
       "button",
       { type: "button", "aria-pressed": String(isSelected), "data-model": model.name },
       swatch,
-      element("span", {}, model.name),
+      element("span", { class: "name" }, model.name),
     );
+    if (isDrivable(model) && !session.readOnly) {
+      button.title = "Can be driven: select it, then W A S D or the stick";
+      button.append(icon("drive"), element("span", { class: "visually-hidden" }, "can be driven"));
+    }
     button.addEventListener("click", () => {
       session.select(model.name);
       const pose = session.world?.modelPose(model);
@@ -42,7 +50,12 @@ export function createModelList(session, stage) {
     scheduled = false;
     const models = [...(session.world?.models.values() ?? [])];
     const wanted = filter.value.trim().toLowerCase();
-    const found = models.filter((model) => model.name.toLowerCase().includes(wanted));
+    const isListed = (/** @type {import("../world_state.js").Model} */ model) =>
+      shapeless.checked || hasShapes(model) || model.name === session.selectedName;
+    const found = models.filter((model) => isListed(model) && model.name.toLowerCase().includes(wanted));
+    const hidden = models.filter((model) => !hasShapes(model)).length;
+    byId("shapeless").hidden = hidden === 0;
+    setText(byId("shapeless-text"), `Models without shapes (${hidden})`);
     const focused = document.activeElement?.getAttribute("data-model");
     list.replaceChildren(...found.slice(0, MAX_SHOWN).map(createRow));
     if (found.length > MAX_SHOWN) {
@@ -65,7 +78,14 @@ export function createModelList(session, stage) {
   session.on("models", schedule);
   session.on("current", schedule);
   session.on("hello", schedule);
+  shapeless.addEventListener("change", () => {
+    saveSetting("shapeless", shapeless.checked ? "shown" : "hidden");
+    schedule();
+  });
+  stage.on("theme", schedule);
   session.on("selection", () => {
+    // A selected model without shapes is listed as long as it is selected.
+    schedule();
     for (const row of list.querySelectorAll("button")) {
       const isSelected = row.dataset.model === session.selectedName;
       row.setAttribute("aria-pressed", String(isSelected));

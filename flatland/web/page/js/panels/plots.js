@@ -1,10 +1,12 @@
 import { byId, element, icon, setPressed, setText } from "../dom.js";
 import { significant } from "../format.js";
-import { PlotCanvas } from "./plot_canvas.js";
+import { Chart, loadUPlot } from "./chart.js";
+import { Completion } from "./completion.js";
 
 /** Largest number of samples of a series. */
 const CAPACITY = 4000;
 const MAX_PLOTS = 12;
+/** Least time between two drawings [ms]. */
 const DRAW_PERIOD = 100;
 
 /**
@@ -12,8 +14,9 @@ const DRAW_PERIOD = 100;
  * @property {number[]} times  simulated time [s]
  * @property {number[]} values
  * @property {HTMLElement} figure
+ * @property {HTMLElement} area  element of the chart
  * @property {HTMLElement} latest
- * @property {PlotCanvas} canvas
+ * @property {Chart | null} chart  null without uPlot
  */
 
 /** Plots of published numbers over time. */
@@ -21,35 +24,46 @@ export class Plots {
   /**
    * @param {import("../session.js").Session} session
    * @param {() => boolean} isDark
+   * @param {() => Promise<import("./chart.js").UPlot>} load  loads uPlot at the first plot
    */
-  constructor(session, isDark) {
+  constructor(session, isDark, load = loadUPlot) {
     this.session = session;
     this.isDark = isDark;
+    this.load = load;
     this.panel = byId("plots");
     this.list = byId("plot-list");
-    this.select = byId("plot-series", HTMLSelectElement);
+    this.field = byId("plot-series", HTMLInputElement);
     this.window = byId("plot-window", HTMLSelectElement);
+    this.latest = byId("plot-latest");
+    this.completion = new Completion(this.field, byId("plot-matches"), (name) => this.add(name));
     /** @type {Map<string, Plot>} */
     this.plots = new Map();
+    /** @type {import("./chart.js").UPlot | null} */
+    this.UPlot = null;
+    /** Times that the user has selected, null for the latest ones [s].
+     * @type {[number, number] | null} */
+    this.range = null;
+    /** Number of plots added so far, which selects the colour. */
+    this.added = 0;
     this.time = 0;
     this.drawn = 0;
-    byId("plots-toggle").addEventListener("click", () => this.setOpen(this.panel.hasAttribute("hidden")));
+    byId("plots-toggle").addEventListener("click", () => this.toggle());
     byId("plots-close").addEventListener("click", () => this.setOpen(false));
-    this.select.addEventListener("focus", () => this.refreshNames());
-    byId("plot-add").addEventListener("click", () => this.addSelected());
-    // Not at "change", because each typed character selects the first number with a matching name.
-    this.select.addEventListener("keydown", (event) => {
-      if (event.key !== "Enter" || !this.select.value) return;
-      event.preventDefault();
-      this.addSelected();
-    });
-    this.window.addEventListener("change", () => this.draw());
+    this.field.addEventListener("focus", () => this.refreshNames());
+    this.window.addEventListener("change", () => this.setRange(null));
+    this.latest.addEventListener("click", () => this.setRange(null));
     session.on("values", (message) => this.receive(message));
     session.on("current", () => this.clear());
     session.on("models", () => {
       if (!this.panel.hidden) this.refreshNames();
     });
     this.showNames([]);
+  }
+
+  toggle() {
+    const open = this.panel.hasAttribute("hidden");
+    this.setOpen(open);
+    if (open) this.field.focus();
   }
 
   /** @param {boolean} open */
@@ -59,7 +73,6 @@ export class Plots {
     this.sendSeries();
     if (open) {
       this.refreshNames();
-      this.select.focus();
       this.draw();
     } else if (document.activeElement === document.body) byId("plots-toggle").focus();
   }
@@ -76,21 +89,19 @@ export class Plots {
 
   /** @param {string[]} names */
   showNames(names) {
-    const key = names.join("\n");
-    if (this.select.dataset.key === key) return;
-    this.select.dataset.key = key;
-    const text = names.length > 0 ? "Select a number…" : "Nothing is published";
-    const first = element("option", { value: "" }, text);
-    const before = this.select.value;
-    this.select.replaceChildren(first, ...names.map((name) => element("option", { value: name }, name)));
-    if (names.includes(before)) this.select.value = before;
+    this.field.placeholder = names.length > 0 ? `Search ${names.length} numbers` : "Nothing is published";
+    this.completion.setNames(names);
   }
 
-  /** Adds a plot of the selected number. */
-  addSelected() {
-    if (this.select.value) this.add(this.select.value);
-    this.select.value = "";
-    this.select.focus();
+  /**
+   * Opens the panel with a plot of a number.
+   *
+   * @param {string} name
+   */
+  show(name) {
+    if (this.panel.hidden) this.setOpen(true);
+    this.add(name);
+    this.plots.get(name)?.figure.scrollIntoView({ block: "nearest" });
   }
 
   /** @param {string} name */
@@ -100,7 +111,7 @@ export class Plots {
       this.session.notify("warning", `At most ${MAX_PLOTS} plots are shown`);
       return;
     }
-    const canvas = element("canvas", { role: "img", "aria-label": `Plot of ${name}` });
+    const area = element("div", { class: "chart", role: "img", "aria-label": `Plot of ${name}` });
     const latest = element("output", {}, "–");
     const close = element(
       "button",
@@ -108,27 +119,52 @@ export class Plots {
       icon("close"),
     );
     const caption = element("figcaption", {}, element("code", { title: name }, name), latest, close);
-    const figure = element("figure", { class: "plot", "data-series": name }, caption, canvas);
+    const figure = element("figure", { class: "plot", "data-series": name }, caption, area);
     close.addEventListener("click", () => this.remove(name));
     this.list.append(figure);
-    this.plots.set(name, { times: [], values: [], figure, latest, canvas: new PlotCanvas(canvas) });
+    this.plots.set(name, { times: [], values: [], figure, area, latest, chart: null });
     this.sendSeries();
+    this.createCharts();
+  }
+
+  /** Creates the charts of all plots that have none, after loading uPlot if necessary. */
+  async createCharts() {
+    try {
+      this.UPlot ??= await this.load();
+    } catch {
+      byId("plots-missing").hidden = false;
+      return;
+    }
+    byId("plots-missing").hidden = true;
+    for (const plot of this.plots.values()) {
+      plot.chart ??= new Chart(this.UPlot, plot.area, {
+        index: this.added++,
+        dark: this.isDark(),
+        onRange: (range) => this.setRange(range),
+        onCursor: (value) => setText(plot.latest, significant(value ?? plot.values.at(-1) ?? NaN)),
+      });
+    }
     this.draw();
   }
 
   /** @param {string} name */
   remove(name) {
-    this.plots.get(name)?.figure.remove();
+    const plot = this.plots.get(name);
+    plot?.chart?.dispose();
+    plot?.figure.remove();
     this.plots.delete(name);
+    if (this.plots.size === 0) this.setRange(null);
     this.sendSeries();
-    this.select.focus();
+    this.field.focus();
   }
 
   /** Removes all plots, whose numbers belong to another world. */
   clear() {
+    for (const { chart } of this.plots.values()) chart?.dispose();
     this.list.replaceChildren();
     this.plots.clear();
     this.showNames([]);
+    this.setRange(null);
     this.session.setSeries([]);
     if (!this.panel.hidden) this.refreshNames();
   }
@@ -141,6 +177,7 @@ export class Plots {
   receive({ time, series }) {
     const isReset = time < this.time;
     this.time = time;
+    if (isReset) this.setRange(null);
     for (const [name, plot] of this.plots) {
       if (isReset) plot.times.length = plot.values.length = 0;
       const value = series[name];
@@ -151,17 +188,33 @@ export class Plots {
         plot.times.splice(0, CAPACITY / 4);
         plot.values.splice(0, CAPACITY / 4);
       }
-      setText(plot.latest, significant(value));
+      if (!plot.area.matches(":hover")) setText(plot.latest, significant(value));
     }
     if (performance.now() - this.drawn > DRAW_PERIOD) this.draw();
+  }
+
+  /**
+   * Shows a range of time in all plots.
+   *
+   * @param {[number, number] | null} range  [s], null for the latest times
+   */
+  setRange(range) {
+    this.range = range;
+    this.latest.hidden = range === null;
+    this.draw();
   }
 
   draw() {
     this.drawn = performance.now();
     const span = Number(this.window.value);
-    let index = 0;
-    for (const { times, values, canvas } of this.plots.values()) {
-      canvas.draw(times, values, this.time, span, this.isDark(), index++);
-    }
+    const end = Math.max(this.time, span);
+    const range = this.range ?? [end - span, end];
+    for (const { times, values, chart } of this.plots.values())
+      chart?.draw(times, values, [range[0], range[1]]);
+  }
+
+  /** @param {boolean} dark  whether the theme is dark */
+  setTheme(dark) {
+    for (const { chart } of this.plots.values()) chart?.setTheme(dark);
   }
 }

@@ -1,6 +1,6 @@
 import { shapeEdges, shapePoints } from "../shapes.js";
 import { addAttributes, createNearestTexture, createProgram, uploadFloatTexture } from "./gl.js";
-import { readable } from "./palette.js";
+import { bodyColor } from "./model_colors.js";
 import { forCorners } from "./quads.js";
 import {
   bodyDiscsFragment,
@@ -128,7 +128,7 @@ export class BodyShapes {
     const packed = new Uint32Array(1);
     const bytes = new Uint8Array(packed.buffer);
     for (const body of world.bodies.values()) {
-      bytes.set(readable(body.color, palette).map((part) => Math.round(255 * part)));
+      bytes.set(bodyColor(body, palette).map((part) => Math.round(255 * part)));
       const color = packed[0];
       for (const shape of body.shapes) {
         if (shape.kind === "circle") {

@@ -1,6 +1,8 @@
 import { composePoses, transformPoint } from "../geometry.js";
+import { hasShapes, isRobot } from "../robots.js";
 import { shapesExtent } from "../shapes.js";
 import { packColor } from "./edge_batch.js";
+import { modelColor } from "./model_colors.js";
 import { readable } from "./palette.js";
 
 /**
@@ -192,10 +194,32 @@ export function addShapelessModels(batch, { camera }, world, palette) {
   const size = 6 / camera.zoom;
   const color = packColor([...palette.ink, 0.5]);
   for (const model of world.models.values()) {
-    if (model.bodies.some((body) => body.radius > 0)) continue;
+    if (hasShapes(model)) continue;
     const pose = world.modelPose(model);
     if (!pose) continue;
     batch.add(pose[0] - size, pose[1], pose[0] + size, pose[1], color, 1.5);
     batch.add(pose[0], pose[1] - size, pose[0], pose[1] + size, color, 1.5);
+  }
+}
+
+/** Least size of a robot on the screen [CSS pixels]. */
+const LEAST_SIZE = 10;
+
+/**
+ * Adds discs for robots that would be too small to be seen or selected.
+ *
+ * @param {EdgeBatch} batch
+ * @param {Viewport} viewport
+ * @param {WorldState} world
+ * @param {Palette} palette
+ */
+export function addSmallRobots(batch, { camera }, world, palette) {
+  for (const model of world.models.values()) {
+    if (!isRobot(model) || !hasShapes(model)) continue;
+    const radius = Math.max(...model.bodies.map((body) => body.radius));
+    const pose = world.modelPose(model);
+    if (!pose || 2 * radius * camera.zoom >= LEAST_SIZE) continue;
+    const [r, g, b] = modelColor(model, palette);
+    batch.add(pose[0], pose[1], pose[0], pose[1], packColor([r, g, b]), LEAST_SIZE);
   }
 }

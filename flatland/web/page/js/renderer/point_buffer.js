@@ -1,8 +1,9 @@
 import { addAttributes } from "./gl.js";
+import { modelColor } from "./model_colors.js";
 
 /**
  * @typedef {object} Span  consecutive points of the same colour
- * @property {number} color  index in the series of the palette
+ * @property {import("../world_state.js").Model} model  which has this colour
  * @property {number} start  index of the first point
  * @property {number} count
  */
@@ -48,12 +49,12 @@ export class PointBuffer {
   /**
    * Ends a span, which contains all points since the end of the previous span.
    *
-   * @param {number} color  index in the series of the palette
+   * @param {import("../world_state.js").Model} model  which has the colour of the points
    */
-  endSpan(color) {
+  endSpan(model) {
     const last = this.spans.at(-1);
     const start = last ? last.start + last.count : 0;
-    if (this.count > start) this.spans.push({ color, start, count: this.count - start });
+    if (this.count > start) this.spans.push({ model, start, count: this.count - start });
   }
 
   upload() {
@@ -73,8 +74,8 @@ export class PointBuffer {
   draw(mode, program, palette, opacity) {
     const { gl } = this;
     gl.bindVertexArray(this.array);
-    for (const { color, start, count } of this.spans) {
-      const [r, g, b] = palette.series[color];
+    for (const { model, start, count } of this.spans) {
+      const [r, g, b] = modelColor(model, palette);
       gl.uniform4f(program.uniform("u_color"), r * opacity, g * opacity, b * opacity, opacity);
       gl.drawArrays(mode, start, count);
     }

@@ -3,7 +3,7 @@ import { BodyPrograms } from "./body_shapes.js";
 import { createColoredEdgeProgram, EdgeBatch } from "./edge_batch.js";
 import { EdgeProgram } from "./edge_layers.js";
 import { LabelPlaces } from "./label_places.js";
-import { addFrames, addGrid, addJoints, addNames, addShapelessModels } from "./marks.js";
+import { addFrames, addGrid, addJoints, addNames, addShapelessModels, addSmallRobots } from "./marks.js";
 import { createPalette } from "./palette.js";
 import { Quads } from "./quads.js";
 import { ScanPrograms } from "./scan_clouds.js";
@@ -109,13 +109,15 @@ export class Renderer {
     viewport = this.drawGround(world, graphics.layers, viewport, frame);
     if (displays.scans) graphics.scans.drawAreas(viewport, world, palette, selected);
     if (displays.trails) graphics.trails.draw(viewport, world.trails);
+    // Below the bodies, which are hardly visible below the points of many scans.
+    if (displays.scans) graphics.scans.drawPoints(viewport, world, palette);
     if (displays.models) {
       graphics.bodies.draw(viewport);
       addJoints(batch, world, palette);
       addShapelessModels(batch, viewport, world, palette);
+      addSmallRobots(batch, viewport, world, palette);
     }
     batch.flush(viewport);
-    if (displays.scans) graphics.scans.drawPoints(viewport, world, palette);
     const places = new LabelPlaces();
     if (displays.names && !isGrid) addNames(labels, places, viewport, world);
     if (displays.frames) addFrames(batch, labels, places, viewport, world, palette);

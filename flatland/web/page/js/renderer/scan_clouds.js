@@ -1,4 +1,5 @@
 import { createProgram } from "./gl.js";
+import { colorKey } from "./model_colors.js";
 import { PointBuffer } from "./point_buffer.js";
 import { flatFragment, flatVertex, pointsFragment, pointsVertex } from "./shaders.js";
 import { lineWeight, useProgram } from "./view.js";
@@ -12,8 +13,6 @@ const SCALE_STEP = 1.25;
 const AREA_OPACITY = 0.09;
 /** Number of lasers up to which the areas of all scans are drawn, not only of the selected model. */
 const MAX_AREAS = 8;
-/** Number of colours. */
-const COLORS = 8;
 
 /**
  * @typedef {import("../world_state.js").LaserState} LaserState
@@ -103,11 +102,17 @@ export class ScanClouds {
   setPoints(lasers, spacing) {
     const { points } = this;
     points.begin(lasers.reduce((sum, { ranges }) => sum + (ranges?.length ?? 0), 0));
-    for (let color = 0; color < COLORS; color++) {
-      for (const laser of lasers) {
-        if (laser.model.index % COLORS === color) this.addPoints(laser, spacing * spacing);
-      }
-      points.endSpan(color);
+    /** @type {Map<string, LaserState[]>} */
+    const byColor = new Map();
+    for (const laser of lasers) {
+      const key = colorKey(laser.model);
+      const same = byColor.get(key);
+      if (same) same.push(laser);
+      else byColor.set(key, [laser]);
+    }
+    for (const same of byColor.values()) {
+      for (const laser of same) this.addPoints(laser, spacing * spacing);
+      points.endSpan(same[0].model);
     }
     points.upload();
   }
@@ -150,7 +155,7 @@ export class ScanClouds {
       const ends = this.endPoints(laser, ranges);
       areas.add(pose[0], pose[1]);
       for (let i = 0; i < ranges.length; i++) areas.add(ends[2 * i], ends[2 * i + 1]);
-      areas.endSpan(model.index % COLORS);
+      areas.endSpan(model);
     }
     areas.upload();
   }

@@ -1,5 +1,6 @@
 import { TRAIL_CAPACITY, TRAIL_LIFETIME } from "../trails.js";
 import { createColoredEdgeArray, EDGE_WORDS, packColor } from "./edge_batch.js";
+import { modelColor } from "./model_colors.js";
 import { forCorners } from "./quads.js";
 import { useProgram } from "./view.js";
 
@@ -28,11 +29,12 @@ export class TrailLines {
   }
 
   /**
-   * @param {import("../trails.js").Trails} trails
+   * @param {import("../world_state.js").WorldState} world
    * @param {import("./palette.js").Palette} palette
    */
-  update(trails, palette) {
+  update(world, palette) {
     const { gl } = this;
+    const { trails } = world;
     gl.bindBuffer(gl.ARRAY_BUFFER, this.buffer);
     if (!this.isAllocated) {
       gl.bufferData(gl.ARRAY_BUFFER, QUAD_BYTES * TRAIL_CAPACITY, gl.DYNAMIC_DRAW);
@@ -42,10 +44,18 @@ export class TrailLines {
     this.generation = trails.generation;
     this.palette = palette;
     let from = Math.max(this.uploaded, trails.added - TRAIL_CAPACITY);
+    if (from === trails.added) return;
+    const colors = new Map(
+      [...world.models.values()].map((model) => [model.index, modelColor(model, palette)]),
+    );
     while (from < trails.added) {
       const start = from % TRAIL_CAPACITY;
       const count = Math.min(trails.added - from, TRAIL_CAPACITY - start);
-      gl.bufferSubData(gl.ARRAY_BUFFER, QUAD_BYTES * start, packSegments(trails, start, count, palette));
+      gl.bufferSubData(
+        gl.ARRAY_BUFFER,
+        QUAD_BYTES * start,
+        packSegments(trails, start, count, colors, palette),
+      );
       from += count;
     }
     this.uploaded = trails.added;
@@ -76,15 +86,19 @@ export class TrailLines {
  * @param {import("../trails.js").Trails} trails
  * @param {number} start
  * @param {number} count
+ * @param {Map<number, import("./palette.js").Rgba>} colors  of the models, by index
  * @param {import("./palette.js").Palette} palette
  */
-function packSegments(trails, start, count, palette) {
+function packSegments(trails, start, count, colors, palette) {
   const floats = new Float32Array(EDGE_WORDS * count);
   const words = new Uint32Array(floats.buffer);
   for (let i = 0; i < count; i++) {
     const at = EDGE_WORDS * i;
     floats.set(trails.segments.subarray(4 * (start + i), 4 * (start + i) + 4), at);
-    words[at + 4] = packColor(palette.series[trails.colors[start + i] % palette.series.length], OPACITY);
+    const model = trails.colors[start + i];
+    // A trail can be longer than the life of its model.
+    const [r, g, b] = colors.get(model) ?? palette.series[model % palette.series.length];
+    words[at + 4] = packColor([r, g, b], OPACITY);
     floats[at + 5] = WIDTH;
     floats[at + 6] = trails.times[start + i];
   }

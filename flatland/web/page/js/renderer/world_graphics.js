@@ -34,7 +34,7 @@ export class WorldGraphics {
   update(world, palette) {
     this.layers.update(world);
     this.bodies.update(world, palette);
-    this.trails.update(world.trails, palette);
+    this.trails.update(world, palette);
   }
 
   dispose() {

@@ -1,5 +1,6 @@
 import { byId, firstChild } from "../dom.js";
 import { fixed } from "../format.js";
+import { loadSetting, saveSetting } from "../settings.js";
 
 /**
  * Connects the stick on the screen with the drive, and shows the stick while a robot is selected.
@@ -75,6 +76,19 @@ export function createStick(session, drive) {
     slider.addEventListener("input", show);
     show();
   }
+  const toggle = byId("drive-toggle");
+  /** @param {boolean} open */
+  const setOpen = (open) => {
+    box.dataset.open = String(open);
+    toggle.setAttribute("aria-expanded", String(open));
+    toggle.title = open ? "Hide the drive pad" : "Show the drive pad";
+  };
+  toggle.addEventListener("click", () => {
+    const open = box.dataset.open !== "true";
+    setOpen(open);
+    saveSetting("drive-pad", open ? "open" : "closed");
+  });
+  setOpen(loadSetting("drive-pad") !== "closed");
   session.on("selection", update);
   session.on("models", update);
   session.on("hello", update);
