@@ -195,6 +195,7 @@ class World:
             (self, self.requests, self.stepping, self._observers),
             self.physics,
             self.timekeeper,
+            self._layers,
             self._models,
             self.plugin_host,
             self.ports,

@@ -15,16 +15,22 @@ from flatland.timekeeper import NANOSECONDS
 
 if TYPE_CHECKING:
     from flatland.copying.kinds import Kind
+    from flatland.entities.body import Body
+    from flatland.entities.layer import Layer
     from flatland.entities.model import Model
     from flatland.physics import PhysicsWorld
     from flatland.plugin_api.port_registry import PortRegistry
     from flatland.plugin_api.ports import Output
+    from flatland.runtime.layer_set import LayerSet
     from flatland.runtime.model_set import ModelSet
     from flatland.runtime.observer import Observers
     from flatland.runtime.plugin_host import PluginHost
     from flatland.timekeeper import Timekeeper
 
 _LOG = logging.getLogger("flatland")
+# Memory of a snapshot, measured with worlds of 3000 map edges and of 100 robots [bytes].
+BYTES_PER_FIXTURE: Final = 350
+_BYTES_PER_OBJECT: Final = 520
 _ADVICE: Final = (
     'the class can define __getstate__ and __setstate__, see "Snapshots" in docs/write_a_plugin.md'
 )
@@ -37,9 +43,10 @@ class WorldSnapshot:
         time_ns: Simulated time [ns].
         number: Number of the snapshot in its world, from 0 on, in the order in which snapshots were
             taken.
+        size: Estimated memory of the snapshot [bytes].
     """
 
-    __slots__ = ("_models", "_objects", "_owner", "_physics", "_ports", "number", "time_ns")
+    __slots__ = ("_models", "_objects", "_owner", "_physics", "_ports", "number", "size", "time_ns")
 
     def __init__(
         self,
@@ -69,6 +76,8 @@ class WorldSnapshot:
         self._objects = objects
         self._models = models
         self._ports = ports
+        fixtures = physics.object_counts().fixtures
+        self.size = BYTES_PER_FIXTURE * fixtures + _BYTES_PER_OBJECT * len(objects)
 
     @property
     def time(self) -> float:
@@ -105,6 +114,7 @@ class Snapshots:
         others: tuple[object, ...],
         physics: PhysicsWorld,
         timekeeper: Timekeeper,
+        layers: LayerSet,
         models: ModelSet,
         host: PluginHost,
         ports: PortRegistry,
@@ -117,6 +127,7 @@ class Snapshots:
             others: The world and its other parts, which the former refer to.
             physics: The physics world.
             timekeeper: The simulated time.
+            layers: The layers.
             models: The models.
             host: The plugins.
             ports: The ports.
@@ -127,6 +138,7 @@ class Snapshots:
         self._others = (*others, self)
         self._physics = physics
         self._timekeeper = timekeeper
+        self._layers = layers
         self._models = models
         self._host = host
         self._ports = ports
@@ -175,18 +187,27 @@ class Snapshots:
                 self._models.delete(model.name)
         watched = kept if observers.watch_appearance else ()
         appearances = [(model, appearance_of(model)) for model in models if model in watched]
+        walls = self._walls()
         ports, time_ns = _Ports(self._ports), self._timekeeper.sim_time_ns
         self._physics.become_copy_of(snapshot._physics)
         error = snapshot._objects.write_back()
         self._host.jobs.change()  # Other outputs may be wanted than at that time.
         if self._timekeeper.sim_time_ns != time_ns:
             observers.time_advanced(self._timekeeper.sim_time_ns)
+        for layer, content in self._walls().items():
+            if walls.get(layer) != content:
+                observers.layer_changed(layer.name)
         self._notify(ports, snapshot._ports, revived)
         for model, appearance in appearances:
             if appearance_of(model) != appearance:
                 observers.model_changed(model)
         if error is not None:
             raise error
+
+    def _walls(self) -> dict[Layer, tuple[Body, int]]:
+        """Returns the body of each layer and its number of edges, which change with the map."""
+        layers = self._layers.all
+        return {each: (each.body, len(each.body.physics.fixture_ids)) for each in layers}
 
     def _notify(self, before: _Ports, now: _Ports, revived: list[Model]) -> None:
         """Notifies the observers of ports and models that were restored or removed."""

@@ -409,6 +409,26 @@ def test_observers_are_notified_of_what_is_there_again(world: World) -> None:
     assert sorted(events) == sorted((opposite[kind], name) for kind, name in deleted)
 
 
+def test_observers_are_notified_of_walls_that_are_there_again(world: World, files: Any) -> None:
+    changed: list[str] = []
+
+    class Recorder(flatland.WorldObserver):
+        def layer_changed(self, layer_name: str) -> None:
+            changed.append(layer_name)
+
+    snapshot, edges = world.snapshot(), world.layers[0].edges
+    world.add_observer(Recorder())
+    world.step()
+    world.restore(snapshot)
+    assert changed == []
+    files.write_map("empty", ["####", "#..#", "####"])
+    world.set_layer_map("walls", "empty.yaml")
+    changed.clear()
+    world.restore(snapshot)
+    assert changed == ["walls"]
+    np.testing.assert_array_equal(world.layers[0].edges, edges)
+
+
 def test_subscribers_remain_after_a_restore_and_are_not_cloned(world: World) -> None:
     received: list[float] = []
     unsubscribe = world.output("/drift/scan").subscribe(lambda scan: received.append(scan.stamp))
