@@ -9,10 +9,12 @@ from collections.abc import Awaitable, Callable, Hashable
 from functools import partial
 from typing import TYPE_CHECKING, Any, Final, TypeVar
 
-from flatland.errors import WorldError
+from flatland.errors import FlatlandError, WorldError
+from flatland.loading.model_source import ModelSpec
 from flatland.plugin_api.plugin import describe
 from flatland.runtime.file_reads import read_in_time_async
 from flatland.values import Twist
+from flatland.web.edits import Edit, Edits, deletion_of, move_of, spawn_of, spec_of
 from flatland.web.feed import WorldFeed
 from flatland.web.messages import Message
 from flatland.web.model_files import check_file, model_files, preview
@@ -44,6 +46,7 @@ class Commands:
         self._newest = _Newest()
         self._holds: dict[_Hold, float] = {}  # wall time at which each hold ends [s]
         self._drives: dict[_Drive, float] = {}  # wall time at which each robot stops [s]
+        self._edits: dict[tuple[Client, WorldFeed], Edits] = {}
         self._active = asyncio.Event()
         self._reading_due = 0.0  # wall time at which files may be read next for a preview [s]
         self._reading_period = 0.0  # time between two such reads [s]
@@ -83,15 +86,25 @@ class Commands:
         if hold in self._holds:
             self._holds[hold] = _now() + HOLD_TIMEOUT
 
-        def move() -> dict[str, str]:
-            name = feed.find_model(number).name
+        def move() -> tuple[Edit, dict[str, str]]:
+            model = feed.find_model(number)
+            name, before = model.name, model.pose
             feed.controller.move(name, pose)
-            return {"overlap": feed.world.describe_overlap(name)}
+            key = number if hold in self._holds else None
+            edit = move_of(name, before, pose, feed.controller, key)
+            return edit, {"overlap": feed.world.describe_overlap(name)}
 
-        return await self._newest.run(("move", *hold), lambda: feed.requests.run(move))
+        async def run() -> dict[str, str]:
+            edit, result = await feed.requests.run(move)
+            self._add_edit(client, feed, edit)
+            return result
+
+        return await self._newest.run(("move", *hold), run)
 
     async def _hold(self, client: Client, feed: WorldFeed, fields: Any) -> None:
         number = fields["model"]
+        if (client, feed, number) not in self._holds and (client, feed) in self._edits:
+            self._edits[client, feed].end_group()
         self._holds[client, feed, number] = _now() + HOLD_TIMEOUT
         self._active.set()
 
@@ -107,7 +120,7 @@ class Commands:
         self._holds.pop(hold, None)
         await feed.requests.run(partial(_release_model, *hold))
 
-    async def _spawn(self, _client: Client, feed: WorldFeed, fields: Any) -> dict[str, str]:
+    async def _spawn(self, client: Client, feed: WorldFeed, fields: Any) -> dict[str, str]:
         file, name, namespace = fields["file"], fields["name"], fields.get("namespace", "")
         if not _NAME.fullmatch(name):
             raise WorldError(
@@ -118,6 +131,8 @@ class Commands:
         store = await read_in_time_async(lambda: source.read_models_ahead([path]))
         spawn = partial(feed.controller.spawn, path, name, namespace, pose)
         await feed.requests.run(source.inputs.using(store)(spawn))
+        spec = ModelSpec(path, name, namespace, pose)
+        self._add_edit(client, feed, spawn_of(spec, feed.controller))
         return {"name": name}
 
     async def _preview(self, client: Client, feed: WorldFeed, fields: Any) -> dict[str, Any]:
@@ -131,9 +146,19 @@ class Commands:
 
         return await self._paced(read)
 
-    async def _delete(self, _client: Client, feed: WorldFeed, fields: Any) -> None:
+    async def _delete(self, client: Client, feed: WorldFeed, fields: Any) -> dict[str, bool]:
         number = fields["model"]
-        await feed.requests.run(lambda: feed.controller.delete(feed.find_model(number).name))
+
+        def delete() -> ModelSpec | None:
+            model = feed.find_model(number)
+            spec = spec_of(model)
+            feed.controller.delete(model.name)
+            return spec
+
+        spec = await feed.requests.run(delete)
+        if spec is not None:
+            self._add_edit(client, feed, deletion_of(spec, feed.controller))
+        return {"can_undo": spec is not None}
 
     async def _files(self, _client: Client, feed: WorldFeed, _fields: Any) -> list[dict[str, str]]:
         feed.contents.model_files = await self._paced(lambda: model_files(feed.world))
@@ -160,6 +185,69 @@ class Commands:
             return await read_in_time_async(timed)
         finally:
             self._reading_due = max(self._reading_due, _now() + self._reading_period)
+
+    # -- earlier states --------------------------------------------------------------------
+
+    async def _reset(self, client: Client, feed: WorldFeed, _fields: Any) -> dict[str, Any]:
+        number = await feed.requests.run(partial(_reset_world, feed))
+        self._forget_edits(feed)  # They may not fit the models of the file.
+        if number is not None:
+            self._add_edit(client, feed, _reset_of(feed, number))
+        effect = feed.controller.set_back_effect
+        return {"can_undo": number is not None, "effect": effect}
+
+    async def _visit(self, _client: Client, feed: WorldFeed, fields: Any) -> Any:
+        controller = feed.controller
+
+        def visit() -> dict[str, str]:
+            feed.history.visit(fields["moment"], controller.restore)
+            controller.holds.keep_paused()
+            controller.pause()
+            return {"effect": controller.set_back_effect}
+
+        async def run() -> dict[str, str]:
+            result = await feed.requests.run(visit)
+            self._forget_edits(feed)  # They belong to another state.
+            return result
+
+        return await self._newest.run(("visit", feed), run)
+
+    # -- undo ------------------------------------------------------------------------------
+
+    def _add_edit(self, client: Client, feed: WorldFeed, edit: Edit) -> None:
+        if client.connected:
+            self._edits.setdefault((client, feed), Edits()).add(edit)
+
+    async def _undo(self, client: Client, feed: WorldFeed, _fields: Any) -> dict[str, str]:
+        edits = self._edits.get((client, feed), Edits())
+        edit = edits.last(undone=False)
+        if edit is None:
+            raise FlatlandError("there is nothing to undo")
+        await self._repeat(edits, edit, edit.undo, feed)
+        return {"text": edit.text}
+
+    async def _redo(self, client: Client, feed: WorldFeed, _fields: Any) -> dict[str, str]:
+        edits = self._edits.get((client, feed), Edits())
+        edit = edits.last(undone=True)
+        if edit is None:
+            raise FlatlandError("there is nothing to redo")
+        await self._repeat(edits, edit, edit.redo, feed)
+        return {"text": edit.text}
+
+    async def _repeat(
+        self, edits: Edits, edit: Edit, action: Callable[[], object], feed: WorldFeed
+    ) -> None:
+        """Undoes or redoes a change that nothing else undoes or redoes at the moment."""
+        source = feed.world.source
+        paths = [edit.file] if edit.file else []
+        # Taken at once, so that a second request does not repeat the same change.
+        edits.shift(edit)
+        try:
+            store = await read_in_time_async(lambda: source.read_models_ahead(paths))
+            await feed.requests.run(source.inputs.using(store)(action))
+        except BaseException:
+            edits.shift(edit)
+            raise
 
     # -- velocity commands -----------------------------------------------------------------
 
@@ -212,6 +300,7 @@ class Commands:
 
     def forget(self, client: Client) -> None:
         """Ends the holds and stops the robots of a client that has disconnected."""
+        self._edits = {key: edits for key, edits in self._edits.items() if key[0] is not client}
         self._end(
             [key for key in self._holds if key[0] is client],
             [key for key in self._drives if key[0] is client],
@@ -219,10 +308,14 @@ class Commands:
 
     def forget_world(self, feed: WorldFeed) -> None:
         """Ends the holds and stops the robots of a world that was removed from the server."""
+        self._forget_edits(feed)
         self._end(
             [key for key in self._holds if key[1] is feed],
             [key for key in self._drives if key[1] is feed],
         )
+
+    def _forget_edits(self, feed: WorldFeed) -> None:
+        self._edits = {key: edits for key, edits in self._edits.items() if key[1] is not feed}
 
     def _end(self, holds: list[_Hold], drives: list[_Drive]) -> None:
         for hold in holds:
@@ -298,6 +391,32 @@ def _drive_topic(feed: WorldFeed, number: int, topic: str | None) -> str:
     return topics[0] if topic is None else topic
 
 
+def _reset_world(feed: WorldFeed) -> int | None:
+    """Resets a world, and returns the number of the moment before; None if it cannot be saved."""
+    try:
+        number = feed.history.mark("before the reset")
+    except WorldError:
+        number = None  # A plugin cannot be copied.
+    feed.controller.reset()
+    return number
+
+
+def _reset_of(feed: WorldFeed, number: int) -> Edit:
+    """Returns the edit of a reset; each repetition saves the state before anew."""
+    before: int | None = number
+
+    def undo() -> None:
+        if before is None:
+            raise WorldError("the state before the reset cannot be saved")
+        feed.history.restore(before, feed.controller.restore)
+
+    def redo() -> None:
+        nonlocal before
+        before = _reset_world(feed)
+
+    return Edit("the reset of the world", undo, redo)
+
+
 def _release_model(client: Client, feed: WorldFeed, number: int) -> None:
     feed.controller.holds.release((client, number))
 
@@ -322,6 +441,10 @@ _ACTIONS: Final[dict[str, Callable[..., Awaitable[Any]]]] = {
     "spawn": Commands._spawn,
     "preview": Commands._preview,
     "delete": Commands._delete,
+    "reset": Commands._reset,
+    "visit": Commands._visit,
+    "undo": Commands._undo,
+    "redo": Commands._redo,
     "drive": Commands._drive,
     "files": Commands._files,
     "describe_series": Commands._describe_series,

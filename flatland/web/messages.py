@@ -119,6 +119,7 @@ _FIELDS: Final[dict[str, tuple[dict[str, Check], dict[str, Check]]]] = {
             "inspect": _optional(_ID),
             "series": _list(_text(MAX_PATH), 0, MAX_SERIES),
             "hidden": _boolean,
+            "history": _boolean,
         },
     ),
     "pause": ({}, {}),
@@ -134,6 +135,10 @@ _FIELDS: Final[dict[str, tuple[dict[str, Check], dict[str, Check]]]] = {
     ),
     "preview": ({"file": _text(MAX_PATH)}, {}),
     "delete": (dict([_MODEL]), {}),
+    "reset": ({}, {}),
+    "visit": ({"moment": _ID}, {}),
+    "undo": ({}, {}),
+    "redo": ({}, {}),
     "drive": (
         dict([_MODEL]),
         {"command": _text(MAX_PATH), "linear": _list(_SPEED, 2, 2), "angular": _SPEED},
