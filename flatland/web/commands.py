@@ -10,11 +10,12 @@ from functools import partial
 from typing import TYPE_CHECKING, Any, Final, TypeVar
 
 from flatland.errors import FlatlandError, WorldError
-from flatland.loading.model_source import ModelSpec
+from flatland.loading.model_source import ModelSpec, spec_of
+from flatland.loading.saved_world import SavedWorld
 from flatland.plugin_api.plugin import describe
 from flatland.runtime.file_reads import read_in_time_async
 from flatland.values import Twist
-from flatland.web.edits import Edit, Edits, deletion_of, move_of, spawn_of, spec_of
+from flatland.web.edits import Edit, Edits, deletion_of, move_of, spawn_of
 from flatland.web.feed import WorldFeed
 from flatland.web.messages import Message
 from flatland.web.model_files import check_file, model_files, preview
@@ -212,6 +213,11 @@ class Commands:
 
         return await self._newest.run(("visit", feed), run)
 
+    async def _save(self, _client: Client, feed: WorldFeed, _fields: Any) -> dict[str, Any]:
+        saved = await feed.requests.run(lambda: SavedWorld(feed.world))
+        text, notes = await self._paced(saved.file)
+        return {"text": text, "name": saved.name, "folder": saved.folder, "notes": notes}
+
     # -- undo ------------------------------------------------------------------------------
 
     def _add_edit(self, client: Client, feed: WorldFeed, edit: Edit) -> None:
@@ -223,21 +229,19 @@ class Commands:
         edit = edits.last(undone=False)
         if edit is None:
             raise FlatlandError("there is nothing to undo")
-        await self._repeat(edits, edit, edit.undo, feed)
-        return {"text": edit.text}
+        return await self._repeat(edits, edit, edit.undo, feed)
 
     async def _redo(self, client: Client, feed: WorldFeed, _fields: Any) -> dict[str, str]:
         edits = self._edits.get((client, feed), Edits())
         edit = edits.last(undone=True)
         if edit is None:
             raise FlatlandError("there is nothing to redo")
-        await self._repeat(edits, edit, edit.redo, feed)
-        return {"text": edit.text}
+        return await self._repeat(edits, edit, edit.redo, feed)
 
     async def _repeat(
         self, edits: Edits, edit: Edit, action: Callable[[], object], feed: WorldFeed
-    ) -> None:
-        """Undoes or redoes a change that nothing else undoes or redoes at the moment."""
+    ) -> dict[str, str]:
+        """Undoes or redoes a change, and returns the result for the reply."""
         source = feed.world.source
         paths = [edit.file] if edit.file else []
         # Taken at once, so that a second request does not repeat the same change.
@@ -248,6 +252,8 @@ class Commands:
         except BaseException:
             edits.shift(edit)
             raise
+        effect = feed.controller.set_back_effect if edit.sets_back else ""
+        return {"text": edit.text, "effect": effect}
 
     # -- velocity commands -----------------------------------------------------------------
 
@@ -414,7 +420,7 @@ def _reset_of(feed: WorldFeed, number: int) -> Edit:
         nonlocal before
         before = _reset_world(feed)
 
-    return Edit("the reset of the world", undo, redo)
+    return Edit("the reset of the world", undo, redo, sets_back=True)
 
 
 def _release_model(client: Client, feed: WorldFeed, number: int) -> None:
@@ -443,6 +449,7 @@ _ACTIONS: Final[dict[str, Callable[..., Awaitable[Any]]]] = {
     "delete": Commands._delete,
     "reset": Commands._reset,
     "visit": Commands._visit,
+    "save": Commands._save,
     "undo": Commands._undo,
     "redo": Commands._redo,
     "drive": Commands._drive,

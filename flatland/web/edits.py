@@ -6,8 +6,6 @@ from collections.abc import Callable, Hashable
 from dataclasses import dataclass, replace
 from typing import Final
 
-from flatland.config.documents import TEXT_NAME
-from flatland.entities.model import Model
 from flatland.geometry import Pose
 from flatland.loading.model_source import ModelSpec
 from flatland.web.controller import WorldController
@@ -24,6 +22,7 @@ class Edit:
         undo: Reverses the change; called between two steps.
         redo: Repeats the change; called between two steps.
         file: Model file that `undo` or `redo` reads; empty for none.
+        sets_back: Whether `undo` and `redo` change the time.
         key: Edits with the same key that follow each other are a single one; None for no key.
     """
 
@@ -31,6 +30,7 @@ class Edit:
     undo: Callable[[], object]
     redo: Callable[[], object]
     file: str = ""
+    sets_back: bool = False
     key: Hashable = None
 
 
@@ -76,17 +76,6 @@ class Edits:
             self._done.append(edit)
 
 
-def spec_of(model: Model) -> ModelSpec | None:
-    """Returns what spawns a model again where it is, None if it was not read from a file.
-
-    Its plugins start anew, and its bodies have the places relative to each other that the model
-    file gives them.
-    """
-    if model.path == TEXT_NAME:
-        return None
-    return ModelSpec(model.path, model.name, model.namespace, model.origin)
-
-
 def spawn_of(spec: ModelSpec, controller: WorldController) -> Edit:
     """Returns the edit of a model that was spawned."""
     return Edit(
@@ -98,7 +87,11 @@ def spawn_of(spec: ModelSpec, controller: WorldController) -> Edit:
 
 
 def deletion_of(spec: ModelSpec, controller: WorldController) -> Edit:
-    """Returns the edit of a model that was deleted."""
+    """Returns the edit of a model that was deleted.
+
+    Its undo spawns the model again: plugins start anew, and the bodies have the places relative to
+    each other that the model file gives them. A snapshot could only restore the whole world.
+    """
     return Edit(
         f'the deletion of "{spec.name}"',
         undo=lambda: _spawn(spec, controller),

@@ -137,6 +137,7 @@ _FIELDS: Final[dict[str, tuple[dict[str, Check], dict[str, Check]]]] = {
     "delete": (dict([_MODEL]), {}),
     "reset": ({}, {}),
     "visit": ({"moment": _ID}, {}),
+    "save": ({}, {}),
     "undo": ({}, {}),
     "redo": ({}, {}),
     "drive": (

@@ -44,12 +44,12 @@ class TestUndo:
         assert client.ask("delete", model=number_of(client, "box")) == {"can_undo": True}
         assert names(world) == ["robot"]
         time = world.time
-        assert client.ask("undo") == {"text": 'the deletion of "box"'}
+        assert client.ask("undo")["text"] == 'the deletion of "box"'
         assert world.time >= time
         box = world.model("box")
         assert (box.namespace, box.path) == ("ns/box", str(files.folder / "offset.model.yaml"))
         np.testing.assert_allclose(box.pose, before, atol=1e-6)
-        assert client.ask("redo") == {"text": 'the deletion of "box"'}
+        assert client.ask("redo")["text"] == 'the deletion of "box"'
         assert names(world) == ["robot"]
 
     def test_a_drag_is_undone_as_one_move_and_another_drag_separately(
@@ -95,12 +95,25 @@ class TestUndo:
         assert client.ask("delete", model=number_of(client, "text")) == {"can_undo": False}
         assert client.reply("undo")["error"] == "there is nothing to undo"
 
-    def test_a_read_only_client_undoes_nothing(self, world: World) -> None:
+    def test_a_read_only_client_neither_undoes_nor_saves(self, world: World) -> None:
         with WebViewer(port=0, read_only=True) as viewer:
             viewer.add_world(world)
             with RawWebClient(viewer.url) as client:
-                for kind in ("undo", "redo"):
+                for kind in ("undo", "redo", "save"):
                     assert client.reply(kind)["error"] == "this viewer is read-only"
+
+
+def test_the_saved_world_is_a_world_file(client: RawWebClient, world: World, files: Any) -> None:
+    client.ask("pause")
+    client.ask("spawn", file="box.model.yaml", name="box", pose=[6, 6, 0.5])
+    saved = client.ask("save")
+    assert (saved["name"], saved["folder"]) == ("world_saved.yaml", str(files.folder))
+    assert saved["notes"] == []
+    path = files.folder / saved["name"]
+    path.write_text(saved["text"])
+    with World.from_yaml(path) as again:
+        assert [model.name for model in again.models] == ["robot", "box"]
+        np.testing.assert_allclose(again.state().poses, world.state().poses, rtol=0, atol=1e-9)
 
 
 def test_the_number_of_edits_is_limited() -> None:

@@ -211,7 +211,7 @@ class TestRequests:
         assert client.ask("reset") == {"can_undo": True, "effect": ""}
         assert (world.time, [model.name for model in world.models]) == (0, ["robot"])
         assert world.paused
-        assert client.ask("undo") == {"text": "the reset of the world"}
+        assert client.ask("undo")["text"] == "the reset of the world"
         assert (world.time, [model.name for model in world.models]) == (time, ["robot", "box"])
         assert command.value == Twist(linear_x=0.5)
         client.ask("step")

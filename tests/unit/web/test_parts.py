@@ -40,6 +40,7 @@ VALID: dict[str, dict[str, Any]] = {
     "delete": {"model": 1},
     "reset": {},
     "visit": {"moment": 3},
+    "save": {},
     "undo": {},
     "redo": {},
     "drive": {"model": 1, "command": "/cmd_vel", "linear": [1, 0], "angular": -1.5},
