@@ -26,7 +26,7 @@ function open(options) {
     elements["history-slider"].value,
     elements["history-slider"].max,
     elements["history-text"].textContent,
-    elements["history-continue"].hidden,
+    elements["history-continue"].disabled,
   ];
   return { elements, connection, session, slide, visits, shown };
 }
@@ -36,7 +36,7 @@ test("the last position is the newest state", () => {
   assert.deepEqual(shown(), ["3", "3", "newest", true]);
   connection.emit("message", history({ moments: [...MOMENTS, NEWEST], current: 4 }));
   assert.deepEqual(shown(), ["1", "3", "2.00 s", false]);
-  assert.ok(!elements["history-newest"].hidden);
+  assert.ok(!elements["history-newest"].disabled);
 });
 
 test("the state at the slider is visited, and left by returning or continuing", async () => {

@@ -17,7 +17,7 @@ import { WorldState } from "./world_state.js";
  * @property {import("./protocol.js").DetailsMessage} details
  * @property {import("./protocol.js").ValuesMessage} values
  * @property {WorldState} history  the earlier states of a world have changed
- * @property {void} moved  this page has moved a model
+ * @property {void} outdated  the edit of the last notice cannot be undone, or is not the last one
  * @property {{level: import("./protocol.js").Level, text: string, topic: string,
  *   action?: NoticeAction}} notice  replaces those of its topic
  *
@@ -118,7 +118,7 @@ export class Session extends Emitter {
   async move(model, pose) {
     const name = this.world?.models.get(model)?.name;
     const answer = await this.attempt("move", { model, pose });
-    if (answer) this.emit("moved", undefined);
+    if (answer) this.emit("outdated", undefined);
     const overlap = answer?.result?.overlap;
     if (overlap) this.notify("warning", `Model "${name}" ${overlap}; the physics separates them`, "overlap");
   }

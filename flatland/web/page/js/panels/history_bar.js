@@ -90,8 +90,10 @@ export class HistoryBar {
     const reply = await this.session.attempt("visit", { moment });
     request.replied = true;
     if (this.request !== request) return;
-    if (reply) this.session.notifySetBack(reply.result.effect);
-    else this.request = null;
+    if (reply) {
+      this.session.emit("outdated", undefined);
+      this.session.notifySetBack(reply.result.effect);
+    } else this.request = null;
     this.proceed();
   }
 
@@ -111,8 +113,7 @@ export class HistoryBar {
     const { history } = this;
     const isVisiting = (history?.current ?? null) !== null;
     this.bar.toggleAttribute("hidden", this.session.readOnly || !this.session.world);
-    this.continueButton.toggleAttribute("hidden", !isVisiting);
-    this.newestButton.toggleAttribute("hidden", !isVisiting);
+    this.continueButton.disabled = this.newestButton.disabled = !isVisiting;
     this.slider.disabled = this.earlier.length === 0;
     this.slider.title = history?.obstacle || "Earlier states of the world";
     if (!this.request && this.wanted === undefined) this.show(history?.current ?? null);

@@ -19,7 +19,7 @@ export function createNotices(session) {
   const remove = (topic) => {
     for (const old of [...list.children]) if (old.getAttribute("data-topic") === topic) old.remove();
   };
-  session.on("moved", () => remove(UNDO_TOPIC));
+  session.on("outdated", () => remove(UNDO_TOPIC));
   session.on("notice", ({ level, text, topic, action }) => {
     remove(topic);
     const close = element(
