@@ -13,7 +13,7 @@ from flatland.scene.description import LayerDescription
 from flatland.web.capture import CapturedWorld, WorldCapture
 from flatland.web.contents import WorldContents
 from flatland.web.controller import WorldController
-from flatland.web.history import History, Timeline
+from flatland.web.history import MAX_AGE, History, Timeline
 from flatland.web.latest_scans import LatestScans
 from flatland.web.optional_messages import OptionalMessages
 from flatland.web.status import STALE_TIMEOUT, WorldStatus
@@ -114,13 +114,22 @@ class WorldFeed:
             while not self.world.closed:
                 if self.audience.empty:
                     self._suspend()
-                    await self.audience.wait()
+                    await self._wait_for_audience()
                 began = loop.time()
                 await self._update(began)
                 self.audience.notify()
                 await asyncio.sleep(max(began + PERIOD - loop.time(), 0.001))
         finally:
             self._end_capture()
+
+    async def _wait_for_audience(self) -> None:
+        """Waits until there is a client; drops the history when all of it is too old."""
+        try:
+            async with asyncio.timeout(MAX_AGE):
+                await self.audience.wait()
+        except TimeoutError:
+            self.requests.post(self.history.clear)
+            await self.audience.wait()
 
     def _suspend(self) -> None:
         """Withdraws the demand for outputs and releases data that no client needs."""

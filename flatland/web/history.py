@@ -21,7 +21,7 @@ MAX_AGE: Final = 300.0  # s of wall time
 MAX_BYTES: Final = 128 * 1024 * 1024  # estimated memory of all snapshots of a world
 MAX_MARKED: Final = 8  # snapshots with a label
 _MAX_SHARE_OF_BYTES: Final = 0.25  # of a single snapshot
-NEWEST: Final = "newest state"
+NEWEST: Final = "before going back"  # label of the newest state during a visit
 _RETRY_PERIOD: Final = 10.0  # s of wall time after a snapshot that could not be taken
 
 
@@ -168,6 +168,11 @@ class History:
             self._moments.pop()
             self._current = None
         self._state = self._state_of_world()
+
+    def clear(self) -> None:
+        """Drops all moments; the world stays as it is."""
+        self._moments.clear()
+        self._current = self._state = None
 
     def _find(self, number: int) -> Moment:
         for moment in self._moments:

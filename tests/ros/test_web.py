@@ -202,7 +202,7 @@ def test_earlier_states_set_the_clock_back_and_keep_topics_connected(
     assert "/clock is set back" in client.do("visit", moment=first["moment"])["effect"]
     clock.until(lambda message: message.clock.to_sec() == pytest.approx(first["time"], abs=1e-9))
     assert client.until_status(paused=True)["paused"]
-    client.until("newest", lambda: moments()[-1]["label"] == "newest state")
+    client.until("newest", lambda: moments()[-1]["label"] == "before going back")
     client.do("visit", moment=moments()[-1]["moment"])
     client.do("resume")
     clock.until(lambda message: message.clock.to_sec() > before)

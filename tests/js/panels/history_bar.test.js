@@ -5,7 +5,7 @@ import { dispatch, openPage, settle } from "../fake_page.js";
 import { showRoom } from "../fake_server.js";
 
 const MOMENTS = [3, 4, 7].map((moment) => ({ moment, time: moment / 2, label: "" }));
-const NEWEST = { moment: 9, time: 5, label: "newest state" };
+const NEWEST = { moment: 9, time: 5, label: "before going back" };
 
 function history(fields = {}) {
   return { type: "history", world: 0, moments: MOMENTS, current: null, obstacle: "", ...fields };
@@ -91,6 +91,15 @@ test("a return to the newest state waits until the server has listed it", async 
   assert.deepEqual(visits(), [4]);
   connection.emit("message", history({ moments: [...MOMENTS, NEWEST], current: 4 }));
   assert.deepEqual(visits(), [9]);
+});
+
+test("a visit that another client replaces does not block the slider", async () => {
+  const { connection, slide, visits } = open();
+  connection.replies.visit = { superseded: true };
+  slide(1);
+  await settle();
+  slide(0);
+  assert.deepEqual(visits(), [4, 3]);
 });
 
 test("after an error, the slider shows the state of the world", async () => {

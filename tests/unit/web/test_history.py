@@ -13,7 +13,7 @@ from waiting import wait_until
 
 from flatland import Twist
 from flatland.simulation import Simulation
-from flatland.web import WebViewer, history
+from flatland.web import WebViewer, feed, history
 from flatland.web.history import History
 from flatland.world import World
 
@@ -196,6 +196,16 @@ class TestRequests:
             other.wait("history", lambda m: m["current"] == first["moment"])
             other.ask("step")
         client.wait("history", lambda m: m["current"] is None)
+
+    def test_states_are_dropped_when_no_client_has_looked_for_long(
+        self, url: str, viewer: WebViewer, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        monkeypatch.setattr(feed, "MAX_AGE", 0.01)
+        with RawWebClient(url) as client:
+            client.ask("look", history=True)
+            wait_moments(client)
+        kept = viewer._hub.feeds[0].history
+        wait_until("the states are dropped", lambda: kept.timeline.moments == ())
 
     def test_a_dropped_state_is_an_error_and_does_not_pause(
         self, client: RawWebClient, world: World

@@ -83,7 +83,7 @@
  * @property {{fields: object, result: {text: string, effect: string}}} redo
  * @property {{fields: object, result: {can_undo: boolean, effect: string}}} reset
  * @property {{fields: object, result: {text: string, name: string, folder: string, notes: string[]}}} save
- * @property {{fields: {moment: number}, result: {effect?: string}}} visit
+ * @property {{fields: {moment: number}, result: {effect?: string, superseded?: boolean}}} visit
  * @property {{fields: {model: number, command: string, linear: Point, angular: number},
  *   result: unknown}} drive
  * @property {{fields: object, result: ModelFile[]}} files

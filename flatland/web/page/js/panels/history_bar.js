@@ -93,7 +93,9 @@ export class HistoryBar {
     if (reply) {
       this.session.emit("outdated", undefined);
       this.session.notifySetBack(reply.result.effect);
-    } else this.request = null;
+    }
+    // After an error, or if another client visits a state instead, no history may follow.
+    if (!reply || reply.result.superseded) this.request = null;
     this.proceed();
   }
 
