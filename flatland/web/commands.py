@@ -9,17 +9,18 @@ from collections.abc import Awaitable, Callable, Hashable
 from functools import partial
 from typing import TYPE_CHECKING, Any, Final, TypeVar
 
-from flatland.errors import FlatlandError, WorldError
+from flatland.errors import WorldError
 from flatland.loading.model_source import ModelSpec, spec_of
 from flatland.loading.saved_world import SavedWorld
 from flatland.plugin_api.plugin import describe
 from flatland.runtime.file_reads import read_in_time_async
 from flatland.values import Twist
-from flatland.web.edits import Edit, Edits, deletion_of, move_of, spawn_of
+from flatland.web.edits import Edit, deletion_of, move_of, spawn_of
 from flatland.web.feed import WorldFeed
 from flatland.web.messages import Message
 from flatland.web.model_files import check_file, model_files, preview
 from flatland.web.numbers import series_of
+from flatland.web.state_commands import StateCommands
 
 if TYPE_CHECKING:
     from flatland.web.client import Client
@@ -47,7 +48,7 @@ class Commands:
         self._newest = _Newest()
         self._holds: dict[_Hold, float] = {}  # wall time at which each hold ends [s]
         self._drives: dict[_Drive, float] = {}  # wall time at which each robot stops [s]
-        self._edits: dict[tuple[Client, WorldFeed], Edits] = {}
+        self._states = StateCommands()
         self._active = asyncio.Event()
         self._reading_due = 0.0  # wall time at which files may be read next for a preview [s]
         self._reading_period = 0.0  # time between two such reads [s]
@@ -84,28 +85,28 @@ class Commands:
     async def _move(self, client: Client, feed: WorldFeed, fields: Any) -> Any:
         number, pose = fields["model"], fields["pose"]
         hold = (client, feed, number)
-        if hold in self._holds:
+        drag = number if hold in self._holds else None
+        if drag is not None:
             self._holds[hold] = _now() + HOLD_TIMEOUT
 
         def move() -> tuple[Edit, dict[str, str]]:
             model = feed.find_model(number)
             name, before = model.name, model.pose
             feed.controller.move(name, pose)
-            key = number if hold in self._holds else None
-            edit = move_of(name, before, pose, feed.controller, key)
+            edit = move_of(name, before, pose, feed.controller, drag)
             return edit, {"overlap": feed.world.describe_overlap(name)}
 
         async def run() -> dict[str, str]:
             edit, result = await feed.requests.run(move)
-            self._add_edit(client, feed, edit)
+            self._states.add(client, feed, edit)
             return result
 
         return await self._newest.run(("move", *hold), run)
 
     async def _hold(self, client: Client, feed: WorldFeed, fields: Any) -> None:
         number = fields["model"]
-        if (client, feed, number) not in self._holds and (client, feed) in self._edits:
-            self._edits[client, feed].end_group()
+        if (client, feed, number) not in self._holds:
+            self._states.begin_drag(client, feed)
         self._holds[client, feed, number] = _now() + HOLD_TIMEOUT
         self._active.set()
 
@@ -133,7 +134,7 @@ class Commands:
         spawn = partial(feed.controller.spawn, path, name, namespace, pose)
         await feed.requests.run(source.inputs.using(store)(spawn))
         spec = ModelSpec(path, name, namespace, pose)
-        self._add_edit(client, feed, spawn_of(spec, feed.controller))
+        self._states.add(client, feed, spawn_of(spec, feed.controller))
         return {"name": name}
 
     async def _preview(self, client: Client, feed: WorldFeed, fields: Any) -> dict[str, Any]:
@@ -158,7 +159,7 @@ class Commands:
 
         spec = await feed.requests.run(delete)
         if spec is not None:
-            self._add_edit(client, feed, deletion_of(spec, feed.controller))
+            self._states.add(client, feed, deletion_of(spec, feed.controller))
         return {"can_undo": spec is not None}
 
     async def _files(self, _client: Client, feed: WorldFeed, _fields: Any) -> list[dict[str, str]]:
@@ -189,71 +190,23 @@ class Commands:
 
     # -- earlier states --------------------------------------------------------------------
 
-    async def _reset(self, client: Client, feed: WorldFeed, _fields: Any) -> dict[str, Any]:
-        number = await feed.requests.run(partial(_reset_world, feed))
-        self._forget_edits(feed)  # They may not fit the models of the file.
-        if number is not None:
-            self._add_edit(client, feed, _reset_of(feed, number))
-        effect = feed.controller.set_back_effect
-        return {"can_undo": number is not None, "effect": effect}
+    async def _undo(self, client: Client, feed: WorldFeed, _fields: Any) -> dict[str, str]:
+        return await self._states.repeat(client, feed, undone=False)
+
+    async def _redo(self, client: Client, feed: WorldFeed, _fields: Any) -> dict[str, str]:
+        return await self._states.repeat(client, feed, undone=True)
+
+    async def _reset(self, client: Client, feed: WorldFeed, _fields: Any) -> dict[str, bool | str]:
+        return await self._states.reset(client, feed)
 
     async def _visit(self, _client: Client, feed: WorldFeed, fields: Any) -> Any:
-        controller = feed.controller
-
-        def visit() -> dict[str, str]:
-            feed.history.visit(fields["moment"], controller.restore)
-            controller.holds.keep_paused()
-            controller.pause()
-            return {"effect": controller.set_back_effect}
-
-        async def run() -> dict[str, str]:
-            result = await feed.requests.run(visit)
-            self._forget_edits(feed)  # They belong to another state.
-            return result
-
-        return await self._newest.run(("visit", feed), run)
+        visit = partial(self._states.visit, feed, fields["moment"])
+        return await self._newest.run(("visit", feed), visit)
 
     async def _save(self, _client: Client, feed: WorldFeed, _fields: Any) -> dict[str, Any]:
         saved = await feed.requests.run(lambda: SavedWorld(feed.world))
         text, notes = await self._paced(saved.file)
         return {"text": text, "name": saved.name, "folder": saved.folder, "notes": notes}
-
-    # -- undo ------------------------------------------------------------------------------
-
-    def _add_edit(self, client: Client, feed: WorldFeed, edit: Edit) -> None:
-        if client.connected:
-            self._edits.setdefault((client, feed), Edits()).add(edit)
-
-    async def _undo(self, client: Client, feed: WorldFeed, _fields: Any) -> dict[str, str]:
-        edits = self._edits.get((client, feed), Edits())
-        edit = edits.last(undone=False)
-        if edit is None:
-            raise FlatlandError("there is nothing to undo")
-        return await self._repeat(edits, edit, edit.undo, feed)
-
-    async def _redo(self, client: Client, feed: WorldFeed, _fields: Any) -> dict[str, str]:
-        edits = self._edits.get((client, feed), Edits())
-        edit = edits.last(undone=True)
-        if edit is None:
-            raise FlatlandError("there is nothing to redo")
-        return await self._repeat(edits, edit, edit.redo, feed)
-
-    async def _repeat(
-        self, edits: Edits, edit: Edit, action: Callable[[], object], feed: WorldFeed
-    ) -> dict[str, str]:
-        """Undoes or redoes a change, and returns the result for the reply."""
-        source = feed.world.source
-        paths = [edit.file] if edit.file else []
-        # Taken at once, so that a second request does not repeat the same change.
-        edits.shift(edit)
-        try:
-            store = await read_in_time_async(lambda: source.read_models_ahead(paths))
-            await feed.requests.run(source.inputs.using(store)(action))
-        except BaseException:
-            edits.shift(edit)
-            raise
-        effect = feed.controller.set_back_effect if edit.sets_back else ""
-        return {"text": edit.text, "effect": effect}
 
     # -- velocity commands -----------------------------------------------------------------
 
@@ -306,7 +259,7 @@ class Commands:
 
     def forget(self, client: Client) -> None:
         """Ends the holds and stops the robots of a client that has disconnected."""
-        self._edits = {key: edits for key, edits in self._edits.items() if key[0] is not client}
+        self._states.forget(client)
         self._end(
             [key for key in self._holds if key[0] is client],
             [key for key in self._drives if key[0] is client],
@@ -314,14 +267,11 @@ class Commands:
 
     def forget_world(self, feed: WorldFeed) -> None:
         """Ends the holds and stops the robots of a world that was removed from the server."""
-        self._forget_edits(feed)
+        self._states.forget_world(feed)
         self._end(
             [key for key in self._holds if key[1] is feed],
             [key for key in self._drives if key[1] is feed],
         )
-
-    def _forget_edits(self, feed: WorldFeed) -> None:
-        self._edits = {key: edits for key, edits in self._edits.items() if key[1] is not feed}
 
     def _end(self, holds: list[_Hold], drives: list[_Drive]) -> None:
         for hold in holds:
@@ -395,32 +345,6 @@ def _drive_topic(feed: WorldFeed, number: int, topic: str | None) -> str:
         asked = "no velocity command" if topic is None else f'no velocity command "{topic}"'
         raise WorldError(f'model "{model.name}" has {asked}; it has: {", ".join(topics) or "none"}')
     return topics[0] if topic is None else topic
-
-
-def _reset_world(feed: WorldFeed) -> int | None:
-    """Resets a world, and returns the number of the moment before; None if it cannot be saved."""
-    try:
-        number = feed.history.mark("before the reset")
-    except WorldError:
-        number = None  # A plugin cannot be copied.
-    feed.controller.reset()
-    return number
-
-
-def _reset_of(feed: WorldFeed, number: int) -> Edit:
-    """Returns the edit of a reset; each repetition saves the state before anew."""
-    before: int | None = number
-
-    def undo() -> None:
-        if before is None:
-            raise WorldError("the state before the reset cannot be saved")
-        feed.history.restore(before, feed.controller.restore)
-
-    def redo() -> None:
-        nonlocal before
-        before = _reset_world(feed)
-
-    return Edit("the reset of the world", undo, redo, sets_back=True)
 
 
 def _release_model(client: Client, feed: WorldFeed, number: int) -> None:
