@@ -142,7 +142,7 @@ class Operations:
             snapshot: A snapshot of the world.
 
         Raises:
-            WorldError: A plugin of a deleted model had a connection that has ended.
+            WorldError: A plugin that has ended since had a connection.
         """
         with self._transport.closing_last():
             self._world.restore(snapshot)

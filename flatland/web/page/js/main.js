@@ -102,7 +102,7 @@ const pointer = new PointerInput(stage, session, tools, (spot, event) => {
   const items = model ? modelItems(model) : [];
   if (!session.readOnly) {
     if (editing.copied) items.push({ text: "Paste", icon: "paste", run: () => void editing.paste(spot) });
-    items.push({ text: "Save world…", icon: "save", run: () => void saveWorld(session) });
+    if (!model) items.push({ text: "Save world…", icon: "save", run: () => void saveWorld(session) });
   }
   if (items.length > 0) menu.open(event.clientX, event.clientY, items, stage.canvas);
 });

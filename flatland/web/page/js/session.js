@@ -134,12 +134,12 @@ export class Session extends Emitter {
   }
 
   /**
-   * Reports that the time of the world was set back.
+   * Reports what a time that was set back does to other programs.
    *
-   * @param {string | undefined} effect  on other programs, empty for none
+   * @param {string | undefined} effect  empty for nothing
    */
   notifySetBack(effect) {
-    if (effect) this.notify("warning", `The time was set back; ${effect}`, "set back");
+    if (effect) this.notify("warning", effect, "set back");
   }
 
   /**

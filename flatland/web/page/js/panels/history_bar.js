@@ -13,6 +13,7 @@ export class HistoryBar {
     this.session = session;
     this.bar = byId("history");
     this.slider = byId("history-slider", HTMLInputElement);
+    this.text = byId("history-text");
     this.continueButton = byId("history-continue", HTMLButtonElement);
     this.newestButton = byId("history-newest", HTMLButtonElement);
     /** Number of the moment to visit, null for the newest state, undefined for none.
@@ -108,7 +109,8 @@ export class HistoryBar {
     this.slider.max = String(earlier.length);
     this.slider.value = String(index < 0 ? earlier.length : index);
     this.slider.setAttribute("aria-valuetext", index < 0 ? "newest state" : text);
-    setText(byId("history-text"), text);
+    setText(this.text, text);
+    this.text.title = text;
   }
 
   update() {
