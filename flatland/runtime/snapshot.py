@@ -234,9 +234,8 @@ class Snapshots:
             raise error
 
     def _walls(self) -> dict[Layer, tuple[Body, int]]:
-        """Returns the body of each layer and its number of edges, which change with the map."""
-        layers = self._layers.all
-        return {each: (each.body, len(each.body.physics.fixture_ids)) for each in layers}
+        """Returns the body of each layer and its number of edges, which change with its walls."""
+        return {layer: (layer.body, layer.added_edges) for layer in self._layers.all}
 
     def _notify(
         self,

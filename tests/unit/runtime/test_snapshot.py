@@ -465,6 +465,9 @@ def test_observers_are_notified_of_walls_that_are_there_again(world: World, file
     world.step()
     world.restore(snapshot)
     assert changed == []
+    world.layers[0].add_edges(np.array([[4, 4, 5, 5]], np.float32))
+    world.restore(snapshot)
+    assert changed == ["walls"]
     files.write_map("empty", ["####", "#..#", "####"])
     world.set_layer_map("walls", "empty.yaml")
     changed.clear()
