@@ -53,6 +53,7 @@ test("the state at the slider is visited, and left by returning or continuing", 
   connection.emit("message", history({ moments: [...MOMENTS, NEWEST], current: 7 }));
   elements["history-newest"].click();
   assert.deepEqual(visits(), [9]);
+  assert.equal(document.activeElement, elements.canvas);
   elements["history-continue"].click();
   assert.deepEqual(connection.take("resume"), [{ world: 0 }]);
 });

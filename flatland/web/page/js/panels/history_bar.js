@@ -25,6 +25,10 @@ export class HistoryBar {
     this.slider.addEventListener("input", () => this.want(this.momentAt(Number(this.slider.value))));
     this.newestButton.addEventListener("click", () => this.want(null));
     this.continueButton.addEventListener("click", () => void session.attempt("resume", {}));
+    for (const button of [this.newestButton, this.continueButton]) {
+      // The button disappears; on the slider, the arrow keys would not drive the robot.
+      button.addEventListener("click", () => byId("canvas").focus());
+    }
     session.on("history", (world) => {
       if (world === session.world) this.proceed();
     });
