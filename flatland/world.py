@@ -195,6 +195,7 @@ class World:
             (self, self.requests, self.stepping, self._observers),
             self.physics,
             self.timekeeper,
+            self._layers,
             self._models,
             self.plugin_host,
             self.ports,
@@ -827,7 +828,7 @@ class World:
 
         Raises:
             WorldError: The world is closed, a plugin calls this, the snapshot is one of another
-                world, or a plugin of a deleted model had a connection that has ended.
+                world, or a plugin that a deletion or a reset has ended since had a connection.
         """
         self._changes.save_or_restore(
             "restore", lambda: snapshot.number, lambda: self._snapshots.restore(snapshot)

@@ -63,6 +63,10 @@ class SavedObjects:
                 kept.append(obj)  # An id must not be used again while others are saved.
         self._entries, self._last = entries, last
 
+    def __len__(self) -> int:
+        """Returns the number of objects whose contents were saved."""
+        return len(self._entries) + len(self._last)
+
     def write_back(self) -> Exception | None:
         """Writes the contents back.
 

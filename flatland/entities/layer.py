@@ -34,6 +34,7 @@ class Layer(Entity):
         map_path: The map file; empty for a layer without one.
         map_topic: Topic that the map is received from; empty for none.
         grid: The map, if it was given as a grid.
+        added_edges: Number of edges that were added, including those too short for the physics.
         map_version: Number of replacements of the map since the layer was loaded.
     """
 
@@ -84,6 +85,7 @@ class Layer(Entity):
         self.map_topic = map_topic
         self.grid: OccupancyGrid | None = None
         self.map_version = 0
+        self.added_edges = 0
         physics_body = physics.create_body("static", origin)
         self.body = Body(physics_body, self, self.name, color, self.class_name)
         if edges is not None and len(edges):
@@ -116,5 +118,6 @@ class Layer(Entity):
             category_bits=self.category_bits,
             mask_bits=self.category_bits,
         )
+        self.added_edges += len(edges)
         if self.material is not None:
             self.body.set_material(self.material)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from flatland.entities.body import Body, Entity
 from flatland.entities.joint import Joint
 from flatland.errors import FlatlandError, WorldError
-from flatland.geometry import MAX_MAGNITUDE, Pose, Vector2, compose, finite_pose, invert
+from flatland.geometry import IDENTITY, MAX_MAGNITUDE, Pose, Vector2, compose, finite_pose, invert
 from flatland.graph_names import clean_name
 
 if TYPE_CHECKING:
@@ -31,6 +31,7 @@ class Model(Entity):
         class_name: Class of objects that the model belongs to, for labels of sensors: the entry
             `class` of the model file, by default the name of the file without extensions, or the
             name of the model if it was spawned from a text.
+        offset: Pose of the first body in the frame of the model file [m, rad].
         followers: Plugins of other models whose `model_moved` is also called for this model, such
             as a hitch that is connected to it.
         displacement: Offset (dx, dy) of the actual pose from the requested pose after the last
@@ -47,6 +48,7 @@ class Model(Entity):
         self.bodies: list[Body] = []
         self.joints: list[Joint] = []
         self.plugins: list[ModelPlugin] = []
+        self.offset: Pose = IDENTITY
         self.followers: list[ModelPlugin] = []
         self.displacement: Vector2 = (0.0, 0.0)
 
@@ -104,6 +106,14 @@ class Model(Entity):
     def pose(self) -> Pose:
         """Pose (x, y, theta) of the first body in the world frame [m, rad]."""
         return self.bodies[0].pose
+
+    @property
+    def origin(self) -> Pose:
+        """Pose in the world frame [m, rad] at which a spawn puts the first body where it is.
+
+        It differs from `pose` if the model file gives the first body a pose.
+        """
+        return self.pose if self.offset == IDENTITY else compose(self.pose, invert(self.offset))
 
     def frame(self, frame_id: str) -> str:
         """Returns the TF frame id of a frame of the model.

@@ -135,6 +135,8 @@ class ModelLoader:
             angular_damping=angular_damping,
         )
         body = Body(physics_body, self._model, name, color, class_name)
+        if not self._model.bodies:
+            self._model.offset = pose
         self._model.bodies.append(body)
         for footprint in footprints.items():
             with footprint.collect_errors():

@@ -10,6 +10,7 @@ from flatland.config.documents import TEXT_NAME, is_yaml_text
 from flatland.config.reader import YamlReader
 
 if TYPE_CHECKING:
+    from flatland.entities.model import Model
     from flatland.loading.world_source import WorldSource
 
 
@@ -28,6 +29,13 @@ class ModelSpec:
     name: str
     namespace: str = ""
     pose: Sequence[float] = (0.0, 0.0, 0.0)
+
+
+def spec_of(model: Model) -> ModelSpec | None:
+    """Returns what spawns a model again where it is, None if it was spawned from a text."""
+    if model.path == TEXT_NAME:
+        return None
+    return ModelSpec(model.path, model.name, model.namespace, model.origin)
 
 
 class ModelSources:

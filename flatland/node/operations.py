@@ -7,6 +7,8 @@ from collections.abc import Sequence
 from concurrent.futures import Future
 from typing import TYPE_CHECKING, Any
 
+from flatland.node.clock import WallClock
+
 if TYPE_CHECKING:
     from flatland.entities.model import Model
     from flatland.geometry import Pose
@@ -14,6 +16,7 @@ if TYPE_CHECKING:
     from flatland.node.clock import NodeClock
     from flatland.node.transport import Transport
     from flatland.runtime.placement import IfBlocked
+    from flatland.runtime.snapshot import WorldSnapshot
     from flatland.simulation import PauseHolds, Simulation
 
 
@@ -105,7 +108,17 @@ class Operations:
         done.add_done_callback(lambda _done: self._clock.flush())
         return done
 
-    def reset(self, seed: int | None, *, keep_time: bool) -> None:
+    @property
+    def set_back_effect(self) -> str:
+        """What a time that is set back does to other nodes, for users; empty for nothing."""
+        if isinstance(self._clock, WallClock):
+            return ""
+        return (
+            "/clock is set back: nodes with use_sim_time clear their tf buffers, and their sleeps "
+            "may raise errors"
+        )
+
+    def reset(self, seed: int | None = None, *, keep_time: bool = False) -> None:
         """Returns the world to its state after loading.
 
         Topics that exist before and after stay registered.
@@ -119,6 +132,20 @@ class Operations:
         """
         with self._transport.closing_last():
             self._world.reset(seed=seed, keep_time=keep_time)
+
+    def restore(self, snapshot: WorldSnapshot) -> None:
+        """Returns the world to an earlier state; `/clock` is set back as by a reset.
+
+        Topics that exist in both states stay registered.
+
+        Args:
+            snapshot: A snapshot of the world.
+
+        Raises:
+            WorldError: A plugin that has ended since had a connection.
+        """
+        with self._transport.closing_last():
+            self._world.restore(snapshot)
 
     # -- models ----------------------------------------------------------------------------
 

@@ -22,6 +22,9 @@ class PluginRos:
 
     A name that starts with `/` is global. Callbacks run between two steps, in the thread that
     steps the world. Everything that the plugin leaves open is closed with the plugin.
+
+    Attributes:
+        used: Whether the plugin has opened a topic or a service.
     """
 
     def __init__(
@@ -47,6 +50,7 @@ class PluginRos:
         self._transport = transport
         self._post = post
         self._shutting_down = shutting_down
+        self.used = False
         self._closers: list[Callable[[], None]] = []
         self._closed = False
 
@@ -74,7 +78,7 @@ class PluginRos:
             latch=latch,
             owner=self._owner,
         )
-        self._closers.append(publisher.close)
+        self._opened(publisher)
         return publisher
 
     def subscribe(
@@ -108,7 +112,7 @@ class PluginRos:
             lambda message: self._post(lambda: call(message)),
             owner=self._owner,
         )
-        self._closers.append(subscriber.close)
+        self._opened(subscriber)
         return subscriber
 
     def advertise_service(
@@ -147,7 +151,7 @@ class PluginRos:
             lambda request: transport.wait_for(self._post(lambda: run(request)), self._requests),
             owner=self._owner,
         )
-        self._closers.append(service.close)
+        self._opened(service)
         return service
 
     def param(self, name: str, default: Any = _REQUIRED) -> Any:
@@ -178,6 +182,10 @@ class PluginRos:
                     close()
                 except PLUGIN_FAULTS:
                     _LOG.exception("%s: cannot close a connection", self._owner)
+
+    def _opened(self, connection: Connection) -> None:
+        self.used = True
+        self._closers.append(connection.close)
 
     def _resolve(self, name: str) -> str:
         try:

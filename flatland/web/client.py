@@ -114,10 +114,11 @@ class Client:
         fields = message.fields
         self._worlds = fields.get("worlds", self._worlds)
         self._hidden = fields.get("hidden", self._hidden)
-        names = ("scans", "compact_scans", "frames", "inspect", "series")
-        self._view = dataclasses.replace(
-            self._view, **{name: fields[name] for name in names if name in fields}
-        )
+        names = ("scans", "compact_scans", "frames", "inspect", "series", "history")
+        view = {name: fields[name] for name in names if name in fields}
+        if self.read_only:
+            view["history"] = False  # Its snapshots are for those who can return to them.
+        self._view = dataclasses.replace(self._view, **view)
         self.update_feeds()
 
     def update_feeds(self) -> None:

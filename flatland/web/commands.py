@@ -10,13 +10,17 @@ from functools import partial
 from typing import TYPE_CHECKING, Any, Final, TypeVar
 
 from flatland.errors import WorldError
+from flatland.loading.model_source import ModelSpec, spec_of
+from flatland.loading.saved_world import SavedWorld
 from flatland.plugin_api.plugin import describe
 from flatland.runtime.file_reads import read_in_time_async
 from flatland.values import Twist
+from flatland.web.edits import Edit, deletion_of, move_of, spawn_of
 from flatland.web.feed import WorldFeed
 from flatland.web.messages import Message
 from flatland.web.model_files import check_file, model_files, preview
 from flatland.web.numbers import series_of
+from flatland.web.state_commands import StateCommands
 
 if TYPE_CHECKING:
     from flatland.web.client import Client
@@ -44,6 +48,7 @@ class Commands:
         self._newest = _Newest()
         self._holds: dict[_Hold, float] = {}  # wall time at which each hold ends [s]
         self._drives: dict[_Drive, float] = {}  # wall time at which each robot stops [s]
+        self._states = StateCommands()
         self._active = asyncio.Event()
         self._reading_due = 0.0  # wall time at which files may be read next for a preview [s]
         self._reading_period = 0.0  # time between two such reads [s]
@@ -80,18 +85,28 @@ class Commands:
     async def _move(self, client: Client, feed: WorldFeed, fields: Any) -> Any:
         number, pose = fields["model"], fields["pose"]
         hold = (client, feed, number)
-        if hold in self._holds:
+        drag = number if hold in self._holds else None
+        if drag is not None:
             self._holds[hold] = _now() + HOLD_TIMEOUT
 
-        def move() -> dict[str, str]:
-            name = feed.find_model(number).name
+        def move() -> tuple[Edit, dict[str, str]]:
+            model = feed.find_model(number)
+            name, before = model.name, model.pose
             feed.controller.move(name, pose)
-            return {"overlap": feed.world.describe_overlap(name)}
+            edit = move_of(name, before, pose, feed.controller, drag)
+            return edit, {"overlap": feed.world.describe_overlap(name)}
 
-        return await self._newest.run(("move", *hold), lambda: feed.requests.run(move))
+        async def run() -> dict[str, str]:
+            edit, result = await feed.requests.run(move)
+            self._states.add(client, feed, edit)
+            return result
+
+        return await self._newest.run(("move", *hold), run)
 
     async def _hold(self, client: Client, feed: WorldFeed, fields: Any) -> None:
         number = fields["model"]
+        if (client, feed, number) not in self._holds:
+            self._states.begin_drag(client, feed)
         self._holds[client, feed, number] = _now() + HOLD_TIMEOUT
         self._active.set()
 
@@ -107,7 +122,7 @@ class Commands:
         self._holds.pop(hold, None)
         await feed.requests.run(partial(_release_model, *hold))
 
-    async def _spawn(self, _client: Client, feed: WorldFeed, fields: Any) -> dict[str, str]:
+    async def _spawn(self, client: Client, feed: WorldFeed, fields: Any) -> dict[str, str]:
         file, name, namespace = fields["file"], fields["name"], fields.get("namespace", "")
         if not _NAME.fullmatch(name):
             raise WorldError(
@@ -118,6 +133,8 @@ class Commands:
         store = await read_in_time_async(lambda: source.read_models_ahead([path]))
         spawn = partial(feed.controller.spawn, path, name, namespace, pose)
         await feed.requests.run(source.inputs.using(store)(spawn))
+        spec = ModelSpec(path, name, namespace, pose)
+        self._states.add(client, feed, spawn_of(spec, feed.controller))
         return {"name": name}
 
     async def _preview(self, client: Client, feed: WorldFeed, fields: Any) -> dict[str, Any]:
@@ -131,9 +148,19 @@ class Commands:
 
         return await self._paced(read)
 
-    async def _delete(self, _client: Client, feed: WorldFeed, fields: Any) -> None:
+    async def _delete(self, client: Client, feed: WorldFeed, fields: Any) -> dict[str, bool]:
         number = fields["model"]
-        await feed.requests.run(lambda: feed.controller.delete(feed.find_model(number).name))
+
+        def delete() -> ModelSpec | None:
+            model = feed.find_model(number)
+            spec = spec_of(model)
+            feed.controller.delete(model.name)
+            return spec
+
+        spec = await feed.requests.run(delete)
+        if spec is not None:
+            self._states.add(client, feed, deletion_of(spec, feed.controller))
+        return {"can_undo": spec is not None}
 
     async def _files(self, _client: Client, feed: WorldFeed, _fields: Any) -> list[dict[str, str]]:
         feed.contents.model_files = await self._paced(lambda: model_files(feed.world))
@@ -160,6 +187,26 @@ class Commands:
             return await read_in_time_async(timed)
         finally:
             self._reading_due = max(self._reading_due, _now() + self._reading_period)
+
+    # -- earlier states --------------------------------------------------------------------
+
+    async def _undo(self, client: Client, feed: WorldFeed, _fields: Any) -> dict[str, str]:
+        return await self._states.repeat(client, feed, undone=False)
+
+    async def _redo(self, client: Client, feed: WorldFeed, _fields: Any) -> dict[str, str]:
+        return await self._states.repeat(client, feed, undone=True)
+
+    async def _reset(self, client: Client, feed: WorldFeed, _fields: Any) -> dict[str, bool | str]:
+        return await self._states.reset(client, feed)
+
+    async def _visit(self, _client: Client, feed: WorldFeed, fields: Any) -> Any:
+        visit = partial(self._states.visit, feed, fields["moment"])
+        return await self._newest.run(("visit", feed), visit)
+
+    async def _save(self, _client: Client, feed: WorldFeed, _fields: Any) -> dict[str, Any]:
+        saved = await feed.requests.run(lambda: SavedWorld(feed.world))
+        text, notes = await self._paced(saved.file)
+        return {"text": text, "name": saved.name, "folder": saved.folder, "notes": notes}
 
     # -- velocity commands -----------------------------------------------------------------
 
@@ -212,6 +259,7 @@ class Commands:
 
     def forget(self, client: Client) -> None:
         """Ends the holds and stops the robots of a client that has disconnected."""
+        self._states.forget(client)
         self._end(
             [key for key in self._holds if key[0] is client],
             [key for key in self._drives if key[0] is client],
@@ -219,6 +267,7 @@ class Commands:
 
     def forget_world(self, feed: WorldFeed) -> None:
         """Ends the holds and stops the robots of a world that was removed from the server."""
+        self._states.forget_world(feed)
         self._end(
             [key for key in self._holds if key[1] is feed],
             [key for key in self._drives if key[1] is feed],
@@ -322,6 +371,11 @@ _ACTIONS: Final[dict[str, Callable[..., Awaitable[Any]]]] = {
     "spawn": Commands._spawn,
     "preview": Commands._preview,
     "delete": Commands._delete,
+    "reset": Commands._reset,
+    "visit": Commands._visit,
+    "save": Commands._save,
+    "undo": Commands._undo,
+    "redo": Commands._redo,
     "drive": Commands._drive,
     "files": Commands._files,
     "describe_series": Commands._describe_series,

@@ -8,6 +8,7 @@ from typing import Protocol
 
 from flatland.errors import WorldError
 from flatland.geometry import Pose
+from flatland.runtime.snapshot import WorldSnapshot
 from flatland.simulation import PauseHolds, Simulation
 from flatland.world import World
 
@@ -46,6 +47,16 @@ class WorldController(Protocol):
         Returns:
             A future that is completed after the last step.
         """
+
+    @property
+    def set_back_effect(self) -> str:
+        """What a time that is set back does to other programs, for users; empty for nothing."""
+
+    def reset(self) -> None:
+        """Returns the world to its state after loading, with the time 0."""
+
+    def restore(self, snapshot: WorldSnapshot) -> None:
+        """Returns the world to an earlier state, with its time."""
 
     def spawn(self, file: str, name: str, namespace: str, pose: Pose) -> object:
         """Adds a model to the world."""
@@ -101,6 +112,16 @@ class _DefaultController:
         if self._simulation is not None:
             return self._simulation.request_steps(count)  # type: ignore[return-value]
         return self._world.post(lambda: self._world.step(count, while_paused=True))
+
+    @property
+    def set_back_effect(self) -> str:
+        return ""
+
+    def reset(self) -> None:
+        self._world.reset()
+
+    def restore(self, snapshot: WorldSnapshot) -> None:
+        self._world.restore(snapshot)
 
     def spawn(self, file: str, name: str, namespace: str, pose: Pose) -> None:
         self._world.spawn_model(file, name, namespace, pose, if_blocked="allow")

@@ -13,10 +13,11 @@ from flatland.scene.description import LayerDescription
 from flatland.web.capture import CapturedWorld, WorldCapture
 from flatland.web.contents import WorldContents
 from flatland.web.controller import WorldController
+from flatland.web.history import MAX_AGE, History, Timeline
 from flatland.web.latest_scans import LatestScans
 from flatland.web.optional_messages import OptionalMessages
 from flatland.web.status import STALE_TIMEOUT, WorldStatus
-from flatland.web.views import Audience, Received, View
+from flatland.web.views import Audience, Demand, Received, View
 from flatland.web.world_requests import WorldRequests
 from flatland.world import World
 
@@ -36,6 +37,7 @@ class WorldFeed:
         audience: The clients that look at the world.
         requests: Requests of the server to the world.
         contents: Layers, models and poses of the world.
+        history: Earlier states of the world; used between two steps.
     """
 
     def __init__(
@@ -59,6 +61,7 @@ class WorldFeed:
         self.audience = Audience()
         self.requests = WorldRequests(world)
         self.contents = WorldContents(index, name)
+        self.history = History(world)
         self._capture = WorldCapture(world, controller, ids)
         self._layers_changed = True
         self._scans = LatestScans()
@@ -111,13 +114,22 @@ class WorldFeed:
             while not self.world.closed:
                 if self.audience.empty:
                     self._suspend()
-                    await self.audience.wait()
+                    await self._wait_for_audience()
                 began = loop.time()
                 await self._update(began)
                 self.audience.notify()
                 await asyncio.sleep(max(began + PERIOD - loop.time(), 0.001))
         finally:
             self._end_capture()
+
+    async def _wait_for_audience(self) -> None:
+        """Waits until there is a client; drops the history when all of it is too old."""
+        try:
+            async with asyncio.timeout(MAX_AGE):
+                await self.audience.wait()
+        except TimeoutError:
+            self.requests.post(self.history.clear)
+            await self.audience.wait()
 
     def _suspend(self) -> None:
         """Withdraws the demand for outputs and releases data that no client needs."""
@@ -136,9 +148,11 @@ class WorldFeed:
         loop = asyncio.get_running_loop()
         self._stale_timer = loop.call_later(STALE_TIMEOUT, self._report_stale)
         try:
-            captured = await self.requests.run(lambda: self._capture.take(demand))
+            captured, timeline = await self.requests.run(lambda: self._take(demand))
             await self._optional.read_parameters(captured.details)
             self._apply(captured, now, loop.time())
+            if timeline is not None:
+                self._optional.set_timeline(timeline, self.contents.tick)
         except PLUGIN_FAULTS as error:
             self._layers_changed = self._layers_changed or demand.layers
             if not self.world.closed:
@@ -146,6 +160,14 @@ class WorldFeed:
                 await asyncio.sleep(1.0)
         finally:
             self._stale_timer.cancel()
+
+    def _take(self, demand: Demand) -> tuple[CapturedWorld, Timeline | None]:
+        """Captures the world, and its history if it is demanded; called between two steps."""
+        captured = self._capture.take(demand)
+        if not demand.history:
+            return captured, None
+        self.history.update()
+        return captured, self.history.timeline
 
     def _report_stale(self) -> None:
         """Sends the time without an answer of the simulator, repeatedly until there is one."""

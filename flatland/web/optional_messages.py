@@ -1,4 +1,4 @@
-"""Messages that are sent only on demand: details of models, frames and plotted numbers."""
+"""Messages that are sent only on demand: details, frames, plotted numbers and the history."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from flatland.runtime.file_reads import read_in_time_async
 from flatland.values import Transform
 from flatland.web.capture import CapturedWorld
 from flatland.web.encoding import text_message
+from flatland.web.history import Timeline
 from flatland.web.inspection import Details, details_message
 from flatland.web.model_files import plugin_parameters
 from flatland.web.model_tracker import Json
@@ -19,7 +20,7 @@ from flatland.world import World
 
 
 class OptionalMessages:
-    """The latest details, frames and plotted numbers of one world."""
+    """The latest details, frames, plotted numbers and history of one world."""
 
     def __init__(self, index: int, world: World) -> None:
         """Creates an object without messages.
@@ -35,6 +36,8 @@ class OptionalMessages:
         self._values: dict[str, float] = {}
         self._values_tick = -1
         self._values_time = -math.inf
+        self._timeline: Timeline | None = None
+        self._history: tuple[int, str] = (-1, "")  # number of the capture, and message
         self._parameters: dict[int, tuple[str, Json]] = {}  # path of the model, and parameters
 
     async def read_parameters(self, details: list[Details]) -> None:
@@ -77,6 +80,32 @@ class OptionalMessages:
             self._values_tick = tick
         self._values, self._values_time = values, captured.time
 
+    def set_timeline(self, timeline: Timeline, tick: int) -> None:
+        """Replaces the message of the history if it has changed.
+
+        Args:
+            timeline: The history.
+            tick: Number of the capture.
+        """
+        if timeline is self._timeline:
+            return
+        self._timeline = timeline
+        self._history = (
+            tick,
+            text_message(
+                {
+                    "type": "history",
+                    "world": self._index,
+                    "moments": [
+                        {"moment": number, "time": time, "label": label}
+                        for number, time, label in timeline.moments
+                    ],
+                    "current": timeline.current,
+                    "obstacle": timeline.obstacle,
+                }
+            ),
+        )
+
     def clear(self) -> None:
         """Removes the details and the plotted numbers."""
         self._details.clear()
@@ -97,6 +126,9 @@ class OptionalMessages:
                 return text
         if view.frames and received.frames < self._frames[0]:
             received.frames, text = self._frames
+            return text
+        if view.history and received.history < self._history[0]:
+            received.history, text = self._history
             return text
         if view.series and received.values < self._values_tick:
             received.values = self._values_tick

@@ -22,6 +22,7 @@ class View:
         frames: Whether to send the transforms of frames.
         inspect: Id of the model that is inspected, None for none.
         series: Names of the numbers that are plotted.
+        history: Whether to keep earlier states of the world, and to send their times.
     """
 
     scans: bool = False
@@ -29,6 +30,7 @@ class View:
     frames: bool = False
     inspect: int | None = None
     series: tuple[str, ...] = ()
+    history: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,6 +44,7 @@ class Demand:
         inspected: Ids of the models that are inspected.
         details: Whether to copy the details of these models.
         series: Names of the numbers that are plotted.
+        history: Whether to keep earlier states of the world.
     """
 
     scans: bool = False
@@ -50,6 +53,7 @@ class Demand:
     inspected: frozenset[int] = frozenset()
     details: bool = False
     series: frozenset[str] = frozenset()
+    history: bool = False
 
 
 @dataclass(slots=True)
@@ -67,6 +71,7 @@ class Received:
         details: Number of the capture of the details.
         frames: Number of the capture of the frames.
         values: Number of the capture of the plotted numbers.
+        history: Number of the capture of the history.
     """
 
     world: int = -1
@@ -79,6 +84,7 @@ class Received:
     details: int = -1
     frames: int = -1
     values: int = -1
+    history: int = -1
 
 
 class Audience:
@@ -136,6 +142,7 @@ class Audience:
             inspected=inspected,
             details=now >= self._details_due and bool(inspected),
             series=frozenset(name for view in views for name in view.series),
+            history=any(view.history for view in views),
         )
         if demand.frames:
             self._frames_due = now + FRAMES_PERIOD

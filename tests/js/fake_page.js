@@ -304,6 +304,7 @@ export function openPage({ hash = "", search = "" } = {}) {
       getItem: (name) => stored.get(name) ?? null,
       setItem: (name, value) => stored.set(name, value),
     },
+    getSelection: () => "",
     matchMedia: () => Object.assign(media, { matches: false }),
     requestAnimationFrame: (callback) => frames.push(callback),
   });

@@ -15,6 +15,10 @@ const ACTIONS = [
   "step",
   "openSpawn",
   "deleteSelected",
+  "copy",
+  "paste",
+  "undo",
+  "redo",
   "toggleFollow",
   "togglePlots",
   "showAll",
@@ -75,10 +79,26 @@ test("a read-only page has no keys that change the world", () => {
   assert.deepEqual(calls, ["togglePlots"]);
 });
 
+test("Ctrl and Cmd copy, paste, undo and redo, unless text is selected", () => {
+  const { calls, session } = open();
+  session.select("robot");
+  assert.ok(press("c", { ctrlKey: true }));
+  assert.ok(press("v", { metaKey: true }));
+  assert.ok(press("z", { ctrlKey: true }));
+  assert.ok(press("Z", { ctrlKey: true, shiftKey: true }));
+  assert.ok(press("y", { ctrlKey: true }));
+  assert.deepEqual(calls.splice(0), ["copy", "paste", "undo", "redo", "redo"]);
+  assert.ok(!press("w", { ctrlKey: true, code: "KeyW" }), "does not drive");
+  window.getSelection = () => "selected text";
+  assert.ok(!press("c", { ctrlKey: true }));
+  assert.deepEqual(calls, []);
+});
+
 test("typed text, shortcuts of the browser and dialogs have no effect", () => {
   const { calls, elements } = open();
   press("n", { ctrlKey: true });
   press("n", {}, elements["model-filter"]);
+  press("z", { ctrlKey: true }, elements["model-filter"]);
   press(" ", {}, elements.pause);
   elements["help-dialog"].showModal();
   press("n");

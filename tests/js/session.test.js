@@ -38,6 +38,7 @@ test("changes of a task are one request to the server", async () => {
       scans: true,
       compact_scans: true,
       frames: true,
+        history: true,
       inspect: ROBOT,
       series: ["/odom/pose/0"],
       hidden: false,
@@ -45,13 +46,13 @@ test("changes of a task are one request to the server", async () => {
   ]);
 });
 
-test("a grid needs neither frames nor numbers", async () => {
+test("a grid needs neither frames nor numbers nor earlier states", async () => {
   const { connection, session } = showRoom({ worlds: 2 });
   session.setDisplay("frames", true);
   session.setSeries(["/odom/pose/0"]);
   await settle();
-  const { worlds, frames, series } = connection.take("look").at(-1);
-  assert.deepEqual([worlds, frames, series], [[0, 1], false, []]);
+  const { worlds, frames, history, series } = connection.take("look").at(-1);
+  assert.deepEqual([worlds, frames, history, series], [[0, 1], false, false, []]);
 });
 
 test("a hidden page says so, and checks the connection when it is shown again", () => {

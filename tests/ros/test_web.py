@@ -185,6 +185,37 @@ def test_a_drag_in_rviz_and_one_on_the_page_share_the_pause(client: WebClient, r
     client.until_status(paused=False)
 
 
+def test_earlier_states_set_the_clock_back_and_keep_topics_connected(
+    client: WebClient, ros: Any
+) -> None:
+    truth = ros.topic("/odometry/ground_truth", Odometry)
+    clock = ros.topic("/clock", Clock)
+    client.look(history=True)
+
+    def moments() -> list[dict[str, Any]]:
+        found = [text for text in client.texts if text["type"] == "history"]
+        return found[-1]["moments"] if found else []
+
+    client.until("two moments", lambda: len(moments()) >= 2)
+    first = moments()[0]
+    before = client.status()["time"]
+    assert "/clock is set back" in client.do("visit", moment=first["moment"])["effect"]
+    clock.until(lambda message: message.clock.to_sec() == pytest.approx(first["time"], abs=1e-9))
+    assert client.until_status(paused=True)["paused"]
+    client.until("newest", lambda: moments()[-1]["label"] == "before going back")
+    client.do("visit", moment=moments()[-1]["moment"])
+    client.do("resume")
+    clock.until(lambda message: message.clock.to_sec() > before)
+    truth.until(lambda message: message.header.stamp.to_sec() > before)
+
+    assert "/clock is set back" in client.do("reset")["effect"]
+    clock.until(lambda message: message.clock.to_sec() < before)
+    truth.until(lambda message: message.header.stamp.to_sec() < before)
+    client.do("undo")
+    clock.until(lambda message: message.clock.to_sec() > before)
+    truth.until(lambda message: message.header.stamp.to_sec() > before)
+
+
 # -- the start of the viewer -----------------------------------------------------------------
 
 

@@ -13,7 +13,7 @@ const [done] = arguments;
 for (const dialog of document.querySelectorAll("dialog[open]")) dialog.close();
 for (const menu of document.querySelectorAll("[popover]")) menu.hidePopover();
 for (const form of document.querySelectorAll("dialog form")) form.reset();
-const buttons = document.querySelectorAll("figure.plot button, #notices button");
+const buttons = document.querySelectorAll("figure.plot button, #notices [aria-label=Dismiss]");
 for (const button of buttons) button.click();
 if (!document.querySelector("#plots").hidden) document.querySelector("#plots-close").click();
 if (document.body.dataset.panel === "closed") document.querySelector("#panel-toggle").click();

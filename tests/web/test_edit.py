@@ -96,7 +96,7 @@ def test_a_model_is_spawned_with_a_preview(room: ViewedWorld, page: ViewerPage) 
     wait_until("the model is in the world", lambda: "second" in room.names())
     assert room.pose("second") == close_to((-3, -3, math.pi / 2))
     browser.until("flatland.state.selected === 'second'")
-    browser.picture_until("both crates are visible", lambda image: cyan(image) > 1.8 * before)
+    browser.picture_until("both crates are visible", lambda image: cyan(image) > 1.6 * before)
 
 
 def test_errors_of_the_simulator_are_shown(room: ViewedWorld, page: ViewerPage) -> None:

@@ -39,3 +39,17 @@ test("at most four notices are shown, and the user can dismiss them", (t) => {
   elements.notices.querySelector("button").click();
   assert.deepEqual(texts(), ["3", "4", "5"]);
 });
+
+test("a button of a notice runs its action once; such a notice stays longer", (t) => {
+  const { elements, session, texts } = open(t);
+  const calls = [];
+  const action = { text: "Undo", run: () => calls.push("undo") };
+  session.notify("info", "Deleted crate", "undo", action);
+  t.mock.timers.tick(9000);
+  assert.deepEqual(texts(), ["Deleted crate"]);
+  elements.notices.querySelector("button").click();
+  assert.deepEqual([calls, texts()], [["undo"], []]);
+  session.notify("info", "Deleted crate", "undo", action);
+  t.mock.timers.tick(10_000);
+  assert.deepEqual(texts(), []);
+});

@@ -409,6 +409,73 @@ def test_observers_are_notified_of_what_is_there_again(world: World) -> None:
     assert sorted(events) == sorted((opposite[kind], name) for kind, name in deleted)
 
 
+def test_a_reset_can_be_restored_with_its_world_plugins(world: World) -> None:
+    (before,) = world.plugins
+    world.step(20)
+    snapshot, expected = world.snapshot(), world.state_hash()
+    world.reset()
+    (after,) = world.plugins
+    assert after is not before
+    ended: list[str] = []
+    after.on_shutdown = lambda: ended.append("shutdown")  # type: ignore[method-assign]
+    world.restore(snapshot)
+    assert world.plugins == [before]
+    assert ended == ["shutdown"]
+    assert world.state_hash() == expected
+
+
+class Ros:
+    """Access to ROS of a plugin, as far as snapshots are concerned."""
+
+    used = False
+
+    def close(self) -> None:
+        pass
+
+
+def test_plugins_with_access_to_ros_return_unless_they_have_used_it(world: World) -> None:
+    class Bridge(flatland.WorldObserver):
+        def plugin_ros(self, plugin: Any) -> Ros:
+            return Ros()
+
+    world.add_observer(Bridge())
+    world.delete_model("drift")
+    world.spawn_model("drift.model.yaml", "drift", "drift", (2.0, 6.0, 0.0))
+    snapshot = world.snapshot()
+    world.delete_model("drift")
+    world.restore(snapshot)
+    laser = world.model("drift").plugin("laser")
+    assert isinstance(laser.ros, Ros)
+    laser.ros.used = True
+    world.delete_model("drift")
+    with pytest.raises(WorldError, match=r'"laser".*attribute "ros" holds a connection'):
+        world.restore(snapshot)
+    assert "drift" not in [model.name for model in world.models]
+
+
+def test_observers_are_notified_of_walls_that_are_there_again(world: World, files: Any) -> None:
+    changed: list[str] = []
+
+    class Recorder(flatland.WorldObserver):
+        def layer_changed(self, layer_name: str) -> None:
+            changed.append(layer_name)
+
+    snapshot, edges = world.snapshot(), world.layers[0].edges
+    world.add_observer(Recorder())
+    world.step()
+    world.restore(snapshot)
+    assert changed == []
+    world.layers[0].add_edges(np.array([[4, 4, 5, 5]], np.float32))
+    world.restore(snapshot)
+    assert changed == ["walls"]
+    files.write_map("empty", ["####", "#..#", "####"])
+    world.set_layer_map("walls", "empty.yaml")
+    changed.clear()
+    world.restore(snapshot)
+    assert changed == ["walls"]
+    np.testing.assert_array_equal(world.layers[0].edges, edges)
+
+
 def test_subscribers_remain_after_a_restore_and_are_not_cloned(world: World) -> None:
     received: list[float] = []
     unsubscribe = world.output("/drift/scan").subscribe(lambda scan: received.append(scan.stamp))

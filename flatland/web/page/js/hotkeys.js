@@ -8,7 +8,7 @@ const TURN_STEP = Math.PI / 24;
 
 /**
  * @typedef {object} Hotkey
- * @property {string[]} keys  values of `KeyboardEvent.key`, lower case
+ * @property {string[]} keys  values of `KeyboardEvent.key`, lower case, after `ctrl+` or `ctrl+shift+`
  * @property {string} shown  the keys for users
  * @property {string} text
  * @property {() => void} run
@@ -19,6 +19,10 @@ const TURN_STEP = Math.PI / 24;
  * @property {() => void} step
  * @property {() => void} openSpawn
  * @property {() => void} deleteSelected
+ * @property {() => void} copy
+ * @property {() => void} paste
+ * @property {() => void} undo
+ * @property {() => void} redo
  * @property {() => void} toggleFollow
  * @property {() => void} togglePlots
  * @property {() => void} showAll
@@ -64,6 +68,16 @@ export class Hotkeys {
         run: actions.deleteSelected,
         writes: true,
       },
+      { keys: ["ctrl+z"], shown: "Ctrl+Z", text: "Undo", run: actions.undo, writes: true },
+      {
+        keys: ["ctrl+shift+z", "ctrl+y"],
+        shown: "Ctrl+Shift+Z",
+        text: "Redo",
+        run: actions.redo,
+        writes: true,
+      },
+      { keys: ["ctrl+c"], shown: "Ctrl+C", text: "Copy the selected model", run: actions.copy, writes: true },
+      { keys: ["ctrl+v"], shown: "Ctrl+V", text: "Paste at the pointer", run: actions.paste, writes: true },
       { keys: ["v"], shown: "V", text: "Select and move models", run: () => tools.use("select") },
       { keys: ["h"], shown: "H", text: "Move the view only", run: () => tools.use("pan") },
       { keys: ["m"], shown: "M", text: "Measure distances", run: () => tools.use("measure") },
@@ -89,7 +103,7 @@ export class Hotkeys {
 
   /** @param {KeyboardEvent} event */
   press(event) {
-    if (event.defaultPrevented || event.ctrlKey || event.metaKey || event.altKey) return;
+    if (event.defaultPrevented || event.altKey) return;
     if (takesKey(event.target, event.key) || document.querySelector("dialog[open], :popover-open")) return;
     if (
       event.key === " " &&
@@ -97,11 +111,14 @@ export class Hotkeys {
       event.target.closest("button, summary, input")
     )
       return;
-    if (!event.shiftKey && this.tools.name === "select" && this.drive.press(event.code)) {
+    const isShortcut = event.ctrlKey || event.metaKey;
+    if (isShortcut && String(window.getSelection())) return; // The browser copies the selected text.
+    if (!isShortcut && !event.shiftKey && this.tools.name === "select" && this.drive.press(event.code)) {
       event.preventDefault();
       return;
     }
-    const key = event.key.toLowerCase();
+    const prefix = isShortcut ? `ctrl+${event.shiftKey ? "shift+" : ""}` : "";
+    const key = prefix + event.key.toLowerCase();
     const found = this.hotkeys.find((each) => each.keys.includes(key));
     if (!found || (found.writes && this.session.readOnly)) return;
     event.preventDefault();

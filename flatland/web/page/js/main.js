@@ -1,15 +1,18 @@
 import { Connection } from "./connection.js";
 import { byId, setText } from "./dom.js";
+import { Editing } from "./editing.js";
 import { Hotkeys } from "./hotkeys.js";
 import { Capture } from "./panels/capture.js";
 import { createConnectionBadge } from "./panels/connection_badge.js";
 import { createDisplays } from "./panels/displays.js";
 import { createDriveHint } from "./panels/drive_hint.js";
+import { HistoryBar } from "./panels/history_bar.js";
 import { Inspector } from "./panels/inspector.js";
 import { createModelList } from "./panels/model_list.js";
 import { ModelMenu } from "./panels/model_menu.js";
 import { createNotices } from "./panels/notices.js";
 import { Plots } from "./panels/plots.js";
+import { saveWorld } from "./panels/save_world.js";
 import { createScaleBar } from "./panels/scale_bar.js";
 import { createShare } from "./panels/share.js";
 import { SpawnDialog } from "./panels/spawn_dialog.js";
@@ -29,6 +32,7 @@ import { SelectTool } from "./tools/select_tool.js";
 import { SpawnTool } from "./tools/spawn_tool.js";
 import { createStick } from "./tools/stick.js";
 import { ToolBox } from "./tools/tool_box.js";
+import { redo, undo } from "./undo.js";
 import { ViewLink } from "./view_link.js";
 
 /** Returns the address of the WebSocket of the server that sent the page. */
@@ -54,14 +58,17 @@ const tools = new ToolBox({
 });
 const drive = new Drive(session);
 
+/** Returns the position of the mouse in the view, else the centre of the view. */
+function pastePlace() {
+  const { px, py } = pointer.hovered ?? hotkeys.center();
+  const [x, y] = stage.camera.toWorld(px, py);
+  return { x, y };
+}
+
+const editing = new Editing(session, pastePlace);
+
 async function deleteSelected() {
-  const { selected } = session;
-  if (!selected || session.readOnly) return;
-  if (await session.attempt("delete", { model: selected.id })) {
-    session.notify("info", `Deleted ${selected.name}`);
-    if (session.selectedName === selected.name) session.select(null);
-    stage.canvas.focus();
-  }
+  if (await editing.deleteSelected()) stage.canvas.focus();
 }
 
 function toggleFollow() {
@@ -79,6 +86,10 @@ const hotkeys = new Hotkeys(stage, session, tools, drive, {
   step: () => timeBar.step(),
   openSpawn: () => spawnDialog.open(),
   deleteSelected,
+  copy: () => editing.copy(),
+  paste: () => void editing.paste(),
+  undo: () => void undo(session),
+  redo: () => void redo(session),
   toggleFollow,
   togglePlots: () => plots.toggle(),
   showAll: () => session.worlds.size > 1 && session.show(null),
@@ -87,19 +98,35 @@ const hotkeys = new Hotkeys(stage, session, tools, drive, {
 hotkeys.createHelp();
 byId("help").addEventListener("click", () => help.showModal());
 
-new PointerInput(stage, session, tools, (spot, event) => {
+const pointer = new PointerInput(stage, session, tools, (spot, event) => {
   const model = selectTool.modelUnder(spot);
-  if (!model) return;
-  session.select(model.name);
+  if (model) session.select(model.name);
+  const items = model ? modelItems(model) : [];
+  if (!session.readOnly) {
+    if (editing.copied) items.push({ text: "Paste", icon: "paste", run: () => void editing.paste(spot) });
+    if (!model) items.push({ text: "Save world…", icon: "save", run: () => void saveWorld(session) });
+  }
+  if (items.length > 0) menu.open(event.clientX, event.clientY, items, stage.canvas);
+});
+
+/**
+ * Returns the menu items of a model.
+ *
+ * @param {import("./world_state.js").Model} model
+ */
+function modelItems(model) {
   const pose = session.world?.modelPose(model);
   /** @type {import("./panels/model_menu.js").Item[]} */
   const items = [
     { text: "Centre", icon: "center", run: () => void (pose && stage.centerOn(pose[0], pose[1])) },
     { text: "Follow", icon: "follow", run: () => stage.follow(model.name) },
   ];
-  if (!session.readOnly) items.push({ text: "Delete", icon: "delete", run: () => void deleteSelected() });
-  menu.open(event.clientX, event.clientY, items, stage.canvas);
-});
+  if (!session.readOnly) {
+    items.push({ text: "Copy", icon: "copy", run: () => editing.copy() });
+    items.push({ text: "Delete", icon: "delete", run: () => void deleteSelected() });
+  }
+  return items;
+}
 
 stage.overlay = (batch, labels, viewport, palette) => {
   selectTool.draw(batch, labels, viewport, palette);
@@ -108,6 +135,10 @@ stage.overlay = (batch, labels, viewport, palette) => {
 };
 
 createNotices(session);
+new HistoryBar(session);
+byId("undo").addEventListener("click", () => void undo(session));
+byId("reset").addEventListener("click", () => void editing.reset());
+byId("save-world").addEventListener("click", () => void saveWorld(session));
 createConnectionBadge(session, stage);
 createModelList(session, stage);
 createDisplays(session);

@@ -16,7 +16,7 @@
  *   angle_increment: number, count: number, range_max: number}} LaserInfo
  * @typedef {{name: string, color: number[], bodies: [number, number],
  *   anchors: [Point, Point]}} JointInfo  anchors in the frames of the two bodies
- * @typedef {{id: number, name: string, file: string | null, bodies: BodyInfo[], lasers: LaserInfo[],
+ * @typedef {{id: number, name: string, file: string | null, namespace?: string, bodies: BodyInfo[], lasers: LaserInfo[],
  *   joints: JointInfo[], commands: string[]}} ModelInfo
  * @typedef {{name: string, color: number[], edges: number}} LayerInfo
  * @typedef {{label: string, path: string}} ModelFile
@@ -41,12 +41,15 @@
  *   topics: TopicValue[]}} DetailsMessage
  * @typedef {{type: "values", world: number, time: number, series: Record<string, number>}} ValuesMessage
  * @typedef {{type: "frames", world: number, frames: FrameInfo[]}} FramesMessage
+ * @typedef {{moment: number, time: number, label: string}} Moment
+ * @typedef {{type: "history", world: number, moments: Moment[], current: number | null,
+ *   obstacle: string}} HistoryMessage
  * @typedef {{type: "gone", world: number}} GoneMessage
  * @typedef {{type: "notice", level: Level, text: string}} NoticeMessage
  * @typedef {{type: "reply", id: number, ok: true, result: unknown}
  *   | {type: "reply", id: number, ok: false, error: string}} ReplyMessage
  * @typedef {WorldMessage | ModelsMessage | StatusMessage | DetailsMessage | ValuesMessage
- *   | FramesMessage | GoneMessage} MessageOfWorld
+ *   | FramesMessage | HistoryMessage | GoneMessage} MessageOfWorld
  * @typedef {HelloMessage | NoticeMessage | MessageOfWorld} StateMessage
  *
  * Binary messages of the server:
@@ -59,7 +62,7 @@
  * @typedef {{id: number, pose: Pose, ranges: Float32Array}} Scan
  * @typedef {{kind: "scans", world: number, time: number, scans: Scan[]}} ScansData
  *
- * @typedef {{worlds: number[], scans: boolean, compact_scans: boolean, frames: boolean, inspect: number | null,
+ * @typedef {{worlds: number[], scans: boolean, compact_scans: boolean, frames: boolean, history: boolean, inspect: number | null,
  *   series: string[], hidden: boolean}} Demands  fields of `look`
  *
  * The requests of the page by type, with their fields and results.
@@ -75,7 +78,12 @@
  * @property {{fields: {model: number}, result: unknown}} release
  * @property {{fields: {file: string, name: string, pose: Pose, namespace: string}, result: unknown}} spawn
  * @property {{fields: {file: string}, result: {bodies: PreviewBody[]}}} preview
- * @property {{fields: {model: number}, result: unknown}} delete
+ * @property {{fields: {model: number}, result: {can_undo: boolean}}} delete
+ * @property {{fields: object, result: {text: string, effect: string}}} undo
+ * @property {{fields: object, result: {text: string, effect: string}}} redo
+ * @property {{fields: object, result: {can_undo: boolean, effect: string}}} reset
+ * @property {{fields: object, result: {text: string, name: string, folder: string, notes: string[]}}} save
+ * @property {{fields: {moment: number}, result: {effect?: string, superseded?: boolean}}} visit
  * @property {{fields: {model: number, command: string, linear: Point, angular: number},
  *   result: unknown}} drive
  * @property {{fields: object, result: ModelFile[]}} files

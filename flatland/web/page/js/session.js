@@ -16,8 +16,12 @@ import { WorldState } from "./world_state.js";
  * @property {void} redraw  something that is displayed has changed
  * @property {import("./protocol.js").DetailsMessage} details
  * @property {import("./protocol.js").ValuesMessage} values
- * @property {{level: import("./protocol.js").Level, text: string, topic: string}} notice  replaces
- *   those of its topic
+ * @property {WorldState} history  the earlier states of a world have changed
+ * @property {void} outdated  the edit of the last notice cannot be undone, or is not the last one
+ * @property {{level: import("./protocol.js").Level, text: string, topic: string,
+ *   action?: NoticeAction}} notice  replaces those of its topic
+ *
+ * @typedef {{text: string, run: () => void}} NoticeAction  a button of a notice
  */
 
 /** @type {Display[]} */
@@ -114,6 +118,7 @@ export class Session extends Emitter {
   async move(model, pose) {
     const name = this.world?.models.get(model)?.name;
     const answer = await this.attempt("move", { model, pose });
+    if (answer) this.emit("outdated", undefined);
     const overlap = answer?.result?.overlap;
     if (overlap) this.notify("warning", `Model "${name}" ${overlap}; the physics separates them`, "overlap");
   }
@@ -122,9 +127,19 @@ export class Session extends Emitter {
    * @param {import("./protocol.js").Level} level
    * @param {string} text
    * @param {string} [topic]  earlier notices of the same topic are removed
+   * @param {NoticeAction} [action]
    */
-  notify(level, text, topic = text) {
-    this.emit("notice", { level, text, topic });
+  notify(level, text, topic = text, action = undefined) {
+    this.emit("notice", { level, text, topic, ...(action && { action }) });
+  }
+
+  /**
+   * Reports what a time that was set back does to other programs.
+   *
+   * @param {string | undefined} effect  empty for nothing
+   */
+  notifySetBack(effect) {
+    if (effect) this.notify("warning", effect, "set back");
   }
 
   /**
@@ -197,6 +212,7 @@ export class Session extends Emitter {
       // The resolution of at most 1 mm is that of a pixel at 1000 pixels per metre.
       compact_scans: true,
       frames: this.displays.frames && this.world !== null,
+      history: this.world !== null && !this.readOnly,
       inspect: this.selected?.id ?? null,
       series: this.world ? [...this.series] : [],
       hidden: this.hidden,
@@ -266,6 +282,10 @@ export class Session extends Emitter {
       case "status":
         world.status = message;
         this.emit("status", world);
+        return;
+      case "history":
+        world.history = message;
+        this.emit("history", world);
         return;
       case "frames":
         world.frames = message.frames;

@@ -24,6 +24,7 @@ import { Trails } from "./trails.js";
  * @property {number} id
  * @property {string} name
  * @property {string} file
+ * @property {string} namespace
  * @property {Body[]} bodies
  * @property {import("./protocol.js").LaserInfo[]} lasers
  * @property {import("./protocol.js").JointInfo[]} joints
@@ -75,6 +76,9 @@ export class WorldState {
     this.frames = [];
     /** @type {import("./protocol.js").StatusMessage | null} */
     this.status = null;
+    /** Earlier states, null if the server has not sent them.
+     * @type {import("./protocol.js").HistoryMessage | null} */
+    this.history = null;
     this.time = 0;
     /** Pose of each slot: x, y, heading, 1 if it is known. */
     this.poses = new Float32Array(4 * INITIAL_SLOTS);
@@ -126,6 +130,7 @@ export class WorldState {
         id: info.id,
         name: info.name,
         file: info.file ?? "",
+        namespace: info.namespace ?? "",
         bodies: [],
         lasers: info.lasers,
         joints: info.joints,

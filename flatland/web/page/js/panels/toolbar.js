@@ -41,7 +41,16 @@ export function createToolbar(session, stage, tools, actions) {
   byId("zoom-out").addEventListener("click", actions.zoomOut);
 
   const updateWorld = () => {
-    for (const id of [...Object.keys(names), "spawn", "fit", "zoom-in", "zoom-out"]) {
+    for (const id of [
+      ...Object.keys(names),
+      "spawn",
+      "undo",
+      "reset",
+      "save-world",
+      "fit",
+      "zoom-in",
+      "zoom-out",
+    ]) {
       byId(id, HTMLButtonElement).disabled = session.world === null;
     }
   };

@@ -32,11 +32,17 @@ export class PointerInput {
     this.moved = false;
     /** @type {Spot | null} */
     this.start = null;
+    /** Position of the mouse in the view, null outside.
+     * @type {{px: number, py: number} | null} */
+    this.hovered = null;
     const { canvas } = stage;
     canvas.addEventListener("pointerdown", (event) => this.down(event));
     canvas.addEventListener("pointermove", (event) => this.move(event));
     canvas.addEventListener("pointerup", (event) => this.up(event));
     canvas.addEventListener("pointercancel", (event) => this.abort(event));
+    canvas.addEventListener("pointerleave", () => {
+      this.hovered = null;
+    });
     canvas.addEventListener("wheel", (event) => this.wheel(event), { passive: false });
     canvas.addEventListener("contextmenu", (event) => this.menu(event));
     canvas.addEventListener("dblclick", (event) => this.doubleClick(event));
@@ -80,6 +86,7 @@ export class PointerInput {
   move(event) {
     if (!this.session.world) return;
     const spot = this.spot(event);
+    this.hovered = spot;
     const before = this.pointers.get(event.pointerId);
     if (!before) {
       if (event.pointerType !== "touch") this.setCursor(this.tools.active.hover(spot));

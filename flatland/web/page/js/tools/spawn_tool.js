@@ -1,6 +1,7 @@
 import { composePoses } from "../geometry.js";
 import { packColor } from "../renderer/edge_batch.js";
 import { addArrow, addOutline } from "../renderer/outlines.js";
+import { notifyEdit } from "../undo.js";
 
 /**
  * @typedef {import("./tool_box.js").Spot} Spot
@@ -152,18 +153,19 @@ export class SpawnTool {
 }
 
 /**
- * Spawns a model and selects it.
+ * Spawns a model and selects it; returns whether it was spawned.
  *
  * @param {import("../session.js").Session} session
  * @param {string} file
  * @param {string} name
  * @param {string} namespace  empty to use the name
  * @param {Pose} pose
+ * @param {string} [text]  of the notice
  */
-export async function spawnModel(session, file, name, namespace, pose) {
+export async function spawnModel(session, file, name, namespace, pose, text = `Spawned ${name}`) {
   const fields = { file, name, pose, namespace: namespace || name };
-  if (await session.attempt("spawn", fields)) {
-    session.notify("info", `Spawned ${name}`);
-    session.select(name);
-  }
+  if (!(await session.attempt("spawn", fields))) return false;
+  notifyEdit(session, text);
+  session.select(name);
+  return true;
 }
