@@ -114,10 +114,12 @@ class Client:
         fields = message.fields
         self._worlds = fields.get("worlds", self._worlds)
         self._hidden = fields.get("hidden", self._hidden)
-        names = ("scans", "frames", "inspect", "series")
+        names = ("scans", "frames", "inspect", "series", "topics", "topic_values")
         self._view = dataclasses.replace(
             self._view, **{name: fields[name] for name in names if name in fields}
         )
+        for received in self._received.values():
+            received.keep_topics(self._view)
         self.update_feeds()
 
     def update_feeds(self) -> None:
