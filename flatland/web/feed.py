@@ -73,7 +73,9 @@ class WorldFeed:
         self.foreign_topics = foreign_topics
         self._topics: TopicMessages | None = None
         if foreign_topics is not None:
-            self._topics = TopicMessages(index, foreign_topics, self.audience.notify)
+            self._topics = TopicMessages(
+                index, foreign_topics, self.audience.notify, lambda: self.contents.head.time
+            )
 
     def next_message(self, received: Received, view: View) -> str | bytes | None:
         """Returns the next message for a client, None if the client has received all.

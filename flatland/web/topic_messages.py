@@ -30,17 +30,25 @@ class TopicMessages:
     each topic only.
     """
 
-    def __init__(self, index: int, source: ForeignTopics, notify: Callable[[], None]) -> None:
+    def __init__(
+        self,
+        index: int,
+        source: ForeignTopics,
+        notify: Callable[[], None],
+        now: Callable[[], float],
+    ) -> None:
         """Creates an object without topics.
 
         Args:
             index: Index of the world in messages.
             source: The topics.
             notify: Notifies all clients of new messages.
+            now: Returns the simulated time of the last capture [s].
         """
         self._index = index
         self._source = source
         self._notify = notify
+        self._now = now
         self._numbers: dict[str, int] = {}  # number of each topic in messages
         self._next_number = itertools.count(1)
         self._ticks = itertools.count(1)
@@ -112,7 +120,13 @@ class TopicMessages:
         for name, (kind, content) in encoded.items():
             self._drawings[name] = (next(self._ticks), kind, content)
         for name, value in update.values.items():
-            message = {"type": "topic_values", "world": self._index, "topic": name, "value": value}
+            message = {
+                "type": "topic_values",
+                "world": self._index,
+                "topic": name,
+                "time": self._now(),
+                "value": value,
+            }
             self._values[name] = (next(self._ticks), text_message(message))
         self._apply_list(update)
         self._notify()

@@ -33,7 +33,16 @@ test("changes of a task are one request to the server", async () => {
   session.select("robot");
   await settle();
   assert.deepEqual(connection.take("look"), [
-    { worlds: [0], scans: true, frames: true, inspect: ROBOT, series: ["/odom/pose/0"], hidden: false },
+    {
+      worlds: [0],
+      scans: true,
+      frames: true,
+      inspect: ROBOT,
+      series: ["/odom/pose/0"],
+      topics: [],
+      topic_values: [],
+      hidden: false,
+    },
   ]);
 });
 

@@ -23,6 +23,7 @@ import { Trails } from "./trails.js";
  * @typedef {object} Model
  * @property {number} id
  * @property {string} name
+ * @property {string} namespace  of its topics
  * @property {string} file
  * @property {Body[]} bodies
  * @property {import("./protocol.js").LaserInfo[]} lasers
@@ -125,6 +126,7 @@ export class WorldState {
       const model = {
         id: info.id,
         name: info.name,
+        namespace: info.namespace ?? "",
         file: info.file ?? "",
         bodies: [],
         lasers: info.lasers,

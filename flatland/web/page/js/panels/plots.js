@@ -1,4 +1,5 @@
 import { byId, element, icon, setPressed, setText } from "../dom.js";
+import { numbersIn } from "../foreign_topics.js";
 import { significant } from "../format.js";
 import { PlotCanvas } from "./plot_canvas.js";
 
@@ -6,6 +7,8 @@ import { PlotCanvas } from "./plot_canvas.js";
 const CAPACITY = 4000;
 const MAX_PLOTS = 12;
 const DRAW_PERIOD = 100;
+/** Simulated time by which values of other topics may be late [s]. */
+const LARGEST_DELAY = 1;
 
 /**
  * @typedef {object} Plot
@@ -45,6 +48,7 @@ export class Plots {
     });
     this.window.addEventListener("change", () => this.draw());
     session.on("values", (message) => this.receive(message));
+    session.topics.on("values", (message) => this.receiveTopic(message));
     session.on("current", () => this.clear());
     session.on("models", () => {
       if (!this.panel.hidden) this.refreshNames();
@@ -129,15 +133,26 @@ export class Plots {
     this.list.replaceChildren();
     this.plots.clear();
     this.showNames([]);
-    this.session.setSeries([]);
+    this.sendSeries();
     if (!this.panel.hidden) this.refreshNames();
   }
 
   sendSeries() {
-    this.session.setSeries(this.panel.hasAttribute("hidden") ? [] : [...this.plots.keys()]);
+    const names = this.panel.hasAttribute("hidden") ? [] : [...this.plots.keys()];
+    this.session.setSeries(names);
+    this.session.topics.setPlotted(names);
   }
 
-  /** @param {import("../protocol.js").ValuesMessage} message */
+  /** @param {import("../protocol.js").TopicValuesMessage} message */
+  receiveTopic(message) {
+    const series = numbersIn(message, this.plots.keys());
+    if (Object.keys(series).length === 0) return;
+    // The two kinds of values are sent independently, so that these may be slightly older.
+    const isOlder = message.time < this.time && this.time - message.time < LARGEST_DELAY;
+    this.receive({ time: isOlder ? this.time : message.time, series });
+  }
+
+  /** @param {Pick<import("../protocol.js").ValuesMessage, "time" | "series">} message */
   receive({ time, series }) {
     const isReset = time < this.time;
     this.time = time;
