@@ -31,10 +31,9 @@ def transform(
     """
     matrix = np.eye(4)
     matrix[:3, 3] = position
-    q = np.asarray(quaternion, float)
-    square = float(q @ q)
+    x, y, z, w = map(float, quaternion)  # of Python, which does not warn of infinities
+    square = x * x + y * y + z * z + w * w
     if square > 0:
-        x, y, z, w = q
         s = 2.0 / square
         matrix[:3, :3] = (
             (1 - s * (y * y + z * z), s * (x * y - z * w), s * (x * z + y * w)),

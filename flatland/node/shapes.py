@@ -9,7 +9,7 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
-from flatland.geometry import DoubleArray
+from flatland.geometry import MAX_MAGNITUDE, DoubleArray
 from flatland.web.foreign_topics import Colors, Marks
 
 Color = Sequence[float]
@@ -62,7 +62,7 @@ class Shapes:
             width: Width [m]; 0 for thin lines.
             colors: Colour of each line, shape (n, 4).
         """
-        widths = np.full((len(starts), 1), width)
+        widths = np.full((len(starts), 1), limited(width))
         self._lines.append(np.hstack((starts, ends, widths)))
         self._line_colors.append(colors)
 
@@ -91,7 +91,7 @@ class Shapes:
                 of 0 stands for a part of the length of the arrow.
             colors: Colour of each arrow, shape (n, 4).
         """
-        self._arrows.append(np.hstack((starts, ends, np.tile(sizes, (len(starts), 1)))))
+        self._arrows.append(np.hstack((starts, ends, np.tile(limited(sizes), (len(starts), 1)))))
         self._arrow_colors.append(colors)
 
     def extend(self, other: Shapes) -> None:
@@ -199,9 +199,21 @@ def packed_colors(colors: npt.ArrayLike) -> Colors:
 
 
 def transformed(matrix: DoubleArray, points: npt.ArrayLike) -> DoubleArray:
-    """Returns points, shape (..., 3), transformed by a matrix of shape (4, 4)."""
-    result: DoubleArray = np.asarray(points, float) @ matrix[:3, :3].T + matrix[:3, 3]
+    """Returns points, shape (..., 3), transformed by a matrix of shape (4, 4).
+
+    Numbers that are not finite, or too large for the world, become NaN.
+    """
+    result: DoubleArray = limited(points) @ matrix[:3, :3].T + matrix[:3, 3]
     return result
+
+
+def limited(values: npt.ArrayLike) -> DoubleArray:
+    """Returns numbers, of which those that are not finite or too large are replaced by NaN.
+
+    Unlike infinities, NaN results in no warnings of numpy.
+    """
+    numbers = np.asarray(values, float)
+    return np.where(np.abs(numbers) <= MAX_MAGNITUDE, numbers, np.nan)
 
 
 def _unit_box() -> DoubleArray:
@@ -254,6 +266,5 @@ def _stack_colors(parts: list[Colors]) -> Colors:
 
 
 def _finite(rows: DoubleArray, colors: Colors) -> tuple[DoubleArray, Colors]:
-    # Float32 has no larger finite numbers.
-    kept = (np.abs(rows) < 1e30).all(axis=1)
+    kept = np.isfinite(rows).all(axis=1)
     return rows[kept], colors[kept]

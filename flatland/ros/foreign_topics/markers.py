@@ -16,6 +16,7 @@ from flatland.node.shapes import (
     UNIT_CYLINDER,
     Shapes,
     colors_of,
+    limited,
     packed_colors,
     transformed,
 )
@@ -145,7 +146,7 @@ def _placed_points(marker: Any) -> DoubleArray:
 
 
 def _scale(marker: Any) -> DoubleArray:
-    return np.array((marker.scale.x, marker.scale.y, marker.scale.z), float)
+    return limited((marker.scale.x, marker.scale.y, marker.scale.z))
 
 
 def _arrow(marker: Any, shapes: Shapes) -> None:

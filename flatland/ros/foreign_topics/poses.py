@@ -9,7 +9,7 @@ import numpy as np
 
 from flatland.geometry import DoubleArray
 from flatland.node.frame_tree import transform
-from flatland.node.shapes import MAX_LINES, OWN_COLOR, Shapes, colors_of
+from flatland.node.shapes import MAX_LINES, OWN_COLOR, Shapes, colors_of, limited
 
 _POSE_LENGTH: Final = 0.7  # m
 _POSE_SIZES: Final = (0.08, 0.24, 0.24)  # m
@@ -65,9 +65,8 @@ def _arrows(poses: Sequence[Any], length: float, sizes: Sequence[float]) -> Shap
     shapes = Shapes()
     starts = points_of([each.position for each in poses])
     # The first column of the matrix of a quaternion is the direction of the x axis.
-    q = np.array(
-        [(o.x, o.y, o.z, o.w) for o in (each.orientation for each in poses)], float
-    ).reshape(-1, 4)
+    rotations = [(o.x, o.y, o.z, o.w) for o in (each.orientation for each in poses)]
+    q = limited(rotations).reshape(-1, 4)
     x, y, z, w = q.T
     square = np.maximum((q * q).sum(axis=1), 1e-12)
     columns = (1 - 2 * (y * y + z * z) / square, 2 * (x * y + z * w), 2 * (x * z - y * w))
