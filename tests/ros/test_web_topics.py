@@ -21,6 +21,10 @@ from visualization_msgs.msg import Marker, MarkerArray
 from web_client import WebClient
 
 NODE = "/flatland_server"
+BEACON = """
+bodies: [{name: mast, footprints: [{type: circle, radius: 0.1, density: 1}]}]
+plugins: [{type: ModelTfPublisher, name: tf, publish_tf_world: true, world_frame_id: map}]
+"""
 
 
 class TopicClient(WebClient):
@@ -75,8 +79,12 @@ class TopicClient(WebClient):
 
 @pytest.fixture(scope="module")
 def url(module_launcher: Any, write_world: Callable[..., Path]) -> str:
-    """A node with the viewer on any free port, for which no other node publishes transforms."""
-    world = write_world("[{name: robot, model: robot.model.yaml, pose: [1, 2, 0]}]")
+    """A node with the viewer on any free port; the frame `mast` is at (-2, -3)."""
+    world = write_world(
+        "[{name: robot, model: robot.model.yaml, pose: [1, 2, 0]},"
+        " {name: beacon, model: beacon.model.yaml, pose: [-2, -3, 0]}]",
+        beacon=BEACON,
+    )
     launch = module_launcher.launch(
         "flatland",
         "server.launch",
@@ -146,11 +154,14 @@ def test_frames_of_the_world_are_known_also_while_it_is_paused(
     client: TopicClient, publish: Any
 ) -> None:
     client.do("pause")
-    publish("/in_odom", path("odom"))
-    number = client.topic("/in_odom")["id"]
-    client.look(topics=["/in_odom"])
-    client.until("the path", lambda: len(client.lines.get(number, ())))
-    client.do("resume")
+    try:
+        publish("/from_beacon", path("mast"))
+        number = client.topic("/from_beacon")["id"]
+        client.look(topics=["/from_beacon"])
+        client.until("the path", lambda: len(client.lines.get(number, ())))
+        np.testing.assert_allclose(client.lines[number][:, :4], [[-2, -3, 0, -3]], atol=1e-5)
+    finally:
+        client.do("resume")
 
 
 def test_markers_and_a_grid(client: TopicClient, publish: Any) -> None:
@@ -248,7 +259,7 @@ def test_a_read_only_client_sees_topics_and_publishes_no_poses(url: str, ros: An
     viewer = url.replace("0123456789abcdef", "fedcba9876543210")
     with TopicClient(viewer) as client:
         assert client.hello["read_only"]
-        client.look(topics=["/map"], topic_values=["/odometry/filtered"])
+        client.look(topics=[], topic_values=["/odometry/filtered"])
         client.until("values", lambda: client.last("topic_values"))
         goal = {"purpose": "goal", "topic": "/move_base_simple/goal", "pose": [1, 2, 0]}
         assert client.refused("publish_pose", **goal) == "this viewer is read-only"
