@@ -88,6 +88,7 @@ class BrowserViewer:
                         _LOG.info("for viewers: %s", viewer.view_url)
                     return
             viewer.close()
+            self.close()
 
     def _open(self) -> WebViewer:
         """Returns a server that is started.

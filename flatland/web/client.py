@@ -118,8 +118,9 @@ class Client:
         self._view = dataclasses.replace(
             self._view, **{name: fields[name] for name in names if name in fields}
         )
+        seen = View() if self._hidden else self._view
         for received in self._received.values():
-            received.keep_topics(self._view)
+            received.keep_topics(seen)
         self.update_feeds()
 
     def update_feeds(self) -> None:

@@ -16,7 +16,7 @@ MAX_PATH: Final = 4096  # characters of the path of a file
 MAX_STEPS: Final = 10_000
 MAX_SERIES: Final = 64
 MAX_TOPICS: Final = 64  # topics of other programs that a client draws
-MAX_INSPECTED_TOPICS: Final = 16
+MAX_INSPECTED_TOPICS: Final = 32
 MAX_RATE: Final = 1e6  # Hz
 
 

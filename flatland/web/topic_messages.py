@@ -13,6 +13,7 @@ from flatland.errors import PLUGIN_FAULTS
 from flatland.web import encoding
 from flatland.web.encoding import Head, text_message
 from flatland.web.foreign_topics import Cells, ForeignTopics, Grid, Marks, TopicDemand, TopicUpdate
+from flatland.web.messages import MAX_NAME
 from flatland.web.views import Received, View
 
 _LOG = logging.getLogger("flatland")
@@ -132,7 +133,9 @@ class TopicMessages:
         self._notify()
 
     def _apply_list(self, update: TopicUpdate) -> None:
-        for topic in update.topics:
+        # A client could not select topics with longer names.
+        topics = [topic for topic in update.topics if len(topic.name) <= MAX_NAME]
+        for topic in topics:
             if topic.name not in self._numbers:
                 self._numbers[topic.name] = next(self._next_number)
         fields = {
@@ -144,7 +147,7 @@ class TopicMessages:
                     "drawn_as": topic.drawn_as or None,
                     "status": topic.status,
                 }
-                for topic in update.topics
+                for topic in topics
             ],
             "pose_topics": {kind: list(names) for kind, names in update.pose_topics.items()},
         }

@@ -106,6 +106,16 @@ test("a new connection keeps the selection and discards the drawings", () => {
   assert.deepEqual(session.demands().topics, ["/plan"]);
 });
 
+test("a page in the background discards its drawings, which the server sends again", () => {
+  const { connection, session, topics } = open();
+  topics.show("/plan", true);
+  connection.emit("data", marks(1));
+  session.setHidden(true);
+  assert.equal(topics.marks.size, 0);
+  session.setHidden(false);
+  assert.deepEqual(connection.take("probe look")[0].topics, ["/plan"]);
+});
+
 test("a pose is published in the namespace of the selected model if there is a topic", () => {
   const { topics } = open();
   assert.equal(topics.poseTopic("goal", ""), "/move_base_simple/goal");

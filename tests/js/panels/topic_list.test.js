@@ -52,6 +52,21 @@ test("a check box shows a topic, whose status is displayed at its entry", () => 
   assert.ok(!find(".status").hidden && find("[data-topic=/plan]").checked);
 });
 
+test("the number of topics that are drawn is limited", () => {
+  const { list, find, topics, session } = open();
+  const notices = [];
+  session.on("notice", ({ text }) => notices.push(text));
+  list(Array.from({ length: 33 }, (_, id) => ({ ...PLAN, id, topic: `/plan${id}` })));
+  for (let i = 0; i < 33; i++) {
+    const box = find(`[data-topic=/plan${i}]`);
+    box.checked = true;
+    dispatch(box, "change");
+  }
+  assert.equal(topics.shown.size, 32);
+  assert.ok(!find("[data-topic=/plan32]").checked);
+  assert.deepEqual(notices, ["At most 32 topics are shown"]);
+});
+
 test("a grid can have the colours of a costmap", () => {
   const { list, find, topics } = open();
   list([MAP]);

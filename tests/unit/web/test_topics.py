@@ -147,6 +147,10 @@ def test_marks_and_grids_are_sent_when_they_have_changed(url, source):
             client.ask("look", topics=["/map"])
             client.ask("look", topics=["/map", "/plan"])
             assert struct.unpack_from("<f", client.wait(5).payload, 16) == (5,)
+            # And one that was in the background.
+            client.ask("look", hidden=True)
+            client.ask("look", hidden=False)
+            assert struct.unpack_from("<f", client.wait(5).payload, 16) == (5,)
 
 
 def test_values_are_sent_to_those_who_inspect_a_topic(url, source):

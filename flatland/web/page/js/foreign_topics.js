@@ -17,6 +17,9 @@ import { Emitter } from "./events.js";
  * @property {void} redraw
  */
 
+/** Limits of what a page selects, below those of the server. */
+export const MAX_SHOWN = 32;
+export const MAX_INSPECTED = 16;
 /** Character between a topic and the path of a number in its values. */
 const SEPARATOR = ":";
 
@@ -108,11 +111,16 @@ export class ForeignTopics extends Emitter {
   /** Forgets what the server has sent, for a new connection; the selection of the user remains. */
   reset() {
     this.entries = null;
+    this.clear();
+    this.emit("list", undefined);
+  }
+
+  /** Removes all drawings; the server sends them again to a page that becomes visible. */
+  clear() {
     this.marks.clear();
     this.grids.clear();
     this.latestGrids.clear();
     this.gridsVersion++;
-    this.emit("list", undefined);
   }
 
   /** @param {import("./protocol.js").TopicsMessage} message */

@@ -175,6 +175,7 @@ export class Session extends Emitter {
   /** @param {boolean} hidden  whether the page is in the background */
   setHidden(hidden) {
     this.hidden = hidden;
+    if (hidden) this.topics.clear();
     if (!hidden) this.connection.probe("look", this.demands());
     else if (this.ready) this.connection.request("look", this.demands()).catch(() => {});
   }

@@ -1,5 +1,5 @@
 import { byId, element, icon, setPressed, setText } from "../dom.js";
-import { seriesName } from "../foreign_topics.js";
+import { MAX_INSPECTED, MAX_SHOWN, seriesName } from "../foreign_topics.js";
 import { updateTree } from "./value_tree.js";
 
 /**
@@ -102,6 +102,11 @@ export function createTopicList(session, plot) {
       icon("values"),
     );
     inspect.addEventListener("click", () => {
+      const isFull = topics.inspected.size >= MAX_INSPECTED && !topics.inspected.has(topic);
+      if (isFull) {
+        session.notify("warning", `The values of at most ${MAX_INSPECTED} topics are shown`);
+        return;
+      }
       topics.inspect(topic, !topics.inspected.has(topic));
       tree.replaceChildren();
       tree.removeAttribute("data-shape");
@@ -112,7 +117,12 @@ export function createTopicList(session, plot) {
     let box = null;
     if (drawn_as) {
       const shown = element("input", { type: "checkbox", "data-topic": topic });
-      shown.addEventListener("change", () => topics.show(topic, shown.checked));
+      shown.addEventListener("change", () => {
+        if (shown.checked && topics.shown.size >= MAX_SHOWN) {
+          shown.checked = false;
+          session.notify("warning", `At most ${MAX_SHOWN} topics are shown`);
+        } else topics.show(topic, shown.checked);
+      });
       const swatch = element("span", { class: `swatch series-${id % 8}`, "aria-hidden": "true" });
       head.append(element("label", {}, shown, drawn_as === "marks" ? swatch : "", name));
       box = shown;
