@@ -18,7 +18,12 @@ from nav_msgs.msg import Path as PathMessage
 from std_msgs.msg import Float64
 from tf2_msgs.msg import TFMessage
 from visualization_msgs.msg import Marker, MarkerArray
+from waiting import TIMEOUT
 from web_client import WebClient
+
+from flatland.ros.foreign_topics.topics import _WatchedTopic
+from flatland.ros.transport.registrar import Registrar
+from flatland.ros.transport.ros_transport import RosTransport
 
 NODE = "/flatland_server"
 BEACON = """
@@ -263,3 +268,22 @@ def test_a_read_only_client_sees_topics_and_publishes_no_poses(url: str, ros: An
         client.until("values", lambda: client.last("topic_values"))
         goal = {"purpose": "goal", "topic": "/move_base_simple/goal", "pose": [1, 2, 0]}
         assert client.refused("publish_pose", **goal) == "this viewer is read-only"
+
+
+def test_a_topic_to_which_a_plugin_subscribes_is_shared(ros: Any) -> None:
+    """All subscribers of a node for a topic have the same message class."""
+    registrar = Registrar()
+    transport = RosTransport(registrar)
+    used = [
+        transport.subscribe("/plain_grid", OccupancyGrid, lambda _message: None),
+        transport.subscribe("/number", Float64, lambda _message: None),
+    ]
+    grid = _WatchedTopic(transport, "/plain_grid", "nav_msgs/OccupancyGrid", is_drawn=True)
+    assert grid.status == "no message received"
+    other = _WatchedTopic(transport, "/number", "nav_msgs/Path", is_drawn=True)
+    assert "has the type std_msgs/Float64 already" in other.status
+    unknown = _WatchedTopic(transport, "/unknown", "no_such_msgs/Thing", is_drawn=False)
+    assert unknown.status == "the message package of no_such_msgs/Thing is not installed"
+    for each in (*used, grid, other, unknown):
+        each.close()
+    registrar.close(TIMEOUT)

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import contextlib
 from collections import deque
+from concurrent.futures import CancelledError
 from typing import Any, Final
 
+from flatland.errors import FlatlandError
 from flatland.geometry import quaternion_from_yaw
 from flatland.node.frame_tree import FrameTree, transform
 from flatland.node.transport import Transport
@@ -74,8 +76,9 @@ class TransformSubscription:
         """
         self._frames = frames
         world = simulation.world
-        latest = simulation.post(lambda: list(world.transforms.values()))
-        with contextlib.suppress(TimeoutError):
+        # A closed world raises an error or cancels the request.
+        with contextlib.suppress(TimeoutError, CancelledError, FlatlandError):
+            latest = simulation.post(lambda: list(world.transforms.values()))
             for each in latest.result(_SEED_TIMEOUT):
                 rotation = quaternion_from_yaw(each.yaw, each.roll)
                 frames.set(each.parent, each.child, transform((each.x, each.y, 0.0), rotation))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import threading
 import time
 from collections.abc import Callable
@@ -26,6 +27,8 @@ from flatland.ros.transport.ros_transport import RosTransport
 from flatland.simulation import Simulation
 from flatland.values import OccupancyGrid
 from flatland.web.foreign_topics import Drawing, Marks, PoseKind, Topic, TopicDemand, TopicUpdate
+
+_LOG = logging.getLogger("flatland")
 
 VALUES_PERIOD: Final = 0.2  # s of wall time between two values of a topic
 _GRID: Final = "nav_msgs/OccupancyGrid"
@@ -171,19 +174,20 @@ class _WatchedTopic:
         self._transport = transport
         self._name = name
         self._problem = ""
-        self._invalid = ""  # why the last message cannot be drawn
         self._subscriptions: list[TopicSubscription] = []
         self._values_due = 0.0
         self._inspected: Any = None  # the message of the last values
         if is_drawn and kind in _DRAWERS:
             self.drawer = _DRAWERS[kind]()
-        self._subscribe(name, kind)
+        self._has_updates = kind == _GRID and is_drawn  # until they are subscribed to
+        # Why there is no subscription, or why the last message cannot be drawn.
+        self._invalid = self._subscribe(name, kind)
 
     @property
     def status(self) -> str:
         """Why nothing or only a part is shown; empty if everything is."""
-        if self._problem:
-            return self._problem
+        if self._problem or self._invalid:
+            return self._problem or self._invalid
         if self._subscriptions[0].latest is None:
             return "no message received"
         return self.drawer.note if self.drawer is not None else ""
@@ -196,22 +200,25 @@ class _WatchedTopic:
     def watch_updates(self, graph: Graph) -> None:
         """Subscribes to the updates of a grid as soon as they are published."""
         name = f"{self._name}_updates"
-        is_complete = len(self._subscriptions) != 1 or self.type != _GRID or not self.is_drawn
-        if not is_complete and graph.published.get(name) == _GRID_UPDATE:
-            self._subscribe(name, _GRID_UPDATE)
+        if self._has_updates and graph.published.get(name) == _GRID_UPDATE:
+            self._has_updates = False
+            problem = self._subscribe(name, _GRID_UPDATE)
+            if problem:
+                _LOG.info("web viewer: %s is not updated: %s", self._name, problem)
 
-    def _subscribe(self, name: str, kind: str) -> None:
-        found = _message_class(self._transport, kind)
-        if found is None:
-            self._problem = f"the message package of {kind} is not installed"
-            return
+    def _subscribe(self, name: str, kind: str) -> str:
+        """Subscribes asynchronously; returns why it cannot, empty if it can."""
         keeps_all = isinstance(self.drawer, MarkerDrawer) or kind == _GRID_UPDATE
-        try:
-            subscription = TopicSubscription(self._transport, name, found, keeps_all=keeps_all)
-        except FlatlandError as error:
-            self._problem = str(error)
-        else:
-            self._subscriptions.append(subscription)
+        problem = f"the message package of {kind} is not installed"
+        for found in _message_classes(self._transport, kind):
+            try:
+                subscription = TopicSubscription(self._transport, name, found, keeps_all=keeps_all)
+            except FlatlandError as error:
+                problem = str(error)
+            else:
+                self._subscriptions.append(subscription)
+                return ""
+        return problem
 
     def draw(self, frames: FrameTree) -> Drawing | None:
         """Returns the drawing if it has changed.
@@ -258,11 +265,14 @@ def _drawn_as(kind: str) -> Literal["marks", "grid", ""]:
     return "marks" if kind in _DRAWERS else ""
 
 
-def _message_class(transport: RosTransport, kind: str) -> Any:
-    """Returns a message class, None if it is not installed."""
-    if kind == _GRID:  # The class that other parts of the node use for the same topic.
-        return transport.receivable(OccupancyGrid)[0]
+def _message_classes(transport: RosTransport, kind: str) -> list[Any]:
+    """Returns the message classes of a type, the fastest first; none if it is not installed.
+
+    All subscribers of a node for a topic have the same class, and a plugin may be one of them.
+    """
+    classes = [transport.receivable(OccupancyGrid)[0]] if kind == _GRID else []
     try:
-        return genpy.message.get_message_class(kind)
+        plain = genpy.message.get_message_class(kind)
     except (ImportError, ValueError):
-        return None
+        plain = None
+    return classes if plain is None else [*classes, plain]
