@@ -66,7 +66,7 @@ class RosTopics:
         self._transforms: TransformSubscription | None = None
         self._watched: dict[str, _WatchedTopic] = {}
         self._pose_publisher = PosePublisher(transport, self._graph)
-        self._lock = threading.Lock()  # `close` may interrupt an update
+        self._lock = threading.Lock()  # `close` may be called during an update
         self._closed = False
 
     def update(self, demand: TopicDemand) -> TopicUpdate:
