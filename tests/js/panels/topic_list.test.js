@@ -52,6 +52,18 @@ test("a check box shows a topic, whose status is displayed at its entry", () => 
   assert.ok(!find(".status").hidden && find("[data-topic=/plan]").checked);
 });
 
+test("a control keeps the focus when other topics appear", () => {
+  const { list, find } = open();
+  list([PLAN]);
+  const box = find("[data-topic=/plan]");
+  box.focus();
+  let focused = 0;
+  box.focus = () => focused++;
+  list([MAP, PLAN]);
+  assert.equal(find("[data-topic=/plan]"), box);
+  assert.equal(focused, 1);
+});
+
 test("the number of topics that are drawn is limited", () => {
   const { list, find, topics, session } = open();
   const notices = [];

@@ -57,6 +57,7 @@ export function createTopicList(session, plot) {
   /** @param {TopicEntry[]} entries */
   const rebuild = (entries) => {
     const before = rows;
+    const focused = document.activeElement;
     const wasOpen = list.querySelector("details")?.open ?? false;
     rows = new Map();
     /** @type {Map<string, HTMLElement[]>} */
@@ -80,6 +81,8 @@ export function createTopicList(session, plot) {
       const isOpen = wasOpen || filter.value !== "";
       list.append(element("details", { class: "sub", open: isOpen }, summary, ...others));
     }
+    // Elements that are inserted again have lost the focus.
+    if (focused instanceof HTMLElement && list.contains(focused)) focused.focus();
     if (entries.length === 0) list.append(element("p", { class: "muted" }, "No topics"));
   };
 
