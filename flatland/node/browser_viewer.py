@@ -14,7 +14,7 @@ from flatland.node.transport import REGISTRATION_TIMEOUT
 if TYPE_CHECKING:
     from flatland.node.operations import Operations
     from flatland.node.parameters import NodeParameters
-    from flatland.node.transport import Transport
+    from flatland.node.transport import ForeignTopicsConnection, Transport
     from flatland.simulation import Simulation
     from flatland.web import WebViewer
 
@@ -54,6 +54,7 @@ class BrowserViewer:
         self._lock = threading.Lock()
         self._closing = threading.Event()
         self._viewer: WebViewer | None = None
+        self._topics: ForeignTopicsConnection | None = None
         thread = threading.Thread(target=self._start, name="flatland-web-start", daemon=True)
         # The outer action runs before the first step, the inner one after it.
         simulation.post(lambda: simulation.post(thread.start))
@@ -65,6 +66,9 @@ class BrowserViewer:
             if self._viewer is not None:
                 self._viewer.close()
                 self._viewer = None
+            if self._topics is not None:
+                self._topics.close()
+                self._topics = None
 
     def _start(self) -> None:
         """Starts the server, or logs why it cannot start."""
@@ -84,6 +88,7 @@ class BrowserViewer:
                         _LOG.info("for viewers: %s", viewer.view_url)
                     return
             viewer.close()
+            self.close()
 
     def _open(self) -> WebViewer:
         """Returns a server that is started.
@@ -102,9 +107,13 @@ class BrowserViewer:
             view_token=parameters.web_view_token,
             read_only=parameters.web_read_only,
         )
+        topics = self._topics = self._transport.load_foreign_topics()(self._simulation)
         try:
             viewer.add_world(
-                self._simulation.world, simulation=self._simulation, controller=self._operations
+                self._simulation.world,
+                simulation=self._simulation,
+                controller=self._operations,
+                foreign_topics=topics,
             )
             self._listen(viewer)
         except BaseException:

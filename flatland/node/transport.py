@@ -17,7 +17,15 @@ if TYPE_CHECKING:
     from flatland.node.ticker import TickerThread
     from flatland.runtime.requests import Post, Requests
     from flatland.simulation import Simulation
+    from flatland.web.foreign_topics import ForeignTopics
     from flatland.world import World
+
+    class ForeignTopicsConnection(ForeignTopics, Protocol):
+        """Topics of other nodes, until `close`."""
+
+        def close(self) -> None:
+            """Unsubscribes and unregisters everything."""
+
 
 OnConnection = Callable[[bool], object]
 """Called in any thread whenever a subscriber may have connected or disconnected, with whether there
@@ -380,3 +388,11 @@ class Transport(ABC):
     @abstractmethod
     def load_handle_server(self) -> Callable[[Post, Handles], HandleServer]:
         """Imports the server of interactive markers, and returns the function that starts it."""
+
+    @abstractmethod
+    def load_foreign_topics(self) -> Callable[[Simulation], ForeignTopicsConnection]:
+        """Imports the connection of the viewer in the browser with topics of other nodes.
+
+        Returns:
+            A function that creates it for a simulation; called in any thread.
+        """

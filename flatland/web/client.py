@@ -114,11 +114,23 @@ class Client:
         fields = message.fields
         self._worlds = fields.get("worlds", self._worlds)
         self._hidden = fields.get("hidden", self._hidden)
-        names = ("scans", "compact_scans", "frames", "inspect", "series", "history")
+        names = (
+            "scans",
+            "compact_scans",
+            "frames",
+            "inspect",
+            "series",
+            "history",
+            "topics",
+            "topic_values",
+        )
         view = {name: fields[name] for name in names if name in fields}
         if self.read_only:
             view["history"] = False  # Its snapshots are for those who can return to them.
         self._view = dataclasses.replace(self._view, **view)
+        seen = View() if self._hidden else self._view
+        for received in self._received.values():
+            received.keep_topics(seen)
         self.update_feeds()
 
     def update_feeds(self) -> None:

@@ -9,7 +9,7 @@ from collections.abc import Awaitable, Callable, Hashable
 from functools import partial
 from typing import TYPE_CHECKING, Any, Final, TypeVar
 
-from flatland.errors import WorldError
+from flatland.errors import FlatlandError, WorldError
 from flatland.loading.model_source import ModelSpec, spec_of
 from flatland.loading.saved_world import SavedWorld
 from flatland.plugin_api.plugin import describe
@@ -242,6 +242,20 @@ class Commands:
 
         return await feed.requests.run(describe_all)
 
+    # -- topics of other programs ----------------------------------------------------------
+
+    async def _publish_pose(self, _client: Client, feed: WorldFeed, fields: Any) -> dict[str, bool]:
+        topics = feed.foreign_topics
+        if topics is None:
+            raise FlatlandError("this program is not connected to other programs")
+        kind, topic, pose = fields["purpose"], fields["topic"], fields["pose"]
+
+        async def publish() -> dict[str, bool]:
+            return {"received": await asyncio.to_thread(topics.publish_pose, kind, topic, pose)}
+
+        # One of each kind at a time, so that clients occupy few threads.
+        return await self._newest.run(("publish_pose", feed, kind), publish)  # type: ignore[no-any-return]
+
     # -- holds and robots without further requests -----------------------------------------
 
     async def watch(self) -> None:
@@ -379,4 +393,5 @@ _ACTIONS: Final[dict[str, Callable[..., Awaitable[Any]]]] = {
     "drive": Commands._drive,
     "files": Commands._files,
     "describe_series": Commands._describe_series,
+    "publish_pose": Commands._publish_pose,
 }

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import json
 import struct
+import zlib
 from collections.abc import Sequence
 from typing import Any, Final, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from flatland.geometry import DoubleArray, FloatArray
+from flatland.geometry import DoubleArray, FloatArray, Pose
+from flatland.web.foreign_topics import Cells, Marks
 from flatland.web.scan_codes import codes_of, has_codes
 
 VERSION: Final = 1
@@ -19,11 +21,14 @@ POSES: Final = 2
 SCANS: Final = 3
 SAME_BODIES: Final = 4
 COMPACT_SCANS: Final = 5
+MARKS: Final = 6
+GRID: Final = 7
 
 _HEADER: Final = struct.Struct("<BBHId")
 _TWO_COUNTS: Final = struct.Struct("<II")
-_THREE_COUNTS: Final = struct.Struct("<III")
 _COUNT: Final = struct.Struct("<I")
+_THREE_COUNTS: Final = struct.Struct("<III")
+_GRID: Final = struct.Struct("<II4f")
 
 Ids = npt.NDArray[np.uint32]
 
@@ -126,3 +131,48 @@ def compact_scan_group(
     data = b"".join([column.tobytes() for column in columns])
     padding = bytes(-len(data) % 4)
     return _THREE_COUNTS.pack(*ranges.shape, bits) + data + padding
+
+
+def topic_message(head: Head, kind: int, topic: int, content: bytes) -> bytes:
+    """Returns the message of a drawing of a topic.
+
+    Args:
+        head: Header.
+        kind: `MARKS` or `GRID`.
+        topic: Number of the topic in the message `topics`.
+        content: Returned by `marks_content` or `grid_content`.
+    """
+    return head.packed(kind) + _COUNT.pack(topic) + content
+
+
+def marks_content(marks: Marks) -> bytes:
+    """Encodes the marks of a topic."""
+    texts = json.dumps(list(marks.texts), separators=(",", ":")).encode() if marks.texts else b""
+    return b"".join(
+        (
+            _THREE_COUNTS.pack(len(marks.lines), len(marks.triangles), len(texts)),
+            marks.lines.astype("<f4").tobytes(),
+            marks.triangles.astype("<f4").tobytes(),
+            marks.line_colors.tobytes(),
+            marks.triangle_colors.tobytes(),
+            texts,
+        )
+    )
+
+
+def compressed_cells(cells: Cells) -> bytes:
+    """Compresses the cells of a grid, row by row; does not hold the GIL."""
+    return zlib.compress(np.ascontiguousarray(cells).data, 1)
+
+
+def grid_content(pose: Pose, resolution: float, shape: tuple[int, ...], compressed: bytes) -> bytes:
+    """Encodes a grid.
+
+    Args:
+        pose: Pose of the corner of the first cell in the world frame [m, rad].
+        resolution: Length of a cell [m].
+        shape: Number of rows and columns.
+        compressed: The cells, returned by `compressed_cells`.
+    """
+    height, width = shape
+    return _GRID.pack(width, height, *pose, resolution) + compressed

@@ -13,10 +13,12 @@ from flatland.scene.description import LayerDescription
 from flatland.web.capture import CapturedWorld, WorldCapture
 from flatland.web.contents import WorldContents
 from flatland.web.controller import WorldController
+from flatland.web.foreign_topics import ForeignTopics
 from flatland.web.history import MAX_AGE, History, Timeline
 from flatland.web.latest_scans import LatestScans
 from flatland.web.optional_messages import OptionalMessages
 from flatland.web.status import STALE_TIMEOUT, WorldStatus
+from flatland.web.topic_messages import TopicMessages
 from flatland.web.views import Audience, Demand, Received, View
 from flatland.web.world_requests import WorldRequests
 from flatland.world import World
@@ -38,6 +40,7 @@ class WorldFeed:
         requests: Requests of the server to the world.
         contents: Layers, models and poses of the world.
         history: Earlier states of the world; used between two steps.
+        foreign_topics: Topics of other programs, None without a connection to them.
     """
 
     def __init__(
@@ -47,6 +50,7 @@ class WorldFeed:
         world: World,
         controller: WorldController,
         ids: Iterator[int],
+        foreign_topics: ForeignTopics | None = None,
     ) -> None:
         """Creates a feed without clients, in any thread.
 
@@ -56,6 +60,7 @@ class WorldFeed:
             world: The world.
             controller: Performs the requests of clients.
             ids: Returns ids that have not been used.
+            foreign_topics: Topics of other programs.
         """
         self.index, self.name, self.world, self.controller = index, name, world, controller
         self.audience = Audience()
@@ -68,6 +73,12 @@ class WorldFeed:
         self._status = WorldStatus(index)
         self._optional = OptionalMessages(index, world)
         self._stale_timer: asyncio.TimerHandle
+        self.foreign_topics = foreign_topics
+        self._topics: TopicMessages | None = None
+        if foreign_topics is not None:
+            self._topics = TopicMessages(
+                index, foreign_topics, self.audience.notify, lambda: self.contents.head.time
+            )
 
     def next_message(self, received: Received, view: View) -> str | bytes | None:
         """Returns the next message for a client, None if the client has received all.
@@ -83,7 +94,10 @@ class WorldFeed:
         message = message or contents.next_poses(received)
         if message is None and view.scans:
             message = self._scans.next_message(received, contents.head, compact=view.compact_scans)
-        return message or self._optional.next_message(received, view)
+        message = message or self._optional.next_message(received, view)
+        if message is None and self._topics is not None:
+            message = self._topics.next_message(received, view, contents.head)
+        return message
 
     def find_model(self, number: int) -> Model:
         """Returns the model with an id; must be called between two steps.
@@ -110,6 +124,7 @@ class WorldFeed:
     async def run(self) -> None:
         """Captures the world while there are clients, until the world is closed."""
         loop = asyncio.get_running_loop()
+        topics = None if self._topics is None else asyncio.create_task(self._topics.run())
         try:
             while not self.world.closed:
                 if self.audience.empty:
@@ -120,6 +135,8 @@ class WorldFeed:
                 self.audience.notify()
                 await asyncio.sleep(max(began + PERIOD - loop.time(), 0.001))
         finally:
+            if topics is not None:
+                topics.cancel()
             self._end_capture()
 
     async def _wait_for_audience(self) -> None:
@@ -137,6 +154,8 @@ class WorldFeed:
         self._status.restart()
         self._scans.clear()
         self._optional.clear()
+        if self._topics is not None:
+            self._topics.want(None)
 
     def _end_capture(self) -> None:
         if not self.world.closed:
@@ -144,6 +163,8 @@ class WorldFeed:
 
     async def _update(self, now: float) -> None:
         demand = self.audience.demand(now, self._layers_changed)
+        if self._topics is not None:
+            self._topics.want(self.audience.topic_demand())
         self._layers_changed = False
         loop = asyncio.get_running_loop()
         self._stale_timer = loop.call_later(STALE_TIMEOUT, self._report_stale)

@@ -15,6 +15,8 @@ MAX_NAME: Final = 200  # characters of a name
 MAX_PATH: Final = 4096  # characters of the path of a file
 MAX_STEPS: Final = 10_000
 MAX_SERIES: Final = 64
+MAX_TOPICS: Final = 64  # topics of other programs that a client draws
+MAX_INSPECTED_TOPICS: Final = 32
 MAX_RATE: Final = 1e6  # Hz
 
 
@@ -103,6 +105,15 @@ def _optional(check: Check) -> Check:
     return lambda value: None if value is None else check(value)
 
 
+def _choice(*choices: str) -> Check:
+    def check(value: object) -> str:
+        if value not in choices:
+            raise ValueError(" or ".join(choices))
+        return str(value)
+
+    return check
+
+
 _ID: Final = _integer(0, 2**32 - 1)
 _INDEX: Final = _integer(0, 2**16 - 1)
 _SPEED: Final = _number(-1e6, 1e6)
@@ -119,6 +130,8 @@ _FIELDS: Final[dict[str, tuple[dict[str, Check], dict[str, Check]]]] = {
             "frames": _boolean,
             "inspect": _optional(_ID),
             "series": _list(_text(MAX_PATH), 0, MAX_SERIES),
+            "topics": _optional(_list(_text(MAX_NAME), 0, MAX_TOPICS)),
+            "topic_values": _list(_text(MAX_NAME), 0, MAX_INSPECTED_TOPICS),
             "hidden": _boolean,
             "history": _boolean,
         },
@@ -147,6 +160,14 @@ _FIELDS: Final[dict[str, tuple[dict[str, Check], dict[str, Check]]]] = {
     ),
     "files": ({}, {}),
     "describe_series": ({}, {}),
+    "publish_pose": (
+        {
+            "purpose": _choice("goal", "initial_pose"),
+            "topic": _text(MAX_NAME),
+            "pose": _pose,
+        },
+        {},
+    ),
 }
 READ_ONLY_TYPES: Final = frozenset({"look", "preview", "files", "describe_series"})
 

@@ -26,6 +26,7 @@ from flatland.web.acceptor import Acceptor
 from flatland.web.access import Access
 from flatland.web.controller import WorldController, controller_of
 from flatland.web.feed import WorldFeed
+from flatland.web.foreign_topics import ForeignTopics
 from flatland.web.hub import Hub
 from flatland.web.server import Server
 from flatland.world import World
@@ -233,6 +234,7 @@ class WebViewer:
         name: str = "",
         simulation: Simulation | None = None,
         controller: WorldController | None = None,
+        foreign_topics: ForeignTopics | None = None,
     ) -> WorldHandle:
         """Shows a world; safe from any thread.
 
@@ -243,6 +245,7 @@ class WebViewer:
             simulation: The simulation that steps the world, if there is one.
             controller: Performs the requests of clients; None for a controller that acts on the
                 world and the simulation.
+            foreign_topics: Topics of other programs that clients can show, None for none.
 
         Returns:
             The handle for `remove_world`.
@@ -260,7 +263,7 @@ class WebViewer:
             used = {handle.index for handle in self._shown}
             index = next(n for n in range(len(used) + 1) if n not in used)
             handle = WorldHandle(index, name)
-            feed = WorldFeed(index, name, world, controller, self._ids)
+            feed = WorldFeed(index, name, world, controller, self._ids, foreign_topics)
             observer = _FeedObserver(
                 layer_changed=lambda: self._call(feed.layers_changed),
                 detached=lambda: self.remove_world(handle),

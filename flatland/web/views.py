@@ -8,6 +8,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Final
 
+from flatland.web.foreign_topics import TopicDemand
+
 DETAILS_PERIOD: Final = 0.2  # s of wall time between two messages `details`
 FRAMES_PERIOD: Final = 0.1  # s of wall time between two messages `frames`
 
@@ -23,6 +25,8 @@ class View:
         inspect: Id of the model that is inspected, None for none.
         series: Names of the numbers that are plotted.
         history: Whether to keep earlier states of the world, and to send their times.
+        topics: Names of the topics of other programs that are drawn; None if they are not listed.
+        topic_values: Names of the topics of other programs whose values are shown.
     """
 
     scans: bool = False
@@ -31,6 +35,8 @@ class View:
     inspect: int | None = None
     series: tuple[str, ...] = ()
     history: bool = False
+    topics: tuple[str, ...] | None = None
+    topic_values: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,6 +78,9 @@ class Received:
         frames: Number of the capture of the frames.
         values: Number of the capture of the plotted numbers.
         history: Number of the capture of the history.
+        topics: Version of the list of topics of other programs.
+        drawings: Version of the drawing of each topic that is drawn.
+        topic_values: Version of the values of each topic.
     """
 
     world: int = -1
@@ -85,6 +94,20 @@ class Received:
     frames: int = -1
     values: int = -1
     history: int = -1
+    topics: int = -1
+    drawings: dict[str, int] = field(default_factory=dict)
+    topic_values: dict[str, int] = field(default_factory=dict)
+
+    def keep_topics(self, view: View) -> None:
+        """Forgets topics that the client does not look at, and so receives again when it does."""
+        if view.topics is None:
+            self.topics = -1
+        for received, names in (
+            (self.drawings, view.topics or ()),
+            (self.topic_values, view.topic_values),
+        ):
+            for name in [name for name in received if name not in names]:
+                del received[name]
 
 
 class Audience:
@@ -149,3 +172,13 @@ class Audience:
         if demand.details:
             self._details_due = now + DETAILS_PERIOD
         return demand
+
+    def topic_demand(self) -> TopicDemand | None:
+        """Returns what clients look at of other programs, None if no client lists their topics."""
+        views = [view for view in self._views.values() if view.topics is not None]
+        if not views:
+            return None
+        return TopicDemand(
+            drawn=frozenset(name for view in views for name in view.topics or ()),
+            inspected=frozenset(name for view in views for name in view.topic_values),
+        )

@@ -256,6 +256,11 @@ export function settle() {
   return new Promise((resolve) => setImmediate(resolve));
 }
 
+/** Waits until a condition holds, which depends on work outside of the page's own tasks. */
+export async function eventually(condition) {
+  while (!condition()) await settle();
+}
+
 let frames = [];
 
 /** Calls the functions that wait for the next frame. */

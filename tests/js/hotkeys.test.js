@@ -34,6 +34,8 @@ function open(options) {
     pan: new PanTool(),
     measure: new MeasureTool(stage),
     spawn: new SpawnTool(session, stage),
+    goal: new PanTool(),
+    initial_pose: new PanTool(),
   });
   const drive = new Drive(session);
   const calls = [];
@@ -70,6 +72,23 @@ test("keys run their actions", () => {
   press("Escape");
   assert.equal(tools.name, "select");
   for (const key of ["x", "Backspace"]) assert.ok(!press(key), key);
+});
+
+test("keys of tools that publish poses require topics of other programs", () => {
+  const { session, elements, hotkeys, tools } = open();
+  assert.ok(!press("o"));
+  hotkeys.createHelp();
+  assert.ok(!elements["help-content"].textContent.includes("Publish a goal"));
+  session.topics.receiveList({ topics: [], pose_topics: { goal: [], initial_pose: [] } });
+  hotkeys.createHelp();
+  assert.ok(elements["help-content"].textContent.includes("Publish a goal"));
+  for (const [key, name] of [
+    ["o", "goal"],
+    ["i", "initial_pose"],
+  ]) {
+    assert.ok(press(key));
+    assert.equal(tools.name, name);
+  }
 });
 
 test("a read-only page has no keys that change the world", () => {

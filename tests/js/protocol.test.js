@@ -95,3 +95,30 @@ test("another version and a short message are errors", () => {
     assert.throws(() => decodeBinary(message(kind, words)), RangeError);
   }
 });
+
+test("marks of a topic with texts", () => {
+  const text = new TextEncoder().encode('[[1,2,"ä"]]');
+  const padded = new Uint8Array(16);
+  padded.set(text);
+  const tail = [...new Uint32Array(padded.buffer)];
+  const head = [7, 1, 1, text.length, ...f(1, 2, 3, 4, 0.5), ...f(1, 2, 3, 4, 5, 6), 0x11223344, 0x55667788];
+  const { lines, lineColors, triangles, triangleColors, ...rest } = decodeBinary(
+    message(6, [...head, ...tail]),
+  );
+  assert.deepEqual(rest, { kind: "marks", world: 3, time: 2.5, topic: 7, texts: [[1, 2, "ä"]] });
+  assert.deepEqual(
+    [[...lines], [...triangles]],
+    [
+      [1, 2, 3, 4, 0.5],
+      [1, 2, 3, 4, 5, 6],
+    ],
+  );
+  assert.deepEqual([[...lineColors], [...triangleColors]], [[0x11223344], [0x55667788]]);
+});
+
+test("a grid of a topic", () => {
+  const { compressed, ...rest } = decodeBinary(message(7, [7, 20, 10, ...f(1, 2, 0.5), [0.25], 0x04030201]));
+  const size = { width: 20, height: 10, pose: [1, 2, 0.5], resolution: 0.25 };
+  assert.deepEqual(rest, { kind: "grid", world: 3, time: 2.5, topic: 7, ...size });
+  assert.deepEqual([...compressed], [1, 2, 3, 4]);
+});

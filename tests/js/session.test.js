@@ -38,9 +38,11 @@ test("changes of a task are one request to the server", async () => {
       scans: true,
       compact_scans: true,
       frames: true,
-        history: true,
+      history: true,
       inspect: ROBOT,
       series: ["/odom/pose/0"],
+      topics: [],
+      topic_values: [],
       hidden: false,
     },
   ]);

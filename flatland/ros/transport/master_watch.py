@@ -85,7 +85,7 @@ class MasterWatch:
     def _ask(self) -> tuple[int, str]:
         """Returns the process of the master, and the URI of the node, empty if it is unknown."""
         # A new connection for each call, since a lasting one would hide that the master is gone.
-        with ServerProxy(self._uri, transport=_LimitedTransport()) as master:
+        with ServerProxy(self._uri, transport=LimitedTransport(_TIMEOUT)) as master:
             calls = MultiCall(master)
             name = rospy.get_name()
             calls.getPid(name)
@@ -118,10 +118,16 @@ class MasterWatch:
             self._registering -= 1
 
 
-class _LimitedTransport(Transport):
+class LimitedTransport(Transport):
     """Calls that do not wait for a server that accepts a connection and never responds."""
 
+    def __init__(self, timeout: float) -> None:
+        """Limits the time of each call [s]."""
+        super().__init__()
+        self._timeout = timeout
+
     def make_connection(self, host: Any) -> http.client.HTTPConnection:
+        """Returns a connection with the time limit; called for each call to the server."""
         connection = super().make_connection(host)
-        connection.timeout = _TIMEOUT
+        connection.timeout = self._timeout
         return connection

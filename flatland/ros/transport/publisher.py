@@ -85,6 +85,12 @@ class Publisher:
         with self._update_lock:
             return self.connected
 
+    @property
+    def connections(self) -> int:
+        """Number of subscribers that are connected."""
+        publisher = self._publisher
+        return 0 if publisher is None else int(publisher.get_num_connections())
+
     def publish(self, message: Any) -> None:
         """Sends a message to all subscribers; has no effect once closed or during a shutdown.
 

@@ -28,7 +28,7 @@ from flatland.timekeeper import NANOSECONDS
 if TYPE_CHECKING:
     from flatland.node.handles import Handles, HandleServer
     from flatland.node.ticker import TickerThread
-    from flatland.node.transport import Connection
+    from flatland.node.transport import Connection, ForeignTopicsConnection
     from flatland.runtime.requests import Post
     from flatland.simulation import Simulation
     from flatland.world import World
@@ -188,6 +188,12 @@ class RosTransport(Transport):
         from flatland.ros.interactive.marker_server import MarkerServer
 
         return partial(MarkerServer, self._registrar)
+
+    def load_foreign_topics(self) -> Callable[[Simulation], ForeignTopicsConnection]:
+        """Imports the topics of other nodes for the viewer in the browser."""
+        from flatland.ros.foreign_topics.topics import RosTopics
+
+        return partial(RosTopics, self)
 
 
 class _ClockTopic(StateTopic):

@@ -184,3 +184,31 @@ test("plots belong to a world", async () => {
   assert.equal(plots.plots.size, 0);
   assert.deepEqual(await wanted(), []);
 });
+
+test("numbers of other topics are plotted, also if their values are slightly older", async () => {
+  const { session, connection, plots, values } = await open();
+  const name = "/amcl_pose:pose/position/x";
+  plots.add(name);
+  await settle();
+  assert.deepEqual(session.demands().topic_values, ["/amcl_pose"]);
+  const send = (time, x) =>
+    connection.emit("message", {
+      type: "topic_values",
+      world: 0,
+      topic: "/amcl_pose",
+      time,
+      value: { pose: { position: { x } } },
+    });
+  send(1, 5);
+  values(2, {});
+  send(1.9, 6);
+  assert.deepEqual(
+    [plots.plots.get(name).times, plots.plots.get(name).values],
+    [
+      [1, 2],
+      [5, 6],
+    ],
+  );
+  send(0.5, 7); // The world was reset.
+  assert.deepEqual(plots.plots.get(name).values, [7]);
+});

@@ -16,6 +16,7 @@ from flatland.node.clock import SimulatedClock
 from flatland.node.parameters import read_parameters
 from flatland.node.served_world import ServedWorld
 from flatland.node.transport import Adapter, Transport
+from flatland.web.foreign_topics import TopicDemand, TopicUpdate
 
 
 class FakeTopic:
@@ -50,6 +51,22 @@ class FakeTopic:
 
     def close(self) -> None:
         self.closed = True
+
+
+class FakeForeignTopics:
+    """No topics of other nodes."""
+
+    def update(self, demand: TopicDemand) -> TopicUpdate:
+        return TopicUpdate()
+
+    def suspend(self) -> None:
+        pass
+
+    def publish_pose(self, kind: str, topic: str, pose: Any) -> bool:
+        return False
+
+    def close(self) -> None:
+        pass
 
 
 class FakeTransport(Transport):
@@ -146,6 +163,9 @@ class FakeTransport(Transport):
 
     def load_debug_markers(self) -> Any:
         return []
+
+    def load_foreign_topics(self) -> Any:
+        return lambda _simulation: FakeForeignTopics()
 
     def load_handle_server(self) -> Any:
         raise ImportError("there are no interactive markers here")

@@ -26,6 +26,8 @@ VALID: dict[str, dict[str, Any]] = {
         "frames": False,
         "inspect": None,
         "series": ["/a/b"],
+        "topics": ["/plan"],
+        "topic_values": ["/odom"],
         "hidden": False,
         "history": True,
     },
@@ -47,6 +49,7 @@ VALID: dict[str, dict[str, Any]] = {
     "drive": {"model": 1, "command": "/cmd_vel", "linear": [1, 0], "angular": -1.5},
     "files": {},
     "describe_series": {},
+    "publish_pose": {"purpose": "goal", "topic": "/goal", "pose": [1, 2, 3]},
 }
 FIELDS = [(kind, field) for kind, fields in VALID.items() for field in fields]
 

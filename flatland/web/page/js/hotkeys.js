@@ -13,6 +13,7 @@ const TURN_STEP = Math.PI / 24;
  * @property {string} text
  * @property {() => void} run
  * @property {boolean} [writes]  not available if the page is read-only
+ * @property {() => boolean} [isAvailable]  whether the program has what the key requires
  *
  * @typedef {object} KeyActions
  * @property {() => void} togglePause
@@ -81,6 +82,22 @@ export class Hotkeys {
       { keys: ["v"], shown: "V", text: "Select and move models", run: () => tools.use("select") },
       { keys: ["h"], shown: "H", text: "Move the view only", run: () => tools.use("pan") },
       { keys: ["m"], shown: "M", text: "Measure distances", run: () => tools.use("measure") },
+      {
+        keys: ["o"],
+        shown: "O",
+        text: "Publish a goal",
+        run: () => tools.use("goal"),
+        writes: true,
+        isAvailable: () => session.topics.entries !== null,
+      },
+      {
+        keys: ["i"],
+        shown: "I",
+        text: "Publish an initial pose",
+        run: () => tools.use("initial_pose"),
+        writes: true,
+        isAvailable: () => session.topics.entries !== null,
+      },
       { keys: ["f"], shown: "F", text: "Fit the view", run: () => stage.fit() },
       { keys: ["t"], shown: "T", text: "Follow the selected model", run: actions.toggleFollow },
       { keys: ["g"], shown: "G", text: "Show all worlds", run: actions.showAll },
@@ -120,7 +137,7 @@ export class Hotkeys {
     const prefix = isShortcut ? `ctrl+${event.shiftKey ? "shift+" : ""}` : "";
     const key = prefix + event.key.toLowerCase();
     const found = this.hotkeys.find((each) => each.keys.includes(key));
-    if (!found || (found.writes && this.session.readOnly)) return;
+    if (!found || (found.writes && this.session.readOnly) || found.isAvailable?.() === false) return;
     event.preventDefault();
     const repeats = ["+", "−", "[", "]", ".", "←", "→", "↑", "↓"];
     if (!event.repeat || repeats.includes(found.shown)) found.run();
@@ -178,7 +195,8 @@ export class Hotkeys {
   /** Fills the help dialog. */
   createHelp() {
     const keys = element("dl");
-    for (const { shown, text } of this.hotkeys) {
+    for (const { shown, text, isAvailable } of this.hotkeys) {
+      if (isAvailable?.() === false) continue;
       if (shown === "→" || shown === "↑" || shown === "↓") continue;
       const names = shown === "←" ? ["←", "→", "↑", "↓"] : [shown];
       keys.append(

@@ -12,6 +12,7 @@ import { createModelList } from "./panels/model_list.js";
 import { ModelMenu } from "./panels/model_menu.js";
 import { createNotices } from "./panels/notices.js";
 import { Plots } from "./panels/plots.js";
+import { createPoseTools } from "./panels/pose_tools.js";
 import { saveWorld } from "./panels/save_world.js";
 import { createScaleBar } from "./panels/scale_bar.js";
 import { createShare } from "./panels/share.js";
@@ -19,6 +20,7 @@ import { SpawnDialog } from "./panels/spawn_dialog.js";
 import { createTiles } from "./panels/tiles.js";
 import { TimeBar } from "./panels/time_bar.js";
 import { createToolbar } from "./panels/toolbar.js";
+import { createTopicList } from "./panels/topic_list.js";
 import { createTouchTips } from "./panels/touch_tips.js";
 import { exposeScripting } from "./scripting.js";
 import { Session } from "./session.js";
@@ -28,6 +30,7 @@ import { Drive } from "./tools/drive.js";
 import { MeasureTool } from "./tools/measure_tool.js";
 import { PanTool } from "./tools/pan_tool.js";
 import { PointerInput } from "./tools/pointer.js";
+import { PoseTool } from "./tools/pose_tool.js";
 import { SelectTool } from "./tools/select_tool.js";
 import { SpawnTool } from "./tools/spawn_tool.js";
 import { createStick } from "./tools/stick.js";
@@ -50,11 +53,15 @@ const stage = new Stage(byId("canvas", HTMLCanvasElement), session, isDark());
 
 const selectTool = new SelectTool(session, stage);
 const spawnTool = new SpawnTool(session, stage);
+const goalTool = new PoseTool(session, stage, "goal", "Goal");
+const initialPoseTool = new PoseTool(session, stage, "initial_pose", "Initial pose");
 const tools = new ToolBox({
   select: selectTool,
   pan: new PanTool(),
   measure: new MeasureTool(stage),
   spawn: spawnTool,
+  goal: goalTool,
+  initial_pose: initialPoseTool,
 });
 const drive = new Drive(session);
 
@@ -81,6 +88,11 @@ const spawnDialog = new SpawnDialog(session, tools, spawnTool);
 const menu = new ModelMenu();
 const help = byId("help-dialog", HTMLDialogElement);
 
+function openHelp() {
+  hotkeys.createHelp();
+  help.showModal();
+}
+
 const hotkeys = new Hotkeys(stage, session, tools, drive, {
   togglePause: () => timeBar.togglePause(),
   step: () => timeBar.step(),
@@ -93,10 +105,9 @@ const hotkeys = new Hotkeys(stage, session, tools, drive, {
   toggleFollow,
   togglePlots: () => plots.toggle(),
   showAll: () => session.worlds.size > 1 && session.show(null),
-  openHelp: () => help.showModal(),
+  openHelp,
 });
-hotkeys.createHelp();
-byId("help").addEventListener("click", () => help.showModal());
+byId("help").addEventListener("click", openHelp);
 
 const pointer = new PointerInput(stage, session, tools, (spot, event) => {
   const model = selectTool.modelUnder(spot);
@@ -142,6 +153,11 @@ byId("save-world").addEventListener("click", () => void saveWorld(session));
 createConnectionBadge(session, stage);
 createModelList(session, stage);
 createDisplays(session);
+createTopicList(session, (name) => {
+  plots.setOpen(true);
+  plots.add(name);
+});
+createPoseTools(session, tools, { "tool-goal": goalTool, "tool-initial-pose": initialPoseTool });
 new Inspector(session, stage, { deleteSelected, plot: (name) => plots.show(name) });
 new Capture(stage, session);
 createTiles(session, stage);

@@ -44,12 +44,19 @@
  * @typedef {{moment: number, time: number, label: string}} Moment
  * @typedef {{type: "history", world: number, moments: Moment[], current: number | null,
  *   obstacle: string}} HistoryMessage
+ * @typedef {"goal" | "initial_pose"} PosePurpose
+ * @typedef {{id: number, topic: string, type: string, drawn_as: "marks" | "grid" | null,
+ *   status: string}} TopicEntry
+ * @typedef {{type: "topics", world: number, topics: TopicEntry[],
+ *   pose_topics: Record<PosePurpose, string[]>}} TopicsMessage
+ * @typedef {{type: "topic_values", world: number, topic: string, time: number,
+ *   value: Json}} TopicValuesMessage
  * @typedef {{type: "gone", world: number}} GoneMessage
  * @typedef {{type: "notice", level: Level, text: string}} NoticeMessage
  * @typedef {{type: "reply", id: number, ok: true, result: unknown}
  *   | {type: "reply", id: number, ok: false, error: string}} ReplyMessage
  * @typedef {WorldMessage | ModelsMessage | StatusMessage | DetailsMessage | ValuesMessage
- *   | FramesMessage | HistoryMessage | GoneMessage} MessageOfWorld
+ *   | FramesMessage | HistoryMessage | TopicsMessage | TopicValuesMessage | GoneMessage} MessageOfWorld
  * @typedef {HelloMessage | NoticeMessage | MessageOfWorld} StateMessage
  *
  * Binary messages of the server:
@@ -62,8 +69,15 @@
  * @typedef {{id: number, pose: Pose, ranges: Float32Array}} Scan
  * @typedef {{kind: "scans", world: number, time: number, scans: Scan[]}} ScansData
  *
- * @typedef {{worlds: number[], scans: boolean, compact_scans: boolean, frames: boolean, history: boolean, inspect: number | null,
- *   series: string[], hidden: boolean}} Demands  fields of `look`
+ * @typedef {{kind: "marks", world: number, time: number, topic: number, lines: Float32Array,
+ *   lineColors: Uint32Array, triangles: Float32Array, triangleColors: Uint32Array,
+ *   texts: [number, number, string][]}} MarksData  five numbers for each line, six for each triangle
+ * @typedef {{kind: "grid", world: number, time: number, topic: number, width: number, height: number,
+ *   pose: Pose, resolution: number, compressed: Uint8Array<ArrayBuffer>}} GridData
+ *
+ * @typedef {{worlds: number[], scans: boolean, compact_scans: boolean, frames: boolean, history: boolean,
+ *   inspect: number | null, series: string[], topics: string[] | null, topic_values: string[],
+ *   hidden: boolean}} Demands  fields of `look`
  *
  * The requests of the page by type, with their fields and results.
  *
@@ -88,6 +102,8 @@
  *   result: unknown}} drive
  * @property {{fields: object, result: ModelFile[]}} files
  * @property {{fields: object, result: string[]}} describe_series
+ * @property {{fields: {purpose: PosePurpose, topic: string, pose: Pose},
+ *   result: {received?: boolean}}} publish_pose
  */
 
 /** Name of the WebSocket subprotocol. */
@@ -102,7 +118,7 @@ const HEADER_SIZE = 16;
  * Returns the content of a binary message. The arrays are views of the buffer.
  *
  * @param {ArrayBuffer} buffer
- * @returns {EdgesData | PosesData | ScansData | null} null for an unknown kind
+ * @returns {EdgesData | PosesData | ScansData | MarksData | GridData | null} null for an unknown kind
  * @throws {RangeError} if the message is shorter than its counts state
  * @throws {Error} if the version of the message is not supported
  */
@@ -134,6 +150,8 @@ export function decodeBinary(buffer) {
   }
   if (kind === 4)
     return { kind: "poses", ...header, ids: null, poses: new Float32Array(buffer, start, 3 * first) };
+  if (kind === 6) return { kind: "marks", ...header, topic: first, ...decodeMarks(view, start) };
+  if (kind === 7) return { kind: "grid", ...header, topic: first, ...decodeGrid(view, start) };
   return null;
 }
 
@@ -197,4 +215,47 @@ function decodeRanges(codes, resolutions, beams) {
     else ranges[i] = code * resolutions[Math.floor(i / beams)];
   }
   return ranges;
+}
+
+/**
+ * @param {DataView} view
+ * @param {number} offset
+ */
+function decodeMarks(view, offset) {
+  const { buffer } = view;
+  const lineCount = view.getUint32(offset, true);
+  const triangleCount = view.getUint32(offset + 4, true);
+  const textSize = view.getUint32(offset + 8, true);
+  offset += 12;
+  const lines = new Float32Array(buffer, offset, 5 * lineCount);
+  offset += lines.byteLength;
+  const triangles = new Float32Array(buffer, offset, 6 * triangleCount);
+  offset += triangles.byteLength;
+  const lineColors = new Uint32Array(buffer, offset, lineCount);
+  offset += lineColors.byteLength;
+  const triangleColors = new Uint32Array(buffer, offset, triangleCount);
+  offset += triangleColors.byteLength;
+  const text = new TextDecoder().decode(new Uint8Array(buffer, offset, textSize));
+  /** @type {[number, number, string][]} */
+  const texts = text ? JSON.parse(text) : [];
+  return { lines, lineColors, triangles, triangleColors, texts };
+}
+
+/**
+ * @param {DataView} view
+ * @param {number} offset
+ */
+function decodeGrid(view, offset) {
+  /** @type {(index: number) => number} */
+  const number = (index) => view.getFloat32(offset + 8 + 4 * index, true);
+  /** @type {Pose} */
+  const pose = [number(0), number(1), number(2)];
+  return {
+    width: view.getUint32(offset, true),
+    height: view.getUint32(offset + 4, true),
+    pose,
+    resolution: number(3),
+    // The view is of an ArrayBuffer, which the type of the property `buffer` does not state.
+    compressed: new Uint8Array(/** @type {ArrayBuffer} */ (view.buffer), offset + 24),
+  };
 }

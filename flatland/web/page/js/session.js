@@ -1,4 +1,5 @@
 import { Emitter } from "./events.js";
+import { ForeignTopics } from "./foreign_topics.js";
 import { WorldState } from "./world_state.js";
 
 /**
@@ -60,6 +61,7 @@ export class Session extends Emitter {
     this.displays = { layers: true, models: true, scans: true, frames: false, names: true, trails: false };
     /** @type {Set<string>} */
     this.series = new Set();
+    this.topics = new ForeignTopics();
     this.hidden = document.hidden;
     this.ready = false;
     this.lookScheduled = false;
@@ -69,6 +71,8 @@ export class Session extends Emitter {
       if (state !== "connected") this.ready = false;
       this.emit("redraw", undefined);
     });
+    this.topics.on("demand", () => this.look());
+    this.topics.on("redraw", () => this.emit("redraw", undefined));
   }
 
   /** The displayed world, null for the grid. */
@@ -186,6 +190,7 @@ export class Session extends Emitter {
   /** @param {boolean} hidden  whether the page is in the background */
   setHidden(hidden) {
     this.hidden = hidden;
+    if (hidden) this.topics.clear();
     if (!hidden) this.connection.probe("look", this.demands());
     else if (this.ready) this.connection.request("look", this.demands()).catch(() => {});
   }
@@ -215,6 +220,7 @@ export class Session extends Emitter {
       history: this.world !== null && !this.readOnly,
       inspect: this.selected?.id ?? null,
       series: this.world ? [...this.series] : [],
+      ...this.topics.demands(this.world !== null),
       hidden: this.hidden,
     };
   }
@@ -235,6 +241,7 @@ export class Session extends Emitter {
     this.readOnly = message.read_only;
     // The first message of a connection: ids of an earlier connection are invalid.
     const before = this.ready ? this.worlds : new Map();
+    if (!this.ready) this.topics.reset();
     this.ready = true;
     this.worlds = new Map();
     for (const { world, name } of message.worlds) {
@@ -296,6 +303,12 @@ export class Session extends Emitter {
       case "values":
         if (world === this.world) this.emit("values", message);
         return;
+      case "topics":
+        this.topics.receiveList(message);
+        return;
+      case "topic_values":
+        this.topics.receiveValues(message);
+        return;
       case "gone":
         this.removeWorld(world);
         break;
@@ -311,6 +324,8 @@ export class Session extends Emitter {
     if (!world?.present) return;
     if (data.kind === "edges") world.applyEdges(data);
     else if (data.kind === "poses") world.applyPoses(data);
+    else if (data.kind === "marks") this.topics.receiveMarks(data);
+    else if (data.kind === "grid") this.topics.receiveGrid(data);
     else world.applyScans(data);
     this.emit("redraw", undefined);
   }

@@ -245,6 +245,7 @@ export class Stage extends Emitter {
       views: this.tiles().map((tile) => ({ world: tile.world, viewport: this.viewport(tile) })),
       displays: session.displays,
       selected: session.selected,
+      topics: session.world ? session.topics : null,
       overlay: session.world ? this.overlay : null,
       isGrid: !session.world,
     });

@@ -23,8 +23,8 @@ import { Trails } from "./trails.js";
  * @typedef {object} Model
  * @property {number} id
  * @property {string} name
+ * @property {string} namespace  of its topics
  * @property {string} file
- * @property {string} namespace
  * @property {Body[]} bodies
  * @property {import("./protocol.js").LaserInfo[]} lasers
  * @property {import("./protocol.js").JointInfo[]} joints
@@ -129,8 +129,8 @@ export class WorldState {
       const model = {
         id: info.id,
         name: info.name,
-        file: info.file ?? "",
         namespace: info.namespace ?? "",
+        file: info.file ?? "",
         bodies: [],
         lasers: info.lasers,
         joints: info.joints,

@@ -1,4 +1,5 @@
 import { byId, element, icon, setPressed, setText } from "../dom.js";
+import { numbersIn } from "../foreign_topics.js";
 import { significant } from "../format.js";
 import { Chart, loadUPlot } from "./chart.js";
 import { Completion } from "./completion.js";
@@ -8,6 +9,8 @@ const CAPACITY = 4000;
 const MAX_PLOTS = 12;
 /** Least time between two drawings [ms]. */
 const DRAW_PERIOD = 100;
+/** Simulated time by which values of other topics may be late [s]. */
+const LARGEST_DELAY = 1;
 
 /**
  * @typedef {object} Plot
@@ -53,6 +56,7 @@ export class Plots {
     this.window.addEventListener("change", () => this.setRange(null));
     this.latest.addEventListener("click", () => this.setRange(null));
     session.on("values", (message) => this.receive(message));
+    session.topics.on("values", (message) => this.receiveTopic(message));
     session.on("current", () => this.clear());
     session.on("models", () => {
       if (!this.panel.hidden) this.refreshNames();
@@ -165,15 +169,26 @@ export class Plots {
     this.plots.clear();
     this.showNames([]);
     this.setRange(null);
-    this.session.setSeries([]);
+    this.sendSeries();
     if (!this.panel.hidden) this.refreshNames();
   }
 
   sendSeries() {
-    this.session.setSeries(this.panel.hasAttribute("hidden") ? [] : [...this.plots.keys()]);
+    const names = this.panel.hasAttribute("hidden") ? [] : [...this.plots.keys()];
+    this.session.setSeries(names);
+    this.session.topics.setPlotted(names);
   }
 
-  /** @param {import("../protocol.js").ValuesMessage} message */
+  /** @param {import("../protocol.js").TopicValuesMessage} message */
+  receiveTopic(message) {
+    const series = numbersIn(message, this.plots.keys());
+    if (Object.keys(series).length === 0) return;
+    // The two kinds of values are sent independently, so that these may be slightly older.
+    const isOlder = message.time < this.time && this.time - message.time < LARGEST_DELAY;
+    this.receive({ time: isOlder ? this.time : message.time, series });
+  }
+
+  /** @param {Pick<import("../protocol.js").ValuesMessage, "time" | "series">} message */
   receive({ time, series }) {
     const isReset = time < this.time;
     this.time = time;

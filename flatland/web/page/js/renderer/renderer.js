@@ -8,6 +8,7 @@ import { createPalette } from "./palette.js";
 import { Quads } from "./quads.js";
 import { ScanPrograms } from "./scan_clouds.js";
 import { TextLabels } from "./text_labels.js";
+import { TopicGraphics } from "./topic_graphics.js";
 import { WorldGraphics } from "./world_graphics.js";
 
 /**
@@ -22,6 +23,7 @@ import { WorldGraphics } from "./world_graphics.js";
  * @property {{world: WorldState, viewport: Viewport}[]} views
  * @property {Record<import("../session.js").Display, boolean>} displays
  * @property {import("../world_state.js").Model | null} selected
+ * @property {import("../foreign_topics.js").ForeignTopics | null} topics
  * @property {Overlay | null} overlay
  * @property {boolean} isGrid  whether the views are tiles on the background of a grid
  */
@@ -45,6 +47,7 @@ export class Renderer {
     };
     this.batch = new EdgeBatch(gl, this.programs.coloredEdges, this.programs.quads);
     this.labels = new TextLabels(gl, this.programs.quads);
+    this.topics = new TopicGraphics(gl, this.programs.coloredEdges, this.programs.quads);
     this.backdrop = new Backdrop(gl);
     /** @type {Map<WorldState, WorldGraphics>} */
     this.graphics = new Map();
@@ -98,15 +101,17 @@ export class Renderer {
    */
   drawWorld(world, viewport, frame) {
     const { batch, labels, palette } = this;
-    const { displays, selected, overlay, isGrid } = frame;
+    const { displays, selected, topics, overlay, isGrid } = frame;
     let graphics = this.graphics.get(world);
     if (!graphics) {
       graphics = new WorldGraphics(this.gl, this.programs);
       this.graphics.set(world, graphics);
     }
     graphics.update(world, palette);
+    if (topics) this.topics.update(topics, palette);
     labels.begin(viewport.ratio);
     viewport = this.drawGround(world, graphics.layers, viewport, frame);
+    if (topics) this.topics.drawMarks(viewport, labels);
     if (displays.scans) graphics.scans.drawAreas(viewport, world, palette, selected);
     if (displays.trails) graphics.trails.draw(viewport, world.trails);
     // Below the bodies, which are hardly visible below the points of many scans.
@@ -135,7 +140,7 @@ export class Renderer {
    * @param {Frame} frame
    * @returns {Viewport} the viewport for the rest of the world
    */
-  drawGround(world, layers, viewport, { displays, isGrid }) {
+  drawGround(world, layers, viewport, { displays, topics, isGrid }) {
     const { gl, batch, palette } = this;
     /** @param {Viewport} view */
     const paint = (view) => {
@@ -143,6 +148,7 @@ export class Renderer {
       gl.clear(gl.COLOR_BUFFER_BIT);
       addGrid(batch, view, palette);
       batch.flush(view);
+      if (topics) this.topics.drawGrids(view, topics);
       if (displays.layers) layers.draw(view, world, palette);
     };
     if (isGrid) {
@@ -152,7 +158,7 @@ export class Renderer {
     const shown = displays.layers ? world.layers.map((layer) => Number(layer.visible)) : [];
     return this.backdrop.draw(
       viewport,
-      [world.index, world.layersVersion, palette.dark, shown].join(),
+      [world.index, world.layersVersion, palette.dark, topics?.gridsVersion, shown].join(),
       paint,
     );
   }

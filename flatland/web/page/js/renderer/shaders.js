@@ -90,7 +90,10 @@ flat out vec4 v_color;
 void main() {
   float fade = u_lifetime > 0.0 ? clamp(1.0 - (u_time - a_time) / u_lifetime, 0.0, 1.0) : 1.0;
   v_color = vec4(a_color.rgb, 1.0) * (a_color.a * fade);
-  gl_Position = toClip(capsule(toPixels(a_segment.xy), toPixels(a_segment.zw), a_width * u_ratio));
+  // A negative width is a length in the world [m].
+  float world = max(-a_width * length(u_matrix.xy), 1.5 * u_ratio);
+  float width = a_width < 0.0 ? world : a_width * u_ratio;
+  gl_Position = toClip(capsule(toPixels(a_segment.xy), toPixels(a_segment.zw), width));
 }`;
 
 export const coloredEdgesFragment = `${HEAD}${CAPSULE_COVERAGE}
@@ -160,6 +163,64 @@ export const colorFragment = `${HEAD}
 flat in vec4 v_color;
 out vec4 color;
 void main() { color = v_color; }`;
+
+export const coloredTrianglesVertex = `${HEAD}${VIEW}
+in vec2 a_point;
+in vec4 a_color;
+flat out vec4 v_color;
+void main() {
+  v_color = vec4(a_color.rgb, 1.0) * a_color.a;
+  gl_Position = toClip(toPixels(a_point));
+}`;
+
+/** A grid of cells, drawn as a strip of two triangles. */
+export const cellsVertex = `${HEAD}${VIEW}
+uniform vec3 u_pose;     // of the corner of the first cell [m, rad]
+uniform vec2 u_extent;   // [m]
+out vec2 v_texel;
+void main() {
+  v_texel = vec2(float(gl_VertexID & 1), float(gl_VertexID >> 1));
+  vec2 p = v_texel * u_extent;
+  float c = cos(u_pose.z), s = sin(u_pose.z);
+  gl_Position = toClip(toPixels(u_pose.xy + vec2(c * p.x - s * p.y, s * p.x + c * p.y)));
+}`;
+
+/** Colours as in RViz. Of the cells of a pixel, the one with the largest value is drawn. */
+export const cellsFragment = `${HEAD}
+in vec2 v_texel;
+uniform sampler2D u_cells;
+uniform bool u_isCostmap;
+out vec4 color;
+const int SAMPLES = 4;
+float cellAt(vec2 texel) {
+  float value = floor(255.0 * texture(u_cells, texel).r + 0.5);
+  return value > 127.5 ? value - 256.0 : value;
+}
+float largest() {
+  vec2 span = fwidth(v_texel) * vec2(textureSize(u_cells, 0));
+  if (max(span.x, span.y) <= 1.0) return cellAt(v_texel);
+  float found = -128.0;
+  for (int i = 0; i < SAMPLES * SAMPLES; i++) {
+    vec2 part = (vec2(float(i % SAMPLES), float(i / SAMPLES)) + 0.5) / float(SAMPLES) - 0.5;
+    found = max(found, cellAt(v_texel + part * fwidth(v_texel)));
+  }
+  return found;
+}
+vec4 mapColor(float value) { return vec4(vec3(1.0 - value / 100.0), 0.7); }
+vec4 costColor(float value) {
+  if (value == 0.0) return vec4(0.0);
+  if (value == 99.0) return vec4(0.0, 1.0, 1.0, 0.7);
+  if (value == 100.0) return vec4(1.0, 0.0, 1.0, 0.7);
+  return vec4(value / 100.0, 0.0, 1.0 - value / 100.0, 0.7);
+}
+void main() {
+  float value = largest();
+  vec4 found = u_isCostmap ? costColor(value) : mapColor(value);
+  if (value == -1.0) found = vec4(0.44, 0.54, 0.53, 0.7);
+  if (value < -1.0) found = vec4(1.0, 0.0, 0.0, 0.7);
+  if (value > 100.0) found = vec4(0.0, 1.0, 0.0, 0.7);
+  color = vec4(found.rgb * found.a, found.a);
+}`;
 
 export const pointsVertex = `${HEAD}${VIEW}
 in vec2 a_point;

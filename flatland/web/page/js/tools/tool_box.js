@@ -21,7 +21,7 @@ import { Emitter } from "../events.js";
  * @property {() => void} leave  called when another tool becomes active
  * @property {import("../renderer/renderer.js").Overlay} draw
  *
- * @typedef {"select" | "pan" | "measure" | "spawn"} ToolName
+ * @typedef {"select" | "pan" | "measure" | "spawn" | "goal" | "initial_pose"} ToolName
  */
 
 /**

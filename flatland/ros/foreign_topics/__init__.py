@@ -1,0 +1,1 @@
+"""Topics of other nodes, for the viewer in the browser."""

@@ -1,0 +1,66 @@
+"""Which topics exist, according to the ROS master."""
+
+from __future__ import annotations
+
+import time
+from typing import Any, Final
+from xmlrpc.client import MultiCall, ServerProxy
+
+import rosgraph
+
+from flatland.ros.transport.master_watch import LimitedTransport
+
+PERIOD: Final = 1.0  # s of wall time between two calls to the master
+_TIMEOUT: Final = 2.0  # s
+_UNKNOWN_TYPE: Final = "*"
+
+
+class Graph:
+    """The topics of the last response of the ROS master.
+
+    Attributes:
+        published: Type of each topic that has a publisher.
+        subscribed: Type of each topic that has a subscriber, and its subscribers.
+    """
+
+    def __init__(self, node_name: str) -> None:
+        """Creates a graph without topics.
+
+        Args:
+            node_name: Name of this node.
+        """
+        self.published: dict[str, str] = {}
+        self.subscribed: dict[str, tuple[str, frozenset[str]]] = {}
+        self._node_name = node_name
+        self._uri: str = rosgraph.get_master_uri()
+        self._due = 0.0
+
+    def refresh(self) -> None:
+        """Calls the master after the period; without a response, the topics stay the same."""
+        now = time.monotonic()
+        if now < self._due:
+            return
+        self._due = now + PERIOD
+        try:
+            publishers, subscribers, types = self._ask()
+        except Exception:  # The master does not respond, which the node logs.
+            return
+        self.published = {
+            name: types[name]
+            for name, _ in sorted(publishers)
+            if types.get(name, _UNKNOWN_TYPE) != _UNKNOWN_TYPE
+        }
+        self.subscribed = {
+            name: (types.get(name, _UNKNOWN_TYPE), frozenset(nodes))
+            for name, nodes in sorted(subscribers)
+        }
+
+    def _ask(self) -> tuple[Any, Any, dict[str, str]]:
+        with ServerProxy(self._uri, transport=LimitedTransport(_TIMEOUT)) as master:
+            calls = MultiCall(master)
+            calls.getSystemState(self._node_name)
+            calls.getTopicTypes(self._node_name)
+            responses: Any = calls()
+            (_, _, state), (_, _, types) = responses[0], responses[1]
+        publishers, subscribers, _services = state
+        return publishers, subscribers, dict(types)

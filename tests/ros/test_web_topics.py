@@ -1,0 +1,290 @@
+"""Topics of other nodes in the viewer in the browser."""
+
+from __future__ import annotations
+
+import json
+import struct
+import zlib
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import rospy
+from geometry_msgs.msg import Point, PoseStamped, PoseWithCovarianceStamped, TransformStamped
+from nav_msgs.msg import OccupancyGrid
+from nav_msgs.msg import Path as PathMessage
+from std_msgs.msg import Float64
+from tf2_msgs.msg import TFMessage
+from visualization_msgs.msg import Marker, MarkerArray
+from waiting import TIMEOUT
+from web_client import WebClient
+
+from flatland.ros.foreign_topics.topics import _WatchedTopic
+from flatland.ros.transport.registrar import Registrar
+from flatland.ros.transport.ros_transport import RosTransport
+from flatland.web.encoding import GRID, MARKS
+
+NODE = "/flatland_server"
+BEACON = """
+bodies: [{name: mast, footprints: [{type: circle, radius: 0.1, density: 1}]}]
+plugins: [{type: ModelTfPublisher, name: tf, publish_tf_world: true, world_frame_id: map}]
+"""
+
+
+class TopicClient(WebClient):
+    """A client that decodes the messages about topics.
+
+    Attributes:
+        lines: The lines of each topic by its id.
+        texts_of: The texts of each topic by its id.
+        cells: The cells of each grid by the id of its topic.
+    """
+
+    def __init__(self, url: str) -> None:
+        self.lines: dict[int, Any] = {}
+        self.texts_of: dict[int, Any] = {}
+        self.cells: dict[int, Any] = {}
+        super().__init__(url, topics=[])
+
+    def _take_binary(self, data: bytes) -> None:
+        super()._take_binary(data)
+        if data[0] == MARKS:
+            number, lines, triangles, size = struct.unpack_from("<4I", data, 16)
+            shown = np.frombuffer(data, "<f4", 5 * lines, 32)
+            self.lines[number] = shown.reshape(-1, 5)
+            self.cells.pop(number, None)
+            end = 32 + 24 * lines + 28 * triangles
+            self.texts_of[number] = json.loads(data[end : end + size] or b"[]")
+        elif data[0] == GRID:
+            number, width, height = struct.unpack_from("<3I", data, 16)
+            cells = np.frombuffer(zlib.decompress(data[44:]), np.int8)
+            self.cells[number] = cells.reshape(height, width)
+
+    def last(self, kind: str, **fields: Any) -> dict[str, Any]:
+        """Returns the last message of a type with these fields, empty if there is none."""
+        found = [
+            text for text in self.texts if text["type"] == kind and fields.items() <= text.items()
+        ]
+        return found[-1] if found else {}
+
+    def topic(self, name: str) -> dict[str, Any]:
+        """Waits until a topic is listed, and returns its entry."""
+
+        def entry() -> Any:
+            listed = self.last("topics").get("topics", [])
+            return next((each for each in listed if each["topic"] == name), None)
+
+        return dict(self.until(f"topic {name}", entry))
+
+    def until_status(self, name: str, status: str) -> None:  # type: ignore[override]
+        """Waits for the status of a topic."""
+        self.until(f"{name}: {status}", lambda: self.topic(name)["status"] == status)
+
+
+@pytest.fixture(scope="module")
+def url(module_launcher: Any, write_world: Callable[..., Path]) -> str:
+    """A node with the viewer on any free port; the frame `mast` is at (-2, -3)."""
+    world = write_world(
+        "[{name: robot, model: robot.model.yaml, pose: [1, 2, 0]},"
+        " {name: beacon, model: beacon.model.yaml, pose: [-2, -3, 0]}]",
+        beacon=BEACON,
+    )
+    launch = module_launcher.launch(
+        "flatland",
+        "server.launch",
+        f"world_path:={world}",
+        "show_viz:=false",
+        "web:=true",
+        "web_port:=0",
+        "web_token:=0123456789abcdef",
+        "web_view_token:=fedcba9876543210",
+    )
+    return str(launch.wait_for_line(r"viewer in the browser: (http://\S+)")[1])
+
+
+@pytest.fixture
+def client(url: str, ros: Any) -> Iterator[TopicClient]:
+    with TopicClient(url) as client:
+        yield client
+
+
+@pytest.fixture
+def publish(ros_master: Any) -> Iterator[Callable[..., rospy.Publisher]]:
+    """Publishes a latched message on a topic until the end of the test."""
+    publishers = []
+
+    def publish(name: str, message: Any) -> rospy.Publisher:
+        publishers.append(rospy.Publisher(name, type(message), queue_size=1, latch=True))
+        publishers[-1].publish(message)
+        return publishers[-1]
+
+    yield publish
+    for publisher in publishers:
+        publisher.unregister()
+
+
+def stamped(message: Any, frame: str) -> Any:
+    message.header.frame_id = frame
+    return message
+
+
+def path(frame: str) -> PathMessage:
+    message = stamped(PathMessage(), frame)
+    for x in (0, 2):
+        each = PoseStamped()
+        each.pose.position.x = x
+        message.poses.append(each)
+    return message
+
+
+def test_a_path_appears_as_soon_as_its_frame_is_known(
+    client: TopicClient, publish: Any, ros: Any
+) -> None:
+    publish("/plan", path("local"))
+    plan = client.topic("/plan")
+    assert (plan["type"], plan["drawn_as"], plan["status"]) == ("nav_msgs/Path", "marks", "")
+    client.look(topics=["/plan"])
+    client.until_status("/plan", 'no transform from "local" to "map"')
+    transform = stamped(TransformStamped(child_frame_id="local"), "map")
+    transform.transform.translation.y = 3
+    transform.transform.rotation.w = 1
+    publish("/tf_static", TFMessage([transform]))
+    client.until("the path", lambda: len(client.lines.get(plan["id"], ())))
+    np.testing.assert_allclose(client.lines[plan["id"]][:, :4], [[0, 3, 2, 3]], atol=1e-5)
+    client.until_status("/plan", "")
+
+
+def test_frames_of_the_world_are_known_also_while_it_is_paused(
+    client: TopicClient, publish: Any
+) -> None:
+    client.do("pause")
+    try:
+        publish("/from_beacon", path("mast"))
+        number = client.topic("/from_beacon")["id"]
+        client.look(topics=["/from_beacon"])
+        client.until("the path", lambda: len(client.lines.get(number, ())))
+        np.testing.assert_allclose(client.lines[number][:, :4], [[-2, -3, 0, -3]], atol=1e-5)
+    finally:
+        client.do("resume")
+
+
+def test_markers_and_a_grid(client: TopicClient, publish: Any) -> None:
+    marker = stamped(Marker(type=Marker.TEXT_VIEW_FACING, text="goal"), "map")
+    marker.color.a = 1
+    marker.pose.position = Point(1, 2, 3)
+    marks = publish("/marks", MarkerArray(markers=[marker]))
+    grid = stamped(OccupancyGrid(), "map")
+    grid.info.width, grid.info.height, grid.info.resolution = 3, 2, 0.5
+    grid.data = [0, 100, -1, 1, 2, 3]
+    publish("/cells", grid)
+    number, cells = client.topic("/marks")["id"], client.topic("/cells")["id"]
+    client.look(topics=["/marks", "/cells"])
+    client.until("the text", lambda: client.texts_of.get(number) == [[1, 2, "goal"]])
+    client.until("the grid", lambda: cells in client.cells)
+    assert client.cells[cells].tolist() == [[0, 100, -1], [1, 2, 3]]
+    marks.publish(MarkerArray(markers=[Marker(action=Marker.DELETEALL)]))
+    client.until("no text", lambda: client.texts_of.get(number) == [])
+    # An invalid message removes what was drawn.
+    grid.data.pop()
+    publish("/cells", grid)
+    client.until("an error", lambda: client.topic("/cells")["status"])
+    assert "3 x 2 cells" in client.topic("/cells")["status"]
+    client.until("no grid", lambda: cells not in client.cells)
+
+
+def test_subscriptions_exist_only_while_a_client_looks(
+    client: TopicClient, publish: Any, ros: Any, eventually: Any
+) -> None:
+    publish("/plan", path("map"))
+    publish("/value", Float64(1.5))
+    for name in ("/plan", "/value"):
+        client.topic(name)
+
+    def subscribed() -> set[str]:
+        return ros.registered_now(NODE)["subscribers"] & {"/plan", "/value", "/tf"}
+
+    client.look(topics=[], topic_values=["/value"])
+    client.until("a value", lambda: client.last("topic_values", value={"data": 1.5}))
+    assert subscribed() == {"/value"}
+    client.look(topics=["/plan"], topic_values=[])
+    eventually("the path", lambda: subscribed() == {"/plan", "/tf"})
+    client.close()
+    eventually("no subscriptions", lambda: subscribed() == set())
+
+
+def test_the_list_follows_publishers(client: TopicClient, publish: Any) -> None:
+    publisher = publish("/short_lived", Float64(1))
+    assert client.topic("/short_lived")["drawn_as"] is None
+    client.look(topic_values=["/short_lived"])
+    publisher.unregister()
+    client.until_status("/short_lived", "no publisher")
+    client.look(topic_values=[])
+    names = lambda: [each["topic"] for each in client.last("topics")["topics"]]  # noqa: E731
+    client.until("no topic", lambda: "/short_lived" not in names())
+
+
+def test_goals_and_initial_poses_are_those_of_rviz(
+    client: TopicClient, ros: Any, eventually: Any
+) -> None:
+    received: dict[str, list[Any]] = {"/move_base_simple/goal": [], "/r2/initialpose": []}
+    types = (PoseStamped, PoseWithCovarianceStamped)
+    subscribers = [
+        rospy.Subscriber(name, kind, messages.append)
+        for (name, messages), kind in zip(received.items(), types, strict=True)
+    ]
+    topics = {
+        "goal": ["/move_base_simple/goal"],
+        "initial_pose": ["/initialpose", "/r2/initialpose"],
+    }
+    client.until("the topics", lambda: client.last("topics").get("pose_topics") == topics)
+    pose = {"pose": [1, 2, 0.5]}
+    for purpose, topic in (("goal", "/move_base_simple/goal"), ("initial_pose", "/r2/initialpose")):
+        assert client.do("publish_pose", purpose=purpose, topic=topic, **pose) == {"received": True}
+    eventually("both poses", lambda: all(received.values()))
+    (goal,), (initial,) = received.values()
+    assert goal.header.frame_id == initial.header.frame_id == "map"
+    assert goal.header.stamp.to_sec() > 0
+    for position in (goal.pose.position, initial.pose.pose.position):
+        assert (position.x, position.y) == (1, 2)
+    assert goal.pose.orientation.z == pytest.approx(np.sin(0.25))
+    covariance = np.zeros((6, 6))
+    covariance[0, 0] = covariance[1, 1] = 0.25
+    covariance[5, 5] = (np.pi / 12) ** 2
+    np.testing.assert_allclose(np.reshape(initial.pose.covariance, (6, 6)), covariance)
+    alone = client.do("publish_pose", purpose="initial_pose", topic="/initialpose", **pose)
+    assert alone == {"received": False}
+    error = client.refused("publish_pose", purpose="goal", topic="/cmd_vel", **pose)
+    assert error == 'no node subscribes to poses on "/cmd_vel"'
+    for subscriber in subscribers:
+        subscriber.unregister()
+
+
+def test_a_read_only_client_sees_topics_and_publishes_no_poses(url: str, ros: Any) -> None:
+    viewer = url.replace("0123456789abcdef", "fedcba9876543210")
+    with TopicClient(viewer) as client:
+        assert client.hello["read_only"]
+        client.look(topics=[], topic_values=["/odometry/filtered"])
+        client.until("values", lambda: client.last("topic_values"))
+        goal = {"purpose": "goal", "topic": "/move_base_simple/goal", "pose": [1, 2, 0]}
+        assert client.refused("publish_pose", **goal) == "this viewer is read-only"
+
+
+def test_a_topic_to_which_a_plugin_subscribes_is_shared(ros: Any) -> None:
+    """All subscribers of a node for a topic have the same message class."""
+    registrar = Registrar()
+    transport = RosTransport(registrar)
+    used = [
+        transport.subscribe("/plain_grid", OccupancyGrid, lambda _message: None),
+        transport.subscribe("/number", Float64, lambda _message: None),
+    ]
+    grid = _WatchedTopic(transport, "/plain_grid", "nav_msgs/OccupancyGrid", is_drawn=True)
+    assert grid.status == "no message received"
+    other = _WatchedTopic(transport, "/number", "nav_msgs/Path", is_drawn=True)
+    assert "has the type std_msgs/Float64 already" in other.status
+    unknown = _WatchedTopic(transport, "/unknown", "no_such_msgs/Thing", is_drawn=False)
+    assert unknown.status == "the message package of no_such_msgs/Thing is not installed"
+    for each in (*used, grid, other, unknown):
+        each.close()
+    registrar.close(TIMEOUT)
