@@ -108,8 +108,6 @@ class Stepping:
         self._timekeeper = world.timekeeper
         self._requests = world.requests
         self._host = host
-        self._jobs = host.jobs
-        self._contacts = host.contacts
         self._body_monitor = body_monitor
         self._observers = observers
         self._transforms = transforms
@@ -155,12 +153,12 @@ class Stepping:
             Whether this is possible: nothing observes the world, no request waits, and no plugin
             has to be called first. Then the world is locked, and `end_unattended` must follow.
         """
-        requests = self._requests
+        requests, host = self._requests, self._host
         if (
             requests.actions
             or requests.in_use
-            or self._jobs.is_pending
-            or self._contacts.is_stale
+            or host.jobs.is_pending
+            or host.contacts.is_stale
             or self._observers.watch_any
             or self.change_log is not None
             or self._faults.first is not None

@@ -104,3 +104,17 @@ def test_an_exception_of_one_world_ends_the_steps_of_all(make: Make, room: Path)
     # No world remains locked, and the other worlds have been stepped.
     assert env._stage.worlds[0].time == env._stage.worlds[2].time == pytest.approx(0.2)
     assert not env._stage.worlds[1].requests.lock._is_owned()
+
+
+def test_the_core_performs_all_steps_alone_after_those_with_first_updates(
+    make: Make, room: Path
+) -> None:
+    env = make(FlatlandVectorEnv, COUNT, room, ending=Arrived(), max_steps=1000)
+    env.reset(seed=0)
+    actions, ones = np.full((COUNT, 2), 0.1), np.ones(COUNT, np.bool_)
+    for _ in range(2):
+        env.step(actions)
+    batch = env._episodes._batch
+    assert batch.perform(actions, ones, 20).tolist() == []
+    env._stage.worlds[1].add_observer(Watcher())
+    assert batch.perform(actions, ones, 20).tolist() == [1]
