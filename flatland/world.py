@@ -800,7 +800,7 @@ class World:
         """
         return self._changes.read(self._hash)
 
-    def snapshot(self) -> WorldSnapshot:
+    def snapshot(self, *, original: WorldSnapshot | None = None) -> WorldSnapshot:
         """Returns the current state of the world, for `restore`.
 
         The snapshot includes everything that affects later steps: bodies, contacts, the attributes
@@ -808,12 +808,18 @@ class World:
         values of outputs. It does not include pending requests, the pause, observers and
         subscribers.
 
+        Args:
+            original: A snapshot of the world of which this one is a clone, if neither has changed
+                since. Both snapshots then share the copy of all bodies, which is most of a
+                snapshot.
+
         Raises:
             WorldError: The world is closed, a plugin calls this, or a plugin has an attribute that
                 cannot be copied; see *Snapshots* in `docs/write_a_plugin.md`.
+            ValueError: The bodies of this world differ from those of `original`.
         """
         return self._changes.save_or_restore(
-            "snapshot", lambda: self._snapshots.taken, self._snapshots.take
+            "snapshot", lambda: self._snapshots.taken, lambda: self._snapshots.take(original)
         )
 
     def restore(self, snapshot: WorldSnapshot) -> None:

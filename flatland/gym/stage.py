@@ -79,7 +79,9 @@ class Stage:
             self.worlds += [undo.enter_context(first.clone()) for _ in names[1:]]
             agents = [agent for world in self.worlds for agent in find_agents(world)]
             self.episodes = Episodes(agents, settings, num_threads)
-            self._snapshots = [world.snapshot() for world in self.worlds]
+            original = first.snapshot()
+            clones = [world.snapshot(original=original) for world in self.worlds[1:]]
+            self._snapshots = [original, *clones]
             self._view = EpisodeView(self.worlds, names, settings.dt, web_port)
             undo.pop_all()
 

@@ -5,6 +5,8 @@ from __future__ import annotations
 import logging
 from typing import TYPE_CHECKING, Any, Final
 
+import numpy as np
+
 from flatland.copying.copier import Copier
 from flatland.copying.kinds import UncopyableError
 from flatland.copying.record import SavedObjects
@@ -161,8 +163,14 @@ class Snapshots:
 
     # -- snapshots -------------------------------------------------------------------------
 
-    def take(self) -> WorldSnapshot:
+    def take(self, original: WorldSnapshot | None = None) -> WorldSnapshot:
         """Takes a snapshot; see `World.snapshot`."""
+        if original is None:
+            physics = self._physics.copy()
+        else:
+            physics = original._physics
+            if not np.array_equal(physics.body_states(), self._physics.body_states()):
+                raise ValueError("the world is not an unchanged clone: its bodies differ")
         try:
             objects = SavedObjects(self._saved, self._kinds, self._not_saved)
         except UncopyableError as error:
@@ -171,7 +179,7 @@ class Snapshots:
             self,
             self.taken,
             self._timekeeper.sim_time_ns,
-            self._physics.copy(),
+            physics,
             objects,
             list(self._models.by_name.values()),
             list(self._host.world_plugins),

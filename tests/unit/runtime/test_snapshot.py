@@ -281,6 +281,24 @@ def test_a_clone_repeats_the_steps_of_its_original(world: World) -> None:
         assert observations(clone) == expected
 
 
+def test_a_snapshot_of_a_clone_shares_the_copy_of_all_bodies(world: World) -> None:
+    with world.clone() as clone:
+        original = world.snapshot()
+        shared = clone.snapshot(original=original)
+        assert shared._physics is original._physics
+        world.step(50)
+        clone.step(20)
+        with pytest.raises(ValueError, match="bodies differ"):
+            clone.snapshot(original=original)
+        clone.restore(shared)
+        clone.step(50)
+        assert clone.state_hash() == world.state_hash()
+        # What the clone has done did not change the shared copy.
+        world.restore(original)
+        world.step(50)
+        assert clone.state_hash() == world.state_hash()
+
+
 def test_a_clone_of_a_clone_of_a_restored_world(world: World) -> None:
     snapshot = world.snapshot()
     expected = observations(world)
