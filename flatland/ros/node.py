@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import gc
 import logging
 import math
 import sys
@@ -67,7 +68,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
     )
     # The remaining arguments are read by rospy.
     options, _ = parser.parse_known_args(arguments)
-    return ServerNode(options.msgs_package).run()
+    # During the start, the collector would examine the objects of all modules several times.
+    gc.disable()
+    try:
+        return ServerNode(options.msgs_package).run()
+    finally:
+        gc.enable()
 
 
 class ServerNode:
@@ -252,6 +258,7 @@ class ServerNode:
             self._simulation = served.simulation
             if self._stopping.is_set():
                 served.simulation.stop()
+            gc.enable()
             served.run()
             # Before the topics, so that no topic is registered again.
             master_watch.close()
