@@ -96,6 +96,7 @@ class Batch:
         begun: list[int] = []
         others: list[int] = []
         unfinished: dict[int, RunResult | Exception] = {}
+        made = 0
         is_acting, values = acting.tolist(), commands.tolist()
         try:
             for row in self._order:
@@ -118,8 +119,10 @@ class Batch:
             if others:
                 steps[others] = observes[others] = False
             unfinished = self._call_core(run, commands, steps, observes)
+            made = n
         finally:
-            _end([agents[row].world for row in begun], n, [unfinished.get(row) for row in begun])
+            results = [unfinished.get(row) for row in begun]
+            _end([agents[row].world for row in begun], made, results)
         if not others and not unfinished:
             return _NO_ROWS
         for row in others:
@@ -161,7 +164,7 @@ class Batch:
 
 
 def _end(worlds: list[World], n: int, results: list[RunResult | Exception | None]) -> None:
-    """Completes the steps of worlds; raises the exception of the first one that fails."""
+    """Completes n steps of worlds; raises the exception of the first one that fails."""
     error: BaseException | None = None
     for world, result in zip(worlds, results, strict=True):
         try:

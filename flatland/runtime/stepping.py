@@ -225,7 +225,7 @@ class Stepping:
                     requests.process()
                     self._world.check_open()  # A request may have closed it.
             made = 1
-            if while_paused or not self._world.paused:
+            if begun is not None or while_paused or not self._world.paused:
                 with requests.hooks():
                     self._observers.step_started()
                     try:

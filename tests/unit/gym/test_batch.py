@@ -118,3 +118,17 @@ def test_the_core_performs_all_steps_alone_after_those_with_first_updates(
     assert batch.perform(actions, ones, 20).tolist() == []
     env._stage.worlds[1].add_observer(Watcher())
     assert batch.perform(actions, ones, 20).tolist() == [1]
+
+
+def test_a_refused_call_of_the_core_advances_no_world(make: Make, room: Path) -> None:
+    env = make(FlatlandVectorEnv, COUNT, room)
+    env.reset(seed=0)
+    for _ in range(2):
+        env.step(np.zeros((COUNT, 2)))
+    times = [world.time for world in env._stage.worlds]
+    batch = env._episodes._batch
+    batch._sensor_poses = np.zeros((COUNT, 2))  # The core refuses the array, after the locks.
+    with pytest.raises(ValueError, match="sensor_poses"):
+        env.step(np.ones((COUNT, 2)))
+    assert [world.time for world in env._stage.worlds] == times
+    assert not any(world.requests.lock._is_owned() for world in env._stage.worlds)
