@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import importlib
+import math
+import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import ExitStack
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
@@ -63,6 +66,7 @@ class Stage:
             DependencyNotInstalled: `human` requires aiohttp.
             FlatlandError: A file is missing or invalid, or a model cannot be an agent; no world is
                 left open.
+            MemoryError: There is not enough memory for the worlds.
             ValueError: An argument is out of range.
         """
         if render_mode is not None and render_mode not in RENDER_MODES:
@@ -75,6 +79,8 @@ class Stage:
         self._render_mode = render_mode
         with ExitStack() as undo:
             first = undo.enter_context(settings.load())
+            if len(names) > 1:
+                check_memory(len(names), first.snapshot().size)
             self.worlds = [first]
             self.worlds += [undo.enter_context(first.clone()) for _ in names[1:]]
             agents = [agent for world in self.worlds for agent in find_agents(world)]
@@ -148,6 +154,40 @@ class Stage:
             for world in reversed(self.worlds):
                 closing.callback(world.close)
             self._view.close()
+
+
+def check_memory(count: int, size: int) -> None:
+    """Checks that there is enough memory for the worlds of environments.
+
+    Args:
+        count: Number of worlds.
+        size: Memory of a world [bytes].
+
+    Raises:
+        MemoryError: There is not; the text states how much is needed.
+    """
+    available = _available_memory()
+    if count * size > available:
+        raise MemoryError(
+            f"{count} environments need about {count * size / 1e9:.1f} GB, and "
+            f"{available / 1e9:.1f} GB are available"
+        )
+
+
+def _available_memory() -> float:
+    """Returns the memory that the process may use in addition [bytes]; inf if it is unknown."""
+    numbers = re.search(r"MemAvailable:\s+(\d+) kB", _read("/proc/meminfo"))
+    machine = 1024.0 * int(numbers[1]) if numbers else math.inf
+    limit, used = (_read(f"/sys/fs/cgroup/memory.{name}").strip() for name in ("max", "current"))
+    group = float(limit) - float(used) if limit.isdigit() and used.isdigit() else math.inf
+    return min(machine, group)
+
+
+def _read(path: str) -> str:
+    try:
+        return Path(path).read_text()
+    except OSError:
+        return ""
 
 
 def _draw(world: World, goals: Iterable[Vector2], radius: float) -> Image:

@@ -57,6 +57,7 @@ class FlatlandVectorEnv(VectorEnv[Any, Any, Any]):
         Raises:
             DependencyNotInstalled: `human` requires aiohttp.
             FlatlandError: A file is missing or invalid, or the model cannot be an agent.
+            MemoryError: There is not enough memory for that many environments.
             TypeError: An argument is unknown or has the wrong type.
             ValueError: An argument is out of range.
         """

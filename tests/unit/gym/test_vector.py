@@ -209,3 +209,9 @@ def test_closed_environments_are_of_no_use(make: Make) -> None:
 def test_an_invalid_argument_is_an_error(kwargs: dict[str, Any], message: str) -> None:
     with pytest.raises(ValueError, match=message):
         FlatlandVectorEnv(**{"num_envs": 1, "world": "corridor", **kwargs})
+
+
+def test_too_many_environments_are_refused_with_the_memory_that_they_need(make: Make) -> None:
+    text = r"1000000 environments need about \d+\.\d GB, and \d+\.\d GB are available"
+    with pytest.raises(MemoryError, match=text):
+        make(FlatlandVectorEnv, 1_000_000)
