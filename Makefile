@@ -158,4 +158,4 @@ mutate: setup-dev  ## measure which share of random defects the tests find: make
 
 .PHONY: clean
 clean:  ## remove all build results and .venv
-	rm -rf $(VENV) build flatland/_core*.so flatland/msg flatland/srv flatland_msgs
+	rm -rf $(VENV) build flatland/_core*.so flatland/msg flatland/srv flatland_msgs flatland/web/page/vendor

@@ -19,6 +19,13 @@ quietly() {
   rm -f "$log"
 }
 
+# replace_file SOURCE TARGET: copies a file atomically, since other processes may be reading the target.
+replace_file() {
+  if cmp -s "$1" "$2"; then return; fi
+  cp "$1" "$2.new"
+  mv "$2.new" "$2"
+}
+
 # requirements PYTHON KEY...: prints a list in pyproject.toml, one entry per line.
 requirements() {
   "$1" - "${@:2}" <<'EOF'

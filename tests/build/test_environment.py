@@ -170,6 +170,17 @@ def test_numpy_is_the_debian_package(shell):
     assert done.stdout.count("/usr/lib/python3/dist-packages/") == 2
 
 
+def test_the_installed_page_contains_uplot_with_its_licence(installed):
+    if not (installed / ".venv" / "flatland-setup" / "npm").exists():
+        pytest.skip("the last set-up could not reach npm")
+    [package] = installed.glob(".venv/lib/python3*/site-packages/flatland")
+    uplot = package / "web" / "page" / "vendor" / "uplot"
+    assert "Copyright" in (uplot / "LICENSE").read_text()
+    of_npm = installed / ".venv" / "js" / "node_modules" / "uplot" / "dist"
+    for name in ("uPlot.esm.js", "uPlot.min.css"):
+        assert (uplot / name).read_bytes() == (of_npm / name).read_bytes()
+
+
 def test_tests_use_the_installed_package(installed):
     if os.environ.get("VIRTUAL_ENV") != str(installed / ".venv"):
         pytest.skip("only in the virtual environment, as under `make test`")

@@ -30,6 +30,12 @@ def source_files(checkout: Path) -> set[str]:
     return {name for name in set(listed.split("\0")) - {""} if (checkout / name).exists()}
 
 
+def page_files_of_npm(checkout: Path) -> set[str]:
+    """Returns uPlot in the page, which .gitignore excludes; empty if npm could not be reached."""
+    folder = checkout / "flatland" / "web" / "page" / "vendor"
+    return {path.relative_to(checkout).as_posix() for path in folder.rglob("*") if path.is_file()}
+
+
 @pytest.fixture(scope="module")
 def wheel(tmp_path_factory: pytest.TempPathFactory, checkout: Path) -> Iterator[zipfile.ZipFile]:
     """The wheel of the checkout, built in the folder of `make setup` to compile little."""
@@ -55,6 +61,7 @@ def wheel(tmp_path_factory: pytest.TempPathFactory, checkout: Path) -> Iterator[
 def test_package_contains_sources_and_built_files_only(wheel, checkout):
     names = {name for name in wheel.namelist() if name.startswith("flatland/")}
     sources = {name for name in source_files(checkout) if name.startswith("flatland/")}
+    sources |= page_files_of_npm(checkout)
     messages = {f"flatland/msg/_{path.stem}.py" for path in (checkout / "msg").iterdir()}
     services = {f"flatland/srv/_{path.stem}.py" for path in (checkout / "srv").iterdir()}
     modules = {"flatland/msg/__init__.py", "flatland/srv/__init__.py"}
@@ -135,6 +142,7 @@ def test_source_distribution(tmp_path, checkout):
     folders = ("cmake/", "compat/", "flatland/", "launch/", "msg/", "rviz/", "scripts/")
     needed = {n for n in source_files(checkout) if n.startswith((*folders, "src/", "srv/"))}
     assert {n for n in needed if not (checkout / n).is_dir()} <= names
+    assert page_files_of_npm(checkout) <= names
     assert {"CMakeLists.txt", "LICENSE", "pyproject.toml", "catkin/flatland/package.xml"} <= names
     assert not [n for n in names if n.endswith(".so") or n.startswith(("tests/", "docs/images/"))]
     assert len([n for n in names if n.startswith("catkin/")]) == 1

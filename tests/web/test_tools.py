@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import cv2
 import numpy as np
+import pytest
 from chromium import Image, mask
 from viewed_world import ROBOT_COLOR, WALL_COLOR, ViewedWorld
 from viewer_page import ViewerPage
 
 from flatland import Twist
+from flatland.web.server import PAGE
 
 EBML = b"\x1a\x45\xdf\xa3"  # first bytes of WebM
 
@@ -74,6 +76,10 @@ def test_the_inspector_shows_the_values_of_the_model(page: ViewerPage) -> None:
         browser.until(f"{inspector}.includes(arguments[0])", text)
 
 
+@pytest.mark.skipif(
+    not (PAGE / "vendor" / "uplot").is_dir(),
+    reason="uPlot is not installed (make setup installs it)",
+)
 def test_plots_show_published_numbers(room: ViewedWorld, page: ViewerPage) -> None:
     browser = page.browser
     room.ask(lambda: room.world.command("/cmd_vel").set(Twist(angular_z=0.5)))

@@ -64,14 +64,15 @@ def test_nothing_is_inline(index: Elements) -> None:
         assert not [name for name in attributes if name == "style" or name.startswith("on")]
 
 
-def test_files_of_other_projects_have_their_licence() -> None:
-    folders = [path for path in (PAGE / "vendor").iterdir() if path.is_dir()]
-    assert [folder.name for folder in folders] == ["uplot"]
-    for folder in folders:
-        assert "Copyright" in (folder / "LICENSE").read_text()
-    imports = "".join((PAGE / module).read_text() for module in MODULES)
-    for name in re.findall(r"vendor/[\w./-]+", imports):
-        assert (PAGE / name).is_file()
+def test_files_of_other_projects_exist_and_have_their_licence() -> None:
+    if not (PAGE / "vendor").is_dir():
+        pytest.skip("uPlot is not installed (make setup installs it)")
+    sources = "".join((PAGE / module).read_text() for module in MODULES)
+    names = set(re.findall(r"vendor/[\w./-]+", sources))
+    assert names == {"vendor/uplot/uPlot.esm.js", "vendor/uplot/uPlot.min.css"}
+    for path in (PAGE / name for name in names):
+        assert path.stat().st_size > 0
+        assert "Copyright" in (path.parent / "LICENSE").read_text()
 
 
 def test_ids_are_unique_and_those_of_the_modules_exist(index: Elements) -> None:

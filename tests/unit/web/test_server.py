@@ -19,6 +19,7 @@ from flatland.errors import FlatlandError
 from flatland.web import WebViewer
 from flatland.web.access import Access
 from flatland.web.page_files import PageFiles
+from flatland.web.server import PAGE
 
 TOKEN = "open-the-sesame-now"
 
@@ -81,7 +82,9 @@ class TestFiles:
         for name in ("js/main.js", "css/theme.css", "icon.svg"):
             assert f"{prefix}/{name}" in links
             assert get(f"{viewer.url}{name}")[0] == 404, "without a version"
-        for link in [*links, f"{prefix}/vendor/uplot/uPlot.esm.js"]:
+        # Not linked, but imported by a module.
+        vendor = [path.relative_to(PAGE) for path in PAGE.glob("vendor/*/*.js")]
+        for link in [*links, *(f"{prefix}/{path}" for path in vendor)]:
             status, headers, _ = get(f"{viewer.url}{link}")
             assert status == 200
             assert headers["Cache-Control"] == "public, max-age=31536000, immutable"
