@@ -300,6 +300,21 @@ def test_a_read_only_client_sees_topics_and_publishes_no_poses(url: str, ros: An
         assert client.refused("publish_pose", **goal) == "this viewer is read-only"
 
 
+def test_topics_remain_through_a_reset_and_its_undo(client: TopicClient, publish: Any) -> None:
+    shown = path("mast")
+    publisher = publish("/kept", shown)
+    number = client.topic("/kept")["id"]
+    client.look(topics=["/kept"], topic_values=["/kept"])
+    client.until("the path", lambda: len(client.lines.get(number, ())))
+    for request in ("reset", "undo"):
+        assert "/clock is set back" in client.do(request)["effect"]
+        shown.poses[-1].pose.position.x += 1
+        publisher.publish(shown)
+        end = shown.poses[-1].pose.position.x - 2
+        client.until(f"the path after {request}", lambda end=end: client.lines[number][0, 2] == end)
+    assert client.topic("/kept")["status"] == ""
+
+
 def test_what_a_page_uses_gives_way_to_a_plugin(
     client: TopicClient, publish: Any, ros: Any
 ) -> None:
