@@ -98,7 +98,7 @@ test("a read-only page has no keys that change the world", () => {
   assert.deepEqual(calls, ["togglePlots"]);
 });
 
-test("Ctrl and Cmd copy, paste, undo and redo, unless text is selected", () => {
+test("Ctrl and Cmd copy, paste, undo and redo; selected text is copied by the browser", () => {
   const { calls, session } = open();
   session.select("robot");
   assert.ok(press("c", { ctrlKey: true }));
@@ -110,18 +110,21 @@ test("Ctrl and Cmd copy, paste, undo and redo, unless text is selected", () => {
   assert.ok(!press("w", { ctrlKey: true, code: "KeyW" }), "does not drive");
   window.getSelection = () => "selected text";
   assert.ok(!press("c", { ctrlKey: true }));
-  assert.deepEqual(calls, []);
+  assert.ok(press("z", { ctrlKey: true }));
+  assert.deepEqual(calls, ["undo"]);
 });
 
 test("typed text, shortcuts of the browser and dialogs have no effect", () => {
-  const { calls, elements } = open();
+  const { calls, elements, session, tools } = open();
+  session.topics.receiveList({ type: "topics", world: 0, topics: [], pose_topics: {} });
   press("n", { ctrlKey: true });
   press("n", {}, elements["model-filter"]);
-  press("z", { ctrlKey: true }, elements["model-filter"]);
+  for (const key of ["z", "y", "c", "v"]) press(key, { ctrlKey: true }, elements["model-filter"]);
+  for (const key of ["o", "i"]) press(key, {}, elements["plot-series"]);
   press(" ", {}, elements.pause);
   elements["help-dialog"].showModal();
   press("n");
-  assert.deepEqual(calls, []);
+  assert.deepEqual([calls, tools.name], [[], "select"]);
   elements["help-dialog"].close();
   press("n", {}, elements["toggle-names"]);
   assert.deepEqual(calls, ["openSpawn"], "a check box takes no text");
@@ -179,8 +182,23 @@ test("the help lists each key once", () => {
   const { hotkeys, elements } = open();
   hotkeys.createHelp();
   const names = elements["help-content"].querySelectorAll("kbd").map((key) => key.textContent);
-  assert.ok(names.includes("Space") && names.includes("Esc"));
+  for (const name of ["Space", "Esc", "Ctrl+Z", "Ctrl+Shift+Z", "Ctrl+Y", "Ctrl+C", "Ctrl+V"])
+    assert.ok(names.includes(name), name);
   assert.equal(names.length, new Set(names).size);
+});
+
+test("the help lists the keys that the page has", () => {
+  const keys = (options, withTopics) => {
+    const { hotkeys, session, elements } = open(options);
+    if (withTopics) session.topics.receiveList({ type: "topics", world: 0, topics: [], pose_topics: {} });
+    hotkeys.createHelp();
+    return elements["help-content"].querySelectorAll("kbd").map((key) => key.textContent);
+  };
+  const all = keys({}, true);
+  assert.ok(all.includes("O") && all.includes("I"));
+  const ofReadOnly = keys({ readOnly: true }, true);
+  for (const key of ["O", "I", "N", "Ctrl+Z", "Ctrl+V"]) assert.ok(!ofReadOnly.includes(key), key);
+  assert.ok(!keys({}, false).includes("O"));
 });
 
 test("the help begins with what the device has", () => {

@@ -15,7 +15,7 @@ import rospy
 from geometry_msgs.msg import Point, PoseStamped, PoseWithCovarianceStamped, TransformStamped
 from nav_msgs.msg import OccupancyGrid
 from nav_msgs.msg import Path as PathMessage
-from std_msgs.msg import Float64
+from std_msgs.msg import Float64, String
 from tf2_msgs.msg import TFMessage
 from visualization_msgs.msg import Marker, MarkerArray
 from waiting import TIMEOUT
@@ -27,6 +27,24 @@ from flatland.ros.transport.ros_transport import RosTransport
 from flatland.web.encoding import GRID, MARKS
 
 NODE = "/flatland_server"
+LISTENER = """
+bodies: [{name: base, footprints: []}]
+plugins: [{type: 'test::Listener', name: listener}]
+"""
+LISTENER_PLUGIN = """
+import flatland
+from geometry_msgs.msg import PoseStamped
+from nav_msgs.msg import OccupancyGrid
+from std_msgs.msg import Float64, String
+
+
+class Listener(flatland.ModelPlugin):
+    def on_initialize(self, config):
+        received = self.ros.advertise("received", String, latch=True)
+        report = lambda message: received.publish(String(message._type))
+        self.ros.subscribe("/some_grid", OccupancyGrid, report)
+        self.ros.advertise("/move_base_simple/goal", Float64)
+"""
 BEACON = """
 bodies: [{name: mast, footprints: [{type: circle, radius: 0.1, density: 1}]}]
 plugins: [{type: ModelTfPublisher, name: tf, publish_tf_world: true, world_frame_id: map}]
@@ -90,7 +108,18 @@ def url(module_launcher: Any, write_world: Callable[..., Path]) -> str:
         "[{name: robot, model: robot.model.yaml, pose: [1, 2, 0]},"
         " {name: beacon, model: beacon.model.yaml, pose: [-2, -3, 0]}]",
         beacon=BEACON,
+        listener=LISTENER,
     )
+    (world.parent / "listener_plugin.py").write_text(LISTENER_PLUGIN)
+    manifest = world.parent / "manifest.xml"
+    manifest.write_text(
+        '<library path="."><class name="test::Listener" type="listener_plugin.Listener"'
+        ' base_class_type="flatland::ModelPlugin"/></library>'
+    )
+    module_launcher.environment = {
+        **module_launcher.environment,
+        "FLATLAND_PLUGIN_PATH": str(manifest),
+    }
     launch = module_launcher.launch(
         "flatland",
         "server.launch",
@@ -269,6 +298,47 @@ def test_a_read_only_client_sees_topics_and_publishes_no_poses(url: str, ros: An
         client.until("values", lambda: client.last("topic_values"))
         goal = {"purpose": "goal", "topic": "/move_base_simple/goal", "pose": [1, 2, 0]}
         assert client.refused("publish_pose", **goal) == "this viewer is read-only"
+
+
+def test_topics_remain_through_a_reset_and_its_undo(client: TopicClient, publish: Any) -> None:
+    shown = path("mast")
+    publisher = publish("/kept", shown)
+    number = client.topic("/kept")["id"]
+    client.look(topics=["/kept"], topic_values=["/kept"])
+    client.until("the path", lambda: len(client.lines.get(number, ())))
+    for request in ("reset", "undo"):
+        assert "/clock is set back" in client.do(request)["effect"]
+        shown.poses[-1].pose.position.x += 1
+        publisher.publish(shown)
+        end = shown.poses[-1].pose.position.x - 2
+        client.until(f"the path after {request}", lambda end=end: client.lines[number][0, 2] == end)
+    assert client.topic("/kept")["status"] == ""
+
+
+def test_what_a_page_uses_gives_way_to_a_plugin(
+    client: TopicClient, publish: Any, ros: Any
+) -> None:
+    """The page receives grids with a class of its own, and publishes goals of another type."""
+    grid = stamped(OccupancyGrid(), "map")
+    grid.info.width, grid.info.height, grid.info.resolution = 2, 1, 0.5
+    grid.data = [0, 100]
+    publisher = publish("/some_grid", grid)
+    number = client.topic("/some_grid")["id"]
+    client.look(topics=["/some_grid"])
+    client.until("the grid", lambda: number in client.cells)
+    goal = {"purpose": "goal", "topic": "/move_base_simple/goal", "pose": [1, 2, 0]}
+    client.do("publish_pose", **goal)
+    answer = ros.spawn("listener.model.yaml", "listener", "listener")
+    assert answer.success, answer.message
+    assert ros.topic("/listener/received", String).next().data == "nav_msgs/OccupancyGrid"
+    error = client.refused("publish_pose", **goal)
+    assert "has the type std_msgs/Float64 already, used by" in error
+    # The page receives later grids as well.
+    grid.data = [100, 0]
+    publisher.publish(grid)
+    client.until("the next grid", lambda: client.cells[number].tolist() == [[100, 0]])
+    ros.delete("listener")
+    client.do("publish_pose", **goal)
 
 
 def test_a_topic_to_which_a_plugin_subscribes_is_shared(ros: Any) -> None:

@@ -142,6 +142,14 @@ def test_the_page_fits_a_phone(room: ViewedWorld, page: ViewerPage) -> None:
         browser.click("#panel-toggle")
         browser.until("document.querySelector('#inspector').checkVisibility()")
         browser.until("document.querySelector('#inspector').innerText.includes('robot')")
+        browser.click("#plots-toggle")
+        browser.until("!document.querySelector('#plots').hidden")
+        page.wait_for_frame()
+        # The view keeps a part of the window, and the rest scrolls inside of the panels.
+        assert browser.evaluate("document.querySelector('#canvas').clientHeight") > 150
+        sizes = "[document.documentElement.scrollWidth, document.documentElement.scrollHeight]"
+        assert browser.evaluate(sizes) == list(PHONE)
+        browser.click("#plots-close")
         browser.click("#panel-toggle")
         x, y = browser.center("#pause")
         browser.touch("Start", (x, y))

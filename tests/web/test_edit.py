@@ -127,7 +127,7 @@ def test_a_read_only_viewer_changes_nothing(
 ) -> None:
     room, page = visited_room
     browser = page.browser
-    for selector in ("#pause", "#step", "#spawn", "#stick"):
+    for selector in ("#pause", "#step", "#spawn", "#stick", "#undo", "#reset", "#history"):
         assert not browser.evaluate(
             "document.querySelector(arguments[0]).checkVisibility({visibilityProperty: true})",
             selector,

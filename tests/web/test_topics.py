@@ -124,6 +124,34 @@ def test_marks_and_a_costmap_are_drawn_where_they_are(page: ViewerPage) -> None:
     assert status == 'no transform from "odom" to "map"'
 
 
+def test_the_tools_fit_all_widths(page: ViewerPage) -> None:
+    browser = page.browser
+    labels = {1600: True, 1260: True, 1259: False, 1080: False, 800: False, 641: False, 390: False}
+    try:
+        for width, has_labels in labels.items():
+            browser.resize(width, 800)
+            page.wait_for_frame()
+            shown, outside, rows, visible = browser.evaluate(
+                """(() => {
+                  const buttons = [...document.querySelectorAll(".top button")]
+                    .filter((each) => each.checkVisibility());
+                  const boxes = buttons.map((each) => each.getBoundingClientRect());
+                  return [
+                    [...document.querySelectorAll(".tools .text")].some((e) => e.checkVisibility()),
+                    buttons.filter((_, i) => boxes[i].left < 0 || boxes[i].right > innerWidth)
+                      .map((each) => each.id),
+                    new Set(boxes.map(({top}) => Math.round(top))).size,
+                    document.querySelector("#tool-goal").checkVisibility(),
+                  ];
+                })()"""
+            )
+            rows_allowed = 1 if width > 640 else 2
+            expected = (width, has_labels, [], rows_allowed, True)
+            assert (width, shown, outside, rows, visible) == expected
+    finally:
+        browser.resize(1200, 800)
+
+
 def test_a_drag_publishes_a_goal(page: ViewerPage, source: Source) -> None:
     page.browser.key("o")
     page.browser.drag(page.screen(1, 1), page.screen(1, 3))

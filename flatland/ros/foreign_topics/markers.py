@@ -34,13 +34,13 @@ class _Shown:
     Attributes:
         frame: Its frame.
         shapes: Its shapes in this frame.
-        end: ROS time at which it disappears [ns], None if it does not.
+        lifetime: ROS times at which it was received and disappears [ns], None if it does not.
         omitted: Why it is not drawn; empty if it is.
     """
 
     frame: str
     shapes: Shapes
-    end: int | None
+    lifetime: tuple[int, int] | None
     omitted: str
 
 
@@ -72,8 +72,8 @@ class MarkerDrawer:
         elif marker.action == Marker.DELETE:
             self._shown.pop(key, None)
         elif key in self._shown or len(self._shown) < MAX_MARKERS:
-            lifetime = marker.lifetime.to_nsec()
-            end = now + lifetime if lifetime > 0 else None
+            duration = marker.lifetime.to_nsec()
+            lifetime = (now, now + duration) if duration > 0 else None
             omitted = ""
             shapes = Shapes()
             if marker.type not in _CONVERTERS:
@@ -82,7 +82,7 @@ class MarkerDrawer:
                 omitted = "opacity 0"
             else:
                 _CONVERTERS[marker.type](marker, shapes)
-            self._shown[key] = _Shown(marker.header.frame_id, shapes, end, omitted)
+            self._shown[key] = _Shown(marker.header.frame_id, shapes, lifetime, omitted)
 
     def draw(self, frames: FrameTree, now: int, *, again: bool) -> Drawing | None:
         """Returns the drawing if a marker or a transform has changed.
@@ -94,8 +94,11 @@ class MarkerDrawer:
         """
         if not self._has_received:
             return None
+        # Also before its start: the time was set back, by a reset of the world for example.
         ended = [
-            key for key, each in self._shown.items() if each.end is not None and each.end < now
+            key
+            for key, each in self._shown.items()
+            if each.lifetime is not None and not each.lifetime[0] <= now <= each.lifetime[1]
         ]
         for key in ended:
             del self._shown[key]

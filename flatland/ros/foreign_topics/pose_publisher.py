@@ -65,8 +65,8 @@ class PosePublisher:
             FlatlandError: The node publishes messages of another type on the topic.
         """
         publisher = self._publishers.get(topic)
-        if publisher is None:
-            publisher = self._transport.advertise(topic, _TYPES[kind])
+        if publisher is None or publisher.closed:
+            publisher = self._transport.advertise(topic, _TYPES[kind], gives_way=True)
             self._publishers[topic] = publisher
             self._wait_for_connections(publisher)
         publisher.publish(_message(kind, pose))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import logging
 from collections import deque
 from concurrent.futures import CancelledError
 from typing import Any, Final
@@ -10,9 +11,11 @@ from typing import Any, Final
 from flatland.errors import FlatlandError
 from flatland.geometry import quaternion_from_yaw
 from flatland.node.frame_tree import FrameTree, transform
-from flatland.node.transport import Transport
 from flatland.node.values import FrameParents
+from flatland.ros.transport.ros_transport import RosTransport
 from flatland.simulation import Simulation
+
+_LOG = logging.getLogger("flatland")
 
 MAX_QUEUED: Final = 1000  # messages of a topic of which all matter, between two updates
 _SEED_TIMEOUT: Final = 1.0  # s; a paused world answers, one whose plugin blocks does not
@@ -21,12 +24,14 @@ _SEED_TIMEOUT: Final = 1.0  # s; a paused world answers, one whose plugin blocks
 class TopicSubscription:
     """Keeps the newest messages of a topic until they are taken.
 
+    It ends when a plugin subscribes to the topic with another message class.
+
     Attributes:
         latest: The newest message, None if there is none.
     """
 
     def __init__(
-        self, transport: Transport, topic: str, message_type: type[Any], *, keeps_all: bool
+        self, transport: RosTransport, topic: str, message_type: type[Any], *, keeps_all: bool
     ) -> None:
         """Subscribes asynchronously.
 
@@ -41,7 +46,12 @@ class TopicSubscription:
         """
         self.latest: Any = None
         self._messages: deque[Any] = deque(maxlen=MAX_QUEUED if keeps_all else 1)
-        self._subscriber = transport.subscribe(topic, message_type, self._receive)
+        self._subscriber = transport.subscribe(topic, message_type, self._receive, gives_way=True)
+
+    @property
+    def closed(self) -> bool:
+        """Whether the subscription has ended."""
+        return self._subscriber.closed
 
     def _receive(self, message: Any) -> None:
         """Keeps a message; called in a thread of rospy, which must not be delayed."""
@@ -64,7 +74,7 @@ class TopicSubscription:
 class TransformSubscription:
     """Receives the transforms of all nodes into a tree."""
 
-    def __init__(self, transport: Transport, simulation: Simulation, frames: FrameTree) -> None:
+    def __init__(self, transport: RosTransport, simulation: Simulation, frames: FrameTree) -> None:
         """Subscribes asynchronously, and takes the transforms of the own world.
 
         A paused world sends no transforms.
@@ -84,10 +94,19 @@ class TransformSubscription:
                 frames.set(each.parent, each.child, transform((each.x, each.y, 0.0), rotation))
         # The class that the node uses for other subscribers of the same topics.
         message_type, _ = transport.receivable(FrameParents)
-        self._subscribers = [
-            transport.subscribe(topic, message_type, self._receive)
-            for topic in ("/tf", "/tf_static")
-        ]
+        self._subscribers = []
+        for topic in ("/tf", "/tf_static"):
+            try:
+                subscriber = transport.subscribe(topic, message_type, self._receive, gives_way=True)
+            except FlatlandError as error:
+                _LOG.warning("web viewer: transforms are missing: %s", error)
+            else:
+                self._subscribers.append(subscriber)
+
+    @property
+    def closed(self) -> bool:
+        """Whether a subscription has given way to one with another message class."""
+        return any(subscriber.closed for subscriber in self._subscribers)
 
     def _receive(self, message: Any) -> None:
         for each in message.transforms:

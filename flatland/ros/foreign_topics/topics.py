@@ -105,6 +105,7 @@ class RosTopics:
         wanted = {name: name in demand.drawn for name in demand.drawn | demand.inspected}
         for name, watched in list(self._watched.items()):
             is_current = watched.type == self._graph.published.get(name, watched.type)
+            is_current = is_current and not watched.gave_way
             if wanted.get(name) != watched.is_drawn or not is_current:
                 self._watched.pop(name).close()
         for name, is_drawn in wanted.items():
@@ -115,13 +116,14 @@ class RosTopics:
             if name in self._watched:
                 self._watched[name].watch_updates(self._graph)
         is_drawing = any(watched.drawer is not None for watched in self._watched.values())
+        transforms = self._transforms
+        if transforms is not None and (transforms.closed or not is_drawing):
+            transforms.close()
+            self._transforms = None
         if is_drawing and self._transforms is None:
             self._transforms = TransformSubscription(
                 self._transport, self._simulation, self._frames
             )
-        elif not is_drawing and self._transforms is not None:
-            self._transforms.close()
-            self._transforms = None
 
     def _collect(self, demand: TopicDemand) -> TopicUpdate:
         drawings: dict[str, Drawing] = {}
@@ -191,6 +193,11 @@ class _WatchedTopic:
         if self._subscriptions[0].latest is None:
             return "no message received"
         return self.drawer.note if self.drawer is not None else ""
+
+    @property
+    def gave_way(self) -> bool:
+        """Whether a subscription has ended because a plugin needs another message class."""
+        return any(subscription.closed for subscription in self._subscriptions)
 
     def close(self) -> None:
         """Unsubscribes."""

@@ -30,6 +30,7 @@ class Publisher:
         topic: Resolved name of the topic.
         owner: Plugin that publishes, for messages.
         connected: Whether the topic has subscribers.
+        closed: Whether the topic was closed, or has given way.
     """
 
     def __init__(
@@ -42,6 +43,7 @@ class Publisher:
         latch: bool = False,
         on_connection: Callable[[bool], object] | None = None,
         owner: str = "",
+        gives_way: bool = False,
     ) -> None:
         """Advertises a topic asynchronously.
 
@@ -55,6 +57,8 @@ class Publisher:
             on_connection: Called in a rospy thread whenever a subscriber may have connected or
                 disconnected, with whether there are subscribers.
             owner: Plugin that publishes, for messages.
+            gives_way: Whether the topic is closed when another publisher of this node, which does
+                not give way, needs another message class.
 
         Raises:
             FlatlandError: This node publishes messages of another type on the topic.
@@ -68,7 +72,8 @@ class Publisher:
         self._queue_size = queue_size
         self._latch = latch
         self._on_connection = on_connection
-        self._closed = False
+        self.closed = False
+        self._gives_way = gives_way
         self._publisher: rospy.Publisher | None = None
         self._early_message: Any = None  # latched message of a topic that is not advertised yet
         # Two locks, because rospy calls `_update` while it holds locks of its own: with one lock,
@@ -76,7 +81,8 @@ class Publisher:
         self._early_lock = threading.Lock()
         self._update_lock = threading.Lock()
         self._listener = _ConnectionListener(self._connection_changed)
-        registrar.claim("publisher", self.topic, message_type, self)
+        give_way = self._give_way if gives_way else None
+        registrar.claim("publisher", self.topic, message_type, self, give_way=give_way)
         registrar.submit(self._open)
 
     @property
@@ -97,7 +103,7 @@ class Publisher:
         Args:
             message: The message, or its bytes, see `publish_serialized`.
         """
-        if self._closed:
+        if self.closed:
             return
         if isinstance(message, bytes):
             self.publish_serialized(message)
@@ -135,7 +141,7 @@ class Publisher:
         publisher = self._publisher
         impl: Any = publisher.impl if publisher is not None else None
         lock = getattr(impl, "publock", None)  # None once rospy has closed the topic
-        if self._closed or lock is None:
+        if self.closed or lock is None:
             return
         broken = []
         with lock:
@@ -163,17 +169,27 @@ class Publisher:
 
     def close(self) -> None:
         """Unregisters the topic asynchronously, unless this node has another publisher of it."""
-        if self._closed:
+        if self.closed:
             return
-        self._closed = True
+        self.closed = True
         self._update()
+        if self._gives_way:
+            # First, because another thread may claim the topic with another class.
+            self._registrar.submit(self._end)
+            self._registrar.release("publisher", self.topic, self)
+            return
         self._registrar.release("publisher", self.topic, self)
         self._registrar.submit_closing(self._end)
 
     # -- in the registrar's thread ---------------------------------------------------------
 
+    def _give_way(self) -> None:
+        self.closed = True
+        self._end()
+        self._update()
+
     def _open(self) -> None:
-        if self._closed:
+        if self.closed:
             return
         # Connections accepted before `_take_over` use the queue of rospy, which does not block
         # either.
@@ -221,7 +237,7 @@ class Publisher:
         with self._update_lock:
             publisher = self._publisher
             impl = publisher.impl if publisher is not None else None
-            connected = not self._closed and impl is not None and impl.has_connections()
+            connected = not self.closed and impl is not None and impl.has_connections()
             self.connected = connected
             if self._on_connection is not None:
                 self._on_connection(connected)

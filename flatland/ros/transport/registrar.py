@@ -62,7 +62,8 @@ class Registrar:
         self.master_lost = False
         self._lock = threading.Lock()
         self._types: dict[tuple[str, str], type[Any]] = {}
-        self._endpoints: dict[tuple[str, str], list[Endpoint]] = {}
+        # The endpoints of each name, with the actions that end those that give way.
+        self._endpoints: dict[tuple[str, str], dict[Endpoint, Callable[[], object] | None]] = {}
         # Parameters by resolved name: as the node found them, and as it has set them.
         self._found_parameters: dict[str, object] = {}
         self._own_parameters: dict[str, object] = {}
@@ -72,8 +73,7 @@ class Registrar:
     def submit(self, action: Callable[[], object]) -> None:
         """Queues an action and returns immediately."""
         with self._lock:
-            self._unfinished += 1
-        self._actions.put(action)
+            self._put(action)
 
     def submit_closing(self, action: Callable[[], object]) -> None:
         """Queues an action that closes a topic; at the end of `closing_last` if that is active."""
@@ -116,7 +116,14 @@ class Registrar:
         return done.wait(timeout)
 
     def claim(
-        self, kind: str, name: str, ros_type: type[Any], endpoint: Endpoint, *, shared: bool = True
+        self,
+        kind: str,
+        name: str,
+        ros_type: type[Any],
+        endpoint: Endpoint,
+        *,
+        shared: bool = True,
+        give_way: Callable[[], object] | None = None,
     ) -> None:
         """Reserves a name, because rospy does not detect two types of the same name.
 
@@ -126,6 +133,8 @@ class Registrar:
             ros_type: Message or service class.
             endpoint: What uses the name.
             shared: Whether other endpoints of the same type may use the name.
+            give_way: Action that ends the endpoint when another one, which does not give way,
+                needs the name with another type; None to refuse the other one.
 
         Raises:
             FlatlandError: The name has another type, or cannot be shared.
@@ -133,8 +142,16 @@ class Registrar:
         key = kind, name
         with self._lock:
             known = self._types.setdefault(key, ros_type)
-            endpoints = self._endpoints.setdefault(key, [])
-            used_by = f", used by {endpoints[0].owner}" if endpoints and endpoints[0].owner else ""
+            endpoints = self._endpoints.setdefault(key, {})
+            if known is not ros_type and give_way is None and None not in endpoints.values():
+                # They end before the new one is opened, whose action is queued after this call.
+                for end in endpoints.values():
+                    if end is not None:
+                        self._put(end)
+                endpoints.clear()
+                known = self._types[key] = ros_type
+            owner = next((each.owner for each in endpoints), "")
+            used_by = f", used by {owner}" if owner else ""
             if known is not ros_type:
                 raise FlatlandError(
                     f'{kind} "{name}" has the type {known._type} already{used_by}, '
@@ -142,15 +159,17 @@ class Registrar:
                 )
             if endpoints and not shared:
                 raise FlatlandError(f'{kind} "{name}" exists already{used_by}')
-            endpoints.append(endpoint)
+            endpoints[endpoint] = give_way
 
     def release(self, kind: str, name: str, endpoint: Endpoint) -> None:
-        """Releases a name reserved by `claim`."""
+        """Releases a name reserved by `claim`, unless the endpoint has given way."""
         key = kind, name
         with self._lock:
-            self._endpoints[key].remove(endpoint)
-            if not self._endpoints[key]:
-                del self._endpoints[key], self._types[key]
+            endpoints = self._endpoints.get(key, {})
+            if endpoint in endpoints:
+                del endpoints[endpoint]
+                if not endpoints:
+                    del self._endpoints[key], self._types[key]
 
     def is_connected(self, topic: str) -> bool:
         """Returns whether all publishers and subscribers of this node for a topic are connected.
@@ -211,6 +230,11 @@ class Registrar:
         self._closed = True
         self.submit(lambda: None)
         self._thread.join(timeout)
+
+    def _put(self, action: Callable[[], object]) -> None:
+        """Queues an action; to be called with the lock."""
+        self._unfinished += 1
+        self._actions.put(action)
 
     def _run(self) -> None:
         while not self._closed:

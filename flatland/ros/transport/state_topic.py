@@ -78,7 +78,7 @@ class StateTopic(Publisher):
             self._post(self._serve_new_subscribers)
 
     def _serve_new_subscribers(self) -> None:
-        if self._closed or not self._new_subscribers:
+        if self.closed or not self._new_subscribers:
             return
         try:
             message = self._make()
@@ -99,7 +99,7 @@ class StateTopic(Publisher):
             publish(message)
         except rospy.ROSException:
             # The topic was closed in the meantime, by its owner or by a shutdown.
-            if not self._closed and not rospy.core.is_shutdown_requested():
+            if not self.closed and not rospy.core.is_shutdown_requested():
                 raise
         finally:
             impl.release()

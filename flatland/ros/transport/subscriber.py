@@ -16,6 +16,7 @@ class Subscriber:
     Attributes:
         topic: Resolved name of the topic.
         owner: Plugin that subscribes, for messages.
+        closed: Whether the subscription has ended: it was closed, or has given way.
     """
 
     def __init__(
@@ -26,6 +27,7 @@ class Subscriber:
         callback: Callable[[Any], object],
         *,
         owner: str = "",
+        gives_way: bool = False,
     ) -> None:
         """Subscribes to a topic asynchronously.
 
@@ -35,6 +37,8 @@ class Subscriber:
             message_type: ROS message class.
             callback: Called with each message.
             owner: Plugin that subscribes, for messages.
+            gives_way: Whether the subscription ends when another one of this node, which does not
+                give way, needs another message class.
 
         Raises:
             FlatlandError: This node subscribes to the topic with another message type.
@@ -44,9 +48,11 @@ class Subscriber:
         self._registrar = registrar
         self._message_type = message_type
         self._callback = callback
-        self._closed = False
+        self.closed = False
+        self._gives_way = gives_way
         self._subscriber: rospy.Subscriber | None = None
-        registrar.claim("subscriber", self.topic, message_type, self)
+        give_way = self._give_way if gives_way else None
+        registrar.claim("subscriber", self.topic, message_type, self, give_way=give_way)
         registrar.submit(self._open)
 
     @property
@@ -59,20 +65,30 @@ class Subscriber:
 
     def close(self) -> None:
         """Unsubscribes asynchronously; no callback starts after this call."""
-        if self._closed:
+        if self.closed:
             return
-        self._closed = True
+        self.closed = True
+        if self._gives_way:
+            # First, because another thread may claim the topic with another class.
+            self._registrar.submit(self._end)
+            self._registrar.release("subscriber", self.topic, self)
+            return
         self._registrar.release("subscriber", self.topic, self)
         self._registrar.submit_closing(self._end)
 
     def _receive(self, message: Any) -> None:
-        if not self._closed:
+        if not self.closed:
             self._callback(message)
 
     def _open(self) -> None:
-        if not self._closed:
+        if not self.closed:
             self._subscriber = rospy.Subscriber(self.topic, self._message_type, self._receive)
 
+    def _give_way(self) -> None:
+        self.closed = True
+        self._end()
+
     def _end(self) -> None:
-        if self._subscriber is not None:
-            unregister(self._subscriber)
+        subscriber, self._subscriber = self._subscriber, None
+        if subscriber is not None:
+            unregister(subscriber)

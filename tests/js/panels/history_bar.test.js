@@ -113,6 +113,29 @@ test("after an error, the slider shows the state of the world", async () => {
   assert.deepEqual([notices, shown()[0]], [["this state is not kept any more"], "3"]);
 });
 
+test("a connection that is lost during a visit does not block the slider", async () => {
+  const { connection, session, slide, visits, elements } = open();
+  let fail = () => {};
+  connection.replies.visit = new Promise((_, reject) => {
+    fail = () => reject(new Error("the connection is lost"));
+  });
+  slide(0);
+  slide(1);
+  connection.emit("state", "reconnecting");
+  fail();
+  await settle();
+  connection.emit("state", "connected");
+  const worlds = [{ world: 0, name: "room 0" }];
+  connection.emit("message", { type: "hello", title: "", read_only: false, worlds });
+  assert.ok(elements["history-slider"].disabled, "the states of the new connection are not known");
+  assert.deepEqual(visits(), [3], "the position that waited belongs to the lost connection");
+  connection.replies.visit = { effect: "" };
+  connection.emit("message", history());
+  slide(2);
+  await settle();
+  assert.deepEqual([visits(), session.world.history.moments.length], [[7], 3]);
+});
+
 test("the reason for a missing history is shown", () => {
   const { elements, connection } = open();
   connection.emit("message", history({ moments: [], obstacle: "the world is recorded" }));

@@ -197,6 +197,24 @@ class TestRequests:
             other.ask("step")
         client.wait("history", lambda m: m["current"] is None)
 
+    def test_a_visit_during_a_drag_of_another_client_keeps_the_world_paused(
+        self, client: RawWebClient, world: World, url: str
+    ) -> None:
+        first = wait_moments(client)["moments"][0]
+        with RawWebClient(url) as other:
+            robot = other.wait_model("robot")["id"]
+            other.ask("hold", model=robot)
+            other.ask("move", model=robot, pose=[6, 6, 0])
+            client.ask("visit", moment=first["moment"])
+            np.testing.assert_allclose(pose(world), (3, 5, 0), atol=1e-6)
+            # The drag goes on in the visited state.
+            other.ask("hold", model=robot)
+            other.ask("move", model=robot, pose=[5, 5, 0])
+            other.ask("release", model=robot)
+        np.testing.assert_allclose(pose(world), (5, 5, 0), atol=1e-6)
+        assert world.paused
+        assert world.time == first["time"]
+
     def test_states_are_dropped_when_no_client_has_looked_for_long(
         self, url: str, viewer: WebViewer, monkeypatch: pytest.MonkeyPatch
     ) -> None:

@@ -72,7 +72,7 @@ export class Hotkeys {
       { keys: ["ctrl+z"], shown: "Ctrl+Z", text: "Undo", run: actions.undo, writes: true },
       {
         keys: ["ctrl+shift+z", "ctrl+y"],
-        shown: "Ctrl+Shift+Z",
+        shown: "Ctrl+Shift+Z, Ctrl+Y",
         text: "Redo",
         run: actions.redo,
         writes: true,
@@ -129,7 +129,6 @@ export class Hotkeys {
     )
       return;
     const isShortcut = event.ctrlKey || event.metaKey;
-    if (isShortcut && String(window.getSelection())) return; // The browser copies the selected text.
     if (!isShortcut && !event.shiftKey && this.tools.name === "select" && this.drive.press(event.code)) {
       event.preventDefault();
       return;
@@ -138,6 +137,8 @@ export class Hotkeys {
     const key = prefix + event.key.toLowerCase();
     const found = this.hotkeys.find((each) => each.keys.includes(key));
     if (!found || (found.writes && this.session.readOnly) || found.isAvailable?.() === false) return;
+    // The browser copies the selected text.
+    if (key === "ctrl+c" && String(window.getSelection())) return;
     event.preventDefault();
     const repeats = ["+", "−", "[", "]", ".", "←", "→", "↑", "↓"];
     if (!event.repeat || repeats.includes(found.shown)) found.run();
@@ -195,10 +196,10 @@ export class Hotkeys {
   /** Fills the help dialog. */
   createHelp() {
     const keys = element("dl");
-    for (const { shown, text, isAvailable } of this.hotkeys) {
-      if (isAvailable?.() === false) continue;
+    for (const { shown, text, writes, isAvailable } of this.hotkeys) {
+      if ((writes && this.session.readOnly) || isAvailable?.() === false) continue;
       if (shown === "→" || shown === "↑" || shown === "↓") continue;
-      const names = shown === "←" ? ["←", "→", "↑", "↓"] : [shown];
+      const names = shown === "←" ? ["←", "→", "↑", "↓"] : shown.split(", ");
       keys.append(
         element("dt", {}, ...names.map((name) => element("kbd", {}, name))),
         element("dd", {}, text),
@@ -220,7 +221,7 @@ export class Hotkeys {
       ["Drag elsewhere", "Move the view; also middle button, Shift"],
       ["Right drag", "Turn the view"],
       ["Wheel, pinch", "Zoom"],
-      ["Right click", "Menu of a model"],
+      ["Right click", "Menu of a model, or of the world"],
       ["Double click", "Centre the model"],
       ["Arrows, W A S D", "Drive the selected robot; Q and E sideways"],
       ["Shift, arrows", "Move the view while a robot is selected"],

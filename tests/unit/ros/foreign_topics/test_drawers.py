@@ -342,6 +342,10 @@ class TestMarkers:
         assert len(drawer.draw(frames, 5 * SECOND, again=False).lines) == 1
         assert drawer.draw(frames, 6 * SECOND, again=False) is None
         assert len(drawer.draw(frames, 6 * SECOND + 1, again=False).lines) == 0
+        # A reset of the world sets the time back, after which the marker would remain for long.
+        drawer.receive(short, 60 * SECOND)
+        assert len(drawer.draw(frames, 60 * SECOND, again=False).lines) == 1
+        assert len(drawer.draw(frames, SECOND, again=False).lines) == 0
 
     def test_markers_of_several_frames(self, frames):
         moved = marker(Marker.SPHERE, 1)

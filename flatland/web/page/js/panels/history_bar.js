@@ -75,7 +75,8 @@ export class HistoryBar {
   proceed() {
     const { history, request, wanted } = this;
     if (request?.replied && history !== request.before) this.request = null;
-    if (history && !this.request && wanted !== undefined) {
+    // Positions that wait during a lost connection are dropped with the next one.
+    if (history && this.session.ready && !this.request && wanted !== undefined) {
       this.wanted = undefined;
       // While an earlier state is shown, the last moment is the newest state.
       const newest = history.current === null ? null : (history.moments.at(-1)?.moment ?? null);
