@@ -11,8 +11,8 @@ stamp=$venv/flatland-setup/npm
 level=${1:-run}
 case $level in
   # Each `make run` tries again until npm can be reached, and must not wait long for that.
-  run) limit=(timeout 60) options=(--omit=dev --fetch-retries=0) ;;
-  dev) limit=() options=() ;;
+  run) limit=30 options=(--omit=dev --fetch-retries=0) ;;
+  dev) limit=600 options=() ;;
   *) fail "the argument of tools/npm_packages.sh must be run or dev, got '$level'" ;;
 esac
 
@@ -31,7 +31,9 @@ if [[ $installed != "$level $identity" && $installed != "dev $identity" ]]; then
   # This Node trusts only the certificate authorities that it contains, unless others are named.
   store=/etc/ssl/certs/ca-certificates.crt
   if [[ -z ${NODE_EXTRA_CA_CERTS-} && -e $store ]]; then export NODE_EXTRA_CA_CERTS=$store; fi
-  quietly "npm ci" "${limit[@]}" "$venv/bin/node" "$node/lib/node_modules/npm/bin/npm-cli.js" ci "${options[@]}" \
+  # Options of npm do not limit the time of connecting, and it does not end on SIGTERM.
+  quietly "npm ci (at most $limit s)" timeout --foreground --signal=KILL "$limit" \
+    "$venv/bin/node" "$node/lib/node_modules/npm/bin/npm-cli.js" ci "${options[@]}" \
     --prefix "$venv/js" --ignore-scripts --no-audit --no-fund --no-update-notifier
   echo "$level $identity" >"$stamp"
 fi
