@@ -195,11 +195,6 @@ class Observers:
         """Notifies all observers."""
         self._notify("model_removed", model)
 
-    @property
-    def watch_layers(self) -> bool:
-        """Whether an observer overrides `layer_changed`."""
-        return any(_overrides(observer, "layer_changed") for observer in self._all)
-
     def layer_changed(self, layer_name: str) -> None:
         """Notifies all observers."""
         self._notify("layer_changed", layer_name)

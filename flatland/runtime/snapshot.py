@@ -224,17 +224,16 @@ class Snapshots:
                 self._models.delete(model.name)
         watched = kept if observers.watch_appearance else ()
         appearances = [(model, appearance_of(model)) for model in models if model in watched]
-        walls = self._walls() if observers.watch_layers else {}
+        walls = self._walls()
         ports, time_ns = _Ports(self._ports), self._timekeeper.sim_time_ns
         self._physics.become_copy_of(snapshot._physics)
         error = snapshot._objects.write_back()
         self._host.jobs.change()  # Other outputs may be wanted than at that time.
         if self._timekeeper.sim_time_ns != time_ns:
             observers.time_advanced(self._timekeeper.sim_time_ns)
-        if observers.watch_layers:
-            for layer, content in self._walls().items():
-                if walls.get(layer) != content:
-                    observers.layer_changed(layer.name)
+        for layer, content in self._walls().items():
+            if walls.get(layer) != content:
+                observers.layer_changed(layer.name)
         self._notify(ports, snapshot._ports, revived, revived_plugins)
         for model, appearance in appearances:
             if appearance_of(model) != appearance:
