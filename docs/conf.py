@@ -106,6 +106,7 @@ nitpick_ignore_regex = [
     (r"py:exc", r"(ClosedEnvironmentError|DependencyNotInstalled|InvalidAction|ResetNeeded)"),
     # Names that are imported only for type checkers, or are not described.
     (r"py:class", r"(FleetEnv|Laser|PluginWorld|Touches|Update)"),
+    (r"py:class", r"flatland\.web\.foreign_topics\.ForeignTopics"),
     (r"py:class", r"flatland\._core\..*"),
     # Type variables.
     (r"py:(class|obj)", r"(flatland\.[a-z_.]+\.)?[CDHRT]"),
