@@ -38,7 +38,7 @@ class Row:
         """Whether the value is within its limit, None without a bar."""
         if self.bar is None:
             return None
-        return self.value >= self.bar if self.at_least else self.value <= self.bar
+        return bool(self.value >= self.bar if self.at_least else self.value <= self.bar)
 
 
 def _number(value: float | None) -> str:
