@@ -42,10 +42,9 @@ class Sum(Reward):
 
     def compute(self, situation: Situation) -> DoubleArray:
         """Returns the sum of the terms, in their order."""
-        first, *others = self.terms
-        total = first.compute(situation)
-        for term in others:
-            total = total + term.compute(situation)
+        total = np.zeros(len(situation))
+        for term in self.terms:
+            total += term.compute(situation)
         return total
 
 

@@ -19,6 +19,7 @@ from flatland.gym import (
     Observation,
     Progress,
     Proximity,
+    Reward,
     Scan,
     Situation,
     Step,
@@ -27,6 +28,7 @@ from flatland.gym import (
     VelocityAction,
     navigation_reward,
 )
+from flatland.gym.rewards import Sum
 
 
 @pytest.fixture
@@ -213,3 +215,17 @@ def test_sectors_of_random_scans_have_their_nearest_ranges() -> None:
     with np.errstate(invalid="ignore"):
         expected = np.where(nearest < 4.0, scaled / (scaled + np.float32(1.5)), np.float32(1.0))
     assert out.tobytes() == expected.astype(np.float32).tobytes()
+
+
+def test_a_sum_is_independent_of_the_arrays_of_its_terms(situation: Situation) -> None:
+    class Constant(Reward):
+        numbers = np.array([1, 2])
+
+        def compute(self, situation: Situation) -> np.ndarray:
+            return self.numbers
+
+    total = Sum(Constant()).compute(situation)
+    total[:] = 0.5
+    assert Constant.numbers.tolist() == [1, 2]
+    assert total.dtype == np.float64
+    assert Sum().compute(situation).tolist() == [0.0, 0.0]
