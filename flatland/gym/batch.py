@@ -125,11 +125,7 @@ class Batch:
             _end([agents[row].world for row in begun], made, results)
         if not others and not unfinished:
             return _NO_ROWS
-        for row in others:
-            v, omega = values[row]
-            agents[row].command.set(Twist(v, 0.0, omega))
-            agents[row].touches.clear()
-        step_worlds([agents[row].world for row in others], n, self._num_threads)
+        step_agents([agents[row] for row in others], commands[others], n, self._num_threads)
         rest = sorted([*others, *unfinished])
         self._situation.collided[rest] = [agents[row].touches.touched for row in rest]
         return np.array(rest, np.intp)
@@ -161,6 +157,25 @@ class Batch:
             if observed[row] and row not in unfinished:
                 agents[row].laser.count_computed((x, y, theta), self._ranges[row])
         return unfinished
+
+
+def step_agents(agents: Sequence[Agent], commands: DoubleArray, n: int, num_threads: int) -> None:
+    """Carries out commands by steps of the worlds of agents, which may share worlds.
+
+    Args:
+        agents: The agents; their collected contacts are cleared first.
+        commands: Forward speed and yaw rate of each agent [m/s, rad/s], shape (len(agents), 2).
+        n: Number of steps.
+        num_threads: Number of threads, 0 for one per core.
+
+    Raises:
+        Exception: As `World.step`.
+    """
+    for agent, (v, omega) in zip(agents, commands.tolist(), strict=True):
+        agent.command.set(Twist(v, 0.0, omega))
+        agent.touches.clear()
+    worlds = list({id(agent.world): agent.world for agent in agents}.values())
+    step_worlds(worlds, n, num_threads)
 
 
 def _end(worlds: list[World], n: int, results: list[RunResult | Exception | None]) -> None:

@@ -11,13 +11,11 @@ import numpy.typing as npt
 
 from flatland.errors import WorldError
 from flatland.geometry import BoolArray, DoubleArray, FloatArray, Pose, Vector2, finite_pose
-from flatland.gym.batch import Batch
+from flatland.gym.batch import Batch, step_agents
 from flatland.gym.situation import Rows, Situation
 from flatland.gym.tasks import Occupied
 from flatland.plugins.laser import compute_scans
-from flatland.runtime.batch import step_worlds
 from flatland.runtime.placement import TOLERANCE
-from flatland.values import Twist
 
 if TYPE_CHECKING:
     from flatland.gym.agents import Agent
@@ -118,26 +116,17 @@ class Episodes:
         s.actions[chosen] = actions[chosen]
         s.previous_distance[chosen] = s.distance[chosen]
         s.steps[chosen] += 1
+        n = self._settings.physics_steps
         if self._batch is None:
-            self._step_worlds(commands, self._all if rows is None else rows)
+            agents = [self.agents[row] for row in (self._all if rows is None else rows).tolist()]
+            step_agents(agents, commands[chosen], n, self._num_threads)
+            s.collided[chosen] = [agent.touches.touched for agent in agents]
             self.look()
             return
-        acting = np.ones(len(s), np.bool_)
-        if rows is not None:
-            acting[:] = False
-            acting[rows] = True
-        self._measure(self._batch.perform(commands, acting, self._settings.physics_steps))
+        acting = np.zeros(len(s), np.bool_)
+        acting[chosen] = True
+        self._measure(self._batch.perform(commands, acting, n))
         self._observe()
-
-    def _step_worlds(self, commands: DoubleArray, rows: Rows) -> None:
-        agents = [self.agents[row] for row in rows.tolist()]
-        for agent, (v, omega) in zip(agents, commands[rows].tolist(), strict=True):
-            agent.command.set(Twist(v, 0.0, omega))
-            agent.touches.clear()
-        # Agents may share a world.
-        worlds = list({id(agent.world): agent.world for agent in agents}.values())
-        step_worlds(worlds, self._settings.physics_steps, self._num_threads)
-        self.situation.collided[rows] = [agent.touches.touched for agent in agents]
 
     def look(self, rows: Rows | None = None) -> None:
         """Performs scans and computes the observations.

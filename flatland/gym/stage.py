@@ -80,7 +80,7 @@ class Stage:
         with ExitStack() as undo:
             first = undo.enter_context(settings.load())
             if len(names) > 1:
-                check_memory(len(names), first.snapshot().size)
+                _check_memory(len(names), first.snapshot().size)
             self.worlds = [first]
             self.worlds += [undo.enter_context(first.clone()) for _ in names[1:]]
             agents = [agent for world in self.worlds for agent in find_agents(world)]
@@ -156,7 +156,7 @@ class Stage:
             self._view.close()
 
 
-def check_memory(count: int, size: int) -> None:
+def _check_memory(count: int, size: int) -> None:
     """Checks that there is enough memory for the worlds of environments.
 
     Args:
