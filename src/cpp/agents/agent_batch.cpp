@@ -42,7 +42,8 @@ double AgentBatch::expected_time(const AgentCommands& commands, const Run& run) 
 }
 
 std::vector<UnfinishedRun> AgentBatch::perform(const AgentCommands& commands, const Run& run,
-                                               const AgentRows& rows, std::size_t num_threads) {
+                                               const AgentObservations& rows,
+                                               std::size_t num_threads) {
   std::vector<std::optional<UnfinishedRun>> unfinished(agents_.size());
   const auto perform_one = [&](std::size_t i) {
     RunResult result;
@@ -85,7 +86,8 @@ RunResult AgentBatch::step(const Agent& agent, double forward, double omega, con
   return world.run(run);
 }
 
-void AgentBatch::observe(std::size_t i, const AgentCommands& commands, const AgentRows& rows) {
+void AgentBatch::observe(std::size_t i, const AgentCommands& commands,
+                         const AgentObservations& rows) {
   const Agent& agent = agents_[i];
   World& world = *agent.world;
   const b2Body* body = world.find_body(agent.body);

@@ -32,7 +32,7 @@ struct AgentCommands {
 };
 
 // What is observed, with a row for each agent.
-struct AgentRows {
+struct AgentObservations {
   double* poses;         // of the body (x, y, theta) in the world frame
   double* velocities;    // of the origin of the body (vx, vy, omega) in the world frame
   double* sensor_poses;  // of the range finder in the world frame
@@ -58,11 +58,11 @@ class AgentBatch {
   // Performs the steps of all agents and observes them, on several threads. The caller has
   // exclusive use of the worlds. An agent with steps that remain is not observed.
   std::vector<UnfinishedRun> perform(const AgentCommands& commands, const Run& run,
-                                     const AgentRows& rows, std::size_t num_threads);
+                                     const AgentObservations& rows, std::size_t num_threads);
 
  private:
   RunResult step(const Agent& agent, double forward, double omega, const Run& run);
-  void observe(std::size_t i, const AgentCommands& commands, const AgentRows& rows);
+  void observe(std::size_t i, const AgentCommands& commands, const AgentObservations& rows);
 
   std::vector<Agent> agents_;
 };

@@ -22,6 +22,17 @@ namespace {
 template <typename Scalar>
 using Rows = py::array_t<Scalar, py::array::c_style>;
 
+// Throws a ValueError unless an array has a row for each agent.
+template <typename Scalar>
+void check_rows(const Rows<Scalar>& array, std::size_t agents, std::size_t columns,
+                const char* name) {
+  if (array.ndim() == 0 || static_cast<std::size_t>(array.shape(0)) != agents ||
+      static_cast<std::size_t>(array.size()) != columns * agents) {
+    throw py::value_error(std::string(name) + " must have a row of " + std::to_string(columns) +
+                          " for each agent");
+  }
+}
+
 // A body, its controller, the collector of its contacts, and its range finder.
 using PyAgent =
     std::tuple<BodyHandle, ControllerHandle, TouchesHandle, std::shared_ptr<RangeFinder>>;
@@ -48,22 +59,23 @@ class PyAgentBatch {
                    const Rows<std::uint64_t>& noises, Rows<double>& poses, Rows<double>& pose_rates,
                    Rows<double>& sensor_poses, Rows<float>& ranges, Rows<bool>& touched,
                    std::size_t num_threads) {
+    const std::size_t agents = batch_.agents().size();
     const std::size_t readings = batch_.agents().front().finder->readings();
-    check(steps, 1, "steps");
-    check(observes, 1, "observes");
-    check(velocities, 2, "velocities");
-    check(times, 1, "times");
-    check(noises, 2, "noises");
-    check(poses, 3, "poses");
-    check(pose_rates, 3, "pose_rates");
-    check(sensor_poses, 3, "sensor_poses");
-    check(ranges, readings, "ranges");
-    check(touched, 1, "touched");
+    check_rows(steps, agents, 1, "steps");
+    check_rows(observes, agents, 1, "observes");
+    check_rows(velocities, agents, 2, "velocities");
+    check_rows(times, agents, 1, "times");
+    check_rows(noises, agents, 2, "noises");
+    check_rows(poses, agents, 3, "poses");
+    check_rows(pose_rates, agents, 3, "pose_rates");
+    check_rows(sensor_poses, agents, 3, "sensor_poses");
+    check_rows(ranges, agents, readings, "ranges");
+    check_rows(touched, agents, 1, "touched");
     const AgentCommands commands{steps.data(), observes.data(), velocities.data(), times.data(),
                                  noises.data()};
-    const AgentRows rows{poses.mutable_data(), pose_rates.mutable_data(),
-                         sensor_poses.mutable_data(), ranges.mutable_data(),
-                         touched.mutable_data()};
+    const AgentObservations rows{poses.mutable_data(), pose_rates.mutable_data(),
+                                 sensor_poses.mutable_data(), ranges.mutable_data(),
+                                 touched.mutable_data()};
     const Run run = to_run(given_run);
     run.check();
     // Safe without the GIL: the worlds are in use, and the caller keeps the arrays alive.
@@ -112,15 +124,6 @@ class PyAgentBatch {
     return agents;
   }
 
-  template <typename Scalar>
-  void check(const Rows<Scalar>& array, std::size_t columns, const char* name) const {
-    if (static_cast<std::size_t>(array.size()) != columns * batch_.agents().size() ||
-        static_cast<std::size_t>(array.shape(0)) != batch_.agents().size()) {
-      throw py::value_error(std::string(name) + " must have a row of " + std::to_string(columns) +
-                            " for each agent");
-    }
-  }
-
   AgentBatch batch_;
   std::vector<PyWorld> worlds_;
 };
@@ -144,16 +147,16 @@ class PyAgentRows {
     if (poses_.ndim() != 2 || ranges_.ndim() != 2) {
       throw py::value_error("poses and ranges must have two dimensions");
     }
-    check(poses_, 3, "poses");
-    check(velocities_, 3, "velocities");
-    check(goals_, 2, "goals");
-    check(goal_ahead_, 1, "goal_ahead");
-    check(goal_left_, 1, "goal_left");
-    check(distance_, 1, "distance");
-    check(speed_, 1, "speed");
-    check(yaw_rate_, 1, "yaw_rate");
-    check(arrived_, 1, "arrived");
-    check(ranges_, static_cast<std::size_t>(ranges_.shape(1)), "ranges");
+    check_rows(poses_, count(), 3, "poses");
+    check_rows(velocities_, count(), 3, "velocities");
+    check_rows(goals_, count(), 2, "goals");
+    check_rows(goal_ahead_, count(), 1, "goal_ahead");
+    check_rows(goal_left_, count(), 1, "goal_left");
+    check_rows(distance_, count(), 1, "distance");
+    check_rows(speed_, count(), 1, "speed");
+    check_rows(yaw_rate_, count(), 1, "yaw_rate");
+    check_rows(arrived_, count(), 1, "arrived");
+    check_rows(ranges_, count(), static_cast<std::size_t>(ranges_.shape(1)), "ranges");
   }
 
   void locate(double goal_radius) { flatland::locate(places(), goal_radius); }
@@ -175,15 +178,6 @@ class PyAgentRows {
 
  private:
   std::size_t count() const { return static_cast<std::size_t>(poses_.shape(0)); }
-
-  template <typename Scalar>
-  void check(const Rows<Scalar>& array, std::size_t columns, const char* name) const {
-    if (array.ndim() == 0 || static_cast<std::size_t>(array.shape(0)) != count() ||
-        static_cast<std::size_t>(array.size()) != columns * count()) {
-      throw py::value_error(std::string(name) + " must have a row of " + std::to_string(columns) +
-                            " for each agent");
-    }
-  }
 
   AgentPlaces places() {
     return {count(),

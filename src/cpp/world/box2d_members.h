@@ -102,17 +102,13 @@ struct ContactDestroyer {
 };
 template struct Expose<ContactDestroyer, &b2Contact::Destroy>;
 
-template <typename Tag, int value>
-struct ExposeFlag {
-  friend int expose(Tag) { return value; }
-};
-
 // `expose(Tag{})` returns a private constant.
 #define FLATLAND_EXPOSE_FLAG(Class, flag, Tag) \
   struct Tag {                                 \
-    friend int expose(Tag);                    \
+    using Pointer = int;                       \
+    friend Pointer expose(Tag);                \
   };                                           \
-  template struct ExposeFlag<Tag, Class::flag>
+  template struct Expose<Tag, Class::flag>
 
 FLATLAND_EXPOSE_FLAG(b2Body, e_awakeFlag, BodyAwakeFlag);
 FLATLAND_EXPOSE_FLAG(b2Contact, e_filterFlag, ContactFilterFlag);
