@@ -25,6 +25,7 @@ pytest.importorskip("flatland.msg", reason="the messages are not built")
 import rosgraph
 import roslib.packages
 import rospy
+from plugin_manifests import write_plugins
 from programs import Program
 from roscpp.srv import SetLoggerLevel
 from waiting import TIMEOUT, wait_until
@@ -353,6 +354,11 @@ class Launcher:
         self.environment = environment
         self._server = server
         self._processes: list[Program] = []
+
+    def add_plugins(self, folder: Path, source: str, module: str) -> None:
+        """Writes a module to a folder and makes nodes find its plugins, as `test::NAME`."""
+        manifest = write_plugins(folder, source, module)
+        self.environment = {**self.environment, "FLATLAND_PLUGIN_PATH": manifest}
 
     def program(self, *command: str, **environment: str) -> Program:
         """Starts a program."""

@@ -139,18 +139,7 @@ def server(module_launcher: Any, write_world: Callable[..., Path]) -> Any:
         for name in NAMES
     }
     world = write_world("[{name: first, model: Stove.model.yaml}]", **files)
-    (world.parent / "test_plugins_of_ros.py").write_text(PLUGINS)
-    classes = "".join(
-        f'<class name="test::{name}" type="test_plugins_of_ros.{name}" '
-        'base_class_type="flatland::ModelPlugin"/>'
-        for name in NAMES
-    )
-    manifest = world.parent / "manifest.xml"
-    manifest.write_text(f'<library path=".">{classes}</library>')
-    module_launcher.environment = {
-        **module_launcher.environment,
-        "FLATLAND_PLUGIN_PATH": str(manifest),
-    }
+    module_launcher.add_plugins(world.parent, PLUGINS, "test_plugins_of_ros")
     return module_launcher.server(world)
 
 

@@ -28,7 +28,7 @@ plugins:
   - {type: DiffDrive, name: drive, body: base, pub_rate: 50, odom_pose_noise: [0.01, 0.01, 0.01]}
   - {type: Laser, name: laser, body: base, range: 20, update_rate: 10, noise_std_dev: 0.05,
      angle: {min: -1.5, max: 1.5, increment: 0.5}}
-  - {type: Talker, name: talker}
+  - {type: "test::Talker", name: talker}
 """
 TALKER = """
 import pathlib
@@ -45,11 +45,6 @@ class Talker(flatland.ModelPlugin):
             raise RuntimeError("cannot start")
         self.talk = self.ros.advertise("talk", String)
         self.ros.subscribe("listen", String, lambda message: self.talk.publish(message))
-"""
-MANIFEST = """
-<library path=".">
-  <class name="Talker" type="reset_talker.Talker" base_class_type="flatland::ModelPlugin"/>
-</library>
 """
 KEPT = {
     "publishers": {
@@ -72,21 +67,14 @@ KEPT = {
 
 @pytest.fixture(scope="module")
 def world(write_world: Callable[..., Path]) -> Path:
-    path = write_world(
+    return write_world(
         "[{name: first, model: noisy.model.yaml, namespace: first, pose: [3, 3, 0]}]", noisy=NOISY
     )
-    (path.parent / "reset_talker.py").write_text(TALKER)
-    (path.parent / "manifest.xml").write_text(MANIFEST)
-    return path
 
 
 @pytest.fixture(scope="module", autouse=True)
 def server(module_launcher: Any, world: Path) -> Any:
-    manifest = str(world.parent / "manifest.xml")
-    module_launcher.environment = {
-        **module_launcher.environment,
-        "FLATLAND_PLUGIN_PATH": manifest,
-    }
+    module_launcher.add_plugins(world.parent, TALKER, "reset_talker")
     return module_launcher.server(world, lockstep=True, seed=1, show_viz=True)
 
 
@@ -262,7 +250,7 @@ def test_a_failed_reset_is_reported(ros: Any, world: Path) -> None:
     finally:
         fail.unlink()
     assert answer.success is False
-    assert 'Plugin "talker" type "Talker" model "first": ' in answer.message
+    assert 'Plugin "talker" type "test::Talker" model "first": ' in answer.message
     assert "cannot start" in answer.message
     reset(ros)
     ros.step()

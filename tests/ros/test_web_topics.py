@@ -110,16 +110,7 @@ def url(module_launcher: Any, write_world: Callable[..., Path]) -> str:
         beacon=BEACON,
         listener=LISTENER,
     )
-    (world.parent / "listener_plugin.py").write_text(LISTENER_PLUGIN)
-    manifest = world.parent / "manifest.xml"
-    manifest.write_text(
-        '<library path="."><class name="test::Listener" type="listener_plugin.Listener"'
-        ' base_class_type="flatland::ModelPlugin"/></library>'
-    )
-    module_launcher.environment = {
-        **module_launcher.environment,
-        "FLATLAND_PLUGIN_PATH": str(manifest),
-    }
+    module_launcher.add_plugins(world.parent, LISTENER_PLUGIN, "listener_plugin")
     launch = module_launcher.launch(
         "flatland",
         "server.launch",

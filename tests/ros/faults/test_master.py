@@ -146,13 +146,7 @@ def test_node_registers_again_with_a_new_master(
     core: Core, launcher: Any, server_path: str, write_world: Callable[..., Path]
 ) -> None:
     world = write_world("[{name: robot, model: talker.model.yaml}]", talker=TALKER)
-    (world.parent / "test_talker.py").write_text(PLUGIN)
-    manifest = world.parent / "manifest.xml"
-    manifest.write_text(
-        '<library path="."><class name="test::Talker" type="test_talker.Talker" '
-        'base_class_type="flatland::ModelPlugin"/></library>'
-    )
-    launcher.environment["FLATLAND_PLUGIN_PATH"] = str(manifest)
+    launcher.add_plugins(world.parent, PLUGIN, "test_talker")
     core.master.setParam("/use_sim_time", True)
     server = start_server(core, launcher, server_path, world)
     client = launcher.program(sys.executable, "-c", CLIENT)

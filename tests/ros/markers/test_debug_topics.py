@@ -72,10 +72,6 @@ class Grow(flatland.WorldPlugin):
         body.physics.create_edges(np.array([[9, 9, 9, 11]], np.float32))
         return TriggerResponse(True, "")
 """
-MANIFEST = """
-<library path="."><class name="test::Grow" type="test_plugin_of_markers.Grow"
-  base_class_type="flatland::WorldPlugin"/></library>
-"""
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -83,15 +79,10 @@ def server(module_launcher: Any, write_world: Callable[..., Path]) -> Any:
     world = write_world(arm=ARM)
     folder = world.parent
     (folder / "turned.yaml").write_text(TURNED)
-    (folder / "test_plugin_of_markers.py").write_text(PLUGIN)
-    (folder / "manifest.xml").write_text(MANIFEST)
     world.write_text(
         f"properties: {{}}\n{LAYERS}\nmodels: []\nplugins: [{{name: grow, type: 'test::Grow'}}]\n"
     )
-    module_launcher.environment = {
-        **module_launcher.environment,
-        "FLATLAND_PLUGIN_PATH": str(folder / "manifest.xml"),
-    }
+    module_launcher.add_plugins(folder, PLUGIN, "test_plugin_of_markers")
     return module_launcher.server(world, show_viz=True, viz_pub_rate=RATE)
 
 
