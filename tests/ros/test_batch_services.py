@@ -77,12 +77,6 @@ def test_spawn_move_and_delete(ros: Any) -> None:
     ]
 
 
-def test_requests_without_models_succeed(ros: Any) -> None:
-    assert ros.call("/spawn_models", SpawnModels, []).success
-    assert ros.call("/move_models", MoveModels, []).success
-    assert ros.call("/delete_models", DeleteModels, []).success
-
-
 @pytest.mark.parametrize("text", [BALL, f"\n{BALL[1:-1]}", "\n" + BALL])
 def test_text_instead_of_a_path(ros: Any, text: str) -> None:
     assert ros.spawn(text, "t", "", (1, 1, 0)).success
@@ -124,13 +118,3 @@ def test_blocked_poses_are_refused(ros: Any) -> None:
     assert answer.success is False
     assert answer.message.startswith('Flatland World: failed to move model "second", it overlaps')
     assert ros.delete("second").success
-
-
-def test_many_models(ros: Any) -> None:
-    models = [
-        ModelSpec(BALL, f"b{i}", "", Pose2D(i % 20 / 2.2 - 4.5, i // 20 / 2.2 - 4, 0))
-        for i in range(140)
-    ]
-    answer = ros.call("/spawn_models", SpawnModels, models)
-    assert (answer.success, len(answer.poses)) == (True, 140)
-    assert ros.call("/delete_models", DeleteModels, [model.name for model in models]).success

@@ -13,8 +13,7 @@ from nav_msgs.msg import Odometry
 from raw_subscriber import RawSubscriber
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import LaserScan
-from std_msgs.msg import Bool, String
-from std_srvs.srv import Empty
+from std_msgs.msg import String
 from tf2_msgs.msg import TFMessage
 from visualization_msgs.msg import InteractiveMarkerUpdate, MarkerArray
 from waiting import wait_until
@@ -228,13 +227,6 @@ def test_markers_follow(ros: Any) -> None:
     reset(ros)
     markers.until(is_at(3))
     updates.until(marker_at(3))
-
-
-def test_a_pause_continues(ros: Any) -> None:
-    ros.call("/pause", Empty)
-    reset(ros)
-    assert ros.topic("/flatland_server/paused", Bool).next().data is True
-    ros.call("/resume", Empty)
 
 
 def test_largest_seed(ros: Any) -> None:

@@ -281,16 +281,6 @@ def test_goals_and_initial_poses_are_those_of_rviz(
         subscriber.unregister()
 
 
-def test_a_read_only_client_sees_topics_and_publishes_no_poses(url: str, ros: Any) -> None:
-    viewer = url.replace("0123456789abcdef", "fedcba9876543210")
-    with TopicClient(viewer) as client:
-        assert client.hello["read_only"]
-        client.look(topics=[], topic_values=["/odometry/filtered"])
-        client.until("values", lambda: client.last("topic_values"))
-        goal = {"purpose": "goal", "topic": "/move_base_simple/goal", "pose": [1, 2, 0]}
-        assert client.refused("publish_pose", **goal) == "this viewer is read-only"
-
-
 def test_topics_remain_through_a_reset_and_its_undo(client: TopicClient, publish: Any) -> None:
     shown = path("mast")
     publisher = publish("/kept", shown)
