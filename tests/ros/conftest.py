@@ -8,7 +8,6 @@ import os
 import queue
 import re
 import signal
-import socket
 import sys
 import time
 import warnings
@@ -18,6 +17,7 @@ from typing import Any
 from xmlrpc.client import ServerProxy
 
 import pytest
+from free_ports import free_port
 
 pytest.importorskip("rospy", reason="ROS is not installed")
 pytest.importorskip("flatland.msg", reason="the messages are not built")
@@ -253,9 +253,7 @@ class Ros:
 def ros_environment(checkout: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
     """Environment of ROS programs: a free port for the master, and the package under test."""
     folder = tmp_path_factory.mktemp("ros")
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        port = probe.getsockname()[1]
+    port = free_port()
     environment = {
         **os.environ,
         "ROS_MASTER_URI": f"http://127.0.0.1:{port}",

@@ -11,6 +11,7 @@ from typing import Any
 import pytest
 import roslaunch.config
 import rospy
+from free_ports import free_port
 from rosgraph_msgs.msg import Clock
 
 from flatland.msg import DebugTopicList
@@ -202,10 +203,3 @@ def test_launch_files_without_arguments(
     # Set although it is empty, so that it replaces the seed of an earlier launch on the master.
     assert given[f"/{node}/seed"].strip() == ""
     assert (given[f"/{node}/plugin_timeout"], given["/use_sim_time"]) == (60.0, True)
-
-
-def free_port() -> int:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        port: int = probe.getsockname()[1]
-        return port

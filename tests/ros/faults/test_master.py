@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import signal
-import socket
 import sys
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -14,6 +13,7 @@ from xmlrpc.client import ServerProxy
 import pytest
 import rosgraph
 import tcpros
+from free_ports import free_port
 from geometry_msgs.msg import Pose2D
 from rosgraph_msgs.msg import Clock
 from tcpros import ServiceClient
@@ -81,9 +81,7 @@ class Core:
     """A roscore of the test, apart from the one of other tests, that can be killed."""
 
     def __init__(self, environment: Mapping[str, str], start: Callable[..., Any]) -> None:
-        with socket.socket() as probe:
-            probe.bind(("127.0.0.1", 0))
-            self._port = probe.getsockname()[1]
+        self._port = free_port()
         self.uri = f"http://127.0.0.1:{self._port}"
         self.environment = {**environment, "ROS_MASTER_URI": self.uri}
         self.master = rosgraph.Master("/flatland_tests", self.uri)
