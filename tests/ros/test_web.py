@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from free_ports import free_port
 from geometry_msgs.msg import Twist
 from nav_msgs.msg import Odometry
 from programs import run_program
@@ -175,9 +176,9 @@ def test_earlier_states_set_the_clock_back_and_keep_topics_connected(
 
 
 def test_a_restarted_simulator_is_shown_at_the_same_address(launcher: Any, world: Path) -> None:
-    first = launcher.server(world, web=True, web_port=0)
+    port = free_port()
+    first = launcher.server(world, web=True, web_port=port)
     url = first.wait_for_line(PORT_LINE)[1]
-    port = int(url.rsplit(":", 1)[1].strip("/"))
     with WebClient(url) as client:
         assert client.pose("robot")
         # The new node has the name of the first one, which ends, and takes its port.
