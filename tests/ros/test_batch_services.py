@@ -27,7 +27,7 @@ def world(write_world: Callable[..., Path]) -> Path:
 
 @pytest.fixture(scope="module", autouse=True)
 def server(module_launcher: Any, world: Path) -> Any:
-    return module_launcher.server(world, if_blocked="refuse", show_viz=True)
+    return module_launcher.server(world, show_viz=True)
 
 
 @pytest.fixture(autouse=True)
@@ -103,18 +103,3 @@ def test_a_failed_call_leaves_everything_as_it_was(ros: Any) -> None:
     assert ros.registered() == before
     assert all(other == listed for other in topics.rest())
     assert "does not exist" in ros.delete("m0").message
-
-
-def test_blocked_poses_are_refused(ros: Any) -> None:
-    """With `~if_blocked:=refuse`, also without a batch."""
-    answer = ros.spawn("ball.model.yaml", "second", "", (3.1, 3, 0.5))
-    assert (answer.success, answer.message) == (
-        False,
-        'Flatland World: failed to spawn model "second", it overlaps model "first" at '
-        "(3.100, 3.000, 0.500)",
-    )
-    assert ros.spawn("ball.model.yaml", "second").success
-    answer = ros.move("second", (3.1, 3, 0))
-    assert answer.success is False
-    assert answer.message.startswith('Flatland World: failed to move model "second", it overlaps')
-    assert ros.delete("second").success

@@ -170,24 +170,6 @@ def test_time_starts_at_0_again_or_continues(ros: Any) -> None:
     assert ros.step() == 21 * STEP_NS
 
 
-def test_models_of_the_file_are_back_and_others_are_gone(ros: Any) -> None:
-    reset(ros)
-    ros.step()
-    before = ros.registered()
-    assert ros.spawn("ball.model.yaml", "more").success
-    assert ros.spawn("robot.model.yaml", "other", "other", (-3, -3, 0)).success
-    assert ros.delete("first").success
-    reset(ros)
-    # Marker topics of deleted models are closed after a delay.
-    wait_until("the topics of the file", lambda: ros.registered() == before)
-    assert not ros.delete("more").success
-    assert not ros.delete("other").success
-    truth = ros.ready_topic("/first/odometry/ground_truth", Odometry)
-    ros.step(0.1)
-    position = truth.next().pose.pose.position
-    assert (position.x, position.y) == pytest.approx((3, 3), abs=1e-6)
-
-
 def test_topics_do_not_flicker_and_subscribers_stay_connected(ros: Any, raw: Any) -> None:
     scans, talk = raw("/first/scan", LaserScan), ros.topic("/first/talk", String)
     raw_talk = raw("/first/talk", String)
