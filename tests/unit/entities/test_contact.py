@@ -11,7 +11,6 @@ import pytest
 import flatland
 from flatland import Contact, ContactImpulse, ModelPlugin, MutableContact, WorldPlugin
 
-DT = 0.005
 DISC = "bodies: [{name: base, footprints: [{type: circle, radius: 0.2, density: 10, friction: 1}]}]"
 SLAB = """
 bodies:
