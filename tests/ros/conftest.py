@@ -27,7 +27,6 @@ import roslib.packages
 import rospy
 from plugin_manifests import write_plugins
 from programs import Program
-from roscpp.srv import SetLoggerLevel
 from waiting import TIMEOUT, wait_until
 
 import flatland
@@ -186,10 +185,6 @@ class Ros:
         answer = self.call("/step_world", StepWorld, duration)
         assert answer.success, answer.message
         return int(answer.stamp.to_nsec())
-
-    def log_everything(self, node: str = "/flatland_server") -> None:
-        """Makes a node log messages of all levels."""
-        self.call(f"{node}/set_logger_level", SetLoggerLevel, "rosout", "debug")
 
     def wait_until_ready(self, *topics: str, node: str = "/flatland_server") -> None:
         """Waits until a node has registered everything, and topics of it are connected."""
