@@ -25,6 +25,10 @@ def test_infinite_rate_fires_in_every_step() -> None:
     assert fired_steps(math.inf, 0.005, 50) == list(range(50))
 
 
+def test_default_rate_is_infinite() -> None:
+    assert UpdateTimer().rate == math.inf
+
+
 def test_rate_zero_fires_at_time_zero_only() -> None:
     assert fired_steps(0.0, 0.005, 1000) == [0]
 
@@ -49,6 +53,11 @@ def test_updates_agree_with_the_formula_of_the_reference(rate: float) -> None:
     dt = 0.005
     expected = [k for k in range(3000) if math.fmod(k * dt + dt / 2, 1 / rate) < dt]
     assert fired_steps(rate, dt, 3000) == expected
+
+
+def test_rate_above_the_step_rate_fires_in_every_step() -> None:
+    assert fired_steps(1000.0, 0.005, 100) == list(range(100))
+    assert fired_steps(201.0, 0.005, 1000) == list(range(1000))
 
 
 def test_timers_of_one_rate_agree_whenever_they_were_created() -> None:

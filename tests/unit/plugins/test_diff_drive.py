@@ -294,6 +294,11 @@ class TestEnableParameters:
         types = {topic: output.value_type for topic, output in outputs.items()}
         assert types == {"/r1/a": Odometry, "/r1/b/c": Odometry, "/d": TwistWithCovariance}
 
+    def test_default_topics(self, plugin_world: Any) -> None:
+        world = plugin_world(drive())
+        assert sorted(world.ports.outputs) == [ODOMETRY, TRUTH, "/twist"]
+        assert list(world.ports.commands) == ["/cmd_vel"]
+
     @pytest.mark.parametrize(
         ("extra", "topics"),
         [

@@ -26,6 +26,15 @@ ROOM_LAYERS = "[{name: 2d, map: room.yaml}, {name: 3d}]"
 CROSS = "{min: 0, max: 4.8, increment: 1.5707963267948966}"  # right, up, left, down
 
 
+BESIDE_A_POST = """
+- name: base
+  footprints: [{type: circle, radius: 0.2, density: 1, layers: [3d]}]
+- name: post
+  pose: [0.501, 0, 0]
+  footprints: [{type: circle, radius: 0.5, density: 1}]
+"""
+
+
 def laser(extra: str = "", angle: str = CROSS) -> str:
     return f"- {{type: Laser, name: eye, body: base, range: 20, angle: {angle}, {extra}}}"
 
@@ -196,6 +205,10 @@ class TestRangeMin:
         close = ranges == -math.inf
         assert 0.4 < close.mean() < 0.6
         assert (ranges[~close] >= 2).all()
+
+    def test_nothing_is_too_close_by_default(self, walls: Walls) -> None:
+        world = walls.load(laser(), bodies=BESIDE_A_POST)
+        assert eye(world).compute_ranges()[0] == pytest.approx(0.001, abs=1e-4)
 
     def test_the_message_contains_it(self, walls: Walls) -> None:
         world = walls.room("range_min: 2.5")

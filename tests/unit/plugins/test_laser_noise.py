@@ -91,6 +91,10 @@ class TestGaussian:
         ranges = eye.ranges("noise_model: additive, noise_std_dev: 0.2")
         assert deviation_of(ranges, lambda x: normal((x - EXACT) / 0.2)) < LIMIT
 
+    def test_additive_is_the_default(self, eye: Eye) -> None:
+        default = eye.ranges("noise_std_dev: 0.2")
+        assert (default == eye.ranges("noise_model: additive, noise_std_dev: 0.2")).all()
+
     def test_the_deviation_of_proportional_noise_is_a_share_of_the_range(self, eye: Eye) -> None:
         ranges = eye.ranges("noise_model: proportional, noise_std_dev: 0.02")
         assert deviation_of(ranges, lambda x: normal((x - EXACT) / (0.02 * EXACT))) < LIMIT

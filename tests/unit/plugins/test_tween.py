@@ -64,6 +64,11 @@ def test_yoyo(plugin_world: Any) -> None:
     assert xs(world, 9) == pytest.approx([5, 10, 5, 0, 5, 10, 5, 0, 5], abs=1e-5)
 
 
+def test_yoyo_is_the_default_mode(plugin_world: Any) -> None:
+    world = plugin_world(tween("delta: [10, 10, 1]"), step_size=0.5)
+    assert xs(world, 5) == pytest.approx([5, 10, 5, 0, 5], abs=1e-5)
+
+
 def test_trigger(plugin_world: Any) -> None:
     world = plugin_world(
         tween("delta: [1, 0, 0], duration: 1, mode: trigger, trigger_topic: open"),
