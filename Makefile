@@ -34,9 +34,13 @@ PYTEST_OPTIONS := --numprocesses 3 --dist loadgroup --no-loadscope-reorder
 test: setup-dev  ## run all tests, in three processes: make test [ARGS="-k laser"]
 	@. ./setup.bash && pytest $(PYTEST_OPTIONS) $(ARGS)
 
+# Ignored, although their tests have marks, because each process would import their modules.
+NOT_QUICK := ros web build
+
 .PHONY: test-quick
 test-quick: setup-dev  ## run the tests that need no ROS master, browser or build: make test-quick [ARGS="-k laser"]
-	@. ./setup.bash && pytest --numprocesses 3 --dist loadgroup -m "not ros and not web and not build" $(ARGS)
+	@. ./setup.bash && pytest --numprocesses 3 --dist loadgroup $(NOT_QUICK:%=--ignore tests/%) \
+		-m "not ros and not web and not build" $(ARGS)
 
 # Runs, and busy processes beside them.
 N := 20

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import gc
 import os
 from collections import Counter
 from pathlib import Path
@@ -62,6 +63,12 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     for item in items:
         for mark in _marks_of(item.path):
             item.add_marker(mark)
+
+
+def pytest_collection_finish() -> None:
+    """Excludes modules and tests from garbage collection, which otherwise visits all of them."""
+    gc.collect()
+    gc.freeze()
 
 
 class SlowestGroups:

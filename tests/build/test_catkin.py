@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import os
-import socket
 import subprocess
 from pathlib import Path
 
 import pytest
+from free_ports import free_port
 from programs import Program, run_program
 from waiting import BUILD_TIMEOUT
 
@@ -149,9 +149,7 @@ def test_bundled_worlds_are_valid(space):
 
 
 def test_node_publishes_the_clock_until_roslaunch_is_stopped(space, world_file):
-    with socket.socket() as free:
-        free.bind(("127.0.0.1", 0))
-        port = free.getsockname()[1]
+    port = free_port()
     environment = {**space.environment, "ROS_MASTER_URI": f"http://127.0.0.1:{port}"}
     command = ["roslaunch", "-p", str(port), "flatland", "server.launch"]
     launch = Program(

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import importlib.util
 import os
-import socket
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
+from free_ports import free_port
 from programs import run_program
 
 from flatland.errors import FlatlandError
@@ -141,9 +141,7 @@ def test_server_runs_with_a_broken_python_first_on_path(shell, world_file, tmp_p
     for name in ("python", "python3", f"python3.{sys.version_info.minor}"):
         (broken / name).write_text('#!/bin/sh\necho "$0 was started"\nexit 99\n')
         (broken / name).chmod(0o755)
-    with socket.socket() as free:
-        free.bind(("127.0.0.1", 0))
-        port = free.getsockname()[1]
+    port = free_port()
     done = shell(
         f'. "$0"; export PATH="{broken}:$PATH"; roslaunch -p {port} flatland benchmark.launch '
         f"world_path:='{world_file}' benchmark_duration:=1",

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import socket
 from pathlib import Path
 
 import pytest
+from free_ports import free_port
 from programs import Program, run_program
 from waiting import BUILD_TIMEOUT
 
@@ -85,9 +85,7 @@ def test_a_clone_in_a_workspace_needs_nothing_else(catkin_workspace):
 
 
 def test_cpp_client_of_the_reference(space, room):
-    with socket.socket() as free:
-        free.bind(("127.0.0.1", 0))
-        port = free.getsockname()[1]
+    port = free_port()
     environment = {**space.environment, "ROS_MASTER_URI": f"http://127.0.0.1:{port}"}
     command = ["roslaunch", "-p", str(port), "flatland_server", "server.launch"]
     launch = Program(

@@ -15,7 +15,7 @@ import pytest
 from programs import run_program
 from waiting import BUILD_TIMEOUT
 
-DURATION = 8.0  # simulated time [s]
+DURATION = 4.0  # simulated time [s]
 # Update rates [Hz], in the order in which the scans are complete.
 SPEEDS = {"as fast as possible": 0, "five times": 1000, "real time": 200}
 # Topic, chain of frames from the fixed frame to the sensor, period of the scans [s].

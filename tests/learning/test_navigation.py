@@ -5,7 +5,6 @@ from __future__ import annotations
 import csv
 import os
 import signal
-import socket
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -15,6 +14,7 @@ import evaluate
 import numpy as np
 import pytest
 import train_navigate
+from free_ports import free_port
 from navigation import make_many, make_one
 from sb3_vector import StableVector
 from stable_baselines3 import PPO
@@ -44,9 +44,7 @@ def policy(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture
 def simulator(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     """The node in lockstep, with a master of its own."""
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        port = probe.getsockname()[1]
+    port = free_port()
     monkeypatch.setenv("ROS_MASTER_URI", f"http://127.0.0.1:{port}")
     monkeypatch.setenv("ROS_IP", "127.0.0.1")
     monkeypatch.setenv("ROS_HOME", str(tmp_path))

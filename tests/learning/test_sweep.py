@@ -8,7 +8,6 @@ import os
 import re
 import shlex
 import signal
-import socket
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
@@ -28,6 +27,7 @@ from flatland_sweep.measurements import Measurements
 from flatland_sweep.planner import PlanningError, plan_path
 from flatland_sweep.results import Results, read_results
 from flatland_sweep.summary import summarize, wilson_interval
+from free_ports import free_port
 from pages import code_blocks
 from waiting import TIMEOUT, wait_until
 
@@ -683,10 +683,7 @@ CLUSTER = """
 @pytest.fixture
 def unused_port() -> int:
     """A TCP port of this machine that no program uses."""
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        port: int = probe.getsockname()[1]
-        return port
+    return free_port()
 
 
 @pytest.fixture

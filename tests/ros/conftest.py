@@ -8,7 +8,6 @@ import os
 import queue
 import re
 import signal
-import socket
 import sys
 import time
 import warnings
@@ -18,6 +17,7 @@ from typing import Any
 from xmlrpc.client import ServerProxy
 
 import pytest
+from free_ports import free_port
 
 pytest.importorskip("rospy", reason="ROS is not installed")
 pytest.importorskip("flatland.msg", reason="the messages are not built")
@@ -25,8 +25,8 @@ pytest.importorskip("flatland.msg", reason="the messages are not built")
 import rosgraph
 import roslib.packages
 import rospy
+from plugin_manifests import write_plugins
 from programs import Program
-from roscpp.srv import SetLoggerLevel
 from waiting import TIMEOUT, wait_until
 
 import flatland
@@ -186,10 +186,6 @@ class Ros:
         assert answer.success, answer.message
         return int(answer.stamp.to_nsec())
 
-    def log_everything(self, node: str = "/flatland_server") -> None:
-        """Makes a node log messages of all levels."""
-        self.call(f"{node}/set_logger_level", SetLoggerLevel, "rosout", "debug")
-
     def wait_until_ready(self, *topics: str, node: str = "/flatland_server") -> None:
         """Waits until a node has registered everything, and topics of it are connected."""
         name = rosgraph.names.namespace(node) + "wait_until_ready"
@@ -252,9 +248,7 @@ class Ros:
 def ros_environment(checkout: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
     """Environment of ROS programs: a free port for the master, and the package under test."""
     folder = tmp_path_factory.mktemp("ros")
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        port = probe.getsockname()[1]
+    port = free_port()
     environment = {
         **os.environ,
         "ROS_MASTER_URI": f"http://127.0.0.1:{port}",
@@ -353,6 +347,11 @@ class Launcher:
         self.environment = environment
         self._server = server
         self._processes: list[Program] = []
+
+    def add_plugins(self, folder: Path, source: str, module: str) -> None:
+        """Writes a module to a folder and makes nodes find its plugins, as `test::NAME`."""
+        manifest = write_plugins(folder, source, module)
+        self.environment = {**self.environment, "FLATLAND_PLUGIN_PATH": manifest}
 
     def program(self, *command: str, **environment: str) -> Program:
         """Starts a program."""

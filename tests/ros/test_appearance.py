@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from sensor_msgs.msg import LaserScan
 from visualization_msgs.msg import InteractiveMarkerInit, MarkerArray
 
 from flatland.srv import SetAppearance, SetAppearanceRequest
@@ -93,15 +92,6 @@ def test_a_changed_model_can_be_deleted_before_its_handle_is_published(ros: Any)
     assert change(ros, color=BLUE).success
     assert ros.delete("box").success
     handles.until(lambda message: "box" not in [marker.name for marker in message.markers])
-
-
-def test_lasers_follow_the_layers(ros: Any) -> None:
-    scans = ros.ready_topic("/r/scan", LaserScan)
-    for layer, distance in (("2d", 1.5), ("ghosts", 4.0), ("all", 1.5)):
-        # A body that is not visible is detected nevertheless.
-        assert change(ros, layers=[layer], visible=HIDE).success
-        ros.step()
-        assert scans.next().ranges[0] == pytest.approx(distance, abs=1e-3)
 
 
 @pytest.mark.parametrize(

@@ -27,7 +27,7 @@ def world(write_world: Callable[..., Path]) -> Path:
 
 @pytest.fixture(scope="module", autouse=True)
 def server(module_launcher: Any, world: Path) -> Any:
-    return module_launcher.server(world, if_blocked="refuse", show_viz=True)
+    return module_launcher.server(world, show_viz=True)
 
 
 @pytest.fixture(autouse=True)
@@ -77,12 +77,6 @@ def test_spawn_move_and_delete(ros: Any) -> None:
     ]
 
 
-def test_requests_without_models_succeed(ros: Any) -> None:
-    assert ros.call("/spawn_models", SpawnModels, []).success
-    assert ros.call("/move_models", MoveModels, []).success
-    assert ros.call("/delete_models", DeleteModels, []).success
-
-
 @pytest.mark.parametrize("text", [BALL, f"\n{BALL[1:-1]}", "\n" + BALL])
 def test_text_instead_of_a_path(ros: Any, text: str) -> None:
     assert ros.spawn(text, "t", "", (1, 1, 0)).success
@@ -109,28 +103,3 @@ def test_a_failed_call_leaves_everything_as_it_was(ros: Any) -> None:
     assert ros.registered() == before
     assert all(other == listed for other in topics.rest())
     assert "does not exist" in ros.delete("m0").message
-
-
-def test_blocked_poses_are_refused(ros: Any) -> None:
-    """With `~if_blocked:=refuse`, also without a batch."""
-    answer = ros.spawn("ball.model.yaml", "second", "", (3.1, 3, 0.5))
-    assert (answer.success, answer.message) == (
-        False,
-        'Flatland World: failed to spawn model "second", it overlaps model "first" at '
-        "(3.100, 3.000, 0.500)",
-    )
-    assert ros.spawn("ball.model.yaml", "second").success
-    answer = ros.move("second", (3.1, 3, 0))
-    assert answer.success is False
-    assert answer.message.startswith('Flatland World: failed to move model "second", it overlaps')
-    assert ros.delete("second").success
-
-
-def test_many_models(ros: Any) -> None:
-    models = [
-        ModelSpec(BALL, f"b{i}", "", Pose2D(i % 20 / 2.2 - 4.5, i // 20 / 2.2 - 4, 0))
-        for i in range(140)
-    ]
-    answer = ros.call("/spawn_models", SpawnModels, models)
-    assert (answer.success, len(answer.poses)) == (True, 140)
-    assert ros.call("/delete_models", DeleteModels, [model.name for model in models]).success

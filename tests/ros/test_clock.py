@@ -39,11 +39,6 @@ class Slow(flatland.WorldPlugin):
         while not pathlib.Path(config.get("go", "string")).exists():
             time.sleep(0.01)
 """
-MANIFEST = """
-<library path=".">
-  <class name="Slow" type="slow_start.Slow" base_class_type="flatland::WorldPlugin"/>
-</library>
-"""
 
 
 @contextmanager
@@ -66,13 +61,9 @@ def test_the_time_is_published_while_the_world_is_loaded_and_to_late_nodes(
 ) -> None:
     world = write_world()
     go = world.parent / "go"
-    world.write_text(
-        world.read_text().replace("plugins: []", f"plugins: [{{type: Slow, name: s, go: {go}}}]")
-    )
-    (world.parent / "slow_start.py").write_text(SLOW)
-    (world.parent / "manifest.xml").write_text(MANIFEST)
-    manifest = str(world.parent / "manifest.xml")
-    launcher.environment = {**launcher.environment, "FLATLAND_PLUGIN_PATH": manifest}
+    plugin = f"{{type: 'test::Slow', name: s, go: {go}}}"
+    world.write_text(world.read_text().replace("plugins: []", f"plugins: [{plugin}]"))
+    launcher.add_plugins(world.parent, SLOW, "slow_start")
     server = launcher.start(world_path=world, lockstep=True, clock_rate=1e-3)
     clock = ros.topic("/clock", Clock)
     assert clock.next().clock.to_nsec() == 0

@@ -63,23 +63,6 @@ def test_robot_follows_the_command(commands: Any, robot: Any) -> None:
     assert position.x > 0.5
 
 
-@pytest.mark.parametrize("bad", [math.nan, math.inf])
-def test_a_command_that_is_not_finite_is_ignored(commands: Any, robot: Any, bad: float) -> None:
-    velocities: list[float] = []
-
-    def velocity() -> float:
-        velocities.append(robot().twist.twist.linear.x)
-        return velocities[-1]
-
-    commands.publish(twist(0.1, 0))
-    wait_until("the first command", lambda: velocity() > 0.05)
-    commands.publish(twist(bad, 0))
-    commands.publish(twist(0, bad))
-    commands.publish(twist(0.2, 0))
-    wait_until("the last command", lambda: velocity() > 0.15)
-    assert sorted({round(each, 3) for each in velocities} - {0.0}) == [0.1, 0.2]
-
-
 def test_ignored_command_gives_a_warning_on_rosout(ros: Any, commands: Any, server: Any) -> None:
     log = ros.topic("/rosout", Log)
 

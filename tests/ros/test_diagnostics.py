@@ -28,12 +28,6 @@ class Broken(flatland.ModelPlugin):
     def before_physics_step(self, timekeeper):
         raise ValueError("expected")
 """
-MANIFEST = """
-<library path=".">
-  <class name="Slow" type="diagnosed.Slow" base_class_type="flatland::ModelPlugin"/>
-  <class name="Broken" type="diagnosed.Broken" base_class_type="flatland::ModelPlugin"/>
-</library>
-"""
 # Each scan has 40 kB, so that the buffers of a connection are soon full.
 BEAMS = """
 bodies: [{name: base, footprints: [{type: circle, radius: 0.2, density: 1}]}]
@@ -41,6 +35,7 @@ plugins:
   - {type: Laser, name: laser, body: base, range: 20,
      angle: {min: -2, max: 2, increment: 0.0004}}
 """
+BODY = "bodies: [{name: base, footprints: []}]\n"
 OK, WARN, ERROR = DiagnosticStatus.OK, DiagnosticStatus.WARN, DiagnosticStatus.ERROR
 
 
@@ -69,16 +64,10 @@ def server(module_launcher: Any, write_world: Callable[..., Path]) -> Any:
     world = write_world(
         "[{name: robot, model: beams.model.yaml}]",
         beams=BEAMS,
-        slow="bodies: [{name: base, footprints: []}]\nplugins: [{type: Slow, name: plug}]\n",
-        broken="bodies: [{name: base, footprints: []}]\nplugins: [{type: Broken, name: plug}]\n",
+        slow=BODY + "plugins: [{type: 'test::Slow', name: plug}]\n",
+        broken=BODY + "plugins: [{type: 'test::Broken', name: plug}]\n",
     )
-    (world.parent / "diagnosed.py").write_text(PLUGINS)
-    (world.parent / "manifest.xml").write_text(MANIFEST)
-    manifest = str(world.parent / "manifest.xml")
-    module_launcher.environment = {
-        **module_launcher.environment,
-        "FLATLAND_PLUGIN_PATH": manifest,
-    }
+    module_launcher.add_plugins(world.parent, PLUGINS, "diagnosed")
     return module_launcher.server(world, update_rate=20, max_lag=0.5)
 
 
@@ -112,11 +101,11 @@ def test_causes_of_warnings(ros: Any) -> None:
             and status.message.startswith("the update rate of 20 Hz cannot be held: ")
         ),
     )
-    name = 'Model Plugin "plug" type "Slow" model "slow" [%]'
+    name = 'Model Plugin "plug" type "test::Slow" model "slow" [%]'
     values = diagnosed.until(
         "plugins", lambda status, v: status.level == ERROR and float(v.get(name, 0)) > 20
     )
-    assert values["disabled"] == 'Model Plugin "plug" type "Broken" model "broken"'
+    assert values["disabled"] == 'Model Plugin "plug" type "test::Broken" model "broken"'
     values = diagnosed.until(
         "subscribers",
         lambda status, _: (

@@ -23,7 +23,7 @@ bodies:
     type: kinematic
     footprints:
       - {type: circle, radius: 30, center: [-1.0e+5, 94.9], density: 0, restitution: 1.0e+9}
-plugins: [{type: "spin::Spin", name: spin}]
+plugins: [{type: "test::Spin", name: spin}]
 """
 PLUGIN = """
 import flatland
@@ -31,11 +31,6 @@ import flatland
 class Spin(flatland.ModelPlugin):
     def before_physics_step(self, timekeeper):
         self.model.bodies[0].set_velocity(0, 0, 1e9)
-"""
-MANIFEST = """
-<library path=".">
-  <class name="spin::Spin" type="spin_plugin.Spin" base_class_type="flatland::ModelPlugin"/>
-</library>
 """
 
 
@@ -51,10 +46,7 @@ def test_model_is_removed_and_the_rest_goes_on(
         heavy=BODY,
         lever=LEVER,
     )
-    (world.parent / "spin_plugin.py").write_text(PLUGIN)
-    manifest = world.parent / "manifest.xml"
-    manifest.write_text(MANIFEST)
-    launcher.environment = {**launcher.environment, "FLATLAND_PLUGIN_PATH": str(manifest)}
+    launcher.add_plugins(world.parent, PLUGIN, "spin_plugin")
     process = launcher.server(world)
     process.wait_for_line(r'body "base" of model "heavy".* not finite: removed from the world')
     clock = ros.topic("/clock", Clock)

@@ -11,12 +11,9 @@ import pytest
 from geometry_msgs.msg import Point, PoseWithCovarianceStamped, Quaternion
 from geometry_msgs.msg import Pose as PoseMessage
 from nav_msgs.msg import Odometry
-from std_srvs.srv import Empty
 from tf2_msgs.msg import TFMessage
 from visualization_msgs.msg import InteractiveMarkerFeedback
 from waiting import wait_until
-
-from flatland.srv import GetModelStates
 
 KIDNAPPED = """
 bodies: [{name: base, footprints: [{type: circle, radius: 0.2, density: 1}]}]
@@ -121,22 +118,3 @@ def test_initialpose_moves_the_model_and_keeps_its_odometry(
     for place in (AWAY, START):
         initialpose.publish(initial_pose(*place, 2.0, frame))
         wait_until("the moved robot", lambda place=place: robot.is_at(place))
-
-
-def test_initialpose_while_paused_takes_effect(initialpose: Any, ros: Any) -> None:
-    def pose() -> Any:
-        return ros.call("/get_model_states", GetModelStates, ["007"]).states.pose[0]
-
-    ros.call("/pause", Empty)
-    for place in (AWAY, START):
-        initialpose.publish(initial_pose(*place))
-        wait_until("the moved robot", lambda place=place: _xy(pose()) == place)
-    ros.call("/resume", Empty)
-
-
-def test_an_invalid_initialpose_is_ignored_with_a_warning(
-    server: Any, initialpose: Any, ros: Any
-) -> None:
-    initialpose.publish(initial_pose(math.nan, 0))
-    server.wait_for_line(r"\[WARN\].*initialpose: ignoring a pose that is not finite")
-    assert Robot(ros).is_at(START)

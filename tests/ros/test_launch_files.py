@@ -12,7 +12,7 @@ import pytest
 import roslaunch
 import roslib.packages
 
-from flatland.node.parameters import NodeParameters
+from flatland.node.parameters import NodeParameters, read_parameters
 
 # Not the default of any parameter.
 VALUES: dict[str, object] = {
@@ -66,6 +66,13 @@ def test_arguments_are_parameters_of_the_node(ros: Any, package: str) -> None:
     expected = {"world_path": "/a/world.yaml", "show_viz": False, **VALUES}
     expected["msgs_package"] = "flatland" if package == "flatland" else "flatland_msgs"
     assert found == expected
+
+
+def test_defaults_are_those_of_the_node(ros: Any) -> None:
+    del ros
+    found = read_parameters(parameters("flatland").get)
+    expected = {"world_path": "/a/world.yaml", "show_viz": False}
+    assert found == read_parameters(expected.get)
 
 
 def test_every_parameter_has_an_argument() -> None:

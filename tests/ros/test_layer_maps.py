@@ -85,12 +85,6 @@ def test_maps_from_files_and_grids(ros: Any, scans: Any) -> None:
     assert scans.ahead() == pytest.approx(1.75, abs=1e-5)
 
 
-def test_a_reset_returns_to_the_map_of_the_file(ros: Any, scans: Any) -> None:
-    assert set_map(ros, message=grid()).success
-    ros.reset()
-    assert scans.ahead() == pytest.approx(4, abs=1e-5)
-
-
 def test_the_published_map_and_markers_follow(ros: Any, scans: Any, server: Any) -> None:
     del scans
     maps, metadata = ros.topic("/map", OccupancyGrid), ros.topic("/map_metadata", MapMetaData)
@@ -109,12 +103,6 @@ def test_the_published_map_and_markers_follow(ros: Any, scans: Any, server: Any)
     assert ros.topic("/map", OccupancyGrid).next().info.width == 9
     ros.reset()
     assert maps.until(lambda message: message.info.width != 9).data == room.data
-
-
-def test_overlapped_models_are_logged(ros: Any, scans: Any, server: Any) -> None:
-    del scans
-    assert set_map(ros, message=grid(3, x=1.0)).success
-    server.wait_for_line(r'\[WARN\].*model "r" overlaps layer "2d" at \(1\.000, 1\.000, 0\.000\)')
 
 
 def broken(**changes: Any) -> Any:

@@ -102,12 +102,3 @@ def test_map_is_latched_and_created_once(ros: Any, server: Any) -> None:
     lines = [line for line in server.lines if "publishing layer" in line]
     assert len(lines) == 1
     assert 'publishing layer "low" as a map of 3 x 2 cells of 0.5 m' in lines[0]
-
-
-def test_a_laser_without_a_path_to_the_world_causes_one_warning(server: Any) -> None:
-    server.wait_for_line(
-        r'\[WARN\].*Model Plugin "eye" type "Laser" model "lost": no TF path leads from frame '
-        r'"lost_eye" of the scans on /lost/scan to the world \(the chain of parents ends at '
-        r'"lost_base"\).*Remedy: enable_odom_tf_pub'
-    )
-    assert sum("no TF path" in line for line in server.lines) == 1

@@ -17,14 +17,9 @@ class Stuck(flatland.ModelPlugin):
         self.output("early", bool)
         threading.Event().wait()
 """
-MANIFEST = """
-<library path=".">
-  <class name="stuck::Stuck" type="stuck_plugin.Stuck" base_class_type="flatland::ModelPlugin"/>
-</library>
-"""
 MODEL = """
 bodies: [{name: base, footprints: []}]
-plugins: [{name: plug, type: "stuck::Stuck"}]
+plugins: [{name: plug, type: "test::Stuck"}]
 """
 
 
@@ -32,16 +27,13 @@ def test_model_with_a_plugin_that_never_starts_fails_to_spawn(
     launcher: Any, ros: Any, write_world: Callable[..., Path]
 ) -> None:
     world = write_world(stuck=MODEL)
-    (world.parent / "stuck_plugin.py").write_text(STUCK)
-    manifest = world.parent / "manifest.xml"
-    manifest.write_text(MANIFEST)
-    launcher.environment = {**launcher.environment, "FLATLAND_PLUGIN_PATH": str(manifest)}
+    launcher.add_plugins(world.parent, STUCK, "stuck_plugin")
     process = launcher.server(world, plugin_timeout=0.25)
     before = ros.registered()
     answer = ros.spawn("stuck.model.yaml", "stuck")
     assert answer.success is False
     assert answer.message.startswith(
-        'Flatland plugin: Model Plugin "plug" type "stuck::Stuck" model "stuck": '
+        'Flatland plugin: Model Plugin "plug" type "test::Stuck" model "stuck": '
         "on_initialize did not return within 0.25 s"
     )
     assert ros.registered() == before

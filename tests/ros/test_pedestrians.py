@@ -116,20 +116,3 @@ def _speed_of_first(array: Any) -> float:
     (lines,) = (marker for marker in array.markers if marker.ns == "velocities")
     start, end = lines.points[:2]
     return math.hypot(end.x - start.x, end.y - start.y)
-
-
-def test_failed_calls_report_a_reason_and_change_nothing(ros: Any) -> None:
-    answer = ros.call("/spawn_people", SpawnPeople, "x", 1, [])
-    assert not answer.success
-    assert 'group "x" does not exist' in answer.message
-    answer = ros.call("/spawn_people", SpawnPeople, "a", 0, [Pose2D(math.nan, 0, 0)])
-    assert not answer.success
-    assert "finite" in answer.message
-    answer = ros.call("/remove_people", RemovePeople, ["a_0", "nobody"])
-    assert (answer.success, "nobody" in answer.message) == (False, True)
-    answer = ros.call("/direct_people", DirectPeople, ["a_0"], 7, Pose2D())
-    assert "action must be from 0 to 2" in answer.message
-    people = states(ros)
-    ros.wait_until_ready("/people/states")
-    ros.step(0.1)
-    assert people.next().name == ["a_0", "a_1"]

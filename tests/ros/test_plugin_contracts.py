@@ -112,18 +112,7 @@ def server(module_launcher: Any, write_world: Callable[..., Path]) -> Any:
         journal=JOURNAL,
         scanner=SCANNER,
     )
-    (world.parent / "test_plugins_of_contracts.py").write_text(PLUGINS)
-    classes = "".join(
-        f'<class name="test::{name}" type="test_plugins_of_contracts.{name}" '
-        'base_class_type="flatland::ModelPlugin"/>'
-        for name in ("FaultyAdapter", "Journal")
-    )
-    manifest = world.parent / "manifest.xml"
-    manifest.write_text(f'<library path=".">{classes}</library>')
-    module_launcher.environment = {
-        **module_launcher.environment,
-        "FLATLAND_PLUGIN_PATH": str(manifest),
-    }
+    module_launcher.add_plugins(world.parent, PLUGINS, "test_plugins_of_contracts")
     return module_launcher.server(world)
 
 

@@ -104,17 +104,6 @@ class WrongName(flatland.ModelPlugin):
         self.ros.subscribe("no name", String, print)
 
 
-class Faulty(flatland.ModelPlugin):
-    def before_physics_step(self, timekeeper):
-        raise RuntimeError("expected")
-
-    def after_physics_step(self, timekeeper):
-        sys.exit("expected")
-
-    def on_shutdown(self):
-        raise RuntimeError("expected")
-
-
 class TakenService(flatland.ModelPlugin):
     def on_initialize(self, config):
         self.ros.advertise_service("/spawn_model", Trigger, print)
@@ -126,7 +115,6 @@ NAMES = (
     "WrongType",
     "OtherType",
     "WrongName",
-    "Faulty",
     "TakenService",
 )
 
@@ -139,18 +127,7 @@ def server(module_launcher: Any, write_world: Callable[..., Path]) -> Any:
         for name in NAMES
     }
     world = write_world("[{name: first, model: Stove.model.yaml}]", **files)
-    (world.parent / "test_plugins_of_ros.py").write_text(PLUGINS)
-    classes = "".join(
-        f'<class name="test::{name}" type="test_plugins_of_ros.{name}" '
-        'base_class_type="flatland::ModelPlugin"/>'
-        for name in NAMES
-    )
-    manifest = world.parent / "manifest.xml"
-    manifest.write_text(f'<library path=".">{classes}</library>')
-    module_launcher.environment = {
-        **module_launcher.environment,
-        "FLATLAND_PLUGIN_PATH": str(manifest),
-    }
+    module_launcher.add_plugins(world.parent, PLUGINS, "test_plugins_of_ros")
     return module_launcher.server(world)
 
 
@@ -262,16 +239,3 @@ def test_callback_may_not_step_or_close_the_world(ros: Any, server: Any, method:
     ros.publisher("/listen", String).publish(String(method))
     assert f"{method} must not be called from a plugin's hook" in echo.next().data
     assert ros.delete("m").success
-
-
-def test_plugin_that_raises_is_disabled_and_the_node_continues(ros: Any, server: Any) -> None:
-    assert ros.spawn("Faulty.model.yaml", "m").success
-    place = 'Model Plugin "p" type "test::Faulty" model "m"'
-    server.wait_for_line(rf"\[ERROR\].*{place}: before_physics_step raised$")
-    server.wait_for_line("RuntimeError: expected")
-    server.wait_for_line(rf"\[ERROR\].*{place}: before_physics_step raised 3 times in a row, the")
-    # The other plugins are not affected.
-    assert ros.topic("/temperature", Float32).next()
-    assert ros.delete("m").success
-    server.wait_for_line(rf"\[ERROR\].*{place}: on_shutdown raised$")
-    assert server.running

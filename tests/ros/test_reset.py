@@ -13,8 +13,7 @@ from nav_msgs.msg import Odometry
 from raw_subscriber import RawSubscriber
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import LaserScan
-from std_msgs.msg import Bool, String
-from std_srvs.srv import Empty
+from std_msgs.msg import String
 from tf2_msgs.msg import TFMessage
 from visualization_msgs.msg import InteractiveMarkerUpdate, MarkerArray
 from waiting import wait_until
@@ -28,7 +27,7 @@ plugins:
   - {type: DiffDrive, name: drive, body: base, pub_rate: 50, odom_pose_noise: [0.01, 0.01, 0.01]}
   - {type: Laser, name: laser, body: base, range: 20, update_rate: 10, noise_std_dev: 0.05,
      angle: {min: -1.5, max: 1.5, increment: 0.5}}
-  - {type: Talker, name: talker}
+  - {type: "test::Talker", name: talker}
 """
 TALKER = """
 import pathlib
@@ -45,11 +44,6 @@ class Talker(flatland.ModelPlugin):
             raise RuntimeError("cannot start")
         self.talk = self.ros.advertise("talk", String)
         self.ros.subscribe("listen", String, lambda message: self.talk.publish(message))
-"""
-MANIFEST = """
-<library path=".">
-  <class name="Talker" type="reset_talker.Talker" base_class_type="flatland::ModelPlugin"/>
-</library>
 """
 KEPT = {
     "publishers": {
@@ -72,21 +66,14 @@ KEPT = {
 
 @pytest.fixture(scope="module")
 def world(write_world: Callable[..., Path]) -> Path:
-    path = write_world(
+    return write_world(
         "[{name: first, model: noisy.model.yaml, namespace: first, pose: [3, 3, 0]}]", noisy=NOISY
     )
-    (path.parent / "reset_talker.py").write_text(TALKER)
-    (path.parent / "manifest.xml").write_text(MANIFEST)
-    return path
 
 
 @pytest.fixture(scope="module", autouse=True)
 def server(module_launcher: Any, world: Path) -> Any:
-    manifest = str(world.parent / "manifest.xml")
-    module_launcher.environment = {
-        **module_launcher.environment,
-        "FLATLAND_PLUGIN_PATH": manifest,
-    }
+    module_launcher.add_plugins(world.parent, TALKER, "reset_talker")
     return module_launcher.server(world, lockstep=True, seed=1, show_viz=True)
 
 
@@ -183,24 +170,6 @@ def test_time_starts_at_0_again_or_continues(ros: Any) -> None:
     assert ros.step() == 21 * STEP_NS
 
 
-def test_models_of_the_file_are_back_and_others_are_gone(ros: Any) -> None:
-    reset(ros)
-    ros.step()
-    before = ros.registered()
-    assert ros.spawn("ball.model.yaml", "more").success
-    assert ros.spawn("robot.model.yaml", "other", "other", (-3, -3, 0)).success
-    assert ros.delete("first").success
-    reset(ros)
-    # Marker topics of deleted models are closed after a delay.
-    wait_until("the topics of the file", lambda: ros.registered() == before)
-    assert not ros.delete("more").success
-    assert not ros.delete("other").success
-    truth = ros.ready_topic("/first/odometry/ground_truth", Odometry)
-    ros.step(0.1)
-    position = truth.next().pose.pose.position
-    assert (position.x, position.y) == pytest.approx((3, 3), abs=1e-6)
-
-
 def test_topics_do_not_flicker_and_subscribers_stay_connected(ros: Any, raw: Any) -> None:
     scans, talk = raw("/first/scan", LaserScan), ros.topic("/first/talk", String)
     raw_talk = raw("/first/talk", String)
@@ -242,13 +211,6 @@ def test_markers_follow(ros: Any) -> None:
     updates.until(marker_at(3))
 
 
-def test_a_pause_continues(ros: Any) -> None:
-    ros.call("/pause", Empty)
-    reset(ros)
-    assert ros.topic("/flatland_server/paused", Bool).next().data is True
-    ros.call("/resume", Empty)
-
-
 def test_largest_seed(ros: Any) -> None:
     reset(ros, seed=2**63 - 1)
     reset(ros, seed=1)
@@ -262,7 +224,7 @@ def test_a_failed_reset_is_reported(ros: Any, world: Path) -> None:
     finally:
         fail.unlink()
     assert answer.success is False
-    assert 'Plugin "talker" type "Talker" model "first": ' in answer.message
+    assert 'Plugin "talker" type "test::Talker" model "first": ' in answer.message
     assert "cannot start" in answer.message
     reset(ros)
     ros.step()

@@ -59,7 +59,6 @@ class SlowEnd(flatland.WorldPlugin):
                 time.sleep(0.1)
             file.write("complete\\n")
 """
-NAMES = ("EndlessStart", "EndlessStep", "EndlessEnd", "EndlessThread", "SlowEnd")
 NOTHING = {"publishers": set(), "subscribers": set(), "services": set()}
 
 
@@ -74,15 +73,7 @@ def world_with(launcher: Any, write_world: Callable[..., Path]) -> Callable[[str
 
     def write(plugin: str) -> Path:
         world = write_world(plugins=f"[{{name: slow, type: 'test::{plugin}'}}]")
-        (world.parent / "test_plugins_of_shutdown.py").write_text(PLUGINS)
-        classes = "".join(
-            f'<class name="test::{name}" type="test_plugins_of_shutdown.{name}" '
-            'base_class_type="flatland::WorldPlugin"/>'
-            for name in NAMES
-        )
-        manifest = world.parent / "manifest.xml"
-        manifest.write_text(f'<library path=".">{classes}</library>')
-        launcher.environment = {**launcher.environment, "FLATLAND_PLUGIN_PATH": str(manifest)}
+        launcher.add_plugins(world.parent, PLUGINS, "test_plugins_of_shutdown")
         return world
 
     return write

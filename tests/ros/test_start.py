@@ -11,6 +11,7 @@ from typing import Any
 import pytest
 import roslaunch.config
 import rospy
+from free_ports import free_port
 from rosgraph_msgs.msg import Clock
 
 from flatland.msg import DebugTopicList
@@ -107,64 +108,6 @@ def test_simulator_publishes_markers_without_a_display(
     assert launch.stop() == 0
 
 
-def test_server_launch_passes_all_parameters(launcher: Any, ros: Any, world: Path) -> None:
-    process = launcher.launch(
-        "flatland",
-        "server.launch",
-        f"world_path:={world}",
-        "update_rate:=inf",
-        "max_lag:=0.25",
-        "step_size:=0.01",
-        "show_viz:=false",
-        "viz_pub_rate:=15",
-        "simplify_map:=1",
-        "seed:=7",
-        "plugin_timeout:=30",
-        "shutdown_timeout:=5",
-        "clock_rate:=500",
-        "publish_map:=2d",
-        f"model_path:={world.parent}:/usr",
-    )
-    times = [message.clock.to_nsec() for message in ros.topic("/clock", Clock).take(20)]
-    assert {time % 10_000_000 for time in times} == {0}
-    parameters = ros.master.getParam("/flatland_server")
-    assert parameters == {
-        "world_path": str(world),
-        "update_rate": "inf",
-        "max_lag": 0.25,
-        "step_size": 0.01,
-        "show_viz": False,
-        "viz_pub_rate": 15,
-        "simplify_map": 1,
-        "seed": 7,
-        "plugin_timeout": 30,
-        "shutdown_timeout": 5,
-        "if_blocked": "warn",
-        "move_keeps_odometry": False,
-        "initialpose_model": "",
-        "use_sim_time": True,
-        "clock_rate": 500,
-        "publish_map": "2d",
-        "msgs_package": "flatland",
-        "model_path": f"{world.parent}:/usr",
-        "record": "",
-        "record_mcap": "",
-        "lockstep": False,
-        "model_states_rate": 50,
-        "web": False,
-        "web_host": "127.0.0.1",
-        "web_port": 8000,
-        "web_token": "",
-        "web_view_token": "",
-        "web_read_only": False,
-    }
-    assert ros.master.getParam("/use_sim_time") is True
-    ros.log_everything()
-    process.wait_for_line(r"^\[DEBUG\].*cycle use min .*mean .*real-time factor: target inf")
-    assert "drawn at random" not in process.output
-    assert process.stop() == 0
-
-
 @pytest.mark.parametrize(
     ("private", "global_", "found"), [(None, None, None), (1, None, 1), (None, 1, 1), (0, 1, 0)]
 )
@@ -202,10 +145,3 @@ def test_launch_files_without_arguments(
     # Set although it is empty, so that it replaces the seed of an earlier launch on the master.
     assert given[f"/{node}/seed"].strip() == ""
     assert (given[f"/{node}/plugin_timeout"], given["/use_sim_time"]) == (60.0, True)
-
-
-def free_port() -> int:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        port: int = probe.getsockname()[1]
-        return port

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import struct
 import zlib
 from collections.abc import Callable, Iterator
@@ -12,12 +11,11 @@ from typing import Any
 import numpy as np
 import pytest
 import rospy
-from geometry_msgs.msg import Point, PoseStamped, PoseWithCovarianceStamped, TransformStamped
+from geometry_msgs.msg import PoseStamped, PoseWithCovarianceStamped, TransformStamped
 from nav_msgs.msg import OccupancyGrid
 from nav_msgs.msg import Path as PathMessage
 from std_msgs.msg import Float64, String
 from tf2_msgs.msg import TFMessage
-from visualization_msgs.msg import Marker, MarkerArray
 from waiting import TIMEOUT
 from web_client import WebClient
 
@@ -56,25 +54,21 @@ class TopicClient(WebClient):
 
     Attributes:
         lines: The lines of each topic by its id.
-        texts_of: The texts of each topic by its id.
         cells: The cells of each grid by the id of its topic.
     """
 
     def __init__(self, url: str) -> None:
         self.lines: dict[int, Any] = {}
-        self.texts_of: dict[int, Any] = {}
         self.cells: dict[int, Any] = {}
         super().__init__(url, topics=[])
 
     def _take_binary(self, data: bytes) -> None:
         super()._take_binary(data)
         if data[0] == MARKS:
-            number, lines, triangles, size = struct.unpack_from("<4I", data, 16)
+            number, lines = struct.unpack_from("<2I", data, 16)
             shown = np.frombuffer(data, "<f4", 5 * lines, 32)
             self.lines[number] = shown.reshape(-1, 5)
             self.cells.pop(number, None)
-            end = 32 + 24 * lines + 28 * triangles
-            self.texts_of[number] = json.loads(data[end : end + size] or b"[]")
         elif data[0] == GRID:
             number, width, height = struct.unpack_from("<3I", data, 16)
             cells = np.frombuffer(zlib.decompress(data[44:]), np.int8)
@@ -110,16 +104,7 @@ def url(module_launcher: Any, write_world: Callable[..., Path]) -> str:
         beacon=BEACON,
         listener=LISTENER,
     )
-    (world.parent / "listener_plugin.py").write_text(LISTENER_PLUGIN)
-    manifest = world.parent / "manifest.xml"
-    manifest.write_text(
-        '<library path="."><class name="test::Listener" type="listener_plugin.Listener"'
-        ' base_class_type="flatland::ModelPlugin"/></library>'
-    )
-    module_launcher.environment = {
-        **module_launcher.environment,
-        "FLATLAND_PLUGIN_PATH": str(manifest),
-    }
+    module_launcher.add_plugins(world.parent, LISTENER_PLUGIN, "listener_plugin")
     launch = module_launcher.launch(
         "flatland",
         "server.launch",
@@ -183,44 +168,6 @@ def test_a_path_appears_as_soon_as_its_frame_is_known(
     client.until("the path", lambda: len(client.lines.get(plan["id"], ())))
     np.testing.assert_allclose(client.lines[plan["id"]][:, :4], [[0, 3, 2, 3]], atol=1e-5)
     client.until_status("/plan", "")
-
-
-def test_frames_of_the_world_are_known_also_while_it_is_paused(
-    client: TopicClient, publish: Any
-) -> None:
-    client.do("pause")
-    try:
-        publish("/from_beacon", path("mast"))
-        number = client.topic("/from_beacon")["id"]
-        client.look(topics=["/from_beacon"])
-        client.until("the path", lambda: len(client.lines.get(number, ())))
-        np.testing.assert_allclose(client.lines[number][:, :4], [[-2, -3, 0, -3]], atol=1e-5)
-    finally:
-        client.do("resume")
-
-
-def test_markers_and_a_grid(client: TopicClient, publish: Any) -> None:
-    marker = stamped(Marker(type=Marker.TEXT_VIEW_FACING, text="goal"), "map")
-    marker.color.a = 1
-    marker.pose.position = Point(1, 2, 3)
-    marks = publish("/marks", MarkerArray(markers=[marker]))
-    grid = stamped(OccupancyGrid(), "map")
-    grid.info.width, grid.info.height, grid.info.resolution = 3, 2, 0.5
-    grid.data = [0, 100, -1, 1, 2, 3]
-    publish("/cells", grid)
-    number, cells = client.topic("/marks")["id"], client.topic("/cells")["id"]
-    client.look(topics=["/marks", "/cells"])
-    client.until("the text", lambda: client.texts_of.get(number) == [[1, 2, "goal"]])
-    client.until("the grid", lambda: cells in client.cells)
-    assert client.cells[cells].tolist() == [[0, 100, -1], [1, 2, 3]]
-    marks.publish(MarkerArray(markers=[Marker(action=Marker.DELETEALL)]))
-    client.until("no text", lambda: client.texts_of.get(number) == [])
-    # An invalid message removes what was drawn.
-    grid.data.pop()
-    publish("/cells", grid)
-    client.until("an error", lambda: client.topic("/cells")["status"])
-    assert "3 x 2 cells" in client.topic("/cells")["status"]
-    client.until("no grid", lambda: cells not in client.cells)
 
 
 def test_subscriptions_exist_only_while_a_client_looks(
@@ -288,16 +235,6 @@ def test_goals_and_initial_poses_are_those_of_rviz(
     assert error == 'no node subscribes to poses on "/cmd_vel"'
     for subscriber in subscribers:
         subscriber.unregister()
-
-
-def test_a_read_only_client_sees_topics_and_publishes_no_poses(url: str, ros: Any) -> None:
-    viewer = url.replace("0123456789abcdef", "fedcba9876543210")
-    with TopicClient(viewer) as client:
-        assert client.hello["read_only"]
-        client.look(topics=[], topic_values=["/odometry/filtered"])
-        client.until("values", lambda: client.last("topic_values"))
-        goal = {"purpose": "goal", "topic": "/move_base_simple/goal", "pose": [1, 2, 0]}
-        assert client.refused("publish_pose", **goal) == "this viewer is read-only"
 
 
 def test_topics_remain_through_a_reset_and_its_undo(client: TopicClient, publish: Any) -> None:

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 from PIL import Image
+from plugin_manifests import manifest
 from waiting import TIMEOUT
 
 import flatland
@@ -82,6 +83,23 @@ def files(tmp_path: Path) -> Iterator[WorldFiles]:
     world_files.write("minimal.model.yaml", MINIMAL_MODEL)
     yield world_files
     world_files.close()
+
+
+@pytest.fixture
+def declare_plugins(files: WorldFiles, monkeypatch: pytest.MonkeyPatch) -> Callable[..., None]:
+    """Declares classes of the test as plugins, named `test::CLASS`."""
+
+    def declare(*classes: type) -> None:
+        bases = {
+            f"{each.__module__}.{each.__name__}": "Model"
+            if issubclass(each, flatland.ModelPlugin)
+            else "World"
+            for each in classes
+        }
+        path = files.write("declared_plugins.xml", manifest(bases))
+        monkeypatch.setenv("FLATLAND_PLUGIN_PATH", path)
+
+    return declare
 
 
 @pytest.fixture

@@ -16,6 +16,7 @@ from pathlib import Path
 
 import pytest
 from pages import code_blocks, pattern_of
+from plugin_manifests import manifest
 from programs import run_program
 
 import flatland
@@ -125,11 +126,9 @@ def step_closed(world: flatland.World) -> None:
 
 
 def with_plugin(case: Case, parameters: str, **options: object) -> str:
-    (case.folder / "plugins.xml").write_text(
-        f'<library><class name="test::Failing" type="{__name__}.FailingPlugin"'
-        ' base_class_type="flatland::ModelPlugin"/></library>'
-    )
-    robot = f'{BODY}plugins: [{{name: p, type: "test::Failing", {parameters}}}]'
+    declared = manifest({f"{__name__}.FailingPlugin": "Model"})
+    (case.folder / "plugins.xml").write_text(declared)
+    robot = f'{BODY}plugins: [{{name: p, type: "test::FailingPlugin", {parameters}}}]'
     return case.load(robot=robot, then=lambda world: world.step(5), **options)
 
 

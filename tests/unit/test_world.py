@@ -51,21 +51,9 @@ class Probe(ModelPlugin):
 
 
 @pytest.fixture
-def probe(files, monkeypatch, request):
-    """The class `Probe`, found by manifest as `test::Probe`."""
-    monkeypatch.setenv(
-        "FLATLAND_PLUGIN_PATH",
-        files.write(
-            "probe.xml",
-            """
-            <library><class name="test::Probe" type="probe_plugin_for_tests.Probe"
-              base_class_type="flatland::ModelPlugin"/></library>
-            """,
-        ),
-    )
-    monkeypatch.setitem(
-        __import__("sys").modules, "probe_plugin_for_tests", type("Module", (), {"Probe": Probe})
-    )
+def probe(files, declare_plugins):
+    """The class `Probe`, declared as a plugin."""
+    declare_plugins(Probe)
     Probe.calls = []
     Probe.hook = ""
     Probe.act = None

@@ -99,19 +99,6 @@ def test_a_model_is_spawned_with_a_preview(room: ViewedWorld, page: ViewerPage) 
     browser.picture_until("both crates are visible", lambda image: cyan(image) > 1.6 * before)
 
 
-def test_errors_of_the_simulator_are_shown(room: ViewedWorld, page: ViewerPage) -> None:
-    browser = page.browser
-    browser.click("#spawn")
-    browser.until("document.querySelector('#spawn-preview').ariaLabel.includes(' by ')")
-    browser.fill("#spawn-name", "robot")
-    browser.click("#spawn-number")
-    browser.click("#spawn-by-numbers")
-    browser.click("#spawn-ok")
-    text = browser.until("document.querySelector('#notices [data-level=error]')?.innerText")
-    assert "robot" in text
-    assert sorted(room.names()) == ["crate", "robot"]
-
-
 @pytest.fixture
 def visited_room(browser: Chromium, tmp_path: Path) -> Iterator[tuple[ViewedWorld, ViewerPage]]:
     """A read-only viewer of a room, and its page."""
@@ -164,17 +151,6 @@ def test_pause_step_and_resume(room: ViewedWorld, page: ViewerPage) -> None:
     browser.until(f"parseFloat({shown}) > arguments[0]", 1e-9 * before + 0.1)
 
 
-def test_the_rate_slider(room: ViewedWorld, page: ViewerPage) -> None:
-    browser = page.browser
-    browser.evaluate("document.querySelector('#rate').focus()")
-    browser.key("Home")
-    wait_until("a lower rate", lambda: room.ask(lambda: room.simulation.rate) == 10)
-    browser.until("document.querySelector('#rate-text').textContent.startsWith('10 Hz')")
-    browser.until("parseFloat(document.querySelector('#rtf').textContent) < 0.2")
-    browser.key("End")
-    wait_until("no limit", lambda: room.ask(lambda: room.simulation.rate) == math.inf)
-
-
 # -- driving -------------------------------------------------------------------------------
 
 
@@ -183,19 +159,3 @@ def test_keys_drive_the_selected_robot(room: ViewedWorld, page: ViewerPage) -> N
     with keys_held(page.browser, "w", "a"):
         wait_until("a curve", lambda: speed(room)[0] > 0.1 and speed(room)[1] > 0.1)
     wait_until_it_stands(room)
-
-
-def test_the_stick_drives_with_mouse_and_finger(room: ViewedWorld, page: ViewerPage) -> None:
-    browser = page.browser
-    page.select("robot")
-    x, y = browser.center("#stick")
-    browser.press((x, y))
-    browser.drag_over(line((x, y), (x, y - 40), 3))
-    wait_until("the robot drives", lambda: speed(room)[0] > 0.1)
-    browser.release((x, y - 40))
-    wait_until_it_stands(room)
-    browser.touch("Start", (x - 40, y))
-    wait_until("the robot turns", lambda: speed(room)[1] > 0.1)
-    with browser.tab_in_front():
-        wait_until_it_stands(room)
-    browser.touch("Cancel")

@@ -60,22 +60,6 @@ def test_recording(room: ViewedWorld, page: ViewerPage) -> None:
     assert max(places) > min(places) + 5, "the robot moves"
 
 
-def test_the_inspector_shows_the_values_of_the_model(page: ViewerPage) -> None:
-    browser = page.browser
-    inspector = "document.querySelector('#inspector').textContent"
-    page.select("crate")
-    browser.until(f"{inspector}.includes(arguments[0])", f"{1.6 * 0.6:.2f}")  # the mass
-    assert browser.evaluate("Number(document.querySelector('#pose-x').value)") == 2
-    page.select("robot")
-    # A section does not push the next one out of the window.
-    assert browser.evaluate(
-        "(([a, b]) => a.bottom <= b.bottom)(['#toggle-trails', '#panel']"
-        ".map((each) => document.querySelector(each).getBoundingClientRect()))"
-    )
-    for text in ("DiffDrive", "Laser", "/scan", "ranges: 311 values", "pub_rate"):
-        browser.until(f"{inspector}.includes(arguments[0])", text)
-
-
 @pytest.mark.skipif(
     not (PAGE / "vendor" / "uplot").is_dir(),
     reason="uPlot is not installed (make setup installs it)",
@@ -107,17 +91,3 @@ def test_plots_show_published_numbers(room: ViewedWorld, page: ViewerPage) -> No
     browser.click(f'.plot-number[data-series="{other}"]')
     browser.until("document.querySelectorAll('figure.plot').length === 2")
     browser.until("document.querySelectorAll('.chart canvas').length === 2")
-
-
-def test_the_menu_is_closed_by_an_item_and_by_escape(page: ViewerPage) -> None:
-    browser = page.browser
-    shown = "document.querySelector('#page-menu').checkVisibility()"
-    dark = "document.documentElement.dataset.theme === 'dark'"
-    before = browser.evaluate(dark)
-    page.menu("#theme")
-    browser.until(f"({dark}) !== arguments[0] && !{shown}", before)
-    page.menu("#theme")
-    browser.click("#page-menu-toggle")
-    browser.until(shown)
-    browser.key("Escape")
-    browser.until(f"!{shown}")

@@ -87,7 +87,10 @@ def page(tmp_path: Path, browser: Chromium, source: Source) -> Iterator[ViewerPa
         page.open(viewer.url)
         browser.until("document.querySelectorAll('[data-topic]').length === 3")
         yield page
-        assert browser.console() == []
+        errors = browser.console()
+        # Otherwise the page would report that it cannot reconnect, in the next test.
+        browser.open("about:blank")
+        assert errors == []
 
 
 def found(image: Image, color: tuple[int, int, int]) -> int:

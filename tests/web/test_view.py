@@ -24,10 +24,6 @@ def close_to(point: Any, tolerance: float = 3.0) -> Any:
     return pytest.approx(point, abs=tolerance)
 
 
-def pixels(image: Image, color: tuple[int, int, int]) -> int:
-    return int(np.count_nonzero(mask(image, color)))
-
-
 def pause(room: ViewedWorld, page: ViewerPage) -> None:
     """Pauses the world and waits until the page has drawn its last state."""
     room.ask(room.world.pause)
@@ -61,19 +57,6 @@ def test_the_world_is_drawn_where_it_is_while_the_robot_moves(
     pause(room, page)
     x, y, _ = room.pose("robot")
     assert centroid(page.canvas(page.browser.picture()), ROBOT_COLOR) == close_to(page.screen(x, y))
-
-
-def test_displays_are_switched_off_and_on(page: ViewerPage) -> None:
-    page.show("scans", False)
-    for display, color in (("layers", WALL_COLOR), ("models", CRATE_COLOR)):
-        for shown in (True, False, True):
-            page.show(display, shown)
-
-            def is_right(image: Image, color: Any = color, shown: bool = shown) -> bool:
-                found = pixels(page.canvas(image), color)
-                return found > 100 if shown else found < 10
-
-            page.browser.picture_until(f"{display}: {shown}", is_right)
 
 
 def test_each_display_changes_the_picture(room: ViewedWorld, page: ViewerPage) -> None:
@@ -119,38 +102,6 @@ def test_wheel_drag_and_fingers_zoom_and_pan(page: ViewerPage) -> None:
         assert page.screen(0, 3) == close_to(center, 6)
     finally:
         browser.resize(1200, 800)
-
-
-def test_the_view_follows_the_selected_robot(room: ViewedWorld, page: ViewerPage) -> None:
-    page.select("robot")
-    page.browser.click("#follow")
-    page.browser.until("flatland.state.followed === 'robot'")
-    drive(room, FORWARD)
-    page.browser.until("flatland.state.worlds[0].models.robot.pose[0] > -1")
-    pause(room, page)
-    x, y, _ = room.pose("robot")
-    box = page.browser.evaluate(
-        "((b) => [b.x + b.width / 2, b.y + b.height / 2])"
-        "(document.querySelector('#canvas').getBoundingClientRect())"
-    )
-    assert page.screen(x, y) == close_to(box)
-    page.browser.drag(page.screen(0, 3), page.screen(1, 3))
-    page.browser.until("flatland.state.followed === null")
-
-
-def test_a_link_restores_the_view(page: ViewerPage) -> None:
-    browser = page.browser
-    browser.wheel(page.screen(1, 1), -360)
-    browser.drag(page.screen(0, 2), page.screen(0.5, 2.5))
-    page.show("names", False)
-    page.menu("#share")
-    browser.until("document.querySelector('#notices').innerText.startsWith('Link')")
-    url = browser.until("location.hash.includes('zoom') && location.href")
-    scale, point = page.scale(), page.screen(1, 1)
-    page.open(url)
-    assert page.scale() == pytest.approx(scale, rel=0.01)
-    assert page.screen(1, 1) == close_to(point)
-    assert not browser.evaluate("document.querySelector('[data-display=names]').checked")
 
 
 def test_lasers_scan_only_for_visible_pages_that_show_scans(

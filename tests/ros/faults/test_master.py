@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import signal
-import socket
 import sys
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -14,6 +13,7 @@ from xmlrpc.client import ServerProxy
 import pytest
 import rosgraph
 import tcpros
+from free_ports import free_port
 from geometry_msgs.msg import Pose2D
 from rosgraph_msgs.msg import Clock
 from tcpros import ServiceClient
@@ -81,9 +81,7 @@ class Core:
     """A roscore of the test, apart from the one of other tests, that can be killed."""
 
     def __init__(self, environment: Mapping[str, str], start: Callable[..., Any]) -> None:
-        with socket.socket() as probe:
-            probe.bind(("127.0.0.1", 0))
-            self._port = probe.getsockname()[1]
+        self._port = free_port()
         self.uri = f"http://127.0.0.1:{self._port}"
         self.environment = {**environment, "ROS_MASTER_URI": self.uri}
         self.master = rosgraph.Master("/flatland_tests", self.uri)
@@ -146,13 +144,7 @@ def test_node_registers_again_with_a_new_master(
     core: Core, launcher: Any, server_path: str, write_world: Callable[..., Path]
 ) -> None:
     world = write_world("[{name: robot, model: talker.model.yaml}]", talker=TALKER)
-    (world.parent / "test_talker.py").write_text(PLUGIN)
-    manifest = world.parent / "manifest.xml"
-    manifest.write_text(
-        '<library path="."><class name="test::Talker" type="test_talker.Talker" '
-        'base_class_type="flatland::ModelPlugin"/></library>'
-    )
-    launcher.environment["FLATLAND_PLUGIN_PATH"] = str(manifest)
+    launcher.add_plugins(world.parent, PLUGIN, "test_talker")
     core.master.setParam("/use_sim_time", True)
     server = start_server(core, launcher, server_path, world)
     client = launcher.program(sys.executable, "-c", CLIENT)

@@ -62,16 +62,7 @@ plugins: [{type: "test::Faulty", name: bad}]
 def folder(module_launcher: Any, write_world: Callable[..., Path]) -> Path:
     """The folder of a world whose plugin has a fault when a file of that name appears."""
     world = write_world("[{name: robot, model: faulty.model.yaml}]", faulty=MODEL)
-    (world.parent / "test_faulty_plugins.py").write_text(PLUGINS)
-    manifest = world.parent / "manifest.xml"
-    manifest.write_text(
-        '<library path="."><class name="test::Faulty" type="test_faulty_plugins.Faulty" '
-        'base_class_type="flatland::ModelPlugin"/></library>'
-    )
-    module_launcher.environment = {
-        **module_launcher.environment,
-        "FLATLAND_PLUGIN_PATH": str(manifest),
-    }
+    module_launcher.add_plugins(world.parent, PLUGINS, "test_faulty_plugins")
     return world.parent
 
 

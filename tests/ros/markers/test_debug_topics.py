@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Callable
 from contextlib import closing
 from pathlib import Path
@@ -52,7 +51,6 @@ class Grow(flatland.WorldPlugin):
     def on_initialize(self, config):
         self.ros.advertise_service("grow", Trigger, self.grow)
         self.ros.advertise_service("fill", Trigger, self.fill)
-        self.ros.advertise_service("modify", Trigger, self.modify)
 
     def grow(self, request):
         return self.add([[0, 0, 1, len(self.world.layer("growing").edges)]])
@@ -66,15 +64,6 @@ class Grow(flatland.WorldPlugin):
         self.world.layer_changed(layer)
         return TriggerResponse(True, "")
 
-    def modify(self, request):
-        body = self.world.model("arm").body("empty")
-        body.color = (1.0, 1.0, 0.0, 1.0)
-        body.physics.create_edges(np.array([[9, 9, 9, 11]], np.float32))
-        return TriggerResponse(True, "")
-"""
-MANIFEST = """
-<library path="."><class name="test::Grow" type="test_plugin_of_markers.Grow"
-  base_class_type="flatland::WorldPlugin"/></library>
 """
 
 
@@ -83,15 +72,10 @@ def server(module_launcher: Any, write_world: Callable[..., Path]) -> Any:
     world = write_world(arm=ARM)
     folder = world.parent
     (folder / "turned.yaml").write_text(TURNED)
-    (folder / "test_plugin_of_markers.py").write_text(PLUGIN)
-    (folder / "manifest.xml").write_text(MANIFEST)
     world.write_text(
         f"properties: {{}}\n{LAYERS}\nmodels: []\nplugins: [{{name: grow, type: 'test::Grow'}}]\n"
     )
-    module_launcher.environment = {
-        **module_launcher.environment,
-        "FLATLAND_PLUGIN_PATH": str(folder / "manifest.xml"),
-    }
+    module_launcher.add_plugins(folder, PLUGIN, "test_plugin_of_markers")
     return module_launcher.server(world, show_viz=True, viz_pub_rate=RATE)
 
 
@@ -162,30 +146,6 @@ def test_layer_markers_have_the_pose_of_the_layer(ros: Any) -> None:
         assert color(marker) == (1, 1, 1, 1)
 
 
-@pytest.mark.parametrize(
-    ("name", "heights"), [("2d", {0, 1}), ("hall", {-0.5, 2.5}), ("bad_heights", {0, 1})]
-)
-def test_walls_cover_every_edge(ros: Any, name: str, heights: set[float]) -> None:
-    (marker,) = markers_of(ros, f"layer/{name}_3d")
-    (lines,) = markers_of(ros, f"layer/{name}")
-    assert (marker.type, marker.action) == (Marker.TRIANGLE_LIST, Marker.ADD)
-    assert marker.header.frame_id == "map"
-    assert marker.frame_locked
-    assert scale(marker) == (1, 1, 1)
-    assert color(marker) == color(lines)
-    corners = points(marker)
-    assert len(corners) == 4 * 6
-    assert {z for _x, _y, z in corners} == heights
-    edges = [points(lines)[i : i + 2] for i in range(0, 8, 2)]
-    for i, edge in enumerate(edges):
-        wall = corners[6 * i : 6 * i + 6]
-        assert {(x, y) for x, y, _z in wall} == {(x, y) for x, y, _z in edge}
-
-
-def test_invalid_heights_are_logged(server: Any) -> None:
-    server.wait_for_line("layer \"bad heights\".*min_z must be a finite number, got 'low'")
-
-
 def test_layer_is_published_once_and_when_it_changes(ros: Any) -> None:
     lines = ros.topic(f"{DEBUG}/layer/growing", MarkerArray)
     walls = ros.topic(f"{DEBUG}/layer/growing_3d", MarkerArray)
@@ -250,19 +210,6 @@ def test_model_as_footprints_and_joints(ros: Any, arm: None) -> None:
     assert np.array(points(cubes)) == pytest.approx(np.array(expected), abs=1e-5)
 
 
-def test_markers_follow_the_model(ros: Any, arm: None) -> None:
-    del arm
-    topic = ros.topic(f"{DEBUG}/model/arm", MarkerArray)
-    topic.next()
-    assert ros.move("arm", (-1, -2, 0)).success
-    message = topic.until(lambda message: pose(message.markers[0])[0] < 0)
-    circle, polygon, lines, cubes = message.markers
-    assert pose(circle) == pytest.approx((-1, -2, 0), abs=1e-5)
-    assert pose(polygon) == pytest.approx((0, -2, 0), abs=1e-5)
-    assert points(lines)[1] == pytest.approx([-0.5, -2, 0], abs=1e-5)
-    assert points(cubes)[2] == pytest.approx([0, -2, 0], abs=1e-5)
-
-
 def test_markers_are_published_while_paused(ros: Any, arm: None) -> None:
     del arm
     topic = ros.topic(f"{DEBUG}/model/arm", MarkerArray)
@@ -275,29 +222,6 @@ def test_markers_are_published_while_paused(ros: Any, arm: None) -> None:
     topic.close()
     assert ros.move("arm", (-3, 0, 0)).success  # without subscribers
     assert pose(late_message(ros, "model/arm").markers[0])[0] == pytest.approx(-3)
-
-
-def test_the_rate_of_wall_time_is_not_exceeded(ros: Any, arm: None) -> None:
-    del arm
-    count = round(0.5 * RATE)
-    before_the_first = time.monotonic()
-    ros.topic(f"{DEBUG}/model/arm", MarkerArray).take(count)
-    # A period between two of them, however late they arrive, but for the one on connection.
-    assert (count - 2) / RATE < time.monotonic() - before_the_first
-
-
-def test_changed_footprints_and_colors(ros: Any, arm: None) -> None:
-    del arm
-    topic = ros.topic(f"{DEBUG}/model/arm", MarkerArray)
-    assert len(topic.next().markers) == 4
-    assert ros.call("/modify", Trigger).success
-    markers = topic.until(lambda message: len(message.markers) == 5).markers
-    edge = markers[2]
-    assert edge.type == Marker.LINE_LIST
-    assert points(edge) == [[9, 9, 0], [9, 11, 0]]  # away from all contacts
-    assert scale(edge)[0] == 0.03
-    assert color(edge) == (1, 1, 0, 1)
-    assert pose(edge) == pytest.approx((3, 1, math.pi / 2), abs=1e-6)
 
 
 # -- added and deleted models, list of topics, names --------------------------------------

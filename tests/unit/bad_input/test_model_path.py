@@ -48,6 +48,59 @@ def test_only_later_models_are_restricted(world_file: Path, outside: Path, uncha
             )
 
 
+REFUSED = {
+    "relative": ("../{outside.name}/good.yaml", "{outside}/good.yaml", ""),
+    "link to a folder": ("allowed/folder_link/good.yaml", "{allowed}/folder_link/good.yaml", ""),
+    "link through /proc": ("allowed/proc_link.yaml", "{allowed}/proc_link.yaml", ""),
+    "device": ("/dev/zero", "/dev/zero", ""),
+    "similar start of the path": ("{allowed}2/good.yaml", "{allowed}2/good.yaml", ""),
+    "include": ("allowed/outer.yaml", "{outside}/body.yaml", " [{allowed}/outer.yaml:1]"),
+    "include through a link": (
+        "allowed/inner.yaml",
+        "{allowed}/folder_link/body.yaml",
+        " [{allowed}/inner.yaml:1]",
+    ),
+    "include of documents": (
+        "allowed/items.yaml",
+        "{outside}/nothing.yaml",
+        " [{allowed}/items.yaml:2]",
+    ),
+}
+
+
+@pytest.mark.parametrize("name", REFUSED)
+def test_no_path_leads_outside(world_file: Path, outside: Path, unchanged: Any, name: str) -> None:
+    allowed = world_file.parent / "allowed"
+    (allowed / "folder_link").symlink_to(outside)
+    (allowed / "proc_link.yaml").symlink_to(f"/proc/self/root{outside}/good.yaml")
+    (allowed / "outer.yaml").write_text(f"bodies: $include {outside}/body.yaml\n")
+    (allowed / "inner.yaml").write_text("bodies: $include folder_link/body.yaml\n")
+    (allowed / "items.yaml").write_text(f"bodies:\n  - $[include] {outside}/nothing.yaml\n")
+    path, shown, place = (text.format(allowed=allowed, outside=outside) for text in REFUSED[name])
+    if not path.startswith("/"):
+        path = str(world_file.parent / path)
+    with (
+        flatland.World.from_yaml(world_file, seed=1, model_path=[allowed]) as world,
+        unchanged(world),
+        pytest.raises(flatland.YamlError) as caught,
+    ):
+        world.spawn_model(path, "b")
+    assert str(caught.value) == (
+        f'Flatland YAML: Failed to read file, path="{shown}", it is outside the folders of '
+        f"model_path, {allowed}{place}"
+    )
+
+
+def test_an_expression_cannot_add_an_include(world_file: Path, outside: Path) -> None:
+    allowed = world_file.parent / "allowed"
+    (allowed / "eval.yaml").write_text(f"bodies: $eval return '$include {outside}/body.yaml'\n")
+    with (
+        flatland.World.from_yaml(world_file, seed=1, model_path=[allowed]) as world,
+        pytest.raises(flatland.YamlError, match="must be a list"),
+    ):
+        world.spawn_model(allowed / "eval.yaml", "b")
+
+
 @pytest.mark.parametrize("key", ["image", "data"])
 def test_nothing_is_said_about_other_files_of_a_map(
     world_file: Path, outside: Path, key: str

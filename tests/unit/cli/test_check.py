@@ -12,6 +12,24 @@ from flatland_command import main
 import flatland
 
 
+class Tolerant(flatland.ModelPlugin):
+    """Reads a value of several kinds."""
+
+    def on_initialize(self, config):
+        try:
+            config.get("value", "float")
+        except flatland.YamlError:
+            config.get("value", "string")
+
+
+class Strict(flatland.ModelPlugin):
+    """Rejects its parameters."""
+
+    def on_initialize(self, config):
+        config.get("rate", "float", 1.0)
+        raise config.error("rates and ranges exclude each other")
+
+
 class TestCheck:
     def test_prints_the_contents_of_the_world(self, world_file, capsys):
         assert main("check", world_file) == 0
@@ -42,18 +60,6 @@ class TestCheck:
     def test_param(self, world_file, capsys):
         assert main("check", world_file, "--param", "/radius=-1") == 1
         assert main("check", world_file, "--param", "/radius=-1", "--param", "/radius=2") == 0
-
-    def test_prints_the_error(self, files, capsys):
-        path = files.write("world.yaml", "properties: {}\nlayers: [{name: a, colour: red}]\n")
-        assert main("check", path) == 1
-        captured = capsys.readouterr()
-        assert captured.err == ""
-        assert captured.out.splitlines() == [
-            f"{path}:2: error: Entry index=0 contains unrecognized entry(s) "
-            '{"colour"} (in "layers")',
-            '    hint: did you mean "color"?',
-            f"{path}: 1 error",
-        ]
 
 
 LAYERED = """
@@ -106,15 +112,6 @@ class TestProblems:
 
 
 class TestCheckModel:
-    def test_accepts_any_layer(self, files, capsys):
-        path = files.write("my.robot.model.yaml", LAYERED)
-        assert main("check", path) == 0
-        assert capsys.readouterr().out.splitlines() == [
-            f"{path}: no errors",
-            "model my: 1 body, 0 joints; plugins: eye (Laser)",
-            "checked in an empty world with the layers that the model names: low, high, top",
-        ]
-
     def test_a_model_without_layers_is_checked(self, files, capsys):
         assert main("check", files.folder / "minimal.model.yaml") == 0
         assert capsys.readouterr().out.splitlines()[-1] == (
@@ -317,30 +314,11 @@ class TestAllProblems:
             "problems": [],
         }
 
-    def test_a_plugin_that_catches_errors_has_no_problem(self, files, monkeypatch, capsys):
+    def test_a_plugin_that_catches_errors_has_no_problem(self, files, declare_plugins, capsys):
         """A value may be of several kinds, which a plugin finds out by trying."""
-        files.write(
-            "tolerant.py",
-            """
-            import flatland
-
-            class Tolerant(flatland.ModelPlugin):
-                def on_initialize(self, config):
-                    try:
-                        config.get("value", "float")
-                    except flatland.YamlError:
-                        config.get("value", "string")
-            """,
-        )
-        manifest = files.write(
-            "plugins.xml",
-            '<library path="."><class name="my::Tolerant" type="tolerant.Tolerant" '
-            'base_class_type="flatland::ModelPlugin"/></library>',
-        )
-        monkeypatch.setenv("FLATLAND_PLUGIN_PATH", manifest)
-        monkeypatch.syspath_prepend(str(files.folder))
+        declare_plugins(Tolerant)
         body = "{name: base, footprints: []}"
-        plugin = "{type: 'my::Tolerant', name: t, value: text}"
+        plugin = "{type: 'test::Tolerant', name: t, value: text}"
         path = files.write("m.model.yaml", f"bodies: [{body}]\nplugins: [{plugin}]\n")
         assert main("check", path) == 0
         assert capsys.readouterr().out.startswith(f"{path}: no errors")
@@ -350,27 +328,10 @@ class TestAllProblems:
         report = self.report(path, capsys)
         assert ['{"unread"}' in problem["message"] for problem in report["problems"]] == [True]
 
-    def test_a_plugin_that_rejects_all_of_its_parameters(self, files, monkeypatch, capsys):
+    def test_a_plugin_that_rejects_all_of_its_parameters(self, files, declare_plugins, capsys):
         """The error concerns no single value, so that the plugin is not started forever."""
-        files.write(
-            "strict.py",
-            """
-            import flatland
-
-            class Strict(flatland.ModelPlugin):
-                def on_initialize(self, config):
-                    config.get("rate", "float", 1.0)
-                    raise config.error("rates and ranges exclude each other")
-            """,
-        )
-        manifest = files.write(
-            "plugins.xml",
-            '<library path="."><class name="my::Strict" type="strict.Strict" '
-            'base_class_type="flatland::ModelPlugin"/></library>',
-        )
-        monkeypatch.setenv("FLATLAND_PLUGIN_PATH", manifest)
-        monkeypatch.syspath_prepend(str(files.folder))
-        plugin = "{type: 'my::Strict', name: s, rate: fast}"
+        declare_plugins(Strict)
+        plugin = "{type: 'test::Strict', name: s, rate: fast}"
         body = "{name: base, footprints: []}"
         path = files.write("m.model.yaml", f"bodies: [{body}]\nplugins: [{plugin}]\n")
         problems = self.report(path, capsys)["problems"]

@@ -49,11 +49,6 @@ def recording(world: str, capsys: pytest.CaptureFixture[str]) -> Path:
     return Path("run.flog")
 
 
-def test_a_recorded_run_is_repeated(recording: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main("replay", recording) == 0
-    assert capsys.readouterr().out == "run.flog: 500 steps (2.5 s), no difference\n"
-
-
 def test_a_difference_is_printed(recording: Path, capsys: pytest.CaptureFixture[str]) -> None:
     records = log_file.read_recording(recording).records
     writer = log_file.LogWriter(recording)

@@ -34,6 +34,14 @@ plugins:
 """
 
 
+class Failing(flatland.ModelPlugin):
+    """Raises in the step from 0.5 s on."""
+
+    def before_physics_step(self, timekeeper):
+        if timekeeper.sim_time >= 0.5:
+            raise ValueError("out of fuel")
+
+
 @pytest.fixture
 def robot_world(files: Any, monkeypatch: pytest.MonkeyPatch) -> str:
     """A room with a robot at (3, 5); its folder is the current one."""
@@ -107,9 +115,9 @@ class TestSimulation:
         assert re.search(r"100%.*3\.0/3\.0 s.*\d+\.\dx real time", text.decode())
 
     def test_an_exception_of_a_plugin_is_an_error_with_its_time(
-        self, robot_world, files, monkeypatch, capsys
+        self, robot_world, files, declare_plugins, capsys
     ):
-        add_failing_plugin(files, monkeypatch)
+        add_failing_plugin(files, declare_plugins)
         (files.folder / "old.bag").write_text("old")
         arguments = ["--bag", "old.bag", "--video", "new.mp4", "--size", "64x64", "--no-axes"]
         before = set(files.folder.iterdir())
@@ -120,27 +128,10 @@ class TestSimulation:
         assert set(files.folder.iterdir()) - before <= {files.folder / "__pycache__"}
 
 
-def add_failing_plugin(files: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+def add_failing_plugin(files: Any, declare_plugins: Any) -> None:
     """Adds a plugin to the robot that raises in the step from 0.5 s on."""
-    files.write(
-        "failing.py",
-        """
-        import flatland
-
-        class Failing(flatland.ModelPlugin):
-            def before_physics_step(self, timekeeper):
-                if timekeeper.sim_time >= 0.5:
-                    raise ValueError("out of fuel")
-        """,
-    )
-    manifest = files.write(
-        "plugins.xml",
-        '<library path="."><class name="my::Failing" type="failing.Failing" '
-        'base_class_type="flatland::ModelPlugin"/></library>',
-    )
-    monkeypatch.setenv("FLATLAND_PLUGIN_PATH", manifest)
-    monkeypatch.syspath_prepend(str(files.folder))
-    files.write("robot.model.yaml", ROBOT + "- {type: 'my::Failing', name: failing}\n")
+    declare_plugins(Failing)
+    files.write("robot.model.yaml", ROBOT + "- {type: 'test::Failing', name: failing}\n")
 
 
 class TestCommands:

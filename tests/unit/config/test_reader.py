@@ -237,18 +237,6 @@ def test_invalid_has_the_position_of_the_entry_or_of_the_map(file: Path) -> None
 # Error messages, which end with the position.
 
 
-def test_missing_required_key(file: Path) -> None:
-    reader = read_file(file, "# first\na: 1\n")
-    assert failure(reader.get, "Key", "float") == (
-        f'Flatland YAML: Entry "Key" does not exist [{file}:2]'
-    )
-    body = reader.with_location('model "M"', 'body "B"')
-    for action in (body.subnode, lambda key: body.get_list(key, "int")):
-        assert failure(action, "Key") == (
-            f'Flatland YAML: Entry "Key" does not exist (in model "m" body "b") [{file}:2]'
-        )
-
-
 def test_missing_list_item(file: Path) -> None:
     items = read_file(file, "a:\n  - 1\n").subnode("a")
     for index in (1, -1):
@@ -257,23 +245,6 @@ def test_missing_list_item(file: Path) -> None:
         )
     assert items.get(0, "int") == 1
     assert items.get(1, "int", 7) == 7
-
-
-@pytest.mark.parametrize(
-    ("kind", "text"), [("map", "[1]"), ("map", "x"), ("map", ""), ("map", "~")]
-)
-def test_must_be_a_map(file: Path, kind: Any, text: str) -> None:
-    reader = read_file(file, f"other: 1\nKey: {text}\n").with_location('layer "L"')
-    assert failure(reader.subnode, "Key", kind) == (
-        f'Flatland YAML: Entry "Key" must be a map (in layer "l") [{file}:2]'
-    )
-
-
-@pytest.mark.parametrize("text", ["{a: 1}", "x", ""])
-def test_must_be_a_list(file: Path, text: str) -> None:
-    reader = read_file(file, f"Key: {text}\n")
-    for action in (lambda: reader.subnode("Key", "list"), lambda: reader.get_list("Key", "int")):
-        assert failure(action) == f'Flatland YAML: Entry "Key" must be a list [{file}:1]'
 
 
 def test_list_items_must_be_of_the_required_kind(file: Path) -> None:
@@ -296,23 +267,6 @@ def test_the_root_must_be_of_the_required_kind(file: Path) -> None:
     assert failure(list, reader.items()) == f"Flatland YAML: Entry must be a list [{file}:1]"
 
 
-@pytest.mark.parametrize(
-    ("sizes", "wanted"),
-    [
-        ({"size": 2}, "of exactly 2"),
-        ({"min_size": 4, "max_size": 4}, "of exactly 4"),
-        ({"min_size": 4}, ">= 4"),
-        ({"max_size": 2}, "<= 2"),
-        ({"min_size": 4, "max_size": 8}, ">= 4"),
-    ],
-)
-def test_lists_of_a_wrong_size(file: Path, sizes: dict[str, int], wanted: str) -> None:
-    body = read_file(file, "\nPoints: [1, 2, 3]\n").with_location('model "M"', 'body "B"')
-    assert failure(body.get_list, "Points", "int", **sizes) == (
-        f'Flatland YAML: Entry "points" must have size {wanted} (in model "m" body "b") [{file}:2]'
-    )
-
-
 def test_lists_of_a_valid_size() -> None:
     reader = read("a: [1, 2, 3]\nb: [[1, 2], [3, 4]]\nc: []\nd: [x, 1]\ne: [[1, 2, 3]]\nf: [on]\n")
     for sizes in ({"size": 3}, {"min_size": 3}, {"max_size": 3}, {"min_size": 1, "max_size": 5}):
@@ -324,37 +278,6 @@ def test_lists_of_a_valid_size() -> None:
     assert reader.get_list("f", bool) == [True]
     assert reader.get_list("no", "int", [7]) == [7]
     assert reader.get_list("no", "int", None) is None
-
-
-@pytest.mark.parametrize("kind", ["bool", "int", "float", "string", "vector"])
-def test_wrong_type(file: Path, kind: Any) -> None:
-    body = read_file(file, "a: 1\nKEY: {}\n").with_location('model "M"', 'body "B"')
-    assert failure(body.get, "KEY", kind) == (
-        f'Flatland YAML: Error converting entry "key" to {kind} (in model "m" body "b") [{file}:2]'
-    )
-
-
-def test_wrong_type_of_an_item(file: Path) -> None:
-    reader = read_file(file, "Origin: [1,\n  2, x]\n").with_location('model "M"')
-    message = f'Error converting entry index=2 to float (in model "m" "origin") [{file}:2]'
-    assert failure(reader.get, "Origin", "pose") == "Flatland YAML: " + message
-    assert failure(reader.get_list, "Origin", "float") == "Flatland YAML: " + message
-
-
-def test_unread_keys_are_unknown(file: Path) -> None:
-    reader = read_file(file, "a: 1\nb: 3\nZ: 2\n")
-    reader.get("a", "int")
-    assert failure(reader.ensure_accessed_all) == (
-        f'Flatland YAML: Entry contains unrecognized entry(s) {{"Z", "b"}} [{file}:2]'
-    )
-    body = reader.with_location('model "M"', 'body "B"')
-    assert failure(body.ensure_accessed_all) == (
-        'Flatland YAML: Entry body "b" contains unrecognized entry(s) {"Z", "b"} '
-        f'(in model "m") [{file}:2]'
-    )
-    reader.optional_subnode("Z")
-    reader.get("b", "int", 0)
-    body.ensure_accessed_all()
 
 
 def test_unknown_keys_of_a_nested_map(file: Path) -> None:
@@ -372,19 +295,6 @@ def test_only_maps_have_unknown_keys() -> None:
     for text in ("[1, 2]", "x", ""):
         assert read(text).ensure_accessed_all() is None
     assert "unrecognized" in failure(read("{a: 1}").ensure_accessed_all)
-
-
-def test_a_file_that_does_not_exist(file: Path) -> None:
-    assert failure(YamlReader.from_file, file) == (
-        f'Flatland YAML: File does not exist, path="{file}"'
-    )
-
-
-def test_not_yaml(file: Path) -> None:
-    assert failure(read_file, file, "a: 1\nb: [\n") == (
-        f'Flatland YAML: Malformatted file, path="{file}", line 3 col 1, '
-        "did not find expected node content"
-    )
 
 
 def test_duplicate_keys(file: Path, caplog: pytest.LogCaptureFixture) -> None:
@@ -530,17 +440,6 @@ def test_error_appends_the_position(file: Path) -> None:
     assert str(read("a: 1").error("Invalid")) == "Flatland YAML: Invalid [line 1]"
 
 
-def test_path_and_line(file: Path) -> None:
-    reader = read_file(file, "a: 1\nb:\n  c: 2\n")
-    assert (reader.path, reader.line) == (str(file), 1)
-    assert (reader.subnode("b").subnode("c").path, reader.subnode("b").subnode("c").line) == (
-        str(file),
-        3,
-    )
-    assert read("a: 1").path == ""
-    assert str(file) in repr(reader)
-
-
 def test_paths_are_relative_to_the_folder_of_the_file(
     file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -559,14 +458,6 @@ def test_plain_returns_unconverted_data() -> None:
     shared = ["1", None, {"b": "on"}]
     assert reader.plain() == {"a": shared, "c": shared, "d": ""}
     assert reader.optional_subnode("no").plain() is None
-
-
-def test_aliases_are_read_like_their_anchors() -> None:
-    reader = read("a: &x {pose: [1, 2, 3]}\nb: *x\n")
-    assert reader.subnode("b").get("pose", "pose") == (1.0, 2.0, 3.0)
-    assert 'unrecognized entry(s) {"<<"}' in failure(
-        read("a: &x {b: 1}\nc: {<<: *x}\n").subnode("c").ensure_accessed_all
-    )
 
 
 def test_the_reference_world(shared_dir: Path) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from types import SimpleNamespace
 from typing import Any
 
@@ -12,7 +11,6 @@ import pytest
 import flatland
 from flatland import Contact, ContactImpulse, ModelPlugin, MutableContact, WorldPlugin
 
-DT = 0.005
 DISC = "bodies: [{name: base, footprints: [{type: circle, radius: 0.2, density: 10, friction: 1}]}]"
 SLAB = """
 bodies:
@@ -20,16 +18,6 @@ bodies:
     type: static
     footprints:
       - {type: polygon, density: 1, friction: 1, points: [[0, -9], [1, -9], [1, 9], [0, 9]]}
-"""
-MANIFEST = """
-<library>
-  <class name="test::Recorder" type="contact_plugins.Recorder"
-         base_class_type="flatland::ModelPlugin"/>
-  <class name="test::WorldRecorder" type="contact_plugins.WorldRecorder"
-         base_class_type="flatland::WorldPlugin"/>
-  <class name="test::Modifier" type="contact_plugins.Modifier"
-         base_class_type="flatland::ModelPlugin"/>
-</library>
 """
 
 
@@ -78,11 +66,9 @@ class Modifier(ModelPlugin):
 
 
 @pytest.fixture
-def bench(files: Any, monkeypatch: pytest.MonkeyPatch) -> Any:
+def bench(files: Any, declare_plugins: Any) -> Any:
     """Writes models with the plugins above and loads a world with a slab at x = 0.199."""
-    monkeypatch.setenv("FLATLAND_PLUGIN_PATH", files.write("plugins.xml", MANIFEST))
-    module = SimpleNamespace(Recorder=Recorder, WorldRecorder=WorldRecorder, Modifier=Modifier)
-    monkeypatch.setitem(sys.modules, "contact_plugins", module)  # type: ignore[arg-type]
+    declare_plugins(Recorder, WorldRecorder, Modifier)
     for name in ("Recorder", "Modifier"):
         files.write(f"{name}.yaml", f"{DISC}\nplugins: [{{name: p, type: 'test::{name}'}}]\n")
     files.write("disc.yaml", DISC)

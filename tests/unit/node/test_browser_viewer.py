@@ -7,6 +7,7 @@ import socket
 from typing import Any
 
 import pytest
+from free_ports import free_port
 from waiting import wait_until
 from web_client import WebClient
 
@@ -48,8 +49,8 @@ def test_a_port_that_becomes_free_is_used(
     """As when the node that had the port ends, because this one has taken its name."""
     tries = []
     wait = browser_viewer.BrowserViewer._listen
-    taken = socket.create_server(("127.0.0.1", 0))
-    port = taken.getsockname()[1]
+    port = free_port()
+    taken = socket.create_server(("127.0.0.1", port))
 
     def listen(self: Any, viewer: Any) -> None:
         start = viewer.start

@@ -7,12 +7,10 @@ from typing import Any
 
 import pytest
 
+import flatland
 from flatland.node.bridge import Bridge
 from flatland.node.clock import NodeClock
 from flatland.runtime.plugin_costs import PluginCosts
-
-EMITTER = """
-import flatland
 
 
 class Emitter(flatland.ModelPlugin):
@@ -36,12 +34,8 @@ class Emitter(flatland.ModelPlugin):
     def emit(self, **numbers):
         for name, number in numbers.items():
             getattr(self, name).emit(number)
-"""
-MANIFEST = """
-<library path=".">
-  <class name="Emitter" type="bridge_emitter.Emitter" base_class_type="flatland::ModelPlugin"/>
-</library>
-"""
+
+
 WORLD = """
 properties: {}
 layers: [{name: 2d}]
@@ -49,7 +43,7 @@ models: [{name: robot, model: emitter.model.yaml}]
 """
 MODEL = """
 bodies: [{name: base, footprints: []}]
-plugins: [{type: Emitter, name: emitter}]
+plugins: [{type: 'test::Emitter', name: emitter}]
 """
 
 
@@ -89,11 +83,10 @@ class Setup:
 
 
 @pytest.fixture
-def setup(files: Any, transport: Any, monkeypatch: pytest.MonkeyPatch) -> Iterator[Setup]:
+def setup(files: Any, transport: Any, declare_plugins: Any) -> Iterator[Setup]:
     """A world whose topics have subscribers."""
     files.write("emitter.model.yaml", MODEL)
-    files.write("bridge_emitter.py", EMITTER)
-    monkeypatch.setenv("FLATLAND_PLUGIN_PATH", files.write("manifest.xml", MANIFEST))
+    declare_plugins(Emitter)
     log: list[str] = []
     bridge = Bridge(transport, RecordedClock(log))
     world = files.load(WORLD, observers=[bridge], plugin_errors="disable")

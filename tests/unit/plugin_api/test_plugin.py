@@ -2,23 +2,12 @@
 
 from __future__ import annotations
 
-import sys
-from types import SimpleNamespace
 from typing import Any
 
 import pytest
 
 import flatland
 from flatland import ModelPlugin, PluginError, Twist, WorldPlugin
-
-MANIFEST = """
-<library>
-  <class name="own::Model" type="own_plugins_for_tests.Model"
-         base_class_type="flatland::ModelPlugin"/>
-  <class name="own::World" type="own_plugins_for_tests.World"
-         base_class_type="flatland::WorldPlugin"/>
-</library>
-"""
 
 
 class Model(ModelPlugin):
@@ -46,18 +35,16 @@ class World(WorldPlugin):
 
 
 @pytest.fixture
-def load(files: Any, monkeypatch: pytest.MonkeyPatch) -> Any:
-    monkeypatch.setenv("FLATLAND_PLUGIN_PATH", files.write("own.xml", MANIFEST))
-    module = SimpleNamespace(Model=Model, World=World)
-    monkeypatch.setitem(sys.modules, "own_plugins_for_tests", module)  # type: ignore[arg-type]
+def load(files: Any, declare_plugins: Any) -> Any:
+    declare_plugins(Model, World)
     files.write(
         "own.yaml",
         """
         bodies: [{name: base, footprints: []}]
         plugins:
-          - {name: one, type: "own::Model", enabled: true, gain: 2}
-          - {name: two, type: "own::Model"}
-          - {name: off, type: "own::Model", enabled: false}
+          - {name: one, type: "test::Model", enabled: true, gain: 2}
+          - {name: two, type: "test::Model"}
+          - {name: off, type: "test::Model", enabled: false}
         """,
     )
 
@@ -67,7 +54,7 @@ def load(files: Any, monkeypatch: pytest.MonkeyPatch) -> Any:
             properties: {}
             layers: [{name: 2d}, {name: 3d}]
             models: [{name: m, model: own.yaml, namespace: r1}]
-            plugins: [{name: w, type: "own::World"}]
+            plugins: [{name: w, type: "test::World"}]
             """,
             **options,
         )
@@ -79,12 +66,12 @@ def load(files: Any, monkeypatch: pytest.MonkeyPatch) -> Any:
 def test_attributes_are_set_before_on_initialize(load: Any) -> None:
     world = load()
     one, two = world.model("m").plugins
-    assert one.at_start == ("one", "own::Model", "r1", "m", None)
+    assert one.at_start == ("one", "test::Model", "r1", "m", None)
     assert two.name == "two"
     # The entry without name, type and enabled.
     assert one.keys == ["gain"]
     [plugin] = world.plugins
-    assert plugin.at_start == ("w", "own::World", "", None)
+    assert plugin.at_start == ("w", "test::World", "", None)
     assert plugin.layers == 2
     # A world plugin starts after the models of the file.
     assert plugin.models == ["m"]

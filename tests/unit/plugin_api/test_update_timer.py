@@ -33,10 +33,6 @@ def test_rate_zero_fires_at_time_zero_only() -> None:
     assert fired_steps(0.0, 0.005, 1000) == [0]
 
 
-def test_rate_that_divides_the_step_rate_fires_every_nth_step() -> None:
-    assert fired_steps(40.0, 0.005, 100) == list(range(0, 100, 5))
-
-
 @pytest.mark.parametrize("hours", [1, 24, 10_000])
 def test_40_hz_at_5_ms_fires_every_fifth_step_for_hours(hours: int) -> None:
     start = hours * 3600 * 200

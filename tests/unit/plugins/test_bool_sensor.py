@@ -45,11 +45,6 @@ def test_defaults(plugin_world: Any, files: Any, collect: Collect) -> None:
     assert all(type(message) is bool for message in messages)
 
 
-def test_topic_parameter(plugin_world: Any) -> None:
-    world = plugin_world("[{type: BoolSensor, name: switch, topic: /pressed}]", namespace="r1")
-    assert list(world.ports.outputs) == ["/pressed"]
-
-
 def test_false_after_the_end_of_the_contact(
     plugin_world: Any, files: Any, collect: Collect
 ) -> None:
@@ -164,13 +159,6 @@ def test_a_contact_between_two_messages_is_reported_once(
     world.move_model("robot", (-3, 0, 0))
     world.step(28)
     assert messages == [False, True, False, False]
-
-
-def test_messages_are_published_at_the_update_rate(plugin_world: Any, collect: Collect) -> None:
-    world = plugin_world("[{type: BoolSensor, name: switch, update_rate: 40}]")
-    messages = collect(world, "/bool_sensor")
-    world.step(200)
-    assert len(messages) == 40
 
 
 def test_a_late_subscriber_receives_an_existing_contact(plugin_world: Any, files: Any) -> None:

@@ -70,13 +70,6 @@ def test_topic_and_frame(plugin_world: Any, files: Any) -> None:
     assert output.latest.frame_id == "earth"
 
 
-def test_stamp_is_the_time_after_the_step(plugin_world: Any, collect: Collect) -> None:
-    world = plugin_world(BUMPER)
-    messages = collect(world, "/collisions")
-    world.step(3)
-    assert [message.stamp for message in messages] == [5_000_000, 10_000_000, 15_000_000]
-
-
 def test_a_contact_is_in_the_message_of_the_same_step(
     plugin_world: Any, files: Any, collect: Collect
 ) -> None:
@@ -115,12 +108,6 @@ def test_without_publish_all_collisions_the_update_rate_holds(
     world.step(40)
     assert [message.stamp for message in messages] == [50_000_000 * i for i in range(1, 5)]
     assert all(len(message.collisions) == 1 for message in messages)
-
-
-def test_nothing_is_emitted_without_subscribers(plugin_world: Any, files: Any) -> None:
-    world = touching(plugin_world, files)
-    world.step(5)
-    assert world.ports.find_output("/collisions").latest is None
 
 
 def test_a_late_subscriber_receives_existing_contacts(plugin_world: Any, files: Any) -> None:

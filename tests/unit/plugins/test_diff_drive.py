@@ -37,11 +37,6 @@ def base(world: flatland.World) -> flatland.Body:
 
 
 class TestMotion:
-    def test_robot_is_at_rest_without_a_command(self, plugin_world: Any) -> None:
-        world = plugin_world(drive(), pose=(1.0, 2.0, 0.5))
-        world.step(20)
-        assert base(world).pose == pytest.approx((1.0, 2.0, 0.5), abs=1e-6)
-
     def test_robot_drives_along_its_heading(self, plugin_world: Any) -> None:
         world = plugin_world(drive(), pose=(1.0, 2.0, 0.5))
         command(world, 0.8, 0.0)
@@ -186,12 +181,6 @@ class TestOdometry:
         assert np.abs(error.mean(axis=0)).max() < 0.07
         correlation = np.corrcoef(error.T) - np.eye(6)
         assert np.abs(correlation).max() < 0.1
-
-    def test_noise_does_not_affect_the_motion(self, plugin_world: Any) -> None:
-        world = plugin_world(drive("odom_pose_noise: [1, 1, 1], odom_twist_noise: [1, 1, 1]"))
-        world.output(ODOMETRY)
-        world.step(20)
-        assert base(world).pose == (0.0, 0.0, 0.0)
 
     def test_noise_does_not_depend_on_subscribers_of_other_outputs(self, plugin_world: Any) -> None:
         noise = "odom_pose_noise: [1, 1, 1], odom_twist_noise: [1, 1, 1]"

@@ -1,11 +1,9 @@
 from __future__ import annotations
 
-import logging
 import math
 from collections.abc import Callable
 from typing import Any
 
-import numpy as np
 import pytest
 
 import flatland
@@ -83,23 +81,6 @@ def base(world: flatland.World) -> flatland.Body:
 
 
 class TestMotion:
-    def test_straight_ahead(self, trike: Any) -> None:
-        world = trike(pose=(1.0, 2.0, 0.5))
-        command(world, 0.8, 0.0)
-        world.step(200)
-        expected = (1.0 + 0.8 * math.cos(0.5), 2.0 + 0.8 * math.sin(0.5), 0.5)
-        assert base(world).pose == pytest.approx(expected, abs=1e-3)
-
-    def test_velocities_of_the_bicycle_model(self, trike: Any) -> None:
-        world = trike(pose=(0.0, 0.0, 0.7))
-        command(world, 0.6, 0.5)
-        control_bodies(world)
-        omega = 0.6 * math.sin(0.5) / 1.0
-        vx, vy, rate = base(world).velocity
-        assert rate == pytest.approx(omega, abs=1e-5)
-        # The front wheel, at the origin, moves at 0.6 m/s along its heading.
-        assert (vx, vy) == pytest.approx((0.6 * math.cos(1.2), 0.6 * math.sin(1.2)), abs=1e-5)
-
     def test_rear_center_moves_along_the_heading(self, trike: Any) -> None:
         # A slanted axle whose midpoint is the foot of the perpendicular from the origin.
         line = joints(
@@ -148,9 +129,6 @@ class TestSteering:
             world.step()
             angles.append(plugin(world).steering_angle)
         return angles
-
-    def test_without_limits_the_angle_is_reached_in_one_step(self, trike: Any) -> None:
-        assert self.steps(trike(), 1.2, 2) == pytest.approx([1.2, 1.2])
 
     def test_max_steer_angle_of_zero_means_no_limit(self, trike: Any) -> None:
         assert self.steps(trike("max_steer_angle: 0"), 3.0, 1) == pytest.approx([3.0])
@@ -264,13 +242,6 @@ class TestOdometry:
         assert odometry[-1].twist == pytest.approx(expected, abs=1e-3)
         assert truths[-1].twist == pytest.approx(expected, abs=1e-3)
 
-    def test_odometry_has_its_own_frame(self, trike: Any, collect: Collect) -> None:
-        world = trike()
-        truths, odometry = collect(world, TRUTH), collect(world, ODOMETRY)
-        world.step()
-        assert (odometry[0].frame_id, odometry[0].child_frame_id) == ("odom", "base")
-        assert (truths[0].frame_id, truths[0].child_frame_id) == ("map", "base")
-
     def test_frames_have_no_namespace(self, plugin_world: Any, collect: Collect) -> None:
         world = plugin_world(
             drive("odom_frame_id: o, ground_truth_frame_id: /w, odom_pub: a, ground_truth_pub: b"),
@@ -282,15 +253,6 @@ class TestOdometry:
         world.step()
         assert (odometry[0].frame_id, odometry[0].child_frame_id) == ("o", "r1_base")
         assert (truths[0].frame_id, truths[0].child_frame_id) == ("/w", "r1_base")
-
-    def test_noise_and_covariance(self, trike: Any, collect: Collect) -> None:
-        world = trike("odom_pose_noise: [0.04, 0.09, 0.16], odom_twist_noise: [0.25, 0.36, 0.49]")
-        odometry = collect(world, ODOMETRY)
-        world.step(1500)
-        measured = np.array([[*value.pose, *value.twist] for value in odometry])
-        assert measured.std(axis=0) == pytest.approx([0.2, 0.3, 0.4, 0.5, 0.6, 0.7], rel=0.1)
-        assert odometry[0].pose_covariance.diagonal().tolist() == [0.04, 0.09, 0, 0, 0, 0.16]
-        assert odometry[0].twist_covariance.diagonal().tolist() == [0.25, 0.36, 0, 0, 0, 0.49]
 
     def test_transform_to_the_body_on_request(self, trike: Any, collect: Collect) -> None:
         extra = "enable_odom_tf_pub: true, odom_pose_noise: [1, 1, 1], pub_rate: 50"
@@ -304,23 +266,11 @@ class TestOdometry:
             assert sent.stamp == odometry[-1].stamp
         assert sent.stamp == 40_000_000
 
-    def test_the_transform_needs_no_subscriber(self, trike: Any) -> None:
-        world = trike("enable_odom_tf_pub: true, odom_frame_id: wheel_odom")
-        command(world, 1.0, 0.0)
-        world.step(11)
-        assert world.transforms["wheel_odom", "base"].x == pytest.approx(0.05, abs=1e-3)
-
     def test_no_transform_and_no_twist_topic(self, trike: Any) -> None:
         world = trike()
         world.step()
         assert world.transforms == {}
         assert sorted(world.ports.outputs) == [ODOMETRY, TRUTH]
-
-    def test_pub_rate(self, trike: Any, collect: Collect) -> None:
-        world = trike("pub_rate: 50")
-        truths = collect(world, TRUTH)
-        world.step(20)
-        assert [value.stamp for value in truths] == [k * 20_000_000 for k in range(5)]
 
 
 class TestTwistCommand:
@@ -432,29 +382,6 @@ class TestTwistCommand:
         world.step(3)
         assert plugin(world).steering_angle == pytest.approx(math.atan2(0.8, 0.6))
         assert base(world).velocity == pytest.approx((0.0, 0.0, 0.0), abs=1e-6)
-
-    def test_steering_commands_are_the_default(self, trike: Any) -> None:
-        for extra in ("", "command: steering"):
-            world = trike(extra)
-            command(world, 0.6, 0.8)
-            control_bodies(world)
-            assert plugin(world).steering_angle == 0.8
-            assert plugin(world).front_velocity == 0.6
-
-
-def test_an_invalid_command_is_rejected(trike: Any, caplog: pytest.LogCaptureFixture) -> None:
-    world = trike()
-    command(world, 0.5, 0.0)
-    world.step(5)
-    with caplog.at_level(logging.WARNING, "flatland"):
-        command(world, 0.5, math.nan)
-    world.step(5)
-    assert 'plugin "wheels" of model "robot"' in caplog.text
-    assert base(world).pose[0] == pytest.approx(0.025, abs=1e-4)
-
-
-def test_command_topic(trike: Any) -> None:
-    assert list(trike("twist_sub: go").ports.commands) == ["/go"]
 
 
 class TestErrors:

@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import logging
 import os
-import sys
 from collections.abc import Callable
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -201,20 +199,10 @@ class Helper(ModelPlugin):
 
 
 def test_changes_made_by_plugins_are_repeated_by_the_plugins(
-    world_files: Any, monkeypatch: pytest.MonkeyPatch
+    world_files: Any, declare_plugins: Any
 ) -> None:
-    monkeypatch.setitem(sys.modules, "helper_of_replay", SimpleNamespace(Helper=Helper))
-    manifest = world_files.write(
-        "helper.xml",
-        """
-        <library path=".">
-          <class type="helper_of_replay.Helper" name="tests::Helper"
-                 base_class_type="flatland::ModelPlugin"/>
-        </library>
-        """,
-    )
-    monkeypatch.setenv("FLATLAND_PLUGIN_PATH", manifest)
-    plugins = "plugins: [{type: 'tests::Helper', name: helper}]\n"
+    declare_plugins(Helper)
+    plugins = "plugins: [{type: 'test::Helper', name: helper}]\n"
     world_files.write("helper.model.yaml", BALL + plugins)
     world = world_files.load(WORLD + "  - {name: first, model: helper.model.yaml, pose: [2, 2, 0]}")
     path = world_files.folder / "run.flog"
@@ -242,20 +230,10 @@ class FileReader(ModelPlugin):
 
 
 def test_a_file_that_a_plugin_reads_is_part_of_recordings_and_resets(
-    world_files: Any, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+    world_files: Any, declare_plugins: Any, tmp_path: Path
 ) -> None:
-    monkeypatch.setitem(sys.modules, "reader_of_replay", SimpleNamespace(FileReader=FileReader))
-    manifest = world_files.write(
-        "reader.xml",
-        """
-        <library path=".">
-          <class type="reader_of_replay.FileReader" name="tests::FileReader"
-                 base_class_type="flatland::ModelPlugin"/>
-        </library>
-        """,
-    )
-    monkeypatch.setenv("FLATLAND_PLUGIN_PATH", manifest)
-    plugins = "plugins: [{type: 'tests::FileReader', name: reader, file: speed.yaml}]\n"
+    declare_plugins(FileReader)
+    plugins = "plugins: [{type: 'test::FileReader', name: reader, file: speed.yaml}]\n"
     world_files.write("reader.model.yaml", BALL + plugins)
     own = Path(world_files.write("speed.yaml", 'speed: $eval param("speed", 1)'))
     world = world_files.load(

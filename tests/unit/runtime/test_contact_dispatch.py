@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import sys
-from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -13,15 +11,9 @@ from flatland import Contact, ModelPlugin
 
 HOOKS = ("begin_contact", "pre_solve", "post_solve", "end_contact")
 SPACING = 0.398  # m between discs of 0.4 m: each touches its neighbors
-MANIFEST = """
-<library>
-  <class name="calls::Recorder" type="contact_recorder_for_tests.Recorder"
-         base_class_type="flatland::ModelPlugin"/>
-</library>
-"""
 ROBOT = """
 bodies: [{name: base, footprints: [{type: circle, radius: 0.2, density: 1}]}]
-plugins: [{name: recorder, type: 'calls::Recorder'}]
+plugins: [{name: recorder, type: 'test::Recorder'}]
 """
 
 
@@ -38,11 +30,9 @@ class Recorder(ModelPlugin):
 
 
 @pytest.fixture
-def row(files: Any, monkeypatch: pytest.MonkeyPatch) -> Any:
+def row(files: Any, declare_plugins: Any) -> Any:
     """Returns a function that runs a row of touching robots and returns their recorders."""
-    module = SimpleNamespace(Recorder=Recorder)
-    monkeypatch.setitem(sys.modules, "contact_recorder_for_tests", module)
-    monkeypatch.setenv("FLATLAND_PLUGIN_PATH", files.write("calls.xml", MANIFEST))
+    declare_plugins(Recorder)
     files.write("robot.model.yaml", ROBOT)
 
     def run(count: int) -> list[Recorder]:

@@ -185,37 +185,28 @@ def test_a_world_cannot_be_run_by_two_simulations(files: Any) -> None:
 
 # -- plugins that react to the removal of a model --------------------------------------------
 
-PLUGIN = """
-from flatland import ModelPlugin
 
-act = None
+class Reacting(flatland.ModelPlugin):
+    """Calls a function in the hook that its parameter names."""
 
+    act: Callable[[flatland.World], object] | None = None
 
-class Reacting(ModelPlugin):
-    def on_initialize(self, config):
-        self.results = []
+    def on_initialize(self, config: Any) -> None:
+        self.results: list[Any] = []
         setattr(self, config.get("hook", "string"), self.react)
 
-    def react(self, *arguments):
-        if act is not None:
+    def react(self, *arguments: object) -> None:
+        if self.act is not None:
             try:
-                self.results.append(act(self.world))
+                self.results.append(self.act(self.world))
             except Exception as error:
                 self.results.append(error)
-"""
 
 
 @pytest.fixture
-def reacting(files: Any, monkeypatch: pytest.MonkeyPatch, request: Any) -> Callable[..., Any]:
+def reacting(files: Any, declare_plugins: Any) -> Callable[..., Any]:
     """Returns a function that loads a world with a plugin that calls a function in a hook."""
-    name = f"reacting_{abs(hash(request.node.nodeid))}"
-    files.write(f"src/{name}.py", PLUGIN)
-    manifest = files.write(
-        "plugins.xml",
-        f'<library path="src"><class name="test::Reacting" type="{name}.Reacting" '
-        'base_class_type="flatland::ModelPlugin"/></library>',
-    )
-    monkeypatch.setenv("FLATLAND_PLUGIN_PATH", manifest)
+    declare_plugins(Reacting)
 
     def load(hook: str, act: Callable[[flatland.World], object]) -> tuple[flatland.World, Any]:
         plugin = f'{{name: p, type: "test::Reacting", hook: {hook}}}'
@@ -226,7 +217,7 @@ def reacting(files: Any, monkeypatch: pytest.MonkeyPatch, request: Any) -> Calla
         world.spawn_model("minimal.model.yaml", "b", pose=(0.5, 0, 0), if_blocked="allow")
         world.step()
         found = world.model("a").plugin("p")
-        monkeypatch.setattr(f"{name}.act", act)
+        found.act = act
         return world, found
 
     return load

@@ -229,32 +229,18 @@ def test_requests_and_the_pause_remain(world: World) -> None:
     assert calls == [1]
 
 
-FAILING = """
-from flatland import ModelPlugin
-
-calls = []
-
-
-class Failing(ModelPlugin):
+class Failing(flatland.ModelPlugin):
     def on_initialize(self, config):
         config.get("number", "float")
         if self.world.seed == 13:
             raise ValueError("unlucky")
         if config.get("uncopyable", "bool", False):
             self.numbers = (number for number in range(3))
-"""
 
 
 @pytest.fixture
-def failing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, files: Any) -> None:
-    (tmp_path / "failing_plugins.py").write_text(FAILING)
-    manifest = tmp_path / "failing_plugins.xml"
-    manifest.write_text(
-        '<library path="failing_plugins"><class name="Failing" type="failing_plugins.Failing" '
-        'base_class_type="flatland::ModelPlugin"/></library>'
-    )
-    monkeypatch.setenv("FLATLAND_PLUGIN_PATH", str(manifest))
-    monkeypatch.syspath_prepend(str(tmp_path))
+def failing(declare_plugins: Any) -> None:
+    declare_plugins(Failing)
 
 
 def failing_world(files: Any, options: str = "") -> World:
@@ -264,7 +250,7 @@ def failing_world(files: Any, options: str = "") -> World:
         "failing.model.yaml",
         f"""
         bodies: [{{name: base, footprints: [{{type: circle, radius: 0.2, density: 1}}]}}]
-        plugins: [{{type: Failing, name: failing, number: 1{options}}}, $include drive.yaml]
+        plugins: [{{type: 'test::Failing', name: failing, number: 1{options}}}, $include drive.yaml]
         """,
     )
     world: World = files.load(

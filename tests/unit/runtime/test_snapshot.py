@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 import pytest
 from observations import observations
+from plugin_manifests import write_plugins
 
 import flatland
 from flatland import StaleHandleError, Twist, World, WorldError
@@ -207,20 +208,12 @@ class Threaded(ModelPlugin):
     def on_initialize(self, config):
         self.device = threading.Event()
 '''
-NAMES = ("Everything", "Generating", "Connected", "Threaded")
 
 
 @pytest.fixture
 def plugins(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    (tmp_path / "snapshot_plugins.py").write_text(PLUGINS)
-    classes = "".join(
-        f'<class name="{name}" type="snapshot_plugins.{name}" '
-        'base_class_type="flatland::ModelPlugin"/>'
-        for name in NAMES
-    )
-    manifest = tmp_path / "snapshot_plugins.xml"
-    manifest.write_text(f'<library path="snapshot_plugins">{classes}</library>')
-    monkeypatch.setenv("FLATLAND_PLUGIN_PATH", str(manifest))
+    manifest = write_plugins(tmp_path, PLUGINS, "snapshot_plugins")
+    monkeypatch.setenv("FLATLAND_PLUGIN_PATH", manifest)
     monkeypatch.syspath_prepend(str(tmp_path))
 
 
@@ -244,7 +237,7 @@ def plugin_model(kind: str) -> str:
     bodies:
       - name: base
         footprints: [{{type: circle, radius: 0.2, density: 1}}]
-    plugins: [{{type: {kind}, name: plugin}}]
+    plugins: [{{type: "test::{kind}", name: plugin}}]
     """
 
 
@@ -552,7 +545,7 @@ def test_a_plugin_that_cannot_be_copied_is_named(world: World, files: Any) -> No
     files.write("threaded.model.yaml", plugin_model("Threaded"))
     world.spawn_model("threaded.model.yaml", "thread", pose=(2.0, 2.0, 0.0))
     snapshot = world.snapshot()
-    text = 'type "Threaded" model "thread": attribute "device" holds .*threading.Event'
+    text = 'type "test::Threaded" model "thread": attribute "device" holds .*threading.Event'
     with pytest.raises(WorldError, match=text):
         world.clone()
     world.restore(snapshot)
@@ -560,7 +553,7 @@ def test_a_plugin_that_cannot_be_copied_is_named(world: World, files: Any) -> No
     with pytest.raises(WorldError, match='"device" holds a connection that ended'):
         world.restore(snapshot)
     world.spawn_model("generating.model.yaml", "generator", pose=(2.0, 2.0, 0.0))
-    text = 'type "Generating" model "generator": attribute "numbers" holds .* generator'
+    text = 'type "test::Generating" model "generator": attribute "numbers" holds .* generator'
     for method in (world.snapshot, world.clone):
         with pytest.raises(WorldError, match=text):
             method()

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from python_plugins import ContactWitness, PythonDrive, PythonTricycle, PythonTween
 from waiting import TIMEOUT, wait_until
 
 import flatland
@@ -19,16 +20,7 @@ from flatland.plugin_api.update_timer import UpdateTimer
 from flatland.runtime.batch import step_worlds
 from flatland.runtime.observer import WorldObserver
 from flatland.simulation import Simulation
-from tests.support import python_plugins
 
-MANIFEST = """<library path=".">
-{}
-</library>
-"""
-CLASS = (
-    '<class name="test::{0}" type="tests.support.python_plugins.{0}" '
-    'base_class_type="flatland::ModelPlugin"/>'
-)
 CART = """
 bodies:
   - {{name: base, footprints: [{{type: circle, radius: 0.2, density: 5, restitution: 0.3}}]}}
@@ -77,12 +69,9 @@ WITNESS = "  - {type: 'test::ContactWitness', name: witness}\n"
 
 
 @pytest.fixture(autouse=True)
-def plugins(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+def plugins(declare_plugins: Any) -> None:
     """Declares the plugins of this module."""
-    names = ("PythonDrive", "PythonTricycle", "PythonTween", "ContactWitness")
-    manifest = tmp_path / "manifest.xml"
-    manifest.write_text(MANIFEST.format("\n".join(map(CLASS.format, names))))
-    monkeypatch.setenv("FLATLAND_PLUGIN_PATH", str(manifest))
+    declare_plugins(PythonDrive, PythonTricycle, PythonTween, ContactWitness)
 
 
 def room(files: Any, models: dict[str, str], **options: Any) -> flatland.World:
@@ -151,7 +140,7 @@ class TestTheCoreEqualsPython:
         found: list[Any] = []
         world.ports.outputs["/a/collisions"].subscribe(found.append)
         witness = world.model("a").plugin("witness")
-        assert isinstance(witness, python_plugins.ContactWitness)
+        assert isinstance(witness, ContactWitness)
         drive(world, LENGTHS)
         for turn in (0.0, 0.7, -0.7):
             world.command("/a/cmd_vel").set(flatland.Twist(linear_x=-1.0, angular_z=turn))

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from ranging_plugins import Cone, Fan
 from raw_web_client import RawWebClient
 from waiting import wait_until
 
@@ -17,11 +18,6 @@ from flatland.values import Twist
 from flatland.web import WebViewer
 from flatland.web.capture import WorldCapture
 
-MANIFEST = """<library path=".">
-<class name="test::Fan" type="ranging_plugins.Fan" base_class_type="flatland::ModelPlugin"/>
-<class name="test::Cone" type="ranging_plugins.Cone" base_class_type="flatland::ModelPlugin"/>
-</library>
-"""
 WORLD = """
 properties: {}
 layers: [{name: walls, map: room.yaml}]
@@ -468,9 +464,8 @@ class TestOtherSensors:
             (laser,) = client.wait_model("robot")["lasers"]
             assert (laser["angle_min"], laser["angle_increment"]) == (0, -0.5)
 
-    def test_plugins_with_similar_values_are_shown(self, files, viewer, monkeypatch):
-        files.write("manifest.xml", MANIFEST)
-        monkeypatch.setenv("FLATLAND_PLUGIN_PATH", str(files.folder / "manifest.xml"))
+    def test_plugins_with_similar_values_are_shown(self, files, viewer, declare_plugins):
+        declare_plugins(Fan, Cone)
         files.write_map("room", ["##########", *["#........#"] * 8, "##########"])
         files.write(
             "robot.model.yaml",

@@ -29,11 +29,10 @@ from visualization_msgs.msg import Marker, MarkerArray
 from flatland.errors import MapFileError
 from flatland.geometry import quaternion_from_yaw
 from flatland.node.frame_tree import FrameTree, NoTransformError, transform
-from flatland.node.shapes import MAX_LINES
 from flatland.ros.foreign_topics import poses
 from flatland.ros.foreign_topics.drawers import LatestDrawer
 from flatland.ros.foreign_topics.grids import MAX_LENGTH, GridDrawer
-from flatland.ros.foreign_topics.markers import MAX_MARKERS, MarkerDrawer
+from flatland.ros.foreign_topics.markers import MarkerDrawer
 from flatland.ros.foreign_topics.trees import MAX_VALUES, tree_of
 from flatland.web.foreign_topics import Grid, Marks
 
@@ -85,12 +84,13 @@ class TestPosesAndPaths:
         path = Path(poses=[PoseStamped(pose=pose())] * count)
         assert len(drawn(poses.path, stamped(path), frames).lines) == 0
 
-    def test_a_long_path_keeps_its_ends(self, frames):
-        all_poses = [PoseStamped(pose=pose(0.01 * i)) for i in range(2 * MAX_LINES)]
+    def test_a_long_path_keeps_its_ends(self, frames, monkeypatch):
+        monkeypatch.setattr(poses, "MAX_LINES", 100)
+        all_poses = [PoseStamped(pose=pose(0.01 * i)) for i in range(200)]
         marks = drawn(poses.path, stamped(Path(poses=all_poses)), frames)
-        assert MAX_LINES // 2 < len(marks.lines) <= MAX_LINES
+        assert 50 < len(marks.lines) <= 100
         assert marks.lines[0, 0] == 0
-        assert marks.lines[-1, 2] == pytest.approx(0.01 * (2 * MAX_LINES - 1))
+        assert marks.lines[-1, 2] == pytest.approx(1.99)
 
     def test_poses_are_arrows(self, frames):
         array = PoseArray(poses=[pose(1, 2, math.pi / 2), pose(3, 4, math.pi)])
@@ -375,11 +375,12 @@ class TestMarkers:
         marks = self.draw(frames, one)
         assert (len(marks.lines), len(marks.triangles), len(marks.texts)) == (0, 0, 0)
 
-    def test_the_number_of_markers_is_limited(self, frames):
+    def test_the_number_of_markers_is_limited(self, frames, monkeypatch):
+        monkeypatch.setattr("flatland.ros.foreign_topics.markers.MAX_MARKERS", 20)
         drawer = MarkerDrawer()
-        shared = [marker(Marker.SPHERE, number) for number in range(MAX_MARKERS + 5)]
+        shared = [marker(Marker.SPHERE, number) for number in range(25)]
         drawer.receive(MarkerArray(markers=shared), 0)
-        assert len(drawer.draw(frames, 0, again=False).lines) == MAX_MARKERS
+        assert len(drawer.draw(frames, 0, again=False).lines) == 20
 
 
 class TestTrees:

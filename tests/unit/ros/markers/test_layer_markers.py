@@ -58,6 +58,18 @@ def test_heights_of_walls(
     assert caplog.records == []
 
 
+def test_walls_have_the_pose_and_colour_of_the_layer() -> None:
+    (marker,) = markers_of(LayerMarkers(make_layer({})).walls(0))
+    assert (marker.type, marker.action) == (Marker.TRIANGLE_LIST, Marker.ADD)
+    assert marker.header.frame_id == "map"
+    assert marker.frame_locked
+    assert (marker.scale.x, marker.scale.y, marker.scale.z) == (1, 1, 1)
+    color, position = marker.color, marker.pose.position
+    assert (color.r, color.g, color.b, color.a) == pytest.approx((0.1, 0.2, 0.3, 0.4))
+    assert (position.x, position.y, position.z) == (1, 2, 0)
+    assert {(point.x, point.y) for point in marker.points} == {(0, 0), (2, 0)}
+
+
 @pytest.mark.parametrize(
     ("debug", "reason"),
     [

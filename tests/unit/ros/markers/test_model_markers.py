@@ -83,8 +83,12 @@ def test_joints_connect_the_origins_and_the_anchors(model: Any) -> None:
 def test_changed_footprints_and_colors_are_rebuilt(model: Any) -> None:
     cached = ModelMarkers(model)
     before = markers_of(cached.message(0))
-    model.bodies[2].create_circle((0.0, 0.0), 0.3, density=1.0)
-    model.bodies[0].color = (0.5, 0.5, 0.5, 0.5)
+    model.bodies[2].physics.create_edges([[9, 9, 9, 11]])
+    model.bodies[2].color = model.bodies[0].color = (0.5, 0.5, 0.5, 0.5)
     after = markers_of(cached.message(0))
     assert len(after) == len(before) + 1
     assert {marker.color.a for marker in after[:2]} == {0.5}
+    edge = after[3]
+    assert (edge.type, edge.scale.x, edge.color.r) == (Marker.LINE_LIST, 0.03, 0.5)
+    assert [(point.x, point.y, point.z) for point in edge.points] == [(9, 9, 0), (9, 11, 0)]
+    assert (edge.pose.position.x, edge.pose.position.y) == model.bodies[2].pose[:2]
