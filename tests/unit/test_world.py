@@ -314,6 +314,7 @@ def test_a_closed_world_raises_and_may_be_closed_again(files, probe):
         lambda: world.spawn_model("minimal.model.yaml", "x"),
         lambda: world.move_model("a", (0, 0, 0)),
         lambda: world.delete_model("a"),
+        world.state,
     ):
         with pytest.raises(WorldError, match="the world is closed"):
             action()

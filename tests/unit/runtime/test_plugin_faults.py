@@ -296,6 +296,16 @@ def test_a_plugin_that_raises_in_on_initialize_fails_only_its_model(files, fault
     assert all(count > 3 for count in witness(world).values())
 
 
+def test_an_interrupt_during_initialization_is_raised_and_leaves_no_model(files, faults):
+    world = crowded(files)
+    importlib.import_module(faults.module).Model.start_fault = KeyboardInterrupt
+    robot(files, WITNESS, 'name: bad, type: "faults::Model", hook: on_initialize', name="bad.yaml")
+    with pytest.raises(KeyboardInterrupt, match="no device"):
+        world.spawn_model("bad.yaml", "second")
+    assert [model.name for model in world.models if "disc" not in model.name] == ["robot"]
+    run_all_hooks(world)
+
+
 def test_a_world_plugin_that_raises_in_on_initialize_fails_the_world(files, faults):
     with pytest.raises(PluginError) as caught:
         crowded(files, world_plugins='[{name: bad, type: "faults::World", hook: on_initialize}]')
