@@ -221,6 +221,16 @@ def test_an_invalid_duration_is_refused(node: Any, duration: float, message: str
     assert (answer.success, answer.message, answer.stamp) == (False, message, 10_000_000)
 
 
+def test_steps_end_before_the_longest_time(node: Any) -> None:
+    start = 2**61 - 2 * STEP_NS
+    node.run(lambda: setattr(node.world.timekeeper, "sim_time_ns", start))
+    assert node.call("step_world", duration=0.005).stamp == start + STEP_NS
+    for duration in (0.0, 0.01):
+        answer = node.call("step_world", duration=duration)
+        message = "the simulated time must remain below 2305843009 s (73 years)"
+        assert (answer.success, answer.message) == (False, message)
+
+
 def test_steps_report_dropped_messages(node: Any) -> None:
     node.transport.lost.update({("/scan", "/slow"): 3, ("/clock", "/slow"): 9})
     answer = node.call("step_world", duration=0.0)
