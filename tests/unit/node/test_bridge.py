@@ -88,6 +88,11 @@ def test_the_topic_of_a_deleted_model_is_closed(node: Any) -> None:
     assert scans.sent == []
 
 
+def test_the_topics_of_a_node_that_ends_are_left_to_the_transport(node: Any) -> None:
+    node.close()
+    assert not node.transport.topics["scan"].closed
+
+
 def test_a_model_that_returns_has_topics_of_its_own(files: Any, transport: Any) -> None:
     drive = "plugins: [{type: DiffDrive, name: drive, body: base}]"
     base = "bodies: [{name: base, footprints: [{type: circle, radius: 0.2, density: 1}]}]"

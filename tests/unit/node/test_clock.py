@@ -73,7 +73,8 @@ def test_stamps_increase_although_the_clock_stands_still_or_is_corrected(wall: W
     stamps = [wall.step(until_advance=0, rest=0)[1] for _ in range(3)]
     wall.now -= 10 * MS
     stamps += [wall.step(until_advance=0, rest=0)[1] for _ in range(3)]
-    assert stamps == sorted(set(stamps))
+    # By the least that is possible, to stay close to the clock.
+    assert stamps == list(range(stamps[0], stamps[0] + 6))
 
 
 def test_stamps_follow_a_clock_that_is_set_back(wall: Wall) -> None:

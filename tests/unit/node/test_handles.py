@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from flatland.node.handles import DELETE_ENTRY, DRAG_TIMEOUT, Event, Feedback, Handles
+from flatland.node.handles import DELETE_ENTRY, Event, Feedback, Handles
 from flatland.node.ticker import TickerThread
 from flatland.node.values import ReceivedPose
 from flatland.simulation import Simulation
@@ -30,6 +30,7 @@ class FakeServer:
         self.handles: set[str] = set()
         self.moved: list[str] = []
         self.inserted: list[str] = []
+        self.keep_alives = 0
 
     def insert(self, _model: object, name: str) -> None:
         self.handles.add(name)
@@ -45,7 +46,7 @@ class FakeServer:
         pass
 
     def keep_alive(self) -> None:
-        pass
+        self.keep_alives += 1
 
 
 class Setup:
@@ -121,10 +122,10 @@ def test_a_pause_by_other_means_during_a_drag_remains(setup: Setup) -> None:
 def test_a_drag_without_feedback_ends_and_the_model_does_not_move(setup: Setup) -> None:
     setup.send("a", Event.PRESS, time=1.0)
     setup.send("a", Event.KEEP_ALIVE, time=2.0)
-    assert setup.handles._tick(2.0 + 0.9 * DRAG_TIMEOUT)
+    assert setup.handles._tick(2.09)
     assert setup.world.paused
     assert setup.handles.pose_of("a") == (1.0, 2.0, 0.0)
-    setup.handles._tick(2.0 + 1.1 * DRAG_TIMEOUT)
+    setup.handles._tick(2.11)
     assert not setup.world.paused
     assert setup.handles.pose_of("a") == (0.0, 0.0, 0.0)
     assert setup.server.moved[-1] == "a"
@@ -162,6 +163,17 @@ def test_poses_are_published_once_and_only_with_clients(setup: Setup) -> None:
     assert setup.server.moved == ["a"]
     assert setup.handles._tick(3.0)
     assert setup.server.moved == ["a"]
+
+
+def test_clients_are_informed_twice_a_second_that_the_server_is_there(setup: Setup) -> None:
+    counts = []
+    for time in (1.0, 1.4, 1.5, 1.9):
+        setup.handles._tick(time)
+        counts.append(setup.server.keep_alives)
+    assert counts == [1, 1, 2, 2]
+    setup.handles.connection_changed()  # A new client is informed at once.
+    setup.handles._tick(1.95)
+    assert setup.server.keep_alives == 3
 
 
 def test_the_handle_of_a_model_with_other_colors_is_replaced(setup: Setup) -> None:
