@@ -67,7 +67,14 @@ _ROOMS = {
             "tests/unit/cli/test_check_mistakes.py",
         ),
     ),
-    "node": Room(("flatland/node/*.py",), ("tests/unit/node", "tests/unit/web/test_live_view.py")),
+    "node": Room(
+        ("flatland/node/*.py",),
+        (
+            "tests/unit/node",
+            "tests/unit/web/test_live_view.py",
+            "tests/unit/ros/foreign_topics/test_drawers.py",
+        ),
+    ),
     "physics": Room(
         ("flatland/physics/*.py",),
         (
