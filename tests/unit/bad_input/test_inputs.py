@@ -433,6 +433,10 @@ INPUTS: dict[str, Input] = {
     "empty model path": models(
         "{name: m, model: ''}", 'failed to spawn model "m", the path must not be empty'
     ),
+    "missing map": layers(
+        "[{name: a, map: nothing.map.yaml}]",
+        'File does not exist, path="{folder}/nothing.map.yaml"',
+    ),
     "missing model": models(
         "{name: m, model: god.model.yaml}",
         'File does not exist, path="{folder}/god.model.yaml"',

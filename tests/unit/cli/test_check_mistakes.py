@@ -100,6 +100,19 @@ MISTAKES: dict[str, Mistake] = {
         ("world.yaml", 2, 'Entry "name" does not exist (in "layers" index=0)', ""),
         robot=plugins(LASER % ("l", ", layers: [room]")).replace("1}]", "1, layers: [room]}]"),
     ),
+    "layer of an existing name": of_world(
+        "properties: {}\nlayers:\n- {name: room, map: room.yaml}\n"
+        f"- {{name: [room, attic], map: rom.yaml}}\n{ROBOT % '[1, 1, 0]'}",
+        ("world.yaml", 4, 'Layer with name "room" already exists', ""),
+        ("world.yaml", 4, "File does not exist", 'did you mean "room.yaml"?'),
+        (
+            "robot.yaml",
+            1,
+            'Invalid footprint "layers" in model "r"',
+            "layers of the world: room, attic",
+        ),
+        robot=MODEL.replace("density: 1", "density: 1, layers: [attic, cellar]"),
+    ),
     "two bodies with errors": of_model(
         "bodies:\n- {name: a}\n- {name: b, footprints: 1}\n",
         ("robot.yaml", 2, 'Entry "footprints" does not exist', '"footprints: []" is a body'),

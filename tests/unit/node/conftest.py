@@ -157,7 +157,7 @@ class FakeTransport(Transport):
         self.is_delayed = False
 
     def record(self, path: str, world: Any) -> FakeTopic:
-        return FakeTopic(path, None, None, None)
+        return self._add(path)
 
     def clock_topic(self, now: Any, post: Any, on_connection: Any) -> FakeTopic:
         return self._add("/clock", now, post, on_connection)

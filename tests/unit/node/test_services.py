@@ -8,10 +8,12 @@ from concurrent.futures import ThreadPoolExecutor
 from types import SimpleNamespace
 from typing import Any
 
+import numpy as np
 import pytest
 from waiting import TIMEOUT, wait_until
 
 from flatland.runtime import file_reads
+from flatland.values import OccupancyGrid
 
 STEP_NS = 5_000_000
 
@@ -251,6 +253,20 @@ def test_an_invalid_seed_is_refused(node: Any, seed: int) -> None:
     answer = node.call("reset_world", seed=seed, keep_time=False)
     assert answer.message == f"seed must be at least 0, or -1 for the current one, got {seed}"
     assert answer.success is False
+
+
+class GridMessage(OccupancyGrid):
+    """A grid with the field that the service reads of a message."""
+
+    @property
+    def data(self) -> Any:
+        return self.cells.ravel()
+
+
+def test_a_map_of_one_cell_is_received(node: Any) -> None:
+    grid = GridMessage((1.0, 2.0, 0.0), 0.5, np.full((1, 1), 100, np.int8))
+    assert node.call("set_layer_map", layer="2d", map_path="", grid=grid).success
+    assert len(node.world.layers[0].edges) == 4
 
 
 def test_invalid_requests(node: Any) -> None:
