@@ -149,6 +149,7 @@ _ROOMS = {
             "tests/unit/test_world.py",
             "tests/unit/test_sensors_world.py",
             "tests/unit/plugins/test_laser_batch.py",
+            "tests/unit/gym/test_batch.py",
         ),
     ),
     "world": Room(

@@ -98,6 +98,17 @@ class Witness(ModelPlugin):
         self.calls = None
 
 
+class FaultyDrive(ModelPlugin):
+    """Drives its robot at 1 m/s, and fails in each step."""
+
+    def on_initialize(self, config):
+        drive = self.control(self.model.bodies[0].control_velocity())
+        drive.set_target(1.0, 0.0, 0.0)
+
+    def after_physics_step(self, timekeeper):
+        raise RuntimeError("no encoder")
+
+
 class FaultyShutdown(ModelPlugin):
     def on_shutdown(self):
         raise RuntimeError("cannot shut down")
@@ -245,6 +256,20 @@ def test_a_hook_that_always_raises_is_called_three_times(files, faults, caplog, 
     world.spawn_model("minimal.model.yaml", "new", pose=(0, 9, 0))
     world.delete_model("robot")
     world.step()
+
+
+def test_a_disabled_plugin_no_longer_drives_its_robot(files, faults):
+    robot(files, 'name: bad, type: "faults::FaultyDrive"')
+    world = files.load(
+        "{properties: {}, layers: [], models: [{name: r, model: robot.model.yaml}]}",
+        plugin_errors="disable",
+    )
+    body = world.model("r").bodies[0]
+    world.step(3)
+    assert body.velocity == pytest.approx((1.0, 0.0, 0.0))
+    body.set_velocity(0.25, 0.0, 0.0)
+    world.step()
+    assert body.velocity == pytest.approx((0.25, 0.0, 0.0))
 
 
 def test_a_hook_that_succeeds_in_between_is_not_disabled(files, faults):
