@@ -109,6 +109,17 @@ class FaultyDrive(ModelPlugin):
         raise RuntimeError("no encoder")
 
 
+class FaultyCount(ModelPlugin):
+    """Fails when it accounts for updates without a call."""
+
+    def on_initialize(self, config):
+        values = self.output("values", float)
+        self.on_update(lambda timekeeper: None, outputs=[values], skipped=self.fail)
+
+    def fail(self, count, stamp, poses):
+        raise RuntimeError("no count")
+
+
 class FaultyShutdown(ModelPlugin):
     def on_shutdown(self):
         raise RuntimeError("cannot shut down")
@@ -270,6 +281,14 @@ def test_a_disabled_plugin_no_longer_drives_its_robot(files, faults):
     body.set_velocity(0.25, 0.0, 0.0)
     world.step()
     assert body.velocity == pytest.approx((0.25, 0.0, 0.0))
+
+
+def test_a_plugin_that_fails_to_account_for_skipped_updates_is_reported(files, faults, caplog):
+    world = crowded(files, 'name: bad, type: "faults::FaultyCount"')
+    world.step(3)
+    world.state_hash()  # for which all updates are accounted for
+    assert 'type "faults::FaultyCount" model "robot": after_physics_step raised' in caplog.text
+    assert "RuntimeError: no count" in caplog.text
 
 
 def test_a_hook_that_succeeds_in_between_is_not_disabled(files, faults):

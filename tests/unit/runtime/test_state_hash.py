@@ -189,6 +189,8 @@ def test_different_values_have_different_hashes() -> None:
         set(),
         {1, 2},
         [1, 2],
+        [1, None],
+        [None, 1],
         [1, [2]],
         [[1], 2],
         ["12"],
