@@ -101,6 +101,7 @@ _ROOMS = {
         (
             "tests/unit/plugins/test_after_step.py",
             "tests/unit/plugins/test_drive_odometry.py",
+            "tests/unit/plugins/test_laser_noise.py",
             "tests/unit/plugins/test_force_mode.py",
             "tests/unit/plugins/test_moving_worlds.py",
         ),
