@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from concurrent.futures import Future
 from typing import Any
 
 import pytest
+from waiting import wait_until
 
 from flatland.node.handles import DELETE_ENTRY, Event, Feedback, Handles
 from flatland.node.ticker import TickerThread
@@ -56,8 +58,13 @@ class Setup:
         self.world = world
         self.server = FakeServer()
         self.simulation = Simulation(world)
-        thread = TickerThread("handles", lambda _action: Future())  # The test ticks itself.
+        self.posted: list[object] = []  # ticks that wait; the test ticks itself
+        thread = TickerThread("handles", self._post)
         self.handles = Handles(self.simulation, thread, lambda _post, _handles: self.server)
+
+    def _post(self, action: object) -> Future[Any]:
+        self.posted.append(action)
+        return Future()
 
     def send(
         self,
@@ -144,6 +151,14 @@ def test_a_pose_in_another_frame_is_ignored(setup: Setup, caplog: pytest.LogCapt
     assert 'ignoring a pose in frame "odom", expected frame "map"' in caplog.text
 
 
+def test_an_invalid_pose_is_a_warning_that_names_the_handle(
+    setup: Setup, caplog: pytest.LogCaptureFixture
+) -> None:
+    setup.send("a", Event.RELEASE, math.nan)
+    assert 'interactive marker "a": Flatland World: failed to move model "a"' in caplog.text
+    assert setup.world.model("a").pose == (0.0, 0.0, 0.0)
+
+
 def test_the_menu_deletes_a_model_whose_drag_ends(setup: Setup) -> None:
     setup.send("a", Event.PRESS)
     setup.send("a", Event.MENU, entry=DELETE_ENTRY)
@@ -171,7 +186,9 @@ def test_clients_are_informed_twice_a_second_that_the_server_is_there(setup: Set
         setup.handles._tick(time)
         counts.append(setup.server.keep_alives)
     assert counts == [1, 1, 2, 2]
+    assert not setup.posted
     setup.handles.connection_changed()  # A new client is informed at once.
+    wait_until("a tick", lambda: setup.posted)
     setup.handles._tick(1.95)
     assert setup.server.keep_alives == 3
 
