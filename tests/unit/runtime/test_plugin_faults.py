@@ -109,6 +109,14 @@ class FaultyDrive(ModelPlugin):
         raise RuntimeError("no encoder")
 
 
+class Deleting(ModelPlugin):
+    """Requests deletions that fail."""
+
+    def before_physics_step(self, timekeeper):
+        self.world.delete_model("nobody")
+        self.world.delete_models(["nobody"])
+
+
 class FaultyCount(ModelPlugin):
     """Fails when it accounts for updates without a call."""
 
@@ -281,6 +289,14 @@ def test_a_disabled_plugin_no_longer_drives_its_robot(files, faults):
     body.set_velocity(0.25, 0.0, 0.0)
     world.step()
     assert body.velocity == pytest.approx((0.25, 0.0, 0.0))
+
+
+def test_a_request_of_a_hook_that_fails_is_logged(files, faults, caplog):
+    world = crowded(files, 'name: bad, type: "faults::Deleting"')
+    world.step()
+    text = [record.getMessage() for record in caplog.records][-2:]
+    assert text[0].startswith('delete_model "nobody": Flatland World: ')
+    assert text[1].startswith("delete_models: Flatland World: ")
 
 
 def test_a_plugin_that_fails_to_account_for_skipped_updates_is_reported(files, faults, caplog):

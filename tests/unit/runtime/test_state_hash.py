@@ -200,6 +200,8 @@ def test_different_values_have_different_hashes() -> None:
         1 << 80,
         Twist(),
         Twist(1.0),
+        [Twist(1.0, 2.0, 3.0), 4.0],
+        [1.0, Twist(2.0, 3.0, 4.0)],
         np.zeros(2),
         np.zeros(2, np.float32),
         np.zeros((2, 1)),
