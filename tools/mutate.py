@@ -125,10 +125,12 @@ _ROOMS = {
         ("flatland/ros/**/*.py",),
         (
             "tests/unit/ros",
+            "tests/unit/cli/test_run.py",
             "tests/ros/adapters",
             "tests/ros/transport",
             "tests/ros/markers",
             "tests/ros/interactive",
+            "tests/ros/test_web_topics.py",
         ),
     ),
     # Without tests that take long; each still serves for the file that it mirrors.
