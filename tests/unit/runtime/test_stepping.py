@@ -551,6 +551,7 @@ def test_a_removed_plugin_leaves_no_clock(files: Any) -> None:
         world.spawn_model("\n" + CART.format(drive="DiffDrive") + gps, "b")
         world.step()
         world.delete_model("b")
+    assert len(world.plugin_host.jobs._controllers) == 1
     calls: list[int] = []
     world.output("/a/odometry/filtered").subscribe(lambda odometry: calls.append(odometry.stamp))
     gps = "  - {type: Gps, name: gps, body: base, update_rate: 1.25}\n"
