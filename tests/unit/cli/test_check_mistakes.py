@@ -80,6 +80,12 @@ MISTAKES: dict[str, Mistake] = {
         ("robot.yaml", 1, 'Invalid "type" in model "?" body "base", must be one of', "did you"),
         robot=MODEL.replace("{name: base", "{name: base, type: dinamic"),
     ),
+    "illegal namespace of a model with a mistake": of_world(
+        f"{WORLD}models:\n- {{name: r, model: robot.yaml, namespace: my robot, pose: [1, 1, 0]}}\n",
+        ("world.yaml", 4, 'failed to spawn model "r", namespace "my robot" is not', ""),
+        ("robot.yaml", 3, 'Entry "type" does not exist (in model "r" "plugins" index=0)', ""),
+        robot=plugins("{name: bumper}"),
+    ),
     "layers without a dash": of_world(
         "properties: {publish_map: room}\nlayers:\n  name: room\n  map: room.yaml\n"
         f"{ROBOT % '[1, 1, 0]'}",
