@@ -67,7 +67,14 @@ _ROOMS = {
             "tests/unit/cli/test_check_mistakes.py",
         ),
     ),
-    "node": Room(("flatland/node/*.py",), ("tests/unit/node", "tests/unit/web/test_live_view.py")),
+    "node": Room(
+        ("flatland/node/*.py",),
+        (
+            "tests/unit/node",
+            "tests/unit/web/test_live_view.py",
+            "tests/unit/ros/foreign_topics/test_drawers.py",
+        ),
+    ),
     "physics": Room(
         ("flatland/physics/*.py",),
         (
@@ -94,6 +101,7 @@ _ROOMS = {
         (
             "tests/unit/plugins/test_after_step.py",
             "tests/unit/plugins/test_drive_odometry.py",
+            "tests/unit/plugins/test_laser_noise.py",
             "tests/unit/plugins/test_force_mode.py",
             "tests/unit/plugins/test_moving_worlds.py",
         ),
@@ -117,10 +125,12 @@ _ROOMS = {
         ("flatland/ros/**/*.py",),
         (
             "tests/unit/ros",
+            "tests/unit/cli/test_run.py",
             "tests/ros/adapters",
             "tests/ros/transport",
             "tests/ros/markers",
             "tests/ros/interactive",
+            "tests/ros/test_web_topics.py",
         ),
     ),
     # Without tests that take long; each still serves for the file that it mirrors.
@@ -142,6 +152,7 @@ _ROOMS = {
             "tests/unit/test_world.py",
             "tests/unit/test_sensors_world.py",
             "tests/unit/plugins/test_laser_batch.py",
+            "tests/unit/gym/test_batch.py",
         ),
     ),
     "world": Room(

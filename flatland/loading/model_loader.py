@@ -61,7 +61,6 @@ class ModelLoader:
         Raises:
             YamlError: The file is invalid.
         """
-        self._reader.require_kind("model")
         self._model.class_name = read_class(self._reader, self._model.class_name)
         bodies = self._reader.subnode("bodies", "list")
         invalid = len(bodies)

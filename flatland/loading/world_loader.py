@@ -307,12 +307,7 @@ def _load_map(source: WorldSource, reader: YamlReader, map_path: str, layer_name
         return source.load_map(map_path, layer_name)
     except UnreadableFileError as error:
         hint = unreadable_file(source.resolve(map_path), "map")
-        raise reader.subnode("map").error(_without_place(error), hint) from error
-
-
-def _without_place(error: YamlError) -> str:
-    """Returns the message of an error for another place."""
-    return error.message.removesuffix(error.place.suffix if error.place else "")
+        raise reader.subnode("map").error(error.message, hint) from error
 
 
 def _load_models(world: LoadedWorld, reader: YamlReader) -> None:
@@ -349,7 +344,7 @@ def _load_model(world: LoadedWorld, entry: YamlReader, names: set[str]) -> None:
         except UnreadableFileError as error:
             located = model_reader.subnode("model")
             hint = unreadable_file(world.resolve_path(path), "model")
-            raise located.error(_without_place(error), hint) from error
+            raise located.error(error.message, hint) from error
 
 
 def _all_missing_plugins(world: LoadedWorld, reader: YamlReader) -> MissingPluginsError | None:

@@ -41,7 +41,7 @@ class FaultReports:
         """Installs the reports for the process."""
         # On a segmentation fault, an abort and the like: the stack of each thread, with the files,
         # lines and functions of the plugin that was running. Nothing else can be called then.
-        faulthandler.enable(all_threads=True)
+        faulthandler.enable()
         threading.excepthook = self._log
 
     def _log(self, ended: threading.ExceptHookArgs) -> None:

@@ -24,6 +24,7 @@ from flatland.node.states import stamped_states
 from flatland.node.transport import REGISTRATION_TIMEOUT, REPLACED, CallError, Transport
 from flatland.runtime.file_reads import read_in_time
 from flatland.simulation import Simulation
+from flatland.timekeeper import NANOSECONDS
 from flatland.values import OccupancyGrid
 
 _LOG = logging.getLogger("flatland")
@@ -31,7 +32,7 @@ _LOG = logging.getLogger("flatland")
 MAX_STEP_DURATION: Final = 3600.0
 """Longest simulated time of a call of `step_world` [s]; a larger one probably has another unit."""
 _STEP_TOLERANCE: Final = 1e-3  # of a step, by which a duration may differ from a multiple of steps
-_MAX_STAMP: Final = 2**32  # s; the time of ROS ends there
+_MAX_TIME: Final = 2**61 / NANOSECONDS  # s; the core counts up to there, stamps of ROS further
 _KEEP_SEED: Final = -1  # in ResetWorld
 _READY_POLL_PERIOD: Final = 0.01  # s between two checks of the connections
 _VISIBLE: Final = {0: None, 1: True, -1: False}  # KEEP, SHOW and HIDE in SetAppearance
@@ -244,13 +245,13 @@ class Services:
         timekeeper = self._world.timekeeper
         step_size = timekeeper.step_size
         if duration == 0:
-            return 1
+            duration = step_size
         if not 0 < duration < math.inf:
             raise CallError(f"duration must be finite and not negative [s], got {duration}")
         if duration > MAX_STEP_DURATION:
             raise CallError(f"duration must be at most {MAX_STEP_DURATION:g} s, got {duration}")
-        if timekeeper.sim_time + duration >= _MAX_STAMP:
-            raise CallError(f"the time after {duration} s would not fit a stamp of ROS")
+        if timekeeper.sim_time + duration >= _MAX_TIME:
+            raise CallError(f"the simulated time must remain below {_MAX_TIME:.0f} s (73 years)")
         steps = duration / step_size
         count = round(steps)
         if count == 0 or abs(steps - count) > _STEP_TOLERANCE:

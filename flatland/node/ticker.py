@@ -88,7 +88,6 @@ class TickerThread:
             self._wakes_at = math.inf if due else self._next_due()
             limit = None if math.isinf(self._wakes_at) else self._wakes_at - now
             self._changed.wait(limit)
-            self._wakes_at = -math.inf
         return [], math.nan
 
     def _next_due(self) -> float:

@@ -255,6 +255,8 @@ class Spread:
 def _points_on(ends: DoubleArray, size: IntArray) -> DoubleArray:
     """Returns points at most half a unit apart on the parts of edges that lie in a rectangle.
 
+    Edges on the border of the rectangle may be left out.
+
     Args:
         ends: Both ends of each edge, shape (n, 2, 2).
         size: Width and height of the rectangle, which starts at the origin.
@@ -263,13 +265,11 @@ def _points_on(ends: DoubleArray, size: IntArray) -> DoubleArray:
         The points, shape (m, 2).
     """
     start, along = ends[:, 0], ends[:, 1] - ends[:, 0]
-    # The part of each edge, from 0 to 1, between the two lines that bound each axis.
+    # The part of each edge, from 0 to 1, between the two lines that bound each axis: infinite or
+    # empty if the edge is parallel to them, NaN if it lies on one of them.
     with np.errstate(divide="ignore", invalid="ignore"):
         crossings = np.stack((-start / along, (size - start) / along))
-    parallel = along == 0
-    inside = (start >= 0) & (start <= size)
-    enter = np.where(parallel, np.where(inside, 0.0, 2.0), crossings.min(axis=0))
-    leave = np.where(parallel, np.where(inside, 1.0, -1.0), crossings.max(axis=0))
+        enter, leave = crossings.min(axis=0), crossings.max(axis=0)
     first = np.maximum(enter.max(axis=1), 0.0)
     last = np.minimum(leave.min(axis=1), 1.0)
     kept = first <= last

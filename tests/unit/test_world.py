@@ -302,11 +302,28 @@ def test_a_closed_world_raises_and_may_be_closed_again(files, probe):
         lambda: world.spawn_model("minimal.model.yaml", "x"),
         lambda: world.move_model("a", (0, 0, 0)),
         lambda: world.delete_model("a"),
+        world.state,
     ):
         with pytest.raises(WorldError, match="the world is closed"):
             action()
     with pytest.raises(flatland.StaleHandleError):
         body.pose  # noqa: B018
+
+
+def test_a_command_of_a_hook_takes_effect_in_the_same_step(files, probe):
+    world = files.load_model(
+        """
+        bodies: [{name: base, footprints: [{type: circle, radius: 0.2, density: 1}]}]
+        plugins:
+          - {name: p, type: "test::Probe"}
+          - {name: drive, type: DiffDrive, body: base}
+        """
+    )
+    command = world.command("/cmd_vel")
+    probe.hook = "before"
+    probe.act = staticmethod(lambda p: command.set(flatland.Twist(1.0)))
+    world.step()
+    assert world.model("robot").bodies[0].velocity == (1.0, 0.0, 0.0)
 
 
 def test_ports_are_found_by_topic(files):

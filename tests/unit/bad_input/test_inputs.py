@@ -433,6 +433,15 @@ INPUTS: dict[str, Input] = {
     "empty model path": models(
         "{name: m, model: ''}", 'failed to spawn model "m", the path must not be empty'
     ),
+    "map of an invalid topic": layers(
+        "[{name: a, map: 'topic://my map'}]",
+        'Invalid "map", "my map" is not a legal topic name: it must start with a letter or "/" and '
+        'hold only letters, digits, "_" and "/", expected topic:///map (in "layers" index=0)',
+    ),
+    "missing map": layers(
+        "[{name: a, map: nothing.map.yaml}]",
+        'File does not exist, path="{folder}/nothing.map.yaml"',
+    ),
     "missing model": models(
         "{name: m, model: god.model.yaml}",
         'File does not exist, path="{folder}/god.model.yaml"',

@@ -80,6 +80,12 @@ MISTAKES: dict[str, Mistake] = {
         ("robot.yaml", 1, 'Invalid "type" in model "?" body "base", must be one of', "did you"),
         robot=MODEL.replace("{name: base", "{name: base, type: dinamic"),
     ),
+    "illegal namespace of a model with a mistake": of_world(
+        f"{WORLD}models:\n- {{name: r, model: robot.yaml, namespace: my robot, pose: [1, 1, 0]}}\n",
+        ("world.yaml", 4, 'failed to spawn model "r", namespace "my robot" is not', ""),
+        ("robot.yaml", 3, 'Entry "type" does not exist (in model "r" "plugins" index=0)', ""),
+        robot=plugins("{name: bumper}"),
+    ),
     "layers without a dash": of_world(
         "properties: {publish_map: room}\nlayers:\n  name: room\n  map: room.yaml\n"
         f"{ROBOT % '[1, 1, 0]'}",
@@ -99,6 +105,19 @@ MISTAKES: dict[str, Mistake] = {
         f"properties: {{}}\nlayers: [{{map: room.yaml}}]\n{ROBOT % '[1, 1, 0]'}",
         ("world.yaml", 2, 'Entry "name" does not exist (in "layers" index=0)', ""),
         robot=plugins(LASER % ("l", ", layers: [room]")).replace("1}]", "1, layers: [room]}]"),
+    ),
+    "layer of an existing name": of_world(
+        "properties: {}\nlayers:\n- {name: room, map: room.yaml}\n"
+        f"- {{name: [room, attic], map: rom.yaml}}\n{ROBOT % '[1, 1, 0]'}",
+        ("world.yaml", 4, 'Layer with name "room" already exists', ""),
+        ("world.yaml", 4, "File does not exist", 'did you mean "room.yaml"?'),
+        (
+            "robot.yaml",
+            1,
+            'Invalid footprint "layers" in model "r"',
+            "layers of the world: room, attic",
+        ),
+        robot=MODEL.replace("density: 1", "density: 1, layers: [attic, cellar]"),
     ),
     "two bodies with errors": of_model(
         "bodies:\n- {name: a}\n- {name: b, footprints: 1}\n",

@@ -118,6 +118,8 @@ def test_the_core_performs_all_steps_alone_after_those_with_first_updates(
     assert batch.perform(actions, ones, 20).tolist() == []
     env._stage.worlds[1].add_observer(Watcher())
     assert batch.perform(actions, ones, 20).tolist() == [1]
+    env._stage.worlds[2].physics.pre_solve = lambda *_: None
+    assert batch.perform(actions, ones, 20).tolist() == [1, 2]
 
 
 def test_a_refused_call_of_the_core_advances_no_world(make: Make, room: Path) -> None:

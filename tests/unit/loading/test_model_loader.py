@@ -67,6 +67,12 @@ def test_entries_of_a_body(files):
     assert (polygon.category_bits, polygon.mask_bits) == (0xFFFF, 0)
 
 
+def test_a_circle_is_centered_by_default(files):
+    world = files.load_model(body(footprint="type: circle, radius: 1, density: 1"))
+    (fixture,) = world.model("robot").body("base").fixtures
+    assert fixture.center == (0, 0)
+
+
 def test_a_footprint_without_layers_has_no_category_bits(files):
     world = files.load_model(body(footprint="type: circle, radius: 1, density: 1, layers: []"))
     (fixture,) = world.model("robot").body("base").fixtures

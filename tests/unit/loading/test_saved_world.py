@@ -90,6 +90,14 @@ def test_models_without_a_file_are_named(world: World, files: Any) -> None:
     assert r'"a \"text\"\nx"' in notes[0]
 
 
+@pytest.mark.parametrize(("count", "end"), [(5, '"m4". '), (6, '"m4", .... ')])
+def test_five_models_without_a_file_are_named(world: World, count: int, end: str) -> None:
+    for number in range(count):
+        world.spawn_model("\nbodies: [{name: b, footprints: []}]", f"m{number}", pose=(4, 4, 0))
+    [note] = SavedWorld(world).file()[1]
+    assert f'not included: "m0", "m1", "m2", "m3", {end}' in note
+
+
 def test_a_world_without_a_file_is_an_error() -> None:
     with World() as world, pytest.raises(WorldError, match="loaded from a file"):
         SavedWorld(world)

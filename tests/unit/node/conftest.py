@@ -56,6 +56,8 @@ class FakeTopic:
 class FakeForeignTopics:
     """No topics of other nodes."""
 
+    closed = False
+
     def update(self, demand: TopicDemand) -> TopicUpdate:
         return TopicUpdate()
 
@@ -66,7 +68,7 @@ class FakeForeignTopics:
         return False
 
     def close(self) -> None:
-        pass
+        self.closed = True
 
 
 class FakeTransport(Transport):
@@ -79,6 +81,7 @@ class FakeTransport(Transport):
         parameters: Parameters by name.
         lost: Messages that were dropped, by topic and subscriber.
         is_delayed: Whether the system may delay small messages.
+        foreign_topics: Topics of other nodes for the viewer in the browser.
     """
 
     REGISTER_ADAPTER = "register"
@@ -93,6 +96,7 @@ class FakeTransport(Transport):
         self.parameters: dict[str, object] = {}
         self.lost: Counter[tuple[str, str]] = Counter()
         self.time_ns = 0
+        self.foreign_topics = FakeForeignTopics()
 
     def find_adapter(self, value_type: type[Any]) -> Adapter:
         return Adapter(value_type, value_type, lambda value: value, lambda message: message)
@@ -153,7 +157,7 @@ class FakeTransport(Transport):
         self.is_delayed = False
 
     def record(self, path: str, world: Any) -> FakeTopic:
-        return FakeTopic(path, None, None, None)
+        return self._add(path)
 
     def clock_topic(self, now: Any, post: Any, on_connection: Any) -> FakeTopic:
         return self._add("/clock", now, post, on_connection)
@@ -165,7 +169,7 @@ class FakeTransport(Transport):
         return []
 
     def load_foreign_topics(self) -> Any:
-        return lambda _simulation: FakeForeignTopics()
+        return lambda _simulation: self.foreign_topics
 
     def load_handle_server(self) -> Any:
         raise ImportError("there are no interactive markers here")
@@ -178,13 +182,17 @@ class Node:
         transport: Its connections.
         served: Its world.
         world: The same.
+        close: Ends the node; idempotent.
     """
 
-    def __init__(self, transport: FakeTransport, served: ServedWorld) -> None:
+    def __init__(
+        self, transport: FakeTransport, served: ServedWorld, close: Callable[[], None]
+    ) -> None:
         self.transport = transport
         self.served = served
         self.world = served.world
         self.call = transport.call
+        self.close = close
 
     def run(self, action: Callable[[], Any]) -> Any:
         """Runs an action between two steps and returns its result."""
@@ -215,7 +223,7 @@ def serve(files: Any, transport: FakeTransport) -> Iterator[Callable[..., Node]]
             served.close()
 
         ends.append(end)
-        return Node(transport, served)
+        return Node(transport, served, end)
 
     yield start
     for end in ends:

@@ -69,6 +69,34 @@ def test_the_messages_of_a_step_follow_its_time_and_its_transforms(node: Any) ->
     assert order == ["/clock", "/tf", "odometry/filtered", "scan"]
 
 
+def test_a_value_emitted_between_two_steps_is_published_at_once(node: Any) -> None:
+    scans = node.transport.topics["scan"]
+    scans.connect()
+    step(node, 0.02)
+    node.run(lambda: node.world.output("/scan").emit(scans.sent[0]))
+    assert scans.sent[2:] == scans.sent[:1]
+
+
+def test_ports_without_an_adapter_are_named(
+    serve: Any,
+    files: Any,
+    transport: Any,
+    caplog: pytest.LogCaptureFixture,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    files.write("robot.model.yaml", ROBOT)
+    find = transport.find_adapter
+    monkeypatch.setattr(
+        transport,
+        "find_adapter",
+        lambda kind: None if kind in (flatland.LaserScan, flatland.Twist) else find(kind),
+    )
+    serve(WORLD)
+    text = "%s is not connected to ROS: no adapter for %s is registered (register)"
+    for port in (('output "/scan"', "LaserScan"), ('command "/cmd_vel"', "Twist")):
+        assert text % port in caplog.text
+
+
 def test_the_last_of_several_commands_is_in_effect(node: Any) -> None:
     receive = node.transport.callbacks["cmd_vel"]
     for number in range(100):
@@ -86,6 +114,11 @@ def test_the_topic_of_a_deleted_model_is_closed(node: Any) -> None:
     assert scans.closed
     step(node, 0.02)
     assert scans.sent == []
+
+
+def test_the_topics_of_a_node_that_ends_are_left_to_the_transport(node: Any) -> None:
+    node.close()
+    assert not node.transport.topics["scan"].closed
 
 
 def test_a_model_that_returns_has_topics_of_its_own(files: Any, transport: Any) -> None:

@@ -84,6 +84,29 @@ def test_access_from_other_machines_requires_a_token(
         WebClient(f"http://127.0.0.1:{port}/?token=guess")
 
 
+def test_given_tokens_are_those_of_controllers_and_viewers(
+    serve: Any, caplog: pytest.LogCaptureFixture
+) -> None:
+    serve(web=True, web_port=0, web_token="token-of-controllers", web_view_token="token-of-viewers")
+    for_viewers = wait_until("two addresses", lambda: re.search(r"for viewers: (\S+)", caplog.text))
+    url = url_of_the_page(caplog)
+    assert url.endswith("/?token=token-of-controllers")
+    with WebClient(url) as client:
+        assert not client.hello["read_only"]
+    assert for_viewers[1].endswith("/?token=token-of-viewers")
+    with WebClient(for_viewers[1]) as client:
+        assert client.hello["read_only"]
+
+
+def test_the_viewer_ends_with_the_node(serve: Any, caplog: pytest.LogCaptureFixture) -> None:
+    node = serve(web=True, web_port=0)
+    url = url_of_the_page(caplog)
+    node.close()
+    with pytest.raises(OSError, match="Cannot connect"):
+        WebClient(url)
+    assert node.transport.foreign_topics.closed
+
+
 def test_the_page_steps_a_world_in_lockstep(
     serve: Any, transport: Any, caplog: pytest.LogCaptureFixture
 ) -> None:

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import threading
 import time
 from collections.abc import Iterator
 from typing import Any
 
 import pytest
-from waiting import wait_until
+from waiting import TIMEOUT, wait_until
 
 from flatland.node.clock import SimulatedClock, WallClock, stamp
 
@@ -73,7 +74,8 @@ def test_stamps_increase_although_the_clock_stands_still_or_is_corrected(wall: W
     stamps = [wall.step(until_advance=0, rest=0)[1] for _ in range(3)]
     wall.now -= 10 * MS
     stamps += [wall.step(until_advance=0, rest=0)[1] for _ in range(3)]
-    assert stamps == sorted(set(stamps))
+    # By the least that is possible, to stay close to the clock.
+    assert stamps == list(range(stamps[0], stamps[0] + 6))
 
 
 def test_stamps_follow_a_clock_that_is_set_back(wall: Wall) -> None:
@@ -142,4 +144,9 @@ def test_with_a_limited_rate_a_time_is_published_once(transport: Any) -> None:
     clock.flush()
     assert topic.sent == [0, 0, 3 * STEP]
     assert (clock.watches_steps, clock.watches_time) == (False, True)
+    threads = [each for each in threading.enumerate() if each.name == "flatland-clock"]
+    assert threads
     clock.close()
+    for thread in threads:
+        thread.join(TIMEOUT)
+        assert not thread.is_alive()

@@ -10,7 +10,7 @@ import pytest
 from flatland.node.diagnostics import DiagnosticsTopic, _Costs, _Drops, _Rate
 from flatland.node.values import Level
 from flatland.runtime.plugin_costs import PluginCosts
-from flatland.simulation import Simulation
+from flatland.simulation import CycleStatistics, Simulation
 
 WORLD = "{properties: {}, layers: [{name: 2d}], models: [{name: r, model: robot.model.yaml}]}"
 ROBOT = """
@@ -132,6 +132,16 @@ def test_the_rate_since_the_previous_message(
         "models": "1",
     }
     assert status.values == expected
+
+
+def test_the_use_of_cycles_is_reported_if_they_have_a_length(world: Any) -> None:
+    simulation = Simulation(world, 100.0)
+    simulation.statistics = CycleStatistics(7, 10.0, 30.0, 20.0, 0.5, 0.5)
+    values = _Rate(simulation).status(1.0).values
+    assert values["mean use of a cycle [%]"] == "20.0"
+    assert values["maximum use of a cycle [%]"] == "30.0"
+    simulation.set_rate(0.0)
+    assert "mean use of a cycle [%]" not in _Rate(simulation).status(1.0).values
 
 
 def test_the_rate_while_paused_and_without_a_limit(world: Any) -> None:

@@ -52,6 +52,16 @@ def test_invalid_transforms_are_ignored() -> None:
     assert frames.to_root("odom")[0, 3] == 1
 
 
+def test_the_number_of_frames_is_limited() -> None:
+    frames = FrameTree("map")
+    for number in range(10_001):
+        frames.set("map", str(number), planar(1, 0, 0))
+    frames.set("map", "9999", planar(2, 0, 0))
+    assert frames.to_root("9999")[0, 3] == 2
+    with pytest.raises(NoTransformError):
+        frames.to_root("10000")
+
+
 def test_a_quaternion_is_normalized_and_zero_is_no_rotation() -> None:
     np.testing.assert_allclose(
         transform((0, 0, 0), (0, 0, 2, 2)), planar(0, 0, math.pi / 2), atol=1e-12

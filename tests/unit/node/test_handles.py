@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from concurrent.futures import Future
 from typing import Any
 
 import pytest
+from waiting import wait_until
 
-from flatland.node.handles import DELETE_ENTRY, DRAG_TIMEOUT, Event, Feedback, Handles
+from flatland.node.handles import DELETE_ENTRY, Event, Feedback, Handles
 from flatland.node.ticker import TickerThread
 from flatland.node.values import ReceivedPose
 from flatland.simulation import Simulation
@@ -30,6 +32,7 @@ class FakeServer:
         self.handles: set[str] = set()
         self.moved: list[str] = []
         self.inserted: list[str] = []
+        self.keep_alives = 0
 
     def insert(self, _model: object, name: str) -> None:
         self.handles.add(name)
@@ -45,7 +48,7 @@ class FakeServer:
         pass
 
     def keep_alive(self) -> None:
-        pass
+        self.keep_alives += 1
 
 
 class Setup:
@@ -55,8 +58,13 @@ class Setup:
         self.world = world
         self.server = FakeServer()
         self.simulation = Simulation(world)
-        thread = TickerThread("handles", lambda _action: Future())  # The test ticks itself.
+        self.posted: list[object] = []  # ticks that wait; the test ticks itself
+        thread = TickerThread("handles", self._post)
         self.handles = Handles(self.simulation, thread, lambda _post, _handles: self.server)
+
+    def _post(self, action: object) -> Future[Any]:
+        self.posted.append(action)
+        return Future()
 
     def send(
         self,
@@ -121,10 +129,10 @@ def test_a_pause_by_other_means_during_a_drag_remains(setup: Setup) -> None:
 def test_a_drag_without_feedback_ends_and_the_model_does_not_move(setup: Setup) -> None:
     setup.send("a", Event.PRESS, time=1.0)
     setup.send("a", Event.KEEP_ALIVE, time=2.0)
-    assert setup.handles._tick(2.0 + 0.9 * DRAG_TIMEOUT)
+    assert setup.handles._tick(2.09)
     assert setup.world.paused
     assert setup.handles.pose_of("a") == (1.0, 2.0, 0.0)
-    setup.handles._tick(2.0 + 1.1 * DRAG_TIMEOUT)
+    setup.handles._tick(2.11)
     assert not setup.world.paused
     assert setup.handles.pose_of("a") == (0.0, 0.0, 0.0)
     assert setup.server.moved[-1] == "a"
@@ -141,6 +149,14 @@ def test_a_pose_in_another_frame_is_ignored(setup: Setup, caplog: pytest.LogCapt
     setup.send("a", Event.PRESS, frame="odom")
     assert not setup.world.paused
     assert 'ignoring a pose in frame "odom", expected frame "map"' in caplog.text
+
+
+def test_an_invalid_pose_is_a_warning_that_names_the_handle(
+    setup: Setup, caplog: pytest.LogCaptureFixture
+) -> None:
+    setup.send("a", Event.RELEASE, math.nan)
+    assert 'interactive marker "a": Flatland World: failed to move model "a"' in caplog.text
+    assert setup.world.model("a").pose == (0.0, 0.0, 0.0)
 
 
 def test_the_menu_deletes_a_model_whose_drag_ends(setup: Setup) -> None:
@@ -162,6 +178,19 @@ def test_poses_are_published_once_and_only_with_clients(setup: Setup) -> None:
     assert setup.server.moved == ["a"]
     assert setup.handles._tick(3.0)
     assert setup.server.moved == ["a"]
+
+
+def test_clients_are_informed_twice_a_second_that_the_server_is_there(setup: Setup) -> None:
+    counts = []
+    for time in (1.0, 1.4, 1.5, 1.9):
+        setup.handles._tick(time)
+        counts.append(setup.server.keep_alives)
+    assert counts == [1, 1, 2, 2]
+    assert not setup.posted
+    setup.handles.connection_changed()  # A new client is informed at once.
+    wait_until("a tick", lambda: setup.posted)
+    setup.handles._tick(1.95)
+    assert setup.server.keep_alives == 3
 
 
 def test_the_handle_of_a_model_with_other_colors_is_replaced(setup: Setup) -> None:

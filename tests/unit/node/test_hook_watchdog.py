@@ -59,6 +59,22 @@ def test_calls_while_the_time_advances_are_not_reported(
     assert caplog.records == []
 
 
+def test_a_check_that_fails_is_logged_and_repeated(
+    empty_world: flatland.World, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    monkeypatch.setattr("flatland.node.hook_watchdog._POLL_PERIOD", 0.01)
+
+    def fail(_self: HookWatchdog, _now: float) -> None:
+        raise RuntimeError("no frame")
+
+    monkeypatch.setattr(HookWatchdog, "_check", fail)
+    watchdog = HookWatchdog(empty_world)
+    wait_until("two checks", lambda: len(caplog.records) > 1)
+    watchdog.close()
+    assert "cannot inspect the thread of the simulation" in caplog.text
+    assert "RuntimeError: no frame" in caplog.text
+
+
 def test_the_thread_of_the_simulation_is_watched(
     empty_world: flatland.World, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -12,7 +12,9 @@ import pytest
 from flatland.node.parameters import (
     NodeParameters,
     ParameterError,
+    TeleopParameters,
     read_parameters,
+    read_table,
 )
 
 
@@ -122,6 +124,12 @@ VALID: list[tuple[str, object, object]] = [
     ("model_path", "/usr:/tmp", ("/usr", "/tmp")),
     ("model_path", ["/usr", "/tmp"], ("/usr", "/tmp")),
 ]
+
+
+def test_defaults_of_the_keyboard() -> None:
+    assert read_table(TeleopParameters, {}.get) == TeleopParameters(
+        max_linear=1.0, max_angular=2.0, rate=20.0, repeat_delay=0.6, key_timeout=0.2
+    )
 
 
 def test_valid_values() -> None:

@@ -103,6 +103,13 @@ def test_a_node_that_cannot_start_leaves_no_thread_and_no_world(
     assert transport.topics["/clock"].closed
 
 
+def test_a_recording_of_messages_is_closed_with_the_world(serve: Any, transport: Any) -> None:
+    node = serve(record_mcap="/run.mcap")
+    assert not transport.topics["/run.mcap"].closed
+    node.close()
+    assert transport.topics["/run.mcap"].closed
+
+
 def test_the_end_stops_all_threads(serve: Callable[..., Any]) -> None:
     before = set(threading.enumerate())
     node = serve()

@@ -8,10 +8,12 @@ from concurrent.futures import ThreadPoolExecutor
 from types import SimpleNamespace
 from typing import Any
 
+import numpy as np
 import pytest
 from waiting import TIMEOUT, wait_until
 
 from flatland.runtime import file_reads
+from flatland.values import OccupancyGrid
 
 STEP_NS = 5_000_000
 
@@ -221,6 +223,16 @@ def test_an_invalid_duration_is_refused(node: Any, duration: float, message: str
     assert (answer.success, answer.message, answer.stamp) == (False, message, 10_000_000)
 
 
+def test_steps_end_before_the_longest_time(node: Any) -> None:
+    start = 2**61 - 2 * STEP_NS
+    node.run(lambda: setattr(node.world.timekeeper, "sim_time_ns", start))
+    assert node.call("step_world", duration=0.005).stamp == start + STEP_NS
+    for duration in (0.0, 0.01):
+        answer = node.call("step_world", duration=duration)
+        message = "the simulated time must remain below 2305843009 s (73 years)"
+        assert (answer.success, answer.message) == (False, message)
+
+
 def test_steps_report_dropped_messages(node: Any) -> None:
     node.transport.lost.update({("/scan", "/slow"): 3, ("/clock", "/slow"): 9})
     answer = node.call("step_world", duration=0.0)
@@ -241,6 +253,20 @@ def test_an_invalid_seed_is_refused(node: Any, seed: int) -> None:
     answer = node.call("reset_world", seed=seed, keep_time=False)
     assert answer.message == f"seed must be at least 0, or -1 for the current one, got {seed}"
     assert answer.success is False
+
+
+class GridMessage(OccupancyGrid):
+    """A grid with the field that the service reads of a message."""
+
+    @property
+    def data(self) -> Any:
+        return self.cells.ravel()
+
+
+def test_a_map_of_one_cell_is_received(node: Any) -> None:
+    grid = GridMessage((1.0, 2.0, 0.0), 0.5, np.full((1, 1), 100, np.int8))
+    assert node.call("set_layer_map", layer="2d", map_path="", grid=grid).success
+    assert len(node.world.layers[0].edges) == 4
 
 
 def test_invalid_requests(node: Any) -> None:

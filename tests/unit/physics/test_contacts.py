@@ -53,6 +53,31 @@ def run_until(world: PhysicsWorld, kind: str) -> list[ContactEvent]:
     raise AssertionError(f"no {kind} in 1000 steps")
 
 
+@pytest.mark.parametrize("has_hook", [False, True])
+def test_velocity_and_position_iterations_are_those_of_the_solver(
+    world: PhysicsWorld, has_hook: bool
+) -> None:
+    """The former change the velocities of overlapping discs, the latter separate them."""
+    discs = [add_disc(world, 0.0), add_disc(world, 0.9)]
+    if has_hook:
+        world.pre_solve = lambda contact, old_manifold: None
+
+    def gap() -> float:
+        return discs[1].pose[0] - discs[0].pose[0]
+
+    world.step(STEP, 10, 0)
+    assert gap() == pytest.approx(0.9)
+    world.step(STEP, 0, 10)
+    separated = gap()
+    assert separated > 0.91
+    discs[0].set_velocity(0.1, 0.0, 0.0)
+    world.step(STEP, 0, 0)
+    assert discs[0].velocity[0] == pytest.approx(0.1)
+    world.step(STEP, 10, 0)
+    assert discs[0].velocity[0] == pytest.approx(0.05, abs=1e-3)
+    assert gap() == pytest.approx(separated - 0.001, abs=1e-4)
+
+
 def test_events_of_a_collision_from_begin_to_end(world: PhysicsWorld) -> None:
     wall = add_wall(world)
     disc = add_disc(world, -2, speed=2)

@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from flatland.errors import StaleHandleError, WorldLockedError
-from flatland.physics import PhysicsBody, PhysicsFixture, PhysicsWorld, Pose
+from flatland.physics import ALL_BITS, PhysicsBody, PhysicsFixture, PhysicsWorld, Pose
 
 Points = npt.NDArray[np.float64]
 SQUARE = [(-0.5, -0.5), (0.5, -0.5), (0.5, 0.5), (-0.5, 0.5)]
@@ -151,6 +151,14 @@ def test_discs_consider_their_layers_and_the_given_bodies() -> None:
     assert world.free_discs(poses, 0.3, 3, only=[stone]).tolist() == [True, True, False]
     assert world.free_discs(poses, 0.3, 3, only=[]).tolist() == [True, True, True]
     assert world.free_discs(poses, 0.3, 3, least_gap=0.25).tolist() == [False, False, False]
+
+
+def test_all_categories_are_those_of_all_fixtures() -> None:
+    world = PhysicsWorld()
+    for bit in range(16):
+        disc(world, bit, 0, 0.1, category_bits=1 << bit)
+    poses = [(float(bit), 0.0, 0.0) for bit in range(17)]
+    assert world.free_discs(poses, 0.1, ALL_BITS).tolist() == [False] * 16 + [True]
 
 
 # -- random shapes ------------------------------------------------------------------------------

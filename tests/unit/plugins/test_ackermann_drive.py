@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib.util
 import math
 import sys
 from pathlib import Path
@@ -192,6 +193,26 @@ class TestAckermannCommand:
         world.command("/ackermann_cmd").set(AckermannCommand(speed=math.nan))
         world.step()
         assert plugin(world).speed == 1.0
+
+    @pytest.mark.parametrize("is_installed", [True, False])
+    def test_with_ros_the_messages_must_be_installed(
+        self, car: Any, monkeypatch: pytest.MonkeyPatch, is_installed: bool
+    ) -> None:
+        class Bridge(flatland.WorldObserver):
+            def plugin_ros(self, plugin: Any) -> Any:
+                return SimpleNamespace(close=lambda: None)
+
+        find_spec = importlib.util.find_spec
+        monkeypatch.setattr(
+            importlib.util,
+            "find_spec",
+            lambda name: is_installed or None if name == "ackermann_msgs" else find_spec(name),
+        )
+        if is_installed:
+            assert car("command: ackermann", observers=[Bridge()]).command("/ackermann_cmd")
+        else:
+            with pytest.raises(flatland.PluginError, match="requires the ROS package"):
+                car("command: ackermann", observers=[Bridge()])
 
     def test_message(self, monkeypatch: pytest.MonkeyPatch) -> None:
         """The adapter converts a message of the package, which need not be installed."""

@@ -155,6 +155,16 @@ class TestChoice:
         with pytest.raises(flatland.WorldError, match="no model is within"):
             hitch(world).attach()
 
+    def test_two_bodies_that_no_force_moves_are_not_connected(self, plugin_world: Any) -> None:
+        fixed = BODIES.replace("- name: base", "- name: base\n  type: static")
+        world = plugin_world("[{type: Hitch, name: hitch, body: base, reach: 1}]", bodies=fixed)
+        fixed_trailer = TRAILER.replace("- name: base", "- name: base\n    type: static")
+        world.spawn_model("\n" + fixed_trailer, "trailer", pose=(-0.7, 0.0, 0.0))
+        with pytest.raises(flatland.WorldError, match="no model is within"):
+            hitch(world).attach()
+        world.spawn_model("\n" + TRAILER, "loose", pose=(0.7, 0.0, 0.0))
+        assert hitch(world).attach().name == "loose"
+
     def test_angle_beyond_the_limit(self, tow: Any) -> None:
         world = tow("max_angle: 0.2, reach: 0.5")
         world.move_model("trailer", (-0.8, -0.8, 1.2))

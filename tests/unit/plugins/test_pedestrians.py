@@ -298,6 +298,20 @@ def test_dynamic_people_can_be_pushed(files: WorldFiles) -> None:
     assert moved["dynamic"] > 0.02
 
 
+@pytest.mark.parametrize(("radius", "offset"), [(0.2, 0.25), (0.3, 0.125)])
+def test_legs_keep_their_radius_from_walls(files: WorldFiles, radius: float, offset: float) -> None:
+    """In a passage of 1 m, wide legs are closer to each other."""
+    options = CALM + f"layers: [body], legs: {{layers: [2d], radius: {radius}, spacing: 0.5}}, "
+    passage = ["##########", "#        #", "##########"]
+    world = load(files, ONE % "[8, 1.5]", options, passage)
+    people = people_of(world)
+    [name] = people.spawn(poses=[(4.0, 1.5, 0.0)])
+    people.stop([name])
+    world.step(100)
+    legs = [body for body in world.model(name).bodies if body.name != "body"]
+    assert [body.pose[1] for body in legs] == pytest.approx([1.5 + offset, 1.5 - offset], abs=1e-3)
+
+
 def test_lasers_see_the_legs_in_their_layer(files: WorldFiles) -> None:
     options = CALM + "layers: [body], legs: {layers: [2d], radius: 0.07, spacing: 0.2}, "
     world = load(files, ONE % "[8, 3]", options)

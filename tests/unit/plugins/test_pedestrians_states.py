@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 from rooms_with_people import CALM, ONE, load, people_of
 
+from flatland import WorldObserver
 from flatland.errors import PluginError, WorldError
 from tests.unit.conftest import WorldFiles
 
@@ -37,6 +40,28 @@ def test_runs_with_one_seed_are_equal(files: WorldFiles, options: str) -> None:
             world.step(300)
         hashes.append(world.state_hash())
     assert hashes[0] == hashes[1] != hashes[2]
+
+
+def test_services_spawn_direct_and_remove_people(files: WorldFiles) -> None:
+    services: dict[str, Callable[[Any], Any]] = {}
+
+    class Bridge(WorldObserver):
+        def plugin_ros(self, plugin: Any) -> Any:
+            def advertise(name: str, _kind: str, serve: Callable[[Any], Any]) -> None:
+                services[name] = serve
+
+            return SimpleNamespace(advertise_service=advertise, close=lambda: None)
+
+    world = load(files, ONE % "[7, 2]", CALM, observers=[Bridge()])
+    poses = [SimpleNamespace(x=float(x), y=2.0, theta=0.0) for x in (2, 4)]
+    spawned = services["spawn_people"](SimpleNamespace(group="", count=0, poses=poses))
+    assert spawned == (True, "", ["a_0", "a_1"])
+    stop = SimpleNamespace(names=["a_1"], action=0, STOP=0, RESUME=1, SEND=2)
+    assert services["direct_people"](stop) == (True, "")
+    world.step(200)
+    assert people_of(world).people.poses[:, 0] == pytest.approx([2.9, 4.0], abs=0.2)
+    assert services["remove_people"](SimpleNamespace(names=["a_0"])) == (True, "")
+    assert people_of(world).people.names == ("a_1",)
 
 
 @pytest.mark.parametrize("options", [FULL, FULL + "body_type: dynamic, "])

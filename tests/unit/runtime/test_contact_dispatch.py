@@ -57,3 +57,22 @@ def test_the_number_of_calls_is_proportional_to_the_number_of_contacts(
     for hook in HOOKS:
         calls = sum(len(recorder.calls[hook]) for recorder in recorders)
         assert calls == 2 * (count - 1), hook
+
+
+def test_contacts_of_a_new_model_are_reported_although_another_one_is_deleted(row: Any) -> None:
+    world = row(1)[0].world
+    world.spawn_model("minimal.model.yaml", "other", pose=(9, 0, 0))
+    world.step()
+    world.spawn_model("minimal.model.yaml", "disc", pose=(SPACING, 20, 0))
+    recorder = world.spawn_model("robot.model.yaml", "new", pose=(0, 20, 0)).plugins[0]
+    world.delete_model("other")
+    world.step()
+    assert recorder.calls["begin_contact"] == [{"disc", "new"}]
+
+
+def test_without_plugins_the_core_calls_nothing_for_contacts(row: Any) -> None:
+    world = row(1)[0].world
+    assert world.physics.pre_solve is not None
+    world.delete_model("0")
+    world.step()
+    assert world.physics.pre_solve is None

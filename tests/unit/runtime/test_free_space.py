@@ -177,6 +177,24 @@ def test_walls_near_the_bounds_are_included_and_distant_ones_ignored() -> None:
     assert places(free_space, None)[:, 1].max() > 5.9
 
 
+@pytest.mark.parametrize(
+    ("wall", "point"),
+    [
+        ((0.0, 5.6, 10.0, 5.6), (2.0, 5.98)),
+        ((0.0, 0.4, 10.0, 0.4), (2.0, 0.02)),
+        ((9.6, 0.0, 9.6, 6.0), (9.98, 2.0)),
+        ((0.4, 0.0, 0.4, 6.0), (0.02, 2.0)),
+    ],
+)
+def test_a_strip_along_the_bounds_is_a_place(
+    wall: tuple[float, float, float, float], point: tuple[float, float]
+) -> None:
+    """Only the outermost cells are wide enough, because there are no walls out of bounds."""
+    found = places(space(np.array([wall]), 0.35), point)
+    assert len(found) >= 100
+    assert (np.abs(found - point).min(axis=1) < 0.1).all()
+
+
 def test_without_walls_all_cells_are_free() -> None:
     found = places(space(np.empty((0, 4)), 0.5), (1.0, 1.0))
     assert len(found) == 200 * 120

@@ -123,6 +123,13 @@ def test_a_grid_equals_the_map_file_of_its_image(world: Any, folder: Path) -> No
     assert np.array_equal(world.layer("2d").world_edges, expected)
 
 
+def test_layers_are_the_same_objects_after_a_reset(world: Any) -> None:
+    (layer,) = world.layers
+    world.reset()
+    assert world.layers[0] is layer
+    assert layer.body.physics.alive
+
+
 def test_origin_with_an_angle(world: Any) -> None:
     world.set_layer_map("2d", box(origin=(3.25, -1.25, math.pi / 2)))
     # The grid covers x from -1.25 to 3.25, its wall is 0.5 m thick.

@@ -22,11 +22,13 @@ def test_offset_out_of_a_disc() -> None:
 
 
 @pytest.mark.parametrize("angle", np.linspace(0, math.tau, 12, endpoint=False))
-def test_offset_out_of_a_half_plane(angle: float) -> None:
+@pytest.mark.parametrize("distance", [1.234, 0.05])
+def test_offset_out_of_a_half_plane(angle: float, distance: float) -> None:
     normal = np.array([math.cos(angle), math.sin(angle)])
-    offset = nearest_offset(lambda offsets: offsets @ normal >= 1.234)
+    offset = nearest_offset(lambda offsets: offsets @ normal >= distance)
     assert offset is not None
-    assert math.hypot(*offset) == pytest.approx(1.234, abs=0.005)
+    assert math.hypot(*offset) == pytest.approx(distance, abs=0.005)
+    assert offset @ normal >= distance - 1e-9
 
 
 def test_the_closer_of_two_sides_is_found() -> None:

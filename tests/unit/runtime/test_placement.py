@@ -91,6 +91,16 @@ def test_the_overlap_of_a_model_is_a_text(world: flatland.World) -> None:
         world.describe_overlap("nothing")
 
 
+def test_an_unknown_choice_is_refused_before_anything_changes(world: flatland.World) -> None:
+    with pytest.raises(ValueError, match=r"if_blocked must be one of .*, got 'maybe'"):
+        spawn(world, "minimal", "m", (0, 0, 0), if_blocked="maybe")
+    assert world.models == []
+    spawn(world, "minimal", "m", (0, 0, 0))
+    with pytest.raises(ValueError, match=r"if_blocked must be one of .*, got 'maybe'"):
+        world.move_model("m", (1, 0, 0), if_blocked="maybe")
+    assert world.model("m").pose == (0.0, 0.0, 0.0)
+
+
 def test_allow_logs_nothing(world: flatland.World, caplog: pytest.LogCaptureFixture) -> None:
     model = spawn(world, "minimal", "m", (5, 0, 0), if_blocked="allow")
     world.move_model("m", (-5, 0, 0), if_blocked="allow")

@@ -98,6 +98,36 @@ class Witness(ModelPlugin):
         self.calls = None
 
 
+class FaultyDrive(ModelPlugin):
+    """Drives its robot at 1 m/s, and fails in each step."""
+
+    def on_initialize(self, config):
+        drive = self.control(self.model.bodies[0].control_velocity())
+        drive.set_target(1.0, 0.0, 0.0)
+
+    def after_physics_step(self, timekeeper):
+        raise RuntimeError("no encoder")
+
+
+class Deleting(ModelPlugin):
+    """Requests deletions that fail."""
+
+    def before_physics_step(self, timekeeper):
+        self.world.delete_model("nobody")
+        self.world.delete_models(["nobody"])
+
+
+class FaultyCount(ModelPlugin):
+    """Fails when it accounts for updates without a call."""
+
+    def on_initialize(self, config):
+        values = self.output("values", float)
+        self.on_update(lambda timekeeper: None, outputs=[values], skipped=self.fail)
+
+    def fail(self, count, stamp, poses):
+        raise RuntimeError("no count")
+
+
 class FaultyShutdown(ModelPlugin):
     def on_shutdown(self):
         raise RuntimeError("cannot shut down")
@@ -247,6 +277,36 @@ def test_a_hook_that_always_raises_is_called_three_times(files, faults, caplog, 
     world.step()
 
 
+def test_a_disabled_plugin_no_longer_drives_its_robot(files, faults):
+    robot(files, 'name: bad, type: "faults::FaultyDrive"')
+    world = files.load(
+        "{properties: {}, layers: [], models: [{name: r, model: robot.model.yaml}]}",
+        plugin_errors="disable",
+    )
+    body = world.model("r").bodies[0]
+    world.step(3)
+    assert body.velocity == pytest.approx((1.0, 0.0, 0.0))
+    body.set_velocity(0.25, 0.0, 0.0)
+    world.step()
+    assert body.velocity == pytest.approx((0.25, 0.0, 0.0))
+
+
+def test_a_request_of_a_hook_that_fails_is_logged(files, faults, caplog):
+    world = crowded(files, 'name: bad, type: "faults::Deleting"')
+    world.step()
+    text = [record.getMessage() for record in caplog.records][-2:]
+    assert text[0].startswith('delete_model "nobody": Flatland World: ')
+    assert text[1].startswith("delete_models: Flatland World: ")
+
+
+def test_a_plugin_that_fails_to_account_for_skipped_updates_is_reported(files, faults, caplog):
+    world = crowded(files, 'name: bad, type: "faults::FaultyCount"')
+    world.step(3)
+    world.state_hash()  # for which all updates are accounted for
+    assert 'type "faults::FaultyCount" model "robot": after_physics_step raised' in caplog.text
+    assert "RuntimeError: no count" in caplog.text
+
+
 def test_a_hook_that_succeeds_in_between_is_not_disabled(files, faults):
     world = crowded(files, 'name: bad, type: "faults::Recovering"')
     world.step(12)
@@ -294,6 +354,16 @@ def test_a_plugin_that_raises_in_on_initialize_fails_only_its_model(files, fault
     assert [model.name for model in world.models if "disc" not in model.name] == ["robot"]
     run_all_hooks(world)
     assert all(count > 3 for count in witness(world).values())
+
+
+def test_an_interrupt_during_initialization_is_raised_and_leaves_no_model(files, faults):
+    world = crowded(files)
+    importlib.import_module(faults.module).Model.start_fault = KeyboardInterrupt
+    robot(files, WITNESS, 'name: bad, type: "faults::Model", hook: on_initialize', name="bad.yaml")
+    with pytest.raises(KeyboardInterrupt, match="no device"):
+        world.spawn_model("bad.yaml", "second")
+    assert [model.name for model in world.models if "disc" not in model.name] == ["robot"]
+    run_all_hooks(world)
 
 
 def test_a_world_plugin_that_raises_in_on_initialize_fails_the_world(files, faults):

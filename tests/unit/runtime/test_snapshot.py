@@ -241,6 +241,13 @@ def plugin_model(kind: str) -> str:
     """
 
 
+def test_the_size_of_a_snapshot_grows_with_models(world: World) -> None:
+    before = world.snapshot().size
+    assert before > 0
+    world.spawn_model("drift.model.yaml", "more", "more", (2.0, 2.0, 0.0))
+    assert world.snapshot().size > before
+
+
 def test_the_state_of_all_models(world: World) -> None:
     world.step(30)
     state = world.state()

@@ -215,6 +215,25 @@ class TestRunsEqualSingleSteps:
         assert hashes == [world.state_hash() for world in alone]
         assert len(set(hashes)) == 5
 
+    def test_threads_may_step_the_same_worlds_in_another_order(self, files: Any) -> None:
+        worlds = [room(files, MIXED) for _ in range(2)]
+
+        def step(order: list[flatland.World]) -> None:
+            for _ in range(200):
+                step_worlds(order, 1)
+                sum(range(20_000))  # The other thread takes the lock for which it waits.
+
+        threads = [
+            threading.Thread(target=step, args=[order], daemon=True)
+            for order in (worlds, worlds[::-1])
+        ]
+        for thread in threads:
+            thread.start()
+        for thread in threads:
+            thread.join(TIMEOUT)
+            assert not thread.is_alive()
+        assert [world.timekeeper.sim_time_ns for world in worlds] == [400 * 5_000_000] * 2
+
 
 class TestUnwantedUpdates:
     def test_a_quiet_robot_needs_no_call(self, files: Any, monkeypatch: Any) -> None:
@@ -521,6 +540,7 @@ def test_a_removed_plugin_leaves_no_clock(files: Any) -> None:
         world.spawn_model("\n" + CART.format(drive="DiffDrive") + gps, "b")
         world.step()
         world.delete_model("b")
+    assert len(world.plugin_host.jobs._controllers) == 1
     calls: list[int] = []
     world.output("/a/odometry/filtered").subscribe(lambda odometry: calls.append(odometry.stamp))
     gps = "  - {type: Gps, name: gps, body: base, update_rate: 1.25}\n"

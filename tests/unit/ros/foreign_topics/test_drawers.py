@@ -313,6 +313,14 @@ class TestMarkers:
         text = self.draw(frames, marker(Marker.TEXT_VIEW_FACING, text=" two\nlines "))
         assert text.texts == [(1, 2, "two lines")]
 
+    @pytest.mark.parametrize("kind", [Marker.LINE_LIST, Marker.TRIANGLE_LIST])
+    def test_the_number_of_shapes_is_limited(self, frames, kind):
+        per_shape = 2 if kind == Marker.LINE_LIST else 3
+        corners = [Point(0, 0, 0), Point(1, 0, 0), Point(0, 1, 0)][:per_shape] * 50_001
+        marks = self.draw(frames, marker(kind, points=corners))
+        assert len(marks.lines) + len(marks.triangles) == 50_000
+        assert len(marks.line_colors) + len(marks.triangle_colors) == 50_000
+
     def test_add_modify_delete_and_delete_all(self, frames):
         drawer = MarkerDrawer()
 
