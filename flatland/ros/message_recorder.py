@@ -10,13 +10,11 @@ from io import BytesIO
 from pathlib import Path
 from typing import Any, Final
 
-from tf2_msgs.msg import TFMessage
-
 from flatland.extras import require
 from flatland.node.transport import Adapter
 from flatland.node.values import Transforms
 from flatland.plugin_api.ports import Output
-from flatland.ros.adapters import convert, find_adapter, tf
+from flatland.ros.adapters import convert, find_adapter
 from flatland.runtime.observer import WorldObserver
 from flatland.values import Transform
 from flatland.world import World
@@ -108,7 +106,11 @@ class MessageRecorder(WorldObserver):
     def transforms_sent(self, transforms: Sequence[Transform]) -> None:
         """Records the transforms of a step in one message, at the time of their stamps."""
         if self._write_transforms is None:
-            self._write_transforms = self._writer("/tf", TFMessage, tf.serialize, numbered=False)
+            adapter = find_adapter(Transforms)
+            assert adapter is not None and adapter.serialize is not None  # an included one
+            self._write_transforms = self._writer(
+                "/tf", adapter.message_type, adapter.serialize, numbered=False
+            )
         self._write_transforms(Transforms(transforms), max(each.stamp for each in transforms))
 
     def _now(self) -> int:

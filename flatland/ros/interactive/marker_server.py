@@ -23,9 +23,10 @@ from visualization_msgs.msg import (
 
 from flatland.entities.model import Model
 from flatland.geometry import Pose
+from flatland.node.adapters.receivers import planar_pose
 from flatland.node.handles import SERVER_NAME, Event, Feedback, Handles
 from flatland.node.values import ReceivedPose
-from flatland.ros.adapters import convert, packing
+from flatland.ros.adapters import packing
 from flatland.ros.interactive.model_handle import model_handle
 from flatland.ros.transport.publisher import Publisher
 from flatland.ros.transport.registrar import Registrar
@@ -205,7 +206,7 @@ class MarkerServer:
             message.client_id,
             _EVENTS.get(message.event_type, Event.OTHER),
             message.menu_entry_id,
-            ReceivedPose(message.header.frame_id.lstrip("/"), convert.planar_pose(message.pose)),
+            ReceivedPose(message.header.frame_id.lstrip("/"), planar_pose(message.pose)),
             time.monotonic(),
         )
         self._post(lambda: self._handles.receive(feedback))

@@ -1,0 +1,64 @@
+"""The quality of service of topics.
+
+| topics of the node | reliability | durability |
+|---|---|---|
+| `/clock` | best effort | volatile |
+| measurements of sensors | best effort | volatile |
+| `map`, states and other latched topics | reliable | transient local |
+| all others | reliable | volatile |
+
+A subscription is reliable, and transient local for maps and static transforms.
+"""
+
+from __future__ import annotations
+
+from typing import Any, Final
+
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+
+from flatland.ros2.message_types import type_name
+
+CLOCK: Final = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
+STATE: Final = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+_MIN_DEPTH: Final = 10  # messages, as usual in ROS 2; a burst of steps creates several
+_SENSORS: Final = frozenset(
+    (
+        "sensor_msgs/msg/Imu",
+        "sensor_msgs/msg/LaserScan",
+        "sensor_msgs/msg/NavSatFix",
+        "sensor_msgs/msg/Range",
+        "flatland_msgs/msg/SemanticScan",
+    )
+)
+_STATIC_TRANSFORMS: Final = "/tf_static"
+_MAP: Final = "nav_msgs/msg/OccupancyGrid"
+
+
+def of_publisher(message_type: type[Any], queue_size: int, *, latch: bool) -> QoSProfile:
+    """Returns the quality of service of a publisher.
+
+    Args:
+        message_type: The message class.
+        queue_size: Number of messages kept for a slow subscriber, at least.
+        latch: Whether new subscribers receive the last messages.
+    """
+    if latch:
+        return QoSProfile(depth=queue_size, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+    depth = max(queue_size, _MIN_DEPTH)
+    if type_name(message_type) in _SENSORS:
+        return QoSProfile(depth=depth, reliability=ReliabilityPolicy.BEST_EFFORT)
+    return QoSProfile(depth=depth)
+
+
+def of_subscription(topic: str, message_type: type[Any]) -> QoSProfile:
+    """Returns the quality of service of a subscription.
+
+    Args:
+        topic: Resolved name of the topic.
+        message_type: The message class.
+    """
+    if topic == _STATIC_TRANSFORMS:
+        return QoSProfile(depth=100, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+    if type_name(message_type) == _MAP:
+        return STATE
+    return QoSProfile(depth=_MIN_DEPTH)
