@@ -8,7 +8,7 @@ import logging
 import sys
 import threading
 from collections.abc import Sequence
-from contextlib import ExitStack, closing, suppress
+from contextlib import ExitStack, closing
 from typing import TYPE_CHECKING, Any, Final
 
 from flatland.errors import FlatlandError
@@ -32,6 +32,7 @@ _LOG = logging.getLogger("flatland")
 
 NODE_NAME: Final = "flatland_server"
 _SWITCH_INTERVAL: Final = 0.0002  # s for which a thread keeps the GIL while others wait for it
+_SPIN_PERIOD: Final = 3600.0  # s
 _EXECUTOR_TIMEOUT: Final = 0.5  # s, for the callback in progress when the node ends
 
 
@@ -178,21 +179,29 @@ class _ExecutorThread:
         from rclpy.experimental.events_executor import EventsExecutor
 
         # Much faster than the other executors, which examine all entities after each callback.
-        self._executor = EventsExecutor()
+        self._executor: Any = EventsExecutor()
         self._executor.add_node(node)
+        self._end = self._executor.create_future()
         self._thread = threading.Thread(target=self._run, name="flatland-executor", daemon=True)
         self._thread.start()
 
     def close(self) -> None:
         """Ends the thread."""
-        self._executor.shutdown(0)
+        self._end.set_result(None)
+        self._executor.wake()
         self._thread.join(_EXECUTOR_TIMEOUT)
 
     def _run(self) -> None:
-        from rclpy.executors import ExternalShutdownException, ShutdownException
+        from rclpy.exceptions import InvalidHandle
 
-        with suppress(ExternalShutdownException, ShutdownException):
-            self._executor.spin()
+        while not self._end.done():
+            try:
+                # `spin` waits actively in some versions, because its time limit is infinite.
+                self._executor.spin_until_future_complete(self._end, _SPIN_PERIOD)
+            except InvalidHandle:
+                pass  # An event of a connection that has just been closed.
+            except Exception:
+                _LOG.exception("unexpected internal error in a callback")
 
 
 def _first_line(error: Exception) -> str:
