@@ -32,15 +32,18 @@ class Endpoints:
 
     Attributes:
         node: The node.
+        reliable_sensors: Whether measurements of sensors are published reliably.
     """
 
-    def __init__(self, node: Node) -> None:
+    def __init__(self, node: Node, *, reliable_sensors: bool = False) -> None:
         """Creates a table without connections.
 
         Args:
             node: The node.
+            reliable_sensors: Whether measurements of sensors are published reliably.
         """
         self.node = node
+        self.reliable_sensors = reliable_sensors
         self._lock = threading.RLock()
         self._shared: dict[Key, Shared] = {}
         self._postponed: list[Shared] | None = None
@@ -257,7 +260,9 @@ class Publisher(User):
         self._endpoints = endpoints
         self._on_connection = on_connection
         if profile is None:
-            profile = qos.of_publisher(message_type, queue_size, latch=latch)
+            profile = qos.of_publisher(
+                message_type, queue_size, latch=latch, reliable_sensors=endpoints.reliable_sensors
+            )
         self._shared: Any = endpoints.join(
             "publisher",
             self.topic,

@@ -146,7 +146,9 @@ class ServerNode:
         own: Ros2Parameters = read_table(Ros2Parameters, declared.get)
         watchdog.timeout = parameters.shutdown_timeout
         declared.describe(parameters, own)
-        transport = self._transport = Ros2Transport(node, declared)
+        transport = self._transport = Ros2Transport(
+            node, declared, reliable_sensors=own.reliable_sensors
+        )
         clock: NodeClock
         if parameters.use_sim_time:
             clock = SimulatedClock(transport, parameters.clock_rate)

@@ -48,17 +48,20 @@ class Ros2Transport(Transport):
 
     REGISTER_ADAPTER = "flatland.ros2.adapters.register_adapter"
 
-    def __init__(self, node: Node, parameters: DeclaredParameters) -> None:
+    def __init__(
+        self, node: Node, parameters: DeclaredParameters, *, reliable_sensors: bool
+    ) -> None:
         """Uses a node, which must outlive the transport.
 
         Args:
             node: The node, which an executor runs in another thread.
             parameters: Its parameters.
+            reliable_sensors: Whether measurements of sensors are published reliably.
         """
         self._node = node
         self._parameters = parameters
         self._clock = node.get_clock()
-        self._endpoints = Endpoints(node)
+        self._endpoints = Endpoints(node, reliable_sensors=reliable_sensors)
         self._shutting_down = False
 
     def shut_down(self) -> None:
@@ -103,6 +106,11 @@ class Ros2Transport(Transport):
         return service_class(f"flatland/{name}")
 
     # -- the node --------------------------------------------------------------------------
+
+    @property
+    def node(self) -> Node:
+        """The node, for what only ROS 2 has."""
+        return self._node
 
     @property
     def node_name(self) -> str:
