@@ -86,8 +86,8 @@ class ServerNode:
             "`--ros-args -p NAME:=VALUE`.",
             allow_abbrev=False,
         )
-        parser.parse_args(remove_ros_args(command_line)[1:])
         try:
+            parser.parse_args(remove_ros_args(command_line)[1:])
             rclpy.init(args=command_line, signal_handler_options=SignalHandlerOptions.NO)
             node = rclpy.create_node(NODE_NAME)
         except Exception as error:  # an invalid argument or name, of several types
