@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Final, Protocol, TypeVar
 from flatland.node.names import sendable_text
 
 if TYPE_CHECKING:
+    from flatland.node.adapters.writer import Writer
     from flatland.node.handles import Handles, HandleServer
     from flatland.node.ticker import TickerThread
     from flatland.runtime.requests import Post, Requests
@@ -34,6 +35,7 @@ are subscribers."""
 R = TypeVar("R")
 
 _POLL_PERIOD: Final = 0.2  # s between two checks of a request that waits
+MARKERS: Final = "visualization_msgs/MarkerArray"
 REPLACED: Final = ("/clock",)
 """Topics whose messages are replaced by the next one, so that subscribers need not receive all."""
 REGISTRATION_TIMEOUT: Final = 5.0
@@ -104,10 +106,19 @@ class StateTopic(Connection, Protocol):
     """Publishes a state: to new subscribers when they connect, to all by `send`.
 
     Attributes:
+        topic: Resolved name of the topic.
         connected: Whether the topic has subscribers.
     """
 
+    topic: str
     connected: bool
+
+    def replace(self, make: Callable[[], Any]) -> None:
+        """Publishes another state from now on; must be called in the thread that steps the world.
+
+        Args:
+            make: Creates the message of the new state, as in `Transport.advertise_state`.
+        """
 
     def send(self) -> None:
         """Publishes the current state.
@@ -134,6 +145,21 @@ class Transport(ABC):
     @abstractmethod
     def find_adapter(self, value_type: type[Any]) -> Adapter | None:
         """Returns the adapter of a value type or of its nearest base class, or None."""
+
+    @abstractmethod
+    def message_class(self, name: str) -> type[Any]:
+        """Imports a message class.
+
+        Args:
+            name: `PACKAGE/NAME`, with the package `flatland` for messages of flatland.
+
+        Raises:
+            ImportError: The package is not installed.
+        """
+
+    @abstractmethod
+    def writer(self) -> Writer:
+        """Returns a writer for a new message."""
 
     @abstractmethod
     def advertise(

@@ -11,7 +11,7 @@ from rclpy.exceptions import InvalidHandle
 from rclpy.node import Node
 
 from flatland.errors import FlatlandError
-from flatland.node.clock import stamp
+from flatland.node.stamps import stamp
 from flatland.node.transport import CallError
 from flatland.ros2.adapters import find_adapter
 from flatland.ros2.endpoints import Endpoints, Shared, User, expanded
