@@ -93,13 +93,29 @@ class Publisher(Connection, Protocol):
     Attributes:
         topic: Resolved name of the topic.
         connected: Whether the topic has subscribers.
+        closed: Whether the topic was closed, or has given way.
     """
 
     topic: str
     connected: bool
+    closed: bool
+
+    @property
+    def connections(self) -> int:
+        """Number of subscribers that are connected."""
 
     def publish(self, message: Any) -> None:
         """Sends a message, or its bytes, to all subscribers; has no effect once closed."""
+
+
+class Subscription(Connection, Protocol):
+    """A subscription to a topic.
+
+    Attributes:
+        closed: Whether it has ended: it was closed, or has given way.
+    """
+
+    closed: bool
 
 
 class StateTopic(Connection, Protocol):
@@ -171,6 +187,7 @@ class Transport(ABC):
         latch: bool = False,
         on_connection: OnConnection | None = None,
         owner: str = "",
+        gives_way: bool = False,
     ) -> Publisher:
         """Advertises a topic.
 
@@ -181,6 +198,8 @@ class Transport(ABC):
             latch: Whether a new subscriber receives the last message when it connects.
             on_connection: Reports changes of the subscribers.
             owner: Plugin that publishes.
+            gives_way: Whether the topic is closed when another publisher of this node, which does
+                not give way, needs another message class.
         """
 
     @abstractmethod
@@ -211,8 +230,18 @@ class Transport(ABC):
         callback: Callable[[Any], object],
         *,
         owner: str = "",
-    ) -> Connection:
-        """Calls a function with each message of a topic, in any thread."""
+        gives_way: bool = False,
+    ) -> Subscription:
+        """Calls a function with each message of a topic, in any thread.
+
+        Args:
+            topic: Name of the topic.
+            message_type: ROS message class.
+            callback: The function.
+            owner: Plugin that subscribes.
+            gives_way: Whether the subscription ends when another one of this node, which does not
+                give way, needs another message class.
+        """
 
     @abstractmethod
     def serve(

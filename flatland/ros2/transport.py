@@ -208,7 +208,10 @@ class Ros2Transport(Transport):
 
     def load_foreign_topics(self) -> Callable[[Simulation], ForeignTopicsConnection]:
         """Imports the topics of other nodes for the viewer in the browser."""
-        raise ImportError("interactive markers are not offered in ROS 2")
+        from flatland.node.foreign_topics.topics import RosTopics
+        from flatland.ros2.graph import Graph
+
+        return partial(RosTopics, self, Graph(self._node))
 
 
 class ClockTopic(StateTopic):

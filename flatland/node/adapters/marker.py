@@ -42,11 +42,15 @@ class Marker:
 
     ARROW: ClassVar[int] = 0
     CUBE: ClassVar[int] = 1
+    SPHERE: ClassVar[int] = 2
+    CYLINDER: ClassVar[int] = 3
     LINE_STRIP: ClassVar[int] = 4
     LINE_LIST: ClassVar[int] = 5
     CUBE_LIST: ClassVar[int] = 6
     SPHERE_LIST: ClassVar[int] = 7
+    POINTS: ClassVar[int] = 8
     TEXT_VIEW_FACING: ClassVar[int] = 9
+    MESH_RESOURCE: ClassVar[int] = 10
     TRIANGLE_LIST: ClassVar[int] = 11
 
     namespace: str = ""

@@ -205,9 +205,10 @@ class RosTransport(Transport):
 
     def load_foreign_topics(self) -> Callable[[Simulation], ForeignTopicsConnection]:
         """Imports the topics of other nodes for the viewer in the browser."""
-        from flatland.ros.foreign_topics.topics import RosTopics
+        from flatland.node.foreign_topics.topics import RosTopics
+        from flatland.ros.graph import Graph
 
-        return partial(RosTopics, self)
+        return partial(RosTopics, self, Graph(self.node_name))
 
 
 class _ClockTopic(StateTopic):
