@@ -302,6 +302,9 @@ class Ros2Parameters:
     enable_stamped_cmd_vel: bool = _row(
         _boolean, False, "Whether velocity commands are `geometry_msgs/TwistStamped`, as in Nav2."
     )
+    reliable_sensors: bool = _row(
+        _boolean, False, "Whether measurements of sensors are published reliably."
+    )
 
 
 @dataclass(frozen=True, slots=True)

@@ -32,15 +32,18 @@ class Endpoints:
 
     Attributes:
         node: The node.
+        reliable_sensors: Whether measurements of sensors are published reliably.
     """
 
-    def __init__(self, node: Node) -> None:
+    def __init__(self, node: Node, *, reliable_sensors: bool = False) -> None:
         """Creates a table without connections.
 
         Args:
             node: The node.
+            reliable_sensors: Whether measurements of sensors are published reliably.
         """
         self.node = node
+        self.reliable_sensors = reliable_sensors
         self._lock = threading.RLock()
         self._shared: dict[Key, Shared] = {}
         self._postponed: list[Shared] | None = None
@@ -62,6 +65,8 @@ class Endpoints:
         """
         with self._lock:
             shared = self._shared.get((kind, name))
+            if shared is not None and shared.type is not ros_type and not user.gives_way:
+                shared = self._remove_those_that_give_way(shared)
             if shared is not None:
                 owner = next((each.owner for each in shared.users), "")
                 used_by = f", used by {owner}" if owner else ""
@@ -79,6 +84,16 @@ class Endpoints:
                     raise FlatlandError(f'cannot open {kind} "{name}": {error}') from error
             shared.users.append(user)
             return shared
+
+    def _remove_those_that_give_way(self, shared: Shared) -> Shared | None:
+        """Ends a connection unless one of its users does not give way; returns what remains."""
+        if not all(user.gives_way for user in shared.users):
+            return shared
+        for user in shared.users:
+            user.closed = True
+        shared.users.clear()
+        self._end_unused(shared)
+        return None
 
     def leave(self, shared: Shared, user: User) -> None:
         """Removes a user; the connection ends with the last one, see also `closing_last`."""
@@ -128,12 +143,14 @@ class User:
 
     Attributes:
         owner: Plugin that uses it, for messages; empty for the node itself.
+        gives_way: Whether the use ends when a user that does not give way needs another type.
         closed: Whether the use has ended.
     """
 
-    def __init__(self, owner: str) -> None:
+    def __init__(self, owner: str, *, gives_way: bool = False) -> None:
         """Creates a user of nothing."""
         self.owner = owner
+        self.gives_way = gives_way
         self.closed = False
 
 
@@ -232,6 +249,7 @@ class Publisher(User):
         latch: bool = False,
         on_connection: OnConnection | None = None,
         owner: str = "",
+        gives_way: bool = False,
         profile: QoSProfile | None = None,
     ) -> None:
         """Advertises a topic.
@@ -245,19 +263,22 @@ class Publisher(User):
             on_connection: Called by the executor whenever subscribers have connected or
                 disconnected, with whether there are any.
             owner: Plugin that publishes, for messages.
+            gives_way: See `User`.
             profile: Quality of service; None for that of `qos`.
 
         Raises:
             FlatlandError: This node publishes messages of another type on the topic, or its name
                 is not legal.
         """
-        super().__init__(owner)
+        super().__init__(owner, gives_way=gives_way)
         self.topic = resolve_topic(endpoints.node, topic)
         self.connected = False
         self._endpoints = endpoints
         self._on_connection = on_connection
         if profile is None:
-            profile = qos.of_publisher(message_type, queue_size, latch=latch)
+            profile = qos.of_publisher(
+                message_type, queue_size, latch=latch, reliable_sensors=endpoints.reliable_sensors
+            )
         self._shared: Any = endpoints.join(
             "publisher",
             self.topic,
@@ -374,6 +395,7 @@ class Subscription(User):
         callback: Callable[[Any], object],
         *,
         owner: str = "",
+        gives_way: bool = False,
     ) -> None:
         """Subscribes to a topic.
 
@@ -383,12 +405,13 @@ class Subscription(User):
             message_type: ROS message class.
             callback: Called with each message.
             owner: Plugin that subscribes, for messages.
+            gives_way: See `User`.
 
         Raises:
             FlatlandError: This node subscribes to the topic with another message type, or its name
                 is not legal.
         """
-        super().__init__(owner)
+        super().__init__(owner, gives_way=gives_way)
         self.topic = resolve_topic(endpoints.node, topic)
         self._endpoints = endpoints
         self._callback = callback

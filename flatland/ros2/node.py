@@ -86,8 +86,8 @@ class ServerNode:
             "`--ros-args -p NAME:=VALUE`.",
             allow_abbrev=False,
         )
-        parser.parse_args(remove_ros_args(command_line)[1:])
         try:
+            parser.parse_args(remove_ros_args(command_line)[1:])
             rclpy.init(args=command_line, signal_handler_options=SignalHandlerOptions.NO)
             node = rclpy.create_node(NODE_NAME)
         except Exception as error:  # an invalid argument or name, of several types
@@ -146,7 +146,9 @@ class ServerNode:
         own: Ros2Parameters = read_table(Ros2Parameters, declared.get)
         watchdog.timeout = parameters.shutdown_timeout
         declared.describe(parameters, own)
-        transport = self._transport = Ros2Transport(node, declared)
+        transport = self._transport = Ros2Transport(
+            node, declared, reliable_sensors=own.reliable_sensors
+        )
         clock: NodeClock
         if parameters.use_sim_time:
             clock = SimulatedClock(transport, parameters.clock_rate)

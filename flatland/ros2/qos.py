@@ -3,7 +3,7 @@
 | topics of the node | reliability | durability |
 |---|---|---|
 | `/clock` | best effort | volatile |
-| measurements of sensors | best effort | volatile |
+| measurements of sensors | best effort, unless `reliable_sensors` is set | volatile |
 | `map`, states and other latched topics | reliable | transient local |
 | all others | reliable | volatile |
 
@@ -34,18 +34,21 @@ _STATIC_TRANSFORMS: Final = "/tf_static"
 _MAP: Final = "nav_msgs/msg/OccupancyGrid"
 
 
-def of_publisher(message_type: type[Any], queue_size: int, *, latch: bool) -> QoSProfile:
+def of_publisher(
+    message_type: type[Any], queue_size: int, *, latch: bool, reliable_sensors: bool
+) -> QoSProfile:
     """Returns the quality of service of a publisher.
 
     Args:
         message_type: The message class.
         queue_size: Number of messages kept for a slow subscriber, at least.
         latch: Whether new subscribers receive the last messages.
+        reliable_sensors: Whether measurements of sensors are reliable.
     """
     if latch:
         return QoSProfile(depth=queue_size, durability=DurabilityPolicy.TRANSIENT_LOCAL)
     depth = max(queue_size, _MIN_DEPTH)
-    if type_name(message_type) in _SENSORS:
+    if type_name(message_type) in _SENSORS and not reliable_sensors:
         return QoSProfile(depth=depth, reliability=ReliabilityPolicy.BEST_EFFORT)
     return QoSProfile(depth=depth)
 

@@ -7,11 +7,11 @@ import threading
 from collections.abc import Callable
 from typing import Any
 
+from rclpy.exceptions import InvalidHandle
 from rclpy.node import Node
-from rclpy.task import Future
 
 from flatland.errors import FlatlandError
-from flatland.node.clock import stamp
+from flatland.node.stamps import stamp
 from flatland.node.transport import CallError
 from flatland.ros2.adapters import find_adapter
 from flatland.ros2.endpoints import Endpoints, Shared, User, expanded
@@ -67,6 +67,15 @@ class Service(User):
             self._endpoints.leave(self._shared, self)
 
 
+_Pending = tuple[Any, Any]
+"""A request, and an empty response to it."""
+
+
+def _same(request: Any, response: Any) -> _Pending:
+    """Returns the arguments; called by the executor with each request."""
+    return request, response
+
+
 class _SharedService(Shared):
     """A service of rclpy."""
 
@@ -81,21 +90,35 @@ class _SharedService(Shared):
         super().__init__("service", resolved, service_type)
         self._node = node
         self._handler = handler
-        self._service = node.create_service(service_type, name, self._call)
+        self._service = node.create_service(service_type, name, _same)
+        # Instead of a coroutine, whose result the executor does not send in all versions: the
+        # executor passes what `_same` returns, and the sender, to this function.
+        self._send_response = self._service.send_response
+        self._service.send_response = self._start
 
     def destroy(self) -> None:
         """Ends the service."""
         self._node.destroy_service(self._service)
 
-    async def _call(self, request: Any, response: Any) -> Any:
-        """Handles a request in another thread, while the executor goes on."""
-        done: Future[Any] = Future(executor=self._node.executor)
+    def _start(self, pending: _Pending, sender: Any) -> None:
+        """Handles a request in another thread, while the executor goes on.
+
+        Args:
+            pending: The request, and an empty response.
+            sender: Identifies the request.
+        """
         threading.Thread(
-            target=lambda: done.set_result(self._handle(request, response)),
-            name="flatland-service",
-            daemon=True,
+            target=self._respond, args=(pending, sender), name="flatland-service", daemon=True
         ).start()
-        return await done
+
+    def _respond(self, pending: _Pending, sender: Any) -> None:
+        response = self._handle(*pending)
+        try:
+            self._send_response(response, sender)
+        except InvalidHandle:
+            pass  # The service has been closed.
+        except Exception:  # for example, a response of another type
+            _LOG.exception("service %s: cannot send the response", self.key[1])
 
     def _handle(self, request: Any, response: Any) -> Any:
         """Returns the response; one that states the failure if the handler raises.

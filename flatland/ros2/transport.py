@@ -7,6 +7,7 @@ import time
 from collections import Counter
 from collections.abc import Callable
 from contextlib import AbstractContextManager
+from functools import partial
 from typing import TYPE_CHECKING, Any, Final
 
 from rclpy.clock_type import ClockType
@@ -15,7 +16,7 @@ from rclpy.time import Time
 from rosgraph_msgs.msg import Clock
 
 from flatland.node.ticker import Ticker
-from flatland.node.transport import Adapter, OnConnection, Transport
+from flatland.node.transport import MARKERS, Adapter, OnConnection, Transport
 from flatland.ros2 import qos, ros_time
 from flatland.ros2.endpoints import (
     Endpoints,
@@ -24,7 +25,7 @@ from flatland.ros2.endpoints import (
     Subscription,
     resolve_topic,
 )
-from flatland.ros2.message_types import service_class
+from flatland.ros2.message_types import message_class, service_class
 from flatland.ros2.parameters import DeclaredParameters
 from flatland.ros2.service import Service, fields_service
 from flatland.ros2.writer import CdrWriter
@@ -48,17 +49,20 @@ class Ros2Transport(Transport):
 
     REGISTER_ADAPTER = "flatland.ros2.adapters.register_adapter"
 
-    def __init__(self, node: Node, parameters: DeclaredParameters) -> None:
+    def __init__(
+        self, node: Node, parameters: DeclaredParameters, *, reliable_sensors: bool
+    ) -> None:
         """Uses a node, which must outlive the transport.
 
         Args:
             node: The node, which an executor runs in another thread.
             parameters: Its parameters.
+            reliable_sensors: Whether measurements of sensors are published reliably.
         """
         self._node = node
         self._parameters = parameters
         self._clock = node.get_clock()
-        self._endpoints = Endpoints(node)
+        self._endpoints = Endpoints(node, reliable_sensors=reliable_sensors)
         self._shutting_down = False
 
     def shut_down(self) -> None:
@@ -72,6 +76,14 @@ class Ros2Transport(Transport):
         from flatland.ros2.adapters import find_adapter
 
         return find_adapter(value_type)
+
+    def message_class(self, name: str) -> type[Any]:
+        """Imports a message class."""
+        return message_class(name)
+
+    def writer(self) -> CdrWriter:
+        """Returns a writer for a new message."""
+        return CdrWriter()
 
     def advertise(self, *arguments: Any, **options: Any) -> Publisher:
         """Advertises a topic."""
@@ -103,6 +115,11 @@ class Ros2Transport(Transport):
         return service_class(f"flatland/{name}")
 
     # -- the node --------------------------------------------------------------------------
+
+    @property
+    def node(self) -> Node:
+        """The node, for what only ROS 2 has."""
+        return self._node
 
     @property
     def node_name(self) -> str:
@@ -180,15 +197,21 @@ class Ros2Transport(Transport):
         self,
     ) -> Callable[[Simulation, float, TickerThread], Connection]:
         """Imports the debug markers."""
-        raise ImportError("not available")
+        from flatland.node.markers.debug_topics import DebugTopics
+
+        self.message_class(MARKERS)
+        return partial(DebugTopics, self)
 
     def load_handle_server(self) -> Callable[[Post, Handles], HandleServer]:
         """Imports the server of interactive markers."""
-        raise ImportError("not available")
+        raise ImportError("interactive markers are not offered in ROS 2")
 
     def load_foreign_topics(self) -> Callable[[Simulation], ForeignTopicsConnection]:
         """Imports the topics of other nodes for the viewer in the browser."""
-        raise ImportError("not available")
+        from flatland.node.foreign_topics.topics import RosTopics
+        from flatland.ros2.graph import Graph
+
+        return partial(RosTopics, self, Graph(self._node))
 
 
 class ClockTopic(StateTopic):

@@ -7,7 +7,7 @@ from functools import lru_cache
 from typing import Final
 
 from flatland.node.adapters.writer import Writer
-from flatland.node.clock import stamp as clock_stamp
+from flatland.node.stamps import stamp as message_stamp
 from flatland.ros2 import ros_time
 from flatland.timekeeper import NANOSECONDS
 
@@ -44,7 +44,7 @@ class CdrWriter(Writer):
 
     def time(self, time_ns: int) -> None:
         """Writes the stamp of a simulated time [ns] without a header."""
-        self.stamp(*divmod(clock_stamp(time_ns), NANOSECONDS))
+        self.stamp(*divmod(message_stamp(time_ns), NANOSECONDS))
 
     def now(self) -> int:
         """Returns the current ROS time [ns]."""
@@ -60,15 +60,25 @@ class CdrWriter(Writer):
         self.pack("f", 0.0)
 
     def marker_end(self, text: str) -> None:
-        """Writes no texture, the text and an empty mesh."""
-        self.text("")  # texture_resource
-        self.stamp(0, 0)
-        self.text("")  # frame of the texture
-        self.text("")  # its format
-        self.count(0)  # its data
-        self.count(0)  # uv_coordinates
-        self.text(text)
-        self.text("")  # mesh_resource
-        self.text("")  # name of the file of the mesh
-        self.count(0)  # its data
-        self.pack("B", 0)
+        """Writes no texture, the text and an empty mesh.
+
+        Each marker of an array begins four bytes after a multiple of eight, so that arrays can be
+        joined: the format of the texture, which has no meaning without a texture, is padding.
+        """
+        start = len(self.data)
+        for padding in ("", "    "):
+            del self.data[start:]
+            self.text("")  # texture_resource
+            self.stamp(0, 0)
+            self.text("")  # frame of the texture
+            self.text(padding)  # its format
+            self.count(0)  # its data
+            self.count(0)  # uv_coordinates
+            self.text(text)
+            self.text("")  # mesh_resource
+            self.text("")  # name of the file of the mesh
+            self.count(0)  # its data
+            self.pack("B", 0)  # mesh_use_embedded_materials
+            self.align(4)
+            if len(self.data) % 8 == 0:  # after the encapsulation of 4 bytes
+                return

@@ -21,7 +21,7 @@ from visualization_msgs.msg import Marker, MarkerArray
 from waiting import TIMEOUT
 from web_client import WebClient
 
-from flatland.ros.foreign_topics.topics import _WatchedTopic
+from flatland.node.foreign_topics.topics import _WatchedTopic
 from flatland.ros.transport.registrar import Registrar
 from flatland.ros.transport.ros_transport import RosTransport
 from flatland.web.encoding import GRID, MARKS

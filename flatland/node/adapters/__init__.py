@@ -39,6 +39,7 @@ MESSAGE_TYPES: Final[dict[type[Any], str]] = {
     values.Transform: "geometry_msgs/TransformStamped",
     values.Twist: "geometry_msgs/Twist",
     values.TwistWithCovariance: "geometry_msgs/TwistWithCovarianceStamped",
+    node_values.DebugTopicNames: f"{OWN_PACKAGE}/DebugTopicList",
     node_values.Diagnostics: "diagnostic_msgs/DiagnosticArray",
     node_values.FrameParents: "tf2_msgs/TFMessage",
     node_values.MapMetadata: "nav_msgs/MapMetaData",

@@ -9,8 +9,8 @@ from typing import ClassVar
 import numpy as np
 
 from flatland.geometry import DoubleArray
-from flatland.node import clock
 from flatland.node.adapters.writer import Writer
+from flatland.node.stamps import stamp as message_stamp
 from flatland.timekeeper import NANOSECONDS
 
 Triple = tuple[float, float, float]
@@ -42,11 +42,15 @@ class Marker:
 
     ARROW: ClassVar[int] = 0
     CUBE: ClassVar[int] = 1
+    SPHERE: ClassVar[int] = 2
+    CYLINDER: ClassVar[int] = 3
     LINE_STRIP: ClassVar[int] = 4
     LINE_LIST: ClassVar[int] = 5
     CUBE_LIST: ClassVar[int] = 6
     SPHERE_LIST: ClassVar[int] = 7
+    POINTS: ClassVar[int] = 8
     TEXT_VIEW_FACING: ClassVar[int] = 9
+    MESH_RESOURCE: ClassVar[int] = 10
     TRIANGLE_LIST: ClassVar[int] = 11
 
     namespace: str = ""
@@ -85,7 +89,7 @@ def write_marker(marker: Marker, to: Writer) -> MarkerPlaces:
     points = marker.points
     if points.ndim != 2 or points.shape[1] != 3:
         raise ValueError(f"points must have shape (n, 3), got {points.shape}")
-    stamp = to.stamp(*divmod(0 if marker.stamp is None else clock.stamp(marker.stamp), NANOSECONDS))
+    stamp = to.stamp(*divmod(0 if marker.stamp is None else message_stamp(marker.stamp), NANOSECONDS))
     to.text(marker.frame_id)
     to.text(marker.namespace)
     to.pack("i", marker.number, marker.kind, marker.action)

@@ -256,6 +256,11 @@ def _sendable(names: Sequence[str]) -> list[str]:
     return [sendable_text(name) for name in names]
 
 
+def debug_topic_names(value: node_values.DebugTopicNames, to: Writer) -> None:
+    """Writes a `DebugTopicList`."""
+    to.texts(value)
+
+
 # -- people_msgs -------------------------------------------------------------------------------
 
 
@@ -291,6 +296,7 @@ SERIALIZERS: Final[dict[type[Any], Serialize]] = {
     values.PeopleStates: people_states,
     values.PeopleMarkers: people_markers,
     values.TrackedPeople: tracked_people,
+    node_values.DebugTopicNames: debug_topic_names,
     node_values.Transforms: transforms,
     node_values.MapMetadata: map_metadata,
     node_values.PublishedMap: published_map,

@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from flatland.geometry import Pose, quaternion_from_yaw
-from flatland.node import clock
+from flatland.node.stamps import stamp as message_stamp
 from flatland.timekeeper import NANOSECONDS
 
 FLOAT32: Final = np.dtype("<f4")
@@ -77,7 +77,7 @@ class Writer(ABC):
             time_ns: Simulated time [ns].
             frame_id: The frame.
         """
-        self.stamp(*divmod(clock.stamp(time_ns), NANOSECONDS))
+        self.stamp(*divmod(message_stamp(time_ns), NANOSECONDS))
         self.text(frame_id)
 
     def pack(self, code: str, *values: Any) -> None:

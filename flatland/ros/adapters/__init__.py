@@ -15,7 +15,7 @@ from flatland.node.adapters import Adapters
 from flatland.node.parameters import OWN_PACKAGE
 from flatland.node.transport import Adapter as Adapter
 from flatland.ros.adapters.writer import RosWriter
-from flatland.ros.message_types import message_class, with_arrays
+from flatland.ros import message_types
 
 _GRID = "nav_msgs/OccupancyGrid"
 
@@ -29,12 +29,12 @@ class _RosAdapters(Adapters):
         """Imports a message class; that of grids has arrays of numpy."""
         package, _, message = name.partition("/")
         if package == OWN_PACKAGE:
-            return message_class(message)
+            return message_types.message_class(message)
         found: type[Any] = getattr(importlib.import_module(f"{package}.msg"), message)
         if name != _GRID:
             return found
         if self._grid is None:
-            self._grid = with_arrays(found)
+            self._grid = message_types.with_arrays(found)
         return self._grid
 
     def deserialize(self, message_type: type[Any], data: bytes) -> Any:
@@ -45,3 +45,4 @@ class _RosAdapters(Adapters):
 _adapters = _RosAdapters(RosWriter)
 register_adapter = _adapters.register
 find_adapter = _adapters.find
+message_class = _adapters.message_class

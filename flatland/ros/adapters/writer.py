@@ -9,7 +9,7 @@ from typing import Final
 import rospy
 
 from flatland.node.adapters.writer import Writer
-from flatland.node.clock import stamp as clock_stamp
+from flatland.node.stamps import stamp as message_stamp
 from flatland.timekeeper import NANOSECONDS
 
 _COUNT: Final = struct.Struct("<I")
@@ -41,7 +41,7 @@ class RosWriter(Writer):
 
     def time(self, time_ns: int) -> None:
         """Writes the stamp of a simulated time [ns] without a header."""
-        self.data += _STAMP.pack(*divmod(clock_stamp(time_ns), NANOSECONDS))
+        self.data += _STAMP.pack(*divmod(message_stamp(time_ns), NANOSECONDS))
 
     def now(self) -> int:
         """Returns the current ROS time [ns]."""

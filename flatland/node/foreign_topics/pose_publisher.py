@@ -6,25 +6,18 @@ import math
 import time
 from typing import Any, Final
 
-import rospy
-from geometry_msgs.msg import PoseStamped, PoseWithCovarianceStamped
-from std_msgs.msg import Header
+import numpy as np
 
 from flatland.geometry import Pose
+from flatland.node.foreign_topics.graph import Graph
+from flatland.node.transport import Publisher, Transport
 from flatland.node.values import WORLD_FRAME
-from flatland.ros.adapters import convert
-from flatland.ros.foreign_topics.graph import Graph
-from flatland.ros.transport.publisher import Publisher
-from flatland.ros.transport.ros_transport import RosTransport
+from flatland.timekeeper import NANOSECONDS
 from flatland.web.foreign_topics import PoseKind
 
-DEFAULT_TOPICS: Final[dict[PoseKind, str]] = {
-    "goal": "move_base_simple/goal",
-    "initial_pose": "initialpose",
-}
-_TYPES: Final[dict[PoseKind, Any]] = {
-    "goal": PoseStamped,
-    "initial_pose": PoseWithCovarianceStamped,
+_TYPES: Final[dict[PoseKind, str]] = {
+    "goal": "geometry_msgs/PoseStamped",
+    "initial_pose": "geometry_msgs/PoseWithCovarianceStamped",
 }
 _POSITION_VARIANCE: Final = 0.5**2  # m², as RViz
 _YAW_VARIANCE: Final = (math.pi / 12) ** 2  # rad²
@@ -35,7 +28,7 @@ _POLL_PERIOD: Final = 0.01  # s
 class PosePublisher:
     """Publishes poses on topics, each of which is advertised when it is first used."""
 
-    def __init__(self, transport: RosTransport, graph: Graph) -> None:
+    def __init__(self, transport: Transport, graph: Graph) -> None:
         """Creates an object without topics.
 
         Args:
@@ -48,11 +41,11 @@ class PosePublisher:
 
     def topics(self, kind: PoseKind) -> list[str]:
         """Returns the default topic of a kind of pose, and those to which other nodes subscribe."""
-        default = self._transport.resolve(DEFAULT_TOPICS[kind])
+        default = self._transport.resolve(self._graph.pose_topics[kind])
         others = [
             name
             for name, (message_type, nodes) in self._graph.subscribed.items()
-            if message_type == _TYPES[kind]._type
+            if message_type == _TYPES[kind]
             and nodes - {self._transport.node_name}
             and name != default
         ]
@@ -66,10 +59,12 @@ class PosePublisher:
         """
         publisher = self._publishers.get(topic)
         if publisher is None or publisher.closed:
-            publisher = self._transport.advertise(topic, _TYPES[kind], gives_way=True)
+            publisher = self._transport.advertise(
+                topic, self._transport.message_class(_TYPES[kind]), gives_way=True
+            )
             self._publishers[topic] = publisher
             self._wait_for_connections(publisher)
-        publisher.publish(_message(kind, pose))
+        publisher.publish(self._message(kind, pose))
         return bool(publisher.connections)
 
     def _wait_for_connections(self, publisher: Publisher) -> None:
@@ -84,15 +79,13 @@ class PosePublisher:
         for publisher in self._publishers.values():
             publisher.close()
 
-
-def _message(kind: PoseKind, pose: Pose) -> Any:
-    message = _TYPES[kind](header=Header(0, rospy.get_rostime(), WORLD_FRAME))
-    if kind == "goal":
-        message.pose = convert.pose(*pose)
-        return message
-    message.pose.pose = convert.pose(*pose)
-    covariance = [0.0] * 36
-    covariance[0] = covariance[7] = _POSITION_VARIANCE
-    covariance[35] = _YAW_VARIANCE
-    message.pose.covariance = covariance
-    return message
+    def _message(self, kind: PoseKind, pose: Pose) -> bytes:
+        to = self._transport.writer()
+        to.stamp(*divmod(self._graph.now(), NANOSECONDS))
+        to.text(WORLD_FRAME)
+        to.pose(*pose)
+        if kind == "initial_pose":
+            variances = np.zeros(6)
+            variances[[0, 1, 5]] = _POSITION_VARIANCE, _POSITION_VARIANCE, _YAW_VARIANCE
+            to.covariance(np.diag(variances), 6)
+        return bytes(to.data)

@@ -6,13 +6,12 @@ import struct
 from typing import Final
 
 import numpy as np
-from visualization_msgs.msg import Marker
-
 from flatland.entities.body import Color
 from flatland.entities.model import Model
 from flatland.geometry import Pose
-from flatland.ros.markers.marker_geometry import CIRCLE_HEIGHT, closed_strip, flat
-from flatland.ros.markers.packed_markers import PackedMarkers
+from flatland.node.adapters.marker import Marker
+from flatland.node.markers.marker_geometry import CIRCLE_HEIGHT, closed_strip, flat
+from flatland.node.markers.packed_markers import NewWriter, PackedMarkers
 from flatland.scene.description import (
     JointDescription,
     ShapeDescription,
@@ -31,15 +30,17 @@ _CUBE_POINTS: Final = struct.Struct("<12d")
 class ModelMarkers:
     """Caches the serialized markers of a model, so that only poses are replaced in each message."""
 
-    def __init__(self, model: Model) -> None:
+    def __init__(self, model: Model, writer: NewWriter) -> None:
         """Creates an empty cache; the first message fills it.
 
         Args:
             model: The model.
+            writer: Creates the writer of a message.
         """
         self._model = model
+        self._writer = writer
         self._key: object = None
-        self._markers = PackedMarkers()
+        self._markers = PackedMarkers(writer)
         self._footprints: list[list[int]] = []  # numbers of the markers of each body
         # Number of the first of the two markers of each joint: the lines, followed by the cubes.
         self._joints: list[tuple[int, JointDescription]] = []
@@ -78,7 +79,7 @@ class ModelMarkers:
     def _build(self) -> None:
         previous_count = len(self._markers)
         model = describe_model(self._model)
-        markers = PackedMarkers(model.name)
+        markers = PackedMarkers(self._writer, model.name)
         self._footprints = [
             [_add_footprint(markers, shape, body.color) for shape in body.visible_shapes]
             for body in model.bodies

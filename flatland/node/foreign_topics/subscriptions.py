@@ -12,7 +12,7 @@ from flatland.errors import FlatlandError
 from flatland.geometry import quaternion_from_yaw
 from flatland.node.frame_tree import FrameTree, transform
 from flatland.node.values import FrameParents
-from flatland.ros.transport.ros_transport import RosTransport
+from flatland.node.transport import Transport
 from flatland.simulation import Simulation
 
 _LOG = logging.getLogger("flatland")
@@ -31,7 +31,7 @@ class TopicSubscription:
     """
 
     def __init__(
-        self, transport: RosTransport, topic: str, message_type: type[Any], *, keeps_all: bool
+        self, transport: Transport, topic: str, message_type: type[Any], *, keeps_all: bool
     ) -> None:
         """Subscribes asynchronously.
 
@@ -54,7 +54,7 @@ class TopicSubscription:
         return self._subscriber.closed
 
     def _receive(self, message: Any) -> None:
-        """Keeps a message; called in a thread of rospy, which must not be delayed."""
+        """Keeps a message; called in a thread that must not be delayed."""
         self.latest = message
         self._messages.append(message)
 
@@ -74,7 +74,7 @@ class TopicSubscription:
 class TransformSubscription:
     """Receives the transforms of all nodes into a tree."""
 
-    def __init__(self, transport: RosTransport, simulation: Simulation, frames: FrameTree) -> None:
+    def __init__(self, transport: Transport, simulation: Simulation, frames: FrameTree) -> None:
         """Subscribes asynchronously, and takes the transforms of the own world.
 
         A paused world sends no transforms.

@@ -7,9 +7,8 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 import numpy as np
-from visualization_msgs.msg import Marker
-
 from flatland.geometry import DoubleArray
+from flatland.node.adapters.marker import Marker
 from flatland.node.frame_tree import FrameTree, NoTransformError
 from flatland.node.shapes import (
     UNIT_BOX,
@@ -20,7 +19,8 @@ from flatland.node.shapes import (
     packed_colors,
     transformed,
 )
-from flatland.ros.foreign_topics.poses import matrix_of, points_of
+from flatland.node.foreign_topics.poses import matrix_of, points_of
+from flatland.node.foreign_topics.trees import nanoseconds_of
 from flatland.web.foreign_topics import Colors, Drawing
 
 MAX_MARKERS: Final = 10_000  # of a topic
@@ -72,7 +72,7 @@ class MarkerDrawer:
         elif marker.action == Marker.DELETE:
             self._shown.pop(key, None)
         elif key in self._shown or len(self._shown) < MAX_MARKERS:
-            duration = marker.lifetime.to_nsec()
+            duration = nanoseconds_of(marker.lifetime)
             lifetime = (now, now + duration) if duration > 0 else None
             omitted = ""
             shapes = Shapes()

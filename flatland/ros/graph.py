@@ -6,9 +6,13 @@ import time
 from typing import Any, Final
 from xmlrpc.client import MultiCall, ServerProxy
 
+import genpy.message
 import rosgraph
+import rospy
 
+from flatland.ros.adapters import message_class
 from flatland.ros.transport.master_watch import LimitedTransport
+from flatland.web.foreign_topics import PoseKind
 
 PERIOD: Final = 1.0  # s of wall time between two calls to the master
 _TIMEOUT: Final = 2.0  # s
@@ -21,7 +25,13 @@ class Graph:
     Attributes:
         published: Type of each topic that has a publisher.
         subscribed: Type of each topic that has a subscriber, and its subscribers.
+        pose_topics: Name of the usual topic of each kind of pose.
     """
+
+    pose_topics: Final[dict[PoseKind, str]] = {
+        "goal": "move_base_simple/goal",
+        "initial_pose": "initialpose",
+    }
 
     def __init__(self, node_name: str) -> None:
         """Creates a graph without topics.
@@ -64,3 +74,16 @@ class Graph:
             (_, _, state), (_, _, types) = responses[0], responses[1]
         publishers, subscribers, _services = state
         return publishers, subscribers, dict(types)
+
+    def message_classes(self, kind: str) -> list[type[Any]]:
+        """Returns the message classes of a type: that of adapters, and that of other users."""
+        try:
+            classes: list[type[Any]] = [message_class(kind)]
+            plain = genpy.message.get_message_class(kind)
+        except (AttributeError, ImportError, ValueError):
+            return []
+        return classes if plain is None or plain is classes[0] else [*classes, plain]
+
+    def now(self) -> int:
+        """Returns the ROS time [ns]."""
+        return int(rospy.get_rostime().to_nsec())

@@ -8,56 +8,57 @@ one message to the next, are overwritten in place.
 from __future__ import annotations
 
 import struct
-from collections.abc import Iterable, Sequence
-from io import BytesIO
+from collections.abc import Callable, Iterable, Sequence
 from typing import Final
 
 import numpy as np
 import numpy.typing as npt
-from std_msgs.msg import ColorRGBA
-from visualization_msgs.msg import Marker
 
 from flatland.geometry import quaternion_from_yaw
+from flatland.node.adapters.marker import Marker, write_marker
+from flatland.node.adapters.writer import Writer
 from flatland.node.names import sendable_text
-from flatland.ros.adapters import convert
+from flatland.node.values import WORLD_FRAME
+from flatland.node.stamps import stamp as message_stamp
 from flatland.timekeeper import NANOSECONDS
-
-FRAME: Final = "map"
 
 _COUNT: Final = struct.Struct("<I")
 _STAMP: Final = struct.Struct("<II")
 _POSE: Final = struct.Struct("<7d")
 _POINT_SIZE: Final = 3 * 8  # bytes
-_SEQUENCE_SIZE: Final = 4  # bytes of a header before the stamp
-_BEFORE_POSE: Final = 3 * 4  # bytes of id, type, action
-# Bytes from the pose to the points: pose, scale, color, lifetime, frame_locked.
-_POSE_TO_POINTS: Final = 7 * 8 + 3 * 8 + 4 * 4 + 2 * 4 + 1
+
+NewWriter = Callable[[], Writer]
 
 
 class PackedMarkers:
     """A serialized array of numbered markers in the frame `map`, with a common namespace."""
 
-    def __init__(self, namespace: str = "") -> None:
+    def __init__(self, writer: NewWriter, namespace: str = "") -> None:
         """Creates an array without markers.
 
         Args:
+            writer: Creates the writer of a message.
             namespace: Namespace of all markers.
         """
         self._namespace = sendable_text(namespace)
-        self._data = bytearray(_COUNT.size)
+        self._message = writer()
+        self._start = len(self._message.data)  # of the number of markers
+        self._message.count(0)
+        self._data = self._message.data
         self._stamp: tuple[int, int] | None = None  # of all markers, None if one was added since
         self._stamps: list[int] = []
         self._poses: list[int] = []
         self._points: list[tuple[int, int]] = []
 
     @classmethod
-    def deletion_of_all(cls, time_ns: int = 0) -> PackedMarkers:
+    def deletion_of_all(cls, writer: NewWriter, time_ns: int = 0) -> PackedMarkers:
         """Returns a message that deletes all markers of a topic.
 
         Args:
+            writer: Creates the writer of a message.
             time_ns: Stamp of the message, simulated time [ns].
         """
-        markers = cls()
+        markers = cls(writer)
         markers.add_deletion_of_all()
         markers.set_stamp(time_ns)
         return markers
@@ -87,23 +88,21 @@ class PackedMarkers:
         Returns:
             Number of the marker.
         """
-        marker = self._new(Marker.ADD, kind)
-        marker.scale.x, marker.scale.y, marker.scale.z = scale
-        marker.color = ColorRGBA(*color)
-        marker.frame_locked = frame_locked
-        return self._append(marker, _packed(points), len(points))
+        return self._append(
+            Marker(kind=kind, scale=scale, color=color, frame_locked=frame_locked, points=points)
+        )
 
     def add_deletion(self) -> int:
         """Adds an entry that deletes the marker with the same number; returns the number."""
-        return self._append(self._new(Marker.DELETE), b"", 0)
+        return self._append(Marker(action=Marker.DELETE))
 
     def add_deletion_of_all(self) -> int:
         """Adds an entry that deletes all markers of the topic; returns its number."""
-        return self._append(self._new(Marker.DELETEALL), b"", 0)
+        return self._append(Marker(action=Marker.DELETEALL))
 
     def set_stamp(self, time_ns: int) -> None:
         """Sets the stamp of all markers to a simulated time [ns]."""
-        stamp = divmod(convert.stamp(time_ns), NANOSECONDS)
+        stamp = divmod(message_stamp(time_ns), NANOSECONDS)
         if stamp == self._stamp:
             return
         self._stamp = stamp
@@ -140,46 +139,23 @@ class PackedMarkers:
     @property
     def packed_markers(self) -> memoryview:
         """The serialized markers without their count; a view of the message."""
-        return memoryview(self._data)[_COUNT.size :]
+        return memoryview(self._data)[self._start + _COUNT.size :]
 
-    def _new(self, action: int, kind: int = Marker.ARROW) -> Marker:
-        marker = Marker(ns=self._namespace, id=len(self), type=kind, action=action)
-        marker.header.frame_id = FRAME
-        marker.pose.orientation.w = 1.0
-        return marker
-
-    def _append(self, marker: Marker, points: bytes, count: int) -> int:
-        """Appends a serialized marker and inserts its serialized points; returns its number."""
-        buffer = BytesIO()
-        marker.serialize(buffer)
-        data = buffer.getvalue()
-        start = len(self._data)
-        number = len(self)
-        stamp = _SEQUENCE_SIZE
-        texts = (marker.header.frame_id, marker.ns)
-        pose = stamp + _STAMP.size + _BEFORE_POSE
-        pose += sum(_COUNT.size + len(text.encode()) for text in texts)
-        points_count = pose + _POSE_TO_POINTS
-        points_start = points_count + _COUNT.size
-        self._data += data[:points_count] + _COUNT.pack(count)
-        self._data += points
-        self._data += data[points_start:]
+    def _append(self, marker: Marker) -> int:
+        """Appends a marker; returns its number."""
+        marker.namespace, marker.number = self._namespace, len(self)
+        marker.frame_id = WORLD_FRAME
+        places = write_marker(marker, self._message)
         self._stamp = None
-        self._stamps.append(start + stamp)
-        self._poses.append(start + pose)
-        self._points.append((start + points_start, count))
-        _COUNT.pack_into(self._data, 0, len(self))
-        return number
+        self._stamps.append(places.stamp)
+        self._poses.append(places.pose)
+        self._points.append((places.points, len(marker.points)))
+        _COUNT.pack_into(self._data, self._start, len(self))
+        return marker.number
 
 
-def join(parts: Sequence[PackedMarkers]) -> bytes:
+def join(parts: Sequence[PackedMarkers], writer: NewWriter) -> bytes:
     """Returns a serialized message with the markers of several arrays of different namespaces."""
-    count = _COUNT.pack(sum(map(len, parts)))
-    return b"".join((count, *(part.packed_markers for part in parts)))
-
-
-def _packed(points: npt.NDArray[np.float64]) -> bytes:
-    """Serializes points, shape (n, 3), without their count."""
-    if points.ndim != 2 or points.shape[1] != 3:
-        raise ValueError(f"points must have shape (n, 3), got {points.shape}")
-    return points.astype("<f8", copy=False).tobytes()
+    message = writer()
+    message.count(sum(map(len, parts)))
+    return b"".join((message.data, *(part.packed_markers for part in parts)))

@@ -8,24 +8,20 @@ import time
 from collections.abc import Callable
 from typing import Any, Final, Literal
 
-import genpy.message
-import rospy
-
 from flatland.errors import PLUGIN_FAULTS, FlatlandError
 from flatland.geometry import Pose
 from flatland.node.frame_tree import FrameTree, NoTransformError
 from flatland.node.values import WORLD_FRAME
-from flatland.ros.foreign_topics import poses
-from flatland.ros.foreign_topics.drawers import Drawer, LatestDrawer
-from flatland.ros.foreign_topics.graph import Graph
-from flatland.ros.foreign_topics.grids import GridDrawer
-from flatland.ros.foreign_topics.markers import MarkerDrawer
-from flatland.ros.foreign_topics.pose_publisher import PosePublisher
-from flatland.ros.foreign_topics.subscriptions import TopicSubscription, TransformSubscription
-from flatland.ros.foreign_topics.trees import tree_of
-from flatland.ros.transport.ros_transport import RosTransport
+from flatland.node.foreign_topics import poses
+from flatland.node.foreign_topics.drawers import Drawer, LatestDrawer
+from flatland.node.foreign_topics.graph import Graph
+from flatland.node.foreign_topics.grids import GridDrawer
+from flatland.node.foreign_topics.markers import MarkerDrawer
+from flatland.node.foreign_topics.pose_publisher import PosePublisher
+from flatland.node.foreign_topics.subscriptions import TopicSubscription, TransformSubscription
+from flatland.node.foreign_topics.trees import tree_of
+from flatland.node.transport import Transport
 from flatland.simulation import Simulation
-from flatland.values import OccupancyGrid
 from flatland.web.foreign_topics import Drawing, Marks, PoseKind, Topic, TopicDemand, TopicUpdate
 
 _LOG = logging.getLogger("flatland")
@@ -46,22 +42,23 @@ _DRAWERS: Final[dict[str, Callable[[], Drawer]]] = {
 
 
 class RosTopics:
-    """Topics of the nodes of a ROS master; implements `ForeignTopics`.
+    """Topics of other nodes; implements `ForeignTopics`.
 
-    Subscriptions exist only while a client looks. rospy deserializes messages in its own threads;
-    everything else happens in the thread that calls `update`.
+    Subscriptions exist only while a client looks. The client library deserializes messages in its
+    own threads; everything else happens in the thread that calls `update`.
     """
 
-    def __init__(self, transport: RosTransport, simulation: Simulation) -> None:
+    def __init__(self, transport: Transport, graph: Graph, simulation: Simulation) -> None:
         """Creates an object without subscriptions.
 
         Args:
             transport: Subscribes and publishes.
+            graph: The topics of all nodes.
             simulation: Simulation of the world.
         """
         self._transport = transport
         self._simulation = simulation
-        self._graph = Graph(transport.node_name)
+        self._graph = graph
         self._frames = FrameTree(WORLD_FRAME)
         self._transforms: TransformSubscription | None = None
         self._watched: dict[str, _WatchedTopic] = {}
@@ -111,10 +108,12 @@ class RosTopics:
         for name, is_drawn in wanted.items():
             if name not in self._watched and name in self._graph.published:
                 message_type = self._graph.published[name]
-                watched = _WatchedTopic(self._transport, name, message_type, is_drawn=is_drawn)
+                watched = _WatchedTopic(
+                    self._transport, self._graph, name, message_type, is_drawn=is_drawn
+                )
                 self._watched[name] = watched
             if name in self._watched:
-                self._watched[name].watch_updates(self._graph)
+                self._watched[name].watch_updates()
         is_drawing = any(watched.drawer is not None for watched in self._watched.values())
         transforms = self._transforms
         if transforms is not None and (transforms.closed or not is_drawing):
@@ -168,12 +167,15 @@ class _WatchedTopic:
         drawer: Draws it, None if it is not drawn.
     """
 
-    def __init__(self, transport: RosTransport, name: str, kind: str, *, is_drawn: bool) -> None:
+    def __init__(
+        self, transport: Transport, graph: Graph, name: str, kind: str, *, is_drawn: bool
+    ) -> None:
         """Subscribes asynchronously; the status states why it cannot."""
         self.type = kind
         self.is_drawn = is_drawn
         self.drawer: Drawer | None = None
         self._transport = transport
+        self._graph = graph
         self._name = name
         self._problem = ""
         self._subscriptions: list[TopicSubscription] = []
@@ -204,10 +206,10 @@ class _WatchedTopic:
         for subscription in self._subscriptions:
             subscription.close()
 
-    def watch_updates(self, graph: Graph) -> None:
+    def watch_updates(self) -> None:
         """Subscribes to the updates of a grid as soon as they are published."""
         name = f"{self._name}_updates"
-        if self._has_updates and graph.published.get(name) == _GRID_UPDATE:
+        if self._has_updates and self._graph.published.get(name) == _GRID_UPDATE:
             self._has_updates = False
             problem = self._subscribe(name, _GRID_UPDATE)
             if problem:
@@ -217,7 +219,7 @@ class _WatchedTopic:
         """Subscribes asynchronously; returns why it cannot, empty if it can."""
         keeps_all = isinstance(self.drawer, MarkerDrawer) or kind == _GRID_UPDATE
         problem = f"the message package of {kind} is not installed"
-        for found in _message_classes(self._transport, kind):
+        for found in self._graph.message_classes(kind):
             try:
                 subscription = TopicSubscription(self._transport, name, found, keeps_all=keeps_all)
             except FlatlandError as error:
@@ -234,7 +236,7 @@ class _WatchedTopic:
         """
         if self.drawer is None or not self._subscriptions:
             return None
-        now = rospy.get_rostime().to_nsec()
+        now = self._graph.now()
         for subscription in self._subscriptions:
             for message in subscription.take():
                 self._receive(self.drawer, message, now)
@@ -270,16 +272,3 @@ def _drawn_as(kind: str) -> Literal["marks", "grid", ""]:
     if kind == _GRID:
         return "grid"
     return "marks" if kind in _DRAWERS else ""
-
-
-def _message_classes(transport: RosTransport, kind: str) -> list[Any]:
-    """Returns the message classes of a type, the fastest first; none if it is not installed.
-
-    All subscribers of a node for a topic have the same class, and a plugin may be one of them.
-    """
-    classes = [transport.receivable(OccupancyGrid)[0]] if kind == _GRID else []
-    try:
-        plain = genpy.message.get_message_class(kind)
-    except (ImportError, ValueError):
-        plain = None
-    return classes if plain is None else [*classes, plain]

@@ -8,13 +8,12 @@ from collections.abc import Callable
 from functools import partial
 from typing import Any, Final
 
-from visualization_msgs.msg import Marker
-
 from flatland.entities.layer import Layer
 from flatland.geometry import DoubleArray, FloatArray
-from flatland.ros.markers.marker_geometry import flat, wall_triangles
-from flatland.ros.markers.model_markers import LINE_WIDTH
-from flatland.ros.markers.packed_markers import PackedMarkers
+from flatland.node.adapters.marker import Marker
+from flatland.node.markers.marker_geometry import flat, wall_triangles
+from flatland.node.markers.model_markers import LINE_WIDTH
+from flatland.node.markers.packed_markers import NewWriter, PackedMarkers
 from flatland.scene.description import describe_layer
 
 _LOG = logging.getLogger("flatland")
@@ -25,15 +24,17 @@ DEFAULT_HEIGHTS: Final = (0.0, 1.0)  # m
 class LayerMarkers:
     """Creates the markers of a layer."""
 
-    def __init__(self, layer: Layer) -> None:
+    def __init__(self, layer: Layer, writer: NewWriter) -> None:
         """Reads the height of the walls from the properties of a layer.
 
         Invalid heights are logged as a warning and replaced by the default.
 
         Args:
             layer: The layer.
+            writer: Creates the writer of a message.
         """
         self._layer = layer
+        self._writer = writer
         self._heights = wall_heights(layer)
 
     def lines(self, time_ns: int) -> PackedMarkers:
@@ -63,7 +64,7 @@ class LayerMarkers:
         locked: bool = False,
     ) -> PackedMarkers:
         layer = describe_layer(self._layer)
-        markers = PackedMarkers(layer.name)
+        markers = PackedMarkers(self._writer, layer.name)
         if len(layer.edges):
             number = markers.add(
                 kind, points(layer.edges), scale=scale, color=layer.color, frame_locked=locked

@@ -12,10 +12,10 @@ from collections.abc import Callable, Mapping
 from functools import partial
 from typing import Final
 
-from flatland.ros.markers.layer_markers import LayerMarkers
-from flatland.ros.markers.model_markers import ModelMarkers
-from flatland.ros.markers.packed_markers import PackedMarkers, join
-from flatland.ros.transport.state_topic import StateTopic
+from flatland.node.markers.layer_markers import LayerMarkers
+from flatland.node.markers.model_markers import ModelMarkers
+from flatland.node.markers.packed_markers import NewWriter, PackedMarkers, join
+from flatland.node.transport import StateTopic
 
 LAYERS: Final = "all_layers"
 WALLS: Final = "all_layers_3d"
@@ -42,6 +42,7 @@ class CombinedMarkers:
         layers: Mapping[str, LayerMarkers],
         models: Mapping[str, ModelMarkers],
         open_topic: OpenTopic,
+        writer: NewWriter,
     ) -> None:
         """Advertises the topics.
 
@@ -49,7 +50,9 @@ class CombinedMarkers:
             layers: Markers of all layers by name; may change.
             models: Markers of all models by name; may change.
             open_topic: Advertises a topic in the namespace of the debug topics.
+            writer: Creates the writer of a message.
         """
+        self._writer = writer
         self._layers = layers
         self._models = models
         self._delete_until = 0.0  # s, time.monotonic
@@ -77,10 +80,10 @@ class CombinedMarkers:
     ) -> bytes:
         # A layer may have lost all edges and with them its marker, so that all are deleted first.
         parts = [make(layer, time_ns) for layer in self._layers.values()]
-        return join([PackedMarkers.deletion_of_all(), *parts])
+        return join([PackedMarkers.deletion_of_all(self._writer), *parts], self._writer)
 
     def _join_models(self, time_ns: int) -> bytes:
         parts = [markers.message(time_ns) for markers in self._models.values()]
         if time.monotonic() < self._delete_until:
-            parts.insert(0, PackedMarkers.deletion_of_all())
-        return join(parts)
+            parts.insert(0, PackedMarkers.deletion_of_all(self._writer))
+        return join(parts, self._writer)

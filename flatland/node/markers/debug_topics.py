@@ -6,29 +6,25 @@ import logging
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Final
-
-from visualization_msgs.msg import MarkerArray
+from typing import Final
 
 from flatland.entities.layer import Layer
 from flatland.entities.model import Model
 from flatland.errors import FlatlandError
 from flatland.node.names import UniqueNames, legal_name
 from flatland.node.ticker import Ticker, TickerThread
-from flatland.ros.markers.combined_markers import CombinedMarkers, Make
-from flatland.ros.markers.layer_markers import LayerMarkers
-from flatland.ros.markers.model_markers import ModelMarkers
-from flatland.ros.markers.packed_markers import PackedMarkers
-from flatland.ros.message_types import message_class
-from flatland.ros.transport.registrar import Registrar
-from flatland.ros.transport.state_topic import StateTopic
+from flatland.node.markers.combined_markers import CombinedMarkers, Make
+from flatland.node.markers.layer_markers import LayerMarkers
+from flatland.node.markers.model_markers import ModelMarkers
+from flatland.node.markers.packed_markers import PackedMarkers
+from flatland.node.transport import MARKERS, StateTopic, Transport
+from flatland.node.values import DebugTopicNames
 from flatland.runtime.observer import WorldObserver
 from flatland.simulation import Simulation
 
 _LOG = logging.getLogger("flatland")
 
 NAMESPACE: Final = "~debug"
-_DebugTopicList = message_class("DebugTopicList")
 CLOSE_DELAY: Final = 0.2  # s of wall time between the last message and the end of a topic
 
 
@@ -48,17 +44,17 @@ class DebugTopics(WorldObserver):
     """
 
     def __init__(
-        self, registrar: Registrar, simulation: Simulation, rate: float, thread: TickerThread
+        self, transport: Transport, simulation: Simulation, rate: float, thread: TickerThread
     ) -> None:
         """Advertises the topics asynchronously; must be called between two steps.
 
         Args:
-            registrar: Registers the topics with the ROS master.
+            transport: Publishes the topics.
             simulation: Simulation of the world.
             rate: Rate of the markers of each model in wall time [Hz].
             thread: Posts the periodic work.
         """
-        self._registrar = registrar
+        self._transport = transport
         self._post = simulation.post
         self._world = simulation.world
         self._closed = False
@@ -69,18 +65,20 @@ class DebugTopics(WorldObserver):
         self._models: dict[str, _Entry] = {}
         self._closing: dict[str, tuple[StateTopic, float]] = {}  # by name, with the closing time
         self._ticker = Ticker("flatland-markers", rate, self._post, self._tick, thread)
-        self._topics = self._open("topics", _DebugTopicList, self._topic_list)
+        self._topics = transport.state_of(
+            f"{NAMESPACE}/topics", DebugTopicNames, self._topic_names, self._post
+        )
         for layer in self._world.layers:
             self._add_layer(layer)
         for model in self._world.models:
             self._add_model(model)
         self._combined = CombinedMarkers(
-            self._layer_markers, self._model_markers, self._open_markers
+            self._layer_markers, self._model_markers, self._open_markers, transport.writer
         )
         self._world.add_observer(self)
 
     def close(self) -> None:
-        """Stops publishing; rospy unregisters all topics at shutdown."""
+        """Stops publishing; all topics are closed at shutdown."""
         self._closed = True
         self._ticker.close()
 
@@ -113,21 +111,25 @@ class DebugTopics(WorldObserver):
         self._combined.delete_models()
         self._names.release(entry.name)
         entry.topic.replace(
-            self._with_time(lambda time_ns: PackedMarkers.deletion_of_all(time_ns).packed)
+            self._with_time(
+                lambda time_ns: PackedMarkers.deletion_of_all(
+                    self._transport.writer, time_ns
+                ).packed
+            )
         )
         self._closing[entry.name] = entry.topic, time.monotonic() + CLOSE_DELAY
         self._topics.send()
         self._ticker.wake()
 
     def _add_layer(self, layer: Layer) -> None:
-        markers = self._layer_markers[layer.name] = LayerMarkers(layer)
+        markers = self._layer_markers[layer.name] = LayerMarkers(layer, self._transport.writer)
         self._layers[layer.name] = [
             self._open_entry("layer", layer.name, "", lambda ns: markers.lines(ns).packed),
             self._open_entry("layer", layer.name, "_3d", lambda ns: markers.walls(ns).packed),
         ]
 
     def _add_model(self, model: Model) -> None:
-        markers = self._model_markers[model.name] = ModelMarkers(model)
+        markers = self._model_markers[model.name] = ModelMarkers(model, self._transport.writer)
         self._models[model.name] = self._open_entry(
             "model", model.name, "", lambda ns: markers.message(ns).packed, periodic=True
         )
@@ -165,32 +167,21 @@ class DebugTopics(WorldObserver):
                 )
             return _Entry(claimed, topic)
 
-    def _open(
-        self,
-        name: str,
-        message_type: type[Any],
-        make: Callable[[], Any],
-        on_connection: Callable[[bool], None] | None = None,
-    ) -> StateTopic:
-        return StateTopic(
-            self._registrar,
-            f"{NAMESPACE}/{name}",
-            message_type,
-            make,
-            self._post,
-            on_connection=on_connection,
-        )
-
     def _open_markers(self, name: str, make: Make, periodic: bool) -> StateTopic:
-        wake = (lambda _connected: self._ticker.wake()) if periodic else None
-        return self._open(name, MarkerArray, self._with_time(make), wake)
+        return self._transport.advertise_state(
+            f"{NAMESPACE}/{name}",
+            self._transport.message_class(MARKERS),
+            self._with_time(make),
+            self._post,
+            (lambda _connected: self._ticker.wake()) if periodic else None,
+        )
 
     def _with_time(self, make: Make) -> Callable[[], bytes]:
         return lambda: make(self._world.timekeeper.sim_time_ns)
 
-    def _topic_list(self) -> Any:
+    def _topic_names(self) -> DebugTopicNames:
         layers = [entry for entries in self._layers.values() for entry in entries]
-        return _DebugTopicList([entry.name for entry in (*layers, *self._models.values())])
+        return DebugTopicNames(entry.name for entry in (*layers, *self._models.values()))
 
     def _tick(self, now: float) -> bool:
         """Publishes the models and closes the topics of deleted models."""
