@@ -159,10 +159,12 @@ class ServerNode:
 
             use_stamped_twists()
         from flatland.node.served_world import ServedWorld
+        from flatland.ros2.simulation_services import simulation_services
 
         with (
             closing(_ExecutorThread(node)),
             closing(ServedWorld(parameters, transport, clock)) as served,
+            simulation_services(transport, served, node),
         ):
             self._fault_reports.world = served.world
             self._simulation = served.simulation
