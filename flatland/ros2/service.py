@@ -132,8 +132,6 @@ class _SharedService(Shared):
         except Exception as error:
             _LOG.exception("service %s raised", self.key[1])
             text = f"{type(error).__name__}: {error}"
-        else:
-            return response
         if hasattr(response, "message"):
             response.message = text
         else:

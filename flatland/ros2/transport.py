@@ -187,9 +187,7 @@ class Ros2Transport(Transport):
     def set_time(self, time_ns: int) -> None:
         """Sets the ROS time of the node [ns], also of its clock of rclpy."""
         ros_time.set_now(time_ns)
-        self._clock.set_ros_time_override(
-            Time(nanoseconds=time_ns, clock_type=ClockType.ROS_TIME)
-        )
+        self._clock.set_ros_time_override(Time(nanoseconds=time_ns, clock_type=ClockType.ROS_TIME))
 
     # -- displays --------------------------------------------------------------------------
 
