@@ -24,6 +24,7 @@ from geometry_msgs.msg import Twist
 from rclpy.experimental.events_executor import EventsExecutor
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rclpy.signals import SignalHandlerOptions
+from rclpy.task import Future
 
 QUALITY = QoSProfile(depth=10, reliability=ReliabilityPolicy.BEST_EFFORT)
 DRIVE_PERIOD = 0.05  # s
@@ -72,7 +73,7 @@ def main() -> None:
         subscribe(node, *argument.split(":"))
     executor = EventsExecutor()
     executor.add_node(node)
-    end = executor.create_future()
+    end = Future(executor=executor)
 
     def spin() -> None:
         executor.spin_until_future_complete(end, 3600.0)
