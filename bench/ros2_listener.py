@@ -4,8 +4,11 @@ With --drive, it publishes a velocity command 20 times a second, so that a robot
 
 Prints `ready` after all subscriptions, then the arrival time of the first message of each topic on
 the monotonic clock [s], `running` with that of the first /clock after 0. At SIGINT, it prints the
-number of messages of each topic, and for scans the median and the 95th percentile of the time from
-their stamps, which must be wall times, to their arrival [s].
+number of messages of each topic, and for scans
+
+- `latency`: the median and the 95th percentile of the time from their stamps, if these are wall
+  times, to their arrival [s], and their number,
+- `speed`: the time between the first and the last stamp, divided by the time between their arrivals.
 """
 
 from __future__ import annotations
@@ -31,7 +34,7 @@ DRIVE_PERIOD = 0.05  # s
 NANOSECONDS = 1_000_000_000
 
 counts: Counter[str] = Counter()
-latencies: list[float] = []
+scans: list[tuple[int, int]] = []  # stamp and arrival in wall time [ns]
 
 
 def receive(message: Any, topic: str) -> None:
@@ -46,7 +49,7 @@ def receive(message: Any, topic: str) -> None:
             print(f"running {time.monotonic()}", flush=True)
     elif hasattr(message, "ranges"):
         stamp = message.header.stamp
-        latencies.append((now - stamp.sec * NANOSECONDS - stamp.nanosec) / NANOSECONDS)
+        scans.append((stamp.sec * NANOSECONDS + stamp.nanosec, now))
 
 
 def subscribe(node: Any, topic: str, name: str) -> None:
@@ -87,9 +90,12 @@ def main() -> None:
     executor.wake()
     thread.join()
     print(f"counts {dict(counts)}", flush=True)
-    if latencies:
-        p50, p95 = np.percentile(latencies, (50, 95))
-        print(f"latency {p50} {p95} {len(latencies)}", flush=True)
+    if len(scans) > 1:
+        stamps, arrivals = np.array(scans).T
+        p50, p95 = np.percentile(arrivals - stamps, (50, 95)) / NANOSECONDS
+        print(f"latency {p50} {p95} {len(scans)}", flush=True)
+        speed = (stamps[-1] - stamps[0]) / (arrivals[-1] - arrivals[0])
+        print(f"speed {speed}", flush=True)
     node.destroy_node()
     rclpy.try_shutdown()
 
