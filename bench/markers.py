@@ -7,9 +7,9 @@ from io import BytesIO
 import numpy as np
 
 from flatland.entities.layer import Layer
+from flatland.node.markers.layer_markers import LayerMarkers
 from flatland.physics import PhysicsWorld
 from flatland.ros.adapters.writer import RosWriter
-from flatland.node.markers.layer_markers import LayerMarkers
 
 from table import Row  # isort: skip
 from timing import best_of

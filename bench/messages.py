@@ -10,10 +10,10 @@ import numpy as np
 from visualization_msgs.msg import MarkerArray
 
 import flatland
+from flatland.node.markers.model_markers import ModelMarkers
 from flatland.node.values import Transforms
 from flatland.ros.adapters import find_adapter
 from flatland.ros.adapters.writer import RosWriter
-from flatland.node.markers.model_markers import ModelMarkers
 
 from scenes import BEAMS, RANGE, benchmark_world_path  # isort: skip
 from table import Row

@@ -104,10 +104,10 @@ class MessageRecorder(WorldObserver):
         """Records the transforms of a step in one message, at the time of their stamps."""
         if self._write_transforms is None:
             adapter = self._find_adapter(Transforms)
-            assert adapter is not None and adapter.serialize is not None  # an included one
-            self._write_transforms = self._writer(
-                "/tf", adapter.message_type, adapter.serialize, numbered=False
-            )
+            pack = None if adapter is None else self._serializer(adapter)
+            if adapter is None or pack is None:
+                raise LookupError("no adapter publishes transforms")
+            self._write_transforms = self._writer("/tf", adapter.message_type, pack, numbered=False)
         self._write_transforms(Transforms(transforms), max(each.stamp for each in transforms))
 
     def _now(self) -> int:

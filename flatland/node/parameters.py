@@ -237,22 +237,43 @@ class NodeParameters:
     """The parameters of the node."""
 
     world_path: str = _row(_path, "", "World file.")
-    update_rate: float = _row(_steps_per_second, 200.0, "Steps per second of wall time [Hz].", _UNLIMITED)
-    max_lag: float = _row(_lag, MAX_LAG, "Limit of the lag that is made up for [s]; 0: one cycle.", _UNLIMITED)
-    step_size: float = _row(_step_size, 0.005, "Simulated time of one step [s].", (MIN_STEP_SIZE, MAX_STEP_SIZE))
+    update_rate: float = _row(
+        _steps_per_second, 200.0, "Steps per second of wall time [Hz].", _UNLIMITED
+    )
+    max_lag: float = _row(
+        _lag, MAX_LAG, "Limit of the lag that is made up for [s]; 0: one cycle.", _UNLIMITED
+    )
+    step_size: float = _row(
+        _step_size, 0.005, "Simulated time of one step [s].", (MIN_STEP_SIZE, MAX_STEP_SIZE)
+    )
     lockstep: bool = _row(_boolean, False, "Whether time passes only on request.")
     show_viz: bool = _row(_boolean, False, "Whether debug markers are published.")
-    viz_pub_rate: float = _row(_positive, 30.0, "Rate of the debug markers in wall time [Hz].", _UNLIMITED)
-    simplify_map: int = _row(_simplification, 0, "0 exact, 1 simplified, 2 opened and simplified.", (0, 2))
-    seed: int | None = _row(_seed, None, "Seed of all random numbers; None: a random one.", (0, _MAX_INTEGER))
+    viz_pub_rate: float = _row(
+        _positive, 30.0, "Rate of the debug markers in wall time [Hz].", _UNLIMITED
+    )
+    simplify_map: int = _row(
+        _simplification, 0, "0 exact, 1 simplified, 2 opened and simplified.", (0, 2)
+    )
+    seed: int | None = _row(
+        _seed, None, "Seed of all random numbers; None: a random one.", (0, _MAX_INTEGER)
+    )
     benchmark_duration: float | None = _row(
-        _positive, None, "Simulated time after which the node logs its speed and ends [s].", _UNLIMITED
+        _positive,
+        None,
+        "Simulated time after which the node logs its speed and ends [s].",
+        _UNLIMITED,
     )
     plugin_timeout: float | None = _row(
-        _timeout, 60.0, "Limit of wall time of `on_initialize` of a plugin [s]; None: no limit.", _UNLIMITED
+        _timeout,
+        60.0,
+        "Limit of wall time of `on_initialize` of a plugin [s]; None: no limit.",
+        _UNLIMITED,
     )
     shutdown_timeout: float | None = _row(
-        _timeout, DEFAULT_SHUTDOWN_TIMEOUT, "Limit of wall time from a stop request to the end [s].", _UNLIMITED
+        _timeout,
+        DEFAULT_SHUTDOWN_TIMEOUT,
+        "Limit of wall time from a stop request to the end [s].",
+        _UNLIMITED,
     )
     if_blocked: IfBlocked = _row(  # noqa: RUF009 - a field
         _word(IF_BLOCKED), "warn", "Behaviour of spawns and moves at poses that are not free."
@@ -266,7 +287,9 @@ class NodeParameters:
     use_sim_time: bool = _row(
         _boolean, True, "Whether `/clock` is published and stamps are not wall times."
     )
-    clock_rate: float = _row(_messages, 0.0, "Rate of `/clock` in wall time [Hz]; 0: each step.", _UNLIMITED)
+    clock_rate: float = _row(
+        _messages, 0.0, "Rate of `/clock` in wall time [Hz]; 0: each step.", _UNLIMITED
+    )
     model_states_rate: float = _row(
         _messages, 50.0, "Rate of `model_states` in simulated time [Hz]; 0: each step.", _UNLIMITED
     )
@@ -275,7 +298,10 @@ class NodeParameters:
     )
     map_frame: str = _row(_frame, "map", "Frame of the map.")
     map_resolution: float = _row(
-        _finite_positive, DEFAULT_RESOLUTION, "Cell size of the map of a layer without image [m].", _UNLIMITED
+        _finite_positive,
+        DEFAULT_RESOLUTION,
+        "Cell size of the map of a layer without image [m].",
+        _UNLIMITED,
     )
     msgs_package: str = _row(_package, OWN_PACKAGE, "Package of the message and service types.")
     model_path: tuple[str, ...] | None = _row(
@@ -283,7 +309,9 @@ class NodeParameters:
     )
     web: bool = _row(_boolean, False, "Whether the viewer in the browser is started.")
     web_host: str = _row(_address, WEB_HOST, "Address that the viewer in the browser listens on.")
-    web_port: int = _row(_port, WEB_PORT, "Port of the viewer in the browser; 0: any free one.", (0, 65535))
+    web_port: int = _row(
+        _port, WEB_PORT, "Port of the viewer in the browser; 0: any free one.", (0, 65535)
+    )
     web_token: str | None = _row(
         _token, None, "Text that the address of the viewer must contain; None: see docs/viewer.md."
     )

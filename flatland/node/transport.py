@@ -441,8 +441,12 @@ class Transport(ABC):
         """
 
     @abstractmethod
-    def load_handle_server(self) -> Callable[[Post, Handles], HandleServer]:
-        """Imports the server of interactive markers, and returns the function that starts it."""
+    def load_handle_server(self) -> Callable[[Post, Handles], HandleServer] | None:
+        """Imports the server of interactive markers.
+
+        Returns:
+            The function that starts it; None if there is none for this kind of ROS.
+        """
 
     @abstractmethod
     def load_foreign_topics(self) -> Callable[[Simulation], ForeignTopicsConnection]:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import struct
 from collections.abc import Callable
-from functools import lru_cache
 from io import BytesIO
 from pathlib import Path
 from typing import Any, Final
@@ -19,7 +18,6 @@ _FIRST_TIME: Final = 1  # ns; rosbag play ignores messages at time 0
 _CHUNK_SIZE: Final = 256 * 1024  # bytes of an MCAP file; what is lost if the process is killed
 
 
-@lru_cache(None)
 def _recorded_class(message_type: type[Any]) -> type[Any]:
     """Returns the class of messages of a type that are serialized already."""
 
@@ -35,11 +33,9 @@ def _recorded_class(message_type: type[Any]) -> type[Any]:
     return Recorded
 
 
-def _recorded(message_type: type[Any], data: bytes, number: int) -> Any:
-    """Returns a serialized message as an object, with a sequence number if it has a header."""
-    if message_type._has_header:
-        data = _SEQUENCE.pack(number) + data[_SEQUENCE.size :]
-    return _recorded_class(message_type)(data)
+def _numbered(message_type: type[Any], data: bytes, number: int) -> bytes:
+    """Returns a serialized message with a sequence number, if it has a header."""
+    return _SEQUENCE.pack(number) + data[_SEQUENCE.size :] if message_type._has_header else data
 
 
 def _serialized(message: Any) -> bytes:
@@ -62,14 +58,15 @@ def _recorder(
         finish: Completes and closes the file.
         ends_on_error: See `MessageRecorder`.
     """
+    classes: dict[type[Any], type[Any]] = {}
+
+    def write_bytes(topic: str, kind: type[Any], data: bytes, time_ns: int, number: int) -> None:
+        if kind not in classes:
+            classes[kind] = _recorded_class(kind)
+        write(topic, classes[kind](_numbered(kind, data, number)), time_ns, number)
+
     return MessageRecorder(
-        find_adapter,
-        _serialized,
-        lambda topic, kind, data, time_ns, number: write(
-            topic, _recorded(kind, data, number), time_ns, number
-        ),
-        finish,
-        ends_on_error=ends_on_error,
+        find_adapter, _serialized, write_bytes, finish, ends_on_error=ends_on_error
     )
 
 

@@ -420,7 +420,9 @@ class Subscription(User):
             self.topic,
             message_type,
             self,
-            lambda: _SharedSubscription(endpoints.node, expanded(topic), self.topic, message_type),
+            lambda: _SharedSubscription(
+                endpoints.node, expanded(topic), self.topic, message_type, for_viewer=gives_way
+            ),
         )
 
     def receive(self, message: Any) -> None:
@@ -438,14 +440,19 @@ class Subscription(User):
 class _SharedSubscription(Shared):
     """A subscription of rclpy."""
 
-    def __init__(self, node: Node, topic: str, resolved: str, message_type: type[Any]) -> None:
+    def __init__(
+        self, node: Node, topic: str, resolved: str, message_type: type[Any], *, for_viewer: bool
+    ) -> None:
         super().__init__("subscriber", resolved, message_type)
         self._node = node
+        profile = qos.of_subscription(resolved, message_type)
+        if for_viewer and resolved != qos.STATIC_TRANSFORMS:
+            profile = qos.of_viewer(node.get_publishers_info_by_topic(resolved))
         self._subscription = node.create_subscription(
             message_type,
             topic,
             self._receive,
-            qos.of_subscription(resolved, message_type),
+            profile,
             event_callbacks=SubscriptionEventCallbacks(matched=self._matched),
         )
 

@@ -6,6 +6,7 @@ import time
 from typing import Any, Final
 
 from rclpy.node import Node
+from rclpy.topic_or_service_is_hidden import topic_or_service_is_hidden
 
 from flatland.ros2 import ros_time
 from flatland.ros2.message_types import message_class
@@ -45,6 +46,8 @@ class Graph:
         published: dict[str, str] = {}
         subscribed: dict[str, tuple[str, frozenset[str]]] = {}
         for topic, types in sorted(self._node.get_topic_names_and_types()):
+            if topic_or_service_is_hidden(topic):  # of an action
+                continue
             kind = types[0].replace("/msg/", "/")
             if self._node.get_publishers_info_by_topic(topic):
                 published[topic] = kind

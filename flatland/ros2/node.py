@@ -181,11 +181,12 @@ class _ExecutorThread:
     def __init__(self, node: Node) -> None:
         """Starts the thread."""
         from rclpy.experimental.events_executor import EventsExecutor
+        from rclpy.task import Future
 
         # Much faster than the other executors, which examine all entities after each callback.
         self._executor: Any = EventsExecutor()
         self._executor.add_node(node)
-        self._end = self._executor.create_future()
+        self._end = Future(executor=self._executor)
         self._thread = threading.Thread(target=self._run, name="flatland-executor", daemon=True)
         self._thread.start()
 

@@ -7,14 +7,17 @@
 | `map`, states and other latched topics | reliable | transient local |
 | all others | reliable | volatile |
 
-A subscription is reliable, and transient local for maps and static transforms.
+A subscription is reliable, and transient local for maps and static transforms. That of the viewer
+in the browser is what all publishers offer.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any, Final
 
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.topic_endpoint_info import TopicEndpointInfo
 
 from flatland.ros2.message_types import type_name
 
@@ -30,7 +33,7 @@ _SENSORS: Final = frozenset(
         "flatland_msgs/msg/SemanticScan",
     )
 )
-_STATIC_TRANSFORMS: Final = "/tf_static"
+STATIC_TRANSFORMS: Final = "/tf_static"
 _MAP: Final = "nav_msgs/msg/OccupancyGrid"
 
 
@@ -53,14 +56,29 @@ def of_publisher(
     return QoSProfile(depth=depth)
 
 
+def of_viewer(publishers: Sequence[TopicEndpointInfo]) -> QoSProfile:
+    """Returns the quality of service of a subscription that all present publishers satisfy.
+
+    Args:
+        publishers: The publishers of the topic.
+    """
+    offered = [each.qos_profile for each in publishers]
+    reliability, durability = ReliabilityPolicy.BEST_EFFORT, DurabilityPolicy.VOLATILE
+    if offered and all(each.reliability == ReliabilityPolicy.RELIABLE for each in offered):
+        reliability = ReliabilityPolicy.RELIABLE
+    if offered and all(each.durability == DurabilityPolicy.TRANSIENT_LOCAL for each in offered):
+        durability = DurabilityPolicy.TRANSIENT_LOCAL
+    return QoSProfile(depth=_MIN_DEPTH, reliability=reliability, durability=durability)
+
+
 def of_subscription(topic: str, message_type: type[Any]) -> QoSProfile:
-    """Returns the quality of service of a subscription.
+    """Returns the quality of service of a subscription of the node or of a plugin.
 
     Args:
         topic: Resolved name of the topic.
         message_type: The message class.
     """
-    if topic == _STATIC_TRANSFORMS:
+    if topic == STATIC_TRANSFORMS:
         return QoSProfile(depth=100, durability=DurabilityPolicy.TRANSIENT_LOCAL)
     if type_name(message_type) == _MAP:
         return STATE

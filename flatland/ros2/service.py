@@ -11,6 +11,7 @@ from rclpy.exceptions import InvalidHandle
 from rclpy.node import Node
 
 from flatland.errors import FlatlandError
+from flatland.node.names import sendable_text
 from flatland.node.stamps import stamp
 from flatland.node.transport import CallError
 from flatland.ros2.adapters import find_adapter
@@ -131,9 +132,7 @@ class _SharedService(Shared):
             text = str(error)
         except Exception as error:
             _LOG.exception("service %s raised", self.key[1])
-            text = f"{type(error).__name__}: {error}"
-        else:
-            return response
+            text = sendable_text(f"{type(error).__name__}: {error}")
         if hasattr(response, "message"):
             response.message = text
         else:

@@ -32,7 +32,6 @@ from flatland.ros2.writer import CdrWriter
 from flatland.timekeeper import NANOSECONDS
 
 if TYPE_CHECKING:
-    from flatland.node.handles import Handles, HandleServer
     from flatland.node.ticker import TickerThread
     from flatland.node.transport import Connection, ForeignTopicsConnection
     from flatland.runtime.requests import Post
@@ -187,9 +186,7 @@ class Ros2Transport(Transport):
     def set_time(self, time_ns: int) -> None:
         """Sets the ROS time of the node [ns], also of its clock of rclpy."""
         ros_time.set_now(time_ns)
-        self._clock.set_ros_time_override(
-            Time(nanoseconds=time_ns, clock_type=ClockType.ROS_TIME)
-        )
+        self._clock.set_ros_time_override(Time(nanoseconds=time_ns, clock_type=ClockType.ROS_TIME))
 
     # -- displays --------------------------------------------------------------------------
 
@@ -202,9 +199,8 @@ class Ros2Transport(Transport):
         self.message_class(MARKERS)
         return partial(DebugTopics, self)
 
-    def load_handle_server(self) -> Callable[[Post, Handles], HandleServer]:
-        """Imports the server of interactive markers."""
-        raise ImportError("interactive markers are not offered in ROS 2")
+    def load_handle_server(self) -> None:
+        """Returns None: interactive markers are not offered."""
 
     def load_foreign_topics(self) -> Callable[[Simulation], ForeignTopicsConnection]:
         """Imports the topics of other nodes for the viewer in the browser."""

@@ -89,7 +89,9 @@ def write_marker(marker: Marker, to: Writer) -> MarkerPlaces:
     points = marker.points
     if points.ndim != 2 or points.shape[1] != 3:
         raise ValueError(f"points must have shape (n, 3), got {points.shape}")
-    stamp = to.stamp(*divmod(0 if marker.stamp is None else message_stamp(marker.stamp), NANOSECONDS))
+    stamp = to.stamp(
+        *divmod(0 if marker.stamp is None else message_stamp(marker.stamp), NANOSECONDS)
+    )
     to.text(marker.frame_id)
     to.text(marker.namespace)
     to.pack("i", marker.number, marker.kind, marker.action)

@@ -14,12 +14,14 @@ class Graph(Protocol):
     Attributes:
         published: Type of each topic that has a publisher, `PACKAGE/NAME`.
         subscribed: Type of each topic that has a subscriber, and its subscribers.
-        pose_topics: Name of the usual topic of each kind of pose.
     """
 
     published: dict[str, str]
     subscribed: dict[str, tuple[str, frozenset[str]]]
-    pose_topics: Mapping[PoseKind, str]
+
+    @property
+    def pose_topics(self) -> Mapping[PoseKind, str]:
+        """Name of the usual topic of each kind of pose."""
 
     def refresh(self) -> None:
         """Renews the topics, not more often than sensible."""

@@ -9,8 +9,8 @@ import numpy as np
 
 from flatland.errors import MapFileError
 from flatland.geometry import DoubleArray, Pose
-from flatland.node.frame_tree import FrameTree
 from flatland.node.foreign_topics.poses import matrix_of
+from flatland.node.frame_tree import FrameTree
 from flatland.web.foreign_topics import Cells, Drawing, Grid
 
 MAX_LENGTH: Final = 4000  # cells of a row or column that are sent

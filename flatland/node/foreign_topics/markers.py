@@ -7,8 +7,11 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 import numpy as np
+
 from flatland.geometry import DoubleArray
 from flatland.node.adapters.marker import Marker
+from flatland.node.foreign_topics.poses import matrix_of, points_of
+from flatland.node.foreign_topics.trees import nanoseconds_of
 from flatland.node.frame_tree import FrameTree, NoTransformError
 from flatland.node.shapes import (
     UNIT_BOX,
@@ -19,8 +22,6 @@ from flatland.node.shapes import (
     packed_colors,
     transformed,
 )
-from flatland.node.foreign_topics.poses import matrix_of, points_of
-from flatland.node.foreign_topics.trees import nanoseconds_of
 from flatland.web.foreign_topics import Colors, Drawing
 
 MAX_MARKERS: Final = 10_000  # of a topic

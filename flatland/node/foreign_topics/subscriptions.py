@@ -11,8 +11,8 @@ from typing import Any, Final
 from flatland.errors import FlatlandError
 from flatland.geometry import quaternion_from_yaw
 from flatland.node.frame_tree import FrameTree, transform
-from flatland.node.values import FrameParents
 from flatland.node.transport import Transport
+from flatland.node.values import FrameParents
 from flatland.simulation import Simulation
 
 _LOG = logging.getLogger("flatland")

@@ -10,8 +10,6 @@ from typing import Any, Final, Literal
 
 from flatland.errors import PLUGIN_FAULTS, FlatlandError
 from flatland.geometry import Pose
-from flatland.node.frame_tree import FrameTree, NoTransformError
-from flatland.node.values import WORLD_FRAME
 from flatland.node.foreign_topics import poses
 from flatland.node.foreign_topics.drawers import Drawer, LatestDrawer
 from flatland.node.foreign_topics.graph import Graph
@@ -20,7 +18,9 @@ from flatland.node.foreign_topics.markers import MarkerDrawer
 from flatland.node.foreign_topics.pose_publisher import PosePublisher
 from flatland.node.foreign_topics.subscriptions import TopicSubscription, TransformSubscription
 from flatland.node.foreign_topics.trees import tree_of
+from flatland.node.frame_tree import FrameTree, NoTransformError
 from flatland.node.transport import Transport
+from flatland.node.values import WORLD_FRAME
 from flatland.simulation import Simulation
 from flatland.web.foreign_topics import Drawing, Marks, PoseKind, Topic, TopicDemand, TopicUpdate
 

@@ -11,12 +11,12 @@ from typing import Final
 from flatland.entities.layer import Layer
 from flatland.entities.model import Model
 from flatland.errors import FlatlandError
-from flatland.node.names import UniqueNames, legal_name
-from flatland.node.ticker import Ticker, TickerThread
 from flatland.node.markers.combined_markers import CombinedMarkers, Make
 from flatland.node.markers.layer_markers import LayerMarkers
 from flatland.node.markers.model_markers import ModelMarkers
 from flatland.node.markers.packed_markers import PackedMarkers
+from flatland.node.names import UniqueNames, legal_name
+from flatland.node.ticker import Ticker, TickerThread
 from flatland.node.transport import MARKERS, StateTopic, Transport
 from flatland.node.values import DebugTopicNames
 from flatland.runtime.observer import WorldObserver
@@ -112,9 +112,9 @@ class DebugTopics(WorldObserver):
         self._names.release(entry.name)
         entry.topic.replace(
             self._with_time(
-                lambda time_ns: PackedMarkers.deletion_of_all(
-                    self._transport.writer, time_ns
-                ).packed
+                lambda time_ns: (
+                    PackedMarkers.deletion_of_all(self._transport.writer, time_ns).packed
+                )
             )
         )
         self._closing[entry.name] = entry.topic, time.monotonic() + CLOSE_DELAY

@@ -6,6 +6,7 @@ import struct
 from typing import Final
 
 import numpy as np
+
 from flatland.entities.body import Color
 from flatland.entities.model import Model
 from flatland.geometry import Pose

@@ -18,8 +18,8 @@ from flatland.geometry import quaternion_from_yaw
 from flatland.node.adapters.marker import Marker, write_marker
 from flatland.node.adapters.writer import Writer
 from flatland.node.names import sendable_text
-from flatland.node.values import WORLD_FRAME
 from flatland.node.stamps import stamp as message_stamp
+from flatland.node.values import WORLD_FRAME
 from flatland.timekeeper import NANOSECONDS
 
 _COUNT: Final = struct.Struct("<I")

@@ -14,8 +14,8 @@ from typing import Any
 from flatland.node.adapters import Adapters
 from flatland.node.parameters import OWN_PACKAGE
 from flatland.node.transport import Adapter as Adapter
-from flatland.ros.adapters.writer import RosWriter
 from flatland.ros import message_types
+from flatland.ros.adapters.writer import RosWriter
 
 _GRID = "nav_msgs/OccupancyGrid"
 

@@ -28,13 +28,13 @@ from visualization_msgs.msg import Marker, MarkerArray
 
 from flatland.errors import MapFileError
 from flatland.geometry import quaternion_from_yaw
-from flatland.node.frame_tree import FrameTree, NoTransformError, transform
-from flatland.node.shapes import MAX_LINES
 from flatland.node.foreign_topics import poses
 from flatland.node.foreign_topics.drawers import LatestDrawer
 from flatland.node.foreign_topics.grids import MAX_LENGTH, GridDrawer
 from flatland.node.foreign_topics.markers import MAX_MARKERS, MarkerDrawer
 from flatland.node.foreign_topics.trees import MAX_VALUES, tree_of
+from flatland.node.frame_tree import FrameTree, NoTransformError, transform
+from flatland.node.shapes import MAX_LINES
 from flatland.web.foreign_topics import Grid, Marks
 
 SECOND = 10**9

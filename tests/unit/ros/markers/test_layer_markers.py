@@ -14,10 +14,10 @@ pytest.importorskip("visualization_msgs", reason="ROS is not installed")
 from visualization_msgs.msg import Marker, MarkerArray
 
 from flatland.entities.layer import Layer
-from flatland.physics import PhysicsWorld
-from flatland.ros.adapters.writer import RosWriter
 from flatland.node.markers.layer_markers import LayerMarkers
 from flatland.node.markers.packed_markers import PackedMarkers
+from flatland.physics import PhysicsWorld
+from flatland.ros.adapters.writer import RosWriter
 
 
 def make_layer(properties: dict[str, Any], edges: np.ndarray | None = None) -> Layer:

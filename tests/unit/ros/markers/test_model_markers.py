@@ -11,8 +11,8 @@ from visualization_msgs.msg import Marker, MarkerArray
 
 import flatland
 import flatland.geometry
-from flatland.ros.adapters.writer import RosWriter
 from flatland.node.markers.model_markers import ModelMarkers
+from flatland.ros.adapters.writer import RosWriter
 
 MODEL = """
 bodies:

@@ -14,8 +14,8 @@ from geometry_msgs.msg import Point, Vector3
 from std_msgs.msg import ColorRGBA
 from visualization_msgs.msg import Marker, MarkerArray
 
-from flatland.ros.adapters.writer import RosWriter
 from flatland.node.markers.packed_markers import PackedMarkers, join
+from flatland.ros.adapters.writer import RosWriter
 
 POINTS = np.array([[1.5, -2.5, 3.5], [0.1, 0.2, 0.3]])
 COLOR = (0.25, 0.5, 0.75, 1.0)
