@@ -111,15 +111,15 @@ class Ros2:
         wait_until(f"a subscriber of {name}", lambda: publisher.get_subscription_count())
         return publisher
 
-    def call(self, name: str, service_type: type[Any], **fields: object) -> Any:
+    def call(self, service: str, service_type: type[Any], **fields: object) -> Any:
         """Calls a service."""
-        client = self.node.create_client(service_type, name)
+        client = self.node.create_client(service_type, service)
         try:
-            assert client.wait_for_service(TIMEOUT), f"no service {name}"
+            assert client.wait_for_service(TIMEOUT), f"no service {service}"
             done = threading.Event()
             future = client.call_async(service_type.Request(**fields))
             future.add_done_callback(lambda _future: done.set())
-            assert done.wait(TIMEOUT), f"no response of {name}"
+            assert done.wait(TIMEOUT), f"no response of {service}"
             return future.result()
         finally:
             self.node.destroy_client(client)

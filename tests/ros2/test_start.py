@@ -84,9 +84,7 @@ def test_parameters_have_descriptions_and_ranges_and_are_read_at_the_start(
     assert values[2].double_value == 0.005
 
 
-def test_two_nodes_in_namespaces_with_remapped_topics(
-    ros: Any, launcher: Any, world: Path
-) -> None:
+def test_two_nodes_in_namespaces_with_remapped_topics(ros: Any, launcher: Any, world: Path) -> None:
     for namespace in ("/first", "/second"):
         remapping = ("-r", f"__ns:={namespace}", "-r", f"{namespace}/scan:={namespace}/laser")
         launcher.server(ros, world, *remapping)

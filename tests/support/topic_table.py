@@ -38,7 +38,7 @@ class Row:
         name: Name of the topic.
         type: Message, `PACKAGE/NAME`; of the package flatland for own messages.
         frame: Frame of the header, None for a message without header.
-        rate: Messages per second of simulated time [Hz]; None for a state.
+        rate: Messages per second of simulated time [Hz]; None if it is not constant.
         delivery: `sensor` (best effort in ROS 2), `state` (late subscribers receive the last
             message), `clock` (best effort) or `reliable`.
     """
@@ -52,7 +52,7 @@ class Row:
 
 TABLE = (
     Row("/clock", "rosgraph_msgs/Clock", None, 200, "clock"),
-    Row("/tf", "tf2_msgs/TFMessage", None, 50, "reliable"),
+    Row("/tf", "tf2_msgs/TFMessage", None, None, "reliable"),  # a message with what is due
     Row("/map", "nav_msgs/OccupancyGrid", "map", None, "state"),
     Row("/map_metadata", "nav_msgs/MapMetaData", None, None, "state"),
     Row("/model_states", "flatland/ModelStates", "map", 50, "state"),
