@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import gc
 import os
-import queue
 import re
 import signal
 import socket
@@ -25,6 +24,7 @@ pytest.importorskip("flatland.msg", reason="the messages are not built")
 import rosgraph
 import roslib.packages
 import rospy
+from message_queue import MessageQueue
 from programs import Program
 from room_world import LAYER, write_room_world
 from roscpp.srv import SetLoggerLevel
@@ -54,52 +54,12 @@ def _collect_garbage() -> None:
 _ADVERTISE_TIMEOUT = 10.0
 
 
-class Topic:
+class Topic(MessageQueue):
     """The messages received on a topic since its creation."""
 
     def __init__(self, name: str, message_type: type[Any]) -> None:
-        self.name = name
-        self._messages: queue.Queue[Any] = queue.Queue()
-        self._subscriber = rospy.Subscriber(name, message_type, self._messages.put)
-
-    def next(self, timeout: float = TIMEOUT) -> Any:
-        """Waits for a message."""
-        try:
-            return self._messages.get(timeout=timeout)
-        except queue.Empty:
-            pytest.fail(f"no message on {self.name} for {timeout} s")
-
-    def until(self, accept: Callable[[Any], bool]) -> Any:
-        """Waits for a message that is accepted."""
-        end = time.monotonic() + TIMEOUT
-        message = self.next()
-        while not accept(message):
-            assert time.monotonic() < end, f"last on {self.name}:\n{message}"
-            message = self.next()
-        return message
-
-    def take(self, count: int) -> list[Any]:
-        """Waits for a number of messages."""
-        return [self.next() for _ in range(count)]
-
-    def drop(self) -> None:
-        """Discards the messages received so far."""
-        with contextlib.suppress(queue.Empty):
-            while True:
-                self._messages.get_nowait()
-
-    def rest(self, silence: float = 0.2) -> list[Any]:
-        """Returns messages until none is received for some time."""
-        messages = []
-        with contextlib.suppress(queue.Empty):
-            while True:
-                messages.append(self._messages.get(timeout=silence))
-        return messages
-
-    @property
-    def is_empty(self) -> bool:
-        """Whether no message waits."""
-        return self._messages.empty()
+        super().__init__(name)
+        self._subscriber = rospy.Subscriber(name, message_type, self.messages.put)
 
     @property
     def connected(self) -> bool:

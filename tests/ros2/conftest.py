@@ -5,18 +5,17 @@ from __future__ import annotations
 import contextlib
 import fcntl
 import os
-import queue
 import random
 import signal
 import sys
 import tempfile
 import threading
-import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
+from message_queue import MessageQueue
 from programs import Program
 from room_world import write_room_world
 from waiting import TIMEOUT, wait_until
@@ -50,40 +49,15 @@ def domain() -> Iterator[int]:
     pytest.fail("all domains are in use")
 
 
-class Topic:
+class Topic(MessageQueue):
     """The messages received on a topic since its creation."""
 
     def __init__(self, node: Any, name: str, message_type: type[Any], profile: Any) -> None:
-        self.name = name
-        self._messages: queue.Queue[Any] = queue.Queue()
+        super().__init__(name)
         self._node = node
         self._subscription = node.create_subscription(
-            message_type, name, self._messages.put, profile
+            message_type, name, self.messages.put, profile
         )
-
-    def next(self) -> Any:
-        """Waits for a message."""
-        try:
-            return self._messages.get(timeout=TIMEOUT)
-        except queue.Empty:
-            pytest.fail(f"no message on {self.name} for {TIMEOUT} s")
-
-    def until(self, accept: Callable[[Any], bool]) -> Any:
-        """Waits for a message that is accepted."""
-        end = time.monotonic() + TIMEOUT
-        message = self.next()
-        while not accept(message):
-            assert time.monotonic() < end, f"last on {self.name}:\n{message}"
-            message = self.next()
-        return message
-
-    def received(self) -> list[Any]:
-        """Returns the messages that wait."""
-        messages = []
-        with contextlib.suppress(queue.Empty):
-            while True:
-                messages.append(self._messages.get_nowait())
-        return messages
 
     def close(self) -> None:
         """Unsubscribes."""
