@@ -38,7 +38,7 @@ from rosidl_typesupport_introspection_c import generate_c as generate_introspect
 PREFIX = Path(sys.prefix)
 SITE = Path(sysconfig.get_path("purelib"))
 KINDS = ("msg", "srv", "action")
-# Little optimization: the set-up waits for the compiler, and large messages are those of the wheels.
+# Little optimization: the set-up waits for the compiler, and large messages are in the wheels.
 FLAGS = ("-O1", "-fPIC", "-w")
 # Both are used by rmw_fastrtps, the second one for the description of a type that others receive.
 TYPE_SUPPORTS = ("rosidl_typesupport_fastrtps_c", "rosidl_typesupport_introspection_c")
@@ -47,7 +47,9 @@ GENERATORS: dict[str, Callable[[str], object]] = {
     "rosidl_typesupport_fastrtps_c": generate_typesupport_fastrtps_c,
     "rosidl_typesupport_introspection_c": generate_introspection,
     "rosidl_typesupport_c": lambda file: generate_type_support(file, TYPE_SUPPORTS),
-    "rosidl_generator_py": lambda file: generate_py_impl.generate_py(file, ["rosidl_typesupport_c"]),
+    "rosidl_generator_py": lambda file: generate_py_impl.generate_py(
+        file, ["rosidl_typesupport_c"]
+    ),
 }
 
 
@@ -141,7 +143,9 @@ def generate(share: Path) -> None:
         )
         return str(file)
 
-    rosidl_generator_type_description.generate_type_hash(arguments_of("rosidl_generator_type_description", share))
+    rosidl_generator_type_description.generate_type_hash(
+        arguments_of("rosidl_generator_type_description", share)
+    )
     for generator, function in GENERATORS.items():
         output = share.parents[1] / generator / name
         function(arguments_of(generator, output))
@@ -168,7 +172,7 @@ def compile_extension(work: Path, package: str) -> Path:
     options.write_text("\n".join([*FLAGS, *(f"-I{folder}" for folder in include)]))
 
     def run(*command: object) -> None:
-        subprocess.run([str(each) for each in command], check=True, cwd=work)
+        subprocess.run([str(each) for each in command], check=True, cwd=work)  # noqa: S603
 
     # Few translation units, because headers cost most of the time. Type descriptions define static
     # variables of equal names.

@@ -53,13 +53,15 @@ class Service(User):
         except ValueError as error:
             raise FlatlandError(f'illegal name of a service, "{name}": {error}') from error
         self._endpoints = endpoints
-        self._shared = endpoints.join(
+        self._shared: Any = endpoints.join(
             "service",
             self.name,
             service_type,
             self,
             lambda: _SharedService(node, expanded(name), self.name, service_type, handler),
         )
+        # A reset of the world keeps services open, with the handlers of new plugins.
+        self._shared.handler = handler
 
     def close(self) -> None:
         """Ends the service."""
@@ -90,7 +92,7 @@ class _SharedService(Shared):
     ) -> None:
         super().__init__("service", resolved, service_type)
         self._node = node
-        self._handler = handler
+        self.handler = handler
         self._service = node.create_service(service_type, name, _same)
         # Instead of a coroutine, whose result the executor does not send in all versions: the
         # executor passes what `_same` returns, and the sender, to this function.
@@ -127,7 +129,7 @@ class _SharedService(Shared):
         ROS 2 has no response for an error of a service, and the client would wait forever.
         """
         try:
-            return self._handler(request)
+            return self.handler(request)
         except CallError as error:
             text = str(error)
         except Exception as error:

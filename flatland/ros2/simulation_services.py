@@ -9,9 +9,9 @@ from __future__ import annotations
 import logging
 import math
 import re
+import threading
 from collections.abc import Callable, Iterable, Iterator
-from concurrent.futures import Future
-from contextlib import closing, contextmanager
+from contextlib import closing, contextmanager, suppress
 from functools import partial
 from pathlib import Path
 from types import SimpleNamespace
@@ -20,7 +20,6 @@ from urllib.parse import unquote, urlsplit
 
 import numpy as np
 from geometry_msgs.msg import Vector3
-from rclpy.task import Future as RosFuture
 
 from flatland.errors import UnreadableFileError, YamlError
 from flatland.geometry import (
@@ -115,6 +114,8 @@ class SimulationServices:
             self._simulate_steps,
             cancel_callback=lambda _goal: CancelResponse.ACCEPT,
         )
+        # Goals would otherwise be carried out by the executor, which would wait for the steps.
+        self._action.notify_execute = self._start_goal
 
     def close(self) -> None:
         """Ends the services and the action."""
@@ -148,7 +149,7 @@ class SimulationServices:
         for model in self._world.models:
             if model.name == name:
                 return model
-        raise Refusal(messages.Result.RESULT_NOT_FOUND, f'there is no entity "{name}"')
+        raise RefusedError(messages.Result.RESULT_NOT_FOUND, f'there is no entity "{name}"')
 
     # -- the simulator ---------------------------------------------------------------------
 
@@ -201,16 +202,18 @@ class SimulationServices:
             self._served.simulation.stop()
             return
         if target not in (state.STATE_STOPPED, state.STATE_PLAYING, state.STATE_PAUSED):
-            raise Refusal(response.INCORRECT_TRANSITION, f"state {target} cannot be requested")
+            raise RefusedError(response.INCORRECT_TRANSITION, f"state {target} cannot be requested")
 
         def change() -> None:
             if self._state() == target:
-                raise Refusal(response.ALREADY_IN_TARGET_STATE, "the simulation is in this state")
+                raise RefusedError(
+                    response.ALREADY_IN_TARGET_STATE, "the simulation is in this state"
+                )
             operations = self._served.operations
             if target == state.STATE_PLAYING:
                 if self._served.simulation.lockstep:
                     text = "in lockstep, time passes only on request"
-                    raise Refusal(response.STATE_TRANSITION_ERROR, text)
+                    raise RefusedError(response.STATE_TRANSITION_ERROR, text)
                 operations.resume()
             else:
                 operations.pause()
@@ -227,7 +230,7 @@ class SimulationServices:
             scope = everything
         operations, world = self._served.operations, self._world
         if scope & ~everything:
-            raise Refusal(
+            raise RefusedError(
                 messages.Result.RESULT_FEATURE_UNSUPPORTED, f"scope {scope} is not known"
             )
         if scope == everything:
@@ -241,20 +244,22 @@ class SimulationServices:
                 )
             )
         else:
-            raise Refusal(
+            raise RefusedError(
                 messages.Result.RESULT_FEATURE_UNSUPPORTED,
                 "the time is reset only with everything, and states only with SCOPE_SPAWNED",
             )
 
     def _check_held(self) -> None:
         if not self._held:
-            raise Refusal(messages.Result.RESULT_OPERATION_FAILED, "the simulation is not paused")
+            raise RefusedError(
+                messages.Result.RESULT_OPERATION_FAILED, "the simulation is not paused"
+            )
 
     def _check_steps(self, steps: int) -> None:
         limit = round(MAX_STEP_DURATION / self._world.timekeeper.step_size)
         if steps > limit:
             text = f"steps must be at most {limit}, got {steps}"
-            raise Refusal(messages.Result.RESULT_OPERATION_FAILED, text)
+            raise RefusedError(messages.Result.RESULT_OPERATION_FAILED, text)
 
     def _step_simulation(self, request: Any, _response: Any) -> None:
         self._check_steps(request.steps)
@@ -262,13 +267,26 @@ class SimulationServices:
         if request.steps:
             self._services.result(self._served.operations.step(request.steps))
 
-    async def _simulate_steps(self, goal: Any) -> Any:
-        """Carries out the goal of the action, in the thread of the executor."""
-        result = actions.SimulateSteps.Result()
-        steps, feedback = goal.request.steps, actions.SimulateSteps.Feedback()
+    def _start_goal(self, goal: Any, execute: Callable[[Any], Any] | None) -> None:
+        """Carries out a goal of the action in another thread, while the executor goes on."""
+        threading.Thread(
+            target=self._carry_out_goal,
+            args=(goal, execute or self._simulate_steps),
+            name="flatland-action",
+            daemon=True,
+        ).start()
+
+    def _carry_out_goal(self, goal: Any, execute: Callable[[Any], Any]) -> None:
+        with suppress(StopIteration):  # the end of a coroutine that never waits
+            self._action._execute_goal(execute, goal).send(None)
+
+    def _simulate_steps(self, goal: Any) -> Any:
+        """Carries out the goal of the action and returns its result."""
+        result, feedback = actions.SimulateSteps.Result(), actions.SimulateSteps.Feedback()
+        steps = goal.request.steps
         try:
             self._check_steps(steps)
-            await self._done(self._served.simulation.post(self._check_held))
+            self._services.carry_out(self._check_held)
             for completed in range(1, steps + 1):
                 if goal.is_cancel_requested:
                     goal.canceled()
@@ -276,32 +294,18 @@ class SimulationServices:
                     result.result.result = messages.Result.RESULT_OPERATION_FAILED
                     result.result.error_message = text
                     return result
-                await self._done(self._served.operations.step(1))
+                self._services.result(self._served.operations.step(1))
                 feedback.completed_steps = completed
                 feedback.remaining_steps = steps - completed
                 goal.publish_feedback(feedback)
-        except Exception as error:  # of the request, or of a step
+        except CallError as error:
             result.result.result = _code(error)
-            result.result.error_message = sendable_text(str(error))
+            result.result.error_message = str(error)
             goal.abort()
         else:
             result.result.result = messages.Result.RESULT_OK
             goal.succeed()
         return result
-
-    def _done(self, future: Future[Any]) -> RosFuture[Any]:
-        """Returns what the action awaits instead of a future of another thread."""
-        awaited: RosFuture[Any] = RosFuture(executor=self._action._node.executor)
-
-        def forward(done: Future[Any]) -> None:
-            error = done.exception()
-            if error is None:
-                awaited.set_result(done.result())
-            else:
-                awaited.set_exception(error)
-
-        future.add_done_callback(forward)
-        return awaited
 
     # -- entities --------------------------------------------------------------------------
 
@@ -327,10 +331,10 @@ class SimulationServices:
         resource = getattr(request, "entity_resource", request)
         path = _path_of(resource.uri, resource.resource_string, response)
         if not request.name and not request.allow_renaming:
-            raise Refusal(response.NAME_INVALID, "name is empty, and allow_renaming is false")
+            raise RefusedError(response.NAME_INVALID, "name is empty, and allow_renaming is false")
         if not is_legal_namespace(request.entity_namespace):
             text = f'illegal namespace "{request.entity_namespace}"'
-            raise Refusal(response.NAMESPACE_INVALID, text)
+            raise RefusedError(response.NAMESPACE_INVALID, text)
         pose = _planar(request.initial_pose.header, request.initial_pose.pose, response)
 
         def spawn() -> str:
@@ -340,7 +344,9 @@ class SimulationServices:
             wanted = request.name or _entity_name(resource.uri)
             response.entity_name = names.claim(wanted)
             if response.entity_name != wanted and not request.allow_renaming:
-                raise Refusal(response.NAME_NOT_UNIQUE, f'there is an entity "{wanted}" already')
+                raise RefusedError(
+                    response.NAME_NOT_UNIQUE, f'there is an entity "{wanted}" already'
+                )
             return self._served.operations.spawn(
                 path, response.entity_name, request.entity_namespace, pose
             )
@@ -349,13 +355,13 @@ class SimulationServices:
             return self._services.carry_out(
                 self._services.with_files(lambda source: source.read_models_ahead([path]), spawn)
             )
-        except Refusal:
+        except RefusedError:
             raise
         except CallError as error:
             if isinstance(error.__cause__, UnreadableFileError):
-                raise Refusal(messages.Result.RESULT_NOT_FOUND, str(error)) from error
+                raise RefusedError(messages.Result.RESULT_NOT_FOUND, str(error)) from error
             if isinstance(error.__cause__, YamlError):
-                raise Refusal(response.RESOURCE_PARSE_ERROR, str(error)) from error
+                raise RefusedError(response.RESOURCE_PARSE_ERROR, str(error)) from error
             raise
 
     def _delete_entity(self, request: Any, _response: Any) -> None:
@@ -386,7 +392,7 @@ class SimulationServices:
         # Version 2 of the interfaces has flags.
         sets_pose = getattr(request, "set_pose", True)
         if getattr(request, "set_twist", True) and not _is_zero(state.twist):
-            raise Refusal(
+            raise RefusedError(
                 messages.Result.RESULT_FEATURE_UNSUPPORTED,
                 "entities are at rest after a move: the twist must be zero",
             )
@@ -445,12 +451,12 @@ class SimulationServices:
         """Returns the models that match all filters; must be called between two steps."""
         if len(filters.filter) > _MAX_FILTER:
             text = f"the filter must have at most {_MAX_FILTER} characters"
-            raise Refusal(messages.Result.RESULT_OPERATION_FAILED, text)
+            raise RefusedError(messages.Result.RESULT_OPERATION_FAILED, text)
         try:
             pattern = re.compile(filters.filter)
         except re.error as error:
             text = f'invalid regular expression "{filters.filter}": {error}'
-            raise Refusal(messages.Result.RESULT_OPERATION_FAILED, text) from error
+            raise RefusedError(messages.Result.RESULT_OPERATION_FAILED, text) from error
         categories = {each.category for each in filters.categories}
         people = self._people()
         return [
@@ -478,7 +484,7 @@ class SimulationServices:
         return int(category.CATEGORY_DYNAMIC_OBJECT)
 
 
-class Refusal(CallError):
+class RefusedError(CallError):
     """A request was refused for a reason that has a code."""
 
     def __init__(self, code: int, text: str) -> None:
@@ -520,7 +526,7 @@ def _serve_change_rate(transport: Transport, services: Services) -> Connection:
 
 def _code(error: Exception) -> int:
     """Returns the result code of a failed request."""
-    if isinstance(error, Refusal):
+    if isinstance(error, RefusedError):
         return error.code
     return int(messages.Result.RESULT_OPERATION_FAILED)
 
@@ -529,14 +535,14 @@ def _planar(header: Any, pose: Any, response: Any) -> Pose:
     """Returns a pose in the world frame.
 
     Raises:
-        Refusal: The frame is another one, or the pose is not finite or has no rotation.
+        RefusedError: The frame is another one, or the pose is not finite or has no rotation.
     """
     if header.frame_id.lstrip("/") not in _WORLD_FRAMES:
         text = f'poses are in the frame "{WORLD_FRAME}" of the world, got "{header.frame_id}"'
-        raise Refusal(response.INVALID_POSE, text)
+        raise RefusedError(response.INVALID_POSE, text)
     planar = planar_pose(pose)
     if planar is None:
-        raise Refusal(response.INVALID_POSE, "the pose is not finite or has no rotation")
+        raise RefusedError(response.INVALID_POSE, "the pose is not finite or has no rotation")
     return planar
 
 
@@ -549,19 +555,19 @@ def _path_of(uri: str, text: str, response: Any) -> str:
     """Returns the path of a model file, or YAML text that `World.spawn_model` accepts.
 
     Raises:
-        Refusal: There is neither, or of another format.
+        RefusedError: There is neither, or of another format.
     """
     if not uri:
         if not text.strip():
-            raise Refusal(response.NO_RESOURCE, "neither a URI nor a text is given")
+            raise RefusedError(response.NO_RESOURCE, "neither a URI nor a text is given")
         if text.lstrip().startswith("<"):
-            raise Refusal(response.UNSUPPORTED_FORMAT, "the text is XML, expected YAML")
+            raise RefusedError(response.UNSUPPORTED_FORMAT, "the text is XML, expected YAML")
         return f"\n{text}"
     parts = urlsplit(uri)
     path = unquote(parts.path) if parts.scheme == "file" else uri
     if parts.scheme not in ("", "file") or Path(path).suffix not in _FORMATS:
         text = f'"{uri}" is not the path or the file: URI of a model file (.yaml)'
-        raise Refusal(response.UNSUPPORTED_FORMAT, text)
+        raise RefusedError(response.UNSUPPORTED_FORMAT, text)
     return path
 
 
@@ -602,17 +608,17 @@ def _overlaps(model: Model, bounds: Any) -> bool:
     """Returns whether the bounds of a model overlap those of a filter.
 
     Raises:
-        Refusal: The type of the bounds is not supported, or they have too few points.
+        RefusedError: The type of the bounds is not supported, or they have too few points.
     """
     kind = bounds.type
     if kind == bounds.TYPE_EMPTY:
         return True
     if kind not in (bounds.TYPE_BOX, bounds.TYPE_SPHERE):
         text = "bounds of a filter must be a box or a sphere"
-        raise Refusal(messages.Result.RESULT_FEATURE_UNSUPPORTED, text)
+        raise RefusedError(messages.Result.RESULT_FEATURE_UNSUPPORTED, text)
     if len(bounds.points) != 2:
         text = f"a box or a sphere has 2 points, got {len(bounds.points)}"
-        raise Refusal(messages.Result.RESULT_OPERATION_FAILED, text)
+        raise RefusedError(messages.Result.RESULT_OPERATION_FAILED, text)
     own = _bounds(model)
     if own is None:
         return False

@@ -26,24 +26,12 @@ import rosgraph
 import roslib.packages
 import rospy
 from programs import Program
+from room_world import LAYER, write_room_world
 from roscpp.srv import SetLoggerLevel
 from waiting import TIMEOUT, wait_until
 
 import flatland
 from flatland.srv import DeleteModel, MoveModel, ResetWorld, SpawnModel, StepWorld, WaitUntilReady
-
-MAP = "type: line_segments\ndata: walls.dat\nscale: 1.0\norigin: [0, 0, 0]\n"
-WALLS = "-5 -5 5 -5\n5 -5 5 5\n5 5 -5 5\n-5 5 -5 -5\n"  # a room of 10 m by 10 m around (0, 0)
-LAYER = "{name: 2d, map: map.yaml}"
-BODY = "{name: base, footprints: [{type: circle, radius: 0.2, density: 1}]}"
-BALL = f"bodies: [{BODY}]\n"
-ROBOT = f"""
-bodies: [{BODY}]
-plugins:
-  - {{type: DiffDrive, name: drive, body: base, pub_rate: 50}}
-  - {{type: Laser, name: laser, body: base, range: 20, update_rate: 10,
-     angle: {{min: -1.5, max: 1.5, increment: 0.5}}}}
-"""
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
@@ -434,16 +422,7 @@ def write_world(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., Path]
         models: str = "[]", plugins: str = "[]", layers: str = f"[{LAYER}]", **files: str
     ) -> Path:
         folder = tmp_path_factory.mktemp("world")
-        (folder / "map.yaml").write_text(MAP)
-        (folder / "walls.dat").write_text(WALLS)
-        files = {"ball": BALL, "robot": ROBOT, **files}
-        for name, text in files.items():
-            (folder / f"{name}.model.yaml").write_text(text)
-        path = folder / "world.yaml"
-        path.write_text(
-            f"properties: {{}}\nlayers: {layers}\nmodels: {models}\nplugins: {plugins}\n"
-        )
-        return path
+        return write_room_world(folder, models, plugins, layers, **files)
 
     return write
 
