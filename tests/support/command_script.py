@@ -98,7 +98,9 @@ def run_script(client: Client, result: Path) -> None:
     def step(duration: float) -> None:
         client.step(duration)
         answers.append(client.probe())
+        assert len(answers[-1].split()) == 3, answers[-1]
 
+    client.probe()  # From now on, the laser is computed.
     step(0.1)
     drive(0.5, 0.3)
     step(1.0)

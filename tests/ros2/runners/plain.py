@@ -16,7 +16,6 @@ class PlainClient:
 
     def __init__(self, world: flatland.World) -> None:
         self._world = world
-        world.output("/scan")
 
     def drive(self, linear: float, angular: float) -> None:
         self._world.command("/cmd_vel").set(flatland.Twist(linear, 0.0, angular))
