@@ -11,27 +11,15 @@ from collections.abc import Sequence
 from contextlib import ExitStack, closing
 from typing import TYPE_CHECKING, Any, Final
 
-from flatland.errors import FlatlandError
-from flatland.node.fault_reports import FaultReports
-from flatland.node.parameters import (
-    NodeParameters,
-    ParameterError,
-    Ros2Parameters,
-    read_parameters,
-    read_table,
-)
-from flatland.node.shutdown import ShutdownWatchdog
+from flatland.node.parameters import Ros2Parameters, read_parameters, read_table
+from flatland.node.run import NodeRun
 
 if TYPE_CHECKING:
     from rclpy.node import Node
 
-    from flatland.ros2.transport import Ros2Transport
-    from flatland.simulation import Simulation
-
 _LOG = logging.getLogger("flatland")
 
 NODE_NAME: Final = "flatland_server"
-_SWITCH_INTERVAL: Final = 0.0002  # s for which a thread keeps the GIL while others wait for it
 _SPIN_PERIOD: Final = 3600.0  # s
 _EXECUTOR_TIMEOUT: Final = 0.5  # s, for the callback in progress when the node ends
 
@@ -60,10 +48,7 @@ class ServerNode:
 
     def __init__(self) -> None:
         """Prepares the run."""
-        self._stopping = threading.Event()
-        self._simulation: Simulation | None = None
-        self._transport: Ros2Transport | None = None
-        self._fault_reports = FaultReports(lambda _error_type: False)
+        self._run = NodeRun(lambda _error_type: False, lambda: None)
 
     def run(self, command_line: Sequence[str]) -> int:
         """Runs until a stop is requested, and returns the exit code.
@@ -71,11 +56,6 @@ class ServerNode:
         Args:
             command_line: The name of the program and its arguments.
         """
-        # First of all, so that no signal is lost.
-        watchdog = ShutdownWatchdog(self._stop, lambda: None)
-        self._fault_reports.install()
-        # The executor needs the GIL for each message beside a loop at full speed.
-        sys.setswitchinterval(_SWITCH_INTERVAL)
         import rclpy
         from rclpy.signals import SignalHandlerOptions
         from rclpy.utilities import remove_ros_args
@@ -91,45 +71,20 @@ class ServerNode:
             rclpy.init(args=command_line, signal_handler_options=SignalHandlerOptions.NO)
             node = rclpy.create_node(NODE_NAME)
         except Exception as error:  # an invalid argument or name, of several types
-            return self._fail(_first_line(error))
+            return self._run.fail(_first_line(error))
         with ExitStack() as ending:
             ending.callback(rclpy.try_shutdown)
             ending.callback(node.destroy_node)
             from flatland.ros2.logs import log_to_ros
 
             log_to_ros(node.get_logger())
-            try:
-                self._simulate(node, watchdog)
-            except ParameterError as error:
-                return self._fail(str(error))
-            except FlatlandError as error:
-                return self._fail(error.text_with_hint)
-            except Exception:
-                return self._fail("unexpected internal error", exc_info=True)
-        return 0
+            return self._run.exit_code_of(lambda: self._simulate(node))
 
-    def _stop(self) -> None:
-        """Ends the simulation after the current step; safe from any thread."""
-        self._stopping.set()
-        if self._transport is not None:
-            self._transport.shut_down()
-        if self._simulation is not None:
-            self._simulation.stop()
-
-    def _fail(self, text: str, **options: Any) -> int:
-        if self._stopping.is_set():
-            # An error caused by the stop, for example during loading, is not a failure.
-            _LOG.info("stopped: %s", text)
-            return 0
-        _LOG.critical("%s", text, **options)
-        return 1
-
-    def _simulate(self, node: Node, watchdog: ShutdownWatchdog) -> None:
+    def _simulate(self, node: Node) -> None:
         """Loads the world and steps it until a stop is requested.
 
         Args:
             node: The node.
-            watchdog: Limits the time of the shutdown.
 
         Raises:
             ParameterError: A parameter is invalid.
@@ -142,12 +97,15 @@ class ServerNode:
         # The node sets its time itself, instead of subscribing to its own /clock.
         node._time_source.detach_node()
         declared = DeclaredParameters(node)
-        parameters: NodeParameters = read_parameters(declared.get)
-        own: Ros2Parameters = read_table(Ros2Parameters, declared.get)
-        watchdog.timeout = parameters.shutdown_timeout
+        parameters = read_parameters(declared.get)
+        own = read_table(Ros2Parameters, declared.get)
+        self._run.watchdog.timeout = parameters.shutdown_timeout
         declared.describe(parameters, own)
-        transport = self._transport = Ros2Transport(
-            node, declared, reliable_sensors=own.reliable_sensors
+        transport = Ros2Transport(
+            node,
+            declared,
+            reliable_sensors=own.reliable_sensors,
+            is_stopping=self._run.stopping.is_set,
         )
         clock: NodeClock
         if parameters.use_sim_time:
@@ -158,21 +116,16 @@ class ServerNode:
             from flatland.ros2.adapters import use_stamped_twists
 
             use_stamped_twists()
-        from flatland.node.served_world import ServedWorld
         from flatland.ros2.simulation_services import simulation_services
 
-        with (
-            closing(_ExecutorThread(node)),
-            closing(ServedWorld(parameters, transport, clock)) as served,
-            simulation_services(transport, served, node),
-        ):
-            self._fault_reports.world = served.world
-            self._simulation = served.simulation
-            if self._stopping.is_set():
-                served.simulation.stop()
-            gc.enable()
-            served.run()
-            transport.shut_down()
+        with closing(_ExecutorThread(node)):
+            self._run.serve(
+                parameters,
+                transport,
+                clock,
+                lambda served: simulation_services(transport, served, node),
+                ended=transport.shut_down,
+            )
 
 
 class _ExecutorThread:

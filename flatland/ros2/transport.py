@@ -49,7 +49,12 @@ class Ros2Transport(Transport):
     REGISTER_ADAPTER = "flatland.ros2.adapters.register_adapter"
 
     def __init__(
-        self, node: Node, parameters: DeclaredParameters, *, reliable_sensors: bool
+        self,
+        node: Node,
+        parameters: DeclaredParameters,
+        *,
+        reliable_sensors: bool,
+        is_stopping: Callable[[], bool],
     ) -> None:
         """Uses a node, which must outlive the transport.
 
@@ -57,16 +62,18 @@ class Ros2Transport(Transport):
             node: The node, which an executor runs in another thread.
             parameters: Its parameters.
             reliable_sensors: Whether measurements of sensors are published reliably.
+            is_stopping: Returns whether a stop was requested.
         """
         self._node = node
+        self._is_stopping = is_stopping
         self._parameters = parameters
         self._clock = node.get_clock()
         self._endpoints = Endpoints(node, reliable_sensors=reliable_sensors)
-        self._shutting_down = False
+        self._has_ended = False
 
     def shut_down(self) -> None:
-        """Refuses further requests; safe from any thread."""
-        self._shutting_down = True
+        """Refuses further requests, because the simulation has ended."""
+        self._has_ended = True
 
     # -- topics and services ---------------------------------------------------------------
 
@@ -127,8 +134,8 @@ class Ros2Transport(Transport):
 
     @property
     def shutting_down(self) -> bool:
-        """Whether a stop was requested."""
-        return self._shutting_down
+        """Whether a stop was requested, or the simulation has ended."""
+        return self._has_ended or self._is_stopping()
 
     def resolve(self, name: str) -> str:
         """Returns the global name after remapping."""
