@@ -626,8 +626,8 @@ def _overlaps(model: Model, bounds: Any) -> bool:
     first, second = bounds.points
     if kind == bounds.TYPE_SPHERE:
         nearest = (min(max(first.x, x_min), x_max), min(max(first.y, y_min), y_max))
-        return math.dist(nearest, (first.x, first.y)) <= second.x
-    return (
+        return bool(math.dist(nearest, (first.x, first.y)) <= second.x)
+    return bool(
         min(first.x, second.x) <= x_max
         and x_min <= max(first.x, second.x)
         and min(first.y, second.y) <= y_max
