@@ -52,7 +52,7 @@ class Service(User):
         except ValueError as error:
             raise FlatlandError(f'illegal name of a service, "{name}": {error}') from error
         self._endpoints = endpoints
-        self._shared: Any = endpoints.join(
+        self._shared = endpoints.join(
             "service",
             self.name,
             service_type,
