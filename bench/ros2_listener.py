@@ -8,7 +8,7 @@ number of messages of each topic, and for scans
 
 - `latency`: the median and the 95th percentile of the time from their stamps, if these are wall
   times, to their arrival [s], and their number,
-- `speed`: the time between the first and the last stamp, divided by the time between their arrivals.
+- `speed`: the time between the first and the last stamp, relative to that of their arrivals.
 """
 
 from __future__ import annotations

@@ -9,7 +9,7 @@ import contextlib
 import logging
 import threading
 from collections.abc import Callable, Iterator
-from typing import Any
+from typing import Any, TypeVar, cast
 
 from rclpy.event_handler import PublisherEventCallbacks, SubscriptionEventCallbacks
 from rclpy.node import Node
@@ -25,6 +25,7 @@ _LOG = logging.getLogger("flatland")
 
 Key = tuple[str, str]
 """Kind and resolved name of a connection."""
+S = TypeVar("S", bound="Shared")
 
 
 class Endpoints:
@@ -49,8 +50,8 @@ class Endpoints:
         self._postponed: list[Shared] | None = None
 
     def join(
-        self, kind: str, name: str, ros_type: type[Any], user: User, create: Callable[[], Shared]
-    ) -> Shared:
+        self, kind: str, name: str, ros_type: type[Any], user: User, create: Callable[[], S]
+    ) -> S:
         """Adds a user to the connection of a name, which is created for the first one.
 
         Args:
@@ -83,7 +84,7 @@ class Endpoints:
                 except ValueError as error:  # of rclpy, for a name or a type
                     raise FlatlandError(f'cannot open {kind} "{name}": {error}') from error
             shared.users.append(user)
-            return shared
+            return cast(S, shared)  # Each kind has one class.
 
     def _remove_those_that_give_way(self, shared: Shared) -> Shared | None:
         """Ends a connection unless one of its users does not give way; returns what remains."""
@@ -279,7 +280,7 @@ class Publisher(User):
             profile = qos.of_publisher(
                 message_type, queue_size, latch=latch, reliable_sensors=endpoints.reliable_sensors
             )
-        self._shared: Any = endpoints.join(
+        self._shared = endpoints.join(
             "publisher",
             self.topic,
             message_type,

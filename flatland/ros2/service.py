@@ -12,12 +12,11 @@ from rclpy.node import Node
 
 from flatland.errors import FlatlandError
 from flatland.node.names import sendable_text
-from flatland.node.stamps import stamp
 from flatland.node.transport import CallError
+from flatland.ros2 import convert
 from flatland.ros2.adapters import find_adapter
 from flatland.ros2.endpoints import Endpoints, Shared, User, expanded
 from flatland.ros2.message_types import service_class
-from flatland.timekeeper import NANOSECONDS
 
 _LOG = logging.getLogger("flatland")
 
@@ -53,7 +52,7 @@ class Service(User):
         except ValueError as error:
             raise FlatlandError(f'illegal name of a service, "{name}": {error}') from error
         self._endpoints = endpoints
-        self._shared: Any = endpoints.join(
+        self._shared = endpoints.join(
             "service",
             self.name,
             service_type,
@@ -164,10 +163,7 @@ def fields_service(
 def _field(field_type: str, value: Any) -> Any:
     """Converts a field of a response to its type of ROS."""
     if field_type == "builtin_interfaces/Time":
-        from builtin_interfaces.msg import Time
-
-        seconds, nanoseconds = divmod(stamp(value), NANOSECONDS)
-        return Time(sec=seconds, nanosec=nanoseconds)
+        return convert.time(value)
     if field_type == "sequence<geometry_msgs/Pose2D>":
         from geometry_msgs.msg import Pose2D
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import struct
 from functools import lru_cache
-from typing import Final
+from typing import Any, Final
 
-from flatland.node.adapters.writer import Writer
+from flatland.node.adapters.writer import LAYOUTS, Writer
 from flatland.node.stamps import stamp as message_stamp
 from flatland.ros2 import ros_time
 from flatland.timekeeper import NANOSECONDS
@@ -35,6 +35,13 @@ class CdrWriter(Writer):
     def align(self, size: int) -> None:
         """Pads the message to a multiple of `size` bytes, a power of two up to 8."""
         self.data += _PADDING[(len(ENCAPSULATION) - len(self.data)) & (size - 1)]
+
+    def pack(self, code: str, *values: Any) -> None:
+        """Writes up to 16 numbers of one type, without their count."""
+        size = LAYOUTS[code][1].size
+        if size > 1:
+            self.align(size)
+        self.data += LAYOUTS[code][len(values)].pack(*values)
 
     def stamp(self, seconds: int, nanoseconds: int) -> int:
         """Writes a stamp."""

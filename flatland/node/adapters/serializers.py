@@ -12,7 +12,7 @@ from flatland import values
 from flatland.geometry import DoubleArray
 from flatland.node import values as node_values
 from flatland.node.adapters.people_markers import people_markers
-from flatland.node.adapters.writer import FLOAT32, INT8, UINT32, Writer
+from flatland.node.adapters.writer import BOOL, FLOAT32, INT8, UINT32, Writer
 from flatland.node.names import sendable_text
 from flatland.timekeeper import NANOSECONDS
 
@@ -231,7 +231,7 @@ def people_states(value: values.PeopleStates, to: Writer) -> None:
     to.texts(value.names)
     to.texts(value.groups)
     _poses_and_twists(value.poses, value.velocities, to)
-    to.array(np.asarray(value.standing, bool), bool)
+    to.array(np.asarray(value.standing, bool), BOOL)
 
 
 def model_states(value: node_values.StampedModelStates, to: Writer) -> None:

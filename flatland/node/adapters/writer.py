@@ -5,7 +5,6 @@ from __future__ import annotations
 import struct
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from functools import lru_cache
 from typing import Any, Final
 
 import numpy as np
@@ -19,12 +18,13 @@ FLOAT32: Final = np.dtype("<f4")
 FLOAT64: Final = np.dtype("<f8")
 UINT32: Final = np.dtype("<u4")
 INT8: Final = np.dtype("i1")
+BOOL: Final = np.dtype(bool)
 
 
-@lru_cache(None)
-def packed_numbers(code: str, count: int) -> struct.Struct:
-    """Returns the little-endian layout of `count` numbers of one type, as in `struct`."""
-    return struct.Struct(f"<{count}{code}")
+LAYOUTS: Final = {
+    code: [struct.Struct(f"<{count}{code}") for count in range(17)] for code in "bBHiIQfd"
+}
+"""The little-endian layouts of up to 16 numbers of one type, by its code in `struct`."""
 
 
 class Writer(ABC):
@@ -80,35 +80,31 @@ class Writer(ABC):
         self.stamp(*divmod(message_stamp(time_ns), NANOSECONDS))
         self.text(frame_id)
 
+    @abstractmethod
     def pack(self, code: str, *values: Any) -> None:
-        """Writes numbers of one type, without their count.
+        """Writes up to 16 numbers of one type, without their count.
 
         Args:
-            code: The type as in `struct`.
+            code: The type, one of `LAYOUTS`.
             values: The numbers.
 
         Raises:
             struct.error: A value is not a number, or does not fit the type.
         """
-        layout = packed_numbers(code, len(values))
-        if layout.size > len(values):
-            self.align(layout.size // len(values))
-        self.data += layout.pack(*values)
 
     def count(self, count: int) -> None:
         """Writes the number of items of an array that follows."""
         self.pack("I", count)
 
-    def numbers(self, values: npt.NDArray[Any], kind: npt.DTypeLike = FLOAT64) -> None:
+    def numbers(self, values: npt.NDArray[Any], kind: np.dtype[Any] = FLOAT64) -> None:
         """Writes the numbers of an array in row-major order, without their count."""
         if values.size:
-            kind = np.dtype(kind)
             self.align(kind.itemsize)
             if values.dtype is not kind:
                 values = values.astype(kind)
             self.data += values.tobytes()
 
-    def array(self, values: npt.NDArray[Any], kind: npt.DTypeLike = FLOAT64) -> None:
+    def array(self, values: npt.NDArray[Any], kind: np.dtype[Any] = FLOAT64) -> None:
         """Writes an array of numbers of variable length, with its count."""
         self.pack("I", values.size)
         self.numbers(values, kind)

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import struct
 from functools import lru_cache
-from typing import Final
+from typing import Any, Final
 
+import numpy as np
+import numpy.typing as npt
 import rospy
 
-from flatland.node.adapters.writer import Writer
+from flatland.node.adapters.writer import FLOAT64, LAYOUTS, Writer
 from flatland.node.stamps import stamp as message_stamp
 from flatland.timekeeper import NANOSECONDS
 
@@ -33,6 +35,20 @@ class RosWriter(Writer):
 
     def align(self, size: int) -> None:
         """Has no effect: messages have no padding."""
+
+    def pack(self, code: str, *values: Any) -> None:
+        """Writes up to 16 numbers of one type, without their count."""
+        self.data += LAYOUTS[code][len(values)].pack(*values)
+
+    def numbers(self, values: npt.NDArray[Any], kind: np.dtype[Any] = FLOAT64) -> None:
+        """Writes the numbers of an array in row-major order, without their count."""
+        if values.dtype is not kind:
+            values = values.astype(kind)
+        self.data += values.tobytes()
+
+    def header(self, time_ns: int, frame_id: str) -> None:
+        """Writes a `std_msgs/Header` with the sequence number 0."""
+        self.data += _HEADER.pack(0, *divmod(message_stamp(time_ns), NANOSECONDS)) + _text(frame_id)
 
     def stamp(self, seconds: int, nanoseconds: int) -> int:
         """Writes the sequence number 0 and the stamp."""
