@@ -39,7 +39,7 @@ if TYPE_CHECKING:
     from flatland.world import World
 
 _CLOCK: Final = "/clock"
-_CLOCK_REPETITIONS: Final = 2.0  # s of wall time after a new subscriber
+_CLOCK_REPETITIONS: Final = 5.0  # s of wall time after a new subscriber
 _CLOCK_REPETITION_RATE: Final = 10.0  # Hz
 
 
