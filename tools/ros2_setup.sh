@@ -26,8 +26,8 @@ identity="$("$python" --version) $venv $(cat tools/ros2/common.txt "$requirement
 if [[ $(cat "$venv/flatland-requirements" 2>/dev/null) != "$identity" ]]; then
   echo "flatland: installing ROS 2 ${distribution^} in $venv"
   quietly "python3 -m venv" "$python" -m venv --clear "$venv"
-  # All packages are listed: without a search for versions, this takes half the time.
-  pip_install "pip install of ROS 2" "$venv/bin/python" --no-deps -r "$requirements"
+  # All packages are listed, so that no versions are searched for; Python compiles what it imports.
+  pip_install "pip install of ROS 2" "$venv/bin/python" --no-compile --no-deps -r "$requirements"
   echo "$identity" >"$venv/flatland-requirements"
 fi
 

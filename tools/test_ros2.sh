@@ -10,9 +10,10 @@ if [[ -n $missing ]]; then
   echo "flatland: tests/ros2 are skipped: $missing"
   exit 0
 fi
-for distribution in kilted jazzy; do
-  tools/ros2_setup.sh "$distribution"
-done
+tools/ros2_setup.sh kilted &
+kilted=$!
+tools/ros2_setup.sh jazzy
+wait "$kilted"
 
 if [[ $# == 0 ]]; then set -- tests/ros2; fi
 status=0

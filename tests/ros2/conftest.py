@@ -52,16 +52,16 @@ def domain() -> Iterator[int]:
 class Topic(MessageQueue):
     """The messages received on a topic since its creation."""
 
-    def __init__(self, node: Any, name: str, message_type: type[Any], profile: Any) -> None:
+    def __init__(self, ros: Ros2, name: str, message_type: type[Any], profile: Any) -> None:
         super().__init__(name)
-        self._node = node
-        self._subscription = node.create_subscription(
-            message_type, name, self.messages.put, profile
+        self._ros = ros
+        self._subscription = ros.run(
+            lambda: ros.node.create_subscription(message_type, name, self.messages.put, profile)
         )
 
     def close(self) -> None:
         """Unsubscribes."""
-        self._node.destroy_subscription(self._subscription)
+        self._ros.run(lambda: self._ros.node.destroy_subscription(self._subscription))
 
 
 class Ros2:
@@ -71,23 +71,34 @@ class Ros2:
         self.node = node
         self._closers: list[Callable[[], object]] = []
 
+    def run(self, action: Callable[[], Any]) -> Any:
+        """Runs an action in the thread of the executor.
+
+        There, nothing is destroyed while the executor waits for it, which would end the executor.
+        """
+        done = threading.Event()
+        task = self.node.executor.create_task(action)
+        task.add_done_callback(lambda _task: done.set())
+        assert done.wait(TIMEOUT), "the executor is blocked"
+        return task.result()
+
     def topic(self, name: str, message_type: type[Any], profile: Any = 10) -> Topic:
         """Subscribes to a topic until the end of the test; waits for its publisher."""
-        topic = Topic(self.node, name, message_type, profile)
+        topic = Topic(self, name, message_type, profile)
         self._closers.append(topic.close)
         wait_until(f"a publisher of {name}", lambda: self.node.count_publishers(name))
         return topic
 
     def publisher(self, name: str, message_type: type[Any], profile: Any = 10) -> Any:
         """Advertises a topic until the end of the test; waits for its subscriber."""
-        publisher = self.node.create_publisher(message_type, name, profile)
-        self._closers.append(lambda: self.node.destroy_publisher(publisher))
+        publisher = self.run(lambda: self.node.create_publisher(message_type, name, profile))
+        self._closers.append(lambda: self.run(lambda: self.node.destroy_publisher(publisher)))
         wait_until(f"a subscriber of {name}", lambda: publisher.get_subscription_count())
         return publisher
 
     def call(self, service: str, service_type: type[Any], **fields: object) -> Any:
         """Calls a service."""
-        client = self.node.create_client(service_type, service)
+        client = self.run(lambda: self.node.create_client(service_type, service))
         try:
             assert client.wait_for_service(TIMEOUT), f"no service {service}"
             done = threading.Event()
@@ -96,7 +107,7 @@ class Ros2:
             assert done.wait(TIMEOUT), f"no response of {service}"
             return future.result()
         finally:
-            self.node.destroy_client(client)
+            self.run(lambda: self.node.destroy_client(client))
 
     def wait_until_ready(self, *topics: str, namespace: str = "") -> None:
         """Waits until a node has opened everything, and topics of it are connected."""

@@ -7,12 +7,14 @@ import sys
 from pathlib import Path
 from typing import Any
 
+import pytest
 from rclpy.qos import ReliabilityPolicy
 
 from flatland.ros2 import qos
 from flatland.ros2.message_types import message_class
 
 
+@pytest.mark.kilted
 def test_from_nothing_to_a_driving_robot(ros: Any, launcher: Any, checkout: Path) -> None:
     text = (checkout / "docs" / "ros2.md").read_text()
     [commands] = re.findall(r"```bash\nmake ros2\n(.*?)```", text, re.DOTALL)

@@ -130,7 +130,7 @@ def test_steps(ros: Any) -> None:
 
 def run_action(ros: Any, steps: int, cancel_after: int = 0) -> tuple[Any, list[int]]:
     """Returns the result of the action, and the numbers of completed steps of the feedback."""
-    client = ActionClient(ros.node, SimulateSteps, "/simulate_steps")
+    client = ros.run(lambda: ActionClient(ros.node, SimulateSteps, "/simulate_steps"))
     assert client.wait_for_server(TIMEOUT)
     completed: list[int] = []
     enough = threading.Event()
@@ -152,7 +152,7 @@ def run_action(ros: Any, steps: int, cancel_after: int = 0) -> tuple[Any, list[i
         assert enough.wait(TIMEOUT)
         goal.cancel_goal_async()
     result = wait_for(goal.get_result_async())
-    client.destroy()
+    ros.run(client.destroy)
     return result.result.result, completed
 
 
