@@ -9,8 +9,9 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+import flatland_msgs.srv
 import pytest
-from command_script import run_script, write_world
+from command_script import FAILURES, run_script, write_world
 from flatland_msgs.srv import DeleteModel, MoveModel, ResetWorld, SpawnModel
 from geometry_msgs.msg import Pose2D, Twist
 from programs import run_program
@@ -73,6 +74,10 @@ def test_equal_results(ros: Any, launcher: Any, checkout: Path, tmp_path: Path) 
     launcher.environment |= plugin
     launcher.server(ros, world, lockstep=True, seed=SEED)
     run_script(Ros2Client(ros), tmp_path / "ros2.json")
+    failures = []
+    for name, service_type, fields in FAILURES:
+        answer = ros.call(f"/{name}", getattr(flatland_msgs.srv, service_type), **fields)
+        failures.append([answer.success, answer.message])
 
     python = checkout / ".venv" / "bin" / "python"
     environment = environment_of_ros_1(checkout) | plugin
@@ -88,6 +93,8 @@ def test_equal_results(ros: Any, launcher: Any, checkout: Path, tmp_path: Path) 
     expected = json.loads((tmp_path / "plain.json").read_text())
     assert len(expected) == 5
     assert len(set(expected)) == 5
+    assert not any(success or not message for success, message in failures)
+    assert json.loads((tmp_path / "ros1.failures").read_text()) == failures
     for name in ("ros1", "ros2", "wheels"):
         assert json.loads((tmp_path / f"{name}.json").read_text()) == expected, name
 

@@ -49,7 +49,7 @@ def test_all_services_of_ros_1_are_offered(ros: Any) -> None:
         assert offered[f"/{service.name}"] == [f"{package}/srv/{name}"]
 
 
-# Texts of tests/ros and tests/unit/node, where they are those of ROS 1.
+# test_equal_results.py compares all texts with those of ROS 1.
 @pytest.mark.parametrize(
     ("service", "service_type", "fields", "text"),
     [

@@ -47,6 +47,25 @@ MANIFEST = (
 )
 
 
+# Calls that fail: service, type and fields of the request.
+FAILURES: tuple[tuple[str, str, dict[str, object]], ...] = (
+    ("spawn_model", "SpawnModel", {"yaml_path": "no.model.yaml", "name": "n"}),
+    ("spawn_model", "SpawnModel", {"yaml_path": "ball.model.yaml", "name": "ball"}),
+    ("spawn_model", "SpawnModel", {"yaml_path": "ball.model.yaml", "name": "n", "ns": "a b"}),
+    ("spawn_model", "SpawnModel", {"yaml_path": "{bodies: 3}", "name": "n"}),
+    ("move_model", "MoveModel", {"name": "nobody"}),
+    ("delete_model", "DeleteModel", {"name": "nobody"}),
+    ("delete_models", "DeleteModels", {"names": ["ball", "nobody"]}),
+    ("get_model_states", "GetModelStates", {"names": ["nobody"]}),
+    ("set_rate", "SetRate", {"update_rate": -1.0}),
+    ("set_appearance", "SetAppearance", {"model": "ball", "color": [2.0, 0.0, 0.0]}),
+    ("set_layer_map", "SetLayerMap", {"layer": "2d"}),
+    ("step_world", "StepWorld", {"duration": 0.003}),
+    ("reset_world", "ResetWorld", {"seed": -2}),
+    ("wait_until_ready", "WaitUntilReady", {"topics": ["/x"]}),
+)
+
+
 class Client(Protocol):
     """What carries out the commands of the script in a world in lockstep."""
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import signal
 import socket
@@ -17,11 +18,12 @@ os.environ |= {"ROS_MASTER_URI": f"http://127.0.0.1:{PORT}", "ROS_IP": "127.0.0.
 
 import rosgraph
 import rospy
-from command_script import run_script
+from command_script import FAILURES, run_script
 from geometry_msgs.msg import Pose2D, Twist
 from std_srvs.srv import Trigger
 from waiting import TIMEOUT, wait_until
 
+import flatland.srv
 from flatland.srv import DeleteModel, MoveModel, ResetWorld, SpawnModel, StepWorld
 
 
@@ -72,6 +74,12 @@ try:
     rospy.init_node("script", disable_rostime=True)
     rospy.wait_for_service("/probe", TIMEOUT)
     run_script(Ros1Client(), Path(result))
+    answers = []
+    for name, service_type, fields in FAILURES:
+        found = getattr(flatland.srv, service_type)
+        answer = rospy.ServiceProxy(f"/{name}", found)(found._request_class(**fields))
+        answers.append([answer.success, answer.message])
+    Path(result).with_suffix(".failures").write_text(json.dumps(answers))
 finally:
     for process in (server, core):
         if process is not None:
