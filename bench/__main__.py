@@ -28,6 +28,7 @@ MODULES = (
     "plugin_steps",
     "messages",
     "node",
+    "ros2",
     "lockstep",
     "real_time",
     "large_map",

@@ -7,8 +7,9 @@ from io import BytesIO
 import numpy as np
 
 from flatland.entities.layer import Layer
+from flatland.node.markers.layer_markers import LayerMarkers
 from flatland.physics import PhysicsWorld
-from flatland.ros.markers.layer_markers import LayerMarkers
+from flatland.ros.adapters.writer import RosWriter
 
 from table import Row  # isort: skip
 from timing import best_of
@@ -23,7 +24,7 @@ def rows(_unit: float) -> list[Row]:
     layer = Layer(PhysicsWorld(), ["walls"], 1, color, {}, origin=(0, 0, 0), edges=edges)
 
     def build() -> None:
-        markers = LayerMarkers(layer)
+        markers = LayerMarkers(layer, RosWriter)
         for message in (markers.lines(0), markers.walls(0)):
             BytesIO().write(message.packed)
 

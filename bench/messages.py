@@ -10,9 +10,10 @@ import numpy as np
 from visualization_msgs.msg import MarkerArray
 
 import flatland
+from flatland.node.markers.model_markers import ModelMarkers
 from flatland.node.values import Transforms
 from flatland.ros.adapters import find_adapter
-from flatland.ros.markers.model_markers import ModelMarkers
+from flatland.ros.adapters.writer import RosWriter
 
 from scenes import BEAMS, RANGE, benchmark_world_path  # isort: skip
 from table import Row
@@ -55,7 +56,7 @@ def _of_value(value: Any) -> tuple[Callable[[], object], Callable[[], object]]:
 def _markers_row() -> Row:
     with flatland.World.from_yaml(benchmark_world_path(), seed=1) as world:
         model = world.models[0]
-        markers, body = ModelMarkers(model), model.bodies[0]
+        markers, body = ModelMarkers(model, RosWriter), model.bodies[0]
         message = MarkerArray().deserialize(markers.message(0).packed)
         time_ns = 0
 

@@ -51,12 +51,12 @@ def rows(unit: float) -> list[Row]:
     """Measures the node in the benchmark world."""
     world = benchmark_world_path()
     with ros_session() as session, _quiet(world) as quiet_world:
-        laser = _speed(session, world)
-        quiet = _speed(session, quiet_world)
-        subscribed = _speed(session, world, CLOCK, SCAN, ODOMETRY)
-        four = _speed(session, world, SCAN, TF, ODOMETRY, TWIST)
+        laser = speed(session, world)
+        quiet = speed(session, quiet_world)
+        subscribed = speed(session, world, CLOCK, SCAN, ODOMETRY)
+        four = speed(session, world, SCAN, TF, ODOMETRY, TWIST)
         markers = _markers(world)
-        displayed = _speed(session, quiet_world, *markers, show_viz=True)
+        displayed = speed(session, quiet_world, *markers, show_viz=True)
         use = statistics.fmean(_processor_use(session, quiet_world, SCAN) for _ in range(RUNS))
         displayed_use = statistics.fmean(
             _processor_use(session, quiet_world, *markers, show_viz=True) for _ in range(RUNS)
@@ -124,7 +124,7 @@ def _markers(world: Path) -> list[str]:
     ]
 
 
-def _speed(session: RosSession, world: Path, *topics: str, show_viz: bool = False) -> Mean:
+def speed(session: RosSession, world: Path, *topics: str, show_viz: bool = False) -> Mean:
     """Returns the time of a step as logged by the node, over all runs."""
     listener = _subscribe(session, *topics) if topics else None
     arguments = {"world_path": world, "benchmark_duration": SIMULATED, "seed": 1}

@@ -73,6 +73,10 @@ class Program:
                 raise RuntimeError(f"{pattern!r} not in the output of {command}:\n{self._text}")
             self._text += data.decode(errors="replace")
 
+    def interrupt(self) -> None:
+        """Sends the program an interrupt, without waiting for its end."""
+        self._popen.send_signal(signal.SIGINT)
+
     def stop(self) -> None:
         """Interrupts the program, and kills what remains of its process group."""
         if self._popen.poll() is None:

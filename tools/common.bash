@@ -60,3 +60,12 @@ make_environment() {
   "$python" -c "$site" >"$("$venv/bin/python" -c "$site")/flatland.pth"
   echo "$identity" >"$venv/flatland-requirements"
 }
+
+# no_ros2_wheels PYTHON: prints the reason why there are no wheels of ROS 2 for an interpreter, or nothing.
+no_ros2_wheels() {
+  local platform
+  platform=$("$1" -c 'import platform, sys; print("%d.%d" % sys.version_info[:2], platform.machine())')
+  if [[ $platform != "3.11 x86_64" ]]; then
+    echo "there are no wheels of ROS 2 for Python $platform, only for Python 3.11 x86_64 (Debian 12)"
+  fi
+}

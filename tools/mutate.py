@@ -122,7 +122,12 @@ _ROOMS = {
         ),
     ),
     "ros": Room(
-        ("flatland/ros/**/*.py",),
+        (
+            "flatland/ros/**/*.py",
+            "flatland/node/adapters/*.py",
+            "flatland/node/foreign_topics/*.py",
+            "flatland/node/markers/*.py",
+        ),
         (
             "tests/unit/ros",
             "tests/unit/cli/test_run.py",

@@ -72,13 +72,15 @@ if [[ $level == dev ]]; then
   pip_install "pip install" "$venv/bin/python" --no-deps -r <(echo "$bare")
 fi
 
-# Python started in this folder imports the source package, which therefore requires the build results as well.
+# Python started in this folder imports the source package, which therefore requires the build results as well. It must
+# not import flatland_msgs from here, which is another package in ROS 2.
 site=$("$venv/bin/python" -c 'import sysconfig; print(sysconfig.get_path("platlib"))')
-(cd "$site" && find flatland flatland_msgs -name '_core*.so' -o -path 'flatland_msgs/*.py' \
-  -o -path 'flatland/msg/*.py' -o -path 'flatland/srv/*.py') | while IFS= read -r file; do
-  mkdir -p "$(dirname "$file")"
-  replace_file "$site/$file" "$file"
-done
+rm -rf flatland_msgs
+(cd "$site" && find flatland -name '_core*.so' -o -path 'flatland/msg/*.py' -o -path 'flatland/srv/*.py') |
+  while IFS= read -r file; do
+    mkdir -p "$(dirname "$file")"
+    replace_file "$site/$file" "$file"
+  done
 
 rm -f "$stamps/run" "$stamps/dev"
 echo "$content" >"$stamps/$level"

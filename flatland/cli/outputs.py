@@ -13,7 +13,7 @@ from flatland.cli.contents import counted
 from flatland.extras import missing
 
 if TYPE_CHECKING:
-    from flatland.ros.message_recorder import MessageRecorder
+    from flatland.node.message_recorder import MessageRecorder
 
 
 def path_with(suffixes: Sequence[str]) -> Callable[[str], Path]:

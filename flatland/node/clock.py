@@ -9,6 +9,8 @@ from collections.abc import Callable
 from concurrent.futures import Future
 from typing import Any, Final
 
+from flatland.node.stamps import set_stamps as set_stamps
+from flatland.node.stamps import stamp as stamp
 from flatland.node.ticker import Ticker
 from flatland.node.transport import Transport
 from flatland.timekeeper import NANOSECONDS
@@ -18,24 +20,6 @@ _LOG = logging.getLogger("flatland")
 MAX_STAMP_AGE: Final = 0.1  # s
 """Maximum difference of wall time between the start of a step and the stamps of its messages."""
 _MAX_STAMP_AGE_NS: Final = round(MAX_STAMP_AGE * NANOSECONDS)
-
-_stamps: Callable[[int], int] | None = None
-
-
-def set_stamps(stamps: Callable[[int], int] | None) -> None:
-    """Sets the stamps of all messages of this process.
-
-    Args:
-        stamps: Returns the stamp [ns] of a simulated time [ns]; called in any thread. None if
-            stamps are simulated times.
-    """
-    global _stamps
-    _stamps = stamps
-
-
-def stamp(nanoseconds: int) -> int:
-    """Returns the stamp [ns] of a simulated time [ns]: that time, or wall time."""
-    return nanoseconds if _stamps is None else _stamps(nanoseconds)
 
 
 class NodeClock:

@@ -70,14 +70,13 @@ class DeferredTopics:
                 self._start("debug markers", markers, simulation, self._debug_rate, thread)
             states = importlib.import_module("flatland.node.states")
             self._start("the pause state", states.PauseTopic, transport, simulation)
-            handles = importlib.import_module("flatland.node.handles")
-            self._start(
-                "interactive markers",
-                partial(handles.Handles, move_keeps_odometry=self._move_keeps_odometry),
-                simulation,
-                thread,
-                transport.load_handle_server(),
-            )
+            start_server = transport.load_handle_server()
+            if start_server is not None:
+                handles = importlib.import_module("flatland.node.handles")
+                handles_type = partial(
+                    handles.Handles, move_keeps_odometry=self._move_keeps_odometry
+                )
+                self._start("interactive markers", handles_type, simulation, thread, start_server)
             diagnostics = importlib.import_module("flatland.node.diagnostics")
             transport.publishable(diagnostics.Diagnostics)  # imports the message package
             self._start("diagnostics", diagnostics.DiagnosticsTopic, transport, simulation)

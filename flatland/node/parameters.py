@@ -29,6 +29,9 @@ ParameterSource = Callable[[str], object]
 Read = Callable[[Any], Any]
 """Checks and converts a value that is set; raises `_InvalidError`."""
 
+Limits = tuple[int, int] | tuple[float, float] | None
+"""Least and greatest valid number of a parameter; None for a parameter that is not a number."""
+
 OWN_PACKAGE: Final = "flatland"
 MESSAGE_PACKAGES: Final = (OWN_PACKAGE, "flatland_msgs")
 """Packages with the message and service types; the second one is the package of the reference."""
@@ -212,8 +215,21 @@ def _folders(value: Any) -> tuple[str, ...] | None:
 # -- the tables -------------------------------------------------------------------------------
 
 
-def _row(read: Read, default: Any, meaning: str) -> Any:
-    return dataclasses.field(default=default, metadata={"read": read, "meaning": meaning})
+_UNLIMITED: Final = (0.0, math.inf)
+_MAX_INTEGER: Final = 2**63 - 1
+
+
+def _row(read: Read, default: Any, meaning: str, limits: Limits = None) -> Any:
+    """Describes a parameter.
+
+    Args:
+        read: Checks and converts a value.
+        default: The value of a parameter that is not set.
+        meaning: Description for users.
+        limits: Least and greatest valid number, if there are any.
+    """
+    metadata = {"read": read, "meaning": meaning, "limits": limits}
+    return dataclasses.field(default=default, metadata=metadata)
 
 
 @dataclass(frozen=True, slots=True)
@@ -221,22 +237,43 @@ class NodeParameters:
     """The parameters of the node."""
 
     world_path: str = _row(_path, "", "World file.")
-    update_rate: float = _row(_steps_per_second, 200.0, "Steps per second of wall time [Hz].")
-    max_lag: float = _row(_lag, MAX_LAG, "Limit of the lag that is made up for [s]; 0: one cycle.")
-    step_size: float = _row(_step_size, 0.005, "Simulated time of one step [s].")
+    update_rate: float = _row(
+        _steps_per_second, 200.0, "Steps per second of wall time [Hz].", _UNLIMITED
+    )
+    max_lag: float = _row(
+        _lag, MAX_LAG, "Limit of the lag that is made up for [s]; 0: one cycle.", _UNLIMITED
+    )
+    step_size: float = _row(
+        _step_size, 0.005, "Simulated time of one step [s].", (MIN_STEP_SIZE, MAX_STEP_SIZE)
+    )
     lockstep: bool = _row(_boolean, False, "Whether time passes only on request.")
     show_viz: bool = _row(_boolean, False, "Whether debug markers are published.")
-    viz_pub_rate: float = _row(_positive, 30.0, "Rate of the debug markers in wall time [Hz].")
-    simplify_map: int = _row(_simplification, 0, "0 exact, 1 simplified, 2 opened and simplified.")
-    seed: int | None = _row(_seed, None, "Seed of all random numbers; None: a random one.")
+    viz_pub_rate: float = _row(
+        _positive, 30.0, "Rate of the debug markers in wall time [Hz].", _UNLIMITED
+    )
+    simplify_map: int = _row(
+        _simplification, 0, "0 exact, 1 simplified, 2 opened and simplified.", (0, 2)
+    )
+    seed: int | None = _row(
+        _seed, None, "Seed of all random numbers; None: a random one.", (0, _MAX_INTEGER)
+    )
     benchmark_duration: float | None = _row(
-        _positive, None, "Simulated time after which the node logs its speed and ends [s]."
+        _positive,
+        None,
+        "Simulated time after which the node logs its speed and ends [s].",
+        _UNLIMITED,
     )
     plugin_timeout: float | None = _row(
-        _timeout, 60.0, "Limit of wall time of `on_initialize` of a plugin [s]; None: no limit."
+        _timeout,
+        60.0,
+        "Limit of wall time of `on_initialize` of a plugin [s]; None: no limit.",
+        _UNLIMITED,
     )
     shutdown_timeout: float | None = _row(
-        _timeout, DEFAULT_SHUTDOWN_TIMEOUT, "Limit of wall time from a stop request to the end [s]."
+        _timeout,
+        DEFAULT_SHUTDOWN_TIMEOUT,
+        "Limit of wall time from a stop request to the end [s].",
+        _UNLIMITED,
     )
     if_blocked: IfBlocked = _row(  # noqa: RUF009 - a field
         _word(IF_BLOCKED), "warn", "Behaviour of spawns and moves at poses that are not free."
@@ -250,16 +287,21 @@ class NodeParameters:
     use_sim_time: bool = _row(
         _boolean, True, "Whether `/clock` is published and stamps are not wall times."
     )
-    clock_rate: float = _row(_messages, 0.0, "Rate of `/clock` in wall time [Hz]; 0: each step.")
+    clock_rate: float = _row(
+        _messages, 0.0, "Rate of `/clock` in wall time [Hz]; 0: each step.", _UNLIMITED
+    )
     model_states_rate: float = _row(
-        _messages, 50.0, "Rate of `model_states` in simulated time [Hz]; 0: each step."
+        _messages, 50.0, "Rate of `model_states` in simulated time [Hz]; 0: each step.", _UNLIMITED
     )
     publish_map: str | None = _row(
         _layer, "", "Layer that is published as a map; empty: that of the world file, None: none."
     )
     map_frame: str = _row(_frame, "map", "Frame of the map.")
     map_resolution: float = _row(
-        _finite_positive, DEFAULT_RESOLUTION, "Cell size of the map of a layer without image [m]."
+        _finite_positive,
+        DEFAULT_RESOLUTION,
+        "Cell size of the map of a layer without image [m].",
+        _UNLIMITED,
     )
     msgs_package: str = _row(_package, OWN_PACKAGE, "Package of the message and service types.")
     model_path: tuple[str, ...] | None = _row(
@@ -267,7 +309,9 @@ class NodeParameters:
     )
     web: bool = _row(_boolean, False, "Whether the viewer in the browser is started.")
     web_host: str = _row(_address, WEB_HOST, "Address that the viewer in the browser listens on.")
-    web_port: int = _row(_port, WEB_PORT, "Port of the viewer in the browser; 0: any free one.")
+    web_port: int = _row(
+        _port, WEB_PORT, "Port of the viewer in the browser; 0: any free one.", (0, 65535)
+    )
     web_token: str | None = _row(
         _token, None, "Text that the address of the viewer must contain; None: see docs/viewer.md."
     )
@@ -277,6 +321,18 @@ class NodeParameters:
         "Text in the address of viewers, who cannot change the world; None: none.",
     )
     web_read_only: bool = _row(_boolean, False, "Whether the page only displays the world.")
+
+
+@dataclass(frozen=True, slots=True)
+class Ros2Parameters:
+    """The parameters that the node has in ROS 2 only."""
+
+    enable_stamped_cmd_vel: bool = _row(
+        _boolean, False, "Whether velocity commands are `geometry_msgs/TwistStamped`, as in Nav2."
+    )
+    reliable_sensors: bool = _row(
+        _boolean, False, "Whether measurements of sensors are published reliably."
+    )
 
 
 @dataclass(frozen=True, slots=True)
@@ -294,7 +350,7 @@ def read_table(table: type[P], get: ParameterSource) -> P:
     """Reads and checks all parameters of a table.
 
     Args:
-        table: `NodeParameters` or `TeleopParameters`.
+        table: One of the tables of this module.
         get: Returns the value of a parameter of the node, None if it is not set.
 
     Raises:

@@ -36,6 +36,7 @@ class ServedWorld:
         world: The world.
         simulation: Steps it.
         operations: Changes it as the parameters configure; for services of a kind of ROS alone.
+        services: Carry out requests between two steps; likewise.
     """
 
     def __init__(self, parameters: NodeParameters, transport: Transport, clock: NodeClock) -> None:
@@ -148,7 +149,10 @@ class ServedWorld:
         )
         receive_layers(transport, simulation)
         ModelStatesTopic(transport, simulation, parameters.model_states_rate)
-        Services(transport, simulation, self._clock, self.operations, deferred_topics.opened).open()
+        self.services = Services(
+            transport, simulation, self._clock, self.operations, deferred_topics.opened
+        )
+        self.services.open()
         if parameters.web:
             from flatland.node.browser_viewer import BrowserViewer
 

@@ -121,14 +121,14 @@ class Services:
         except CallError as error:
             return {"success": False, "message": str(error), **service.failed(self, error)}
 
-    def _with_files(
+    def with_files(
         self, read: Callable[[WorldSource], FileStore], action: Callable[[], R]
     ) -> Callable[[], R]:
         """Reads and parses files while the simulation goes on.
 
         Args:
             read: Reads the files that the action needs.
-            action: Action for `_carry_out`.
+            action: Action for `carry_out`.
 
         Returns:
             The action with these files.
@@ -143,15 +143,15 @@ class Services:
             raise CallError(error.text_with_hint) from error
         return source.inputs.using(store)(action)
 
-    def _carry_out(self, action: Callable[[], R]) -> R:
+    def carry_out(self, action: Callable[[], R]) -> R:
         """Runs an action between two steps and returns what it returned.
 
         Raises:
             CallError: The action raised, or the simulation does not carry it out.
         """
-        return self._result(self._simulation.post(action))
+        return self.result(self._simulation.post(action))
 
-    def _result(self, done: Future[R]) -> R:
+    def result(self, done: Future[R]) -> R:
         """Waits for a request.
 
         A client may use the topics of a model as soon as it receives the response: they are
@@ -230,7 +230,7 @@ class Services:
 
     def _step_world(self, request: Any) -> Response:
         count = self._number_of_steps(request.duration)
-        time_ns = self._result(self._simulation.request_steps(count))
+        time_ns = self.result(self._simulation.request_steps(count))
         # With a limited rate, the time after the last step may not be published yet.
         self._clock.flush()
         self._transport.disable_delay()
@@ -276,7 +276,7 @@ class Services:
         path, name, namespace = request.yaml_path, request.name, request.ns
         pose = _pose_of(request.pose)
         return self._described(
-            self._with_files(
+            self.with_files(
                 lambda source: source.read_models_ahead([path]),
                 lambda: self._operations.spawn(path, name, namespace, pose),
             )
@@ -296,7 +296,7 @@ class Services:
         ]
         paths = [spec.yaml_path for spec in specs]
         return self._placed(
-            self._with_files(
+            self.with_files(
                 lambda source: source.read_models_ahead(paths),
                 lambda: self._operations.spawn_all(specs),
             )
@@ -325,7 +325,7 @@ class Services:
         )
 
     def _get_model_states(self, request: Any) -> Response:
-        return {"states": self._carry_out(lambda: stamped_states(self._world, request.names))}
+        return {"states": self.carry_out(lambda: stamped_states(self._world, request.names))}
 
     # -- layers ----------------------------------------------------------------------------
 
@@ -336,7 +336,7 @@ class Services:
         layer, path, source = request.layer, request.map_path, self._world.source
         if not has_grid:
             return self._silent(
-                self._with_files(
+                self.with_files(
                     lambda source: source.read_map_ahead(path),
                     lambda: self._world.set_layer_map(layer, path),
                 )
@@ -359,16 +359,16 @@ class Services:
 
     def _silent(self, action: Callable[[], object]) -> Response:
         """Runs an action whose result is not part of the response."""
-        self._carry_out(action)
+        self.carry_out(action)
         return {}
 
     def _described(self, action: Callable[[], str]) -> Response:
         """Runs an action whose result is the message of the response."""
-        return {"message": sendable_text(self._carry_out(action))}
+        return {"message": sendable_text(self.carry_out(action))}
 
     def _placed(self, action: Callable[[], tuple[str, list[Pose]]]) -> Response:
         """Runs an action that returns the message and the poses of the response."""
-        text, poses = self._carry_out(action)
+        text, poses = self.carry_out(action)
         return {"message": sendable_text(text), "index": -1, "poses": poses}
 
 

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Final, Protocol, TypeVar
 from flatland.node.names import sendable_text
 
 if TYPE_CHECKING:
+    from flatland.node.adapters.writer import Writer
     from flatland.node.handles import Handles, HandleServer
     from flatland.node.ticker import TickerThread
     from flatland.runtime.requests import Post, Requests
@@ -34,6 +35,7 @@ are subscribers."""
 R = TypeVar("R")
 
 _POLL_PERIOD: Final = 0.2  # s between two checks of a request that waits
+MARKERS: Final = "visualization_msgs/MarkerArray"
 REPLACED: Final = ("/clock",)
 """Topics whose messages are replaced by the next one, so that subscribers need not receive all."""
 REGISTRATION_TIMEOUT: Final = 5.0
@@ -91,23 +93,48 @@ class Publisher(Connection, Protocol):
     Attributes:
         topic: Resolved name of the topic.
         connected: Whether the topic has subscribers.
+        closed: Whether the topic was closed, or has given way.
     """
 
     topic: str
     connected: bool
+    closed: bool
+
+    @property
+    def connections(self) -> int:
+        """Number of subscribers that are connected."""
 
     def publish(self, message: Any) -> None:
         """Sends a message, or its bytes, to all subscribers; has no effect once closed."""
+
+
+class Subscription(Connection, Protocol):
+    """A subscription to a topic.
+
+    Attributes:
+        closed: Whether it has ended: it was closed, or has given way.
+    """
+
+    closed: bool
 
 
 class StateTopic(Connection, Protocol):
     """Publishes a state: to new subscribers when they connect, to all by `send`.
 
     Attributes:
+        topic: Resolved name of the topic.
         connected: Whether the topic has subscribers.
     """
 
+    topic: str
     connected: bool
+
+    def replace(self, make: Callable[[], Any]) -> None:
+        """Publishes another state from now on; must be called in the thread that steps the world.
+
+        Args:
+            make: Creates the message of the new state, as in `Transport.advertise_state`.
+        """
 
     def send(self) -> None:
         """Publishes the current state.
@@ -136,6 +163,21 @@ class Transport(ABC):
         """Returns the adapter of a value type or of its nearest base class, or None."""
 
     @abstractmethod
+    def message_class(self, name: str) -> type[Any]:
+        """Imports a message class.
+
+        Args:
+            name: `PACKAGE/NAME`, with the package `flatland` for messages of flatland.
+
+        Raises:
+            ImportError: The package is not installed.
+        """
+
+    @abstractmethod
+    def writer(self) -> Writer:
+        """Returns a writer for a new message."""
+
+    @abstractmethod
     def advertise(
         self,
         topic: str,
@@ -145,6 +187,7 @@ class Transport(ABC):
         latch: bool = False,
         on_connection: OnConnection | None = None,
         owner: str = "",
+        gives_way: bool = False,
     ) -> Publisher:
         """Advertises a topic.
 
@@ -155,6 +198,8 @@ class Transport(ABC):
             latch: Whether a new subscriber receives the last message when it connects.
             on_connection: Reports changes of the subscribers.
             owner: Plugin that publishes.
+            gives_way: Whether the topic is closed when another publisher of this node, which does
+                not give way, needs another message class.
         """
 
     @abstractmethod
@@ -185,8 +230,18 @@ class Transport(ABC):
         callback: Callable[[Any], object],
         *,
         owner: str = "",
-    ) -> Connection:
-        """Calls a function with each message of a topic, in any thread."""
+        gives_way: bool = False,
+    ) -> Subscription:
+        """Calls a function with each message of a topic, in any thread.
+
+        Args:
+            topic: Name of the topic.
+            message_type: ROS message class.
+            callback: The function.
+            owner: Plugin that subscribes.
+            gives_way: Whether the subscription ends when another one of this node, which does not
+                give way, needs another message class.
+        """
 
     @abstractmethod
     def serve(
@@ -386,8 +441,12 @@ class Transport(ABC):
         """
 
     @abstractmethod
-    def load_handle_server(self) -> Callable[[Post, Handles], HandleServer]:
-        """Imports the server of interactive markers, and returns the function that starts it."""
+    def load_handle_server(self) -> Callable[[Post, Handles], HandleServer] | None:
+        """Imports the server of interactive markers.
+
+        Returns:
+            The function that starts it; None if there is none for this kind of ROS.
+        """
 
     @abstractmethod
     def load_foreign_topics(self) -> Callable[[Simulation], ForeignTopicsConnection]:

@@ -23,6 +23,12 @@ class Transforms(tuple[Transform, ...]):
     __slots__ = ()
 
 
+class DebugTopicNames(tuple[str, ...]):
+    """The names of the topics of debug markers, relative to their namespace."""
+
+    __slots__ = ()
+
+
 class FrameParents(dict[str, str]):
     """The parent of each frame in a message of transforms, without leading slashes."""
 

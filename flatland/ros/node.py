@@ -6,37 +6,30 @@ import argparse
 import gc
 import logging
 import math
-import sys
 import threading
 import time
 from collections.abc import Sequence
 from concurrent.futures import Future, wait
 from contextlib import closing
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Final
 
-from flatland.errors import FlatlandError
-from flatland.node.fault_reports import FaultReports
 from flatland.node.parameters import (
     MESSAGE_PACKAGES,
     OWN_PACKAGE,
-    NodeParameters,
     ParameterError,
     read_parameters,
 )
-from flatland.node.shutdown import ShutdownWatchdog
+from flatland.node.run import NodeRun
 from flatland.ros.message_types import select_package
 
 if TYPE_CHECKING:
-    from flatland.ros.parameter_server import ParameterServer
     from flatland.ros.transport.registrar import Registrar
-    from flatland.simulation import Simulation
 
 _LOG = logging.getLogger("flatland")
 
 NODE_NAME: Final = "flatland_server"
 _MASTER_POLL_PERIOD: Final = 0.2  # s between two attempts to reach the ROS master
 _MASTER_WARNING_TIMEOUT: Final = 1.0  # s without a ROS master until a warning is logged
-_SWITCH_INTERVAL: Final = 0.0002  # s for which a thread keeps the GIL while others wait for it
 _REGISTRATION_TIMEOUT: Final = 0.1  # s, for the registration of `/clock`
 _UNREGISTER_TIMEOUT: Final = 2.0  # s
 _STOP_POLL_PERIOD: Final = 0.05  # s between two checks for a stop request without a master
@@ -86,22 +79,12 @@ class ServerNode:
             default_msgs_package: Default of the parameter `msgs_package`.
         """
         self._default_msgs_package = default_msgs_package
-        self._stopping = threading.Event()
-        self._simulation: Simulation | None = None
+        self._run = NodeRun(_is_fault_of_client, _unregister)
         self._registrar: Registrar | None = None
-        self._watchdog: ShutdownWatchdog | None = None
         self._replaced = False  # whether another node has the name of this one
-        self._fault_reports = FaultReports(_is_fault_of_client)
 
     def run(self) -> int:
         """Runs until a stop is requested, and returns the exit code."""
-        # First of all, so that no signal is lost.
-        watchdog = self._watchdog = ShutdownWatchdog(self._stop, _unregister)
-        self._fault_reports.install()
-        # The threads of rospy need the GIL about a hundred times for a connection or registration.
-        # With the default interval of 5 ms, this takes up to a second beside a loop at full speed.
-        # A short interval costs nothing while no other thread waits for the GIL.
-        sys.setswitchinterval(_SWITCH_INTERVAL)
         import rosgraph
         import rospy
 
@@ -118,7 +101,7 @@ class ServerNode:
             # Without rostime, rospy does not subscribe to `/clock`; the bridge sets its time.
             rospy.init_node(NODE_NAME, disable_signals=True, disable_rostime=True)
         except rospy.ROSInitException as error:
-            if self._stopping.is_set():
+            if self._run.stopping.is_set():
                 return 0
             logging.getLogger("rosout").critical("%s", error)
             return 1
@@ -126,28 +109,12 @@ class ServerNode:
 
         def shut_down(reason: str) -> None:
             self._replaced |= _REPLACED in reason
-            watchdog.request_stop()
+            self._run.watchdog.request_stop()
 
         # Before the hook of rospy that unregisters the node. `rospy.on_shutdown` passes no reason.
         rospy.core._preshutdown_hooks.insert(0, shut_down)
         log_to_ros()
-        from flatland.ros.parameter_server import ParameterServer
-
-        try:
-            server = ParameterServer()
-            parameters = read_parameters(
-                server.get, default_msgs_package=self._default_msgs_package
-            )
-            watchdog.timeout = parameters.shutdown_timeout
-            self._simulate(parameters, server)
-        except ParameterError as error:
-            code = self._fail(str(error))
-        except FlatlandError as error:
-            code = self._fail(error.text_with_hint)
-        except Exception:
-            code = self._fail("unexpected internal error", exc_info=True)
-        else:
-            code = 0
+        code = self._run.exit_code_of(self._simulate)
         if self._replaced:
             _LOG.critical(
                 'another node has taken the name "%s" on the ROS master at %s: this one ends',
@@ -182,7 +149,7 @@ class ServerNode:
         # never respond.
         threading.Thread(target=search, name="flatland-master-search", daemon=True).start()
         warning_due = time.monotonic() + _MASTER_WARNING_TIMEOUT
-        while not self._stopping.is_set():
+        while not self._run.stopping.is_set():
             if wait([found], timeout=_STOP_POLL_PERIOD).done:
                 found.result()
                 return True
@@ -195,34 +162,21 @@ class ServerNode:
     def _replace(self) -> None:
         """Ends the node because another one has its name; safe from any thread."""
         self._replaced = True
-        if self._watchdog is not None:
-            self._watchdog.request_stop()
+        self._run.watchdog.request_stop()
 
-    def _stop(self) -> None:
-        """Ends the simulation after the current step; safe from any thread."""
-        self._stopping.set()
-        if self._simulation is not None:
-            self._simulation.stop()
-
-    def _fail(self, text: str, **options: Any) -> int:
-        if self._stopping.is_set():
-            # An error caused by the stop, for example during loading, is not a failure.
-            _LOG.info("stopped: %s", text)
-            return 0
-        _LOG.critical("%s", text, **options)
-        return 1
-
-    def _simulate(self, parameters: NodeParameters, server: ParameterServer) -> None:
+    def _simulate(self) -> None:
         """Loads the world and steps it until a stop is requested.
 
-        Args:
-            parameters: The parameters of the node.
-            server: Where they were found.
-
         Raises:
-            ParameterError: The package of the message types is not installed.
+            ParameterError: A parameter is invalid, or the package of the message types is not
+                installed.
             FlatlandError: The world cannot be loaded.
         """
+        from flatland.ros.parameter_server import ParameterServer
+
+        server = ParameterServer()
+        parameters = read_parameters(server.get, default_msgs_package=self._default_msgs_package)
+        self._run.watchdog.timeout = parameters.shutdown_timeout
         package = parameters.msgs_package
         try:
             # Before the imports below, which fix the types of the topics.
@@ -247,21 +201,11 @@ class ServerNode:
         # Other nodes have a valid time while the following modules are imported, which takes as
         # long as everything before. The import would delay the registration.
         self._registrar.flush(_REGISTRATION_TIMEOUT)
-        from flatland.node.served_world import ServedWorld
         from flatland.ros.transport.master_watch import MasterWatch
 
-        with (
-            closing(MasterWatch(self._registrar, self._replace)) as master_watch,
-            closing(ServedWorld(parameters, transport, clock)) as served,
-        ):
-            self._fault_reports.world = served.world
-            self._simulation = served.simulation
-            if self._stopping.is_set():
-                served.simulation.stop()
-            gc.enable()
-            served.run()
-            # Before the topics, so that no topic is registered again.
-            master_watch.close()
+        with closing(MasterWatch(self._registrar, self._replace)) as master_watch:
+            # Closed before the topics, so that no topic is registered again.
+            self._run.serve(parameters, transport, clock, ended=master_watch.close)
 
 
 def _is_fault_of_client(error_type: type[BaseException]) -> bool:

@@ -125,7 +125,11 @@ def test_each_script_is_an_entry_point(wheel, checkout):
 
 def test_versions_agree(wheel, checkout):
     """flatland/version.py is the source of the version; manifests of ROS contain copies."""
-    packages = [*checkout.glob("catkin/*/package.xml"), *checkout.glob("compat/*/package.xml")]
+    packages = [
+        file
+        for folder in ("catkin", "compat", "ros2")
+        for file in checkout.glob(f"{folder}/*/package.xml")
+    ]
     versions = [ElementTree.parse(path).getroot().findtext("version") for path in packages]
     assert versions == [VERSION] * 5
     assert f"flatland_sim-{VERSION}.dist-info/METADATA" in wheel.namelist()

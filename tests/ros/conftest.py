@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import gc
 import os
-import queue
 import re
 import signal
 import sys
@@ -25,25 +24,14 @@ pytest.importorskip("flatland.msg", reason="the messages are not built")
 import rosgraph
 import roslib.packages
 import rospy
+from message_queue import MessageQueue
 from plugin_manifests import write_plugins
 from programs import Program
+from room_world import LAYER, write_room_world
 from waiting import TIMEOUT, wait_until
 
 import flatland
 from flatland.srv import DeleteModel, MoveModel, ResetWorld, SpawnModel, StepWorld, WaitUntilReady
-
-MAP = "type: line_segments\ndata: walls.dat\nscale: 1.0\norigin: [0, 0, 0]\n"
-WALLS = "-5 -5 5 -5\n5 -5 5 5\n5 5 -5 5\n-5 5 -5 -5\n"  # a room of 10 m by 10 m around (0, 0)
-LAYER = "{name: 2d, map: map.yaml}"
-BODY = "{name: base, footprints: [{type: circle, radius: 0.2, density: 1}]}"
-BALL = f"bodies: [{BODY}]\n"
-ROBOT = f"""
-bodies: [{BODY}]
-plugins:
-  - {{type: DiffDrive, name: drive, body: base, pub_rate: 50}}
-  - {{type: Laser, name: laser, body: base, range: 20, update_rate: 10,
-     angle: {{min: -1.5, max: 1.5, increment: 0.5}}}}
-"""
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
@@ -66,52 +54,12 @@ def _collect_garbage() -> None:
 _ADVERTISE_TIMEOUT = 10.0
 
 
-class Topic:
+class Topic(MessageQueue):
     """The messages received on a topic since its creation."""
 
     def __init__(self, name: str, message_type: type[Any]) -> None:
-        self.name = name
-        self._messages: queue.Queue[Any] = queue.Queue()
-        self._subscriber = rospy.Subscriber(name, message_type, self._messages.put)
-
-    def next(self, timeout: float = TIMEOUT) -> Any:
-        """Waits for a message."""
-        try:
-            return self._messages.get(timeout=timeout)
-        except queue.Empty:
-            pytest.fail(f"no message on {self.name} for {timeout} s")
-
-    def until(self, accept: Callable[[Any], bool]) -> Any:
-        """Waits for a message that is accepted."""
-        end = time.monotonic() + TIMEOUT
-        message = self.next()
-        while not accept(message):
-            assert time.monotonic() < end, f"last on {self.name}:\n{message}"
-            message = self.next()
-        return message
-
-    def take(self, count: int) -> list[Any]:
-        """Waits for a number of messages."""
-        return [self.next() for _ in range(count)]
-
-    def drop(self) -> None:
-        """Discards the messages received so far."""
-        with contextlib.suppress(queue.Empty):
-            while True:
-                self._messages.get_nowait()
-
-    def rest(self, silence: float = 0.2) -> list[Any]:
-        """Returns messages until none is received for some time."""
-        messages = []
-        with contextlib.suppress(queue.Empty):
-            while True:
-                messages.append(self._messages.get(timeout=silence))
-        return messages
-
-    @property
-    def is_empty(self) -> bool:
-        """Whether no message waits."""
-        return self._messages.empty()
+        super().__init__(name)
+        self._subscriber = rospy.Subscriber(name, message_type, self.messages.put)
 
     @property
     def connected(self) -> bool:
@@ -433,16 +381,7 @@ def write_world(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., Path]
         models: str = "[]", plugins: str = "[]", layers: str = f"[{LAYER}]", **files: str
     ) -> Path:
         folder = tmp_path_factory.mktemp("world")
-        (folder / "map.yaml").write_text(MAP)
-        (folder / "walls.dat").write_text(WALLS)
-        files = {"ball": BALL, "robot": ROBOT, **files}
-        for name, text in files.items():
-            (folder / f"{name}.model.yaml").write_text(text)
-        path = folder / "world.yaml"
-        path.write_text(
-            f"properties: {{}}\nlayers: {layers}\nmodels: {models}\nplugins: {plugins}\n"
-        )
-        return path
+        return write_room_world(folder, models, plugins, layers, **files)
 
     return write
 

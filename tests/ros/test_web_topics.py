@@ -19,7 +19,8 @@ from tf2_msgs.msg import TFMessage
 from waiting import TIMEOUT
 from web_client import WebClient
 
-from flatland.ros.foreign_topics.topics import _WatchedTopic
+from flatland.node.foreign_topics.topics import _WatchedTopic
+from flatland.ros.graph import Graph
 from flatland.ros.transport.registrar import Registrar
 from flatland.ros.transport.ros_transport import RosTransport
 from flatland.web.encoding import GRID, MARKS
@@ -282,15 +283,16 @@ def test_a_topic_to_which_a_plugin_subscribes_is_shared(ros: Any) -> None:
     """All subscribers of a node for a topic have the same message class."""
     registrar = Registrar()
     transport = RosTransport(registrar)
+    graph = Graph("/flatland_tests")
     used = [
         transport.subscribe("/plain_grid", OccupancyGrid, lambda _message: None),
         transport.subscribe("/number", Float64, lambda _message: None),
     ]
-    grid = _WatchedTopic(transport, "/plain_grid", "nav_msgs/OccupancyGrid", is_drawn=True)
+    grid = _WatchedTopic(transport, graph, "/plain_grid", "nav_msgs/OccupancyGrid", is_drawn=True)
     assert grid.status == "no message received"
-    other = _WatchedTopic(transport, "/number", "nav_msgs/Path", is_drawn=True)
+    other = _WatchedTopic(transport, graph, "/number", "nav_msgs/Path", is_drawn=True)
     assert "has the type std_msgs/Float64 already" in other.status
-    unknown = _WatchedTopic(transport, "/unknown", "no_such_msgs/Thing", is_drawn=False)
+    unknown = _WatchedTopic(transport, graph, "/unknown", "no_such_msgs/Thing", is_drawn=False)
     assert unknown.status == "the message package of no_such_msgs/Thing is not installed"
     for each in (*used, grid, other, unknown):
         each.close()

@@ -27,7 +27,7 @@ FLOORS = (
     ("simulation", "drawing", "recording"),
     ("web",),
     ("gym", "node", "tools"),
-    ("ros",),
+    ("ros", "ros2"),
     ("viewer",),
     ("cli",),
     ("__main__",),
@@ -180,21 +180,17 @@ def test_only_front_ends_import_the_facade() -> None:
     assert front_ends <= {"flatland.cli.main"}
 
 
-@pytest.mark.parametrize(
-    ("package", "shared"), [("flatland.plugins", ()), ("flatland.ros.adapters", ("convert", ""))]
-)
-def test_plugins_and_adapters_do_not_import_each_other(
-    package: str, shared: tuple[str, ...]
-) -> None:
+def test_plugins_do_not_import_each_other() -> None:
+    package = "flatland.plugins"
     for found in imports():
         if found.module.startswith(package) and found.name.startswith(package):
             target = found.name.removeprefix(package).removeprefix(".").split(".")[0]
-            assert target.startswith("_") or target in shared, found
+            assert target.startswith("_"), found
 
 
 def test_the_room_of_the_node_imports_no_module_of_ros() -> None:
     """Neither directly nor by another module, so that clients of several kinds of ROS share it."""
-    modules = [f"flatland.node.{path.stem}" for path in sorted((PACKAGE / "node").glob("*.py"))]
+    modules = [module_of(path) for path in sorted((PACKAGE / "node").rglob("*.py"))]
     code = (
         "import importlib, sys\n"
         "for name in ('rospy', 'rosgraph', 'genpy', 'rosbag', 'rclpy', 'flatland.ros'):\n"

@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-import math
-
 from genpy import Time
 from geometry_msgs.msg import Point, Pose, Quaternion
 from std_msgs.msg import Header
 
-from flatland import geometry
 from flatland.geometry import quaternion_from_yaw
 from flatland.node.clock import stamp as stamp
 from flatland.timekeeper import NANOSECONDS
@@ -32,12 +29,3 @@ def quaternion(yaw: float) -> Quaternion:
 def pose(x: float, y: float, yaw: float) -> Pose:
     """Creates a planar pose."""
     return Pose(Point(x, y, 0.0), quaternion(yaw))
-
-
-def planar_pose(message: Pose) -> geometry.Pose | None:
-    """Converts a message to (x, y, theta); None for non-finite numbers or a zero quaternion."""
-    position, q = message.position, message.orientation
-    numbers = (position.x, position.y, position.z, q.x, q.y, q.z, q.w)
-    if not all(map(math.isfinite, numbers)) or not any((q.x, q.y, q.z, q.w)):
-        return None
-    return (position.x, position.y, geometry.yaw_from_quaternion(q.x, q.y, q.z, q.w))

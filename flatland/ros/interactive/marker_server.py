@@ -7,7 +7,6 @@ starts again if a number is missing. Keep-alive messages repeat the last number.
 
 from __future__ import annotations
 
-import struct
 import time
 from io import BytesIO
 from typing import Any, Final
@@ -23,9 +22,10 @@ from visualization_msgs.msg import (
 
 from flatland.entities.model import Model
 from flatland.geometry import Pose
+from flatland.node.adapters.receivers import planar_pose
 from flatland.node.handles import SERVER_NAME, Event, Feedback, Handles
 from flatland.node.values import ReceivedPose
-from flatland.ros.adapters import convert, packing
+from flatland.ros.adapters.writer import RosWriter
 from flatland.ros.interactive.model_handle import model_handle
 from flatland.ros.transport.publisher import Publisher
 from flatland.ros.transport.registrar import Registrar
@@ -38,9 +38,6 @@ CONNECTING_TIME: Final = 3.0
 FULL_STATE_PERIOD: Final = 1.0
 """Time between two full states afterwards [s], for clients that need longer."""
 _UPDATE_QUEUE: Final = 100  # messages; a client that misses one requests the full state again
-_NUMBER_AND_TYPE: Final = struct.Struct("<QB")
-_NUMBER: Final = struct.Struct("<Q")
-_HEADER_SIZE: Final = 3 * 4  # bytes of a header before the frame
 
 _EVENTS: Final = {
     InteractiveMarkerFeedback.KEEP_ALIVE: Event.KEEP_ALIVE,
@@ -65,7 +62,7 @@ class MarkerServer:
             post: Runs an action between two steps.
             handles: Returns the poses of the markers, and receives feedback.
         """
-        self._server_id = packing.text(rospy.get_name())
+        self._server_id: str = rospy.get_name()
         self._number = 0  # of the last update
         self._markers: dict[str, _PackedMarker] = {}
         # Changes since the last update: markers added or replaced, moved, erased.
@@ -142,8 +139,9 @@ class MarkerServer:
         if self._full_state_is_outdated:
             self._send_full_state(False)
         if self._update.connected:
-            head = self._update_head(InteractiveMarkerUpdate.KEEP_ALIVE)
-            self._update.publish_serialized(head + 3 * packing.COUNT.pack(0))
+            to = self._head(InteractiveMarkerUpdate.KEEP_ALIVE)
+            to.pack("I", 0, 0, 0)
+            self._update.publish_serialized(bytes(to.data))
 
     def _send_full_state(self, only_moved: bool) -> None:
         """Publishes the full state, but not after each of many updates in which markers only move.
@@ -160,37 +158,37 @@ class MarkerServer:
 
     # -- messages --------------------------------------------------------------------------
 
-    def _update_head(self, kind: int) -> bytes:
-        return self._server_id + _NUMBER_AND_TYPE.pack(self._number, kind)
+    def _head(self, kind: int | None = None) -> RosWriter:
+        """Returns a message with the server, its number and, for an update, its type."""
+        to = RosWriter()
+        to.text(self._server_id)
+        to.pack("Q", self._number)
+        if kind is not None:
+            to.pack("B", kind)
+        return to
 
     def _changes(self) -> bytes:
         markers, pose_of = self._markers, self._pose_of
-        erased = [name for name in self._erased if name not in markers]
-        return b"".join(
-            (
-                self._update_head(InteractiveMarkerUpdate.UPDATE),
-                packing.COUNT.pack(len(self._inserted)),
-                *(markers[name].at(pose_of(name)) for name in self._inserted),
-                packing.COUNT.pack(len(self._moved)),
-                *(markers[name].pose_update(pose_of(name)) for name in self._moved),
-                packing.COUNT.pack(len(erased)),
-                *map(packing.text, erased),
-            )
-        )
+        to = self._head(InteractiveMarkerUpdate.UPDATE)
+        to.count(len(self._inserted))
+        for name in self._inserted:
+            to.data += markers[name].at(pose_of(name))
+        to.count(len(self._moved))
+        for name in self._moved:
+            to.data += markers[name].pose_update(pose_of(name))
+        to.texts([name for name in self._erased if name not in markers])
+        return bytes(to.data)
 
     def _full_state(self) -> bytes:
         """Returns all markers that have been published, with their current poses."""
         published = [
             (name, marker) for name, marker in self._markers.items() if name not in self._inserted
         ]
-        return b"".join(
-            (
-                self._server_id,
-                _NUMBER.pack(self._number),
-                packing.COUNT.pack(len(published)),
-                *(marker.at(self._pose_of(name)) for name, marker in published),
-            )
-        )
+        to = self._head()
+        to.count(len(published))
+        for name, marker in published:
+            to.data += marker.at(self._pose_of(name))
+        return bytes(to.data)
 
     # -- in rospy's threads ----------------------------------------------------------------
 
@@ -205,7 +203,7 @@ class MarkerServer:
             message.client_id,
             _EVENTS.get(message.event_type, Event.OTHER),
             message.menu_entry_id,
-            ReceivedPose(message.header.frame_id.lstrip("/"), convert.planar_pose(message.pose)),
+            ReceivedPose(message.header.frame_id.lstrip("/"), planar_pose(message.pose)),
             time.monotonic(),
         )
         self._post(lambda: self._handles.receive(feedback))
@@ -215,8 +213,9 @@ class _PackedMarker:
     """A serialized interactive marker, and the serialized update of its pose."""
 
     def __init__(self, marker: InteractiveMarker) -> None:
-        frame = packing.text(marker.header.frame_id)
-        self._pose_offset = _HEADER_SIZE + len(frame)
+        head = RosWriter()
+        head.header(0, marker.header.frame_id)
+        self._pose_offset = len(head.data)
         self._marker = _serialized(marker)
         update = InteractiveMarkerPose(marker.header, marker.pose, marker.name)
         self._pose_update = _serialized(update)
@@ -230,7 +229,9 @@ class _PackedMarker:
         return self._replace(self._pose_update, pose)
 
     def _replace(self, data: bytes, pose: Pose) -> bytes:
-        packed = packing.pose(*pose)
+        to = RosWriter()
+        to.pose(*pose)
+        packed = to.data
         start = self._pose_offset
         return b"".join((data[:start], packed, data[start + len(packed) :]))
 

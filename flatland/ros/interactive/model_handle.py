@@ -14,9 +14,9 @@ from visualization_msgs.msg import InteractiveMarker, InteractiveMarkerControl, 
 from flatland.entities.model import Model
 from flatland.geometry import DoubleArray, Pose, compose, invert
 from flatland.node.handles import DELETE_ENTRY
+from flatland.node.markers.marker_geometry import flat
+from flatland.node.values import WORLD_FRAME
 from flatland.ros.adapters import convert
-from flatland.ros.markers.marker_geometry import flat
-from flatland.ros.markers.packed_markers import FRAME
 from flatland.scene.description import BodyDescription, describe_model
 
 HANDLE_SIZE: Final = (0.5, 0.5, 0.05)  # m
@@ -40,7 +40,7 @@ def model_handle(model: Model, name: str) -> InteractiveMarker:
     """
     marker = InteractiveMarker(name=name)
     # For a marker without a stamp, RViz sends poses in this frame instead of its fixed frame.
-    marker.header.frame_id = FRAME
+    marker.header.frame_id = WORLD_FRAME
     marker.pose = pose_message(model.pose)
     model_outline = _ModelOutline(model)
     marker.scale = max(MIN_SCALE, 2.0 * model_outline.radius)

@@ -136,7 +136,7 @@ class Publisher:
 
         Args:
             serialize: Returns the serialized message, with any sequence number in its header; not
-                called without subscribers.
+                called without subscribers, unless the topic is latched.
         """
         publisher = self._publisher
         impl: Any = publisher.impl if publisher is not None else None
@@ -146,7 +146,7 @@ class Publisher:
         broken = []
         with lock:
             connections = impl.connections
-            if impl.closed or not connections:
+            if impl.closed or not (connections or impl.is_latch):
                 return
             message = serialize()
             impl.seq += 1

@@ -15,7 +15,7 @@ import rospy
 from rosgraph_msgs.msg import Clock
 from rospy import rostime
 
-from flatland.node.transport import Adapter, OnConnection, Transport
+from flatland.node.transport import MARKERS, Adapter, OnConnection, Transport
 from flatland.ros.message_types import service_class
 from flatland.ros.transport.outbox import Outbox, open_outboxes
 from flatland.ros.transport.publisher import Publisher
@@ -26,6 +26,7 @@ from flatland.ros.transport.subscriber import Subscriber
 from flatland.timekeeper import NANOSECONDS
 
 if TYPE_CHECKING:
+    from flatland.node.adapters.writer import Writer
     from flatland.node.handles import Handles, HandleServer
     from flatland.node.ticker import TickerThread
     from flatland.node.transport import Connection, ForeignTopicsConnection
@@ -57,6 +58,18 @@ class RosTransport(Transport):
         from flatland.ros.adapters import find_adapter
 
         return find_adapter(value_type)
+
+    def message_class(self, name: str) -> type[Any]:
+        """Imports a message class."""
+        from flatland.ros.adapters import message_class
+
+        return message_class(name)
+
+    def writer(self) -> Writer:
+        """Returns a writer for a new message."""
+        from flatland.ros.adapters.writer import RosWriter
+
+        return RosWriter()
 
     def advertise(self, *arguments: Any, **options: Any) -> Publisher:
         """Advertises a topic."""
@@ -179,9 +192,10 @@ class RosTransport(Transport):
         self,
     ) -> Callable[[Simulation, float, TickerThread], Connection]:
         """Imports the debug markers."""
-        from flatland.ros.markers.debug_topics import DebugTopics
+        from flatland.node.markers.debug_topics import DebugTopics
 
-        return partial(DebugTopics, self._registrar)
+        self.message_class(MARKERS)
+        return partial(DebugTopics, self)
 
     def load_handle_server(self) -> Callable[[Post, Handles], HandleServer]:
         """Imports the server of interactive markers."""
@@ -191,9 +205,10 @@ class RosTransport(Transport):
 
     def load_foreign_topics(self) -> Callable[[Simulation], ForeignTopicsConnection]:
         """Imports the topics of other nodes for the viewer in the browser."""
-        from flatland.ros.foreign_topics.topics import RosTopics
+        from flatland.node.foreign_topics.topics import RosTopics
+        from flatland.ros.graph import Graph
 
-        return partial(RosTopics, self)
+        return partial(RosTopics, self, Graph(self.node_name))
 
 
 class _ClockTopic(StateTopic):

@@ -101,6 +101,12 @@ class FakeTransport(Transport):
     def find_adapter(self, value_type: type[Any]) -> Adapter:
         return Adapter(value_type, value_type, lambda value: value, lambda message: message)
 
+    def message_class(self, name: str) -> type[Any]:
+        return type(name.partition("/")[2], (), {})
+
+    def writer(self) -> Any:
+        raise NotImplementedError
+
     def _add(self, topic: str, make: Any = None, post: Any = None, change: Any = None) -> FakeTopic:
         self.topics[topic] = FakeTopic(topic, make, post, change)
         return self.topics[topic]

@@ -274,3 +274,22 @@ def test_world_path_is_required(path: str | None) -> None:
 def test_every_parameter_has_a_meaning_for_those_who_list_them() -> None:
     for field in dataclasses.fields(NodeParameters):
         assert field.metadata["meaning"].endswith("."), field.name
+
+
+@pytest.mark.parametrize(
+    "field",
+    [field for field in dataclasses.fields(NodeParameters) if field.metadata["limits"]],
+    ids=lambda field: str(field.name),
+)
+def test_limits_are_those_of_the_values_that_are_accepted(field: Any) -> None:
+    """Tools of ROS 2 show them; only open ends are accepted neither by them nor by the reader."""
+    low, high = field.metadata["limits"]
+    above = low + (1 if isinstance(low, int) else 1e-3)
+    field.metadata["read"](above)
+    assert above <= high
+    with pytest.raises(ParameterError):
+        read(**{field.name: low - 1})
+    if high < 2**63 - 1:
+        field.metadata["read"](high)
+        with pytest.raises(ParameterError):
+            read(**{field.name: high + 1})

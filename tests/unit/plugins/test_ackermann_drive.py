@@ -223,8 +223,7 @@ class TestAckermannCommand:
         monkeypatch.setitem(sys.modules, "ackermann_msgs.msg", module)
         from flatland.ros import adapters
 
-        monkeypatch.delitem(sys.modules, "flatland.ros.adapters.ackermann", raising=False)
-        monkeypatch.setattr(adapters, "_adapters", dict(adapters._adapters))
+        monkeypatch.setattr(adapters._adapters, "_adapters", {})
         adapter = adapters.find_adapter(AckermannCommand)
         assert adapter is not None
         assert adapter.from_message is not None
@@ -233,7 +232,6 @@ class TestAckermannCommand:
         )
         found = adapter.from_message(SimpleNamespace(drive=fields))
         assert found == AckermannCommand(0.1, 0.2, 3.0, 4.0)
-        monkeypatch.delitem(sys.modules, "flatland.ros.adapters.ackermann")
 
 
 def test_odometry_and_twist(car: Any) -> None:

@@ -28,12 +28,12 @@ from visualization_msgs.msg import Marker, MarkerArray
 
 from flatland.errors import MapFileError
 from flatland.geometry import quaternion_from_yaw
+from flatland.node.foreign_topics import poses
+from flatland.node.foreign_topics.drawers import LatestDrawer
+from flatland.node.foreign_topics.grids import MAX_LENGTH, GridDrawer
+from flatland.node.foreign_topics.markers import MarkerDrawer
+from flatland.node.foreign_topics.trees import MAX_VALUES, tree_of
 from flatland.node.frame_tree import FrameTree, NoTransformError, transform
-from flatland.ros.foreign_topics import poses
-from flatland.ros.foreign_topics.drawers import LatestDrawer
-from flatland.ros.foreign_topics.grids import MAX_LENGTH, GridDrawer
-from flatland.ros.foreign_topics.markers import MarkerDrawer
-from flatland.ros.foreign_topics.trees import MAX_VALUES, tree_of
 from flatland.web.foreign_topics import Grid, Marks
 
 SECOND = 10**9
@@ -384,7 +384,7 @@ class TestMarkers:
         assert (len(marks.lines), len(marks.triangles), len(marks.texts)) == (0, 0, 0)
 
     def test_the_number_of_markers_is_limited(self, frames, monkeypatch):
-        monkeypatch.setattr("flatland.ros.foreign_topics.markers.MAX_MARKERS", 20)
+        monkeypatch.setattr("flatland.node.foreign_topics.markers.MAX_MARKERS", 20)
         drawer = MarkerDrawer()
         shared = [marker(Marker.SPHERE, number) for number in range(25)]
         drawer.receive(MarkerArray(markers=shared), 0)

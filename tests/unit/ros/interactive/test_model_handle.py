@@ -13,7 +13,7 @@ pytest.importorskip("visualization_msgs", reason="ROS is not installed")
 
 from geometry_msgs.msg import Point, Pose, Quaternion
 
-from flatland.ros.adapters.convert import planar_pose
+from flatland.node.adapters.receivers import planar_pose
 from flatland.ros.interactive.model_handle import model_handle, pose_message
 
 NAN, INF = math.nan, math.inf

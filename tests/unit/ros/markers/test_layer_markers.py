@@ -14,9 +14,10 @@ pytest.importorskip("visualization_msgs", reason="ROS is not installed")
 from visualization_msgs.msg import Marker, MarkerArray
 
 from flatland.entities.layer import Layer
+from flatland.node.markers.layer_markers import LayerMarkers
+from flatland.node.markers.packed_markers import PackedMarkers
 from flatland.physics import PhysicsWorld
-from flatland.ros.markers.layer_markers import LayerMarkers
-from flatland.ros.markers.packed_markers import PackedMarkers
+from flatland.ros.adapters.writer import RosWriter
 
 
 def make_layer(properties: dict[str, Any], edges: np.ndarray | None = None) -> Layer:
@@ -34,7 +35,7 @@ def markers_of(message: PackedMarkers) -> list[Marker]:
 
 
 def heights(properties: dict[str, Any]) -> tuple[float, float]:
-    (marker,) = markers_of(LayerMarkers(make_layer(properties)).walls(0))
+    (marker,) = markers_of(LayerMarkers(make_layer(properties), RosWriter).walls(0))
     z = [point.z for point in marker.points]
     return min(z), max(z)
 
@@ -92,7 +93,7 @@ def test_invalid_heights_are_logged_and_ignored(
 
 
 def test_layer_without_edges_has_no_marker() -> None:
-    markers = LayerMarkers(make_layer({}, np.empty((0, 4), np.float32)))
+    markers = LayerMarkers(make_layer({}, np.empty((0, 4), np.float32)), RosWriter)
     assert markers_of(markers.lines(0)) == []
     assert markers_of(markers.walls(0)) == []
 
@@ -110,7 +111,7 @@ def executed_lines(edge_count: int) -> int:
 
     sys.settrace(trace)
     try:
-        markers = LayerMarkers(layer)
+        markers = LayerMarkers(layer, RosWriter)
         for message in (markers.lines(0), markers.walls(0)):
             assert message.packed
     finally:

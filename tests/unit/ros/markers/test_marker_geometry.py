@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from flatland.ros.markers.marker_geometry import closed_strip, flat, wall_triangles
+from flatland.node.markers.marker_geometry import closed_strip, flat, wall_triangles
 
 EDGES = np.array([[0, 0, 2, 0], [1, 1, 1, 3]], np.float32)
 

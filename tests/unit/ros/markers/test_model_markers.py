@@ -11,7 +11,8 @@ from visualization_msgs.msg import Marker, MarkerArray
 
 import flatland
 import flatland.geometry
-from flatland.ros.markers.model_markers import ModelMarkers
+from flatland.node.markers.model_markers import ModelMarkers
+from flatland.ros.adapters.writer import RosWriter
 
 MODEL = """
 bodies:
@@ -52,19 +53,19 @@ def by_genpy(message: Any) -> bytes:
 
 
 def test_poses_are_replaced_in_place(model: Any) -> None:
-    cached = ModelMarkers(model)
+    cached = ModelMarkers(model, RosWriter)
     cached.message(0)
     for number in range(4):
         for body in model.bodies:
             body.set_velocity(number, -1.0, 2.0)
         model.bodies[1].set_pose(number, 2 * number, 0.3 * number)
         message = cached.message(STAMP)
-        assert message.packed == ModelMarkers(model).message(STAMP).packed
+        assert message.packed == ModelMarkers(model, RosWriter).message(STAMP).packed
         assert message.packed == by_genpy(message)
 
 
 def test_joints_connect_the_origins_and_the_anchors(model: Any) -> None:
-    cached = ModelMarkers(model)
+    cached = ModelMarkers(model, RosWriter)
     cached.message(0)
     model.bodies[1].set_pose(-4.0, 0.5, 2.0)
     lines, cubes = markers_of(cached.message(STAMP))[-2:]
@@ -81,7 +82,7 @@ def test_joints_connect_the_origins_and_the_anchors(model: Any) -> None:
 
 
 def test_changed_footprints_and_colors_are_rebuilt(model: Any) -> None:
-    cached = ModelMarkers(model)
+    cached = ModelMarkers(model, RosWriter)
     before = markers_of(cached.message(0))
     model.bodies[2].physics.create_edges([[9, 9, 9, 11]])
     model.bodies[2].color = model.bodies[0].color = (0.5, 0.5, 0.5, 0.5)

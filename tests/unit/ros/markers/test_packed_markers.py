@@ -14,14 +14,15 @@ from geometry_msgs.msg import Point, Vector3
 from std_msgs.msg import ColorRGBA
 from visualization_msgs.msg import Marker, MarkerArray
 
-from flatland.ros.markers.packed_markers import PackedMarkers, join
+from flatland.node.markers.packed_markers import PackedMarkers, join
+from flatland.ros.adapters.writer import RosWriter
 
 POINTS = np.array([[1.5, -2.5, 3.5], [0.1, 0.2, 0.3]])
 COLOR = (0.25, 0.5, 0.75, 1.0)
 
 
 def packed() -> PackedMarkers:
-    markers = PackedMarkers("Größe")
+    markers = PackedMarkers(RosWriter, "Größe")
     markers.add(Marker.LINE_LIST, POINTS, scale=(0.03, 0, 0), color=COLOR)
     markers.add(Marker.CUBE_LIST, POINTS[:1], scale=(1, 2, 3), color=COLOR, frame_locked=True)
     markers.add_deletion()
@@ -83,7 +84,7 @@ def test_markers_added_later_get_the_same_stamp() -> None:
 
 
 def test_joined_markers_are_those_of_all_parts() -> None:
-    joined = join([packed(), PackedMarkers("empty"), packed()])
+    joined = join([packed(), PackedMarkers(RosWriter, "empty"), packed()], RosWriter)
     assert joined == data(MarkerArray(markers_of(packed()) * 2))
 
 
@@ -106,4 +107,4 @@ def test_points_of_invalid_shape_raise() -> None:
 
 
 def test_empty_array() -> None:
-    assert PackedMarkers().packed == data(MarkerArray())
+    assert PackedMarkers(RosWriter).packed == data(MarkerArray())

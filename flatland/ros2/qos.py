@@ -1,0 +1,85 @@
+"""The quality of service of topics.
+
+| topics of the node | reliability | durability |
+|---|---|---|
+| `/clock` | best effort | volatile |
+| measurements of sensors | best effort, unless `reliable_sensors` is set | volatile |
+| `map`, states and other latched topics | reliable | transient local |
+| all others | reliable | volatile |
+
+A subscription is reliable, and transient local for maps and static transforms. That of the viewer
+in the browser is what all publishers offer.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, Final
+
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.topic_endpoint_info import TopicEndpointInfo
+
+from flatland.ros2.message_types import type_name
+
+CLOCK: Final = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
+STATE: Final = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+_MIN_DEPTH: Final = 10  # messages, as usual in ROS 2; a burst of steps creates several
+_SENSORS: Final = frozenset(
+    (
+        "sensor_msgs/msg/Imu",
+        "sensor_msgs/msg/LaserScan",
+        "sensor_msgs/msg/NavSatFix",
+        "sensor_msgs/msg/Range",
+        "flatland_msgs/msg/SemanticScan",
+    )
+)
+STATIC_TRANSFORMS: Final = "/tf_static"
+_MAP: Final = "nav_msgs/msg/OccupancyGrid"
+
+
+def of_publisher(
+    message_type: type[Any], queue_size: int, *, latch: bool, reliable_sensors: bool
+) -> QoSProfile:
+    """Returns the quality of service of a publisher.
+
+    Args:
+        message_type: The message class.
+        queue_size: Number of messages kept for a slow subscriber, at least.
+        latch: Whether new subscribers receive the last messages.
+        reliable_sensors: Whether measurements of sensors are reliable.
+    """
+    if latch:
+        return QoSProfile(depth=queue_size, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+    depth = max(queue_size, _MIN_DEPTH)
+    if type_name(message_type) in _SENSORS and not reliable_sensors:
+        return QoSProfile(depth=depth, reliability=ReliabilityPolicy.BEST_EFFORT)
+    return QoSProfile(depth=depth)
+
+
+def of_viewer(publishers: Sequence[TopicEndpointInfo]) -> QoSProfile:
+    """Returns the quality of service of a subscription that all present publishers satisfy.
+
+    Args:
+        publishers: The publishers of the topic.
+    """
+    offered = [each.qos_profile for each in publishers]
+    reliability, durability = ReliabilityPolicy.BEST_EFFORT, DurabilityPolicy.VOLATILE
+    if offered and all(each.reliability == ReliabilityPolicy.RELIABLE for each in offered):
+        reliability = ReliabilityPolicy.RELIABLE
+    if offered and all(each.durability == DurabilityPolicy.TRANSIENT_LOCAL for each in offered):
+        durability = DurabilityPolicy.TRANSIENT_LOCAL
+    return QoSProfile(depth=_MIN_DEPTH, reliability=reliability, durability=durability)
+
+
+def of_subscription(topic: str, message_type: type[Any]) -> QoSProfile:
+    """Returns the quality of service of a subscription of the node or of a plugin.
+
+    Args:
+        topic: Resolved name of the topic.
+        message_type: The message class.
+    """
+    if topic == STATIC_TRANSFORMS:
+        return QoSProfile(depth=100, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+    if type_name(message_type) == _MAP:
+        return STATE
+    return QoSProfile(depth=_MIN_DEPTH)
