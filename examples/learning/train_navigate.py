@@ -18,9 +18,10 @@ from typing import Any
 import numpy as np
 import torch
 from navigation import EVALUATION_SEED, make_many
-from sb3_vector import StableVector
 from stable_baselines3 import PPO
 from stable_baselines3.common.callbacks import BaseCallback
+
+from flatland.gym.stable_baselines import StableVector
 
 WINDOW = 1000  # episodes in a point of the curve
 

@@ -10,12 +10,13 @@ from gymnasium.error import ResetNeeded
 
 from flatland.geometry import FloatArray
 from flatland.gym.actions import checked_actions
+from flatland.gym.recreation import Recreated
 from flatland.gym.settings import Settings
 from flatland.gym.stage import RENDER_MODES, Image, Stage
 from flatland.gym.tasks import Occupied
 
 
-class FlatlandEnv(gymnasium.Env[Any, FloatArray]):
+class FlatlandEnv(Recreated, gymnasium.Env[Any, FloatArray]):
     """A robot with a laser that drives to a goal.
 
     An action is a velocity command for `physics_steps` steps of the world. An episode depends on
@@ -29,6 +30,7 @@ class FlatlandEnv(gymnasium.Env[Any, FloatArray]):
         "render_modes": list(RENDER_MODES),
         "render_fps": 10,
     }
+    kept_attributes = ("spec", "_np_random", "_np_random_seed")
 
     def __init__(
         self,
@@ -92,7 +94,7 @@ class FlatlandEnv(gymnasium.Env[Any, FloatArray]):
 
         Raises:
             ClosedEnvironmentError: The environment is closed.
-            WorldError: No place is free.
+            WorldError: No place is free, or no path leads to the start or the goal.
             ValueError: An option is unknown or invalid.
         """
         super().reset(seed=seed)
@@ -117,7 +119,7 @@ class FlatlandEnv(gymnasium.Env[Any, FloatArray]):
         Raises:
             ClosedEnvironmentError: The environment is closed.
             ResetNeeded: There was no reset, or the episode has ended.
-            InvalidAction: The action has the wrong shape, or is NaN.
+            InvalidAction: The action has the wrong shape, is NaN, or no real number.
         """
         self._stage.check_open()
         if not self._running:

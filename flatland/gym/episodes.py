@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import math
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -71,7 +72,7 @@ class Episodes:
         """Begins an episode of an agent whose world is in its initial state.
 
         Raises:
-            WorldError: The start or the goal is not free.
+            WorldError: The start or the goal is not free, or no path leads there.
             ValueError: An option is unknown or invalid.
         """
         agent, s = self.agents[row], self.situation
@@ -83,6 +84,8 @@ class Episodes:
             start = finite_pose(options.get("start", start))
             goal = finite_pose((*options.get("goal", goal), 0.0))[:2]
         self._refuse_taken(agent, start, goal, occupied)
+        if options:
+            self.task.check_paths(start, goal)
         # Agents that have not been placed yet may overlap the start.
         agent.world.move_model(agent.model.name, start, "allow")
         s.goals[row] = goal
@@ -173,7 +176,8 @@ class Episodes:
         s, settings = self.situation, self._settings
         rewards = settings.reward.compute(s)
         terminated = settings.ending.check(s)
-        truncated: BoolArray = (s.steps >= settings.max_steps) & ~terminated
+        limit = math.inf if settings.max_steps is None else settings.max_steps
+        truncated: BoolArray = (s.steps >= limit) & ~terminated
         return rewards, terminated, truncated
 
     def infos(self) -> dict[str, npt.NDArray[Any]]:

@@ -17,7 +17,8 @@ from flatland.entities.body import Body
 from flatland.geometry import FloatArray
 from flatland.gym.actions import checked_actions
 from flatland.gym.agents import Agent, check_alike
-from flatland.gym.settings import Settings
+from flatland.gym.recreation import Recreated
+from flatland.gym.settings import Settings, checked_count
 from flatland.gym.stage import RENDER_MODES, Image, Stage
 from flatland.gym.tasks import Occupied
 from flatland.gym.worlds import ROBOT, included_folder
@@ -31,7 +32,7 @@ Steps = tuple[
 ]
 
 
-class FleetEnv(ParallelEnv[str, Any, FloatArray]):  # type: ignore[misc, unused-ignore]
+class FleetEnv(Recreated, ParallelEnv[str, Any, FloatArray]):  # type: ignore[misc, unused-ignore]
     """Robots that drive to their goals in the same world, as obstacles in the scans of the others.
 
     A robot whose episode has ended stops and remains in the world as an obstacle.
@@ -48,6 +49,7 @@ class FleetEnv(ParallelEnv[str, Any, FloatArray]):  # type: ignore[misc, unused-
         "render_fps": 10,
         "is_parallelizable": True,
     }
+    kept_attributes = ("_rng",)
 
     def __init__(
         self,
@@ -75,8 +77,7 @@ class FleetEnv(ParallelEnv[str, Any, FloatArray]):  # type: ignore[misc, unused-
             TypeError: An argument is unknown or has the wrong type.
             ValueError: An argument is out of range.
         """
-        if isinstance(num_robots, bool) or not isinstance(num_robots, int) or num_robots < 1:
-            raise ValueError(f"num_robots must be an integer of at least 1, got {num_robots!r}")
+        num_robots = checked_count("num_robots", num_robots)
         for name in ("agent", "command"):
             if name in arguments:
                 raise TypeError(f"{name} is not an argument here: it is that of each robot")

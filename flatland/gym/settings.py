@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import math
+import operator
 import os
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final, SupportsIndex
+
+import numpy as np
 
 from flatland.gym.actions import VelocityAction
 from flatland.gym.agents import Agent, find_agent
@@ -20,6 +23,9 @@ from flatland.world import World
 
 if TYPE_CHECKING:
     from flatland.config.inputs import Params
+
+DEFAULT_STEPS: Final = 300
+"""Limit of an episode [steps]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -36,7 +42,7 @@ class Settings:
         action: How actions are scaled.
         reward: The reward.
         ending: When an episode terminates.
-        max_steps: Number of steps after which an episode is truncated.
+        max_steps: Number of steps after which an episode is truncated; None for no limit.
         physics_steps: Number of steps of the world in a step of the environment.
         step_size: Simulated time of a step of the world [s].
         params: Values of `param()` in YAML files.
@@ -51,7 +57,7 @@ class Settings:
     action: VelocityAction = field(default_factory=VelocityAction)
     reward: Reward = field(default_factory=navigation_reward)
     ending: Ending = field(default_factory=navigation_ending)
-    max_steps: int = 300
+    max_steps: int | None = DEFAULT_STEPS
     physics_steps: int = 20
     step_size: float = 0.005
     params: Params = None
@@ -59,8 +65,8 @@ class Settings:
     def __post_init__(self) -> None:
         for name in ("max_steps", "physics_steps"):
             value = getattr(self, name)
-            if isinstance(value, bool) or not isinstance(value, int) or value < 1:
-                raise ValueError(f"{name} must be an integer of at least 1, got {value!r}")
+            if value is not None or name != "max_steps":
+                object.__setattr__(self, name, checked_count(name, value))
         for name, kind in _KINDS.items():
             value = getattr(self, name)
             if not isinstance(value, kind):
@@ -83,6 +89,11 @@ class Settings:
                 f"unknown argument {unknown[0]!r} of the environment; known: {', '.join(known)}"
             )
         return cls(**arguments)
+
+    def limited_to(self, steps: int) -> Settings:
+        """Returns settings whose episodes are truncated after a number of steps at the latest."""
+        limit = steps if self.max_steps is None else min(steps, self.max_steps)
+        return replace(self, max_steps=limit)
 
     @property
     def world_name(self) -> str:
@@ -112,6 +123,27 @@ class Settings:
             WorldError: The model does not exist, or has no laser or no velocity command.
         """
         return find_agent(world, name or self.agent, self.laser, self.command)
+
+
+def checked_count(name: str, value: object, least: int = 1) -> int:
+    """Returns an integer of Python for an integer of any type.
+
+    Args:
+        name: Name of the number, for the error.
+        value: The number.
+        least: Its least value.
+
+    Raises:
+        ValueError: It is no integer, or too small.
+    """
+    if isinstance(value, SupportsIndex) and not isinstance(value, bool | np.bool_):
+        try:
+            number = operator.index(value)
+        except TypeError:  # an array with several numbers
+            number = least - 1
+        if number >= least:
+            return number
+    raise ValueError(f"{name} must be an integer of at least {least}, got {value!r}")
 
 
 _KINDS: dict[str, type] = {
