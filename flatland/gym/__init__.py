@@ -38,7 +38,7 @@ from flatland.gym.settings import Settings
 from flatland.gym.situation import Situation
 from flatland.gym.tasks import FixedGoal, Occupied, RandomGoal, Task
 from flatland.gym.vector import FlatlandVectorEnv
-from flatland.gym.worlds import find_world
+from flatland.gym.worlds import find_world, included_robot
 
 register_all()
 
@@ -73,6 +73,7 @@ __all__ = [
     "Velocity",
     "VelocityAction",
     "find_world",
+    "included_robot",
     "make_parallel",
     "make_vec",
     "navigation_reward",

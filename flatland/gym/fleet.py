@@ -21,7 +21,7 @@ from flatland.gym.recreation import Recreated
 from flatland.gym.settings import Settings, checked_count
 from flatland.gym.stage import RENDER_MODES, Image, Stage
 from flatland.gym.tasks import Occupied
-from flatland.gym.worlds import ROBOT, included_folder
+from flatland.gym.worlds import included_robot
 from flatland.values import Twist
 
 if TYPE_CHECKING:
@@ -218,7 +218,7 @@ class FleetEnv(Recreated, ParallelEnv[str, Any, FloatArray]):  # type: ignore[mi
         self, world: World, robot: str | os.PathLike[str] | None, settings: Settings
     ) -> list[Agent]:
         """Adds the robots at free places."""
-        path = included_folder() / ROBOT if robot is None else robot
+        path = included_robot() if robot is None else robot
         agents: list[Agent] = []
         for name in self.possible_agents:
             # This pose is never simulated: each reset places all robots.

@@ -14,6 +14,7 @@ from gymnasium.error import ClosedEnvironmentError, InvalidAction, ResetNeeded
 from gymnasium.utils.env_checker import check_env
 
 import flatland
+from flatland import worldgen
 from flatland.gym import (
     Arrived,
     FixedGoal,
@@ -23,6 +24,7 @@ from flatland.gym import (
     Scan,
     Step,
     VelocityAction,
+    included_robot,
 )
 
 Make = Callable[..., Any]
@@ -180,6 +182,16 @@ def test_reward_and_ending_are_replaceable(make: Make) -> None:
     env = make(world="corridor", reward=2.0 * Step(), ending=Arrived(), max_steps=3)
     env.reset(seed=0)
     assert [env.step(AHEAD)[1] for _ in range(3)] == [2.0, 2.0, 2.0]
+
+
+def test_a_random_world_can_have_the_included_robot(make: Make, tmp_path: Path) -> None:
+    path = worldgen.office(1, (14, 12)).write(tmp_path / "office", robot=included_robot())
+    env, navigate = make(world=path), make(world="navigate")
+    assert env.observation_space == navigate.observation_space
+    limits = [each._episodes.situation.high.tolist() for each in (env, navigate)]
+    assert limits[0] == limits[1]
+    env.reset(seed=0)
+    env.step(AHEAD)
 
 
 # -- errors ------------------------------------------------------------------------------------
