@@ -14,6 +14,7 @@ from flatland.gym.actions import VelocityAction
 from flatland.gym.agents import Agent
 from flatland.gym.endings import AnyOf, Arrived, Collided, Ending, Strayed
 from flatland.gym.env import FlatlandEnv
+from flatland.gym.evaluation import Outcomes, evaluate
 from flatland.gym.observations import (
     Goal,
     LastAction,
@@ -59,6 +60,7 @@ __all__ = [
     "Observation",
     "ObservationPart",
     "Occupied",
+    "Outcomes",
     "Places",
     "Progress",
     "Proximity",
@@ -72,6 +74,7 @@ __all__ = [
     "Task",
     "Velocity",
     "VelocityAction",
+    "evaluate",
     "find_world",
     "included_robot",
     "make_parallel",

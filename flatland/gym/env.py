@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import gymnasium
 from gymnasium.error import ResetNeeded
@@ -14,6 +14,9 @@ from flatland.gym.recreation import Recreated
 from flatland.gym.settings import Settings
 from flatland.gym.stage import RENDER_MODES, Image, Stage
 from flatland.gym.tasks import Occupied
+
+if TYPE_CHECKING:
+    from flatland.gym.episodes import Episodes
 
 
 class FlatlandEnv(Recreated, gymnasium.Env[Any, FloatArray]):
@@ -78,6 +81,11 @@ class FlatlandEnv(Recreated, gymnasium.Env[Any, FloatArray]):
     def goal(self) -> tuple[float, float]:
         """The goal of the episode in the world frame [m]."""
         return self._stage.goals[0][0]
+
+    @property
+    def episodes(self) -> Episodes:
+        """The episodes: agents, settings, and the layout of the observation."""
+        return self._episodes
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None

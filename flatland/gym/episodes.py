@@ -31,6 +31,7 @@ class Episodes:
 
     Attributes:
         agents: The agents.
+        settings: The arguments of the environment.
         situation: Their state after the last step.
         layout: The observation space and its columns.
         observations: The observations of the last `look`, shape (n, layout.size), float32.
@@ -50,7 +51,7 @@ class Episodes:
         """
         first = agents[0]
         self.agents = tuple(agents)
-        self._settings = settings
+        self.settings = settings
         self._num_threads = num_threads
         self.task = copy.copy(settings.task)  # The copy is prepared for these worlds.
         self.task.prepare(first)
@@ -119,7 +120,7 @@ class Episodes:
         s.actions[chosen] = actions[chosen]
         s.previous_distance[chosen] = s.distance[chosen]
         s.steps[chosen] += 1
-        n = self._settings.physics_steps
+        n = self.settings.physics_steps
         if self._batch is None:
             agents = [self.agents[row] for row in (self._all if rows is None else rows).tolist()]
             step_agents(agents, commands[chosen], n, self._num_threads)
@@ -173,7 +174,7 @@ class Episodes:
 
     def judge(self) -> tuple[DoubleArray, BoolArray, BoolArray]:
         """Returns rewards, which episodes terminated and which were truncated, (n,) each."""
-        s, settings = self.situation, self._settings
+        s, settings = self.situation, self.settings
         rewards = settings.reward.compute(s)
         terminated = settings.ending.check(s)
         limit = math.inf if settings.max_steps is None else settings.max_steps

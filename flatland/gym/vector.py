@@ -23,6 +23,7 @@ from flatland.gym.stage import Image, Stage
 from flatland.gym.tasks import Occupied
 
 if TYPE_CHECKING:
+    from flatland.gym.episodes import Episodes
     from flatland.world import World
 
 
@@ -128,6 +129,11 @@ class FlatlandVectorEnv(Recreated, VectorEnv[Any, Any, Any]):
     def goals(self) -> DoubleArray:
         """A copy of all goals (x, y) in the world frame [m], shape (num_envs, 2)."""
         return self._episodes.situation.goals.copy()
+
+    @property
+    def episodes(self) -> Episodes:
+        """The episodes: agents, settings, and the layout of the observation."""
+        return self._episodes
 
     def reset(
         self,

@@ -129,6 +129,17 @@ def test_training_improves_the_policy(policy: Path) -> None:
     assert trained[0] > untrained[0] + 0.2
 
 
+def test_the_table_compares_the_policy_with_the_controllers(
+    policy: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    evaluate.print_table(PPO.load(policy, device="cpu"), 64)
+    lines = capsys.readouterr().out.splitlines()
+    assert [line.split()[0] for line in lines[2:]] == ["straight", "gap", "window", "policy"]
+    rates = [[float(rate.rstrip("%")) for rate in line.split()[1:4]] for line in lines[2:]]
+    assert [sum(row) for row in rates] == pytest.approx([100] * 4, abs=0.2)
+    assert rates[1][1] == rates[2][1] == 0.0
+
+
 @pytest.mark.usefixtures("simulator")
 def test_the_policy_does_over_ros_what_it_does_in_python(policy: Path) -> None:
     model = PPO.load(policy, device="cpu")
