@@ -12,6 +12,7 @@ require("gymnasium", "flatland.gym requires")
 
 from flatland.gym.actions import VelocityAction
 from flatland.gym.agents import Agent
+from flatland.gym.buildings import Buildings, RandomBuildings
 from flatland.gym.endings import AnyOf, Arrived, Collided, Ending, Strayed
 from flatland.gym.env import FlatlandEnv
 from flatland.gym.evaluation import Outcomes, evaluate
@@ -48,6 +49,7 @@ __all__ = [
     "AnyOf",
     "Arrival",
     "Arrived",
+    "Buildings",
     "Collided",
     "Contact",
     "Ending",
@@ -64,6 +66,7 @@ __all__ = [
     "Places",
     "Progress",
     "Proximity",
+    "RandomBuildings",
     "RandomGoal",
     "Reward",
     "Scan",

@@ -16,7 +16,9 @@ from flatland.gym.stage import RENDER_MODES, Image, Stage
 from flatland.gym.tasks import Occupied
 
 if TYPE_CHECKING:
+    from flatland.gym.buildings import Buildings
     from flatland.gym.episodes import Episodes
+    from flatland.world import World
 
 
 class FlatlandEnv(Recreated, gymnasium.Env[Any, FloatArray]):
@@ -24,9 +26,6 @@ class FlatlandEnv(Recreated, gymnasium.Env[Any, FloatArray]):
 
     An action is a velocity command for `physics_steps` steps of the world. An episode depends on
     the seed of the reset and the actions only, not on earlier episodes.
-
-    Attributes:
-        world: The world; it must be stepped only by the environment.
     """
 
     metadata: dict[str, Any] = {  # noqa: RUF012 - as in the base class
@@ -37,7 +36,7 @@ class FlatlandEnv(Recreated, gymnasium.Env[Any, FloatArray]):
 
     def __init__(
         self,
-        world: str | os.PathLike[str] = "navigate",
+        world: str | os.PathLike[str] | Buildings = "navigate",
         render_mode: str | None = None,
         *,
         web_port: int | None = None,
@@ -46,7 +45,8 @@ class FlatlandEnv(Recreated, gymnasium.Env[Any, FloatArray]):
         """Loads the world.
 
         Args:
-            world: World file, or the name of an included world: `navigate`, `corridor`, `fleet`.
+            world: World file, or the name of an included world: `navigate`, `corridor`, `fleet`; or
+                `Buildings`, one of which is drawn for each episode.
             render_mode: `rgb_array`, `human` or None.
             web_port: Port of the viewer of the render mode `human`, 0 for any free one; the first
                 environment of a process determines it. None for the environment variable
@@ -71,11 +71,18 @@ class FlatlandEnv(Recreated, gymnasium.Env[Any, FloatArray]):
         )
         self.render_mode = render_mode
         self.metadata = self._stage.metadata
-        self.world = self._stage.worlds[0]
         self._episodes = self._stage.episodes
         self.observation_space = self._episodes.layout.space
         self.action_space = action_space
         self._running = False
+
+    @property
+    def world(self) -> World:
+        """The world, which only the environment may step.
+
+        With several buildings, each episode may be in another world.
+        """
+        return self._stage.worlds[0]
 
     @property
     def goal(self) -> tuple[float, float]:

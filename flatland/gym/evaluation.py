@@ -10,7 +10,7 @@ import numpy as np
 from gymnasium.vector import AutoresetMode
 
 from flatland.geometry import BoolArray
-from flatland.gym.settings import checked_count
+from flatland.gym.checks import checked_count
 
 if TYPE_CHECKING:
     from flatland.gym.vector import FlatlandVectorEnv

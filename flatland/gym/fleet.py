@@ -17,8 +17,10 @@ from flatland.entities.body import Body
 from flatland.geometry import FloatArray
 from flatland.gym.actions import checked_actions
 from flatland.gym.agents import Agent, check_alike
+from flatland.gym.buildings import Buildings
+from flatland.gym.checks import checked_count
 from flatland.gym.recreation import Recreated
-from flatland.gym.settings import Settings, checked_count
+from flatland.gym.settings import Settings
 from flatland.gym.stage import RENDER_MODES, Image, Stage
 from flatland.gym.tasks import Occupied
 from flatland.gym.worlds import included_robot
@@ -81,6 +83,8 @@ class FleetEnv(Recreated, ParallelEnv[str, Any, FloatArray]):  # type: ignore[mi
         for name in ("agent", "command"):
             if name in arguments:
                 raise TypeError(f"{name} is not an argument here: it is that of each robot")
+        if isinstance(world, Buildings):
+            raise TypeError("world must be a file or a name: several robots have one building")
         settings = Settings.from_arguments({"world": world, **arguments})
         self.possible_agents = [f"robot_{i}" for i in range(num_robots)]
         self.agents: list[str] = []

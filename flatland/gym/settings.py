@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 import math
-import operator
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final, SupportsIndex
-
-import numpy as np
+from typing import TYPE_CHECKING, Any, Final
 
 from flatland.gym.actions import VelocityAction
 from flatland.gym.agents import Agent, find_agent
+from flatland.gym.buildings import Buildings
+from flatland.gym.checks import checked_count
 from flatland.gym.endings import Ending, navigation_ending
 from flatland.gym.observations import Observation
 from flatland.gym.rewards import Reward, navigation_reward
@@ -33,7 +32,8 @@ class Settings:
     """The arguments that all environments have in common.
 
     Attributes:
-        world: World file, or the name of an included world: `navigate`, `corridor`, `fleet`.
+        world: World file, or the name of an included world: `navigate`, `corridor`, `fleet`; or
+            several buildings, one of which is drawn for each episode.
         agent: Name of the model that is controlled.
         laser: Name of its laser; None for the first one.
         command: Topic of its velocity command; None for the first one.
@@ -48,7 +48,7 @@ class Settings:
         params: Values of `param()` in YAML files.
     """
 
-    world: str | os.PathLike[str] = "navigate"
+    world: str | os.PathLike[str] | Buildings = "navigate"
     agent: str = "robot"
     laser: str | None = None
     command: str | None = None
@@ -67,6 +67,8 @@ class Settings:
             value = getattr(self, name)
             if value is not None or name != "max_steps":
                 object.__setattr__(self, name, checked_count(name, value))
+        if not isinstance(self.world, str | os.PathLike | Buildings):
+            raise TypeError(f"world must be a file, a name or Buildings, got {self.world!r}")
         for name, kind in _KINDS.items():
             value = getattr(self, name)
             if not isinstance(value, kind):
@@ -98,6 +100,8 @@ class Settings:
     @property
     def world_name(self) -> str:
         """The name of the world for users: of its file, or of the folder of a file `world.yaml`."""
+        if isinstance(self.world, Buildings):
+            return self.world.name
         path = Path(self.world)
         return path.parent.name if path.name == "world.yaml" and path.parent.name else path.stem
 
@@ -106,12 +110,23 @@ class Settings:
         """Simulated time of a step of the environment [s]."""
         return self.physics_steps * self.step_size
 
-    def load(self) -> World:
+    @property
+    def building_count(self) -> int:
+        """Number of buildings."""
+        return len(self.world) if isinstance(self.world, Buildings) else 1
+
+    def load(self, building: int = 0) -> World:
         """Loads the world.
+
+        Args:
+            building: Index of the building.
 
         Raises:
             FlatlandError: A file is missing or invalid.
+            ValueError: An argument of a generated building is out of range.
         """
+        if isinstance(self.world, Buildings):
+            return self.world.load(building, self.params, self.step_size)
         return World.from_yaml(
             find_world(self.world), seed=0, params=self.params, step_size=self.step_size
         )
@@ -123,27 +138,6 @@ class Settings:
             WorldError: The model does not exist, or has no laser or no velocity command.
         """
         return find_agent(world, name or self.agent, self.laser, self.command)
-
-
-def checked_count(name: str, value: object, least: int = 1) -> int:
-    """Returns an integer of Python for an integer of any type.
-
-    Args:
-        name: Name of the number, for the error.
-        value: The number.
-        least: Its least value.
-
-    Raises:
-        ValueError: It is no integer, or too small.
-    """
-    if isinstance(value, SupportsIndex) and not isinstance(value, bool | np.bool_):
-        try:
-            number = operator.index(value)
-        except TypeError:  # an array with several numbers
-            number = least - 1
-        if number >= least:
-            return number
-    raise ValueError(f"{name} must be an integer of at least {least}, got {value!r}")
 
 
 _KINDS: dict[str, type] = {

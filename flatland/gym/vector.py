@@ -15,14 +15,16 @@ from gymnasium.vector.utils import batch_space
 from flatland.errors import WorldError
 from flatland.geometry import BoolArray, DoubleArray
 from flatland.gym.actions import checked_actions
+from flatland.gym.checks import checked_count
 from flatland.gym.env import FlatlandEnv
 from flatland.gym.recreation import Recreated
-from flatland.gym.settings import Settings, checked_count
+from flatland.gym.settings import Settings
 from flatland.gym.situation import Rows
 from flatland.gym.stage import Image, Stage
 from flatland.gym.tasks import Occupied
 
 if TYPE_CHECKING:
+    from flatland.gym.buildings import Buildings
     from flatland.gym.episodes import Episodes
     from flatland.world import World
 
@@ -39,7 +41,7 @@ class FlatlandVectorEnv(Recreated, VectorEnv[Any, Any, Any]):
     def __init__(
         self,
         num_envs: int = 1,
-        world: str | os.PathLike[str] = "navigate",
+        world: str | os.PathLike[str] | Buildings = "navigate",
         *,
         autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
         num_threads: int = 0,
@@ -53,7 +55,8 @@ class FlatlandVectorEnv(Recreated, VectorEnv[Any, Any, Any]):
 
         Args:
             num_envs: Number of environments.
-            world: World file, or the name of an included world: `navigate`, `corridor`, `fleet`.
+            world: World file, or the name of an included world: `navigate`, `corridor`, `fleet`; or
+                `Buildings`, one of which is drawn for each episode of each environment.
             autoreset_mode: When an episode that has ended is followed by the next one; see
                 `gymnasium.vector.AutoresetMode`.
             num_threads: Number of threads, 0 for one per core.
@@ -114,7 +117,10 @@ class FlatlandVectorEnv(Recreated, VectorEnv[Any, Any, Any]):
 
     @property
     def worlds(self) -> tuple[World, ...]:
-        """The worlds of the environments, which must be stepped only by the vector."""
+        """The worlds of the environments, which must be stepped only by the vector.
+
+        With several buildings, each episode may be in another world.
+        """
         return tuple(self._stage.worlds)
 
     @property
