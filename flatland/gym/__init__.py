@@ -1,6 +1,6 @@
 """Environments for Gymnasium and PettingZoo: robots that learn to navigate.
 
-Importing this package registers `flatland/Navigate-v0` and `flatland/Corridor-v0` with Gymnasium.
+Importing this package registers `flatland/Navigate-v0` and other environments with Gymnasium.
 `gymnasium.make("flatland.gym:flatland/Navigate-v0")` imports it. `docs/learning.md` describes the
 environments.
 """

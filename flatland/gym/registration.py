@@ -10,15 +10,20 @@ from gymnasium.envs.registration import VectorizeMode
 from gymnasium.error import NameNotFound, UnsupportedMode
 
 from flatland.extras import require
+from flatland.gym.buildings import RandomBuildings
 from flatland.gym.settings import DEFAULT_STEPS
 
 if TYPE_CHECKING:
     from flatland.gym.fleet import FleetEnv
     from flatland.gym.vector import FlatlandVectorEnv
 
+_BUILDINGS: Final = 16
+
 SINGLE: Final[dict[str, dict[str, Any]]] = {
     "flatland/Navigate-v0": {"world": "navigate"},
     "flatland/Corridor-v0": {"world": "corridor"},
+    "flatland/Maze-v0": {"world": RandomBuildings("maze", _BUILDINGS)},
+    "flatland/Warehouse-v0": {"world": RandomBuildings("warehouse", _BUILDINGS)},
 }
 """Arguments of the environments with one robot."""
 STEPS: Final = {"flatland/Corridor-v0": 200}

@@ -26,6 +26,7 @@ from flatland.gym import (
     VelocityAction,
     included_robot,
 )
+from flatland.gym.registration import SINGLE
 
 Make = Callable[..., Any]
 Numbers = list[tuple[bytes, float, bool, bool, dict[str, Any]]]
@@ -49,7 +50,7 @@ def random_actions(seed: int, n: int = 150) -> np.ndarray:
     return np.random.default_rng(seed).uniform(-1, 1, (n, 2)).astype(np.float32)
 
 
-@pytest.mark.parametrize("name", ["flatland/Navigate-v0", "flatland/Corridor-v0"])
+@pytest.mark.parametrize("name", SINGLE)
 def test_the_checker_of_gymnasium_finds_nothing(name: str) -> None:
     env = gymnasium.make(name)
     check_env(env.unwrapped)

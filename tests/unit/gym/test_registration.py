@@ -69,7 +69,7 @@ def test_gymnasium_imports_the_package_by_name() -> None:
 def test_vectors_are_made_by_name(make: Make) -> None:
     envs = make(flatland.gym.make_vec, "flatland/Corridor-v0", num_envs=2, num_threads=1)
     assert isinstance(envs, FlatlandVectorEnv)
-    with pytest.raises(gymnasium.error.NameNotFound, match=r"Navigate-v0, flatland/Corridor-v0"):
+    with pytest.raises(gymnasium.error.NameNotFound, match=r"Navigate-v0, .*Maze-v0"):
         flatland.gym.make_vec("flatland/Nowhere-v0")
     with pytest.raises(gymnasium.error.NameNotFound, match="Fleet-v0"):
         flatland.gym.make_parallel("flatland/Navigate-v0")
