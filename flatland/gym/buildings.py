@@ -22,7 +22,8 @@ class Buildings:
     """World files, one of which is drawn for each episode.
 
     They must contain the same robot: lasers with as many beams of the same range, and drives with
-    the same limits.
+    the same limits. The seed of a world is its index: if a file is given several times, its worlds
+    differ in all that they draw, such as the places of people.
 
     Attributes:
         worlds: The world files, or the names of included worlds.
@@ -65,7 +66,7 @@ class Buildings:
             FlatlandError: A file is missing or invalid.
         """
         path = find_world(self.worlds[number])
-        return World.from_yaml(path, seed=0, params=params, step_size=step_size)
+        return World.from_yaml(path, seed=number, params=params, step_size=step_size)
 
 
 class RandomBuildings(Buildings):
@@ -132,4 +133,4 @@ class RandomBuildings(Buildings):
         with tempfile.TemporaryDirectory() as folder:
             robot = included_robot() if self.robot is None else self.robot
             path = generated.write(Path(folder) / self.worlds[number], robot=robot)
-            return World.from_yaml(path, seed=0, params=params, step_size=step_size)
+            return World.from_yaml(path, seed=number, params=params, step_size=step_size)

@@ -45,8 +45,8 @@ class FlatlandEnv(Recreated, gymnasium.Env[Any, FloatArray]):
         """Loads the world.
 
         Args:
-            world: World file, or the name of an included world: `navigate`, `corridor`, `fleet`; or
-                `Buildings`, one of which is drawn for each episode.
+            world: World file, or the name of an included world: `navigate`, `corridor`, `crowd`,
+                `fleet`; or `Buildings`, one of which is drawn for each episode.
             render_mode: `rgb_array`, `human` or None.
             web_port: Port of the viewer of the render mode `human`, 0 for any free one; the first
                 environment of a process determines it. None for the environment variable

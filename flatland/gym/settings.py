@@ -32,8 +32,8 @@ class Settings:
     """The arguments that all environments have in common.
 
     Attributes:
-        world: World file, or the name of an included world: `navigate`, `corridor`, `fleet`; or
-            several buildings, one of which is drawn for each episode.
+        world: World file, or the name of an included world: `navigate`, `corridor`, `crowd`,
+            `fleet`; or several buildings, one of which is drawn for each episode.
         agent: Name of the model that is controlled.
         laser: Name of its laser; None for the first one.
         command: Topic of its velocity command; None for the first one.

@@ -55,8 +55,8 @@ class FlatlandVectorEnv(Recreated, VectorEnv[Any, Any, Any]):
 
         Args:
             num_envs: Number of environments.
-            world: World file, or the name of an included world: `navigate`, `corridor`, `fleet`; or
-                `Buildings`, one of which is drawn for each episode of each environment.
+            world: World file, or the name of an included world: `navigate`, `corridor`, `crowd`,
+                `fleet`; or `Buildings`, one of which is drawn for each episode of each environment.
             autoreset_mode: When an episode that has ended is followed by the next one; see
                 `gymnasium.vector.AutoresetMode`.
             num_threads: Number of threads, 0 for one per core.

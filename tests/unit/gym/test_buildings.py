@@ -22,7 +22,9 @@ from flatland.gym import (
     FlatlandVectorEnv,
     RandomBuildings,
     RandomGoal,
+    find_world,
     make_parallel,
+    make_vec,
     stage,
 )
 
@@ -124,6 +126,45 @@ def test_buildings_are_files_or_included_worlds(make: Make, tmp_path: Path) -> N
         env.reset(seed=seed)
         names.add(Path(env.world.path).stem)
     assert names == {"corridor", "navigate"}
+
+
+def test_people_differ_between_worlds_and_episodes(make: Make) -> None:
+    envs = make(make_vec, "flatland/Crowd-v0", 4, autoreset_mode="SameStep")
+
+    def people() -> list[tuple[float, ...]]:
+        names = [f"person_{number}" for number in range(20)]
+        return [
+            tuple(x for name in names for x in world.model(name).pose[:2]) for world in envs.worlds
+        ]
+
+    starts: set[tuple[float, ...]] = set()
+    ends: set[tuple[float, ...]] = set()
+    for seed in (0, 100, 0):
+        envs.reset(seed=seed)
+        starts |= set(people())
+        for _ in range(20):
+            envs.step(np.array([[-1.0, 0.0]] * 4))
+        ends |= set(people())
+    assert 4 <= len(starts) <= 8
+    assert len(ends) == 8  # of different seeds; the last episodes repeat the first ones
+
+
+def test_episodes_among_people_equal_those_of_single_environments(
+    make: Make, tmp_path: Path
+) -> None:
+    path = tmp_path / "world.yaml"
+    walls, robot = (
+        find_world("corridor").with_name(name) for name in ("corridor.map.yaml", "robot.model.yaml")
+    )
+    path.write_text(
+        f"properties: {{}}\nlayers: [{{name: walls, map: {walls}}}]\n"
+        f"models: [{{name: robot, model: {robot}, pose: [1, 1.25, 0]}}]\n"
+        "plugins: [{name: people, type: Pedestrians, groups: [{name: person, count: 3}]}]\n"
+    )
+    crowds = Buildings([path] * 3)
+    vector = make(FlatlandVectorEnv, 4, crowds, max_steps=25, num_threads=3)
+    single = make(SyncVectorEnv, [partial(FlatlandEnv, crowds, max_steps=25)] * 4)
+    assert run(vector, 4, 80) == run(single, 4, 80)
 
 
 def test_buildings_survive_a_copy_of_the_environment(make: Make) -> None:

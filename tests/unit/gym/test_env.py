@@ -243,7 +243,7 @@ def test_a_closed_environment_is_of_no_use(make: Make) -> None:
 
 
 def test_an_unknown_world_is_an_error() -> None:
-    with pytest.raises(flatland.WorldError, match=r'"atlantis".*corridor, fleet, navigate'):
+    with pytest.raises(flatland.WorldError, match=r'"atlantis".*corridor, crowd, fleet, navigate'):
         FlatlandEnv(world="atlantis")
     with pytest.raises(flatland.WorldError, match=r'"no/such\.yaml" does not exist'):
         FlatlandEnv(world="no/such.yaml")
