@@ -43,7 +43,7 @@ class Task(ABC):
     _places: Places | None = None
 
     def prepare(self, agent: Agent) -> None:  # noqa: B027 - a task may need nothing
-        """Prepares what all episodes share; called once, for the first of all equal worlds.
+        """Prepares what all episodes in a building share; called for one of its equal worlds.
 
         Raises:
             WorldError: The task is impossible in this world.
