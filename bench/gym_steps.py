@@ -42,9 +42,16 @@ print(int(re.search(r"VmHWM:\\s+(\\d+) kB", open("/proc/self/status").read())[1]
 def rows(unit: float) -> list[Row]:
     """Measures steps of one and of many environments with resets, and the memory of 256."""
     found = []
-    for count, bar in ((1, 0.05), (64, 0.008), (1024, 0.008)):
-        step = _step(flatland.gym.make_vec(NAME, count))
-        name = f"{NAME}, {count} environments in a vector, step of one of them"
+    for env, count, bar in (
+        (NAME, 1, 0.05),
+        (NAME, 16, None),
+        (NAME, 64, 0.008),
+        (NAME, 1024, 0.008),
+        ("flatland/Maze-v0", 64, None),
+        ("flatland/Crowd-v0", 16, None),
+    ):
+        step = _step(flatland.gym.make_vec(env, count))
+        name = f"{env}, {count} environments in a vector, step of one of them"
         note = f"{step.rate}, on {os.cpu_count()} cores"
         found.append(Row(name, step.seconds / unit, "U", bar, note=note))
     single, reset = _single()

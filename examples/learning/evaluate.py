@@ -1,7 +1,9 @@
 #!/usr/bin/env python3
 r"""Runs a trained policy in plain Python, or on the ROS node in lockstep, and counts its successes.
 
-Both use the same episodes. For ROS, start the simulator first:
+With --table, the controllers of flatland.gym and the policy, if one is given, are compared.
+
+All use the same episodes. For ROS, start the simulator first:
   roslaunch flatland server.launch show_viz:=false lockstep:=true \
     world_path:=$(rospack find flatland)/worlds/learning/navigate.yaml
 """
@@ -13,8 +15,10 @@ from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
-from navigation import EVALUATION_SEED, arguments, make_one
-from stable_baselines3 import PPO
+from navigation import EVALUATION_SEED, NAME, actions_of, arguments, make_many, make_one
+
+from flatland.gym import evaluate, make_vec
+from flatland.gym.controllers import CONTROLLERS
 
 Outcome = tuple[bool, bool]
 """Whether the goal was reached, and whether the robot touched something."""
@@ -66,14 +70,49 @@ def run_over_ros(model: Any, count: int) -> list[Outcome]:
     return outcomes
 
 
+def print_table(model: Any, count: int) -> None:
+    """Runs the same episodes with all controllers and a policy, and prints their rates.
+
+    Args:
+        model: The policy, None for the controllers only.
+        count: Number of episodes.
+    """
+    print(f"{count} episodes of {NAME}")
+    print("controller  goal    collision  other   steps to the goal")
+    for name in [*CONTROLLERS, *(["policy"] if model is not None else [])]:
+        if name == "policy":
+            envs = make_many(64)
+            choose = actions_of(model)
+        else:
+            envs = make_vec(NAME, 64, autoreset_mode="SameStep")
+            choose = CONTROLLERS[name](envs)
+        found = evaluate(choose, envs, count, EVALUATION_SEED)
+        envs.close()
+        rates = found.success_rate, found.collision_rate, found.rest_rate
+        print("{:10s}  {:6.1%}  {:9.1%}  {:6.1%}".format(name, *rates), end="")
+        print(f"  {found.mean_steps:17.0f}", flush=True)
+
+
 def main() -> None:
     """Runs the policy and prints the rates."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("policy", type=Path, help="file of train_navigate.py")
+    parser.add_argument("policy", type=Path, nargs="?", help="file of train_navigate.py")
     parser.add_argument("--episodes", type=int, default=100)
     parser.add_argument("--ros", action="store_true", help="on the ROS node")
+    parser.add_argument("--table", action="store_true", help="compare with the controllers")
     options = parser.parse_args()
-    model = PPO.load(options.policy, device="cpu")
+    if options.policy is None and not options.table:
+        parser.error("a policy is required, except with --table")
+    if options.table and options.ros:
+        parser.error("--table is not possible with --ros")
+    model: Any = None
+    if options.policy is not None:
+        from stable_baselines3 import PPO  # not required for the controllers
+
+        model = PPO.load(options.policy, device="cpu")
+    if options.table:
+        print_table(model, options.episodes)
+        return
     run: Callable[[Any, int], list[Outcome]] = run_over_ros if options.ros else run_in_python
     outcomes = run(model, options.episodes)
     for i, (success, collision) in enumerate(outcomes):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 from flatland.gym import (
@@ -42,3 +43,8 @@ def make_many(num_envs: int, **changes: Any) -> FlatlandVectorEnv:
 def make_one(**changes: Any) -> FlatlandEnv:
     """Returns one environment of the same kind."""
     return FlatlandEnv(**arguments(**changes))
+
+
+def actions_of(model: Any) -> Callable[[Any], Any]:
+    """Returns the function from observations to the most probable actions of a policy."""
+    return lambda observations: model.predict(observations, deterministic=True)[0]

@@ -17,10 +17,12 @@ from typing import Any
 
 import numpy as np
 import torch
-from navigation import EVALUATION_SEED, make_many
-from sb3_vector import StableVector
+from navigation import EVALUATION_SEED, actions_of, make_many
 from stable_baselines3 import PPO
 from stable_baselines3.common.callbacks import BaseCallback
+
+from flatland.gym import evaluate
+from flatland.gym.stable_baselines import StableVector
 
 WINDOW = 1000  # episodes in a point of the curve
 
@@ -121,27 +123,13 @@ def success_rate(model: Any, episodes: int, num_envs: int = 64) -> tuple[float, 
 
     Args:
         model: The policy, which takes its most probable action.
-        episodes: Number of episodes, rounded up to a multiple of `num_envs`.
+        episodes: Number of episodes.
         num_envs: Number of environments.
     """
-    outcomes = []
     envs = make_many(num_envs)
-    for first in range(0, episodes, num_envs):
-        observations, _ = envs.reset(seed=EVALUATION_SEED + first)
-        running = np.ones(num_envs, np.bool_)
-        results = np.zeros((num_envs, 2))
-        while running.any():
-            actions, _ = model.predict(observations, deterministic=True)
-            observations, _, terminated, truncated, infos = envs.step(actions)
-            ended = running & (terminated | truncated)
-            for row in np.flatnonzero(ended).tolist():
-                final = infos["final_info"]
-                results[row] = final["is_success"][row], final["collision"][row]
-            running &= ~ended
-        outcomes.append(results)
+    outcomes = evaluate(actions_of(model), envs, episodes, EVALUATION_SEED)
     envs.close()
-    success, collision = np.concatenate(outcomes).mean(axis=0)
-    return float(success), float(collision)
+    return outcomes.success_rate, outcomes.collision_rate
 
 
 def write_curve(progress: Progress, path: Path) -> None:

@@ -1,6 +1,6 @@
 """Environments for Gymnasium and PettingZoo: robots that learn to navigate.
 
-Importing this package registers `flatland/Navigate-v0` and `flatland/Corridor-v0` with Gymnasium.
+Importing this package registers `flatland/Navigate-v0` and other environments with Gymnasium.
 `gymnasium.make("flatland.gym:flatland/Navigate-v0")` imports it. `docs/learning.md` describes the
 environments.
 """
@@ -12,8 +12,10 @@ require("gymnasium", "flatland.gym requires")
 
 from flatland.gym.actions import VelocityAction
 from flatland.gym.agents import Agent
+from flatland.gym.buildings import Buildings, RandomBuildings
 from flatland.gym.endings import AnyOf, Arrived, Collided, Ending, Strayed
 from flatland.gym.env import FlatlandEnv
+from flatland.gym.evaluation import Outcomes, evaluate
 from flatland.gym.observations import (
     Goal,
     LastAction,
@@ -38,7 +40,7 @@ from flatland.gym.settings import Settings
 from flatland.gym.situation import Situation
 from flatland.gym.tasks import FixedGoal, Occupied, RandomGoal, Task
 from flatland.gym.vector import FlatlandVectorEnv
-from flatland.gym.worlds import find_world
+from flatland.gym.worlds import find_world, included_robot
 
 register_all()
 
@@ -47,6 +49,7 @@ __all__ = [
     "AnyOf",
     "Arrival",
     "Arrived",
+    "Buildings",
     "Collided",
     "Contact",
     "Ending",
@@ -59,9 +62,11 @@ __all__ = [
     "Observation",
     "ObservationPart",
     "Occupied",
+    "Outcomes",
     "Places",
     "Progress",
     "Proximity",
+    "RandomBuildings",
     "RandomGoal",
     "Reward",
     "Scan",
@@ -72,7 +77,9 @@ __all__ = [
     "Task",
     "Velocity",
     "VelocityAction",
+    "evaluate",
     "find_world",
+    "included_robot",
     "make_parallel",
     "make_vec",
     "navigation_reward",

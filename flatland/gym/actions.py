@@ -73,14 +73,18 @@ def checked_actions(actions: object, n: int | None) -> DoubleArray:
     """
     shape = (2,) if n is None else (n, 2)
     try:
-        array = np.asarray(actions, dtype=np.float64)
-    except (TypeError, ValueError) as error:
+        given = np.asarray(actions)
+    except ValueError as error:  # rows of different lengths
         raise InvalidAction(f"actions must be numbers of shape {shape}, got {actions!r}") from error
+    # A conversion would read strings, and drop the imaginary part of complex numbers.
+    if given.dtype.kind not in "fiub":
+        raise InvalidAction(f"actions must be numbers of shape {shape}, got {actions!r}")
+    array = given.astype(np.float64)
     if array.shape != shape:
         raise InvalidAction(f"actions must have the shape {shape}, got {array.shape}")
     if np.isnan(array).any():
         raise InvalidAction(f"actions must not be NaN, got {_first_nan(array)}")
-    return limit_to_unit(np.array(array)).reshape(-1, 2)
+    return limit_to_unit(array).reshape(-1, 2)
 
 
 def limit_to_unit(numbers: A) -> A:

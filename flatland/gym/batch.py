@@ -34,13 +34,28 @@ class Batch:
         """Prepares the agents.
 
         Args:
-            agents: The agents, for which `is_possible` is true.
+            agents: The agents, for which `is_possible` is true. If elements are replaced,
+                `agents_changed` must be called.
             situation: Receives what the agents observe.
             num_threads: Number of threads that step and scan, 0 for one per core.
         """
         self._agents = agents
         self._situation = situation
         self._num_threads = num_threads
+        self._is_current = False
+        self._order: list[int] = []
+        self._noisy: list[int] = []
+        self._noises = np.zeros((len(agents), 2), np.uint64)  # see `Laser.next_computed`
+        self._sensor_poses = np.zeros((len(agents), 3))
+        self._ranges = list(situation.ranges)  # a view of each row
+
+    def agents_changed(self) -> None:
+        """Reads the agents again before the next step."""
+        self._is_current = False
+
+    def _read_agents(self) -> None:
+        agents = self._agents
+        self._is_current = True
         # Threads that step overlapping sets of worlds lock them in the same order.
         self._order = sorted(range(len(agents)), key=lambda row: id(agents[row].world))
         self._core = AgentBatch(
@@ -51,9 +66,6 @@ class Batch:
             ]
         )
         self._noisy = [row for row, agent in enumerate(agents) if agent.laser.has_noise]
-        self._noises = np.zeros((len(agents), 2), np.uint64)  # see `Laser.next_computed`
-        self._sensor_poses = np.zeros((len(agents), 3))
-        self._ranges = list(situation.ranges)  # a view of each row
 
     @staticmethod
     def is_possible(agents: Sequence[Agent], low: DoubleArray, high: DoubleArray) -> bool:
@@ -85,6 +97,8 @@ class Batch:
         Raises:
             Exception: As `World.step`.
         """
+        if not self._is_current:
+            self._read_agents()
         agents = self._agents
         timekeeper = agents[0].world.timekeeper
         first = agents[0].world

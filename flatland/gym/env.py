@@ -3,36 +3,40 @@
 from __future__ import annotations
 
 import os
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import gymnasium
 from gymnasium.error import ResetNeeded
 
 from flatland.geometry import FloatArray
 from flatland.gym.actions import checked_actions
+from flatland.gym.recreation import Recreated
 from flatland.gym.settings import Settings
 from flatland.gym.stage import RENDER_MODES, Image, Stage
 from flatland.gym.tasks import Occupied
 
+if TYPE_CHECKING:
+    from flatland.gym.buildings import Buildings
+    from flatland.gym.episodes import Episodes
+    from flatland.world import World
 
-class FlatlandEnv(gymnasium.Env[Any, FloatArray]):
+
+class FlatlandEnv(Recreated, gymnasium.Env[Any, FloatArray]):
     """A robot with a laser that drives to a goal.
 
     An action is a velocity command for `physics_steps` steps of the world. An episode depends on
     the seed of the reset and the actions only, not on earlier episodes.
-
-    Attributes:
-        world: The world; it must be stepped only by the environment.
     """
 
     metadata: dict[str, Any] = {  # noqa: RUF012 - as in the base class
         "render_modes": list(RENDER_MODES),
         "render_fps": 10,
     }
+    kept_attributes = ("spec", "_np_random", "_np_random_seed")
 
     def __init__(
         self,
-        world: str | os.PathLike[str] = "navigate",
+        world: str | os.PathLike[str] | Buildings = "navigate",
         render_mode: str | None = None,
         *,
         web_port: int | None = None,
@@ -41,7 +45,8 @@ class FlatlandEnv(gymnasium.Env[Any, FloatArray]):
         """Loads the world.
 
         Args:
-            world: World file, or the name of an included world: `navigate`, `corridor`, `fleet`.
+            world: World file, or the name of an included world: `navigate`, `corridor`, `crowd`,
+                `fleet`; or `Buildings`, one of which is drawn for each episode.
             render_mode: `rgb_array`, `human` or None.
             web_port: Port of the viewer of the render mode `human`, 0 for any free one; the first
                 environment of a process determines it. None for the environment variable
@@ -66,16 +71,28 @@ class FlatlandEnv(gymnasium.Env[Any, FloatArray]):
         )
         self.render_mode = render_mode
         self.metadata = self._stage.metadata
-        self.world = self._stage.worlds[0]
         self._episodes = self._stage.episodes
         self.observation_space = self._episodes.layout.space
         self.action_space = action_space
         self._running = False
 
     @property
+    def world(self) -> World:
+        """The world, which only the environment may step.
+
+        With several buildings, each episode may be in another world.
+        """
+        return self._stage.worlds[0]
+
+    @property
     def goal(self) -> tuple[float, float]:
         """The goal of the episode in the world frame [m]."""
         return self._stage.goals[0][0]
+
+    @property
+    def episodes(self) -> Episodes:
+        """The episodes: agents, settings, and the layout of the observation."""
+        return self._episodes
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -92,7 +109,7 @@ class FlatlandEnv(gymnasium.Env[Any, FloatArray]):
 
         Raises:
             ClosedEnvironmentError: The environment is closed.
-            WorldError: No place is free.
+            WorldError: No place is free, or no path leads to the start or the goal.
             ValueError: An option is unknown or invalid.
         """
         super().reset(seed=seed)
@@ -117,7 +134,7 @@ class FlatlandEnv(gymnasium.Env[Any, FloatArray]):
         Raises:
             ClosedEnvironmentError: The environment is closed.
             ResetNeeded: There was no reset, or the episode has ended.
-            InvalidAction: The action has the wrong shape, or is NaN.
+            InvalidAction: The action has the wrong shape, is NaN, or no real number.
         """
         self._stage.check_open()
         if not self._running:

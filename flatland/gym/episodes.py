@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import math
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -11,9 +12,10 @@ import numpy.typing as npt
 
 from flatland.errors import WorldError
 from flatland.geometry import BoolArray, DoubleArray, FloatArray, Pose, Vector2, finite_pose
+from flatland.gym.agents import check_alike
 from flatland.gym.batch import Batch, step_agents
 from flatland.gym.situation import Rows, Situation
-from flatland.gym.tasks import Occupied
+from flatland.gym.tasks import Occupied, Task
 from flatland.plugins.laser import compute_scans
 from flatland.runtime.placement import TOLERANCE
 
@@ -30,40 +32,75 @@ class Episodes:
 
     Attributes:
         agents: The agents.
+        settings: The arguments of the environment.
         situation: Their state after the last step.
         layout: The observation space and its columns.
         observations: The observations of the last `look`, shape (n, layout.size), float32.
     """
 
-    def __init__(self, agents: Sequence[Agent], settings: Settings, num_threads: int = 1) -> None:
+    def __init__(
+        self,
+        agents: Sequence[Agent],
+        settings: Settings,
+        num_threads: int,
+        buildings: Sequence[int],
+        firsts: Sequence[Agent],
+    ) -> None:
         """Prepares the episodes; the worlds are in the state at the start of each episode.
 
         Args:
             agents: The agents, each in a world of its own or all in the same.
             settings: The task, the observation, the action and the reward.
             num_threads: Number of threads that step and scan, 0 for one per core.
+            buildings: Index of the building of each agent.
+            firsts: An agent of each building.
 
         Raises:
-            WorldError: The task is impossible.
+            WorldError: The task is impossible in a building, or the agents differ.
             ValueError: The observation does not fit the laser.
         """
         first = agents[0]
-        self.agents = tuple(agents)
-        self._settings = settings
+        self.agents = list(agents)
+        self.settings = settings
         self._num_threads = num_threads
-        self.task = copy.copy(settings.task)  # The copy is prepared for these worlds.
-        self.task.prepare(first)
+        self._buildings = list(buildings)
+        self._tasks = [_prepared(settings.task, agent) for agent in firsts]
+        check_alike(firsts)
         beams = first.laser.angles.count
         self.layout = settings.observation.layout(beams)
         low, high = settings.action.bounds(first)
+        for agent in firsts:
+            if not np.array_equal(settings.action.bounds(agent), (low, high)):
+                raise WorldError("the drives of the agents must have the same limits")
         n = len(agents)
         self.situation = Situation(n, beams, first.laser.range, low, high)
         self.observations: FloatArray = np.zeros((n, self.layout.size), np.float32)
         self._lasers = [agent.laser for agent in agents]
         self._batch = None
-        if Batch.is_possible(agents, low, high):
-            self._batch = Batch(agents, self.situation, num_threads)
+        if Batch.is_possible(agents, low, high) and all(
+            Batch.is_possible([agent], low, high) for agent in firsts
+        ):
+            self._batch = Batch(self.agents, self.situation, num_threads)
         self._all = np.arange(n)
+
+    @property
+    def goal_radius(self) -> float:
+        """Distance to the goal at which an agent has arrived [m]."""
+        return self._tasks[0].goal_radius
+
+    def replace(self, row: int, agent: Agent, building: int) -> None:
+        """Replaces an agent by one of another world, whose next episode begins.
+
+        Args:
+            row: Index of the agent.
+            agent: The other agent.
+            building: Index of its building.
+        """
+        self.agents[row] = agent
+        self._lasers[row] = agent.laser
+        self._buildings[row] = building
+        if self._batch is not None:
+            self._batch.agents_changed()
 
     def begin(
         self, row: int, rng: np.random.Generator, occupied: Occupied, options: Mapping[str, Any]
@@ -71,11 +108,12 @@ class Episodes:
         """Begins an episode of an agent whose world is in its initial state.
 
         Raises:
-            WorldError: The start or the goal is not free.
+            WorldError: The start or the goal is not free, or no path leads there.
             ValueError: An option is unknown or invalid.
         """
         agent, s = self.agents[row], self.situation
-        start, goal = self.task.draw(agent, rng, occupied)
+        task = self._tasks[self._buildings[row]]
+        start, goal = task.draw(agent, rng, occupied)
         if options:
             unknown = sorted(set(options) - {"start", "goal"})
             if unknown:
@@ -83,6 +121,8 @@ class Episodes:
             start = finite_pose(options.get("start", start))
             goal = finite_pose((*options.get("goal", goal), 0.0))[:2]
         self._refuse_taken(agent, start, goal, occupied)
+        if options:
+            task.check_paths(start, goal)
         # Agents that have not been placed yet may overlap the start.
         agent.world.move_model(agent.model.name, start, "allow")
         s.goals[row] = goal
@@ -116,7 +156,7 @@ class Episodes:
         s.actions[chosen] = actions[chosen]
         s.previous_distance[chosen] = s.distance[chosen]
         s.steps[chosen] += 1
-        n = self._settings.physics_steps
+        n = self.settings.physics_steps
         if self._batch is None:
             agents = [self.agents[row] for row in (self._all if rows is None else rows).tolist()]
             step_agents(agents, commands[chosen], n, self._num_threads)
@@ -141,7 +181,7 @@ class Episodes:
             return
         self._measure(rows)
         part = s.take(rows)
-        part.locate(self.task.goal_radius)
+        part.locate(self.goal_radius)
         observations = np.empty((len(rows), self.layout.size), np.float32)
         self.layout.write(part, observations)
         self.observations[rows] = observations
@@ -165,15 +205,16 @@ class Episodes:
 
     def _observe(self) -> None:
         """Computes the observations of all agents."""
-        self.situation.locate(self.task.goal_radius)
+        self.situation.locate(self.goal_radius)
         self.layout.write(self.situation, self.observations)
 
     def judge(self) -> tuple[DoubleArray, BoolArray, BoolArray]:
         """Returns rewards, which episodes terminated and which were truncated, (n,) each."""
-        s, settings = self.situation, self._settings
+        s, settings = self.situation, self.settings
         rewards = settings.reward.compute(s)
         terminated = settings.ending.check(s)
-        truncated: BoolArray = (s.steps >= settings.max_steps) & ~terminated
+        limit = math.inf if settings.max_steps is None else settings.max_steps
+        truncated: BoolArray = (s.steps >= limit) & ~terminated
         return rewards, terminated, truncated
 
     def infos(self) -> dict[str, npt.NDArray[Any]]:
@@ -184,3 +225,10 @@ class Episodes:
     def info(self, row: int) -> dict[str, Any]:
         """Returns the info of one agent after its last step."""
         return {name: values[row].item() for name, values in self.infos().items()}
+
+
+def _prepared(task: Task, agent: Agent) -> Task:
+    """Returns a copy of a task that is prepared for the world of an agent."""
+    prepared = copy.copy(task)
+    prepared.prepare(agent)
+    return prepared

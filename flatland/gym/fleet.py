@@ -17,10 +17,13 @@ from flatland.entities.body import Body
 from flatland.geometry import FloatArray
 from flatland.gym.actions import checked_actions
 from flatland.gym.agents import Agent, check_alike
+from flatland.gym.buildings import Buildings
+from flatland.gym.checks import checked_count
+from flatland.gym.recreation import Recreated
 from flatland.gym.settings import Settings
 from flatland.gym.stage import RENDER_MODES, Image, Stage
 from flatland.gym.tasks import Occupied
-from flatland.gym.worlds import ROBOT, included_folder
+from flatland.gym.worlds import included_robot
 from flatland.values import Twist
 
 if TYPE_CHECKING:
@@ -31,7 +34,7 @@ Steps = tuple[
 ]
 
 
-class FleetEnv(ParallelEnv[str, Any, FloatArray]):  # type: ignore[misc, unused-ignore]
+class FleetEnv(Recreated, ParallelEnv[str, Any, FloatArray]):  # type: ignore[misc, unused-ignore]
     """Robots that drive to their goals in the same world, as obstacles in the scans of the others.
 
     A robot whose episode has ended stops and remains in the world as an obstacle.
@@ -48,6 +51,7 @@ class FleetEnv(ParallelEnv[str, Any, FloatArray]):  # type: ignore[misc, unused-
         "render_fps": 10,
         "is_parallelizable": True,
     }
+    kept_attributes = ("_rng",)
 
     def __init__(
         self,
@@ -75,11 +79,12 @@ class FleetEnv(ParallelEnv[str, Any, FloatArray]):  # type: ignore[misc, unused-
             TypeError: An argument is unknown or has the wrong type.
             ValueError: An argument is out of range.
         """
-        if isinstance(num_robots, bool) or not isinstance(num_robots, int) or num_robots < 1:
-            raise ValueError(f"num_robots must be an integer of at least 1, got {num_robots!r}")
+        num_robots = checked_count("num_robots", num_robots)
         for name in ("agent", "command"):
             if name in arguments:
                 raise TypeError(f"{name} is not an argument here: it is that of each robot")
+        if isinstance(world, Buildings):
+            raise TypeError("world must be a file or a name: several robots have one building")
         settings = Settings.from_arguments({"world": world, **arguments})
         self.possible_agents = [f"robot_{i}" for i in range(num_robots)]
         self.agents: list[str] = []
@@ -217,7 +222,7 @@ class FleetEnv(ParallelEnv[str, Any, FloatArray]):  # type: ignore[misc, unused-
         self, world: World, robot: str | os.PathLike[str] | None, settings: Settings
     ) -> list[Agent]:
         """Adds the robots at free places."""
-        path = included_folder() / ROBOT if robot is None else robot
+        path = included_robot() if robot is None else robot
         agents: list[Agent] = []
         for name in self.possible_agents:
             # This pose is never simulated: each reset places all robots.

@@ -114,6 +114,24 @@ class SharedViewer:
                 raise
             return viewer, handles
 
+    def replace(
+        self, viewer: WebViewer, handle: WorldHandle, world: World, name: str
+    ) -> WorldHandle:
+        """Shows a world in the place of another one.
+
+        Args:
+            viewer: The viewer of the other world.
+            handle: The handle of the other world.
+            world: The world.
+            name: Its name for users.
+
+        Returns:
+            The handle of the world.
+        """
+        with self._lock:
+            viewer.remove_world(handle)
+            return viewer.add_world(world, name)
+
     def remove(self, viewer: WebViewer, handles: Sequence[WorldHandle]) -> None:
         """Removes worlds; the viewer is closed with the last one."""
         with self._lock:
@@ -146,12 +164,13 @@ class EpisodeView:
         """Prepares the view, which opens with the first call of `show`.
 
         Args:
-            worlds: The worlds.
+            worlds: The worlds; their list may change.
             names: Their names for users.
             dt: Simulated time of a step of the environment [s].
             port: See `SharedViewer.add`.
         """
         self._worlds = worlds
+        self._shown: list[World] = []
         self._names = names
         self._dt = dt
         self._port = port
@@ -171,8 +190,15 @@ class EpisodeView:
         """
         if self._opened is None:
             self._opened = SHARED.add(self._worlds, self._names, self._port)
+            self._shown = list(self._worlds)
             self._due = time.monotonic()
         viewer, handles = self._opened
+        for number, world in enumerate(self._worlds):
+            if world is not self._shown[number]:
+                name = self._names[number]
+                handles[number] = SHARED.replace(viewer, handles[number], world, name)
+                self._shown[number] = world
+                self._goals[number] = ()
         for number, (handle, places) in enumerate(zip(handles, goals, strict=True)):
             if places != self._goals[number]:
                 self._goals[number] = places

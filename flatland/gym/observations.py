@@ -4,15 +4,17 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, TypeVar
 
 import numpy as np
 from gymnasium import spaces
 
-from flatland.geometry import FloatArray
+from flatland.geometry import DoubleArray, FloatArray
 
 if TYPE_CHECKING:
     from flatland.gym.situation import Situation
+
+P = TypeVar("P", bound="ObservationPart")
 
 GOAL_SCALE: Final = 10.0  # m
 
@@ -83,6 +85,24 @@ class Scan(ObservationPart):
         """Writes the scaled ranges."""
         situation.core.write_scans(situation.max_range, self.half or 0.0, out)
 
+    def ranges_of(self, values: DoubleArray, max_range: float, beams: int) -> DoubleArray:
+        """Returns the ranges of all beams [m], the inverse of `write`.
+
+        Args:
+            values: Observed values, shape (n, size).
+            max_range: Range of the laser [m], which is that of a beam without a hit.
+            beams: Number of beams of the laser; those of a sector have the same range.
+
+        Returns:
+            Ranges, shape (n, beams).
+        """
+        if self.half is None:
+            ranges = values * max_range
+        else:
+            ranges = self.half * values / np.maximum(1.0 - values, 1e-9)
+        ranges = np.where(values < 1.0, np.minimum(ranges, max_range), max_range)
+        return np.repeat(ranges, beams // values.shape[1], axis=1)
+
 
 class Goal(ObservationPart):
     """The goal in the frame of the robot: distance, cosine and sine of the bearing.
@@ -114,6 +134,18 @@ class Goal(ObservationPart):
         """Writes the distance and the bearing."""
         situation.core.write_goals(self.scale, out)
 
+    def positions_of(self, values: DoubleArray) -> DoubleArray:
+        """Returns the goals (ahead, left) [m], at most `scale` away, the inverse of `write`.
+
+        Args:
+            values: Observed values, shape (n, 3).
+
+        Returns:
+            Positions in the frame of the robot, shape (n, 2).
+        """
+        positions: DoubleArray = self.scale * values[:, :1] * values[:, 1:]
+        return positions
+
 
 class Velocity(ObservationPart):
     """Forward speed and yaw rate, divided by the greatest that can be commanded."""
@@ -128,6 +160,22 @@ class Velocity(ObservationPart):
         """Writes both velocities; a robot that is pushed may exceed the bounds, which are kept."""
         limit = np.maximum(np.abs(situation.low), np.abs(situation.high))
         situation.core.write_velocities(limit[0], limit[1], out)
+
+    def velocities_of(
+        self, values: DoubleArray, low: DoubleArray, high: DoubleArray
+    ) -> DoubleArray:
+        """Returns forward speeds and yaw rates [m/s, rad/s], the inverse of `write`.
+
+        Args:
+            values: Observed values, shape (n, 2).
+            low: Lowest velocity command, shape (2,).
+            high: Highest velocity command, shape (2,).
+
+        Returns:
+            Velocities, shape (n, 2).
+        """
+        velocities: DoubleArray = values * np.maximum(np.abs(low), np.abs(high))
+        return velocities
 
 
 class LastAction(ObservationPart):
@@ -212,6 +260,35 @@ class ObservationLayout:
             self.space = spaces.Dict(boxes)
         else:
             self.space = spaces.Box(low, high, dtype=np.float32)
+
+    def has(self, kind: type[ObservationPart]) -> bool:
+        """Returns whether there is a part of a class."""
+        return any(isinstance(part, kind) for part, _ in self._columns)
+
+    def find(self, kind: type[P]) -> tuple[P, slice]:
+        """Returns the part of a class, with its columns.
+
+        Raises:
+            ValueError: There is none.
+        """
+        for part, columns in self._columns:
+            if isinstance(part, kind):
+                return part, columns
+        raise ValueError(f"the observation must contain {kind.__name__}")
+
+    def select(self, observation: Any, part: ObservationPart, columns: slice) -> FloatArray:
+        """Returns the values of a part in one observation or in those of several agents.
+
+        Args:
+            observation: As the space describes it.
+            part: The part.
+            columns: Its columns, as `find` returns them.
+
+        Returns:
+            The values, shape (size,) or (n, size).
+        """
+        values: FloatArray = observation[part.name] if self._as_dict else observation[..., columns]
+        return values
 
     def write(self, situation: Situation, out: FloatArray) -> None:
         """Writes the observations of all agents to `out`, shape (n, size)."""

@@ -73,6 +73,7 @@ class Places:
             )
         self._reachable = np.zeros(self._space.size, np.bool_)
         self._reachable[self._cells] = True
+        self._regions = self._space.regions_of(self._cells)
 
     def draw(
         self,
@@ -133,6 +134,33 @@ class Places:
         """Returns whether a place belongs to the region of the free places."""
         cell = self._space.cell_at(place[0], place[1])
         return cell is not None and bool(self._reachable[cell])
+
+    def check_path(
+        self, name: str, place: Sequence[float], start: Sequence[float] | None = None
+    ) -> None:
+        """Checks that a path leads to a place.
+
+        A passage that is wider than the disc by less than a cell of the grid may be regarded as
+        closed.
+
+        Args:
+            name: What is at the place, for the error.
+            place: The place in the world frame [m].
+            start: Start of the path in the world frame [m]; None for the free places.
+
+        Raises:
+            WorldError: There is no path.
+        """
+        x, y = place[0], place[1]
+        reached = self._regions if start is None else self._space.regions_at(start[0], start[1])
+        if self._space.regions_at(x, y) & reached:
+            return
+        x_min, y_min, x_max, y_max = self.bounds
+        reason = f"no path of a disc of radius {self.radius:g} m leads there"
+        if not (x_min <= x <= x_max and y_min <= y <= y_max):
+            walls = f"({x_min:g}, {y_min:g}) to ({x_max:g}, {y_max:g})"
+            reason = f"it is outside of the walls, which extend from {walls}"
+        raise WorldError(f"the {name} ({x:g}, {y:g}) cannot be reached: {reason}")
 
     def _any(self, rng: np.random.Generator) -> Vector2:
         numbers = rng.random(3)

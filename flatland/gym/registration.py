@@ -10,16 +10,26 @@ from gymnasium.envs.registration import VectorizeMode
 from gymnasium.error import NameNotFound, UnsupportedMode
 
 from flatland.extras import require
+from flatland.gym.buildings import Buildings, RandomBuildings
+from flatland.gym.settings import DEFAULT_STEPS
 
 if TYPE_CHECKING:
     from flatland.gym.fleet import FleetEnv
     from flatland.gym.vector import FlatlandVectorEnv
 
+_BUILDINGS: Final = 16
+_CROWDS: Final = 8
+
 SINGLE: Final[dict[str, dict[str, Any]]] = {
     "flatland/Navigate-v0": {"world": "navigate"},
-    "flatland/Corridor-v0": {"world": "corridor", "max_steps": 200},
+    "flatland/Corridor-v0": {"world": "corridor"},
+    "flatland/Crowd-v0": {"world": Buildings(["crowd"] * _CROWDS)},
+    "flatland/Maze-v0": {"world": RandomBuildings("maze", _BUILDINGS)},
+    "flatland/Warehouse-v0": {"world": RandomBuildings("warehouse", _BUILDINGS)},
 }
 """Arguments of the environments with one robot."""
+STEPS: Final = {"flatland/Corridor-v0": 200}
+"""Limits of episodes that differ from `DEFAULT_STEPS` [steps]."""
 PARALLEL: Final[dict[str, dict[str, Any]]] = {"flatland/Fleet-v0": {"world": "fleet"}}
 """Arguments of the environments with several robots."""
 
@@ -31,7 +41,9 @@ def register_all() -> None:
             name,
             entry_point="flatland.gym.env:FlatlandEnv",
             vector_entry_point="flatland.gym.vector:FlatlandVectorEnv",
-            kwargs=arguments,
+            # The limit of Gymnasium, so that its argument `max_episode_steps` replaces it.
+            max_episode_steps=STEPS.get(name, DEFAULT_STEPS),
+            kwargs={**arguments, "max_steps": None},
         )
     for name in PARALLEL:
         # Gymnasium has no environments with several agents: the entry point raises an error.
@@ -44,7 +56,8 @@ def make_vec(name: str, num_envs: int = 1, **arguments: Any) -> FlatlandVectorEn
     Args:
         name: A registered name, such as `flatland/Navigate-v0`.
         num_envs: Number of environments.
-        **arguments: See `FlatlandVectorEnv` and `Settings`.
+        **arguments: See `FlatlandVectorEnv` and `Settings`. Either of `max_steps` and
+            `max_episode_steps` replaces the limit of the registered environment.
 
     Raises:
         gymnasium.error.Error: The name is unknown, or the environment has several robots.
@@ -56,6 +69,8 @@ def make_vec(name: str, num_envs: int = 1, **arguments: Any) -> FlatlandVectorEn
         _refuse(name)
     if name not in SINGLE:
         raise NameNotFound(f'environment "{name}" does not exist; known: {", ".join(SINGLE)}')
+    if arguments.get("max_steps") is not None:
+        arguments.setdefault("max_episode_steps", arguments["max_steps"])
     envs: Any = gymnasium.make_vec(
         name, num_envs, vectorization_mode=VectorizeMode.VECTOR_ENTRY_POINT, **arguments
     )

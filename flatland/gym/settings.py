@@ -5,12 +5,14 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 from flatland.gym.actions import VelocityAction
 from flatland.gym.agents import Agent, find_agent
+from flatland.gym.buildings import Buildings
+from flatland.gym.checks import checked_count
 from flatland.gym.endings import Ending, navigation_ending
 from flatland.gym.observations import Observation
 from flatland.gym.rewards import Reward, navigation_reward
@@ -21,13 +23,17 @@ from flatland.world import World
 if TYPE_CHECKING:
     from flatland.config.inputs import Params
 
+DEFAULT_STEPS: Final = 300
+"""Limit of an episode [steps]."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class Settings:
     """The arguments that all environments have in common.
 
     Attributes:
-        world: World file, or the name of an included world: `navigate`, `corridor`, `fleet`.
+        world: World file, or the name of an included world: `navigate`, `corridor`, `crowd`,
+            `fleet`; or several buildings, one of which is drawn for each episode.
         agent: Name of the model that is controlled.
         laser: Name of its laser; None for the first one.
         command: Topic of its velocity command; None for the first one.
@@ -36,13 +42,13 @@ class Settings:
         action: How actions are scaled.
         reward: The reward.
         ending: When an episode terminates.
-        max_steps: Number of steps after which an episode is truncated.
+        max_steps: Number of steps after which an episode is truncated; None for no limit.
         physics_steps: Number of steps of the world in a step of the environment.
         step_size: Simulated time of a step of the world [s].
         params: Values of `param()` in YAML files.
     """
 
-    world: str | os.PathLike[str] = "navigate"
+    world: str | os.PathLike[str] | Buildings = "navigate"
     agent: str = "robot"
     laser: str | None = None
     command: str | None = None
@@ -51,7 +57,7 @@ class Settings:
     action: VelocityAction = field(default_factory=VelocityAction)
     reward: Reward = field(default_factory=navigation_reward)
     ending: Ending = field(default_factory=navigation_ending)
-    max_steps: int = 300
+    max_steps: int | None = DEFAULT_STEPS
     physics_steps: int = 20
     step_size: float = 0.005
     params: Params = None
@@ -59,8 +65,10 @@ class Settings:
     def __post_init__(self) -> None:
         for name in ("max_steps", "physics_steps"):
             value = getattr(self, name)
-            if isinstance(value, bool) or not isinstance(value, int) or value < 1:
-                raise ValueError(f"{name} must be an integer of at least 1, got {value!r}")
+            if value is not None or name != "max_steps":
+                object.__setattr__(self, name, checked_count(name, value))
+        if not isinstance(self.world, str | os.PathLike | Buildings):
+            raise TypeError(f"world must be a file, a name or Buildings, got {self.world!r}")
         for name, kind in _KINDS.items():
             value = getattr(self, name)
             if not isinstance(value, kind):
@@ -84,9 +92,16 @@ class Settings:
             )
         return cls(**arguments)
 
+    def limited_to(self, steps: int) -> Settings:
+        """Returns settings whose episodes are truncated after a number of steps at the latest."""
+        limit = steps if self.max_steps is None else min(steps, self.max_steps)
+        return replace(self, max_steps=limit)
+
     @property
     def world_name(self) -> str:
         """The name of the world for users: of its file, or of the folder of a file `world.yaml`."""
+        if isinstance(self.world, Buildings):
+            return self.world.name
         path = Path(self.world)
         return path.parent.name if path.name == "world.yaml" and path.parent.name else path.stem
 
@@ -95,12 +110,23 @@ class Settings:
         """Simulated time of a step of the environment [s]."""
         return self.physics_steps * self.step_size
 
-    def load(self) -> World:
+    @property
+    def building_count(self) -> int:
+        """Number of buildings."""
+        return len(self.world) if isinstance(self.world, Buildings) else 1
+
+    def load(self, building: int = 0) -> World:
         """Loads the world.
+
+        Args:
+            building: Index of the building.
 
         Raises:
             FlatlandError: A file is missing or invalid.
+            ValueError: An argument of a generated building is out of range.
         """
+        if isinstance(self.world, Buildings):
+            return self.world.load(building, self.params, self.step_size)
         return World.from_yaml(
             find_world(self.world), seed=0, params=self.params, step_size=self.step_size
         )

@@ -17,6 +17,7 @@ from gymnasium.error import ClosedEnvironmentError
 from flatland.drawing.render import MATPLOTLIB_LOCK, make_figure
 from flatland.gym.episodes import Episodes
 from flatland.gym.live_view import EpisodeView, check_live_view
+from flatland.gym.stock import Stock
 
 if TYPE_CHECKING:
     from flatland.geometry import Vector2
@@ -29,13 +30,15 @@ Image = npt.NDArray[np.uint8]
 RENDER_MODES: Final = ("rgb_array", "human")
 _SIZE: Final = (800, 600)  # pixels
 _DPI: Final = 80.0
+_IDLE_PER_WORLD: Final = 3
 
 
 class Stage:
     """The part that all environments share.
 
     Attributes:
-        worlds: Equal worlds; each contains the same number of agents.
+        worlds: The worlds; each contains the same number of agents. With several buildings,
+            `restore` replaces them.
         episodes: The episodes of the agents of all worlds, in this order.
         metadata: What Gymnasium and PettingZoo read from an environment.
     """
@@ -51,7 +54,7 @@ class Stage:
         metadata: Mapping[str, Any],
         num_threads: int = 1,
     ) -> None:
-        """Loads the world and copies it.
+        """Loads the worlds and copies them.
 
         Args:
             settings: The arguments of the environment.
@@ -64,8 +67,8 @@ class Stage:
 
         Raises:
             DependencyNotInstalled: `human` requires aiohttp.
-            FlatlandError: A file is missing or invalid, or a model cannot be an agent; no world is
-                left open.
+            FlatlandError: A file is missing or invalid, a model cannot be an agent, or the robots
+                of several buildings differ; no world is left open.
             MemoryError: There is not enough memory for the worlds.
             ValueError: An argument is out of range.
         """
@@ -78,16 +81,33 @@ class Stage:
         self.metadata = {**metadata, "render_fps": round(1 / settings.dt) or 1}
         self._render_mode = render_mode
         with ExitStack() as undo:
-            first = undo.enter_context(settings.load())
-            if len(names) > 1:
-                _check_memory(len(names), first.snapshot().size)
-            self.worlds = [first]
-            self.worlds += [undo.enter_context(first.clone()) for _ in names[1:]]
-            agents = [agent for world in self.worlds for agent in find_agents(world)]
-            self.episodes = Episodes(agents, settings, num_threads)
-            original = first.snapshot()
-            clones = [world.snapshot(original=original) for world in self.worlds[1:]]
-            self._snapshots = [original, *clones]
+            self._stocks: list[Stock] = []
+            for building in range(settings.building_count):
+                original = undo.enter_context(settings.load(building))
+                if not self._stocks and max(len(names), settings.building_count) > 1:
+                    _check_memory(len(names), settings.building_count, original.snapshot().size)
+                self._stocks.append(Stock(building, original, find_agents))
+            if len(self._stocks) == 1:
+                # The original is the world of the first environment; it is copied before.
+                clones = [undo.enter_context(original.clone()) for _ in names[1:]]
+                self._used = [self._stocks[0].prepare(each) for each in (original, *clones)]
+                firsts = self._used[:1]
+            else:
+                firsts = []
+                for stock in self._stocks:
+                    undo.callback(stock.close)
+                    firsts.append(stock.take())
+                    stock.idle.append(firsts[-1])
+                self._used = []
+                for number in range(len(names)):
+                    self._used.append(self._stocks[number % len(self._stocks)].take())
+                    undo.callback(self._used[-1].world.close)
+            self.worlds = [each.world for each in self._used]
+            agents = [agent for each in self._used for agent in each.agents]
+            buildings = [each.building for each in self._used for _ in each.agents]
+            self.episodes = Episodes(
+                agents, settings, num_threads, buildings, [each.agents[0] for each in firsts]
+            )
             self._view = EpisodeView(self.worlds, names, settings.dt, web_port)
             undo.pop_all()
 
@@ -101,17 +121,38 @@ class Stage:
     def restore(self, number: int, rng: np.random.Generator) -> None:
         """Returns a world to its state before any episode, with new random numbers of all plugins.
 
+        With several buildings, one is drawn first.
+
         Args:
             number: Index of the world.
-            rng: Source of the seeds; the noise is a function of its state.
+            rng: Source of the building and of the seeds; the noise is a function of its state.
         """
+        if len(self._stocks) > 1:
+            self._enter(number, int(rng.integers(len(self._stocks))))
         world = self.worlds[number]
-        world.restore(self._snapshots[number])
+        world.restore(self._used[number].start)
         for model in world.models:
             for plugin in model.plugins:
                 plugin.reseed(rng)
         for world_plugin in world.plugins:
             world_plugin.reseed(rng)
+
+    def _enter(self, number: int, building: int) -> None:
+        """Replaces a world by one of another building."""
+        previous = self._used[number]
+        if previous.building == building:
+            return
+        entered = self._stocks[building].take()
+        self._used[number] = entered
+        self.worlds[number] = entered.world
+        count = len(entered.agents)
+        for row, agent in enumerate(entered.agents, number * count):
+            self.episodes.replace(row, agent, building)
+        self._stocks[previous.building].idle.append(previous)
+        # A new world takes milliseconds; idle ones are kept as far as they are likely to be used.
+        if sum(len(stock.idle) for stock in self._stocks) > _IDLE_PER_WORLD * len(self.worlds):
+            largest = max(self._stocks, key=lambda stock: len(stock.idle))
+            largest.idle.pop(0).world.close()
 
     def render(self) -> list[Image] | None:
         """Returns an image of each world for `rgb_array`; for `human`, shows all in the browser.
@@ -121,7 +162,7 @@ class Stage:
             FlatlandError: The viewer cannot listen on its port, or matplotlib is missing.
         """
         self.check_open()
-        radius = self.episodes.task.goal_radius
+        radius = self.episodes.goal_radius
         if self._render_mode == "rgb_array":
             pairs = zip(self.worlds, self.goals, strict=True)
             return [_draw(world, goals, radius) for world, goals in pairs]
@@ -151,25 +192,29 @@ class Stage:
     def close(self) -> None:
         """Closes all worlds and their view; further calls have no effect."""
         with ExitStack() as closing:
+            for stock in self._stocks:
+                closing.callback(stock.close)
             for world in reversed(self.worlds):
                 closing.callback(world.close)
             self._view.close()
 
 
-def _check_memory(count: int, size: int) -> None:
+def _check_memory(count: int, buildings: int, size: int) -> None:
     """Checks that there is enough memory for the worlds of environments.
 
     Args:
-        count: Number of worlds.
+        count: Number of environments.
+        buildings: Number of buildings; of several, there is one more world of each.
         size: Memory of a world [bytes].
 
     Raises:
         MemoryError: There is not; the text states how much is needed.
     """
     available = _available_memory()
-    if count * size > available:
+    needed = size * (count if buildings == 1 else max(count, buildings) + buildings)
+    if needed > available:
         raise MemoryError(
-            f"{count} environments need about {count * size / 1e9:.1f} GB, and "
+            f"{count} environments need about {needed / 1e9:.1f} GB, and "
             f"{available / 1e9:.1f} GB are available"
         )
 

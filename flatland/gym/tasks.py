@@ -40,13 +40,39 @@ class Task(ABC):
     """
 
     goal_radius: float = 0.3
+    _places: Places | None = None
 
     def prepare(self, agent: Agent) -> None:  # noqa: B027 - a task may need nothing
-        """Prepares what all episodes share; called once, for the first of all equal worlds.
+        """Prepares what all episodes in a building share; called for one of its equal worlds.
 
         Raises:
             WorldError: The task is impossible in this world.
         """
+
+    @property
+    def places(self) -> Places:
+        """The free places.
+
+        Raises:
+            WorldError: The task was not prepared for a world with walls.
+        """
+        if self._places is None:
+            raise WorldError("the task was not prepared for a world with walls")
+        return self._places
+
+    def check_paths(self, start: Pose, goal: Vector2) -> None:
+        """Checks that a path leads to a start and a goal, if the task has free places.
+
+        Args:
+            start: Pose in the world frame [m, rad].
+            goal: Place in the world frame [m].
+
+        Raises:
+            WorldError: There is none.
+        """
+        if self._places is not None:
+            self._places.check_path("start", start)
+            self._places.check_path("goal", goal)
 
     @abstractmethod
     def draw(
@@ -115,22 +141,10 @@ class RandomGoal(Task):
         self.clearance = clearance
         self.goal_radius = goal_radius
         self.origin = origin
-        self._places: Places | None = None
 
     def prepare(self, agent: Agent) -> None:
         """Prepares the free places of the map."""
         self._places = Places(agent, self.clearance, self.origin)
-
-    @property
-    def places(self) -> Places:
-        """The free places.
-
-        Raises:
-            WorldError: The task was not prepared.
-        """
-        if self._places is None:
-            raise WorldError("the task was not prepared for a world")
-        return self._places
 
     def draw(
         self, agent: Agent, rng: np.random.Generator, occupied: Occupied
@@ -178,6 +192,21 @@ class FixedGoal(Task):
         self.start = finite_pose(start)
         self.goal = finite_pose((*goal, 0.0))[:2]
         self.goal_radius = goal_radius
+
+    def prepare(self, agent: Agent) -> None:
+        """Checks that a path leads from the start to the goal, in a world with walls.
+
+        Raises:
+            WorldError: There is none.
+        """
+        if any(len(layer.edges) for layer in agent.world.layers):
+            self._places = Places(agent, 0.0)
+            self.check_paths(self.start, self.goal)
+
+    def check_paths(self, start: Pose, goal: Vector2) -> None:
+        """Checks that a path leads from a start to a goal, in a world with walls."""
+        if self._places is not None:
+            self._places.check_path("goal", goal, start)
 
     def draw(
         self,

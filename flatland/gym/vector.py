@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from gymnasium.error import ResetNeeded
@@ -12,39 +12,51 @@ from gymnasium.utils import seeding
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
+from flatland.errors import WorldError
 from flatland.geometry import BoolArray, DoubleArray
 from flatland.gym.actions import checked_actions
+from flatland.gym.checks import checked_count
 from flatland.gym.env import FlatlandEnv
+from flatland.gym.recreation import Recreated
 from flatland.gym.settings import Settings
 from flatland.gym.situation import Rows
 from flatland.gym.stage import Image, Stage
 from flatland.gym.tasks import Occupied
 
+if TYPE_CHECKING:
+    from flatland.gym.buildings import Buildings
+    from flatland.gym.episodes import Episodes
+    from flatland.world import World
 
-class FlatlandVectorEnv(VectorEnv[Any, Any, Any]):
+
+class FlatlandVectorEnv(Recreated, VectorEnv[Any, Any, Any]):
     """Equal environments whose worlds are stepped and scanned over all cores.
 
     Each environment gives the same numbers as a `FlatlandEnv` of the same seed, for any number of
     threads.
     """
 
+    kept_attributes = ("spec", "_rngs", "_seeds")
+
     def __init__(
         self,
         num_envs: int = 1,
-        world: str | os.PathLike[str] = "navigate",
+        world: str | os.PathLike[str] | Buildings = "navigate",
         *,
         autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
         num_threads: int = 0,
         copy: bool = True,
         render_mode: str | None = None,
         web_port: int | None = None,
+        max_episode_steps: int | None = None,
         **arguments: Any,
     ) -> None:
         """Loads the world and copies it.
 
         Args:
             num_envs: Number of environments.
-            world: World file, or the name of an included world: `navigate`, `corridor`, `fleet`.
+            world: World file, or the name of an included world: `navigate`, `corridor`, `crowd`,
+                `fleet`; or `Buildings`, one of which is drawn for each episode of each environment.
             autoreset_mode: When an episode that has ended is followed by the next one; see
                 `gymnasium.vector.AutoresetMode`.
             num_threads: Number of threads, 0 for one per core.
@@ -52,6 +64,8 @@ class FlatlandVectorEnv(VectorEnv[Any, Any, Any]):
                 call changes the arrays that they returned.
             render_mode: `rgb_array`, `human` or None.
             web_port: Port of the viewer of the render mode `human`, see `FlatlandEnv`.
+            max_episode_steps: Number of steps after which an episode is truncated, as Gymnasium
+                names it; the lower one of this and `max_steps` is the limit.
             **arguments: See `Settings`.
 
         Raises:
@@ -63,11 +77,11 @@ class FlatlandVectorEnv(VectorEnv[Any, Any, Any]):
         """
         super().__init__()
         self.autoreset_mode = AutoresetMode(autoreset_mode)
-        if isinstance(num_envs, bool) or not isinstance(num_envs, int) or num_envs < 1:
-            raise ValueError(f"num_envs must be an integer of at least 1, got {num_envs!r}")
-        if isinstance(num_threads, bool) or not isinstance(num_threads, int) or num_threads < 0:
-            raise ValueError(f"num_threads must be an integer of at least 0, got {num_threads!r}")
+        num_envs = checked_count("num_envs", num_envs)
+        num_threads = checked_count("num_threads", num_threads, 0)
         settings = Settings.from_arguments({"world": world, **arguments})
+        if max_episode_steps is not None:
+            settings = settings.limited_to(checked_count("max_episode_steps", max_episode_steps))
         self.single_action_space = settings.action.space
         self.action_space = batch_space(self.single_action_space, num_envs)
         self._stage = Stage(
@@ -101,6 +115,32 @@ class FlatlandVectorEnv(VectorEnv[Any, Any, Any]):
         """The seeds of the random number generators."""
         return tuple(self._seeds)
 
+    @property
+    def worlds(self) -> tuple[World, ...]:
+        """The worlds of the environments, which must be stepped only by the vector.
+
+        With several buildings, each episode may be in another world.
+        """
+        return tuple(self._stage.worlds)
+
+    @property
+    def poses(self) -> DoubleArray:
+        """A copy of the poses (x, y, theta) of all robots in the world frame, shape (num_envs, 3).
+
+        They are those of the last observations [m, m, rad].
+        """
+        return self._episodes.situation.poses.copy()
+
+    @property
+    def goals(self) -> DoubleArray:
+        """A copy of all goals (x, y) in the world frame [m], shape (num_envs, 2)."""
+        return self._episodes.situation.goals.copy()
+
+    @property
+    def episodes(self) -> Episodes:
+        """The episodes: agents, settings, and the layout of the observation."""
+        return self._episodes
+
     def reset(
         self,
         *,
@@ -112,27 +152,30 @@ class FlatlandVectorEnv(VectorEnv[Any, Any, Any]):
         Args:
             seed: Seed of the first environment, which is increased by one for each of the others,
                 or a list of all seeds.
-            options: `start` and `goal` for all environments, see `FlatlandEnv.reset`, and
-                `reset_mask`, shape (num_envs,).
+            options: `start`, a pose (x, y, theta), and `goal`, a place (x, y), in the world frame
+                [m, rad]: either one for all environments, or one for each, shape (num_envs, 3) and
+                (num_envs, 2). The masks `reset_mask`, `start_mask` and `goal_mask`, bools of shape
+                (num_envs,), select the environments that are reset, and those to which `start` and
+                `goal` apply; the task chooses the others.
 
         Returns:
             The observations of all environments, and the info of those that were reset.
 
         Raises:
             ClosedEnvironmentError: The environments are closed.
-            WorldError: No place is free.
-            TypeError: The mask is not an array of bools.
+            WorldError: No place is free, or no path leads to the start or the goal; the number of
+                the environment is in the text. It has no episode then.
+            TypeError: A mask is not an array of bools.
             ValueError: An option or the number of seeds is invalid.
         """
         self._stage.check_open()
-        given = dict(options or {})
-        mask = _checked_mask(given.pop("reset_mask", None), self.num_envs)
+        mask, places = _checked_options(options or {}, self.num_envs)
         rows = np.flatnonzero(mask)
         seeds = _checked_seeds(seed, self.num_envs)
         for row in rows.tolist():
             if seeds[row] is not None:
                 self._rngs[row], self._seeds[row] = seeding.np_random(seeds[row])
-        self._begin(rows, given)
+        self._begin(rows, places)
         self._episodes.look(None if len(rows) == self.num_envs else rows)
         self._stage.show()
         return self._present(), self._infos(mask)
@@ -150,7 +193,7 @@ class FlatlandVectorEnv(VectorEnv[Any, Any, Any]):
         Raises:
             ClosedEnvironmentError: The environments are closed.
             ResetNeeded: There was no reset, or, without autoreset, an episode has ended.
-            InvalidAction: The actions have the wrong shape, or are NaN.
+            InvalidAction: The actions have the wrong shape, are NaN, or no real numbers.
         """
         self._stage.check_open()
         if not self._has_begun.all():
@@ -165,7 +208,7 @@ class FlatlandVectorEnv(VectorEnv[Any, Any, Any]):
         # Only in the mode NEXT_STEP has any episode ended here.
         fresh = self._has_ended.copy()
         if fresh.any():
-            self._begin(np.flatnonzero(fresh), {})
+            self._begin(np.flatnonzero(fresh))
             self._episodes.step(numbers, np.flatnonzero(~fresh))
         else:
             self._episodes.step(numbers)
@@ -205,12 +248,24 @@ class FlatlandVectorEnv(VectorEnv[Any, Any, Any]):
             self._rngs[row] = rng
         return rng
 
-    def _begin(self, rows: Rows, options: Mapping[str, Any]) -> None:
+    def _begin(self, rows: Rows, places: Sequence[Mapping[str, Any]] = ()) -> None:
+        """Begins episodes.
+
+        Args:
+            rows: The environments.
+            places: Options of all environments, see `Episodes.begin`.
+
+        Raises:
+            WorldError: See `reset`.
+        """
         for row in rows.tolist():
             self._has_begun[row] = False
             rng = self._rng(row)
             self._stage.restore(row, rng)
-            self._episodes.begin(row, rng, Occupied(), options)
+            try:
+                self._episodes.begin(row, rng, Occupied(), places[row] if places else {})
+            except WorldError as error:
+                raise WorldError(f"environment {row}: {error.message}") from error
             self._has_begun[row], self._has_ended[row] = True, False
 
     def _finish(self, ended: BoolArray) -> dict[str, Any]:
@@ -225,7 +280,7 @@ class FlatlandVectorEnv(VectorEnv[Any, Any, Any]):
             "final_info": self._infos(ended),
             "_final_info": ended.copy(),
         }
-        self._begin(rows, {})
+        self._begin(rows)
         self._episodes.look(rows)
         return infos
 
@@ -241,15 +296,47 @@ class FlatlandVectorEnv(VectorEnv[Any, Any, Any]):
         return self._episodes.layout.present(self._episodes.observations, copy=self.copy)
 
 
-def _checked_mask(mask: object, n: int) -> BoolArray:
+def _checked_options(
+    options: Mapping[str, Any], n: int
+) -> tuple[BoolArray, list[dict[str, DoubleArray]]]:
+    """Returns the mask of environments to reset, and the options of each environment.
+
+    Raises:
+        TypeError: A mask is not an array of bools.
+        ValueError: An option is unknown, or has the wrong shape.
+    """
+    known = ("goal", "goal_mask", "reset_mask", "start", "start_mask")
+    unknown = sorted(set(options) - set(known))
+    if unknown:
+        raise ValueError(f"options must be among {', '.join(known)}, got {', '.join(unknown)}")
+    reset = _checked_mask("reset_mask", options.get("reset_mask"), n)
+    if not reset.any():
+        raise ValueError('options["reset_mask"] must contain True')
+    places: list[dict[str, DoubleArray]] = [{} for _ in range(n)]
+    for name, size in (("start", 3), ("goal", 2)):
+        mask = _checked_mask(f"{name}_mask", options.get(f"{name}_mask"), n)
+        if options.get(name) is None:
+            if f"{name}_mask" in options:
+                raise ValueError(f'options["{name}_mask"] requires options["{name}"]')
+            continue
+        values = np.asarray(options[name])
+        if values.shape not in ((size,), (n, size)) or values.dtype.kind not in "fiu":
+            raise ValueError(
+                f'options["{name}"] must be numbers of the shape ({size},) or ({n}, {size}), got '
+                f"{options[name]!r}"
+            )
+        for row in np.flatnonzero(mask).tolist():
+            places[row][name] = values if values.ndim == 1 else values[row]
+    return reset, places
+
+
+def _checked_mask(name: str, mask: object, n: int) -> BoolArray:
     if mask is None:
         return np.ones(n, np.bool_)
     if not isinstance(mask, np.ndarray) or mask.dtype != np.bool_:
-        raise TypeError(f'options["reset_mask"] must be an array of bools, got {mask!r}')
+        raise TypeError(f'options["{name}"] must be an array of bools, got {mask!r}')
     if mask.shape != (n,):
-        raise ValueError(f'options["reset_mask"] must have the shape ({n},), got {mask.shape}')
-    if not mask.any():
-        raise ValueError('options["reset_mask"] must contain True')
+        raise ValueError(f'options["{name}"] must have the shape ({n},), got {mask.shape}')
     return mask
 
 

@@ -38,6 +38,15 @@ def find_world(world: str | os.PathLike[str]) -> Path:
     raise WorldError(f'world file "{name}" does not exist')
 
 
+def included_robot() -> Path:
+    """Returns the path of the model file of the robot of the included worlds.
+
+    Raises:
+        WorldError: This installation lacks the worlds.
+    """
+    return included_folder() / ROBOT
+
+
 def included_folder() -> Path:
     """Returns the folder of the included worlds for learning.
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Callable
 from typing import Final
@@ -19,6 +20,7 @@ _CELLS_PER_RADIUS: Final = 4.0
 _MIN_CELL_SIZE: Final = 0.02  # m
 _MAX_CELL_SIZE: Final = 0.05  # m, exceeded only to limit the number of cells
 _MAX_CELLS: Final = 16_000_000
+_OUTSIDE: Final = -1  # number of the region around the rectangle
 
 
 class FreeSpace:
@@ -90,6 +92,44 @@ class FreeSpace:
         largest = sizes.argmax() if sizes.any() else -1
         cells: IntArray = self._candidates[regions == largest]
         return cells
+
+    def regions_of(self, cells: IntArray) -> frozenset[int]:
+        """Returns the numbers of the connected regions of cells."""
+        return self._with_outside(self._regions[cells])
+
+    def regions_at(self, x: float, y: float) -> frozenset[int]:
+        """Returns the numbers of the connected regions to which a point belongs.
+
+        All surroundings of the rectangle are connected, and belong to the regions at its border.
+
+        Args:
+            x: Position in the world frame [m], may be out of bounds.
+            y: Position in the world frame [m].
+        """
+        column, row = ((np.array((x, y)) - self._origin) / self._cell).tolist()
+        if not (0 <= column <= self._columns and 0 <= row <= self._rows):
+            return self._outside
+        # There is no wall on the way to the center of a cell in which the disc fits.
+        reach = max(self._radius / self._cell, math.sqrt(2))
+        first_column, first_row = (max(math.floor(i - reach), 0) for i in (column, row))
+        last_column, last_row = (math.ceil(i + reach) for i in (column, row))
+        grid = self._regions.reshape(self._rows, self._columns)
+        window = grid[first_row:last_row, first_column:last_column]
+        rows, columns = np.indices(window.shape)
+        squared = (columns + (first_column + 0.5 - column)) ** 2
+        squared += (rows + (first_row + 0.5 - row)) ** 2
+        return self._with_outside(window[squared <= reach * reach])
+
+    @functools.cached_property
+    def _outside(self) -> frozenset[int]:
+        """The numbers of the regions at the border, and that of the surroundings."""
+        grid = self._regions.reshape(self._rows, self._columns)
+        border = np.concatenate((grid[0], grid[-1], grid[:, 0], grid[:, -1]))
+        return frozenset(np.unique(border).tolist()) - {0} | {_OUTSIDE}
+
+    def _with_outside(self, regions: npt.NDArray[np.int32]) -> frozenset[int]:
+        found = frozenset(np.unique(regions).tolist()) - {0}
+        return found | self._outside if found & self._outside else found
 
     @property
     def size(self) -> int:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.resources
+import json
 import math
 import os
 from collections.abc import Callable
@@ -32,6 +33,7 @@ _RESOLUTIONS: Final = (0.02, 0.1)  # m
 _RADII: Final = (0.1, 0.45)  # m
 _NARROWEST_GAP: Final = 0.3  # m; narrower gaps between furniture are filled
 _ROOM_AT_START: Final = 0.6  # m; free radius around the robot of the world file
+_ROBOT: Final = "robot.model.yaml"
 _MAX_SEED: Final = 2**63 - 1
 # Grey values of the map image; map_server takes the darker two as occupied.
 _GREY: Final = np.array([255, 0, 64], np.uint8)
@@ -89,11 +91,15 @@ class RandomWorld:
         rows, columns = self.grid.cells.shape
         return (columns * self.grid.resolution, rows * self.grid.resolution)
 
-    def files(self, name: str = "") -> dict[str, bytes]:
+    def files(
+        self, name: str = "", robot: str | os.PathLike[str] | None = None
+    ) -> dict[str, bytes]:
         """Returns the contents of all files by name: world, map, map image and robot.
 
         Args:
             name: Name of the world, for comments; the kind by default.
+            robot: Model file of the robot, to which the world file refers by its absolute path;
+                None for a robot of its own.
         """
         values = {
             "name": name or self.kind,
@@ -104,23 +110,33 @@ class RandomWorld:
             "resolution": f"{self.grid.resolution:g}",
             "x": f"{self.start[0]:.3f}",
             "y": f"{self.start[1]:.3f}",
+            "robot": _ROBOT if robot is None else json.dumps(str(Path(robot).resolve())),
         }
         templates = importlib.resources.files("flatland.worldgen") / "templates"
-        files = expand(templates / "world", values) | expand(templates / "robot", {"name": "robot"})
+        files = expand(templates / "world", values)
+        if robot is None:
+            files |= expand(templates / "robot", {"name": "robot"})
         kinds = np.where(self.grid.cells == FREE_CELL, 0, np.where(self.furniture, 2, 1))
         return files | {"map.pgm": grey_image(_GREY[kinds[::-1]])}
 
-    def write(self, folder: str | os.PathLike[str]) -> Path:
+    def write(
+        self,
+        folder: str | os.PathLike[str],
+        *,
+        robot: str | os.PathLike[str] | None = None,
+    ) -> Path:
         """Writes the files into a new folder: all of them, or none.
 
         Args:
             folder: The folder, which must not exist; the folder that contains it must.
+            robot: Model file of the robot, see `files`; None for a robot of its own.
 
         Returns:
             The world file.
 
         Raises:
-            WorldError: The folder exists, or the folder that contains it does not.
+            WorldError: The folder exists, or the folder that contains it or the model file does
+                not.
             OSError: A file cannot be written.
         """
         target = Path(folder)
@@ -128,7 +144,9 @@ class RandomWorld:
             raise WorldError(f"the folder {target} exists")
         if not target.parent.is_dir():
             raise WorldError(f"the folder {target.parent} does not exist")
-        write_new(target, self.files(target.name))
+        if robot is not None and not Path(robot).is_file():
+            raise WorldError(f"the model file {os.fspath(robot)} does not exist")
+        write_new(target, self.files(target.name, robot))
         return target / "world.yaml"
 
 

@@ -16,11 +16,12 @@ import pytest
 import train_navigate
 from free_ports import free_port
 from navigation import make_many, make_one
-from sb3_vector import StableVector
 from stable_baselines3 import PPO
 from stable_baselines3.common.env_checker import check_env
 
+import flatland
 from flatland.gym import FlatlandVectorEnv
+from flatland.gym.stable_baselines import StableVector
 
 FOLDER = Path(evaluate.__file__).resolve().parent
 WORLD = FOLDER.parents[1] / "worlds" / "learning" / "navigate.yaml"
@@ -95,6 +96,27 @@ def test_the_vector_ends_episodes_as_stable_baselines_expects() -> None:
         StableVector(FlatlandVectorEnv(1, autoreset_mode="NextStep"))
 
 
+def test_options_of_the_vector_apply_to_the_next_reset() -> None:
+    envs = StableVector(make_many(3))
+    goals = [(-3.0, -3.5), (-2.0, -5.0)]
+    envs.seed(1)
+    envs.set_options([{"start": (-3, -5.5, 1), "goal": goals[0]}, {"goal": goals[1]}, {}])
+    envs.reset()
+    assert envs.envs.poses[0] == pytest.approx((-3, -5.5, 1))
+    np.testing.assert_array_equal(envs.envs.goals[:2], goals)
+    assert tuple(envs.envs.goals[2]) not in goals
+    envs.reset()
+    assert (envs.envs.goals[:2] != goals).all()
+    envs.set_options({"goal": (60.0, 0.0)})
+    with pytest.raises(flatland.WorldError, match=r"environment 0: the goal .* outside"):
+        envs.reset()
+    for options, message in (({"aim": (1, 1)}, "got aim"), ({"goal": "x"}, "environment 0 must")):
+        envs.set_options(options)
+        with pytest.raises(ValueError, match=message):
+            envs.reset()
+    envs.close()
+
+
 def test_training_improves_the_policy(policy: Path) -> None:
     with policy.with_suffix(".csv").open() as file:
         rows = list(csv.DictReader(file))
@@ -103,6 +125,17 @@ def test_training_improves_the_policy(policy: Path) -> None:
     trained = train_navigate.success_rate(PPO.load(policy, device="cpu"), 128)
     untrained = train_navigate.success_rate(PPO("MlpPolicy", make_one(), seed=0, device="cpu"), 128)
     assert trained[0] > untrained[0] + 0.2
+
+
+def test_the_table_compares_the_policy_with_the_controllers(
+    policy: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    evaluate.print_table(PPO.load(policy, device="cpu"), 64)
+    lines = capsys.readouterr().out.splitlines()
+    assert [line.split()[0] for line in lines[2:]] == ["straight", "gap", "window", "policy"]
+    rates = [[float(rate.rstrip("%")) for rate in line.split()[1:4]] for line in lines[2:]]
+    assert [sum(row) for row in rates] == pytest.approx([100] * 4, abs=0.2)
+    assert rates[1][1] == rates[2][1] == 0.0
 
 
 @pytest.mark.usefixtures("simulator")

@@ -25,12 +25,13 @@ std::uint32_t Crowd::add_waypoint(const Waypoint& waypoint) {
   }
   waypoints_[index] = waypoint;
   fields_[index].reset();
-  if (grid_ != nullptr) {
-    const Vec size{grid_->cell() * static_cast<double>(grid_->columns()),
-                   grid_->cell() * static_cast<double>(grid_->rows())};
-    const Vec high = grid_->low() + size;
+  if (ways_ != nullptr) {
+    const FreeGrid& grid = ways_->grid();
+    const Vec size{grid.cell() * static_cast<double>(grid.columns()),
+                   grid.cell() * static_cast<double>(grid.rows())};
+    const Vec high = grid.low() + size;
     const Place& place = waypoint.place;
-    const bool is_inside = place.low.x > grid_->low().x && place.low.y > grid_->low().y &&
+    const bool is_inside = place.low.x > grid.low().x && place.low.y > grid.low().y &&
                            place.high.x < high.x && place.high.y < high.y;
     if (!is_inside) has_grid_ = false;
   }
@@ -181,7 +182,7 @@ void Crowd::read_surroundings(const World& world) {
   has_grid_ = true;
   for (auto& field : fields_) field.reset();
   const Walls& walls = surroundings_.walls();
-  grid_.reset();
+  ways_.reset();
   gates_ = std::make_shared<const std::vector<Gate>>();
   signals_.clear();
   if (walls.empty()) return;
@@ -192,9 +193,9 @@ void Crowd::read_surroundings(const World& world) {
     high = {std::max(high.x, waypoint.place.high.x), std::max(high.y, waypoint.place.high.y)};
   }
   const Vec margin{1.0, 1.0};  // m, to walk around a wall at the border
-  grid_ = std::make_shared<const FreeGrid>(walls, low - margin, high + margin, settings_.cell,
-                                           settings_.clearance);
-  gates_ = std::make_shared<const std::vector<Gate>>(find_gates(*grid_, walls));
+  ways_ = std::make_shared<Ways>(
+      FreeGrid(walls, low - margin, high + margin, settings_.cell, settings_.clearance));
+  gates_ = std::make_shared<const std::vector<Gate>>(find_gates(ways_->grid(), walls));
   signals_.resize(gates_->size());
 }
 
@@ -212,10 +213,13 @@ void Crowd::read_people(World& world) {
 }
 
 const FlowField* Crowd::field_of(std::uint32_t waypoint) {
-  if (grid_ == nullptr) return nullptr;
+  if (ways_ == nullptr) return nullptr;
   auto& field = fields_[waypoint];
   if (field == nullptr) {
-    field = std::make_shared<const FlowField>(*grid_, waypoints_[waypoint].place);
+    // The ways to temporary waypoints, of which there may be any number, end with them.
+    const Waypoint& goal = waypoints_[waypoint];
+    field = goal.is_temporary ? std::make_shared<const FlowField>(ways_->grid(), goal.place)
+                              : ways_->to(goal.place);
   }
   return field.get();
 }
@@ -225,7 +229,7 @@ Vec Crowd::way_to(std::uint32_t waypoint, Vec p) {
   const FlowField* field = field_of(waypoint);
   if (field == nullptr) return unit(straight);
   // Next to the place, the directions of the grid are too coarse.
-  const double close = 3.0 * grid_->cell();
+  const double close = 3.0 * ways_->grid().cell();
   if (square(straight) < close * close && surroundings_.walls().is_clear(p, p + straight)) {
     return unit(straight);
   }

@@ -144,9 +144,9 @@ class Crowd {
   std::uint32_t next_party_ = 0;                    // number of the next party
 
   Surroundings surroundings_;
-  std::unordered_set<Id> own_;            // bodies and legs of all people
-  std::shared_ptr<const FreeGrid> grid_;  // null in a world without walls
-  bool has_grid_ = false;                 // whether `grid_`, `fields_` and `gates_` match the walls
+  std::unordered_set<Id> own_;  // bodies and legs of all people
+  std::shared_ptr<Ways> ways_;  // null in a world without walls
+  bool has_grid_ = false;       // whether `ways_`, `fields_` and `gates_` match the walls
   std::vector<std::shared_ptr<const FlowField>> fields_;  // by waypoint, null if not needed yet
   std::shared_ptr<const std::vector<Gate>> gates_ = std::make_shared<const std::vector<Gate>>();
   std::vector<Signal> signals_;  // by gate

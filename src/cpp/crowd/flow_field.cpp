@@ -179,4 +179,16 @@ Vec FlowField::direction(Vec p, const Walls& walls) const {
   return unit(target);
 }
 
+std::shared_ptr<const FlowField> Ways::to(const Place& place) {
+  Way* way = nullptr;
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    // The nodes of a map remain where they are.
+    way = &ways_[{place.low.x, place.low.y, place.high.x, place.high.y, place.radius}];
+  }
+  std::call_once(way->is_computed,
+                 [&] { way->field = std::make_shared<const FlowField>(grid_, place); });
+  return way->field;
+}
+
 }  // namespace flatland::crowd

@@ -14,6 +14,7 @@ from gymnasium.error import ClosedEnvironmentError, InvalidAction, ResetNeeded
 from gymnasium.utils.env_checker import check_env
 
 import flatland
+from flatland import worldgen
 from flatland.gym import (
     Arrived,
     FixedGoal,
@@ -23,7 +24,9 @@ from flatland.gym import (
     Scan,
     Step,
     VelocityAction,
+    included_robot,
 )
+from flatland.gym.registration import SINGLE
 
 Make = Callable[..., Any]
 Numbers = list[tuple[bytes, float, bool, bool, dict[str, Any]]]
@@ -47,7 +50,7 @@ def random_actions(seed: int, n: int = 150) -> np.ndarray:
     return np.random.default_rng(seed).uniform(-1, 1, (n, 2)).astype(np.float32)
 
 
-@pytest.mark.parametrize("name", ["flatland/Navigate-v0", "flatland/Corridor-v0"])
+@pytest.mark.parametrize("name", SINGLE)
 def test_the_checker_of_gymnasium_finds_nothing(name: str) -> None:
     env = gymnasium.make(name)
     check_env(env.unwrapped)
@@ -182,6 +185,16 @@ def test_reward_and_ending_are_replaceable(make: Make) -> None:
     assert [env.step(AHEAD)[1] for _ in range(3)] == [2.0, 2.0, 2.0]
 
 
+def test_a_random_world_can_have_the_included_robot(make: Make, tmp_path: Path) -> None:
+    path = worldgen.office(1, (14, 12)).write(tmp_path / "office", robot=included_robot())
+    env, navigate = make(world=path), make(world="navigate")
+    assert env.observation_space == navigate.observation_space
+    limits = [each._episodes.situation.high.tolist() for each in (env, navigate)]
+    assert limits[0] == limits[1]
+    env.reset(seed=0)
+    env.step(AHEAD)
+
+
 # -- errors ------------------------------------------------------------------------------------
 
 
@@ -203,6 +216,9 @@ def test_stepping_needs_a_reset(make: Make) -> None:
         (0.5, r"shape \(2,\), got \(\)"),
         ([[0.0, 0.0]], r"shape \(2,\), got \(1, 2\)"),
         (["fast", "left"], "must be numbers"),
+        (["0.5", "0.5"], "must be numbers"),
+        ([0.5 + 1j, 0.0], "must be numbers"),
+        ([[0.0], [0.0, 0.0]], "must be numbers"),
         (None, "must have the shape|must be numbers"),
     ],
 )
@@ -227,7 +243,7 @@ def test_a_closed_environment_is_of_no_use(make: Make) -> None:
 
 
 def test_an_unknown_world_is_an_error() -> None:
-    with pytest.raises(flatland.WorldError, match=r'"atlantis".*corridor, fleet, navigate'):
+    with pytest.raises(flatland.WorldError, match=r'"atlantis".*corridor, crowd, fleet, navigate'):
         FlatlandEnv(world="atlantis")
     with pytest.raises(flatland.WorldError, match=r'"no/such\.yaml" does not exist'):
         FlatlandEnv(world="no/such.yaml")
@@ -297,19 +313,17 @@ def test_an_invalid_argument_is_an_error(
     [
         ({"begin": (1, 1, 0)}, ValueError, "goal and start, got begin"),
         ({"start": (1, 1)}, ValueError, "three numbers"),
-        ({"start": (3.3, 0.5, 0)}, None, ""),
+        ({"start": (3.3, 0.5, 0)}, flatland.WorldError, "start .* cannot be reached: no path"),
+        ({"goal": (60, 0)}, flatland.WorldError, r"goal .* outside of the walls, .*\(10, 2.5\)"),
         ({"start": (3.0, 0.9, 0)}, flatland.WorldError, "start .* is not free"),
         ({"goal": (0.1, 0.1)}, flatland.WorldError, "goal .* is not free"),
         ({"goal": (math.nan, 0.1)}, ValueError, "finite"),
     ],
 )
 def test_a_place_that_is_taken_is_refused(
-    make: Make, options: dict[str, Any], error: type[Exception] | None, message: str
+    make: Make, options: dict[str, Any], error: type[Exception], message: str
 ) -> None:
     env = make(world="corridor")
-    if error is None:  # The interior of a pillar is free: walls are edges.
-        env.reset(seed=0, options=options)
-        return
     with pytest.raises(error, match=message):
         env.reset(seed=0, options=options)
     with pytest.raises(ResetNeeded):

@@ -57,7 +57,7 @@ def test_the_page_shows_the_robot_and_its_goal(
         assert [world["name"] for world in client.hello["worlds"]] == [room.parent.name]
         assert client.pose("robot") == pytest.approx((1, 2, 0))
         edges = goal_edges(client)
-        radius = env.unwrapped._episodes.task.goal_radius
+        radius = env.unwrapped.episodes.goal_radius
         distances = np.hypot(*(edges[:, :2] - (5, 3)).T)
         assert distances == pytest.approx(np.full(len(edges), radius), abs=1e-5)
         env.step(AHEAD)

@@ -35,6 +35,32 @@ def test_names_are_registered_with_gymnasium(make: Make) -> None:
     assert envs.spec.id == "flatland/Corridor-v0"
 
 
+@pytest.mark.parametrize("limit", [3, 305])
+def test_the_limit_of_gymnasium_replaces_that_of_the_environment(make: Make, limit: int) -> None:
+    env = make(gymnasium.make, "flatland/Corridor-v0", max_episode_steps=limit)
+    vector = make(gymnasium.make_vec, "flatland/Corridor-v0", 2, max_episode_steps=limit)
+    own = make(flatland.gym.make_vec, "flatland/Corridor-v0", max_steps=limit)
+    env.reset(seed=0)
+    vector.reset(seed=0)
+    own.reset(seed=0)
+    for step in range(limit):
+        truncated = [
+            env.step(np.array([-1, 0], np.float32))[3],
+            *vector.step(np.array([[-1, 0]] * 2))[3],
+            *own.step(np.array([[-1, 0]]))[3],
+        ]
+        assert truncated == [step == limit - 1] * 4
+
+
+def test_the_registered_limit_is_that_of_gymnasium(make: Make) -> None:
+    assert make(gymnasium.make, "flatland/Corridor-v0").spec.max_episode_steps == 200
+    assert make(gymnasium.make, "flatland/Navigate-v0").spec.max_episode_steps == 300
+    vector = make(flatland.gym.make_vec, "flatland/Corridor-v0")
+    vector.reset(seed=0)
+    truncated = [vector.step(np.array([[-1.0, 0.0]]))[3][0] for _ in range(200)]
+    assert truncated.index(True) == 199
+
+
 def test_gymnasium_imports_the_package_by_name() -> None:
     program = "import gymnasium; gymnasium.make('flatland.gym:flatland/Corridor-v0').close()"
     run_program([sys.executable, "-c", program], check=True)
@@ -43,7 +69,7 @@ def test_gymnasium_imports_the_package_by_name() -> None:
 def test_vectors_are_made_by_name(make: Make) -> None:
     envs = make(flatland.gym.make_vec, "flatland/Corridor-v0", num_envs=2, num_threads=1)
     assert isinstance(envs, FlatlandVectorEnv)
-    with pytest.raises(gymnasium.error.NameNotFound, match=r"Navigate-v0, flatland/Corridor-v0"):
+    with pytest.raises(gymnasium.error.NameNotFound, match=r"Navigate-v0, .*Maze-v0"):
         flatland.gym.make_vec("flatland/Nowhere-v0")
     with pytest.raises(gymnasium.error.NameNotFound, match="Fleet-v0"):
         flatland.gym.make_parallel("flatland/Navigate-v0")

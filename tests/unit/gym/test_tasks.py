@@ -112,6 +112,30 @@ def test_a_fixed_goal_is_that_of_each_episode(make: Make, room: Path) -> None:
         assert env.goal == (4.0, 2.0)
 
 
+def test_a_fixed_goal_without_a_path_is_an_error(make: Make, rooms: Path) -> None:
+    make(world=rooms, task=FixedGoal((1, 2, 0), (2, 3)))  # in the closed room
+    for goal, reason in (((4, 3), "no path of a disc of radius 0.2 m"), ((60, 0), "outside")):
+        with pytest.raises(flatland.WorldError, match=f"goal .* cannot be reached: .*{reason}"):
+            make(world=rooms, task=FixedGoal((1, 2, 0), goal))
+
+
+def test_places_around_open_walls_are_connected(make: Make, rooms: Path) -> None:
+    walls = rooms.parent / "walls.lines"
+    walls.write_text("\n".join(walls.read_text().split("\n")[2:]))  # without the lower wall
+    env = make(world=rooms, task=FixedGoal((4.5, 3, 0), (4.5, -8)))
+    env.reset(seed=0)
+    assert env.goal == (4.5, -8.0)
+    env = make(world=rooms)
+    for goal in ((-5, 3), (1, 1), (7, 3)):  # around the walls, and in all rooms
+        env.reset(seed=0, options={"goal": goal})
+    (rooms.parent / "walls.lines").write_text(ROOMS)
+    closed = make(world=rooms)
+    closed.reset(seed=0, options={"goal": (7, 3)})
+    for goal in ((-5, 3), (1, 1)):
+        with pytest.raises(flatland.WorldError, match=r"goal .* cannot be reached"):
+            closed.reset(seed=0, options={"goal": goal})
+
+
 @pytest.mark.parametrize(
     "arguments",
     [

@@ -12,6 +12,7 @@ import pytest
 from gymnasium.error import ClosedEnvironmentError, InvalidAction, ResetNeeded
 from gymnasium.vector import AutoresetMode, SyncVectorEnv
 
+from flatland.errors import WorldError
 from flatland.gym import FlatlandEnv, FlatlandVectorEnv, Goal, Observation, Scan, Velocity
 
 Make = Callable[..., Any]
@@ -140,6 +141,80 @@ def test_rendering_returns_an_image_of_each(make: Make) -> None:
     assert make(FlatlandVectorEnv, 1, "corridor").render() is None
 
 
+# -- access to the environments, options ----------------------------------------------------------
+
+
+def test_poses_goals_and_worlds_are_public(make: Make) -> None:
+    envs = make(FlatlandVectorEnv, 3, "corridor")
+    envs.reset(seed=0)
+    envs.step(np.ones((3, 2)))
+    models = [world.model("robot") for world in envs.worlds]
+    assert envs.poses == pytest.approx(np.array([model.pose for model in models]))
+    assert envs.goals.shape == (3, 2)
+    distances = np.hypot(*(envs.goals - envs.poses[:, :2]).T)
+    assert distances == pytest.approx(envs.step(-np.ones((3, 2)))[4]["distance"], abs=0.1)
+    envs.poses[:] = envs.goals[:] = 0.0  # Both are copies.
+    assert envs.poses.all()
+
+
+def test_starts_and_goals_apply_to_the_selected_environments(make: Make) -> None:
+    envs = make(FlatlandVectorEnv, 3, "corridor")
+    drawn = make(FlatlandVectorEnv, 3, "corridor")
+    drawn.reset(seed=4)
+    starts = [(1, 1.0, 0), (2, 1.25, 1), (5, 1.25, 2)]
+    envs.reset(seed=4, options={"start": starts, "goal": (8, 1.25)})
+    assert envs.poses == pytest.approx(np.array(starts))
+    np.testing.assert_array_equal(envs.goals, [(8, 1.25)] * 3)
+    mask = np.array([False, True, True])
+    envs.reset(seed=4, options={"start": starts, "start_mask": mask})
+    np.testing.assert_array_equal(envs.poses[0], drawn.poses[0])
+    assert envs.poses[1:] == pytest.approx(np.array(starts[1:]))
+    before = envs.poses
+    only_first = np.array([True, False, False])
+    envs.reset(options={"start": (9, 1.25, 0), "reset_mask": only_first})
+    assert envs.poses[0] == pytest.approx((9, 1.25, 0))
+    np.testing.assert_array_equal(envs.poses[1:], before[1:])
+
+
+@pytest.mark.parametrize(
+    ("options", "error", "message"),
+    [
+        ({"aim": (1, 1)}, ValueError, "start_mask, got aim"),
+        ({"start": (1, 1)}, ValueError, r"shape \(3,\) or \(2, 3\)"),
+        ({"goal": ["a", "b"]}, ValueError, "must be numbers"),
+        ({"goal": (1j, 1)}, ValueError, "must be numbers"),
+        ({"goal_mask": np.array([True, False])}, ValueError, "goal_mask.* requires"),
+        ({"goal": (8, 1), "goal_mask": [1, 0]}, TypeError, "goal_mask"),
+        ({"goal": [(8, 1), (60, 0)]}, WorldError, r"environment 1: the goal \(60, 0\) .* outside"),
+        ({"start": (-9, 0, 0)}, WorldError, "environment 0: the start .* outside"),
+        ({"goal": [(8, 1), (np.nan, 0)]}, ValueError, "finite"),
+    ],
+)
+def test_an_invalid_option_is_an_error(
+    make: Make, options: dict[str, Any], error: type[Exception], message: str
+) -> None:
+    envs = make(FlatlandVectorEnv, 2, "corridor")
+    with pytest.raises(error, match=message):
+        envs.reset(seed=0, options=options)
+    envs.reset(seed=0)
+    envs.step(np.zeros((2, 2)))
+
+
+@pytest.mark.parametrize("count", [np.int64(2), np.uint8(2)])
+def test_counts_may_be_integers_of_numpy(make: Make, count: Any) -> None:
+    envs = make(FlatlandVectorEnv, count, "corridor", num_threads=count, max_steps=count)
+    envs.reset(seed=0)
+    assert not envs.step(np.zeros((2, 2)))[3].any()
+    assert envs.step(np.zeros((2, 2)))[3].all()
+    assert type(envs.num_envs) is int
+
+
+@pytest.mark.parametrize("count", [2.0, True, np.bool_(True), np.array([1, 2]), "2"])
+def test_other_counts_are_errors(count: Any) -> None:
+    with pytest.raises(ValueError, match="num_envs must be an integer of at least 1"):
+        FlatlandVectorEnv(count, "corridor")
+
+
 # -- errors ------------------------------------------------------------------------------------
 
 
@@ -162,6 +237,8 @@ def test_stepping_needs_a_reset(make: Make) -> None:
         (np.zeros((3, 2)), r"shape \(2, 2\), got \(3, 2\)"),
         (np.zeros(2), r"shape \(2, 2\), got \(2,\)"),
         (np.array([[0, 0], [0, np.nan]]), r"nan\] for agent 1"),
+        (np.ones((2, 2), complex), "must be numbers"),
+        (np.full((2, 2), "0.5"), "must be numbers"),
     ],
 )
 def test_invalid_actions_are_errors(make: Make, action: np.ndarray, message: str) -> None:

@@ -13,6 +13,7 @@ from rooms_with_people import CALM, ONE, load, people_of
 
 from flatland import WorldObserver
 from flatland.errors import PluginError, WorldError
+from flatland.runtime.batch import step_worlds
 from tests.unit.conftest import WorldFiles
 
 CROWD = (
@@ -85,6 +86,24 @@ def test_snapshots_clones_and_resets_repeat_the_run(files: WorldFiles, options: 
     assert world.state_hash() == later
     world.reset()
     assert world.state_hash() == start
+
+
+def test_worlds_that_compute_ways_together_have_the_results_of_single_ones(
+    files: WorldFiles,
+) -> None:
+    world = load(files, CROWD, FULL)
+    start = world.snapshot()
+    # No way beyond those of the start has been computed, and all threads need the same ones.
+    clones = [world.clone() for _ in range(6)]
+    step_worlds(clones, 600, num_threads=6)
+    world.step(600)
+    expected = world.state_hash()
+    assert {clone.state_hash() for clone in clones} == {expected}
+    world.restore(start)  # The ways that were computed since remain valid.
+    world.step(600)
+    assert world.state_hash() == expected
+    for clone in clones:
+        clone.close()
 
 
 def test_reseeding_decides_all_further_random_numbers(files: WorldFiles) -> None:

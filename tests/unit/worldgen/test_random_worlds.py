@@ -161,6 +161,20 @@ def test_the_files_are_a_world_that_runs(kind: str, tmp_path: Path) -> None:
         assert len(world.layer("walls").edges) == before
 
 
+def test_another_robot_is_that_of_its_file(tmp_path: Path) -> None:
+    robot = tmp_path / 'a "robot".yaml'
+    generated = worldgen.maze(1, SMALL)
+    with pytest.raises(flatland.WorldError, match=r"robot.* does not exist"):
+        generated.write(tmp_path / "lab", robot=robot)
+    robot.write_text(
+        "bodies: [{name: base, footprints: [{type: circle, radius: 0.1, density: 1}]}]"
+    )
+    path = generated.write(tmp_path / "lab", robot=robot)
+    assert not (path.parent / "robot.model.yaml").exists()
+    with flatland.World.from_yaml(path) as world:
+        assert [body.name for body in world.model("robot").bodies] == ["base"]
+
+
 def test_an_existing_folder_is_not_changed(tmp_path: Path) -> None:
     world = worldgen.maze(1, SMALL)
     (tmp_path / "lab").mkdir()

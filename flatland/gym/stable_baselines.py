@@ -1,4 +1,7 @@
-"""A vector of environments as stable-baselines3 expects it."""
+"""A vector of environments as stable-baselines3 expects it.
+
+The module requires stable-baselines3, which the extra `learning` installs.
+"""
 
 from __future__ import annotations
 
@@ -7,12 +10,16 @@ from typing import Any
 
 import numpy as np
 from gymnasium.vector import AutoresetMode
+
+from flatland.extras import require
+from flatland.gym.vector import FlatlandVectorEnv
+
+require("stable_baselines3", "flatland.gym.stable_baselines requires")
+
 from stable_baselines3.common.vec_env import VecEnv
 
-from flatland.gym import FlatlandVectorEnv
 
-
-class StableVector(VecEnv):
+class StableVector(VecEnv):  # type: ignore[misc, unused-ignore]
     """Passes a `FlatlandVectorEnv` to stable-baselines3.
 
     stable-baselines3 has a class of its own for several environments. It expects that an episode
@@ -35,10 +42,19 @@ class StableVector(VecEnv):
         super().__init__(envs.num_envs, envs.single_observation_space, envs.single_action_space)
 
     def reset(self) -> Any:
-        """Begins an episode in all environments and returns the observations."""
+        """Begins an episode in all environments and returns the observations.
+
+        The seeds and the options are those of the last calls of `seed` and `set_options`, which
+        apply once.
+
+        Raises:
+            WorldError: As `FlatlandVectorEnv.reset`.
+            ValueError: An option is unknown or invalid.
+        """
         seeds = None if self._seeds[0] is None else list(self._seeds)
-        observations, _ = self.envs.reset(seed=seeds)
+        observations, _ = self.envs.reset(seed=seeds, options=_joined(self._options))
         self._reset_seeds()
+        self._reset_options()
         self._returns[:] = 0.0
         self._lengths[:] = 0
         return observations
@@ -97,3 +113,30 @@ class StableVector(VecEnv):
         if indices is None:
             return range(self.num_envs)
         return [indices] if isinstance(indices, int) else indices
+
+
+def _joined(options: Sequence[dict[str, Any]]) -> dict[str, Any]:
+    """Returns the options of single environments as those of a vector.
+
+    Raises:
+        ValueError: An option is unknown or invalid.
+    """
+    joined: dict[str, Any] = {}
+    for name, size in (("start", 3), ("goal", 2)):
+        mask = np.array([each.get(name) is not None for each in options])
+        if not mask.any():
+            continue
+        values = np.zeros((len(options), size))
+        for row in np.flatnonzero(mask).tolist():
+            given = np.asarray(options[row][name])
+            if given.shape != (size,) or given.dtype.kind not in "fiu":
+                raise ValueError(
+                    f"the option {name} of environment {row} must be {size} numbers, got "
+                    f"{options[row][name]!r}"
+                )
+            values[row] = given
+        joined |= {name: values, f"{name}_mask": mask}
+    unknown = {name for each in options for name in each} - {"start", "goal"}
+    if unknown:
+        raise ValueError(f"options must be among goal and start, got {', '.join(sorted(unknown))}")
+    return joined

@@ -1,0 +1,91 @@
+"""Rates of success of a policy or a controller, on episodes that depend on their seeds only."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from gymnasium.vector import AutoresetMode
+
+from flatland.geometry import BoolArray
+from flatland.gym.checks import checked_count
+
+if TYPE_CHECKING:
+    from flatland.gym.vector import FlatlandVectorEnv
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Outcomes:
+    """How episodes ended; element i of each array is that of the seed `seed + i`.
+
+    Attributes:
+        is_success: Whether the robot arrived, shape (n,).
+        collision: Whether the robot touched something in the last step, shape (n,).
+        steps: Number of steps, shape (n,).
+    """
+
+    is_success: BoolArray
+    collision: BoolArray
+    steps: np.typing.NDArray[np.int64]
+
+    @property
+    def success_rate(self) -> float:
+        """Share of episodes in which the robot arrived."""
+        return float(self.is_success.mean())
+
+    @property
+    def collision_rate(self) -> float:
+        """Share of episodes that ended with a contact."""
+        return float(self.collision.mean())
+
+    @property
+    def rest_rate(self) -> float:
+        """Share of other episodes, such as those that reached their limit of steps."""
+        return float((~self.is_success & ~self.collision).mean())
+
+    @property
+    def mean_steps(self) -> float:
+        """Mean number of steps of the episodes in which the robot arrived; NaN without any."""
+        return float(self.steps[self.is_success].mean()) if self.is_success.any() else np.nan
+
+
+def evaluate(
+    choose: Callable[[Any], Any], envs: FlatlandVectorEnv, episodes: int, seed: int = 0
+) -> Outcomes:
+    """Runs episodes with successive seeds, each from its reset with the seed to its end.
+
+    Two calls with equal tasks, worlds and seeds have the same starts and goals.
+
+    Args:
+        choose: Returns the actions for the observations of all environments, such as a
+            `Controller`.
+        envs: Environments of the autoreset mode `SAME_STEP`.
+        episodes: Number of episodes, of any number of environments.
+        seed: Seed of the first episode.
+
+    Raises:
+        ValueError: The environments have another mode, or there is no episode.
+    """
+    if envs.autoreset_mode is not AutoresetMode.SAME_STEP:
+        raise ValueError(f"the autoreset mode must be SAME_STEP, got {envs.autoreset_mode}")
+    episodes, n = checked_count("episodes", episodes), envs.num_envs
+    found = []
+    for first in range(0, episodes, n):
+        observations, _ = envs.reset(seed=seed + first)
+        results = np.zeros((n, 3), np.int64)
+        # The environments beyond the last episode end when the others do.
+        running = np.arange(n) < episodes - first
+        while running.any():
+            observations, _, terminated, truncated, infos = envs.step(choose(observations))
+            results[running, 2] += 1
+            ended = running & (terminated | truncated)
+            if ended.any():
+                final = infos["final_info"]
+                results[ended, 0] = final["is_success"][ended]
+                results[ended, 1] = final["collision"][ended]
+            running &= ~ended
+        found.append(results[: episodes - first])
+    success, collision, steps = np.concatenate(found).T
+    return Outcomes(success.astype(np.bool_), collision.astype(np.bool_), steps)

@@ -1,0 +1,132 @@
+"""Controllers without learning, and the evaluation of controllers and policies."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from flatland import worldgen
+from flatland.gym import (
+    FixedGoal,
+    FlatlandEnv,
+    FlatlandVectorEnv,
+    Goal,
+    Observation,
+    Scan,
+    Velocity,
+    evaluate,
+    included_robot,
+)
+from flatland.gym.controllers import CONTROLLERS, DynamicWindow, Gap, Straight
+
+Make = Callable[..., Any]
+
+OBSERVATIONS = [
+    None,
+    Observation(Velocity(), Scan(36, half=0.5), Goal(20.0)),
+    Observation(Scan(), Velocity(), Goal(), as_dict=True),
+]
+
+
+def make_envs(make: Make, count: int = 8, world: Any = "navigate", **arguments: Any) -> Any:
+    if arguments.get("observation", 0) is None:
+        del arguments["observation"]
+    return make(FlatlandVectorEnv, count, world, autoreset_mode="SameStep", **arguments)
+
+
+@pytest.mark.parametrize("observation", OBSERVATIONS)
+@pytest.mark.parametrize("name", CONTROLLERS)
+def test_a_controller_reaches_a_goal_in_sight(
+    make: Make, name: str, observation: Observation | None
+) -> None:
+    task = FixedGoal((1, 1.9, 0.5), (2.6, 1.7))
+    envs = make_envs(make, 1, "corridor", task=task, observation=observation)
+    outcomes = evaluate(CONTROLLERS[name](envs), envs, 1)
+    assert outcomes.is_success.all()
+    assert outcomes.steps[0] < 40
+
+
+@pytest.mark.parametrize("observation", OBSERVATIONS)
+@pytest.mark.parametrize("name", ["gap", "window"])
+def test_a_controller_drives_around_a_pillar(
+    make: Make, name: str, observation: Observation | None
+) -> None:
+    # The pillar extends from (3, 0) to (3.6, 1.1); there is room above it.
+    task = FixedGoal((2, 1.0, 0), (4.6, 1.2))
+    straight = make_envs(make, 1, "corridor", task=task)
+    assert evaluate(Straight(straight), straight, 1).collision.all()
+    envs = make_envs(make, 1, "corridor", task=task, observation=observation)
+    assert evaluate(CONTROLLERS[name](envs), envs, 1).is_success.all()
+
+
+def test_actions_do_not_depend_on_other_environments(make: Make) -> None:
+    envs = make_envs(make, 4, "corridor")
+    env = make(FlatlandEnv, "corridor")
+    for kind in CONTROLLERS.values():
+        many, one = kind(envs), kind(env)
+        observations, _ = envs.reset(seed=1)
+        actions = many(observations)
+        assert actions.shape == (4, 2)
+        assert actions.dtype == np.float32
+        assert np.abs(actions).max() <= 1
+        for row in range(4):
+            action = one(observations[row])
+            assert env.action_space.contains(action)
+            np.testing.assert_allclose(action, actions[row], atol=1e-6)
+
+
+def test_controllers_that_regard_obstacles_touch_less(make: Make, tmp_path: Path) -> None:
+    path = worldgen.office(3, (20, 14)).write(tmp_path / "office", robot=included_robot())
+    envs = make_envs(make, 16, path)
+    rates = {
+        name: evaluate(kind(envs), envs, 32, seed=5).collision_rate
+        for name, kind in CONTROLLERS.items()
+    }
+    assert rates["gap"] == 0
+    assert rates["window"] == 0
+    assert rates["straight"] > 0.1
+
+
+def test_an_evaluation_depends_on_the_seeds_only(make: Make) -> None:
+    few, many = make_envs(make, 3, "corridor"), make_envs(make, 5, "corridor")
+    first, second = (evaluate(Gap(envs), envs, 7, seed=2) for envs in (few, many))
+    for name in ("is_success", "collision", "steps"):
+        np.testing.assert_array_equal(getattr(first, name), getattr(second, name))
+    assert len(first.steps) == 7
+    rates = first.success_rate + first.collision_rate + first.rest_rate
+    assert rates == pytest.approx(1)
+    assert first.mean_steps == pytest.approx(first.steps[first.is_success].mean())
+
+
+def test_episodes_end_at_the_limit(make: Make) -> None:
+    envs = make_envs(make, 2, "corridor", max_steps=3)
+    outcomes = evaluate(lambda _: np.array([[-1.0, 0.0]] * 2), envs, 2)
+    assert outcomes.rest_rate == 1
+    assert math.isnan(outcomes.mean_steps)
+    assert outcomes.steps.tolist() == [3, 3]
+
+
+def test_an_invalid_argument_is_an_error(make: Make) -> None:
+    blind = make_envs(make, 1, "corridor", observation=Observation(Goal()))
+    with pytest.raises(ValueError, match="must contain Scan"):
+        Straight(blind)
+    still = make_envs(make, 1, "corridor", observation=Observation(Scan(), Goal()))
+    with pytest.raises(ValueError, match="must contain Velocity"):
+        DynamicWindow(still)
+    Gap(still)
+    for arguments in ({"margin": 0.0}, {"distance": math.inf}):
+        with pytest.raises(ValueError, match="must be positive"):
+            Gap(still, **arguments)
+    envs = make_envs(make, 1, "corridor")
+    for arguments in ({"horizon": 0.0}, {"samples": (1, 5)}, {"clearance_weight": -1.0}):
+        with pytest.raises(ValueError, match=next(iter(arguments))):
+            DynamicWindow(envs, **arguments)
+    with pytest.raises(ValueError, match="SAME_STEP"):
+        evaluate(Gap(envs), make(FlatlandVectorEnv, 1, "corridor"), 1)
+    with pytest.raises(ValueError, match="episodes"):
+        evaluate(Gap(envs), envs, 0)
