@@ -12,7 +12,8 @@ from flatland.geometry import bounds_of
 
 if TYPE_CHECKING:
     from flatland.geometry import BoolArray, DoubleArray, Vector2
-    from flatland_sweep.controllers import Task
+    from flatland.physics import PhysicsBody
+    from flatland.scenarios.task import Task
 
 _SPACING: Final = 0.1  # of the points of the grid [m], larger only to limit their number
 _MAX_POINTS: Final = 1_000_000
@@ -20,14 +21,15 @@ _MARGINS: Final = (0.1, 0.05, 0.02)  # distances to obstacles that are tried, in
 _COMFORT: Final = 0.35  # preferred distance to obstacles [m]
 _DISCOMFORT: Final = 2.0  # additional cost of a way without it, relative to its length
 _NEAR: Final = 3.0  # largest distance of start and goal to the grid, in spacings
+_SIGHT: Final = 0.05  # distance of the samples of a shortcut [m]
 
 
 class PlanningError(Exception):
     """There is no path."""
 
 
-def plan_path(task: Task) -> DoubleArray:
-    """Returns points on a path from the robot to the goal, in the world frame [m], shape (n, 2).
+def plan_path(task: Task, start: Vector2, goal: Vector2) -> DoubleArray:
+    """Returns points on a comfortable path, in the world frame [m], shape (n, 2).
 
     All obstacles that the robot collides with are considered: walls, and models at their current
     poses.
@@ -35,26 +37,82 @@ def plan_path(task: Task) -> DoubleArray:
     Raises:
         PlanningError: There is no path.
     """
-    start = task.robot.pose[:2]
-    grid = _Grid(task, start)
+    grid = _Grid(task, start, goal)
     preferred = grid.free(_COMFORT)
     for margin in _MARGINS:
-        path = grid.search(start, task.goal, grid.free(margin), preferred)
+        path = grid.search(start, goal, grid.free(margin), preferred)
         if path is not None:
-            return np.concatenate([path, [task.goal]])
-    raise PlanningError(
-        f"there is no path from ({start[0]:.2f}, {start[1]:.2f}) to ({task.goal[0]:.2f}, "
-        f"{task.goal[1]:.2f}) with a distance of {_MARGINS[-1]} m to obstacles"
+            return np.concatenate([path, [goal]])
+    raise PlanningError(_no_path(start, goal))
+
+
+def shortest_length(task: Task, start: Vector2, goal: Vector2) -> float:
+    """Returns the length of a shortest path, with shortcuts between the points of the grid [m].
+
+    Only walls and static models are considered.
+
+    Raises:
+        PlanningError: There is no path.
+    """
+    walls = _walls(task)
+    grid = _Grid(task, start, goal, walls)
+    free = grid.free(_MARGINS[-1])
+    path = grid.search(start, goal, free, free)
+    if path is None:
+        raise PlanningError(_no_path(start, goal))
+    corners = _shortened(np.concatenate([[start], path, [goal]]), task, walls)
+    return float(np.hypot(*np.diff(corners, axis=0).T).sum())
+
+
+def _no_path(start: Vector2, goal: Vector2) -> str:
+    return (
+        f"there is no path from ({start[0]:.2f}, {start[1]:.2f}) to ({goal[0]:.2f}, "
+        f"{goal[1]:.2f}) with a distance of {_MARGINS[-1]} m to obstacles"
     )
+
+
+def _walls(task: Task) -> list[PhysicsBody]:
+    bodies: list[PhysicsBody] = [layer.body for layer in task.world.layers]
+    for model in task.world.models:
+        bodies += [body for body in model.bodies if body.type == "static"]
+    return bodies
+
+
+def _shortened(path: DoubleArray, task: Task, walls: list[PhysicsBody]) -> DoubleArray:
+    """Returns the corners that remain if points are connected by straight lines where possible."""
+    kept, current = [0], 0
+    while current < len(path) - 1:
+        low, high = current + 1, len(path) - 1
+        # The visible points of a path around corners are nearly always a contiguous part.
+        while low < high:
+            middle = (low + high + 1) // 2
+            if _is_free(path[current], path[middle], task, walls):
+                low = middle
+            else:
+                high = middle - 1
+        current = low
+        kept.append(current)
+    return path[kept]
+
+
+def _is_free(a: DoubleArray, b: DoubleArray, task: Task, walls: list[PhysicsBody]) -> bool:
+    count = max(2, math.ceil(math.dist(a, b) / _SIGHT) + 1)
+    poses = np.zeros((count, 3))
+    poses[:, :2] = np.linspace(a, b, count)
+    free = task.world.physics.free_discs(poses, task.radius, task.category_bits, only=walls)
+    return bool(free.all())
 
 
 class _Grid:
     """The points of a square grid over the walls of a world."""
 
-    def __init__(self, task: Task, start: Vector2) -> None:
+    def __init__(
+        self, task: Task, start: Vector2, goal: Vector2, only: list[PhysicsBody] | None = None
+    ) -> None:
         self._task = task
+        self._only = only
         ends = [layer.world_edges.reshape(-1, 2) for layer in task.world.layers]
-        corners = np.concatenate([*ends, [start, task.goal]])
+        corners = np.concatenate([*ends, [start, goal]])
         x_min, y_min, x_max, y_max = bounds_of(corners) or (*start, *start)
         width, height = x_max - x_min, y_max - y_min
         self._spacing = max(_SPACING, math.sqrt(width * height / _MAX_POINTS))
@@ -70,7 +128,11 @@ class _Grid:
         task = self._task
         poses = np.column_stack((self._points, np.zeros(len(self._points))))
         free = task.world.physics.free_discs(
-            poses, task.radius + margin, task.category_bits, ignored=task.robot.bodies
+            poses,
+            task.radius + margin,
+            task.category_bits,
+            ignored=task.robot.bodies,
+            only=self._only,
         ).reshape(self._shape)
         free[[0, -1], :] = False
         free[:, [0, -1]] = False
