@@ -193,9 +193,7 @@ class YamlReader:
         known = node if isinstance(node, MapNode) else MapNode(node.source, node.line)
         nodes = {key: reader._node for key, reader in entries.items()}
         lines = {key: entry.line for key, entry in nodes.items()}
-        merged = MapNode(
-            known.source, known.line, known.entries | nodes, known.key_lines | lines
-        )
+        merged = MapNode(known.source, known.line, known.entries | nodes, known.key_lines | lines)
         return self._derived(merged, self.location, self.name)
 
     def subnode(self, key: Key, kind: NodeKind = "any") -> Self:

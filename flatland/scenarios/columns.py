@@ -81,7 +81,9 @@ COLUMNS: Final = {
 """All columns by name. All but the key, `passed`, `outcome` and `success` may be missing."""
 
 MEASURES: Final = {
-    name: column for name, column in COLUMNS.items() if column.type in (int, float) and column.better
+    name: column
+    for name, column in COLUMNS.items()
+    if column.type in (int, float) and column.better
 }
 """The columns that conditions and comparisons may refer to."""
 

@@ -116,7 +116,9 @@ def parse_condition(text: str) -> Condition:
         unit = found[4]
         if unit is not None and unit != column.unit:
             expected = f"in {column.unit}" if column.unit else "a number without a unit"
-            raise ConditionError(f'the measure "{column.name}" is {expected}, got the unit "{unit}"')
+            raise ConditionError(
+                f'the measure "{column.name}" is {expected}, got the unit "{unit}"'
+            )
         return Condition(words, column.name, found[2], float(found[3]))
     raise ConditionError(f'must be a condition such as {_FORMS}, got "{text}"')
 

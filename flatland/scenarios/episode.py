@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import itertools
 import math
 import os
 import socket
@@ -127,7 +128,9 @@ def recording_path(run: Run) -> str:
     return f"recordings/{name[:_MAX_NAME]}-{digest}.flog"
 
 
-def _run(run: Run, options: Options, result: Result, begin_command: Callable[[bool], object]) -> None:
+def _run(
+    run: Run, options: Options, result: Result, begin_command: Callable[[bool], object]
+) -> None:
     scenario, out = run.scenario, Path(options.out)
     create = find_controller(run.controller, options.folder)
     path = world_file(scenario, run.seed, out / "worlds")
@@ -244,7 +247,9 @@ def _drive(scenario: Scenario, stage: Stage, driver: _Driver, result: Result) ->
             pose = measures.step()
             if steps == 1:
                 driver.command(goals[reached])
-            while reached < len(goals) and distance_left(pose, goals[reached]) <= scenario.tolerance:
+            while (
+                reached < len(goals) and distance_left(pose, goals[reached]) <= scenario.tolerance
+            ):
                 reached += 1
             outcome = _outcome(scenario, measures, reached, len(goals))
             if not outcome and steps >= last:
@@ -291,9 +296,7 @@ def _efficiency(stage: Stage, row: Row) -> Row:
         return {"spl": 0.0}
     corners = [stage.start[:2], *stage.task.goals]
     try:
-        shortest = sum(
-            shortest_length(stage.task, a, b) for a, b in zip(corners, corners[1:], strict=False)
-        )
+        shortest = sum(shortest_length(stage.task, a, b) for a, b in itertools.pairwise(corners))
     except PlanningError:  # between walls that the robot passes with less room than the grid
         return {"spl": None}
     spl = success_weighted_length(True, shortest, row["path_length"])

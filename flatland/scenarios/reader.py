@@ -176,9 +176,7 @@ def _read_scenario(
     params = {key: _plain(own.subnode(key).plain()) for key in own.keys()}  # noqa: SIM118
     params |= {key: _plain(value.plain()) for key, value in values.items()}
     robot = _read_robot(reader)
-    spawns = [
-        read_spawn(item.with_location("scenario models")) for item in _list(reader, "models")
-    ]
+    spawns = [read_spawn(item.with_location("scenario models")) for item in _list(reader, "models")]
     scenario = Scenario(
         name=f"{stem}/{name}" if name else stem,
         description=reader.get("description", "string", ""),

@@ -110,7 +110,7 @@ def _csv(rows: Iterable[Row]) -> str:
         write = list.append
 
     lines = Lines()
-    writer = csv.DictWriter(lines, list(COLUMNS), lineterminator="\n")  # type: ignore[arg-type]
+    writer = csv.DictWriter(lines, list(COLUMNS), lineterminator="\n")
     writer.writeheader()
     writer.writerows(rows)
     return "".join(lines)

@@ -13,6 +13,7 @@ from flatland.scenarios.task import Scan
 
 if TYPE_CHECKING:
     from flatland.entities.model import Model
+    from flatland.geometry import DoubleArray, FloatArray
     from flatland.plugins.laser import Laser
     from flatland.scenarios.scenario import Fault
     from flatland.values import LaserScan
@@ -63,7 +64,9 @@ class LaserReader:
         self._last = Scan(*self._convert(latest.ranges))
         return self._last
 
-    def _convert(self, measured: np.ndarray) -> tuple[np.ndarray, float, np.ndarray]:
+    def _convert(
+        self, measured: FloatArray | DoubleArray
+    ) -> tuple[DoubleArray, float, DoubleArray]:
         laser = self._laser
         is_hit = np.isfinite(measured) & (measured < np.float32(laser.range))
         ranges = np.where(is_hit, measured.astype(np.float64), laser.range)

@@ -7,11 +7,12 @@ from collections.abc import Sequence
 from typing import Final
 
 import numpy as np
+import numpy.typing as npt
 
 _Z: Final = 1.959964  # 97.5 % quantile of the normal distribution
 _RESAMPLES: Final = 2000
 _BOOTSTRAP_SEED: Final = 0  # the same rows have the same interval
-_EXACT: Final = 200  # pairs up to which the distribution of the signed-rank test is computed exactly
+_EXACT: Final = 200  # pairs up to which the distribution of the signed ranks is exact
 
 
 def wilson_interval(successes: int, trials: int) -> tuple[float, float]:
@@ -61,7 +62,7 @@ def mcnemar_test(gains: int, losses: int) -> float:
     if not trials:
         return 1.0
     tail = sum(math.comb(trials, k) for k in range(min(gains, losses) + 1))
-    return min(1.0, 2 * tail / 2**trials)
+    return min(1.0, 2 * float(tail / 2**trials))
 
 
 def wilcoxon_test(differences: Sequence[float]) -> float:
@@ -87,12 +88,12 @@ def wilcoxon_test(differences: Sequence[float]) -> float:
     return min(1.0, math.erfc(-z / math.sqrt(2)))
 
 
-def _doubled_ranks(sizes: np.ndarray) -> np.ndarray:
+def _doubled_ranks(sizes: npt.NDArray[np.float64]) -> npt.NDArray[np.int64]:
     """Returns twice the rank of each number, an integer also for ties."""
     ordered = np.sort(sizes)
     first = np.searchsorted(ordered, sizes, "left")
     last = np.searchsorted(ordered, sizes, "right")
-    return first + last + 1
+    return np.asarray(first + last + 1, np.int64)
 
 
 def _tail(doubled: Sequence[int], least: int) -> float:

@@ -70,6 +70,8 @@ def find_controller(name: str, folder: str) -> Callable[[Task], Any]:
         if module_name.endswith(".py"):
             module = _load_file(Path(folder, module_name).expanduser())
         else:
+            if str(Path(folder).absolute()) not in sys.path:
+                sys.path.append(str(Path(folder).absolute()))
             module = importlib.import_module(module_name)
     except ControllerError:
         raise

@@ -39,7 +39,7 @@ class PurePursuit:
     def _is_far_from_path(self, pose: Pose) -> bool:
         return float(np.hypot(*(self._path - pose[:2]).T).min()) > self._MAX_DEVIATION
 
-    def command(self, scan: Scan, pose: Pose, goal: Vector2) -> Twist:
+    def command(self, scan: Scan, pose: Pose, goal: Vector2) -> Twist:  # noqa: ARG002
         """Steers towards a point on the path ahead; a new goal or a kidnapping needs a new path."""
         if goal != self._goal or self._is_far_from_path(pose):
             self._plan(goal)

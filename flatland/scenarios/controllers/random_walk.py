@@ -22,7 +22,7 @@ class RandomWalk:
         self._twist = Twist()
         self._left = 0.0  # time until the next change [s]
 
-    def command(self, scan: Scan, pose: Pose, goal: Vector2) -> Twist:
+    def command(self, scan: Scan, pose: Pose, goal: Vector2) -> Twist:  # noqa: ARG002
         """Returns the current velocities."""
         if self._left <= 0:
             turn = self._task.rng.uniform(-self._task.max_turn, self._task.max_turn)

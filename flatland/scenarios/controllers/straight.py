@@ -28,6 +28,4 @@ class Straight:
         dx, dy = goal[0] - pose[0], goal[1] - pose[1]
         bearing = wrap_angle(math.atan2(dy, dx) - pose[2])
         speed = self._task.max_speed * min(1.0, math.hypot(dx, dy) / self._SLOW_DOWN)
-        return Twist(
-            linear_x=speed * max(0.0, math.cos(bearing)), angular_z=self._GAIN * bearing
-        )
+        return Twist(linear_x=speed * max(0.0, math.cos(bearing)), angular_z=self._GAIN * bearing)
