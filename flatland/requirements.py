@@ -41,6 +41,8 @@ PACKAGES: Final = {
     "cv2": Package("OpenCV", "python3-opencv", "opencv-python-headless", "opencv"),
     "gymnasium": Package("Gymnasium", "", "gymnasium", "gym"),
     "pettingzoo": Package("PettingZoo", "", "pettingzoo", "gym"),
+    "pyarrow": Package("pyarrow", "", "pyarrow", "ray"),
+    "ray": Package("Ray", "", "ray", "ray"),
     "mcap_ros1": Package("mcap-ros1-support", "", "mcap mcap-ros1-support", "mcap"),
     "rosbag": Package("rosbag", "python3-rosbag"),
     "tf2_msgs": Package(

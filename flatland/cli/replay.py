@@ -29,10 +29,10 @@ def add(commands: Commands) -> None:
         "replay",
         parents=[recording_arguments()],
         summary="repeat a recorded run and compare it with the recording",
-        description="Repeats a run from a recording of `flatland run --record`, of `flatland test`, of "
-        "the node (record:=FILE) or of World.record, without ROS and as fast as possible, or "
-        "with --view in real time. The exit code is 1 if the run differs from the recording; the "
-        "first step that differs is printed.",
+        description="Repeats a run from a recording of `flatland run --record`, of "
+        "`flatland test`, of the node (record:=FILE) or of World.record, without ROS and as fast "
+        "as possible, or with --view in real time. The exit code is 1 if the run differs from the "
+        "recording; the first step that differs is printed.",
         examples=_EXAMPLES,
     )
     parser.add_argument("path", type=Path, metavar="RECORDING", help="recording")

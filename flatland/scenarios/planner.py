@@ -28,16 +28,22 @@ class PlanningError(Exception):
     """There is no path."""
 
 
-def plan_path(task: Task, start: Vector2, goal: Vector2) -> DoubleArray:
+def plan_path(
+    task: Task, start: Vector2, goal: Vector2, *, only_walls: bool = False
+) -> DoubleArray:
     """Returns points on a comfortable path, in the world frame [m], shape (n, 2).
 
-    All obstacles that the robot collides with are considered: walls, and models at their current
-    poses.
+    Args:
+        task: The robot and its world.
+        start: Start of the path [m].
+        goal: End of the path [m].
+        only_walls: Whether only walls and static models are considered; otherwise, all obstacles
+            that the robot collides with, with models at their current poses.
 
     Raises:
         PlanningError: There is no path.
     """
-    grid = _Grid(task, start, goal)
+    grid = _Grid(task, start, goal, _walls(task) if only_walls else None)
     preferred = grid.free(_COMFORT)
     for margin in _MARGINS:
         path = grid.search(start, goal, grid.free(margin), preferred)

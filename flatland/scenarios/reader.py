@@ -68,15 +68,22 @@ def read_scenarios(
         names = [str(index) for index in range(len(draft.subnode("scenarios", "list")))]
     scenarios: list[Scenario] = []
     roots: dict[tuple[tuple[str, str], ...], YamlReader] = {}
-    for index in range(len(names)):
-        entry = _entry(draft, index)
-        for combination in _combinations(entry):
+    combinations = [list(_combinations(_entry(draft, index))) for index in range(len(names))]
+    # The expressions of other scenarios in the same file need values as well.
+    firsts = {
+        name: _plain(value.plain())
+        for each in reversed(combinations)
+        for name, value in each[0].items()
+        if not name.startswith(_FIELD)
+    }
+    for index, of_entry in enumerate(combinations):
+        for combination in of_entry:
             values = {k: v for k, v in combination.items() if not k.startswith(_FIELD)}
             texts = {name: _text(value) for name, value in values.items()}
             key = tuple(texts.items())
             if key not in roots:
                 known = {name: _plain(value.plain()) for name, value in values.items()}
-                roots[key] = read(file, Inputs(known | given, logs=not key))
+                roots[key] = read(file, Inputs(firsts | known | given, logs=not roots))
             root = roots[key]
             fields = {k: v for k, v in combination.items() if k.startswith(_FIELD)}
             with root.collect_errors():
@@ -100,8 +107,10 @@ def _entry(root: YamlReader, index: int) -> YamlReader:
         if not root.is_map:
             raise root.error("a scenario file must be a map with the keys world, goals and others")
         return root
-    shared = root.without("scenarios")
     entry = root.subnode("scenarios", "list").subnode(index, "map")
+    # One of these takes the place of the other.
+    replaced = [a for a, b in (("goal", "goals"), ("goals", "goal")) if b in entry]
+    shared = root.without("scenarios", *replaced)
     return shared.updated({key: entry.subnode(key) for key in entry.keys()})  # noqa: SIM118
 
 

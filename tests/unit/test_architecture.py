@@ -26,7 +26,7 @@ FLOORS = (
     ("scene",),
     ("simulation", "drawing", "recording"),
     ("web",),
-    ("gym", "node", "tools"),
+    ("gym", "node", "scenarios", "tools"),
     ("ros",),
     ("viewer",),
     ("cli",),

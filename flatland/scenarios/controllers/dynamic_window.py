@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from flatland.scenarios.controllers.guide import Guide
 from flatland.values import Twist
 
 if TYPE_CHECKING:
@@ -20,19 +21,23 @@ class DynamicWindow:
     Each candidate is a circular arc for the next `_HORIZON` seconds. It is rated by its distance to
     the points of the scan, its progress towards the goal and its speed, as by D. Fox, W. Burgard
     and S. Thrun, "The dynamic window approach to collision avoidance", IEEE Robotics & Automation
-    Magazine 4(1), 1997. If no arc is free, the robot turns on the spot, which counts as a recovery.
+    Magazine 4(1), 1997. As in navigation stacks, the goal of the arcs is a point ahead on a path
+    that is planned on the map of the walls; everything else is only in the scan. If no arc is free,
+    the robot turns on the spot, which counts as a recovery.
 
     Attributes:
         recoveries: Number of times that it began to turn on the spot because no arc was free.
     """
 
     _HORIZON: Final = 1.6  # s
+    _LOOKAHEAD: Final = 1.0  # distance of the point on the path [m]
     _SAMPLES: Final = 8  # points of an arc that are checked
     _SPEEDS: Final = 7
     _TURNS: Final = 15
     _ACCELERATION: Final = 1.5  # assumed ability of the robot [m/s^2]
     _TURN_ACCELERATION: Final = 5.0  # [rad/s^2]
-    _MAX_POINTS: Final = 90  # of a scan
+    _TURN: Final = math.radians(80)  # bearing above which it turns on the spot
+    _MAX_POINTS: Final = 60  # of a scan
     _RECOVERY: Final = 1.0  # least time of a turn on the spot [s]
     _MARGIN: Final = 0.06  # distance that an arc must keep to obstacles [m]
     _COMFORT: Final = 0.5  # distance above which obstacles have no influence [m]
@@ -43,6 +48,7 @@ class DynamicWindow:
     def __init__(self, task: Task) -> None:
         """Starts at rest."""
         self._task = task
+        self._guide = Guide(task, only_walls=True)
         self._speed = self._turn = 0.0
         self._left = 0.0  # time of the turn on the spot [s]
         self._side = 1.0
@@ -51,15 +57,19 @@ class DynamicWindow:
 
     def command(self, scan: Scan, pose: Pose, goal: Vector2) -> Twist:
         """Returns the velocities with the best rating."""
+        goal = self._guide.target(pose, goal, self._LOOKAHEAD) or goal
         speeds, turns = self._candidates()
         arcs = self._arcs(speeds, turns)
         gap = self._gaps(arcs, scan)
-        room = np.maximum(gap - self._MARGIN, 0.0)
-        # The robot must be able to stop within its distance to obstacles.
-        is_free = (gap > self._MARGIN) & (speeds <= np.sqrt(2 * self._ACCELERATION * room))
+        # A robot that is closer to an obstacle than the margin may move away from it.
+        margin = min(self._MARGIN, self._gap_now(scan) - 0.005)
+        # It must be able to stop within its distance to obstacles, apart from slow motions.
+        room = np.maximum(gap - margin, 0.0)
+        is_free = (gap > margin) & (speeds <= 0.1 + np.sqrt(2 * self._ACCELERATION * room))
         bearing = math.atan2(goal[1] - pose[1], goal[0] - pose[0]) - pose[2]
         distance = math.hypot(goal[1] - pose[1], goal[0] - pose[0])
-        if self._left > 0 or not (is_free & (speeds > 0)).any():
+        is_ahead = speeds > 0.02
+        if self._left > 0 or not (is_free & is_ahead).any():
             return self._recover(bearing)
         target = np.array([math.cos(bearing), math.sin(bearing)]) * distance
         left = np.hypot(*np.moveaxis(arcs[:, :, :2] - target, -1, 0)).min(axis=1)
@@ -70,9 +80,25 @@ class DynamicWindow:
             + self._W_CLEARANCE * np.minimum(gap, self._COMFORT)
             + self._W_SPEED * speeds / self._task.max_speed
         )
+        # Behind the robot, the point is reached by turning first.
+        is_behind = abs(math.remainder(bearing, math.tau)) > self._TURN
+        if is_behind:
+            return self._turn_towards(bearing)
         best = int(np.argmax(np.where(is_free, rating, -np.inf)))
         self._speed, self._turn = float(speeds[best]), float(turns[best])
         return Twist(linear_x=self._speed, angular_z=self._turn)
+
+    def _turn_towards(self, bearing: float) -> Twist:
+        """Returns a turn on the spot."""
+        self._speed = 0.0
+        self._turn = math.copysign(0.7 * self._task.max_turn, math.remainder(bearing, math.tau))
+        return Twist(angular_z=self._turn)
+
+    def _gap_now(self, scan: Scan) -> float:
+        """Returns the distance of the robot to the nearest point of the scan [m]."""
+        if not len(scan.points):
+            return self._COMFORT
+        return float(np.hypot(*scan.points.T).min()) - self._task.radius
 
     def _candidates(self) -> tuple[DoubleArray, DoubleArray]:
         """Returns the reachable speeds and yaw rates, shape (n,) each."""
@@ -113,6 +139,7 @@ class DynamicWindow:
         if self._left <= 0:
             self._left = self._RECOVERY
             self.recoveries += 1
+            self._guide.plan_again()
             self._side = math.copysign(1.0, math.remainder(bearing, math.tau))
         self._left -= self._task.period
         self._speed, self._turn = 0.0, self._side * 0.6 * self._task.max_turn

@@ -5,9 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Final
 
-import numpy as np
-
-from flatland.scenarios.planner import plan_path
+from flatland.scenarios.controllers.guide import Guide
 from flatland.values import Twist
 
 if TYPE_CHECKING:
@@ -23,32 +21,19 @@ class PurePursuit:
 
     _LOOKAHEAD: Final = 0.35  # [m]
     _SLOW_DOWN: Final = 0.8  # distance to the goal below which it slows down [m]
-    _MAX_DEVIATION: Final = 1.0  # from the path, above which it plans again [m]
     _TURN: Final = math.radians(30)  # deviation above which it turns on the spot
 
     def __init__(self, task: Task) -> None:
         """Plans the path to the first goal."""
         self._task = task
-        self._plan(task.goals[0])
-
-    def _plan(self, goal: Vector2) -> None:
-        self._goal = goal
-        self._path = plan_path(self._task, self._task.robot.pose[:2], goal)
-        self._next = 0  # index of the point of the path that was closest
-
-    def _is_far_from_path(self, pose: Pose) -> bool:
-        return float(np.hypot(*(self._path - pose[:2]).T).min()) > self._MAX_DEVIATION
+        self._guide = Guide(task, only_walls=False)
 
     def command(self, scan: Scan, pose: Pose, goal: Vector2) -> Twist:  # noqa: ARG002
-        """Steers towards a point on the path ahead; a new goal or a kidnapping needs a new path."""
-        if goal != self._goal or self._is_far_from_path(pose):
-            self._plan(goal)
-        distances = np.hypot(*(self._path - pose[:2]).T)
-        # Only a short part ahead: the path may return to the same place.
-        self._next += int(np.argmin(distances[self._next : self._next + 20]))
-        far = np.flatnonzero(distances[self._next :] >= self._LOOKAHEAD)
-        target = self._path[self._next + far[0]] if len(far) else self._path[-1]
-        dx, dy = float(target[0]) - pose[0], float(target[1]) - pose[1]
+        """Steers towards a point on the path ahead, and waits while there is no path."""
+        target = self._guide.target(pose, goal, self._LOOKAHEAD)
+        if target is None:
+            return Twist()
+        dx, dy = target[0] - pose[0], target[1] - pose[1]
         distance = max(math.hypot(dx, dy), 1e-6)
         bearing = math.remainder(math.atan2(dy, dx) - pose[2], math.tau)
         if abs(bearing) > self._TURN:
