@@ -12,6 +12,9 @@ from flatland.scenarios.statistics import holm_adjusted, mcnemar_test, wilcoxon_
 SIGNIFICANCE: Final = 0.05
 """Largest adjusted p-value of a significant difference."""
 
+RELEVANCE: Final = 0.01
+"""Relative difference of means up to which a difference does not matter, however regular it is."""
+
 _RATES: Final = ("passed", "success")
 # Only comparable between runs that have reached their goals.
 _OF_SUCCESSES: Final = ("time", "path_length", "energy", "jerk", "angular_jerk")
@@ -35,7 +38,7 @@ class Difference:
         before: Mean of the first set.
         after: Mean of the second set.
         p_value: Two-sided p-value, adjusted for the number of measures.
-        verdict: `better`, `worse` or empty, if the difference is not significant.
+        verdict: `better`, `worse` or empty, if the difference is not significant or at most 1 %.
     """
 
     measure: str
@@ -102,7 +105,8 @@ def _difference(measure: str, values: Sequence[tuple[float, float]], p: float) -
     before = sum(a for a, _ in values) / len(values)
     after = sum(b for _, b in values) / len(values)
     verdict = ""
-    if p <= SIGNIFICANCE and before != after:
+    is_relevant = abs(after - before) > RELEVANCE * max(abs(before), abs(after))
+    if p <= SIGNIFICANCE and is_relevant:
         is_more = after > before
         verdict = "better" if is_more == (COLUMNS[measure].better == "more") else "worse"
     return Difference(measure, len(values), before, after, p, verdict)
