@@ -90,6 +90,9 @@ class Cluster:
                     ray.exceptions.OutOfMemoryError,
                     ray.exceptions.NodeDiedError,
                 ) as error:
+                    if len(batch) > 1:  # The others are not affected by the one that ends it.
+                        waiting.extend([run] for run in batch)
+                        continue
                     reason = str(error).strip().splitlines()[0]
                     why = f"{type(error).__name__} in each of {MAX_ATTEMPTS} attempts: {reason}"
                     results, recordings = [Result(error_row(run.key, why)) for run in batch], {}

@@ -131,7 +131,7 @@ def _summary_section(summaries: Sequence[Summary]) -> str:
 
 
 def _comparison_section(title: str, differences: Sequence[Difference]) -> str:
-    head = ["measure", "pairs", "before", "after", "p", ""]
+    head = ["measure", "pairs", "before", "after", "p", "verdict"]
     lines = []
     for one in differences:
         verdict = f'<span class="{one.verdict}">{one.verdict}</span>' if one.verdict else ""
