@@ -7,7 +7,7 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from flatland.cli.arguments import Commands, add_command, count, parameter, positive
+from flatland.cli.arguments import Commands, add_command, add_param, count, positive
 from flatland.cli.check import Problem
 from flatland.cli.contents import counted
 from flatland.cli.progress import StopSignals, counting_bar
@@ -79,14 +79,7 @@ def add(commands: Commands) -> None:
     parser.add_argument(
         "--only", default="", metavar="PATTERN", help="only scenarios whose title matches: '*door*'"
     )
-    parser.add_argument(
-        "--param",
-        type=parameter,
-        action="append",
-        default=[],
-        metavar="NAME=VALUE",
-        help="value of param(NAME) in YAML files; may be given several times",
-    )
+    add_param(parser)
     _add_results(parser.add_argument_group("results"))
     where = parser.add_argument_group("where to run")
     where.add_argument(

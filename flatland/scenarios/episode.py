@@ -142,6 +142,7 @@ def _run(
             world.record(out / recording)
         try:
             stage = prepare(world, run)
+            result.outline = outline_of(world)
             result.goals = list(stage.task.goals)
             drive = _Driver(stage, create, begin_command)
             _drive(scenario, stage, drive, result)

@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from flatland.geometry import circle_points, transform_points
+
 if TYPE_CHECKING:
+    from flatland.entities.body import Body
     from flatland.world import World
 
 Line = list[tuple[float, float]]
@@ -27,8 +31,11 @@ class Outline:
     lines: list[Line]
 
 
+_CIRCLE_CORNERS: Final = 16
+
+
 def outline_of(world: World) -> Outline:
-    """Returns the walls of all layers, each edge once, rounded to 1 cm."""
+    """Returns the walls of all layers, each edge once, and static models, rounded to 1 cm."""
     edges: dict[tuple[tuple[float, float], tuple[float, float]], None] = {}
     for layer in world.layers:
         for x1, y1, x2, y2 in np.round(layer.world_edges, 2).tolist():
@@ -41,5 +48,17 @@ def outline_of(world: World) -> Outline:
             lines[-1].append(b)
         else:
             lines.append([a, b])
+    for model in world.models:
+        lines += [line for body in model.bodies if body.type == "static" for line in _shapes(body)]
     digest = hashlib.sha256(repr(lines).encode()).hexdigest()[:16]
     return Outline(digest, lines)
+
+
+def _shapes(body: Body) -> Iterator[Line]:
+    for fixture in body.fixtures:
+        if fixture.shape == "circle":
+            points = circle_points(fixture.center, fixture.radius, _CIRCLE_CORNERS)
+        else:
+            points = fixture.vertices
+        corners = [(x, y) for x, y in np.round(transform_points(body.pose, points), 2).tolist()]
+        yield [*corners, corners[0]]

@@ -102,19 +102,10 @@ def _mean(name: str, rows: Sequence[Row]) -> Estimate:
     return Estimate(mean, *bootstrap_interval(values))
 
 
-def summary_table(summaries: Sequence[Summary], *, intervals: bool = True) -> str:
-    """Returns summaries as a table of text."""
-    head = ["scenarios", "controller", "runs", "passed", "success", "SPL", "time [s]"]
-    head += ["collisions", "clearance [m]", "errors"]
-    lines = [head]
-    for one in summaries:
-        means = [
-            _shown(one.means[name], digits, intervals)
-            for name, digits in (("spl", 2), ("time", 1), ("collisions", 2), ("clearance", 2))
-        ]
-        rates = [_percent(rate, intervals) for rate in (one.passed, one.success)]
-        lines.append([one.group, one.controller, str(one.runs), *rates, *means, str(one.errors)])
-    widths = [max(len(line[column]) for line in lines) for column in range(len(head))]
+def summary_table(summaries: Sequence[Summary]) -> str:
+    """Returns summaries as a table of text, with intervals."""
+    lines = _lines(summaries, intervals=True)
+    widths = [max(len(line[column]) for line in lines) for column in range(len(lines[0]))]
     return "\n".join(
         "  ".join(
             text.ljust(width) if column < 2 else text.rjust(width)
@@ -126,17 +117,25 @@ def summary_table(summaries: Sequence[Summary], *, intervals: bool = True) -> st
 
 def markdown_table(summaries: Sequence[Summary]) -> str:
     """Returns summaries as a table of Markdown, such as the leaderboard of the documentation."""
+    head, *lines = _lines(summaries, intervals=False)
+    lines = [head, ["---"] * len(head), *lines]
+    return "\n".join(f"| {' | '.join(line)} |" for line in lines)
+
+
+def _lines(summaries: Sequence[Summary], *, intervals: bool) -> list[list[str]]:
+    """Returns the cells of a table with its head; the interval of `passed` is always shown."""
     head = ["scenarios", "controller", "runs", "passed", "success", "SPL", "time [s]"]
-    head += ["collisions", "clearance [m]"]
-    lines = [head, ["---"] * len(head)]
+    head += ["collisions", "clearance [m]", "errors"]
+    lines = [head]
     for one in summaries:
         means = [
-            _shown(one.means[name], digits, False)
+            _shown(one.means[name], digits, intervals)
             for name, digits in (("spl", 2), ("time", 1), ("collisions", 2), ("clearance", 2))
         ]
-        rates = [_percent(one.passed, True), _percent(one.success, False)]
-        lines.append([one.group, f"`{one.controller}`", str(one.runs), *rates, *means])
-    return "\n".join(f"| {' | '.join(line)} |" for line in lines)
+        rates = [_percent(one.passed, True), _percent(one.success, intervals)]
+        controller = one.controller if intervals else f"`{one.controller}`"
+        lines.append([one.group, controller, str(one.runs), *rates, *means, str(one.errors)])
+    return lines
 
 
 def _percent(rate: Estimate, interval: bool) -> str:

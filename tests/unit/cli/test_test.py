@@ -68,9 +68,8 @@ def test_a_suite_is_run_and_reported(suite, capsys):
     found = {path.name for path in (suite / "flatland-test").iterdir()}
     assert {"report.html", "results.csv", "results.json", "junit.xml"} <= found
     assert "unfinished.jsonl" not in found
-    rows = [
-        run["row"] for run in json.loads((suite / "flatland-test/results.json").read_text())["runs"]
-    ]
+    content = json.loads((suite / "flatland-test" / "results.json").read_text())
+    rows = [run["row"] for run in content["runs"]]
     # In the order of the suite, independently of the processes.
     assert [(row["seed"], row["controller"]) for row in rows] == [
         (seed, controller) for seed in range(3) for controller in ("straight", "gap")
@@ -116,7 +115,9 @@ def test_a_baseline_decides_on_the_exit_code(suite, capsys):
 
 def test_errors_of_scenarios_are_printed_together(suite, capsys):
     text = (suite / "s.yaml").read_text()
-    (suite / "s.yaml").write_text(text.replace("goal:", "gaol:").replace("reached within", "clerance >"))
+    (suite / "s.yaml").write_text(
+        text.replace("goal:", "gaol:").replace("reached within", "clerance >")
+    )
     (suite / "t.yaml").write_text("world: rom.world.yaml\ngoal: [1, 1]\n")
     assert main("test", "s.yaml", "t.yaml") == 1
     errors = capsys.readouterr().err

@@ -148,6 +148,15 @@ def test_jerk_of_a_change_of_speed(run, room):
     assert result.row["angular_jerk"] == 0.0
 
 
+def test_the_outline_contains_walls_and_static_models(run):
+    outline = run("models: [{name: box, model: box.model.yaml, pose: [7, 7, 0]}]").outline
+    points = [point for line in outline.lines for point in line]
+    assert {(1.0, 1.0), (9.0, 1.0), (9.0, 9.0), (1.0, 9.0)} <= set(points)
+    box = [(6.7, 6.7), (7.3, 6.7), (7.3, 7.3), (6.7, 7.3), (6.7, 6.7)]
+    assert sorted(set(outline.lines[-1])) == sorted(set(box))
+    assert outline.key != run().outline.key
+
+
 # -- events --------------------------------------------------------------------------------
 
 
