@@ -110,7 +110,8 @@ def test_the_scenarios_of_the_page_run(page, tmp_path):
         path.write_text(text)
     named = [block for block in blocks if block.startswith("# scenarios/")]
     assert len(named) == 2
-    (program,) = code_blocks(page, "python")
+    program, policy = code_blocks(page, "python")
+    compile(policy, "learned.py", "exec")
     (tmp_path / "careful.py").write_text(program)
     for block in named:
         path = tmp_path / block.partition("\n")[0].removeprefix("# ")
