@@ -282,6 +282,8 @@ def _print(
 ) -> None:
     summaries = summarize(results.rows)
     print(markdown_table(summaries) if options.markdown else summary_table(summaries))
+    if options.baseline is not None and not comparisons:
+        print(f"\n{options.baseline}: no runs of {options.robot}")
     for title, differences in comparisons.items():
         print(f"\n{title}:")
         shown = [one for one in differences if one.verdict]
@@ -311,6 +313,9 @@ def _exit_code(
 ) -> int:
     if baseline is None:
         return 0 if all(row["passed"] for row in results.rows) else 1
+    # A baseline without runs in common says nothing.
+    if not any(comparisons.values()):
+        return 1
     is_worse = any(became_worse(differences) for differences in comparisons.values())
     return 1 if is_worse or any(row["outcome"] == "error" for row in results.rows) else 0
 

@@ -208,18 +208,17 @@ class _Driver:
         """
         if not isinstance(twist, Twist):
             raise FailedRunError(f"the controller must return a flatland.Twist, got {twist!r}")
-        values = (twist.linear_x, twist.linear_y, twist.angular_z)
         try:
-            is_finite = all(map(math.isfinite, values))
-        except TypeError:
-            is_finite = False
-        if not is_finite:
+            vx, vy, omega = map(float, (twist.linear_x, twist.linear_y, twist.angular_z))
+        except (TypeError, ValueError):
+            vx = vy = omega = math.nan
+        if not all(map(math.isfinite, (vx, vy, omega))):
             raise FailedRunError(f"the controller returned a command that is not finite, {twist}")
         speed, turn = self._stage.task.max_speed, self._stage.task.max_turn
         return Twist(
-            linear_x=min(max(twist.linear_x, -speed), speed),
-            linear_y=min(max(twist.linear_y, -speed), speed),
-            angular_z=min(max(twist.angular_z, -turn), turn),
+            linear_x=min(max(vx, -speed), speed),
+            linear_y=min(max(vy, -speed), speed),
+            angular_z=min(max(omega, -turn), turn),
         )
 
 

@@ -168,7 +168,11 @@ def _replace(path: Path, text: str) -> None:
 
 
 class Journal:
-    """Keeps each result as soon as it is there, so that a killed suite can be continued."""
+    """Keeps each result as soon as it is there, so that a killed suite can be continued.
+
+    Attributes:
+        results: The results so far.
+    """
 
     def __init__(self, folder: Path, definition: str, *, continues: bool) -> None:
         """Opens the file.
@@ -184,7 +188,6 @@ class Journal:
         folder.mkdir(parents=True, exist_ok=True)
         self._path = folder / _UNFINISHED
         self.results = SuiteResults(definition)
-        """The results so far."""
         if continues:
             self._read(definition)
         else:

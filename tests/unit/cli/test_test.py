@@ -113,6 +113,15 @@ def test_a_baseline_decides_on_the_exit_code(suite, capsys):
     assert "energy is worse" in output
 
 
+def test_a_baseline_without_runs_in_common_is_not_passed(suite, capsys):
+    assert main("test", "s.yaml", "--robot", "straight,gap", "--out", "old") == 0
+    run = ("test", "s.yaml", "--baseline", "old")
+    assert main(*run, "--robot", "straight", "--seeds", "7") == 1
+    assert "no runs in common" in capsys.readouterr().out
+    assert main(*run, "--robot", "own.py:Slow") == 1
+    assert "old: no runs of own.py:Slow" in capsys.readouterr().out
+
+
 def test_errors_of_scenarios_are_printed_together(suite, capsys):
     text = (suite / "s.yaml").read_text()
     (suite / "s.yaml").write_text(

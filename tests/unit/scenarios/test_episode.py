@@ -280,6 +280,9 @@ class Counts(Nan):
     recoveries = 2
     def command(self, scan, pose, goal): return flatland.Twist(linear_x=100.0)
 
+class Words(Nan):
+    def command(self, scan, pose, goal): return flatland.Twist(linear_x="fast")
+
 class Miscounts(Counts):
     recoveries = "many"
 
@@ -296,6 +299,7 @@ NUMBER = 5
     ("name", "message"),
     [
         ("Nan", "returned a command that is not finite"),
+        ("Words", "returned a command that is not finite"),
         ("Raises", "RuntimeError: no way [own.py:9]"),
         ("Leaves", "SystemExit: 3"),
         ("Miscounts", "recoveries of the controller must be a count, got 'many'"),
