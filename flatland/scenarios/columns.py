@@ -90,8 +90,6 @@ MEASURES: Final = {
 TIMING: Final = tuple(name for name, column in COLUMNS.items() if column.is_timing)
 """The columns that differ between two runs of the same scenario, seed and controller."""
 
-OUTCOMES: Final = ("reached", "collision", "stuck", "timeout", "error")
-
 
 def empty_row(key: tuple[str, str, int]) -> Row:
     """Returns a row of a run without any measure."""

@@ -6,7 +6,7 @@ import fnmatch
 import hashlib
 import os
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
@@ -194,16 +194,3 @@ def run_suite(
     results.results.sort(key=lambda result: order[key_of(result.row)])
     results.missing = len(runs) - len(results.results)
     return results
-
-
-def absolute(plan: Plan) -> Plan:
-    """Returns a plan whose folders do not depend on the current one."""
-    options = plan.options
-    return replace(
-        plan,
-        options=replace(
-            options,
-            folder=str(Path(options.folder).absolute()),
-            out=str(Path(options.out).absolute()),
-        ),
-    )

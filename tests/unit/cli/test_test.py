@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib.util
 import json
 import re
 import signal
@@ -184,6 +185,14 @@ def test_a_controller_with_an_error_does_not_end_the_suite(suite, capsys):
     (suite / "bad.py").write_text("def bad(scan, pose, goal): raise ValueError('no')")
     assert main("test", "s.yaml", "--robot", "bad.py:bad,straight") == 1
     assert "ValueError: no [bad.py:1]" in capsys.readouterr().out
+
+
+@pytest.mark.skipif(importlib.util.find_spec("ray") is not None, reason="Ray is installed")
+def test_a_missing_package_is_named(suite, capsys):
+    assert main("test", "s.yaml", "--ray") == 1
+    error = capsys.readouterr().err
+    assert "`flatland test --ray` needs Ray" in error
+    assert 'pip install "flatland-sim[ray]"' in error
 
 
 def test_the_included_scenarios_are_listed(suite, capsys):
