@@ -60,7 +60,6 @@ def _run(options: argparse.Namespace) -> int:
         files.callback(replay.close)
         if options.view:
             view = files.enter_context(replay.world.view(read_only=True))
-            print(f"{options.path} is shown at {view.url}", flush=True)
             open_page(view.url)
         _repeat(replay, stop, in_real_time=options.view)
         recordings.close()

@@ -89,9 +89,9 @@ def test_a_failed_run_is_drawn_and_can_be_replayed(suite, capsys):
     (command,) = [line for line in output.splitlines() if line.startswith("flatland replay")]
     words = command.split()[1:]
     assert main(*words) == 0
-    output = capsys.readouterr().out
-    assert re.search(r"is shown at http://127\.0\.0\.1:\d+/", output)
-    assert "no difference" in output
+    printed = capsys.readouterr()
+    assert re.search(r"http://127\.0\.0\.1:\d+/", printed.out + printed.err)
+    assert "no difference" in printed.out
     assert (suite / "j.xml").is_file()
 
 
