@@ -6,7 +6,6 @@ process waiting.
 
 from __future__ import annotations
 
-import asyncio
 import threading
 from collections.abc import Callable
 from concurrent.futures import Future
@@ -44,6 +43,8 @@ def read_in_time(action: Callable[[], R]) -> R:
 
 async def read_in_time_async(action: Callable[[], R]) -> R:
     """Runs an action like `read_in_time`, without blocking the loop."""
+    import asyncio  # Imported here because only viewers in a browser need it.
+
     done = asyncio.wrap_future(_start(action))
     await asyncio.wait([done], timeout=TIME_LIMIT)
     if not done.done():
