@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import itertools
 import os
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, TypeVar
 
 from flatland.config.convert import to_bool, to_float, to_int
 from flatland.config.inputs import Inputs
@@ -27,6 +27,8 @@ from flatland.scenarios.scenario import (
 )
 from flatland.scenarios.seeds import MAX_RUNS, parse_seeds
 from flatland.worldgen.random_world import DEFAULT_RADIUS, DEFAULT_SIZE, KINDS
+
+T = TypeVar("T")
 
 _DEFAULT_CONDITION: Final = "reached"
 _FIELD: Final = "."  # start of a key of the matrix that names a field
@@ -63,12 +65,10 @@ def read_scenarios(
     file = os.fspath(path)
     given = dict(params or {})
     draft = _first_pass(file, given)
-    names = [""]
-    if "scenarios" in draft:
-        names = [str(index) for index in range(len(draft.subnode("scenarios", "list")))]
+    count = len(draft.subnode("scenarios", "list")) if "scenarios" in draft else 1
     scenarios: list[Scenario] = []
     roots: dict[tuple[tuple[str, str], ...], YamlReader] = {}
-    combinations = [list(_combinations(_entry(draft, index))) for index in range(len(names))]
+    combinations = [list(_combinations(_entry(draft, index))) for index in range(count)]
     # The expressions of other scenarios in the same file need values as well.
     firsts = {
         name: _plain(value.plain())
@@ -108,10 +108,14 @@ def _entry(root: YamlReader, index: int) -> YamlReader:
             raise root.error("a scenario file must be a map with the keys world, goals and others")
         return root
     entry = root.subnode("scenarios", "list").subnode(index, "map")
-    # One of these takes the place of the other.
-    replaced = [a for a, b in (("goal", "goals"), ("goals", "goal")) if b in entry]
-    shared = root.without("scenarios", *replaced)
-    return shared.updated({key: entry.subnode(key) for key in entry.keys()})  # noqa: SIM118
+    entries = {key: entry.subnode(key) for key in entry.keys()}  # noqa: SIM118
+    return _replaced(root.without("scenarios"), entries)
+
+
+def _replaced(reader: YamlReader, entries: Mapping[str, YamlReader]) -> YamlReader:
+    """Returns a reader with other entries; `goal` and `goals` take the place of each other."""
+    others = [a for a, b in (("goal", "goals"), ("goals", "goal")) if b in entries]
+    return (reader.without(*others) if others else reader).updated(entries)
 
 
 def _combinations(entry: YamlReader) -> Iterator[dict[str, YamlReader]]:
@@ -141,7 +145,7 @@ def _with_field(reader: YamlReader, path: Sequence[str], value: YamlReader) -> Y
     first, *rest = path
     if rest:
         value = _with_field(reader.optional_subnode(first), rest, value)
-    return reader.updated({first: value})
+    return _replaced(reader, {first: value})
 
 
 def _text(value: YamlReader) -> str:
@@ -185,7 +189,6 @@ def _read_scenario(
     params = {key: _plain(own.subnode(key).plain()) for key in own.keys()}  # noqa: SIM118
     params |= {key: _plain(value.plain()) for key, value in values.items()}
     robot = _read_robot(reader)
-    spawns = [read_spawn(item.with_location("scenario models")) for item in _list(reader, "models")]
     scenario = Scenario(
         name=f"{stem}/{name}" if name else stem,
         description=reader.get("description", "string", ""),
@@ -195,8 +198,8 @@ def _read_scenario(
         start=_read_start(reader),
         goals=_read_goals(reader),
         tolerance=reader.get("tolerance", "float", 0.3, finite=True, minimum=0.01),
-        models=tuple(spawns),
-        people=tuple(_read_people(item) for item in _list(reader, "people")),
+        models=tuple(_read_items(reader, "models", read_spawn)),
+        people=tuple(_read_items(reader, "people", _read_people)),
         events=tuple(read_events(reader.optional_subnode("events", "list"), robot.name)),
         limits=_read_limits(reader.optional_subnode("limits", "map")),
         require=tuple(_read_conditions(reader)),
@@ -208,10 +211,10 @@ def _read_scenario(
     return scenario
 
 
-def _list(reader: YamlReader, key: str) -> Iterator[YamlReader]:
+def _read_items(reader: YamlReader, key: str, read: Callable[[YamlReader], T]) -> Iterator[T]:
     for item in reader.optional_subnode(key, "list").items():
         with item.collect_errors():
-            yield item
+            yield read(item)
 
 
 def _read_world(reader: YamlReader) -> str | GeneratedWorld:
@@ -308,7 +311,7 @@ def _read_people(entry: YamlReader) -> People:
         entry.subnode("poses").get(index, "pose", finite=True)
         for index in range(len(entry.optional_subnode("poses", "list")))
     )
-    count = 0 if poses else entry.get("count", "int", minimum=0, maximum=10_000)
+    count = 0 if "poses" in entry else entry.get("count", "int", minimum=0, maximum=10_000)
     people = People(entry.get("group", "string", ""), count, poses)
     entry.ensure_accessed_all()
     return people

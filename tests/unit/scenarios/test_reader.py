@@ -79,6 +79,13 @@ def test_a_matrix_sets_parameters_and_fields(room):
     assert [one.params["x"] for one in found] == [1, 1, 2.5, 2.5]
 
 
+def test_a_matrix_of_goals_takes_the_place_of_a_goal(scenario, room):
+    file = room / "g.yaml"
+    file.write_text("world: world.yaml\ngoal: [1, 1]\nmatrix: {.goals: [[[2, 2], [3, 3]]]}\n")
+    (found,) = read_scenarios(file)
+    assert found.goals == ((2.0, 2.0), (3.0, 3.0))
+
+
 def test_several_scenarios_in_a_file(room, caplog):
     file = room / "many.yaml"
     file.write_text(
@@ -149,12 +156,16 @@ def test_all_errors_are_collected(room):
         "scenarios:\n"
         "  - {name: a, limits: {time: x}}\n"
         "  - {name: b, events: [{at: -1, delete: c}]}\n"
+        "  - name: c\n"
+        "    people: [{count: -1},\n"
+        "      {poses: 1}]\n"
+        "    models: [{name: d, model: none.yaml, pose: [0, 0, 0]}]\n"
     )
     collector = ErrorCollector()
     with collector.at(Place(str(file))):
         read_scenarios(file, read=collector.read)
     lines = sorted(error.place.line for error in collector.errors)
-    assert lines == [1, 2, 3, 6, 8, 9]
+    assert lines == [1, 2, 3, 6, 8, 9, 11, 12, 13]
 
 
 def test_scenario_files_are_recognized(room):
