@@ -57,6 +57,8 @@ def suite(files, monkeypatch):
         """,
     )
     monkeypatch.chdir(files.folder)
+    # One worker process by default, since most of the time is that of their start.
+    monkeypatch.setattr("os.cpu_count", lambda: 1)
     return files.folder
 
 
