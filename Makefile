@@ -52,7 +52,7 @@ test-repeat: setup-dev  ## run all tests repeatedly, list those that ever failed
 		--hypothesis-profile=random $(ARGS)
 
 .PHONY: test-learning
-test-learning: setup-dev  ## install PyTorch and Ray in build/learning, test examples/learning and examples/sweep
+test-learning: setup-dev  ## install PyTorch and Ray in build/learning, test examples/learning and flatland test --ray
 	@tools/test_learning.sh $(ARGS)
 
 # kilted or jazzy.

@@ -42,6 +42,8 @@ PACKAGES: Final = {
     "gymnasium": Package("Gymnasium", "", "gymnasium", "gym"),
     "pettingzoo": Package("PettingZoo", "", "pettingzoo", "gym"),
     "stable_baselines3": Package("stable-baselines3", "", "stable-baselines3", "learning"),
+    "pyarrow": Package("pyarrow", "", "pyarrow", "ray"),
+    "ray": Package("Ray", "", "ray", "ray"),
     "mcap_ros1": Package("mcap-ros1-support", "", "mcap mcap-ros1-support", "mcap"),
     "rosbag": Package("rosbag", "python3-rosbag"),
     "tf2_msgs": Package(

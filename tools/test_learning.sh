@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Runs the tests of programs with large requirements, in an environment of their own: examples/learning and
-# examples/sweep.
+# `flatland test --ray`.
 #   tools/test_learning.sh [ARGUMENTS OF PYTEST]
 set -euo pipefail
 cd "$(dirname "$0")/.."

@@ -59,14 +59,7 @@ def file_arguments(name: str, kind: str) -> argparse.ArgumentParser:
     """
     parser = argparse.ArgumentParser(add_help=False)
     parser.add_argument("path", type=Path, metavar=name, help=kind)
-    parser.add_argument(
-        "--param",
-        type=parameter,
-        action="append",
-        default=[],
-        metavar="NAME=VALUE",
-        help="value of param(NAME) in YAML files; may be given several times",
-    )
+    add_param(parser)
     parser.add_argument(
         "--simplify-map",
         type=int,
@@ -118,6 +111,18 @@ def picture_options(options: argparse.Namespace) -> dict[str, Any]:
         "scans": not options.no_scans,
         "axes": not options.no_axes,
     }
+
+
+def add_param(parser: argparse.ArgumentParser) -> None:
+    """Adds the option `--param`."""
+    parser.add_argument(
+        "--param",
+        type=parameter,
+        action="append",
+        default=[],
+        metavar="NAME=VALUE",
+        help="value of param(NAME) in YAML files; may be given several times",
+    )
 
 
 def add_step_size(parser: argparse.ArgumentParser) -> None:

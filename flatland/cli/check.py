@@ -1,4 +1,4 @@
-"""`flatland check`: lists all problems of a world or model."""
+"""`flatland check`: lists all problems of a world, model or scenario."""
 
 from __future__ import annotations
 
@@ -20,6 +20,8 @@ from flatland.errors import FlatlandError, Place
 from flatland.loading.model_check import is_model_file, load_model_alone
 from flatland.loading.world_loader import load_world
 from flatland.loading.world_source import WorldSource
+from flatland.scenarios.reader import is_scenario_file, read_scenarios
+from flatland.scenarios.scenario import Scenario
 from flatland.world import World
 
 _EXAMPLES = (
@@ -74,12 +76,12 @@ def add(commands: Commands) -> None:
     parser = add_command(
         commands,
         "check",
-        parents=[file_arguments("FILE", "world or model file")],
-        summary="list all problems of a world or model",
-        description="Loads a world or model with all of its files and prints every problem as "
-        "FILE:LINE: error: TEXT, or the contents if there is none. A model is loaded into an empty "
-        "world with the layers that the model names. The exit code is 1 if there are errors, and "
-        "with --strict also if there are warnings.",
+        parents=[file_arguments("FILE", "world, model or scenario file")],
+        summary="list all problems of a world, model or scenario",
+        description="Loads a world, model or scenario with all of its files and prints every "
+        "problem as FILE:LINE: error: TEXT, or the contents if there is none. A model is loaded "
+        "into an empty world with the layers that the model names. The exit code is 1 if there are "
+        "errors, and with --strict also if there are warnings.",
         examples=_EXAMPLES,
     )
     parser.add_argument("--json", action="store_true", help="print the problems as JSON")
@@ -89,6 +91,8 @@ def add(commands: Commands) -> None:
 
 def _check(options: argparse.Namespace) -> int:
     params = dict(options.param)
+    if is_scenario_file(options.path):
+        return _check_scenarios(options, params)
     root = Place(str(options.path))
     collector = ErrorCollector()
     world: World | None = None
@@ -114,37 +118,65 @@ def _check(options: argparse.Namespace) -> int:
             # Otherwise the result of values in place of the invalid ones.
         if world is not None and not collector.errors:
             warn_about_world(world, params)
-    problems[:0] = [
+    problems[:0] = _errors_of(collector, root)
+    _print(options, is_model, problems, world)
+    return _exit_code(options, problems)
+
+
+def _check_scenarios(options: argparse.Namespace, params: dict[str, object]) -> int:
+    root = Place(str(options.path))
+    collector = ErrorCollector()
+    scenarios: list[Scenario] = []
+    with _collected_warnings(collector, root) as problems, collector.at(root):
+        scenarios = read_scenarios(options.path, params, collector.read)
+    problems[:0] = _errors_of(collector, root)
+    _print_problems(options, "scenario", problems)
+    if not collector.errors and not options.json:
+        runs = sum(len(scenario.seeds) for scenario in scenarios)
+        print(f"{counted(len(scenarios), 'scenario')}, {counted(runs, 'run')} of each controller")
+    return _exit_code(options, problems)
+
+
+def _errors_of(collector: ErrorCollector, root: Place) -> list[Problem]:
+    return [
         Problem.make("error", error.message, error.place or root, error.hint)
         for error in collector.errors
     ]
-    _print(options, is_model, problems, world)
+
+
+def _exit_code(options: argparse.Namespace, problems: list[Problem]) -> int:
     fatal = ("error", "warning") if options.strict else ("error",)
     return 1 if any(problem.severity in fatal for problem in problems) else 0
+
+
+def _print_problems(options: argparse.Namespace, kind: str, problems: list[Problem]) -> None:
+    """Prints the problems and their numbers."""
+    errors = sum(problem.severity == "error" for problem in problems)
+    warnings = len(problems) - errors
+    if options.json:
+        report = {
+            "file": str(options.path.absolute()),
+            "kind": kind,
+            "errors": errors,
+            "warnings": warnings,
+            "problems": [dataclasses.asdict(problem) for problem in problems],
+        }
+        print(json.dumps(report, indent=2))
+        return
+    for problem in problems:
+        print(problem.text())
+    counts = [counted(errors, "error")] if errors else []
+    counts += [counted(warnings, "warning")] if warnings else []
+    print(f"{options.path}: {', '.join(counts) or 'no errors'}")
 
 
 def _print(
     options: argparse.Namespace, is_model: bool, problems: list[Problem], world: World | None
 ) -> None:
     errors = sum(problem.severity == "error" for problem in problems)
-    warnings = len(problems) - errors
     try:
-        if options.json:
-            report = {
-                "file": str(options.path.absolute()),
-                "kind": "model" if is_model else "world",
-                "errors": errors,
-                "warnings": warnings,
-                "problems": [dataclasses.asdict(problem) for problem in problems],
-            }
-            print(json.dumps(report, indent=2))
-            return
-        for problem in problems:
-            print(problem.text())
-        counts = [counted(errors, "error")] if errors else []
-        counts += [counted(warnings, "warning")] if warnings else []
-        print(f"{options.path}: {', '.join(counts) or 'no errors'}")
-        if world is not None and not errors:
+        _print_problems(options, "model" if is_model else "world", problems)
+        if world is not None and not errors and not options.json:
             print_contents(world)
             if is_model:
                 layers = ", ".join(world.collision_filter.names) or "none"

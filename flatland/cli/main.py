@@ -9,7 +9,7 @@ import sys
 from collections.abc import Sequence
 
 import flatland
-from flatland.cli import check, doctor, info, new, replay, run, show, view
+from flatland.cli import check, doctor, info, new, replay, run, show, test, view
 from flatland.errors import FlatlandError
 
 _BROKEN_PIPE = 128 + signal.SIGPIPE  # exit code in a shell of a program ended by SIGPIPE
@@ -85,7 +85,7 @@ def make_parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("--version", action="version", version=f"flatland {flatland.__version__}")
     commands = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
-    for module in (check, info, show, run, view, replay, new, doctor):
+    for module in (check, info, show, run, view, replay, test, new, doctor):
         module.add(commands)
     return parser
 

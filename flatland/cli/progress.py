@@ -36,6 +36,31 @@ def progress_bar(seconds: float) -> Iterator[Callable[[float, float], None]]:
         yield advance
 
 
+@contextmanager
+def counting_bar(total: int, unit: str) -> Iterator[Callable[[str], None]]:
+    """Shows a progress bar of a number of equal parts, as `progress_bar`.
+
+    Args:
+        total: Number of parts.
+        unit: Name of a part.
+
+    Yields:
+        A function that counts a part; its argument is shown beside the bar.
+    """
+    try:
+        from tqdm import tqdm
+    except ImportError:
+        yield lambda _text: None
+        return
+    with tqdm(total=total, unit=unit, disable=None, file=sys.stderr) as bar:
+
+        def advance(text: str) -> None:
+            bar.set_postfix_str(text, refresh=False)
+            bar.update()
+
+        yield advance
+
+
 class StopSignals:
     """Replaces the handlers of SIGINT and SIGTERM; the first signal only ends the simulation.
 

@@ -8,6 +8,7 @@ from contextlib import ExitStack, suppress
 from pathlib import Path
 
 from flatland.cli.arguments import Commands, add_command
+from flatland.cli.browser import open_page
 from flatland.cli.contents import counted
 from flatland.cli.outputs import Recordings, recording_arguments
 from flatland.cli.progress import StopSignals, progress_bar
@@ -16,6 +17,7 @@ from flatland.recording import Replay
 _EXAMPLES = (
     "flatland replay office.flog",
     "flatland replay office.flog --bag office.bag",
+    "flatland replay office.flog --view",
 )
 _UPDATE_PERIOD = 0.05  # s of wall time between two updates of the progress bar
 
@@ -27,9 +29,10 @@ def add(commands: Commands) -> None:
         "replay",
         parents=[recording_arguments()],
         summary="repeat a recorded run and compare it with the recording",
-        description="Repeats a run from a recording of `flatland run --record`, of the node "
-        "(record:=FILE) or of World.record, without ROS and as fast as possible. The exit code is "
-        "1 if the run differs from the recording; the first step that differs is printed.",
+        description="Repeats a run from a recording of `flatland run --record`, of "
+        "`flatland test`, of the node (record:=FILE) or of World.record, without ROS and as fast "
+        "as possible, or with --view in real time. The exit code is 1 if the run differs from the "
+        "recording; the first step that differs is printed.",
         examples=_EXAMPLES,
     )
     parser.add_argument("path", type=Path, metavar="RECORDING", help="recording")
@@ -37,6 +40,11 @@ def add(commands: Commands) -> None:
         "--ignore-changes",
         action="store_true",
         help="repeat the run even if files have changed since the recording",
+    )
+    parser.add_argument(
+        "--view",
+        action="store_true",
+        help="show the run in a browser, in real time; the address is printed",
     )
     parser.set_defaults(run=_run)
 
@@ -50,12 +58,15 @@ def _run(options: argparse.Namespace) -> int:
             observers=recordings.recorders.values(),
         )
         files.callback(replay.close)
-        _repeat(replay, stop)
+        if options.view:
+            view = files.enter_context(replay.world.view(read_only=True))
+            open_page(view.url)
+        _repeat(replay, stop, in_real_time=options.view)
         recordings.close()
         return _report(replay, stop)
 
 
-def _repeat(replay: Replay, stop: StopSignals) -> None:
+def _repeat(replay: Replay, stop: StopSignals, in_real_time: bool) -> None:
     """Repeats the run until its end, a difference or a signal."""
     step_size = replay.world.timekeeper.step_size
     start = shown_at = time.perf_counter()
@@ -66,6 +77,8 @@ def _repeat(replay: Replay, stop: StopSignals) -> None:
             nonlocal shown, shown_at
             if stop.signal:
                 raise _InterruptedError
+            if in_real_time:
+                time.sleep(max(0.0, start + step * step_size - time.perf_counter()))
             now = time.perf_counter()
             if now - shown_at >= _UPDATE_PERIOD or step == replay.last_step:
                 advance((step - shown) * step_size, step * step_size / (now - start))

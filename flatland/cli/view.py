@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import math
-import os
 import threading
 from typing import TYPE_CHECKING
 
@@ -17,6 +16,7 @@ from flatland.cli.arguments import (
     load,
     positive,
 )
+from flatland.cli.browser import open_page
 from flatland.cli.progress import StopSignals
 from flatland.defaults import WEB_HOST, WEB_MIN_TOKEN, WEB_PORT
 from flatland.simulation import Simulation
@@ -113,8 +113,8 @@ def _run(options: argparse.Namespace) -> int:
             print(f"{options.path} is shown at {viewer.url}", flush=True)
             if viewer.view_url is not None:
                 print(f"for viewers: {viewer.view_url}", flush=True)
-            if not options.no_browser and _has_display():
-                threading.Thread(target=_open_browser, args=[viewer.url], daemon=True).start()
+            if not options.no_browser:
+                open_page(viewer.url)
             ended = threading.Event()
             watch = threading.Thread(target=_stop_at_signal, args=[stop, simulation, ended])
             watch.start()
@@ -144,16 +144,6 @@ def _stop_at_signal(stop: StopSignals, simulation: Simulation, ended: threading.
         if stop.signal:
             simulation.stop()
             return
-
-
-def _open_browser(url: str) -> None:
-    import webbrowser  # Late, because most commands open no browser.
-
-    webbrowser.open(url)
-
-
-def _has_display() -> bool:
-    return bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))
 
 
 # -- types of values -----------------------------------------------------------------------

@@ -191,6 +191,8 @@ def conversion(text: str, kind: str) -> str:
             return f"expressions start with $eval: $eval {text}"
     if kind == "bool":
         return "true or false"
+    if kind == "vector":
+        return "two numbers are written as [x, y]"
     return ""
 
 

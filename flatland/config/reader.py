@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import copy
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import AbstractContextManager, nullcontext
 from typing import Any, Literal, Self, TypeVar, Unpack, overload
 
@@ -177,6 +177,24 @@ class YamlReader:
         entries = {key: value for key, value in node.entries.items() if key not in keys}
         rest = MapNode(node.source, node.line, entries, node.key_lines)
         return self._derived(rest, self.location, self.name)
+
+    def updated(self, entries: Mapping[str, YamlReader]) -> Self:
+        """Returns a reader of the same map with other entries, with a new record of keys.
+
+        Args:
+            entries: Readers of the entries that are replaced or added, by key.
+
+        Raises:
+            YamlError: The node is neither a map nor null.
+        """
+        node = self._node
+        if not isinstance(node, MapNode | NullNode):
+            self._check_kind("map")
+        known = node if isinstance(node, MapNode) else MapNode(node.source, node.line)
+        nodes = {key: reader._node for key, reader in entries.items()}
+        lines = {key: entry.line for key, entry in nodes.items()}
+        merged = MapNode(known.source, known.line, known.entries | nodes, known.key_lines | lines)
+        return self._derived(merged, self.location, self.name)
 
     def subnode(self, key: Key, kind: NodeKind = "any") -> Self:
         """Returns a reader of a required entry.

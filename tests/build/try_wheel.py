@@ -52,6 +52,12 @@ def make_a_world() -> None:
     assert Path("office.png").stat().st_size > 0
 
 
+def score_a_controller() -> None:
+    """Runs an included scenario."""
+    run("test", "narrow_doors", "--only", "*/straight_ahead*door=1.2*", "--robot", "gap")
+    assert Path("flatland-test", "report.html").stat().st_size > 0
+
+
 def view_a_world() -> None:
     """Starts the viewer and loads its page."""
     arguments = [COMMAND, "view", WORLDS / "office" / "world.yaml", "--port", "0", "--no-browser"]
@@ -86,6 +92,7 @@ def main() -> None:
         with tempfile.TemporaryDirectory() as folder:
             os.chdir(folder)
             make_a_world()
+            score_a_controller()
             view_a_world()
             os.chdir("/")
     print(f"hash: {hash_of_the_office()}")

@@ -27,7 +27,7 @@ FLOORS = (
     ("simulation", "drawing", "recording"),
     ("web",),
     ("gym", "node", "tools"),
-    ("ros", "ros2"),
+    ("ros", "ros2", "scenarios"),
     ("viewer",),
     ("cli",),
     ("__main__",),

@@ -207,15 +207,3 @@ def test_a_clone_without_extension_names_what_it_hides(clone: Path, checkout: Pa
     command.insert(1, "-P")
     done = run_program(command, cwd=clone, check=True)
     assert done.stdout.startswith(str(checkout)) or "site-packages" in done.stdout
-
-
-def test_workers_of_a_sweep_find_the_installed_package_in_a_clone(
-    clone: Path, checkout: Path
-) -> None:
-    program = (
-        "import sys; sys.path[:0] = ['', sys.argv[1]]; import flatland_sweep.episode, flatland;"
-        "print(flatland.__file__)"
-    )
-    command = [sys.executable, "-c", program, checkout / "examples" / "sweep"]
-    done = run_program(command, cwd=clone, check=True)
-    assert str(clone) not in done.stdout

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import importlib.util
 from collections.abc import Iterator
+from pathlib import Path
 
 import pytest
 from chromium import Chromium, missing_programs
@@ -54,3 +56,12 @@ def page(room: ViewedWorld, browser: Chromium) -> Iterator[ViewerPage]:
     page.wait_for_poses({name: room.pose(name) for name in room.names()})
     yield page
     assert browser.console() == []
+
+
+@pytest.fixture(scope="module")
+def axe() -> str:
+    """The source of axe-core; the package that contains it is not imported."""
+    found = importlib.util.find_spec("axe_playwright_python")
+    if found is None or found.origin is None:
+        pytest.skip("axe-core is not installed (make setup-dev installs it)")
+    return Path(found.origin).with_name("axe.min.js").read_text(encoding="utf-8")

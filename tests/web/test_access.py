@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import importlib.util
 import math
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 from urllib.parse import urlsplit
 
@@ -14,15 +12,6 @@ from chromium import PHONE, Chromium, centroid
 from viewed_world import ROBOT_COLOR, ViewedWorld
 from viewer_page import ViewerPage
 from waiting import wait_until
-
-
-@pytest.fixture(scope="module")
-def axe() -> str:
-    """The source of axe-core; the package that contains it is not imported."""
-    found = importlib.util.find_spec("axe_playwright_python")
-    if found is None or found.origin is None:
-        pytest.skip("axe-core is not installed (make setup-dev installs it)")
-    return Path(found.origin).with_name("axe.min.js").read_text(encoding="utf-8")
 
 
 @pytest.fixture

@@ -48,7 +48,7 @@ def test_the_commands_of_the_page_print_what_it_says(checkout, tmp_path, monkeyp
 
 def test_all_commands_and_options_are_described(checkout):
     page = (checkout / "docs" / "command_line.md").read_text()
-    for command in ("check", "info", "show", "run", "view", "new", "doctor"):
+    for command in ("check", "info", "show", "run", "view", "test", "new", "doctor"):
         assert f"flatland {command}" in page
     from flatland.cli.main import make_parser
 

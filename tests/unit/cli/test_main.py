@@ -99,7 +99,7 @@ def test_interruption_ends_without_a_traceback(monkeypatch, capsys):
     assert capsys.readouterr().err == "flatland: interrupted\n"
 
 
-COMMANDS = ("check", "info", "show", "run", "view", "replay", "new", "doctor")
+COMMANDS = ("check", "info", "show", "run", "view", "replay", "test", "new", "doctor")
 
 
 def subparser(name: str) -> argparse.ArgumentParser:
@@ -135,6 +135,11 @@ def test_the_examples_of_the_help_run(checkout, tmp_path, monkeypatch, capsys, e
         assert main("run", world, "--duration", "0.1", "--record", words[1]) == 0
     if words[0] == "run":
         words += ["--duration", "0.1"]
+    if words[0] == "test":  # test_test.py runs suites
+        scenario = tmp_path / "my" / "scenarios" / "s.yaml"
+        scenario.parent.mkdir(parents=True)
+        scenario.write_text("{world: ../../worlds/office/world.yaml, goal: [1, 1]}")
+        words += ["--list"]
     if words[0] == "view":  # neither endless nor on a port that is in use
         words += ["--duration", "0.1", "--port", "0", "--no-browser"]
     assert main(*words) == 0, capsys.readouterr()

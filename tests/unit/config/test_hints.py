@@ -23,6 +23,7 @@ from flatland.config import hints
         ("pi/2", "float", "expressions start with $eval: $eval pi/2"),
         ("maybe", "bool", "true or false"),
         ("fast", "float", ""),
+        ("", "vector", "two numbers are written as [x, y]"),
     ],
 )
 def test_conversion(text, kind, hint):

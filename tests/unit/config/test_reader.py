@@ -426,6 +426,21 @@ def test_without_keeps_the_location() -> None:
     assert "[line 3]" in failure(rest.ensure_accessed_all)
 
 
+def test_updated_replaces_and_adds_entries(file: Path) -> None:
+    reader = read_file(file, "a: 1\nb: 2\n")
+    other = read("\nb: 5\nc: 6\n")
+    merged = reader.updated({key: other.subnode(key) for key in ("b", "c")})
+    assert [merged.get(key, "int") for key in ("a", "b", "c")] == [1, 5, 6]
+    assert merged.keys() == ["a", "b", "c"]
+    merged.ensure_accessed_all()
+    assert '{"a", "b"}' in failure(reader.ensure_accessed_all)
+    # The place of an entry is that of the text that contains it.
+    assert "[line 3]" in str(merged.invalid("c", "is wrong"))
+    assert f"[{file}:1]" in str(merged.invalid("a", "is wrong"))
+    assert read("~").updated({"b": other.subnode("b")}).get("b", "int") == 5
+    assert "must be a map" in failure(lambda: read("[1]").updated({}))
+
+
 def test_each_reader_of_an_entry_has_its_own_record() -> None:
     reader = read("a: {b: 1}")
     reader.subnode("a").get("b", "int")

@@ -8,7 +8,7 @@ import pytest
 from pages import code_blocks
 
 PAGE = Path(__file__).resolve().parents[3] / "docs" / "learning.md"
-# The program for RLlib requires a cluster; tests/learning/test_sweep.py tests its environment.
+# The program for RLlib requires a cluster; tests/learning/test_rllib.py tests its environment.
 PROGRAMS = [
     program for program in code_blocks(PAGE.read_text(), "python") if "import ray" not in program
 ]

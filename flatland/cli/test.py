@@ -1,0 +1,337 @@
+"""`flatland test`: scores controllers in scenarios, and reports what became better or worse."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+from flatland.cli.arguments import Commands, add_command, add_param, count, positive
+from flatland.cli.check import Problem
+from flatland.cli.contents import counted
+from flatland.cli.progress import StopSignals, counting_bar
+from flatland.config.collecting_reader import ErrorCollector
+from flatland.errors import Place
+from flatland.scenarios.cluster import Cluster
+from flatland.scenarios.comparison import Difference, became_worse, compare
+from flatland.scenarios.controllers import INCLUDED
+from flatland.scenarios.episode import Options, Result
+from flatland.scenarios.junit import write_junit
+from flatland.scenarios.report import Report, worst_first, write_report
+from flatland.scenarios.results import SuiteResults, read_results, write_results
+from flatland.scenarios.scenario import Run, Scenario
+from flatland.scenarios.seeds import parse_seeds
+from flatland.scenarios.sketch import sketch
+from flatland.scenarios.suite import (
+    SUITES,
+    Plan,
+    included_suites,
+    load_suite,
+    run_locally,
+    run_suite,
+    runs_of,
+    scenario_files,
+)
+from flatland.scenarios.summary import markdown_table, summarize, summary_table
+from flatland.scenarios.workers import WorkerLimits
+
+_EXAMPLES = (
+    "flatland test --list",
+    "flatland test office --robot gap",
+    "flatland test my/scenarios --robot my.py:MyController,gap --out results",
+    "flatland test my/scenarios --robot my.py:MyController --baseline old/results.json",
+    "flatland test office maze --robot gap --seeds 0:20 --ray",
+)
+_MEGABYTE = 1 << 20
+
+
+def add(commands: Commands) -> None:
+    """Adds the command."""
+    limits = WorkerLimits()
+    parser = add_command(
+        commands,
+        "test",
+        summary="score controllers in scenarios",
+        description="Runs scenarios with controllers, on all cores, prints a table, and writes a "
+        "report and the results of all runs. The exit code is 1 if a run does not meet its "
+        "conditions; with --baseline, if a measure became significantly worse or a run has an "
+        "error.",
+        examples=_EXAMPLES,
+    )
+    parser.add_argument(
+        "paths",
+        nargs="*",
+        metavar="SCENARIOS",
+        help="scenario files, folders, or names of included suites",
+    )
+    parser.add_argument("--list", action="store_true", help="list the scenarios and end")
+    parser.add_argument(
+        "--robot",
+        default="gap",
+        metavar="CONTROLLERS",
+        help=f"names, separated by commas: {', '.join(INCLUDED)}, FILE.py:NAME or MODULE:NAME "
+        "(default: gap)",
+    )
+    parser.add_argument(
+        "--seeds", type=_seeds, metavar="LIST", help="in place of those of the files: 0:20 or 1,5:9"
+    )
+    parser.add_argument(
+        "--only", default="", metavar="PATTERN", help="only scenarios whose title matches: '*door*'"
+    )
+    add_param(parser)
+    _add_results(parser.add_argument_group("results"))
+    where = parser.add_argument_group("where to run")
+    where.add_argument(
+        "--workers", type=_at_least_one, metavar="N", help="processes (default: one per core)"
+    )
+    where.add_argument(
+        "--ray",
+        nargs="?",
+        const="",
+        metavar="ADDRESS",
+        help="run on a Ray cluster: auto for one that was started on this machine, or HOST:PORT "
+        "(default: start one)",
+    )
+    where.add_argument(
+        "--working-dir",
+        metavar="FOLDER",
+        help="folder that Ray copies to all machines; it must contain all files",
+    )
+    group = parser.add_argument_group("limits of a run")
+    for name, default, text in (
+        ("command-limit", limits.command_time, "wall time of a call of the controller [s]"),
+        ("run-limit", limits.run_time, "wall time of a run [s]"),
+        ("memory", limits.memory / _MEGABYTE, "memory of a run [MB]"),
+    ):
+        group.add_argument(
+            f"--{name}",
+            type=positive,
+            default=default,
+            metavar="X",
+            help=f"{text} (default: {default:g})",
+        )
+    group.add_argument(
+        "--show-output", action="store_true", help="show what controllers print, for debugging"
+    )
+    parser.set_defaults(run=_test)
+
+
+def _add_results(group: argparse._ArgumentGroup) -> None:
+    group.add_argument(
+        "--out",
+        type=Path,
+        default=Path("flatland-test"),
+        metavar="FOLDER",
+        help="folder of the results (default: flatland-test)",
+    )
+    group.add_argument(
+        "--continue",
+        dest="continues",
+        action="store_true",
+        help="continue an interrupted suite in the same folder",
+    )
+    group.add_argument(
+        "--baseline", type=Path, metavar="FILE", help="results.json of an earlier version"
+    )
+    group.add_argument(
+        "--junit", type=Path, metavar="FILE", help="JUnit XML (default: junit.xml in the folder)"
+    )
+    group.add_argument(
+        "--record",
+        choices=("failed", "all", "none"),
+        default="failed",
+        help="runs of which recordings are kept (default: failed)",
+    )
+    group.add_argument(
+        "--markdown", action="store_true", help="print the table in the form of Markdown"
+    )
+
+
+def _test(options: argparse.Namespace) -> int:
+    if options.list:
+        return _list(options)
+    if not options.paths:
+        options.parser.error("name scenario files or included suites; --list shows the latter")
+    if options.working_dir is not None and options.ray is None:
+        options.parser.error("--working-dir requires --ray")
+    controllers = [name.strip() for name in options.robot.split(",") if name.strip()]
+    if not controllers:
+        options.parser.error("--robot: must name a controller")
+    scenarios = _load(options)
+    if scenarios is None:
+        return 1
+    baseline = None if options.baseline is None else read_results(options.baseline)
+    runs = runs_of(scenarios, controllers, options.seeds)
+    with StopSignals() as stop:
+        results = _run(options, runs, stop)
+    comparisons = _comparisons(results, controllers, baseline)
+    _write(options, results, comparisons)
+    _print(options, results, comparisons)
+    if stop.signal:
+        print(f"interrupted: {counted(results.missing, 'run')} missing; --continue makes them")
+        return 128 + stop.signal
+    return _exit_code(results, comparisons, baseline)
+
+
+def _list(options: argparse.Namespace) -> int:
+    names = options.paths or included_suites()
+    total = 0
+    for file in scenario_files(names):
+        for scenario in load_suite([file], dict(options.param), options.only):
+            total += len(scenario.seeds)
+            shown = f"{scenario.title}  {counted(len(scenario.seeds), 'seed')}"
+            print(f"{shown}  {scenario.description}".rstrip())
+    print(f"{counted(total, 'run')} with one controller; the included suites are in {SUITES}")
+    return 0
+
+
+def _load(options: argparse.Namespace) -> list[Scenario] | None:
+    """Returns the scenarios; None if they have errors, all of which are printed."""
+    collector = ErrorCollector()
+    files = scenario_files(options.paths)
+    scenarios: list[Scenario] = []
+    for file in files:
+        with collector.at(Place(str(file))):
+            scenarios += load_suite([file], dict(options.param), read=collector.read)
+    if not collector.errors:
+        return load_suite(files, dict(options.param), options.only)
+    for error in collector.errors:
+        place = error.place or Place(str(files[0]))
+        print(Problem.make("error", error.message, place, error.hint).text(), file=sys.stderr)
+    return None
+
+
+def _run(options: argparse.Namespace, runs: Sequence[Run], stop: StopSignals) -> SuiteResults:
+    folder = options.working_dir or "."
+    plan = Plan(
+        Options(str(Path(folder).absolute()), str(options.out.absolute()), options.record),
+        WorkerLimits(
+            options.command_limit,
+            options.run_limit,
+            round(options.memory * _MEGABYTE),
+            options.show_output,
+        ),
+        options.workers,
+        options.continues,
+    )
+    distribute = run_locally
+    if options.ray is not None:
+        distribute = Cluster(options.ray, options.working_dir or "").run
+    with counting_bar(len(runs), "run") as advance:
+        counts = {"failed": 0, "errors": 0}
+
+        def on_result(result: Result) -> None:
+            counts["errors"] += result.row["outcome"] == "error"
+            counts["failed"] += not result.row["passed"]
+            advance(f"failed: {counts['failed']}, errors: {counts['errors']}")
+
+        return run_suite(
+            runs,
+            plan,
+            distribute=distribute,
+            is_stopped=lambda: stop.signal,
+            on_result=on_result,
+        )
+
+
+# -- what is printed and written -----------------------------------------------------------
+
+
+def _comparisons(
+    results: SuiteResults, controllers: Sequence[str], baseline: SuiteResults | None
+) -> dict[str, list[Difference]]:
+    """Returns the differences to a baseline, or between the first and the other controllers."""
+    rows = {
+        name: [row for row in results.rows if row["controller"] == name] for name in controllers
+    }
+    if baseline is None:
+        first, *others = rows
+        return {f"{name} against {first}": compare(rows[first], rows[name]) for name in others}
+    before = {
+        name: [row for row in baseline.rows if row["controller"] == name]
+        for name in dict.fromkeys(row["controller"] for row in baseline.rows)
+    }
+    if len(rows) == len(before) == 1:
+        # One controller each, which may have another name now.
+        ((name, new),) = rows.items()
+        ((old_name, old),) = before.items()
+        title = f"{name} against the baseline"
+        if name != old_name:
+            title += f" ({old_name})"
+        return {title: compare(old, new)}
+    return {
+        f"{name} against the baseline": compare(before[name], new)
+        for name, new in rows.items()
+        if name in before
+    }
+
+
+def _write(
+    options: argparse.Namespace, results: SuiteResults, comparisons: dict[str, list[Difference]]
+) -> None:
+    folder = options.out
+    write_results(results, folder)
+    write_junit(results, options.junit or folder / "junit.xml")
+    command = ["flatland", "test", *options.paths, "--robot", options.robot]
+    write_report(results, Report(command, comparisons), folder / "report.html")
+
+
+def _print(
+    options: argparse.Namespace, results: SuiteResults, comparisons: dict[str, list[Difference]]
+) -> None:
+    summaries = summarize(results.rows)
+    print(markdown_table(summaries) if options.markdown else summary_table(summaries))
+    if options.baseline is not None and not comparisons:
+        print(f"\n{options.baseline}: no runs of {options.robot}")
+    for title, differences in comparisons.items():
+        print(f"\n{title}:")
+        shown = [one for one in differences if one.verdict]
+        for one in shown:
+            change = f"{one.before:.4g} -> {one.after:.4g}"
+            print(f"  {one.measure} is {one.verdict}: {change} (p = {one.p_value:.2g})")
+        if not shown:
+            print("  no significant difference" if differences else "  no runs in common")
+    failed = [one for one in worst_first(results.results) if not one.row["passed"]]
+    if failed and not options.markdown:
+        worst = failed[0]
+        row = worst.row
+        print(f"\nworst run: {row['scenario']} {row['controller']} seed {row['seed']}")
+        print(f"  {row['failures']}")
+        picture = sketch(worst, results.lines_of(worst))
+        if picture:
+            print(picture)
+        if worst.recording:
+            print(f"flatland replay {options.out / worst.recording} --view")
+    print(f"\nreport: {options.out / 'report.html'}")
+
+
+def _exit_code(
+    results: SuiteResults,
+    comparisons: dict[str, list[Difference]],
+    baseline: SuiteResults | None,
+) -> int:
+    if baseline is None:
+        return 0 if all(row["passed"] for row in results.rows) else 1
+    # A baseline without runs in common says nothing.
+    if not any(comparisons.values()):
+        return 1
+    is_worse = any(became_worse(differences) for differences in comparisons.values())
+    return 1 if is_worse or any(row["outcome"] == "error" for row in results.rows) else 0
+
+
+# -- types of values -----------------------------------------------------------------------
+
+
+def _seeds(text: str) -> tuple[int, ...]:
+    try:
+        return parse_seeds(text)
+    except ValueError as error:
+        raise argparse.ArgumentTypeError(str(error)) from None
+
+
+def _at_least_one(text: str) -> int:
+    number = count(text)
+    if not number:
+        raise argparse.ArgumentTypeError("must be at least 1")
+    return number

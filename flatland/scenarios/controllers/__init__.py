@@ -1,0 +1,125 @@
+"""The included controllers, and how a controller is found by its name."""
+
+from __future__ import annotations
+
+import functools
+import hashlib
+import importlib
+import importlib.util
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+from flatland.errors import FlatlandError
+from flatland.scenarios.controllers.dynamic_window import DynamicWindow
+from flatland.scenarios.controllers.gap import FollowGap
+from flatland.scenarios.controllers.pursuit import PurePursuit
+from flatland.scenarios.controllers.random_walk import RandomWalk
+from flatland.scenarios.controllers.straight import Straight
+
+if TYPE_CHECKING:
+    from types import ModuleType
+
+    from flatland.geometry import Pose, Vector2
+    from flatland.scenarios.task import Controller, Scan, Task
+    from flatland.values import Twist
+
+INCLUDED: Final[dict[str, type[Controller]]] = {
+    "straight": Straight,
+    "gap": FollowGap,
+    "pursuit": PurePursuit,
+    "dynamic_window": DynamicWindow,
+    "random": RandomWalk,
+}
+
+
+class ControllerError(FlatlandError):
+    """A controller does not exist, or cannot be imported."""
+
+    prefix = "Flatland controller: "
+
+
+class FunctionController:
+    """A function `command(scan, pose, goal)` as a controller."""
+
+    def __init__(self, function: Callable[[Scan, Pose, Vector2], Twist], task: Task) -> None:  # noqa: ARG002
+        self.command = function
+
+
+def find_controller(name: str, folder: str) -> Callable[[Task], Any]:
+    """Returns the class of a controller, or what creates the controller of a function.
+
+    Args:
+        name: Name of an included controller, `FILE.py:NAME` or `MODULE:NAME`.
+        folder: Folder that a relative path of a file starts from; empty for the current one.
+
+    Raises:
+        ControllerError: It does not exist or is not a controller.
+    """
+    included = INCLUDED.get(name)
+    if included is not None:
+        return included
+    module_name, colon, attribute = name.rpartition(":")
+    if not (colon and module_name and attribute):
+        raise ControllerError(
+            f"{name!r} does not exist; included are {', '.join(INCLUDED)}, others are given as "
+            "FILE.py:NAME or MODULE:NAME"
+        )
+    try:
+        if module_name.endswith(".py"):
+            module = _load_file(Path(folder, module_name).expanduser())
+        else:
+            if str(Path(folder).absolute()) not in sys.path:
+                sys.path.append(str(Path(folder).absolute()))
+            module = importlib.import_module(module_name)
+    except ControllerError:
+        raise
+    except (Exception, SystemExit) as error:
+        raise ControllerError(
+            f"{name!r}: {type(error).__name__}: {error}, while it was imported"
+        ) from error
+    found: Any = getattr(module, attribute, None)
+    if isinstance(found, type) and callable(getattr(found, "command", None)):
+        return found
+    if callable(found) and not isinstance(found, type):
+        return functools.partial(FunctionController, found)
+    raise ControllerError(
+        f"{name!r}: {module_name} has no function {attribute}, and no class {attribute} with a "
+        "method command"
+    )
+
+
+def controller_digest(name: str, folder: str) -> str:
+    """Returns a hash of the file of a controller, empty for a controller that is not in a file.
+
+    Raises:
+        ControllerError: The controller does not exist.
+    """
+    find_controller(name, folder)
+    path = name.rpartition(":")[0]
+    if not path.endswith(".py"):
+        return ""
+    return hashlib.sha256(Path(folder, path).expanduser().read_bytes()).hexdigest()[:32]
+
+
+def _load_file(path: Path) -> ModuleType:
+    if not path.is_file():
+        raise ControllerError(f"file not found: {path}")
+    path = path.resolve()
+    # Each file is loaded once per process.
+    name = f"flatland_controller_{hashlib.sha256(bytes(path)).hexdigest()[:16]}"
+    known = sys.modules.get(name)
+    if known is not None:
+        return known
+    spec = importlib.util.spec_from_file_location(name, path)
+    if spec is None or spec.loader is None:
+        raise ControllerError(f"file cannot be loaded: {path}")
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[name] = module
+    try:
+        spec.loader.exec_module(module)
+    except BaseException:
+        del sys.modules[name]
+        raise
+    return module

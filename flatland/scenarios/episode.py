@@ -1,0 +1,310 @@
+"""Runs a scenario once."""
+
+from __future__ import annotations
+
+import hashlib
+import itertools
+import math
+import os
+import socket
+import time
+import traceback
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+from flatland.errors import FlatlandError
+from flatland.scenarios.columns import Row, empty_row
+from flatland.scenarios.controllers import find_controller
+from flatland.scenarios.events import Events
+from flatland.scenarios.measures import Measures, distance_left, success_weighted_length
+from flatland.scenarios.outline import outline_of
+from flatland.scenarios.planner import PlanningError, shortest_length
+from flatland.scenarios.stage import Stage, prepare
+from flatland.scenarios.worlds import world_file
+from flatland.values import Twist
+from flatland.world import World
+
+if TYPE_CHECKING:
+    from flatland.scenarios.outline import Outline
+    from flatland.scenarios.scenario import Run, Scenario
+
+_MAX_NAME: Final = 120  # characters of the name of a recording
+_MAX_PATH: Final = 600  # points of the path that are kept
+
+
+class FailedRunError(Exception):
+    """A controller has made a run fail; the text is the reason."""
+
+
+@dataclass(frozen=True, slots=True)
+class Options:
+    """How runs are carried out.
+
+    Attributes:
+        folder: Folder that relative paths of controllers start from.
+        out: Folder of random worlds and recordings.
+        record: Which runs are recorded: `failed`, `all` or `none`.
+    """
+
+    folder: str
+    out: str
+    record: str = "failed"
+
+
+@dataclass(slots=True)
+class Result:
+    """The result of a run.
+
+    Attributes:
+        row: Its row of the table.
+        path: Poses (time, x, y) of the robot [s, m, m].
+        goals: The goals (x, y) [m].
+        events: Times and places of the robot at events: (time, x, y, action).
+        outline: The walls, None if the world could not be loaded.
+        recording: File of the recording, relative to the folder of the results; empty without one.
+    """
+
+    row: Row
+    path: list[tuple[float, float, float]] = field(default_factory=list)
+    goals: list[tuple[float, float]] = field(default_factory=list)
+    events: list[tuple[float, float, float, str]] = field(default_factory=list)
+    outline: Outline | None = None
+    recording: str = ""
+
+
+def run_scenario(
+    run: Run, options: Options, begin_command: Callable[[bool], object] = lambda _is_begin: None
+) -> Result:
+    """Runs a scenario; all that fails in it becomes a row with the error.
+
+    Args:
+        run: The scenario with a controller and a seed.
+        options: How it is carried out.
+        begin_command: Called with True before code of the controller runs, with False after it.
+    """
+    start = time.perf_counter()
+    result = Result(empty_row(run.key))
+    try:
+        _run(run, options, result, begin_command)
+    except (Exception, SystemExit) as error:
+        reason = describe(error)
+        result.row |= {"outcome": "error", "success": False, "passed": False, "error": reason}
+        result.row["failures"] = reason
+        if isinstance(error, MemoryError):
+            raise  # The process is replaced.
+    finally:
+        wall_time = time.perf_counter() - start
+        simulated = result.row["time"] or 0.0
+        result.row |= {
+            "wall_time": wall_time,
+            "real_time_factor": simulated / wall_time if wall_time > 0 else None,
+            "worker": f"{socket.gethostname()}:{os.getpid()}",
+        }
+    return result
+
+
+def describe(error: BaseException) -> str:
+    """Returns the type, text and innermost line of code of an error."""
+    if isinstance(error, FlatlandError):
+        return error.text_with_hint
+    if isinstance(error, FailedRunError | PlanningError):
+        return str(error)
+    text = f"{type(error).__name__}: {error}"
+    frames = traceback.extract_tb(error.__traceback__)
+    if not frames:
+        return text
+    return f"{text} [{Path(frames[-1].filename).name}:{frames[-1].lineno}]"
+
+
+def recording_path(run: Run) -> str:
+    """Returns the file of the recording of a run in the folder of the results.
+
+    The name consists of letters, digits and a few signs, and of a hash that distinguishes it.
+    """
+    name = "".join(c if c.isalnum() or c in "._-=" else "_" for c in run.title)
+    digest = hashlib.sha256(run.title.encode()).hexdigest()[:8]
+    return f"recordings/{name[:_MAX_NAME]}-{digest}.flog"
+
+
+def _run(
+    run: Run, options: Options, result: Result, begin_command: Callable[[bool], object]
+) -> None:
+    scenario, out = run.scenario, Path(options.out)
+    create = find_controller(run.controller, options.folder)
+    path = world_file(scenario, run.seed, out / "worlds")
+    with World.from_yaml(path, seed=run.seed, params=dict(scenario.params)) as world:
+        result.outline = outline_of(world)
+        recording = recording_path(run)
+        if options.record != "none":
+            (out / recording).parent.mkdir(parents=True, exist_ok=True)
+            world.record(out / recording)
+        try:
+            stage = prepare(world, run)
+            result.outline = outline_of(world)
+            result.goals = list(stage.task.goals)
+            drive = _Driver(stage, create, begin_command)
+            _drive(scenario, stage, drive, result)
+        finally:
+            if options.record == "all" or (options.record == "failed" and not result.row["passed"]):
+                result.recording = recording
+    if options.record == "failed" and result.row["passed"]:
+        (out / recording).unlink(missing_ok=True)
+
+
+class _Driver:
+    """Calls the controller and limits its commands.
+
+    Attributes:
+        times: Wall time of each call [s].
+    """
+
+    def __init__(
+        self,
+        stage: Stage,
+        create: Callable[[Any], Any],
+        begin_command: Callable[[bool], object],
+    ) -> None:
+        self._stage = stage
+        self._begin = begin_command
+        self.times: list[float] = []
+        self._begin(True)
+        try:
+            self._controller = create(stage.task)
+        finally:
+            self._begin(False)
+
+    def command(self, goal: tuple[float, float]) -> None:
+        """Sets the command of the next period."""
+        stage = self._stage
+        scan, pose = stage.laser.read(), stage.robot.pose
+        start = time.perf_counter()
+        self._begin(True)
+        try:
+            twist = self._controller.command(scan, pose, goal)
+        finally:
+            self._begin(False)
+        self.times.append(time.perf_counter() - start)
+        stage.drive.set(self._checked(twist))
+
+    @property
+    def recoveries(self) -> int:
+        """Number of recoveries that the controller reports.
+
+        Raises:
+            FailedRunError: It is not a number.
+        """
+        count = getattr(self._controller, "recoveries", 0)
+        if isinstance(count, bool) or not isinstance(count, int) or count < 0:
+            raise FailedRunError(f"recoveries of the controller must be a count, got {count!r}")
+        return count
+
+    def _checked(self, twist: object) -> Twist:
+        """Returns a command within the limits.
+
+        Raises:
+            FailedRunError: It is not a twist of finite numbers.
+        """
+        if not isinstance(twist, Twist):
+            raise FailedRunError(f"the controller must return a flatland.Twist, got {twist!r}")
+        try:
+            vx, vy, omega = map(float, (twist.linear_x, twist.linear_y, twist.angular_z))
+        except (TypeError, ValueError):
+            vx = vy = omega = math.nan
+        if not all(map(math.isfinite, (vx, vy, omega))):
+            raise FailedRunError(f"the controller returned a command that is not finite, {twist}")
+        speed, turn = self._stage.task.max_speed, self._stage.task.max_turn
+        return Twist(
+            linear_x=min(max(vx, -speed), speed),
+            linear_y=min(max(vy, -speed), speed),
+            angular_z=min(max(omega, -turn), turn),
+        )
+
+
+def _drive(scenario: Scenario, stage: Stage, driver: _Driver, result: Result) -> None:
+    """Steps the world until the run ends, and completes the result."""
+    world, limits, goals = stage.world, scenario.limits, stage.task.goals
+    step_size = world.timekeeper.step_size
+    last = max(1, round(limits.time / step_size))
+    steps_per_period = max(1, round(stage.task.period / step_size))
+    events, measures = Events(scenario, stage), Measures(stage)
+    reached, outcome, steps = 0, "", 0
+    try:
+        while not outcome:
+            events.update(reached)
+            if events.kidnapped:
+                measures.moved()
+            x, y, _theta = stage.robot.pose
+            result.events += [(world.time, x, y, action) for action in events.done]
+            if steps % steps_per_period == 0:
+                measures.sample()
+                # Before the first step, there is no scan.
+                if steps:
+                    driver.command(goals[reached])
+            world.step()
+            steps += 1
+            pose = measures.step()
+            if steps == 1:
+                driver.command(goals[reached])
+            while (
+                reached < len(goals) and distance_left(pose, goals[reached]) <= scenario.tolerance
+            ):
+                reached += 1
+            outcome = _outcome(scenario, measures, reached, len(goals))
+            if not outcome and steps >= last:
+                outcome = "timeout"
+    finally:
+        measures.sample()
+        result.path = _thinned(measures.path)
+        result.row |= measures.values()
+        result.row |= {
+            "outcome": outcome,
+            "success": outcome == "reached",
+            "goals": reached,
+            "time": world.time,
+            "start_x": stage.start[0],
+            "start_y": stage.start[1],
+            "goal_x": goals[-1][0],
+            "goal_y": goals[-1][1],
+            "final_distance": distance_left(stage.robot.pose, goals[min(reached, len(goals) - 1)]),
+            "steps": steps,
+            "state_hash": world.state_hash(),
+            "command_time": 1e3 * sum(driver.times) / len(driver.times) if driver.times else None,
+            "max_command_time": 1e3 * max(driver.times) if driver.times else None,
+        }
+    result.row["recoveries"] = driver.recoveries
+    result.row |= _efficiency(stage, result.row)
+    people = frozenset(measures.people)
+    failures = [condition.failure(result.row, people) for condition in scenario.require]
+    result.row["failures"] = "; ".join(filter(None, failures)) or None
+    result.row["passed"] = not any(failures)
+
+
+def _outcome(scenario: Scenario, measures: Measures, reached: int, goals: int) -> str:
+    limits = scenario.limits
+    if limits.collisions is not None and measures.collisions > limits.collisions:
+        return "collision"
+    if reached == goals:
+        return "reached"
+    return "stuck" if limits.stuck is not None and measures.stuck_for >= limits.stuck else ""
+
+
+def _efficiency(stage: Stage, row: Row) -> Row:
+    """Returns the columns about the shortest path; it is only computed for successes."""
+    if not row["success"]:
+        return {"spl": 0.0}
+    corners = [stage.start[:2], *stage.task.goals]
+    try:
+        shortest = sum(shortest_length(stage.task, a, b) for a, b in itertools.pairwise(corners))
+    except PlanningError:  # between walls that the robot passes with less room than the grid
+        return {"spl": None}
+    spl = success_weighted_length(True, shortest, row["path_length"])
+    return {"shortest_path": shortest, "spl": spl}
+
+
+def _thinned(path: list[tuple[float, float, float]]) -> list[tuple[float, float, float]]:
+    """Returns at most `_MAX_PATH` points of a path, with the last one, rounded to 1 mm."""
+    stride = max(1, math.ceil(len(path) / _MAX_PATH))
+    kept = [*path[::stride], path[-1]] if path else []
+    return [(round(t, 3), round(x, 3), round(y, 3)) for t, x, y in kept]

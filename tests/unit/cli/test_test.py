@@ -1,0 +1,237 @@
+"""The command `flatland test`."""
+
+from __future__ import annotations
+
+import importlib.util
+import json
+import re
+import signal
+import subprocess
+import sys
+
+import pytest
+from flatland_command import main
+from waiting import TIMEOUT, wait_until
+
+WORLD = """
+    properties: {}
+    layers: [{name: walls, map: room.yaml}]
+    models: [{name: robot, model: bot.model.yaml, pose: [3, 5, 0]}]
+"""
+ROBOT = """
+    bodies: [{name: base, footprints: [{type: circle, radius: 0.2, density: 100}]}]
+    plugins:
+    - {type: DiffDrive, name: drive, body: base}
+    - {type: Laser, name: eye, body: base, range: 9, angle: {min: -3, max: 3, increment: 0.1}}
+"""
+SLOW = """
+import flatland
+
+class Slow:
+    def __init__(self, task): pass
+    def command(self, scan, pose, goal): return flatland.Twist(linear_x=0.3)
+
+class Late(Slow):
+    def command(self, scan, pose, goal):
+        import time
+        time.sleep(0.02)
+        return flatland.Twist()
+"""
+
+
+@pytest.fixture
+def suite(files, monkeypatch):
+    """A folder with a scenario file that `straight` passes, which is the current folder."""
+    files.write_map("room", ["##########", *["#........#"] * 8, "##########"])
+    files.write("bot.model.yaml", ROBOT)
+    files.write("room.world.yaml", WORLD)
+    files.write("own.py", SLOW)
+    files.write(
+        "s.yaml",
+        """
+        world: room.world.yaml
+        goal: [6, 5]
+        seeds: 0:3
+        limits: {time: 15}
+        require: [reached within 12 s]
+        """,
+    )
+    monkeypatch.chdir(files.folder)
+    # One worker process by default, since most of the time is that of their start.
+    monkeypatch.setattr("os.cpu_count", lambda: 1)
+    return files.folder
+
+
+def test_a_suite_is_run_and_reported(suite, capsys):
+    assert main("test", "s.yaml", "--robot", "straight,gap", "--workers", "2") == 0
+    output = capsys.readouterr().out
+    assert re.search(r"^s +straight +3 +100 %", output, re.MULTILINE)
+    assert "gap against straight" in output
+    assert "worst run" not in output
+    found = {path.name for path in (suite / "flatland-test").iterdir()}
+    assert {"report.html", "results.csv", "results.json", "junit.xml"} <= found
+    assert "unfinished.jsonl" not in found
+    content = json.loads((suite / "flatland-test" / "results.json").read_text())
+    rows = [run["row"] for run in content["runs"]]
+    # In the order of the suite, independently of the processes.
+    assert [(row["seed"], row["controller"]) for row in rows] == [
+        (seed, controller) for seed in range(3) for controller in ("straight", "gap")
+    ]
+
+
+def test_a_failed_run_is_drawn_and_can_be_replayed(suite, capsys):
+    options = ("--robot", "straight", "--param", "x=1", "--out", "out", "--junit", "j.xml")
+    text = (suite / "s.yaml").read_text()
+    (suite / "s.yaml").write_text(text.replace("[6, 5]", "[20, 5]"))
+    assert main("test", "s.yaml", "--seeds", "4", *options) == 1
+    output = capsys.readouterr().out
+    assert "worst run: s straight seed 4" in output
+    assert "reached within 12 s: the outcome is collision" in output
+    assert "S•" in output
+    (command,) = [line for line in output.splitlines() if line.startswith("flatland replay")]
+    words = command.split()[1:]
+    assert main(*words) == 0
+    printed = capsys.readouterr()
+    assert re.search(r"http://127\.0\.0\.1:\d+/", printed.out + printed.err)
+    assert "no difference" in printed.out
+    assert (suite / "j.xml").is_file()
+
+
+def test_a_baseline_decides_on_the_exit_code(suite, capsys):
+    run = ("test", "s.yaml", "--seeds", "0:12")
+    assert main(*run, "--robot", "straight", "--out", "old") == 0
+    baseline = ("--baseline", "old/results.json")
+    assert main(*run, "--robot", "straight", *baseline) == 0
+    assert "no significant difference" in capsys.readouterr().out
+    # Slower, and within its limit.
+    assert main(*run, "--robot", "own.py:Slow", *baseline) == 1
+    output = capsys.readouterr().out
+    assert "own.py:Slow against the baseline (straight):" in output
+    assert re.search(r"time is worse: \d+\S* -> \d+", output)
+    # Faster, and with more energy.
+    assert main(*run, "--robot", "own.py:Slow", "--out", "slow") == 0
+    assert main(*run, "--robot", "straight", "--baseline", "slow") == 1
+    output = capsys.readouterr().out
+    assert "time is better" in output
+    assert "energy is worse" in output
+
+
+def test_a_baseline_without_runs_in_common_is_not_passed(suite, capsys):
+    assert main("test", "s.yaml", "--robot", "straight,gap", "--out", "old") == 0
+    run = ("test", "s.yaml", "--baseline", "old")
+    assert main(*run, "--robot", "straight", "--seeds", "7") == 1
+    assert "no runs in common" in capsys.readouterr().out
+    assert main(*run, "--robot", "own.py:Slow") == 1
+    assert "old: no runs of own.py:Slow" in capsys.readouterr().out
+
+
+def test_errors_of_scenarios_are_printed_together(suite, capsys):
+    text = (suite / "s.yaml").read_text()
+    (suite / "s.yaml").write_text(
+        text.replace("goal:", "gaol:").replace("reached within", "clerance >")
+    )
+    (suite / "t.yaml").write_text("world: rom.world.yaml\ngoal: [1, 1]\n")
+    assert main("test", "s.yaml", "t.yaml") == 1
+    errors = capsys.readouterr().err
+    assert "t.yaml:1: error: The world file does not exist" in errors
+    assert 'hint: did you mean "room.world.yaml"?' in errors
+    assert re.search(r'^s\.yaml:\d+: error: .*there is no measure "clerance"', errors, re.MULTILINE)
+    assert not (suite / "flatland-test").exists()
+
+
+def test_check_lists_the_errors_of_a_scenario(suite, capsys):
+    assert main("check", "s.yaml") == 0
+    assert "1 scenario, 3 runs of each controller" in capsys.readouterr().out
+    (suite / "s.yaml").write_text("world: x.yaml\ngoal: [1, 1]\nsome: thing\n")
+    assert main("check", "s.yaml") == 1
+    output = capsys.readouterr().out
+    assert "s.yaml:1: error: The world file does not exist" in output
+    assert "s.yaml:3: error: " in output
+    assert "s.yaml: 2 errors" in output
+    assert main("check", "s.yaml", "--json") == 1
+    report = json.loads(capsys.readouterr().out)
+    assert (report["kind"], report["errors"]) == ("scenario", 2)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ((), "name scenario files or included suites"),
+        (("s.yaml", "--seeds", "x"), "must be numbers and ranges of seeds"),
+        (("s.yaml", "--workers", "0"), "must be at least 1"),
+        (("s.yaml", "--robot", ","), "must name a controller"),
+        (("s.yaml", "--working-dir", "."), "--working-dir requires --ray"),
+    ],
+)
+def test_invalid_arguments(arguments, message, suite, capsys):
+    with pytest.raises(SystemExit, match="2"):
+        main("test", *arguments)
+    assert message in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (("ofice",), "neither a file nor an included suite 'ofice' (hint: did you mean"),
+        (("s.yaml", "--robot", "unknown"), "'unknown' does not exist; included are straight"),
+        (("s.yaml", "--only", "x"), "no scenario has a title that matches 'x'"),
+        (("s.yaml", "--baseline", "missing.json"), "missing.json cannot be read"),
+    ],
+)
+def test_what_does_not_exist_is_an_error(arguments, message, suite, capsys):
+    assert main("test", *arguments) == 1
+    assert message in capsys.readouterr().err
+
+
+def test_a_controller_with_an_error_does_not_end_the_suite(suite, capsys):
+    (suite / "bad.py").write_text("def bad(scan, pose, goal): raise ValueError('no')")
+    assert main("test", "s.yaml", "--robot", "bad.py:bad,straight") == 1
+    assert "ValueError: no [bad.py:1]" in capsys.readouterr().out
+
+
+@pytest.mark.skipif(importlib.util.find_spec("ray") is not None, reason="Ray is installed")
+def test_a_missing_package_is_named(suite, capsys):
+    assert main("test", "s.yaml", "--ray") == 1
+    error = capsys.readouterr().err
+    assert "`flatland test --ray` needs Ray" in error
+    assert 'pip install "flatland-sim[ray]"' in error
+
+
+def test_the_included_scenarios_are_listed(suite, capsys):
+    assert main("test", "--list") == 0
+    output = capsys.readouterr().out
+    assert "narrow_doors/straight_ahead[door=0.55]" in output
+    assert main("test", "s.yaml", "--list") == 0
+    assert "s  3 seeds" in capsys.readouterr().out
+
+
+def test_the_leaderboard_is_a_table_of_markdown(suite, capsys):
+    assert main("test", "s.yaml", "--robot", "straight", "--markdown") == 0
+    assert "| s | `straight` | 3 | 100 %" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_an_interrupted_command_writes_partial_results(number, suite):
+    command = [sys.executable, "-m", "flatland", "test", "s.yaml", "--robot", "own.py:Late"]
+    command += ["--seeds", "0:50", "--workers", "2", "--out", "out"]
+    with subprocess.Popen(
+        command,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        # A shell ignores this signal on behalf of the programs that it starts in the background.
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
+    ) as process:
+        journal = suite / "out" / "unfinished.jsonl"
+        wait_until(
+            "the first result",
+            lambda: journal.exists() and len(journal.read_text().splitlines()) > 1,
+        )
+        process.send_signal(number)
+        output, errors = process.communicate(timeout=TIMEOUT)
+    assert process.returncode == 128 + number, errors
+    assert re.search(r"interrupted: \d+ runs missing; --continue makes them", output)
+    content = json.loads((suite / "out" / "results.json").read_text())
+    assert 1 <= len(content["runs"]) < 50
+    assert content["missing"] == 50 - len(content["runs"])
+    assert (suite / "out" / "report.html").is_file()

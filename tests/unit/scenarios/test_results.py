@@ -1,0 +1,246 @@
+"""Files of results, comparisons, reports and pictures."""
+
+from __future__ import annotations
+
+import csv
+import html.parser
+import json
+import math
+import xml.etree.ElementTree as ElementTree
+
+import pytest
+
+from flatland.scenarios.columns import COLUMNS, empty_row, error_row
+from flatland.scenarios.comparison import became_worse, compare
+from flatland.scenarios.episode import Result
+from flatland.scenarios.junit import write_junit
+from flatland.scenarios.outline import Outline
+from flatland.scenarios.report import Report, worst_first, write_report
+from flatland.scenarios.results import ResultsError, SuiteResults, read_results, write_results
+from flatland.scenarios.sketch import sketch
+from flatland.scenarios.summary import markdown_table, summarize, summary_table
+
+SQUARE = [[(0.0, 0.0), (10.0, 0.0), (10.0, 5.0), (0.0, 5.0), (0.0, 0.0)]]
+
+
+def row(scenario="s/a", controller="gap", seed=0, **values):
+    good = {"passed": True, "success": True, "outcome": "reached", "spl": 1.0, "time": 10.0}
+    good |= {"collisions": 0, "clearance": 0.5, "path_length": 5.0}
+    return empty_row((scenario, controller, seed)) | good | values
+
+
+FAILED = {"passed": False, "success": False, "outcome": "collision", "spl": 0.0, "collisions": 1}
+
+
+@pytest.fixture
+def results():
+    results = SuiteResults("abc")
+    outline = Outline("k", SQUARE)
+    path = [(0.0, 1.0, 1.0), (1.0, 4.0, 2.0), (2.0, 9.0, 4.0)]
+    results.add(Result(row(), path, [(9.0, 4.0)], outline=outline))
+    failure = "<reached> & more\x00"
+    bad = row(seed=1, failures=failure, **FAILED)
+    event = (0.5, 2.0, 1.5, "kidnap")
+    recording = "recordings/a.flog"
+    results.add(Result(bad, path[:2], [(9.0, 4.0)], [event], Outline("k", SQUARE), recording))
+    results.add(Result(error_row(("t", "gap", 0), "no <way>")))
+    return results
+
+
+def test_results_are_read_as_they_were_written(results, tmp_path):
+    write_results(results, tmp_path)
+    found = read_results(tmp_path)
+    assert found.rows == results.rows
+    assert found.definition == "abc"
+    lines = [[list(point) for point in line] for line in SQUARE]
+    assert found.outlines == {"k": lines}
+    assert found.lines_of(found.results[1]) == lines
+    assert found.lines_of(found.results[2]) == []
+    assert found.results[1].recording == "recordings/a.flog"
+    assert [tuple(point) for point in found.results[0].path] == results.results[0].path
+    with (tmp_path / "results.csv").open() as file:
+        table = list(csv.DictReader(file))
+    assert list(table[0]) == list(COLUMNS)
+    assert [(line["scenario"], line["passed"], line["spl"]) for line in table] == [
+        ("s/a", "True", "1.0"),
+        ("s/a", "False", "0.0"),
+        ("t", "False", ""),
+    ]
+
+
+@pytest.mark.parametrize("text", ["", "[]", "{}", '{"format": 99}'])
+def test_invalid_results_are_refused(text, tmp_path):
+    (tmp_path / "r.json").write_text(text)
+    with pytest.raises(ResultsError, match=r"r\.json"):
+        read_results(tmp_path / "r.json")
+    with pytest.raises(ResultsError, match="cannot be read"):
+        read_results(tmp_path / "missing.json")
+
+
+def test_junit(results, tmp_path):
+    write_junit(results, tmp_path / "junit.xml")
+    root = ElementTree.parse(tmp_path / "junit.xml").getroot()
+    suites = {suite.get("name"): suite for suite in root}
+    counts = {
+        name: (suite.get("tests"), suite.get("failures"), suite.get("errors"))
+        for name, suite in suites.items()
+    }
+    assert counts == {"s": ("2", "1", "0"), "t": ("1", "0", "1")}
+    good, bad = suites["s"]
+    assert (good.get("name"), list(good)) == ("s/a seed 0", [])
+    assert bad[0].get("message") == "<reached> & more?"
+
+
+# -- comparisons ---------------------------------------------------------------------------
+
+
+def verdicts(differences):
+    return {one.measure: one.verdict for one in differences if one.verdict}
+
+
+def test_equal_runs_do_not_differ():
+    rows = [row(seed=seed, clearance=0.1 * seed) for seed in range(20)]
+    differences = compare(rows, rows)
+    assert {one.pairs for one in differences} == {20}
+    assert verdicts(differences) == {}
+    assert compare(rows, [row(scenario="other")]) == []
+
+
+def test_what_became_worse_is_found():
+    before = [row(seed=seed, time=10 + 0.1 * seed) for seed in range(20)]
+    after = [row(seed=seed, time=9 + 0.1 * seed, clearance=0.4) for seed in range(20)]
+    differences = compare(before, after)
+    assert verdicts(differences) == {"time": "better", "clearance": "worse"}
+    assert became_worse(differences) == ["clearance"]
+    assert became_worse(compare(after, before)) == ["time"]
+    found = {one.measure: one for one in differences}
+    assert found["time"].before - found["time"].after == pytest.approx(1.0)
+
+
+def test_differences_of_at_most_one_percent_do_not_matter():
+    before = [row(seed=seed, time=100.0) for seed in range(20)]
+    assert verdicts(compare(before, [row(seed=seed, time=100.9) for seed in range(20)])) == {}
+    worse = compare(before, [row(seed=seed, time=101.5) for seed in range(20)])
+    assert verdicts(worse) == {"time": "worse"}
+
+
+def test_rates_are_compared_in_pairs():
+    before = [row(seed=seed) for seed in range(12)]
+    after = [row(seed=seed, **(FAILED if seed < 10 else {})) for seed in range(12)]
+    worse = became_worse(compare(before, after))
+    assert {"passed", "success", "spl", "collisions"} <= set(worse)
+    # The times of runs without success are no times of the way.
+    (time,) = [one for one in compare(before, after) if one.measure == "time"]
+    assert time.pairs == 2
+
+
+def test_few_runs_are_not_significant():
+    before = [row(seed=seed) for seed in range(4)]
+    after = [row(seed=seed, **FAILED) for seed in range(4)]
+    assert became_worse(compare(before, after)) == []
+
+
+# -- tables --------------------------------------------------------------------------------
+
+
+def test_summaries():
+    rows = [row(seed=seed, spl=0.5 + 0.1 * seed) for seed in range(3)]
+    rows += [row("t", seed=0, **FAILED), row("t", "own.py:A")]
+    summaries = summarize(rows)
+    assert [(one.group, one.controller, one.runs) for one in summaries] == [
+        ("s", "gap", 3),
+        ("t", "gap", 1),
+        ("t", "own.py:A", 1),
+        ("all", "gap", 4),
+        ("all", "own.py:A", 1),
+    ]
+    assert summaries[0].means["spl"].value == pytest.approx(0.6)
+    assert summaries[3].passed.value == 0.75
+    assert math.isnan(summaries[1].means["time"].value)
+    text = summary_table(summaries)
+    assert text.splitlines()[1].split()[:5] == ["s", "gap", "3", "100", "%"]
+    assert markdown_table(summaries).splitlines()[2].startswith("| s | `gap` | 3 | 100 % (44-100)")
+
+
+def test_the_worst_runs_are_first(results):
+    titles = [(one.row["outcome"], one.row["seed"]) for one in worst_first(results.results)]
+    assert titles == [("error", 0), ("collision", 1), ("reached", 0)]
+
+
+# -- report --------------------------------------------------------------------------------
+
+
+class Page(html.parser.HTMLParser):
+    """Checks that elements are nested, and collects them."""
+
+    VOID = ("meta", "br", "circle", "rect", "path", "link", "img")
+
+    def __init__(self, text: str) -> None:
+        super().__init__()
+        self.open: list[str] = []
+        self.elements: list[tuple[str, dict[str, str | None]]] = []
+        self.texts = ""
+        self.feed(text)
+        assert self.open == []
+
+    def handle_starttag(self, tag, attrs):
+        self.elements.append((tag, dict(attrs)))
+        if tag not in self.VOID or tag in ("circle", "rect", "path"):
+            self.open.append(tag)
+
+    def handle_startendtag(self, tag, attrs):
+        self.elements.append((tag, dict(attrs)))
+
+    def handle_endtag(self, tag):
+        assert self.open.pop() == tag
+
+    def handle_data(self, data):
+        self.texts += data
+
+
+def test_the_report_is_one_file(results, tmp_path):
+    comparison = compare([row(seed=s) for s in range(9)], [row(seed=s, time=12) for s in range(9)])
+    report = Report(["flatland", "test", "a b"], {"gap against the baseline": comparison})
+    write_report(results, report, tmp_path / "report.html")
+    page = Page((tmp_path / "report.html").read_text().replace("<!DOCTYPE html>", ""))
+    tags = [tag for tag, _ in page.elements]
+    assert {"script", "link", "img", "iframe"}.isdisjoint(tags)
+    assert tags.count("article") == 3
+    links = [attributes["href"] for tag, attributes in page.elements if tag == "a"]
+    assert links == ["recordings/a.flog"]
+    assert "1 of 3 runs passed, 1 with an error" in page.texts
+    assert "<reached> & more" in page.texts
+    assert f"flatland replay {tmp_path}/recordings/a.flog --view" in page.texts
+    assert "kidnap at 0.50 s" in page.texts
+    assert "worse" in page.texts
+    first = page.texts.index("no <way>")
+    assert first < page.texts.index("Replay")
+
+
+def test_a_report_of_errors_only_can_be_written(tmp_path):
+    results = SuiteResults("")
+    results.add(Result(error_row(("t", "gap", 0), "no way")))
+    results.missing = 3
+    write_report(results, Report(), tmp_path / "report.html")
+    assert "3 missing, because the suite was interrupted" in (tmp_path / "report.html").read_text()
+
+
+def test_sketches_have_the_shape_of_the_world(results):
+    text = sketch(results.results[0], SQUARE, columns=40, rows=12)
+    lines = text.splitlines()
+    assert len(lines) <= 12
+    assert max(map(len, lines)) <= 40
+    # From the lower left to the upper right.
+    (start,) = [index for index, line in enumerate(lines) if "S" in line]
+    (end,) = [index for index, line in enumerate(lines) if "X" in line]
+    assert start > end
+    assert lines[start].index("S") < lines[end].index("X")
+    assert "•" in text
+    assert sketch(results.results[2], []) == ""
+
+
+def test_values_of_json_are_plain(results, tmp_path):
+    write_results(results, tmp_path)
+    text = (tmp_path / "results.json").read_text()
+    assert "NaN" not in text
+    assert json.loads(text)["missing"] == 0

@@ -1,0 +1,209 @@
+"""Runs in real worker processes."""
+
+from __future__ import annotations
+
+import os
+import signal
+
+import pytest
+from waiting import wait_until
+
+from flatland.scenarios.columns import TIMING
+from flatland.scenarios.episode import Options
+from flatland.scenarios.results import ResultsError, key_of
+from flatland.scenarios.scenario import Run
+from flatland.scenarios.suite import Plan, SuiteError, run_suite, runs_of
+from flatland.scenarios.workers import WorkerLimits, run_in_processes
+
+CONTROLLERS = """
+import os, signal, threading
+from pathlib import Path
+import numpy as np
+import flatland
+
+FOLDER = Path(__file__).parent
+
+class Drives:
+    def __init__(self, task):
+        self.seed = task.world.seed
+
+    def command(self, scan, pose, goal):
+        return flatland.Twist(linear_x=0.5)
+
+class Hangs(Drives):
+    def command(self, scan, pose, goal):
+        threading.Event().wait()
+
+class HangsAtStart(Drives):
+    def __init__(self, task):
+        threading.Event().wait()
+
+class Floods(Drives):
+    def command(self, scan, pose, goal):
+        kept = []
+        while True:
+            kept.append(np.ones(4_000_000))
+
+class Prints(Drives):
+    def command(self, scan, pose, goal):
+        print("x" * 100_000)
+        return super().command(scan, pose, goal)
+
+class DiesOnce(Drives):
+    def command(self, scan, pose, goal):
+        flag = FOLDER / f"died{self.seed}"
+        if self.seed == 1 and not flag.exists():
+            flag.write_text(str(os.getpid()))
+            os.kill(os.getpid(), signal.SIGKILL)
+        return super().command(scan, pose, goal)
+
+class Dies(Drives):
+    def command(self, scan, pose, goal):
+        os._exit(3)
+"""
+
+
+@pytest.fixture
+def suite(scenario, room):
+    """Returns the runs of controllers, and a plan."""
+    (room / "own.py").write_text(CONTROLLERS)
+
+    def suite(names, seeds=(1,), limits=None, workers=2, text="limits: {time: 3}", **plan):
+        found = scenario(text + "\nrequire: [no contact]")
+        runs = runs_of([found], [n if n in ("gap",) else f"own.py:{n}" for n in names], seeds)
+        options = Options(str(room), str(room / plan.pop("out", "out")))
+        return runs, Plan(options, limits or WorkerLimits(), workers, **plan)
+
+    return suite
+
+
+def carry_out(runs, plan, **more):
+    found = run_in_processes(runs, plan.options, plan.limits, plan.workers, **more)
+    return {key_of(result.row): result for result in found}
+
+
+def test_results_do_not_depend_on_the_number_of_processes(suite):
+    text = "start: random\ngoal: random\nlimits: {time: 3}"
+    found = []
+    for workers in (1, 3):
+        runs, plan = suite(["gap", "Drives"], seeds=range(4), workers=workers, text=text)
+        results = carry_out(runs, plan)
+        assert len(results) == 8
+        found.append(
+            {
+                key: (
+                    {name: v for name, v in result.row.items() if name not in TIMING},
+                    result.path,
+                    result.goals,
+                )
+                for key, result in results.items()
+            }
+        )
+    assert found[0] == found[1]
+
+
+@pytest.mark.parametrize(
+    ("name", "limits", "message"),
+    [
+        ("Hangs", WorkerLimits(command_time=0.3), "a call of the controller took more than 0.3 s"),
+        ("HangsAtStart", WorkerLimits(command_time=0.3), "a call of the controller took more than"),
+        ("Hangs", WorkerLimits(run_time=0.5), "the run took more than 0.5 s of wall time"),
+        ("Floods", WorkerLimits(memory=200 << 20), "the run needed more memory than its limit"),
+        ("Dies", WorkerLimits(), "ended in each of 3 attempts (exit code 3)"),
+    ],
+)
+def test_a_run_that_must_be_ended_does_not_affect_others(name, limits, message, suite, room):
+    runs, plan = suite([name, "Drives"], limits=limits)
+    results = carry_out(runs, plan)
+    bad, good = results[runs[0].key], results[runs[1].key]
+    assert bad.row["outcome"] == "error"
+    assert message in bad.row["error"]
+    assert not bad.row["passed"]
+    assert good.row["passed"]
+    if bad.recording:
+        assert (room / "out" / bad.recording).is_file()
+
+
+def test_a_run_whose_worker_is_killed_is_made_again(suite, room):
+    runs, plan = suite(["DiesOnce"], seeds=(0, 1, 2))
+    results = carry_out(runs, plan)
+    killed = (room / "died1").read_text()
+    assert [result.row["passed"] for result in results.values()] == [True] * 3
+    assert not results[runs[1].key].row["worker"].endswith(f":{killed}")
+
+
+def test_what_a_controller_prints_is_dropped(suite, capfd):
+    runs, plan = suite(["Prints"])
+    assert carry_out(runs, plan)[runs[0].key].row["passed"]
+    assert capfd.readouterr().out == ""
+
+
+def test_what_a_controller_prints_can_be_shown(suite, capfd):
+    runs, plan = suite(["Prints"], limits=WorkerLimits(shows_output=True))
+    carry_out(runs, plan)
+    assert "xxxx" in capfd.readouterr().out
+
+
+def test_the_processes_end_with_the_suite(suite):
+    runs, plan = suite(["Drives"], seeds=range(6))
+    workers = set()
+    for result in run_in_processes(runs, plan.options, plan.limits, 2):
+        workers.add(int(result.row["worker"].rpartition(":")[2]))
+        break
+
+    def has_ended(pid: int) -> bool:
+        try:
+            os.kill(pid, 0)
+        except ProcessLookupError:
+            return True
+        return False
+
+    wait_until("the workers have ended", lambda: all(map(has_ended, workers)))
+
+
+def test_an_interrupted_suite_is_continued(suite):
+    runs, plan = suite(["Drives"], seeds=range(5), workers=1)
+    done = []
+    partial = run_suite(
+        runs, plan, is_stopped=lambda: len(done) >= 2, on_result=lambda r: done.append(r.row)
+    )
+    assert 2 <= len(partial.results) < 5
+    assert partial.missing == 5 - len(partial.results)
+    _, continued = suite(["Drives"], seeds=range(5), continues=True)
+    complete = run_suite(runs, continued)
+    assert complete.missing == 0
+    assert [row["seed"] for row in complete.rows] == [0, 1, 2, 3, 4]
+    # Results from before were kept.
+    times = {row["seed"]: row["wall_time"] for row in complete.rows}
+    assert all(times[row["seed"]] == row["wall_time"] for row in done)
+    _, other = suite(["Drives"], seeds=range(5), out="other")
+    assert [
+        {name: v for name, v in row.items() if name not in TIMING}
+        for row in run_suite(runs, other).rows
+    ] == [{name: v for name, v in row.items() if name not in TIMING} for row in complete.rows]
+
+
+def test_results_of_another_suite_are_not_continued(suite):
+    runs, plan = suite(["Drives"], seeds=range(2), workers=1)
+    done = []
+    run_suite(runs, plan, is_stopped=lambda: done, on_result=done.append)
+    _, continued = suite(["Drives"], continues=True)
+    with pytest.raises(ResultsError, match="has results of other scenarios"):
+        run_suite(runs[:1], continued)
+
+
+def test_a_suite_needs_runs_with_different_names(suite):
+    runs, plan = suite(["Drives"])
+    with pytest.raises(SuiteError, match="there are no runs"):
+        run_suite([], plan)
+    with pytest.raises(SuiteError, match="two scenario files have the same name"):
+        run_suite([*runs, Run(runs[0].scenario, runs[0].controller, runs[0].seed)], plan)
+
+
+def test_the_signal_of_a_killed_worker_is_named(suite, room):
+    runs, plan = suite(["Drives"])
+    (room / "own.py").write_text(
+        f"import os\ndef Drives(scan, pose, goal): os.kill(os.getpid(), {int(signal.SIGSEGV)})"
+    )
+    (result,) = carry_out(runs, plan).values()
+    assert f"(signal {int(signal.SIGSEGV)})" in result.row["error"]
