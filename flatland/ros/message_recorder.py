@@ -74,9 +74,10 @@ def record_bag(path: str | os.PathLike[str]) -> MessageRecorder:
     """Creates a recorder of a bag with simulated stamps; an existing file is overwritten.
 
     Raises:
-        FlatlandError: rosbag is not installed.
+        FlatlandError: A required package is not installed.
         OSError: The file cannot be created.
     """
+    require("tf2_msgs.msg", "bags need")  # Transforms are recorded in any case.
     bag = require("rosbag", "bags need").Bag(os.fspath(path), "w")
 
     def write(topic: str, message: Any, time_ns: int, _sequence: int) -> None:
@@ -96,6 +97,7 @@ def record_mcap(path: str | os.PathLike[str], *, ends_on_error: bool = False) ->
         FlatlandError: A required package is not installed.
         OSError: The file cannot be created.
     """
+    require("tf2_msgs.msg", "MCAP files need")  # Transforms are recorded in any case.
     writer_module = require("mcap_ros1.writer", "MCAP files need")
     file = Path(path).open("wb")  # noqa: SIM115 - closed by `finish`
     writer = writer_module.Writer(file, chunk_size=_CHUNK_SIZE)

@@ -63,8 +63,8 @@ def footprint(entries: str, error: str, hint: str = "") -> Input:
     return body(f"footprints: [{{{entries}}}]", error, hint)
 
 
-def polygon(points: str, error: str) -> Input:
-    return footprint(f"type: polygon, density: 1, points: {points}", error)
+def polygon(points: str, error: str, hint: str = "") -> Input:
+    return footprint(f"type: polygon, density: 1, points: {points}", error, hint)
 
 
 def joint(entries: str, error: str, hint: str = "") -> Input:
@@ -171,6 +171,7 @@ INPUTS: dict[str, Input] = {
     "point of three": polygon(
         "[[0, 0], [1, 0], [1, 1, 1]]",
         f'Error converting entry index=2 to vector (in {FOOTPRINT} "points")',
+        hint="two numbers are written as [x, y]",
     ),
     "point with NaN": polygon(
         "[[0, 0], [1, .nan], [0, 1]]",

@@ -202,7 +202,8 @@ def test_a_laser_fails(how, run, room):
         f"limits: {{time: 2}}\nevents: [{{at: 0.5, fail: {{how: {how}, for: 0.4}}}}]",
         "own.py:watch",
     )
-    (module,) = [m for name, m in sys.modules.items() if getattr(m, "SCANS", None)]
+    path = str(room / "own.py")
+    (module,) = [m for m in sys.modules.values() if getattr(m, "__file__", None) == path]
     scans = module.SCANS
     del sys.modules[module.__name__]
     if how == "blind":

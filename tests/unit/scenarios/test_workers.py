@@ -112,16 +112,20 @@ def test_results_do_not_depend_on_the_number_of_processes(suite):
         ("Dies", WorkerLimits(), "ended in each of 3 attempts (exit code 3)"),
     ],
 )
-def test_a_run_that_must_be_ended_does_not_affect_others(name, limits, message, suite, room):
-    runs, plan = suite([name, "Drives"], limits=limits)
+def test_a_run_that_must_be_ended_is_an_error(name, limits, message, suite, room):
+    runs, plan = suite([name], limits=limits)
+    (result,) = carry_out(runs, plan).values()
+    assert result.row["outcome"] == "error"
+    assert message in result.row["error"]
+    assert not result.row["passed"]
+    if result.recording:
+        assert (room / "out" / result.recording).is_file()
+
+
+def test_a_run_that_ends_its_process_does_not_affect_others(suite):
+    runs, plan = suite(["Dies", "Drives"])
     results = carry_out(runs, plan)
-    bad, good = results[runs[0].key], results[runs[1].key]
-    assert bad.row["outcome"] == "error"
-    assert message in bad.row["error"]
-    assert not bad.row["passed"]
-    assert good.row["passed"]
-    if bad.recording:
-        assert (room / "out" / bad.recording).is_file()
+    assert [results[run.key].row["passed"] for run in runs] == [False, True]
 
 
 def test_a_run_whose_worker_is_killed_is_made_again(suite, room):

@@ -60,7 +60,7 @@ def test_heights_of_walls(
 
 
 def test_walls_have_the_pose_and_colour_of_the_layer() -> None:
-    (marker,) = markers_of(LayerMarkers(make_layer({})).walls(0))
+    (marker,) = markers_of(LayerMarkers(make_layer({}), RosWriter).walls(0))
     assert (marker.type, marker.action) == (Marker.TRIANGLE_LIST, Marker.ADD)
     assert marker.header.frame_id == "map"
     assert marker.frame_locked
