@@ -462,3 +462,10 @@ class TestErrors:
         text = plugin_world.error(laser(extra))
         assert message in text
         assert "robot.model.yaml:" in text
+
+
+def test_beams_end_at_the_range(plugin_world: Any) -> None:
+    angle = "angle: {min: 0, max: 1.5707963, increment: 1.5707963}"
+    world = plugin_world(f"[{{type: Laser, name: eye, body: base, range: 5, {angle}}}]")
+    ends = world.model("robot").plugin("eye").beam_ends
+    np.testing.assert_allclose(ends, [[5, 0], [0, 5]], atol=1e-5)

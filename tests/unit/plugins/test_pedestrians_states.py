@@ -63,6 +63,7 @@ def test_services_spawn_direct_and_remove_people(files: WorldFiles) -> None:
     assert people_of(world).people.poses[:, 0] == pytest.approx([2.9, 4.0], abs=0.2)
     assert services["remove_people"](SimpleNamespace(names=["a_0"])) == (True, "")
     assert people_of(world).people.names == ("a_1",)
+    assert people_of(world).spawn() == ["a_2"]
 
 
 @pytest.mark.parametrize("options", [FULL, FULL + "body_type: dynamic, "])
