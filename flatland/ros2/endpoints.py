@@ -207,10 +207,10 @@ class _SharedPublisher(Shared):
                 self._publisher.publish(message)
 
     def forget(self) -> None:
-        """Discards the messages that would be sent to new subscribers, if there are none now."""
+        """Discards the messages that would be sent to new subscribers, if there are none then."""
         with self._lock:
             if self._publisher is not None and self._has_sent and not self.connections:
-                self._node.destroy_publisher(self._publisher)
+                destroy_later(self._node, self._node.destroy_publisher, self._publisher)
                 self._has_sent = False
                 self._publisher = self._create()
 
@@ -219,7 +219,7 @@ class _SharedPublisher(Shared):
         with self._lock:
             publisher, self._publisher = self._publisher, None
             self.connections = 0
-        self._node.destroy_publisher(publisher)
+        destroy_later(self._node, self._node.destroy_publisher, publisher)
 
     def _matched(self, info: Any) -> None:
         """Counts the subscribers; called by the executor."""
@@ -460,7 +460,7 @@ class _SharedSubscription(Shared):
     def destroy(self) -> None:
         """Unsubscribes."""
         self.connections = 0
-        self._node.destroy_subscription(self._subscription)
+        destroy_later(self._node, self._node.destroy_subscription, self._subscription)
 
     def _receive(self, message: Any) -> None:
         for user in list(self.users):
@@ -471,6 +471,22 @@ class _SharedSubscription(Shared):
 
     def _matched(self, info: Any) -> None:
         self.connections = info.current_count
+
+
+def destroy_later(node: Node, destroy: Callable[[Any], object], connection: Any) -> None:
+    """Destroys a connection in the thread of the executor, which may be waiting for it otherwise.
+
+    Args:
+        node: The node.
+        destroy: The method of the node that destroys the connection.
+        connection: The publisher, subscription or service; destroyed at once if the executor does
+            not run yet.
+    """
+    executor = node.executor
+    if executor is None:
+        destroy(connection)
+    else:
+        executor.create_task(destroy, connection)
 
 
 def resolve_topic(node: Node, name: str) -> str:

@@ -15,7 +15,7 @@ from flatland.node.names import sendable_text
 from flatland.node.transport import CallError
 from flatland.ros2 import convert
 from flatland.ros2.adapters import find_adapter
-from flatland.ros2.endpoints import Endpoints, Shared, User, expanded
+from flatland.ros2.endpoints import Endpoints, Shared, User, destroy_later, expanded
 from flatland.ros2.message_types import service_class
 
 _LOG = logging.getLogger("flatland")
@@ -100,7 +100,7 @@ class _SharedService(Shared):
 
     def destroy(self) -> None:
         """Ends the service."""
-        self._node.destroy_service(self._service)
+        destroy_later(self._node, self._node.destroy_service, self._service)
 
     def _start(self, pending: _Pending, sender: Any) -> None:
         """Handles a request in another thread, while the executor goes on.
