@@ -13,7 +13,7 @@ CPP_FILES = $(shell find src/cpp tests $(wildcard bench) -name '*.h' -o -name '*
 
 .PHONY: help
 help:  ## list the commands
-	@sed -n 's/^\([a-z-]*\):.*## /  make \1\t/p' $(MAKEFILE_LIST) | expand -t 20
+	@sed -n 's/^\([a-z0-9-]*\):.*## /  make \1\t/p' $(MAKEFILE_LIST) | expand -t 20
 
 .PHONY: setup
 setup:  ## install missing Debian packages, create .venv, build and install flatland
