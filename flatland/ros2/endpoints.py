@@ -78,12 +78,16 @@ class Endpoints:
                     )
                 if kind == "service" and shared.users:
                     raise FlatlandError(f'{kind} "{name}" exists already{used_by}')
+                shared.users.append(user)
             else:
+                shared = create()
+                # First, so that it receives what arrives at once.
+                shared.users.append(user)
                 try:
-                    shared = self._shared[kind, name] = create()
+                    shared.open()
                 except ValueError as error:  # of rclpy, for a name or a type
                     raise FlatlandError(f'cannot open {kind} "{name}": {error}') from error
-            shared.users.append(user)
+                self._shared[kind, name] = shared
             return cast(S, shared)  # Each kind has one class.
 
     def _remove_those_that_give_way(self, shared: Shared) -> Shared | None:
@@ -172,6 +176,10 @@ class Shared:
         self.users: list[Any] = []
         self.connections = 0
 
+    def open(self) -> None:
+        """Opens the connection."""
+        raise NotImplementedError
+
     def destroy(self) -> None:
         """Ends the connection."""
         raise NotImplementedError
@@ -189,7 +197,12 @@ class _SharedPublisher(Shared):
         self._profile = profile
         self._lock = threading.RLock()  # of the publisher and the number of its subscribers
         self._has_sent = False
-        self._publisher = self._create()
+        self._publisher: Any = None
+
+    def open(self) -> None:
+        """Advertises the topic; a subscriber that connects at once is counted afterwards."""
+        with self._lock:
+            self._publisher = self._create()
 
     def _create(self) -> Any:
         return self._node.create_publisher(
@@ -207,10 +220,10 @@ class _SharedPublisher(Shared):
                 self._publisher.publish(message)
 
     def forget(self) -> None:
-        """Discards the messages that would be sent to new subscribers, if there are none now."""
+        """Discards the messages that would be sent to new subscribers, if there are none then."""
         with self._lock:
             if self._publisher is not None and self._has_sent and not self.connections:
-                self._node.destroy_publisher(self._publisher)
+                destroy_later(self._node, self._node.destroy_publisher, self._publisher)
                 self._has_sent = False
                 self._publisher = self._create()
 
@@ -219,7 +232,7 @@ class _SharedPublisher(Shared):
         with self._lock:
             publisher, self._publisher = self._publisher, None
             self.connections = 0
-        self._node.destroy_publisher(publisher)
+        destroy_later(self._node, self._node.destroy_publisher, publisher)
 
     def _matched(self, info: Any) -> None:
         """Counts the subscribers; called by the executor."""
@@ -229,7 +242,7 @@ class _SharedPublisher(Shared):
             self.connections = info.current_count
             users = list(self.users)
         for user in users:
-            user.update(new=info.current_count_change > 0)
+            user.update(connected=info.current_count > 0, new=info.current_count_change > 0)
 
 
 class Publisher(User):
@@ -290,7 +303,7 @@ class Publisher(User):
             ),
         )
         if self._shared.connections:
-            self.update(new=True)
+            self.update(connected=True, new=True)
 
     @property
     def connections(self) -> int:
@@ -302,14 +315,15 @@ class Publisher(User):
         if not self.closed:
             self._shared.publish(message)
 
-    def update(self, *, new: bool) -> None:  # noqa: ARG002
+    def update(self, *, connected: bool, new: bool) -> None:  # noqa: ARG002
         """Reports a change of the subscribers.
 
         Args:
+            connected: Whether there are subscribers.
             new: Whether there is a new subscriber.
         """
         if not self.closed:
-            self.connected = self._shared.connections > 0
+            self.connected = connected
             if self._on_connection is not None:
                 self._on_connection(self.connected)
 
@@ -374,11 +388,11 @@ class StateTopic(Publisher):
         self._make = make
         self.send()
 
-    def update(self, *, new: bool) -> None:
+    def update(self, *, connected: bool, new: bool) -> None:
         """Schedules a message to a new subscriber."""
-        super().update(new=new)
+        super().update(connected=connected, new=new)
         if not self.closed:
-            self._post(self.send if new else self._shared.forget)
+            self._post(self.send if new else lambda: self._shared.forget())
 
 
 class Subscription(User):
@@ -446,21 +460,26 @@ class _SharedSubscription(Shared):
     ) -> None:
         super().__init__("subscriber", resolved, message_type)
         self._node = node
-        profile = qos.of_subscription(resolved, message_type)
+        self._topic = topic  # which rclpy resolves
+        self._profile = qos.of_subscription(resolved, message_type)
         if for_viewer and resolved != qos.STATIC_TRANSFORMS:
-            profile = qos.of_viewer(node.get_publishers_info_by_topic(resolved))
-        self._subscription = node.create_subscription(
-            message_type,
-            topic,
+            self._profile = qos.of_viewer(node.get_publishers_info_by_topic(resolved))
+        self._subscription: Any = None
+
+    def open(self) -> None:
+        """Subscribes."""
+        self._subscription = self._node.create_subscription(
+            self.type,
+            self._topic,
             self._receive,
-            profile,
+            self._profile,
             event_callbacks=SubscriptionEventCallbacks(matched=self._matched),
         )
 
     def destroy(self) -> None:
         """Unsubscribes."""
         self.connections = 0
-        self._node.destroy_subscription(self._subscription)
+        destroy_later(self._node, self._node.destroy_subscription, self._subscription)
 
     def _receive(self, message: Any) -> None:
         for user in list(self.users):
@@ -471,6 +490,22 @@ class _SharedSubscription(Shared):
 
     def _matched(self, info: Any) -> None:
         self.connections = info.current_count
+
+
+def destroy_later(node: Node, destroy: Callable[[Any], object], connection: Any) -> None:
+    """Destroys a connection in the thread of the executor, which may be waiting for it otherwise.
+
+    Args:
+        node: The node.
+        destroy: The method of the node that destroys the connection.
+        connection: The publisher, subscription or service; destroyed at once if the executor does
+            not run yet.
+    """
+    executor = node.executor
+    if executor is None:
+        destroy(connection)
+    else:
+        executor.create_task(destroy, connection)
 
 
 def resolve_topic(node: Node, name: str) -> str:

@@ -133,11 +133,12 @@ class _ExecutorThread:
 
     def __init__(self, node: Node) -> None:
         """Starts the thread."""
-        from rclpy.experimental.events_executor import EventsExecutor
+        from rclpy.executors import SingleThreadedExecutor
         from rclpy.task import Future
 
-        # Much faster than the other executors, which examine all entities after each callback.
-        self._executor: Any = EventsExecutor()
+        # Not the experimental EventsExecutor: the process crashes when connections are closed while
+        # others are opened.
+        self._executor: Any = SingleThreadedExecutor()
         self._executor.add_node(node)
         self._end = Future(executor=self._executor)
         self._thread = threading.Thread(target=self._run, name="flatland-executor", daemon=True)
@@ -154,7 +155,6 @@ class _ExecutorThread:
 
         while not self._end.done():
             try:
-                # `spin` waits actively in some versions, because its time limit is infinite.
                 self._executor.spin_until_future_complete(self._end, _SPIN_PERIOD)
             except InvalidHandle:
                 pass  # An event of a connection that has just been closed.

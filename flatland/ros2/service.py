@@ -15,7 +15,7 @@ from flatland.node.names import sendable_text
 from flatland.node.transport import CallError
 from flatland.ros2 import convert
 from flatland.ros2.adapters import find_adapter
-from flatland.ros2.endpoints import Endpoints, Shared, User, expanded
+from flatland.ros2.endpoints import Endpoints, Shared, User, destroy_later, expanded
 from flatland.ros2.message_types import service_class
 
 _LOG = logging.getLogger("flatland")
@@ -73,11 +73,6 @@ _Pending = tuple[Any, Any]
 """A request, and an empty response to it."""
 
 
-def _same(request: Any, response: Any) -> _Pending:
-    """Returns the arguments; called by the executor with each request."""
-    return request, response
-
-
 class _SharedService(Shared):
     """A service of rclpy."""
 
@@ -92,15 +87,27 @@ class _SharedService(Shared):
         super().__init__("service", resolved, service_type)
         self._node = node
         self.handler = handler
-        self._service = node.create_service(service_type, name, _same)
+        self._name = name  # which rclpy resolves
+        self._is_open = threading.Event()
+        self._service: Any = None
+
+    def open(self) -> None:
+        """Offers the service."""
+        self._service = self._node.create_service(self.type, self._name, self._accept)
         # Instead of a coroutine, whose result the executor does not send in all versions: the
-        # executor passes what `_same` returns, and the sender, to this function.
+        # executor passes what `_accept` returns, and the sender, to this function.
         self._send_response = self._service.send_response
         self._service.send_response = self._start
+        self._is_open.set()
+
+    def _accept(self, request: Any, response: Any) -> _Pending:
+        """Returns the arguments; called by the executor with each request."""
+        self._is_open.wait()
+        return request, response
 
     def destroy(self) -> None:
         """Ends the service."""
-        self._node.destroy_service(self._service)
+        destroy_later(self._node, self._node.destroy_service, self._service)
 
     def _start(self, pending: _Pending, sender: Any) -> None:
         """Handles a request in another thread, while the executor goes on.

@@ -249,9 +249,9 @@ class ClockTopic(StateTopic):
         with self._sending:
             super().send()
 
-    def update(self, *, new: bool) -> None:
+    def update(self, *, connected: bool, new: bool) -> None:
         """Sends the time to new subscribers, and repeats it."""
-        Publisher.update(self, new=new)
+        Publisher.update(self, connected=connected, new=new)
         if new and not self.closed:
             self._repeat_until = time.monotonic() + _CLOCK_REPETITIONS
             self._repetition.wake()
