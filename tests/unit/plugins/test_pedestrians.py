@@ -312,6 +312,17 @@ def test_legs_keep_their_radius_from_walls(files: WorldFiles, radius: float, off
     assert [body.pose[1] for body in legs] == pytest.approx([1.5 + offset, 1.5 - offset], abs=1e-3)
 
 
+@pytest.mark.parametrize(("body_type", "collides"), [("kinematic", True), ("dynamic", False)])
+def test_legs_collide_unless_the_body_can_be_pushed(
+    files: WorldFiles, body_type: str, collides: bool
+) -> None:
+    options = CALM + f"layers: [body], legs: {{layers: [2d]}}, body_type: {body_type}, "
+    world = load(files, ONE % "[8, 3]", options)
+    [name] = people_of(world).spawn(poses=[(4.0, 3.0, 0.0)])
+    legs = [body for body in world.model(name).bodies if body.name != "body"]
+    assert [bool(leg.fixtures[0].mask_bits) for leg in legs] == [collides] * 2
+
+
 def test_lasers_see_the_legs_in_their_layer(files: WorldFiles) -> None:
     options = CALM + "layers: [body], legs: {layers: [2d], radius: 0.07, spacing: 0.2}, "
     world = load(files, ONE % "[8, 3]", options)

@@ -43,6 +43,13 @@ def test_runs_with_one_seed_are_equal(files: WorldFiles, options: str) -> None:
     assert hashes[0] == hashes[1] != hashes[2]
 
 
+def test_social_forces_may_be_zero(files: WorldFiles) -> None:
+    forces = "strength: 0, look_ahead: 0, relative: 0, behind: 0, wall_strength: 0, gaze: 0"
+    world = load(files, CROWD, f"social_force: {{{forces}, cohesion: 0, spacing: 0}}, ")
+    world.step(50)
+    assert len(people_of(world).people.names) == 12
+
+
 def test_services_spawn_direct_and_remove_people(files: WorldFiles) -> None:
     services: dict[str, Callable[[Any], Any]] = {}
 
