@@ -105,7 +105,10 @@ nitpick_ignore_regex = [
     # Of Gymnasium.
     (r"py:exc", r"(ClosedEnvironmentError|DependencyNotInstalled|InvalidAction|ResetNeeded)"),
     # Names that are imported only for type checkers, or are not described.
-    (r"py:class", r"(FleetEnv|Laser|PluginWorld|Touches|Update)"),
+    (
+        r"py:class",
+        r"(Episodes|FleetEnv|Laser|Outline|Path|PluginWorld|ReadYaml|Row|Touches|Update)",
+    ),
     (r"py:class", r"flatland\.web\.foreign_topics\.ForeignTopics"),
     (r"py:class", r"flatland\._core\..*"),
     # Type variables.

@@ -9,10 +9,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from flatland import physics
 from flatland.entities.body import Body
 from flatland.entities.model import Model
 from flatland.errors import WorldError
-from flatland.physics import Controller, Touches
+from flatland.physics import Touches
 from flatland.plugin_api.dynamics_limits import DynamicsLimits
 from flatland.plugin_api.plugin import describe
 from flatland.plugin_api.ports import Command
@@ -56,7 +57,7 @@ class Agent:
     body: Body
     laser: Laser
     command: Command[Twist]
-    controller: Controller | None
+    controller: physics.Controller | None
     touches: Touches
     radius: float
     bits: int
