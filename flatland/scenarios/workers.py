@@ -23,7 +23,7 @@ from flatland.scenarios.scenario import Run
 
 MAX_ATTEMPTS: Final = 3
 _CONTEXT: Final = multiprocessing.get_context("spawn")  # a fork could inherit a locked lock
-_CHECK_PERIOD: Final = 0.05  # s; between two looks at the clocks of the workers
+_CHECK_PERIOD: Final = 0.05  # s; between two checks of the limits
 OUT_OF_MEMORY: Final = "the run needed more memory than its limit"
 _LOG: Final = logging.getLogger("flatland.scenarios")
 

@@ -10,11 +10,13 @@ from programs import run_program
 CHECK = """
 import importlib, pkgutil, sys
 
-WITH_ROS = {"flatland.ros", "flatland.viewer", "flatland.msg", "flatland.srv"}
+WITH_ROS = {"flatland.ros", "flatland.ros2", "flatland.viewer", "flatland.msg", "flatland.srv"}
+# Raises an error that names the extra.
+WITH_EXTRA = {"flatland.gym.stable_baselines"}
 BLOCKED = {
     "rospy", "roslib", "rosgraph", "roslaunch", "rosservice", "rostopic", "genpy", "genmsg",
     "tf2_ros", "tf2_msgs", "std_msgs", "std_srvs", "geometry_msgs", "nav_msgs", "sensor_msgs",
-    "rosgraph_msgs", "visualization_msgs", "interactive_markers", "rviz",
+    "rosgraph_msgs", "rclpy", "visualization_msgs", "interactive_markers", "rviz",
 }
 
 class Block:
@@ -27,7 +29,7 @@ import flatland
 
 def walk(package):
     for info in pkgutil.iter_modules(package.__path__, f"{package.__name__}."):
-        if info.name not in WITH_ROS:
+        if info.name not in WITH_ROS | WITH_EXTRA:
             module = importlib.import_module(info.name)
             if info.ispkg:
                 walk(module)

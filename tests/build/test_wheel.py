@@ -131,7 +131,7 @@ def test_versions_agree(wheel, checkout):
         for file in checkout.glob(f"{folder}/*/package.xml")
     ]
     versions = [ElementTree.parse(path).getroot().findtext("version") for path in packages]
-    assert versions == [VERSION] * 5
+    assert versions == [VERSION] * 8
     assert f"flatland_sim-{VERSION}.dist-info/METADATA" in wheel.namelist()
 
 

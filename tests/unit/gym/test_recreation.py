@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import copy
-import multiprocessing
 import pickle
+import sys
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import gymnasium
@@ -13,6 +14,7 @@ import numpy as np
 import pytest
 from gymnasium.error import ResetNeeded
 from gymnasium.vector import AsyncVectorEnv
+from programs import run_program
 
 from flatland.gym import FlatlandEnv, FlatlandVectorEnv, make_parallel
 
@@ -63,10 +65,18 @@ def test_a_copy_of_a_fleet_continues_with_the_next_episode(make: Make) -> None:
     assert [other.reset()[0]["robot_1"].tobytes() for other in copies] == [following] * 2
 
 
-def test_an_environment_survives_a_new_process(make: Make) -> None:
+def test_an_environment_survives_a_new_process(make: Make, tmp_path: Path) -> None:
     env = make(FlatlandVectorEnv, 2, world="corridor")
-    with multiprocessing.get_context("spawn").Pool(1) as pool:
-        assert pool.apply(episode, (env, 3)) == episode(env, 3)
+    file = tmp_path / "env.pickle"
+    file.write_bytes(pickle.dumps(env))
+    program = (
+        "import pathlib, pickle, sys\n"
+        "env = pickle.loads(pathlib.Path(sys.argv[1]).read_bytes())\n"
+        "print(env.reset(seed=3)[0].tobytes().hex())\n"
+        "env.close()"
+    )
+    done = run_program([sys.executable, "-c", program, str(file)], check=True)
+    assert bytes.fromhex(done.stdout) == env.reset(seed=3)[0].tobytes()
 
 
 def test_a_vector_of_spawned_processes_has_the_same_episodes(make: Make) -> None:
