@@ -22,6 +22,7 @@ from flatland_msgs.srv import (
 from geometry_msgs.msg import Pose2D, Twist
 from sensor_msgs.msg import LaserScan
 from std_srvs.srv import Empty
+from waiting import wait_until
 
 from flatland.node.services import SERVICES
 
@@ -43,10 +44,16 @@ def server(module_ros: Any, module_launcher: Any, write_world: Callable[..., Pat
 
 
 def test_all_services_of_ros_1_are_offered(ros: Any) -> None:
-    offered = dict(ros.node.get_service_names_and_types())
+    expected = {}
     for service in SERVICES:
         package, name = service.type.replace("flatland/", "flatland_msgs/").split("/")
-        assert offered[f"/{service.name}"] == [f"{package}/srv/{name}"]
+        expected[f"/{service.name}"] = [f"{package}/srv/{name}"]
+
+    def are_offered() -> bool:
+        offered = dict(ros.node.get_service_names_and_types())
+        return {name: offered.get(name) for name in expected} == expected
+
+    wait_until("all services", are_offered)
 
 
 # test_equal_results.py compares all texts with those of ROS 1.

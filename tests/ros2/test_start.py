@@ -14,6 +14,7 @@ from rclpy.parameter import Parameter
 from rclpy.qos import qos_profile_sensor_data
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import LaserScan
+from waiting import wait_until
 
 
 @pytest.fixture(scope="module")
@@ -91,8 +92,13 @@ def test_two_nodes_in_namespaces_with_remapped_topics(ros: Any, launcher: Any, w
     for namespace in ("/first", "/second"):
         topic = ros.topic(f"{namespace}/laser", LaserScan, qos_profile_sensor_data)
         assert len(topic.next().ranges) == 7
-    publishers = ros.node.get_publishers_info_by_topic("/clock")
-    assert {each.node_namespace for each in publishers} == {"/first", "/second"}
+
+    def is_published_by_both() -> bool:
+        publishers = ros.node.get_publishers_info_by_topic("/clock")
+        return {each.node_namespace for each in publishers} == {"/first", "/second"}
+
+    # The names of the nodes of publishers are discovered separately.
+    wait_until("/clock of both nodes", is_published_by_both)
     topics = dict(ros.node.get_topic_names_and_types())
     assert not {"/first/scan", "/second/scan", "/scan", "/first/clock"} & topics.keys()
 
