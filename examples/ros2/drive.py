@@ -5,12 +5,14 @@ Uses the topics /scan, /odometry/filtered and /cmd_vel of a running simulator.
 
 from __future__ import annotations
 
+import contextlib
 import math
 import sys
 
 import rclpy
 from geometry_msgs.msg import Twist
 from nav_msgs.msg import Odometry
+from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
 from rclpy.qos import qos_profile_sensor_data
 from sensor_msgs.msg import LaserScan
@@ -66,9 +68,11 @@ def main() -> None:
     """Drives for a simulated time, by default 20 s."""
     rclpy.init()
     driver = Driver(float(sys.argv[1]) if len(sys.argv) > 1 else 20.0)
-    while not driver.done:
-        rclpy.spin_once(driver)
-    rclpy.shutdown()
+    # Ctrl-C and SIGTERM end the program.
+    with contextlib.suppress(KeyboardInterrupt, ExternalShutdownException):
+        while not driver.done:
+            rclpy.spin_once(driver)
+    rclpy.try_shutdown()
 
 
 if __name__ == "__main__":
