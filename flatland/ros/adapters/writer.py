@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 import rospy
 
+from flatland.geometry import Pose, quaternion_from_yaw
 from flatland.node.adapters.writer import FLOAT64, LAYOUTS, Writer
 from flatland.node.stamps import stamp as message_stamp
 from flatland.timekeeper import NANOSECONDS
@@ -17,6 +18,9 @@ from flatland.timekeeper import NANOSECONDS
 _COUNT: Final = struct.Struct("<I")
 _STAMP: Final = struct.Struct("<2I")
 _HEADER: Final = struct.Struct("<3I")
+_POSE: Final = struct.Struct("<7d")
+_TWIST: Final = struct.Struct("<6d")
+_CACHED_STAMPS: Final = 16  # most messages of a step have the same one
 _CACHED_TEXTS: Final = 4096  # frames and names of a large world
 
 
@@ -24,6 +28,12 @@ _CACHED_TEXTS: Final = 4096  # frames and names of a large world
 def _text(value: str) -> bytes:
     data = value.encode()
     return _COUNT.pack(len(data)) + data
+
+
+@lru_cache(_CACHED_STAMPS)
+def _header(time_ns: int) -> bytes:
+    """Returns the sequence number 0 and the stamp of a ROS time [ns]."""
+    return _HEADER.pack(0, *divmod(time_ns, NANOSECONDS))
 
 
 class RosWriter(Writer):
@@ -48,7 +58,7 @@ class RosWriter(Writer):
 
     def header(self, time_ns: int, frame_id: str) -> None:
         """Writes a `std_msgs/Header` with the sequence number 0."""
-        self.data += _HEADER.pack(0, *divmod(message_stamp(time_ns), NANOSECONDS)) + _text(frame_id)
+        self.data += _header(message_stamp(time_ns)) + _text(frame_id)
 
     def stamp(self, seconds: int, nanoseconds: int) -> int:
         """Writes the sequence number 0 and the stamp."""
@@ -58,6 +68,15 @@ class RosWriter(Writer):
     def time(self, time_ns: int) -> None:
         """Writes the stamp of a simulated time [ns] without a header."""
         self.data += _STAMP.pack(*divmod(message_stamp(time_ns), NANOSECONDS))
+
+    def pose(self, x: float, y: float, yaw: float, roll: float = 0.0) -> None:
+        """Writes the position (x, y, 0) and the rotation by `roll`, then `yaw` [rad]."""
+        self.data += _POSE.pack(x, y, 0.0, *quaternion_from_yaw(yaw, roll))
+
+    def twist(self, velocity: Pose) -> None:
+        """Writes the planar velocity (vx, vy, omega)."""
+        linear_x, linear_y, angular_z = velocity
+        self.data += _TWIST.pack(linear_x, linear_y, 0.0, 0.0, 0.0, angular_z)
 
     def now(self) -> int:
         """Returns the current ROS time [ns]."""
