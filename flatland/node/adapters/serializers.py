@@ -60,11 +60,8 @@ def transform(value: values.Transform, to: Writer) -> None:
 def transforms(value: node_values.Transforms, to: Writer) -> None:
     """Writes a `tf2_msgs/TFMessage` with the transforms of a step."""
     to.count(len(value))
-    header, text, pose = to.header, to.text, to.pose
     for each in value:
-        header(each.stamp, each.parent)
-        text(each.child)
-        pose(each.x, each.y, each.yaw, each.roll)
+        transform(each, to)
 
 
 def people(value: values.People, to: Writer) -> None:
