@@ -34,6 +34,7 @@ class _Ros2Adapters(Adapters):
 _adapters = _Ros2Adapters(CdrWriter)
 register_adapter = _adapters.register
 find_adapter = _adapters.find
+message_field = _adapters.field
 
 
 def use_stamped_twists() -> None:

@@ -14,7 +14,7 @@ from flatland.errors import FlatlandError
 from flatland.node.names import sendable_text
 from flatland.node.transport import CallError
 from flatland.ros2 import convert
-from flatland.ros2.adapters import find_adapter
+from flatland.ros2.adapters import message_field
 from flatland.ros2.endpoints import Endpoints, Shared, User, destroy_later, expanded
 from flatland.ros2.message_types import service_class
 
@@ -175,9 +175,4 @@ def _field(field_type: str, value: Any) -> Any:
         from geometry_msgs.msg import Pose2D
 
         return [Pose2D(x=x, y=y, theta=theta) for x, y, theta in value]
-    if isinstance(value, (bool, int, str)):
-        return value
-    adapter = find_adapter(type(value))
-    if adapter is None or adapter.to_message is None:
-        raise LookupError(f"no adapter converts {type(value).__name__} to {field_type}")
-    return adapter.to_message(value)
+    return message_field(field_type, value)

@@ -132,6 +132,23 @@ class Adapters(ABC):
                 return self._adapters[candidate]
         return None
 
+    def field(self, field_type: str, value: Any) -> Any:
+        """Returns a value as a field of a message: unchanged, or as the message of its adapter.
+
+        Args:
+            field_type: Type of the field, for the error.
+            value: A bool, an int, a str, or a value with an adapter.
+
+        Raises:
+            LookupError: There is no adapter that publishes such values.
+        """
+        if isinstance(value, (bool, int, str)):
+            return value
+        adapter = self.find(type(value))
+        if adapter is None or adapter.to_message is None:
+            raise LookupError(f"no adapter converts {type(value).__name__} to {field_type}")
+        return adapter.to_message(value)
+
     def _serializer(self, write: Serialize) -> Callable[[Any], bytes]:
         """Returns the function that converts a value to bytes."""
         writer = self._writer

@@ -45,4 +45,5 @@ class _RosAdapters(Adapters):
 _adapters = _RosAdapters(RosWriter)
 register_adapter = _adapters.register
 find_adapter = _adapters.find
+message_field = _adapters.field
 message_class = _adapters.message_class

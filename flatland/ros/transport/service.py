@@ -117,15 +117,10 @@ def _field(field_type: str, value: Any) -> Any:
     """Converts a field of a response to its type of ROS."""
     from geometry_msgs.msg import Pose2D
 
-    from flatland.ros.adapters import convert, find_adapter
+    from flatland.ros.adapters import convert, message_field
 
     if field_type == "time":
         return convert.time(value)
     if field_type == "geometry_msgs/Pose2D[]":
         return [Pose2D(*pose) for pose in value]
-    if isinstance(value, (bool, int, str)):
-        return value
-    adapter = find_adapter(type(value))
-    if adapter is None or adapter.to_message is None:
-        raise LookupError(f"no adapter converts {type(value).__name__} to {field_type}")
-    return adapter.to_message(value)
+    return message_field(field_type, value)
