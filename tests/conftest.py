@@ -71,14 +71,22 @@ def pytest_collection_finish() -> None:
     gc.freeze()
 
 
-class SlowestGroups:
-    """Prints the groups of tests that took longest, with the time of their fixtures."""
+class Results:
+    """Prints the slowest groups of tests, with their fixtures, and ends runs that would hang."""
 
     def __init__(self) -> None:
         self._times: Counter[str] = Counter()
 
+    @pytest.hookimpl(trylast=True)
     def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
-        """Adds the time of a test, or of its fixtures, to its group."""
+        """Adds the time of a test, or of its fixtures, to its group.
+
+        If a process of the tests has ended within a test, the run ends: pytest-xdist 3.8 may wait
+        forever for the process that replaces it. This includes the time limit of a test, which ends
+        the process. The hook is the last one, so that the test is reported as failed before.
+        """
+        if report.when == "???":  # as pytest-xdist marks the report of such a test
+            pytest.exit("a process of the tests has ended, see above", returncode=1)
         path = report.location[0].replace(os.sep, "/").removeprefix("tests/")
         self._times[_group_of(path)] += report.duration
 
@@ -91,9 +99,9 @@ class SlowestGroups:
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Adds the list of groups to the process that prints the results."""
+    """Adds the hooks of the process that prints the results."""
     if not hasattr(config, "workerinput"):
-        config.pluginmanager.register(SlowestGroups())
+        config.pluginmanager.register(Results())
 
 
 @pytest.fixture(scope="session")
