@@ -60,7 +60,8 @@ def evaluate(
 
     Args:
         choose: Returns the actions for the observations of all environments, such as a
-            `Controller`.
+            `Controller` or a `Policy`. If it has a method `reset`, that is called at the start of
+            episodes, with an array of bools of shape (num_envs,) that selects them.
         envs: Environments of the autoreset mode `SAME_STEP`.
         episodes: Number of episodes, of any number of environments.
         seed: Seed of the first episode.
@@ -71,16 +72,21 @@ def evaluate(
     if envs.autoreset_mode is not AutoresetMode.SAME_STEP:
         raise ValueError(f"the autoreset mode must be SAME_STEP, got {envs.autoreset_mode}")
     episodes, n = checked_count("episodes", episodes), envs.num_envs
+    reset: Callable[[BoolArray], object] = getattr(choose, "reset", lambda _: None)
     found = []
     for first in range(0, episodes, n):
         observations, _ = envs.reset(seed=seed + first)
+        starting = np.ones(n, np.bool_)
         results = np.zeros((n, 3), np.int64)
         # The environments beyond the last episode end when the others do.
         running = np.arange(n) < episodes - first
         while running.any():
+            if starting.any():
+                reset(starting)
             observations, _, terminated, truncated, infos = envs.step(choose(observations))
             results[running, 2] += 1
-            ended = running & (terminated | truncated)
+            starting = terminated | truncated
+            ended = running & starting
             if ended.any():
                 final = infos["final_info"]
                 results[ended, 0] = final["is_success"][ended]
