@@ -73,25 +73,28 @@ def evaluate(
         raise ValueError(f"the autoreset mode must be SAME_STEP, got {envs.autoreset_mode}")
     episodes, n = checked_count("episodes", episodes), envs.num_envs
     reset: Callable[[BoolArray], object] = getattr(choose, "reset", lambda _: None)
-    found = []
-    for first in range(0, episodes, n):
-        observations, _ = envs.reset(seed=seed + first)
-        starting = np.ones(n, np.bool_)
-        results = np.zeros((n, 3), np.int64)
-        # The environments beyond the last episode end when the others do.
-        running = np.arange(n) < episodes - first
-        while running.any():
-            if starting.any():
-                reset(starting)
-            observations, _, terminated, truncated, infos = envs.step(choose(observations))
-            results[running, 2] += 1
-            starting = terminated | truncated
-            ended = running & starting
-            if ended.any():
-                final = infos["final_info"]
-                results[ended, 0] = final["is_success"][ended]
-                results[ended, 1] = final["collision"][ended]
-            running &= ~ended
-        found.append(results[: episodes - first])
-    success, collision, steps = np.concatenate(found).T
+    observations, _ = envs.reset(seed=seed)
+    reset(np.ones(n, np.bool_))
+    numbers = np.arange(n)  # of the episodes in the environments
+    lengths = np.zeros(n, np.int64)
+    results = np.zeros((episodes, 3), np.int64)
+    while (numbers < episodes).any():
+        observations, _, terminated, truncated, infos = envs.step(choose(observations))
+        lengths += 1
+        ended = terminated | truncated
+        if not ended.any():
+            continue
+        counted = ended & (numbers < episodes)
+        final = infos["final_info"]
+        columns = final["is_success"], final["collision"], lengths
+        results[numbers[counted]] = np.stack([column[counted] for column in columns], axis=1)
+        numbers[ended] = numbers.max() + 1 + np.arange(np.count_nonzero(ended))
+        lengths[ended] = 0
+        # Environments without a further episode continue until the others end.
+        begun = ended & (numbers < episodes)
+        if begun.any():
+            seeds = [seed + number for number in numbers.tolist()]
+            observations, _ = envs.reset(seed=seeds, options={"reset_mask": begun})
+        reset(ended)
+    success, collision, steps = results.T
     return Outcomes(success.astype(np.bool_), collision.astype(np.bool_), steps)
