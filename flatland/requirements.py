@@ -41,6 +41,7 @@ PACKAGES: Final = {
     "cv2": Package("OpenCV", "python3-opencv", "opencv-python-headless", "opencv"),
     "gymnasium": Package("Gymnasium", "", "gymnasium", "gym"),
     "pettingzoo": Package("PettingZoo", "", "pettingzoo", "gym"),
+    "onnxruntime": Package("ONNX Runtime", "", "onnxruntime", "onnx"),
     "stable_baselines3": Package("stable-baselines3", "", "stable-baselines3", "learning"),
     "pyarrow": Package("pyarrow", "", "pyarrow", "ray"),
     "ray": Package("Ray", "", "ray", "ray"),

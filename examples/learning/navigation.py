@@ -1,50 +1,108 @@
-"""What the programs of this folder have in common: the environment that is learned."""
+"""What the programs of this folder have in common: the buildings of training and evaluation."""
 
 from __future__ import annotations
 
+import tempfile
 from collections.abc import Callable
-from typing import Any
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
 
+from flatland import worldgen
 from flatland.gym import (
-    FlatlandEnv,
+    Buildings,
     FlatlandVectorEnv,
-    Goal,
-    Observation,
-    Proximity,
-    Scan,
-    Velocity,
+    Outcomes,
+    RandomBuildings,
+    evaluate,
+    included_robot,
     make_vec,
-    navigation_reward,
 )
+from flatland.world import World
 
-NAME = "flatland/Navigate-v0"
-STEP = 0.1  # s, duration of a step of the environment
-EVALUATION_SEED = 1_000_000  # of the first episode; not used in training
+if TYPE_CHECKING:
+    from flatland.config.inputs import Params
+
+NAME: Final = "flatland/Navigate-v0"
+EVALUATION_SEED: Final = 1_000_000  # of the first episode
+SIZE: Final = (20.0, 14.0)  # m, of the random buildings
+_TRAINING_KINDS: Final = ("office", "office", "maze", "office", "office with people")
+_PEOPLE: Final = """
+plugins:
+  - name: people
+    type: Pedestrians
+    groups:
+      - {name: person, count: 12}
+"""
+
+TASKS: Final[dict[str, tuple[Callable[[int], FlatlandVectorEnv], int]]] = {
+    "unseen offices": (
+        lambda n: FlatlandVectorEnv(
+            n,
+            RandomBuildings("office", 64, first_seed=1000, size=SIZE),
+            autoreset_mode="SameStep",
+        ),
+        1,
+    ),
+    NAME: (lambda n: make_vec(NAME, n, autoreset_mode="SameStep"), 1),
+    "flatland/Crowd-v0": (
+        lambda n: make_vec("flatland/Crowd-v0", n, autoreset_mode="SameStep"),
+        4,
+    ),
+}
+"""What policies are evaluated on, by name: how a number of environments is made, and a divisor of
+the number of episodes. No training takes place there."""
 
 
-def arguments(**changes: Any) -> dict[str, Any]:
-    """Returns the arguments of the environment.
+class TrainingBuildings(Buildings):
+    """Random offices and mazes of successive seeds; in some offices, there are people.
 
-    The 180 beams are combined into 36 sectors, so that a small network suffices. A small penalty
-    for short distances to obstacles teaches the robot to keep away before it collides.
+    Attributes:
+        first_seed: Seed of the first building.
     """
-    return {
-        "observation": Observation(Scan(36, half=0.5), Goal(), Velocity()),
-        "reward": navigation_reward() + -0.1 * Proximity(0.5),
-        **changes,
-    }
+
+    def __init__(self, count: int = 60, first_seed: int = 0) -> None:
+        """Creates the collection; the worlds are generated when an environment is created.
+
+        Args:
+            count: Number of buildings.
+            first_seed: Seed of the first building; that of others is greater by their index.
+        """
+        super().__init__(f"building_{number}" for number in range(count))
+        self.first_seed = first_seed
+
+    def load(self, number: int, params: Params, step_size: float) -> World:
+        """Generates and loads a building."""
+        kind, _, people = _TRAINING_KINDS[number % len(_TRAINING_KINDS)].partition(" with ")
+        generated = worldgen.generate(kind, self.first_seed + number, SIZE)
+        with tempfile.TemporaryDirectory() as folder:
+            path = generated.write(Path(folder) / self.worlds[number], robot=included_robot())
+            if people:
+                with path.open("a") as file:
+                    file.write(_PEOPLE)
+            return World.from_yaml(path, seed=number, params=params, step_size=step_size)
 
 
-def make_many(num_envs: int, **changes: Any) -> FlatlandVectorEnv:
-    """Returns environments for training; the next episode begins in the step that ends one."""
-    return make_vec(NAME, num_envs, autoreset_mode="SameStep", **arguments(**changes))
+def evaluate_on(
+    task: str, make: Callable[[FlatlandVectorEnv], Callable[[Any], Any]], episodes: int
+) -> Outcomes:
+    """Runs the episodes of the evaluation.
+
+    Args:
+        task: A key of `TASKS`.
+        make: Returns a controller or a policy for environments.
+        episodes: Number of episodes, before the division in `TASKS`.
+    """
+    make_envs, divisor = TASKS[task]
+    envs = make_envs(64)
+    try:
+        return evaluate(make(envs), envs, max(1, episodes // divisor), EVALUATION_SEED)
+    finally:
+        envs.close()
 
 
-def make_one(**changes: Any) -> FlatlandEnv:
-    """Returns one environment of the same kind."""
-    return FlatlandEnv(**arguments(**changes))
-
-
-def actions_of(model: Any) -> Callable[[Any], Any]:
-    """Returns the function from observations to the most probable actions of a policy."""
-    return lambda observations: model.predict(observations, deterministic=True)[0]
+def rates(outcomes: Outcomes) -> str:
+    """Returns the rates of reached goals, collisions and time limits, and the mean steps."""
+    return (
+        f"{outcomes.success_rate:6.1%} {outcomes.collision_rate:6.1%} {outcomes.rest_rate:6.1%} "
+        f"{outcomes.mean_steps:5.0f}"
+    )

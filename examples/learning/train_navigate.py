@@ -1,189 +1,252 @@
 #!/usr/bin/env python3
-"""Trains a robot to drive to goals in the office, with PPO of stable-baselines3.
+"""Trains policies that drive to goals, by imitation of a teacher that uses the map.
 
-Requires `pip install "flatland-sim[learning]"`. Writes the policy, the learning curve as CSV and as
-a picture, and prints the success rate in new episodes.
+The method is DAgger: S. Ross, G. Gordon, D. Bagnell, "A reduction of imitation learning and
+structured prediction to no-regret online learning", Proc. AISTATS (2011). The policy drives, the
+teacher chooses a heading in each situation, and the network learns the headings of all situations.
+
+Requires `pip install "flatland-sim[learning]"`. For each seed, it writes the policy as ONNX file
+and the learning curve as CSV, and prints the rates in buildings without training. A picture shows
+all curves.
 """
 
 from __future__ import annotations
 
 import argparse
 import csv
-import os
+import functools
 import time
+import warnings
 from collections import deque
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import Final
 
 import numpy as np
 import torch
-from navigation import EVALUATION_SEED, actions_of, make_many
-from stable_baselines3 import PPO
-from stable_baselines3.common.callbacks import BaseCallback
+from navigation import TASKS, TrainingBuildings, evaluate_on, rates
+from network import HEADINGS, STATE, Network, positions
+from teacher import Teacher
+from torch import Tensor
+from torch.nn import functional
 
-from flatland.gym import evaluate
-from flatland.gym.stable_baselines import StableVector
+from flatland.gym import FlatlandVectorEnv
+from flatland.gym.policies import Policy, PolicyRobot
 
-WINDOW = 1000  # episodes in a point of the curve
+STEPS: Final = 64  # of each environment in a round
+UPDATES: Final = 16  # of the network in a round
+BATCH: Final = 4096  # situations in an update
+LEARNING_RATE: Final = 1e-3
+WINDOW: Final = 1000  # episodes in a point of the curve
+CURVE: Final = ("cpu_minutes", "steps", "reached", "collisions", "loss")
+
+Row = tuple[float, int, float, float, float]
 
 
-class Progress(BaseCallback):
-    """Prints and collects the learning curve, and ends the training after a time.
+class Training:
+    """The environments, the teacher, the network, and all situations with their headings.
 
     Attributes:
-        rows: For each update of the policy: minutes, steps, success rate, collision rate, mean
-            return and mean length of the last episodes.
+        network: The network.
+        curve: For each round: processor time [min], steps, rates of reached goals and of collisions
+            in the last episodes, and loss.
     """
 
-    def __init__(self, minutes: float) -> None:
-        """Creates the callback.
+    def __init__(self, seed: int, rounds: int, num_envs: int) -> None:
+        """Creates a network with random weights.
 
         Args:
-            minutes: Wall time of the training.
+            seed: Seed of the episodes, the weights and the updates.
+            rounds: Number of rounds.
+            num_envs: Number of environments.
         """
-        super().__init__()
-        self.rows: list[tuple[float, int, float, float, float, float]] = []
-        self._limit = 60.0 * minutes
-        self._start = 0.0
-        self._printed = 0.0
-        self._episodes: deque[tuple[bool, bool, float, int]] = deque(maxlen=WINDOW)
+        self._start = time.process_time()
+        torch.manual_seed(seed)
+        self._envs = FlatlandVectorEnv(num_envs, TrainingBuildings(), autoreset_mode="SameStep")
+        self._teacher = Teacher(self._envs)
+        self.network = Network(self._envs)
+        self._optimizer = torch.optim.Adam(self.network.parameters(), lr=LEARNING_RATE)
+        self._schedule = torch.optim.lr_scheduler.CosineAnnealingLR(
+            self._optimizer, rounds * UPDATES, eta_min=0.02 * LEARNING_RATE
+        )
+        self._rounds = rounds
+        self._features = torch.zeros(rounds * STEPS, num_envs, self.network.features_size)
+        self._headings = torch.zeros(rounds * STEPS, num_envs)
+        self._size = 0  # steps that are filled
+        self._episodes: deque[tuple[bool, bool]] = deque(maxlen=WINDOW)
+        self._state = torch.zeros(num_envs, STATE)
+        self._observations, _ = self._envs.reset(seed=seed * num_envs)
+        self.curve: list[Row] = []
 
-    def _on_training_start(self) -> None:
-        self._start = time.monotonic()
-
-    def _on_step(self) -> bool:
-        for info in self.locals["infos"]:
-            if "episode" in info:
-                episode = info["episode"]
-                self._episodes.append(
-                    (info["is_success"], info["collision"], episode["r"], episode["l"])
+    def run(self) -> None:
+        """Performs all rounds, and closes the environments."""
+        for number in range(self._rounds):
+            for _ in range(STEPS):
+                self._step(is_taught=number == 0)
+            losses = [self._update() for _ in range(UPDATES)]
+            steps = self._size * len(self._state)
+            reached, collisions = np.mean(list(self._episodes) or [(0, 0)], axis=0).tolist()
+            minutes = (time.process_time() - self._start) / 60
+            self.curve.append((minutes, steps, reached, collisions, losses[-1]))
+            if number % 10 == 9:
+                print(
+                    f"{minutes:5.1f} CPU min {steps:8d} steps: reached {reached:.1%}, collisions "
+                    f"{collisions:.1%}, loss {losses[-1]:.2f}",
+                    flush=True,
                 )
-        left = self._limit - (time.monotonic() - self._start)
-        # The learning rate decreases with the time, not with the number of steps.
-        self.model._current_progress_remaining = max(left / self._limit, 0.0)
-        return left > 0
+        self._teacher.close()
+        self._envs.close()
 
-    def _on_rollout_end(self) -> None:
-        if not self._episodes:
-            return
-        minutes = (time.monotonic() - self._start) / 60
-        success, collision, total, length = np.mean(list(self._episodes), axis=0)
-        self.rows.append((minutes, self.num_timesteps, success, collision, total, length))
-        if minutes - self._printed >= 0.5:
-            self._printed = minutes
-            print(
-                f"{minutes:5.1f} min {self.num_timesteps:9d} steps: success {success:.1%}, "
-                f"collisions {collision:.1%}, return {total:.2f}, {length:.0f} steps",
-                flush=True,
+    def _step(self, *, is_taught: bool) -> None:
+        """Performs a step of all environments.
+
+        Args:
+            is_taught: Whether the robots follow the teacher instead of the network.
+        """
+        wanted = torch.from_numpy(self._teacher.headings(self._observations)).float()
+        observations = torch.from_numpy(self._observations)
+        with torch.no_grad():
+            features, frames = self.network.features(observations)
+            actions, self._state = self.network.follow(observations, self._state, features, frames)
+            if is_taught:
+                actions = self.network.drive(observations, wanted)
+        self._features[self._size] = features
+        self._headings[self._size] = wanted - frames
+        self._size += 1
+        self._observations, _, terminated, truncated, infos = self._envs.step(actions.numpy())
+        ended = terminated | truncated
+        self._state[torch.from_numpy(ended)] = 0.0
+        if ended.any():
+            final = infos["final_info"]
+            self._episodes.extend(
+                zip(final["is_success"][ended], final["collision"][ended], strict=True)
             )
 
+    def _update(self) -> float:
+        """Changes the weights by the gradient in random situations, and returns the loss."""
+        chosen = torch.randint(self._size * len(self._state), (BATCH,))
+        features = self._features.flatten(0, 1)[chosen]
+        headings = self._headings.flatten()[chosen]
+        # Left and right are exchanged in half of the situations.
+        half = BATCH // 2
+        features = torch.cat((self.network.mirrored(features[:half]), features[half:]))
+        headings = torch.cat((-headings[:half], headings[half:]))
+        loss = _loss(self.network.logits(features), headings)
+        self._optimizer.zero_grad()
+        loss.backward()  # type: ignore[no-untyped-call]
+        self._optimizer.step()
+        self._schedule.step()
+        return loss.item()
 
-class PPOByTime(PPO):
-    """PPO whose schedules follow the time that is left, as set by `Progress`."""
+    def write(self, path: Path) -> None:
+        """Writes the network as ONNX file."""
+        example = torch.from_numpy(self._observations), self._state
+        names = ["observation", "state"], ["action", "next_state"]
+        with warnings.catch_warnings():
+            # The other exporter requires one more package.
+            warnings.simplefilter("ignore", DeprecationWarning)
+            torch.onnx.export(
+                self.network.eval(),
+                example,
+                str(path),
+                input_names=names[0],
+                output_names=names[1],
+                dynamic_axes={name: {0: "n"} for name in (*names[0], *names[1])},
+                opset_version=17,
+                dynamo=False,
+            )
+        add_metadata(path, PolicyRobot.of(self._envs))
 
-    def _update_current_progress_remaining(self, num_timesteps: int, total_timesteps: int) -> None:
-        """Keeps what the callback has set."""
+
+def add_metadata(path: Path, robot: PolicyRobot) -> None:
+    """Adds the robot of the training to an ONNX file."""
+    import onnx
+
+    model = onnx.load(path)
+    onnx.helper.set_model_props(model, robot.metadata())
+    onnx.save(model, path)
 
 
-def train(minutes: float, num_envs: int, seed: int) -> tuple[PPO, Progress]:
-    """Trains a policy.
+def _loss(logits: Tensor, headings: Tensor) -> Tensor:
+    """Returns the mean cross entropy of headings, each divided between its two neighbours.
 
     Args:
-        minutes: Wall time of the training.
-        num_envs: Number of environments.
-        seed: Seed of the environments and the policy.
-
-    Returns:
-        The model, and the learning curve.
+        logits: Logits of all headings, shape (n, 72).
+        headings: Headings in the same frames [rad], shape (n,).
     """
-    torch.set_num_threads(1)  # The network is small: more threads wait for each other.
-    envs = StableVector(make_many(num_envs))
-    model = PPOByTime(
-        "MlpPolicy",
-        envs,
-        n_steps=max(8192 // num_envs, 8),
-        batch_size=2048,
-        n_epochs=5,
-        learning_rate=lambda left: 1e-4 + 4e-4 * left,
-        gamma=0.99,
-        gae_lambda=0.95,
-        ent_coef=0.0,
-        policy_kwargs={"net_arch": [128, 128], "log_std_init": -0.7},
-        seed=seed,
-        device="cpu",
-    )
-    progress = Progress(minutes)
-    model.learn(10**12, callback=progress)
-    envs.close()
-    return model, progress
+    place = positions(headings)
+    lower = torch.floor(place)
+    first = torch.remainder(lower.long(), HEADINGS)[:, None]
+    second = torch.remainder(first + 1, HEADINGS)
+    log_probabilities = functional.log_softmax(logits, dim=1)
+    part = (place - lower)[:, None]
+    likelihood = (1.0 - part) * log_probabilities.gather(1, first)
+    likelihood += part * log_probabilities.gather(1, second)
+    return -likelihood.mean()
 
 
-def success_rate(model: Any, episodes: int, num_envs: int = 64) -> tuple[float, float]:
-    """Returns the rates of success and of collisions in new episodes, one per seed.
-
-    Args:
-        model: The policy, which takes its most probable action.
-        episodes: Number of episodes.
-        num_envs: Number of environments.
-    """
-    envs = make_many(num_envs)
-    outcomes = evaluate(actions_of(model), envs, episodes, EVALUATION_SEED)
-    envs.close()
-    return outcomes.success_rate, outcomes.collision_rate
-
-
-def write_curve(progress: Progress, path: Path) -> None:
-    """Writes the learning curve as CSV, and as a picture beside it."""
-    names = ("minutes", "steps", "success", "collisions", "return", "length")
+def write_curve(rows: Sequence[Row], path: Path) -> None:
+    """Writes a learning curve as CSV."""
     with path.open("w", newline="") as file:
         writer = csv.writer(file)
-        writer.writerow(names)
-        writer.writerows(progress.rows)
+        writer.writerow(CURVE)
+        writer.writerows(rows)
+
+
+def draw_curves(curves: dict[int, Sequence[Row]], path: Path) -> None:
+    """Draws learning curves by seed."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    columns = np.array(progress.rows).T
     figure = Figure(figsize=(7, 3.6), dpi=100, layout="constrained")
     FigureCanvasAgg(figure)
     axes = figure.add_subplot()
-    axes.plot(columns[0], columns[2], label="goal reached")
-    axes.plot(columns[0], columns[3], label="collision")
-    axes.plot(columns[0], 1 - columns[2] - columns[3], label="time limit")
-    axes.set(xlabel="minutes", ylabel=f"fraction of the last {WINDOW} episodes", ylim=(0, 1))
+    for seed, rows in curves.items():
+        columns = np.array(rows).T
+        (line,) = axes.plot(columns[1] / 1000, columns[2], label=f"seed {seed}")
+        axes.plot(columns[1] / 1000, columns[3], ":", color=line.get_color())
+    axes.set(xlabel="thousand steps", ylim=(0, 1))
+    axes.set_ylabel(f"fraction of the last {WINDOW} episodes\n(goal reached; dotted: collision)")
     axes.grid(alpha=0.3)
     axes.legend()
-    steps = axes.secondary_xaxis("top", functions=_time_to_steps(columns[0], columns[1]))
-    steps.set_xlabel("million steps")
-    figure.savefig(path.with_suffix(".png"))
-
-
-def _time_to_steps(minutes: Any, steps: Any) -> Any:
-    """Returns the conversion between both axes and its inverse, by the mean speed."""
-    speed = steps[-1] / minutes[-1] / 1e6
-    return (lambda x: x * speed, lambda x: x / speed)
+    figure.savefig(path)
 
 
 def main() -> None:
     """Trains, evaluates, and writes the results."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--minutes", type=float, default=10.0, help="wall time of the training")
-    parser.add_argument("--num-envs", type=int, default=64, help="number of environments")
-    parser.add_argument("--seed", type=int, default=1, help="seed of environments and policy")
-    parser.add_argument("--episodes", type=int, default=1024, help="episodes of the evaluation")
     parser.add_argument(
-        "--output", type=Path, default=Path("build/learning/navigate.zip"), help="the policy"
+        "--seed", type=int, nargs="+", default=[1], help="seeds of episodes and weights"
+    )
+    parser.add_argument("--rounds", type=int, default=60, help=f"rounds of {STEPS} steps")
+    parser.add_argument("--num-envs", type=int, default=64, help="number of environments")
+    parser.add_argument("--episodes", type=int, default=2048, help="episodes of the evaluation")
+    parser.add_argument(
+        "--output",
+        type=Path,
+        default=Path("build/learning/navigate.onnx"),
+        help="the policy; with several seeds, -SEED is added to the name",
     )
     options = parser.parse_args()
-    options.output.parent.mkdir(parents=True, exist_ok=True)
-    model, progress = train(options.minutes, options.num_envs, options.seed)
-    model.save(options.output)
-    write_curve(progress, options.output.with_suffix(".csv"))
-    success, collision = success_rate(model, options.episodes, options.num_envs)
-    load = os.getloadavg()[1]
-    print(
-        f"{model.num_timesteps} steps in {progress.rows[-1][0]:.1f} min on {os.cpu_count()} cores, "
-        f"load {load:.1f}; new episodes: success {success:.1%}, collisions {collision:.1%}"
-    )
+    torch.set_num_threads(1)  # The network is small: more threads wait for each other.
+    output: Path = options.output
+    output.parent.mkdir(parents=True, exist_ok=True)
+    curves: dict[int, Sequence[Row]] = {}
+    table = ["seed  CPU min  task                  goal   coll.  other  steps to the goal"]
+    for seed in options.seed:
+        path = output.with_stem(f"{output.stem}-{seed}") if len(options.seed) > 1 else output
+        training = Training(seed, options.rounds, options.num_envs)
+        training.run()
+        training.write(path)
+        curves[seed] = training.curve
+        write_curve(training.curve, path.with_suffix(".csv"))
+        draw_curves(curves, output.with_suffix(".png"))
+        for task in TASKS:
+            outcomes = evaluate_on(task, functools.partial(Policy, path), options.episodes)
+            minutes = f"{training.curve[-1][0]:7.1f}"
+            table.append(f"{seed:4d}  {minutes}  {task:20s} {rates(outcomes)}")
+            print(table[-1], flush=True)
+    print(*table, sep="\n")
 
 
 if __name__ == "__main__":

@@ -15,7 +15,7 @@ from flatland.config.collecting_reader import ErrorCollector
 from flatland.errors import Place
 from flatland.scenarios.cluster import Cluster
 from flatland.scenarios.comparison import Difference, became_worse, compare
-from flatland.scenarios.controllers import INCLUDED
+from flatland.scenarios.controllers import INCLUDED, POLICY
 from flatland.scenarios.episode import Options, Result
 from flatland.scenarios.junit import write_junit
 from flatland.scenarios.report import Report, worst_first, write_report
@@ -70,8 +70,8 @@ def add(commands: Commands) -> None:
         "--robot",
         default="gap",
         metavar="CONTROLLERS",
-        help=f"names, separated by commas: {', '.join(INCLUDED)}, FILE.py:NAME or MODULE:NAME "
-        "(default: gap)",
+        help=f"names, separated by commas: {', '.join([*INCLUDED, POLICY])}, FILE.py:NAME, "
+        "MODULE:NAME or FILE.onnx (default: gap)",
     )
     parser.add_argument(
         "--seeds", type=_seeds, metavar="LIST", help="in place of those of the files: 0:20 or 1,5:9"

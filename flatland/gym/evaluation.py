@@ -60,7 +60,8 @@ def evaluate(
 
     Args:
         choose: Returns the actions for the observations of all environments, such as a
-            `Controller`.
+            `Controller` or a `Policy`. If it has a method `reset`, that is called at the start of
+            episodes, with an array of bools of shape (num_envs,) that selects them.
         envs: Environments of the autoreset mode `SAME_STEP`.
         episodes: Number of episodes, of any number of environments.
         seed: Seed of the first episode.
@@ -71,21 +72,29 @@ def evaluate(
     if envs.autoreset_mode is not AutoresetMode.SAME_STEP:
         raise ValueError(f"the autoreset mode must be SAME_STEP, got {envs.autoreset_mode}")
     episodes, n = checked_count("episodes", episodes), envs.num_envs
-    found = []
-    for first in range(0, episodes, n):
-        observations, _ = envs.reset(seed=seed + first)
-        results = np.zeros((n, 3), np.int64)
-        # The environments beyond the last episode end when the others do.
-        running = np.arange(n) < episodes - first
-        while running.any():
-            observations, _, terminated, truncated, infos = envs.step(choose(observations))
-            results[running, 2] += 1
-            ended = running & (terminated | truncated)
-            if ended.any():
-                final = infos["final_info"]
-                results[ended, 0] = final["is_success"][ended]
-                results[ended, 1] = final["collision"][ended]
-            running &= ~ended
-        found.append(results[: episodes - first])
-    success, collision, steps = np.concatenate(found).T
+    reset: Callable[[BoolArray], object] = getattr(choose, "reset", lambda _: None)
+    observations, _ = envs.reset(seed=seed)
+    reset(np.ones(n, np.bool_))
+    numbers = np.arange(n)  # of the episodes in the environments
+    lengths = np.zeros(n, np.int64)
+    results = np.zeros((episodes, 3), np.int64)
+    while (numbers < episodes).any():
+        observations, _, terminated, truncated, infos = envs.step(choose(observations))
+        lengths += 1
+        ended = terminated | truncated
+        if not ended.any():
+            continue
+        counted = ended & (numbers < episodes)
+        final = infos["final_info"]
+        columns = final["is_success"], final["collision"], lengths
+        results[numbers[counted]] = np.stack([column[counted] for column in columns], axis=1)
+        numbers[ended] = numbers.max() + 1 + np.arange(np.count_nonzero(ended))
+        lengths[ended] = 0
+        # Environments without a further episode continue until the others end.
+        begun = ended & (numbers < episodes)
+        if begun.any():
+            seeds = [seed + number for number in numbers.tolist()]
+            observations, _ = envs.reset(seed=seeds, options={"reset_mask": begun})
+        reset(ended)
+    success, collision, steps = results.T
     return Outcomes(success.astype(np.bool_), collision.astype(np.bool_), steps)

@@ -48,6 +48,12 @@ ENTRIES: list[tuple[str, str | list[str], str, str]] = [
     ),
     ("gymnasium", "import flatland.gym", "flatland.gym requires Gymnasium", "flatland-sim[gym]"),
     (
+        "onnxruntime",
+        "from flatland.gym.policies import Policy; Policy()",
+        "policies require ONNX Runtime",
+        "flatland-sim[onnx]",
+    ),
+    (
         "pettingzoo",
         "import flatland.gym; flatland.gym.make_parallel()",
         "environments with several robots require PettingZoo",

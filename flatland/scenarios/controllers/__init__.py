@@ -32,6 +32,9 @@ INCLUDED: Final[dict[str, type[Controller]]] = {
     "dynamic_window": DynamicWindow,
     "random": RandomWalk,
 }
+POLICY: Final = "policy"
+"""Name of the included policy, which requires the extra `onnx`."""
+_POLICY_FILE: Final = ".onnx"
 
 
 class ControllerError(FlatlandError):
@@ -51,7 +54,8 @@ def find_controller(name: str, folder: str) -> Callable[[Task], Any]:
     """Returns the class of a controller, or what creates the controller of a function.
 
     Args:
-        name: Name of an included controller, `FILE.py:NAME` or `MODULE:NAME`.
+        name: Name of an included controller, `policy`, `FILE.onnx`, `FILE.py:NAME` or
+            `MODULE:NAME`.
         folder: Folder that a relative path of a file starts from; empty for the current one.
 
     Raises:
@@ -60,11 +64,13 @@ def find_controller(name: str, folder: str) -> Callable[[Task], Any]:
     included = INCLUDED.get(name)
     if included is not None:
         return included
+    if name == POLICY or name.endswith(_POLICY_FILE):
+        return _load_policy(name, folder)
     module_name, colon, attribute = name.rpartition(":")
     if not (colon and module_name and attribute):
         raise ControllerError(
-            f"{name!r} does not exist; included are {', '.join(INCLUDED)}, others are given as "
-            "FILE.py:NAME or MODULE:NAME"
+            f"{name!r} does not exist; included are {', '.join([*INCLUDED, POLICY])}, others are "
+            "given as FILE.py:NAME, MODULE:NAME or FILE.onnx"
         )
     try:
         if module_name.endswith(".py"):
@@ -97,10 +103,21 @@ def controller_digest(name: str, folder: str) -> str:
         ControllerError: The controller does not exist.
     """
     find_controller(name, folder)
-    path = name.rpartition(":")[0]
-    if not path.endswith(".py"):
+    path = name if name.endswith(_POLICY_FILE) else name.rpartition(":")[0]
+    if not path.endswith((".py", _POLICY_FILE)):
         return ""
     return hashlib.sha256(Path(folder, path).expanduser().read_bytes()).hexdigest()[:32]
+
+
+def _load_policy(name: str, folder: str) -> Callable[[Task], Any]:
+    # Imported here, since it requires optional packages.
+    try:
+        policies = importlib.import_module("flatland.scenarios.policies")
+        file = None if name == POLICY else Path(folder, name).expanduser()
+        create: Callable[[Task], Any] = policies.file_controller(file)
+    except FlatlandError as error:
+        raise ControllerError(f"{name!r}: {error}") from error
+    return create
 
 
 def _load_file(path: Path) -> ModuleType:
