@@ -10,7 +10,13 @@ from flatland.extras import require
 # Otherwise, a missing package results in a traceback without a remedy.
 require("gymnasium", "flatland.gym requires")
 
-from flatland.gym.actions import VelocityAction
+from flatland.gym.actions import (
+    Action,
+    DiscreteAction,
+    HolonomicAction,
+    SteeringAction,
+    VelocityAction,
+)
 from flatland.gym.agents import Agent
 from flatland.gym.buildings import Buildings, RandomBuildings
 from flatland.gym.endings import AnyOf, Arrived, Collided, Ending, Strayed
@@ -25,6 +31,20 @@ from flatland.gym.observations import (
     Velocity,
 )
 from flatland.gym.places import Places
+from flatland.gym.randomization import (
+    BeamDropout,
+    CommandLatency,
+    DriveLimits,
+    Friction,
+    ObservationLatency,
+    ObstacleSize,
+    Payload,
+    Randomization,
+    RandomizationSum,
+    RobotSize,
+    ScanDropout,
+    ScanNoise,
+)
 from flatland.gym.registration import make_parallel, make_vec, register_all
 from flatland.gym.rewards import (
     Arrival,
@@ -45,33 +65,49 @@ from flatland.gym.worlds import find_world, included_robot
 register_all()
 
 __all__ = [
+    "Action",
     "Agent",
     "AnyOf",
     "Arrival",
     "Arrived",
+    "BeamDropout",
     "Buildings",
     "Collided",
+    "CommandLatency",
     "Contact",
+    "DiscreteAction",
+    "DriveLimits",
     "Ending",
     "FixedGoal",
     "FlatlandEnv",
     "FlatlandVectorEnv",
+    "Friction",
     "Goal",
+    "HolonomicAction",
     "Jerkiness",
     "LastAction",
     "Observation",
+    "ObservationLatency",
     "ObservationPart",
+    "ObstacleSize",
     "Occupied",
     "Outcomes",
+    "Payload",
     "Places",
     "Progress",
     "Proximity",
     "RandomBuildings",
     "RandomGoal",
+    "Randomization",
+    "RandomizationSum",
     "Reward",
+    "RobotSize",
     "Scan",
+    "ScanDropout",
+    "ScanNoise",
     "Settings",
     "Situation",
+    "SteeringAction",
     "Step",
     "Strayed",
     "Task",

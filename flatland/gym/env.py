@@ -9,7 +9,6 @@ import gymnasium
 from gymnasium.error import ResetNeeded
 
 from flatland.geometry import FloatArray
-from flatland.gym.actions import checked_actions
 from flatland.gym.recreation import Recreated
 from flatland.gym.settings import Settings
 from flatland.gym.stage import RENDER_MODES, Image, Stage
@@ -126,7 +125,8 @@ class FlatlandEnv(Recreated, gymnasium.Env[Any, FloatArray]):
         """Carries out an action.
 
         Args:
-            action: Forward speed and yaw rate, each from -1 to 1, shape (2,).
+            action: An element of the action space, such as forward speed and yaw rate from -1 to 1,
+                shape (2,).
 
         Returns:
             Observation, reward, whether the episode terminated, whether it was truncated, info.
@@ -139,7 +139,7 @@ class FlatlandEnv(Recreated, gymnasium.Env[Any, FloatArray]):
         self._stage.check_open()
         if not self._running:
             raise ResetNeeded("call reset() before step(): no episode has begun, or it has ended")
-        actions = checked_actions(action, None)
+        actions = self._episodes.read_actions(action, None)
         self._episodes.step(actions)
         rewards, terminated, truncated = self._episodes.judge()
         ended = bool(terminated[0]), bool(truncated[0])

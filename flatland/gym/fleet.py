@@ -15,7 +15,6 @@ from pettingzoo import ParallelEnv
 
 from flatland.entities.body import Body
 from flatland.geometry import FloatArray
-from flatland.gym.actions import checked_actions
 from flatland.gym.agents import Agent, check_alike
 from flatland.gym.buildings import Buildings
 from flatland.gym.checks import checked_count
@@ -110,7 +109,7 @@ class FleetEnv(Recreated, ParallelEnv[str, Any, FloatArray]):  # type: ignore[mi
         """Returns the observation space, the same for all robots."""
         return self._observation_space
 
-    def action_space(self, agent: str) -> spaces.Box:
+    def action_space(self, agent: str) -> spaces.Space[Any]:
         """Returns the action space of a robot."""
         return self._action_spaces[agent]
 
@@ -158,7 +157,7 @@ class FleetEnv(Recreated, ParallelEnv[str, Any, FloatArray]):  # type: ignore[mi
         """Carries out an action of each robot whose episode has not ended.
 
         Args:
-            actions: Forward speed and yaw rate, each from -1 to 1, by the names in `agents`.
+            actions: Elements of the action space by the names in `agents`.
 
         Returns:
             Observations, rewards, whether episodes terminated, whether they were truncated, and
@@ -179,8 +178,8 @@ class FleetEnv(Recreated, ParallelEnv[str, Any, FloatArray]):  # type: ignore[mi
                 f"actions must be those of {', '.join(live)}, got {', '.join(actions) or 'none'}"
             )
         rows = np.array([self._row_of[name] for name in live])
-        numbers = np.zeros((len(self._agents), 2))
-        numbers[rows] = checked_actions([actions[name] for name in live], len(live))
+        numbers = np.zeros_like(self._episodes.situation.actions)
+        numbers[rows] = self._episodes.read_actions([actions[name] for name in live], len(live))
         self._episodes.step(numbers, rows)
         rewards, terminated, truncated = self._episodes.judge()
         ended = terminated | truncated

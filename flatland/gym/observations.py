@@ -148,18 +148,37 @@ class Goal(ObservationPart):
 
 
 class Velocity(ObservationPart):
-    """Forward speed and yaw rate, divided by the greatest that can be commanded."""
+    """Forward speed and yaw rate, divided by the greatest that can be commanded.
+
+    With `sideways`, the sideways velocity is between them, for drives that move sideways.
+    """
 
     name = "velocity"
 
+    def __init__(self, sideways: bool = False) -> None:
+        """Creates the part.
+
+        Args:
+            sideways: Whether the sideways velocity is observed.
+        """
+        self.sideways = sideways
+
     def size(self, beams: int) -> int:  # noqa: ARG002 - does not depend on the laser
-        """Returns 2."""
-        return 2
+        """Returns 2, or 3 with the sideways velocity."""
+        return 3 if self.sideways else 2
 
     def write(self, situation: Situation, out: FloatArray) -> None:
-        """Writes both velocities; a robot that is pushed may exceed the bounds, which are kept."""
-        limit = np.maximum(np.abs(situation.low), np.abs(situation.high))
-        situation.core.write_velocities(limit[0], limit[1], out)
+        """Writes the velocities; a robot that is pushed may exceed the bounds, which are kept."""
+        forward, sideways, turn = situation.velocity_limits
+        if not self.sideways:
+            situation.core.write_velocities(forward, turn, out)
+            return
+        both = np.empty((len(out), 2), np.float32)
+        situation.core.write_velocities(forward, turn, both)
+        vx, vy, _ = situation.velocities.T
+        theta = situation.poses[:, 2]
+        out[:, ::2] = both
+        out[:, 1] = np.clip((vy * np.cos(theta) - vx * np.sin(theta)) / sideways, -1.0, 1.0)
 
     def velocities_of(
         self, values: DoubleArray, low: DoubleArray, high: DoubleArray
@@ -179,16 +198,38 @@ class Velocity(ObservationPart):
 
 
 class LastAction(ObservationPart):
-    """The action of the last step, zero at the start of an episode."""
+    """The action of the last step as numbers, zero at the start of an episode."""
 
     name = "last_action"
 
+    def __init__(self, numbers: int = 2) -> None:
+        """Creates the part.
+
+        Args:
+            numbers: Numbers of an action: 2, or 3 for a `HolonomicAction`.
+
+        Raises:
+            ValueError: It is not 2 or 3.
+        """
+        if numbers not in (2, 3):
+            raise ValueError(f"numbers must be 2 or 3, got {numbers!r}")
+        self.numbers = numbers
+
     def size(self, beams: int) -> int:  # noqa: ARG002 - does not depend on the laser
-        """Returns 2."""
-        return 2
+        """Returns the number of numbers."""
+        return self.numbers
 
     def write(self, situation: Situation, out: FloatArray) -> None:
-        """Writes the action."""
+        """Writes the action.
+
+        Raises:
+            ValueError: Actions have another number of numbers.
+        """
+        if situation.actions.shape[1] != self.numbers:
+            raise ValueError(
+                f"LastAction({self.numbers}) requires actions of {self.numbers} numbers, got "
+                f"{situation.actions.shape[1]}"
+            )
         out[:] = situation.actions
 
 

@@ -136,6 +136,7 @@ class Stage:
                 plugin.reseed(rng)
         for world_plugin in world.plugins:
             world_plugin.reseed(rng)
+        self.episodes.randomization.change_world(world, rng)
 
     def _enter(self, number: int, building: int) -> None:
         """Replaces a world by one of another building."""

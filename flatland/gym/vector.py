@@ -14,7 +14,6 @@ from gymnasium.vector.utils import batch_space
 
 from flatland.errors import WorldError
 from flatland.geometry import BoolArray, DoubleArray
-from flatland.gym.actions import checked_actions
 from flatland.gym.checks import checked_count
 from flatland.gym.env import FlatlandEnv
 from flatland.gym.recreation import Recreated
@@ -184,7 +183,8 @@ class FlatlandVectorEnv(Recreated, VectorEnv[Any, Any, Any]):
         """Carries out one action in each environment.
 
         Args:
-            actions: Forward speed and yaw rate, each from -1 to 1, shape (num_envs, 2).
+            actions: An action for each environment, such as forward speed and yaw rate from -1 to
+                1, shape (num_envs, 2).
 
         Returns:
             Observations, rewards, which episodes terminated, which were truncated, infos. The
@@ -204,7 +204,7 @@ class FlatlandVectorEnv(Recreated, VectorEnv[Any, Any, Any]):
                 f"the episode of environment {row} has ended: call reset() with "
                 'options={"reset_mask": ...} before step()'
             )
-        numbers = checked_actions(actions, self.num_envs)
+        numbers = self._episodes.read_actions(actions, self.num_envs)
         # Only in the mode NEXT_STEP has any episode ended here.
         fresh = self._has_ended.copy()
         if fresh.any():
