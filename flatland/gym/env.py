@@ -12,7 +12,7 @@ from flatland.geometry import FloatArray
 from flatland.gym.recreation import Recreated
 from flatland.gym.settings import Settings
 from flatland.gym.stage import RENDER_MODES, Image, Stage
-from flatland.gym.tasks import Occupied
+from flatland.gym.tasks import Occupied, Task
 
 if TYPE_CHECKING:
     from flatland.gym.buildings import Buildings
@@ -87,6 +87,20 @@ class FlatlandEnv(Recreated, gymnasium.Env[Any, FloatArray]):
     def goal(self) -> tuple[float, float]:
         """The goal of the episode in the world frame [m]."""
         return self._stage.goals[0][0]
+
+    @property
+    def task(self) -> Task:
+        """The task, settable: starts and goals of all further episodes.
+
+        Running episodes keep their goals; the `goal_radius` applies at once. A task that is
+        impossible in a building is a `WorldError`, and the previous one remains.
+        """
+        return self._episodes.settings.task
+
+    @task.setter
+    def task(self, task: Task) -> None:
+        self._stage.set_task(task)
+        self._replace_argument("task", task)
 
     @property
     def episodes(self) -> Episodes:

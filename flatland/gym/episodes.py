@@ -5,6 +5,7 @@ from __future__ import annotations
 import copy
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -95,6 +96,21 @@ class Episodes:
     def goal_radius(self) -> float:
         """Distance to the goal at which an agent has arrived [m]."""
         return self._tasks[0].goal_radius
+
+    def set_task(self, task: Task, firsts: Sequence[Agent]) -> None:
+        """Replaces the task of all further episodes.
+
+        Args:
+            task: The task.
+            firsts: An agent of each building, whose worlds are in the state at the start.
+
+        Raises:
+            TypeError: It is no task.
+            WorldError: The task is impossible in a building; the previous one remains.
+        """
+        settings = replace(self.settings, task=task)
+        self._tasks = [_prepared(task, agent) for agent in firsts]
+        self.settings = settings
 
     def replace(self, row: int, agent: Agent, building: int) -> None:
         """Replaces an agent by one of another world, whose next episode begins.

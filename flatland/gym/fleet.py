@@ -21,7 +21,7 @@ from flatland.gym.checks import checked_count
 from flatland.gym.recreation import Recreated
 from flatland.gym.settings import Settings
 from flatland.gym.stage import RENDER_MODES, Image, Stage
-from flatland.gym.tasks import Occupied
+from flatland.gym.tasks import Occupied, Task
 from flatland.gym.worlds import included_robot
 from flatland.values import Twist
 
@@ -112,6 +112,20 @@ class FleetEnv(Recreated, ParallelEnv[str, Any, FloatArray]):  # type: ignore[mi
     def action_space(self, agent: str) -> spaces.Space[Any]:
         """Returns the action space of a robot."""
         return self._action_spaces[agent]
+
+    @property
+    def task(self) -> Task:
+        """The task, settable: starts and goals of all further episodes.
+
+        Running episodes keep their goals; the `goal_radius` applies at once. A task that is
+        impossible in a building is a `WorldError`, and the previous one remains.
+        """
+        return self._episodes.settings.task
+
+    @task.setter
+    def task(self, task: Task) -> None:
+        self._stage.set_task(task)
+        self._replace_argument("task", task)
 
     @property
     def goals(self) -> dict[str, tuple[float, float]]:

@@ -96,8 +96,16 @@ class StableVector(VecEnv):  # type: ignore[misc, unused-ignore]
         return [getattr(self.envs, attr_name) for _ in self._get_indices(indices)]
 
     def set_attr(self, attr_name: str, value: Any, indices: Any = None) -> None:
-        """Raises AttributeError: the environments share their attributes."""
-        raise AttributeError(f"{attr_name} cannot be set: the environments share their attributes")
+        """Sets the attribute `task` of all environments.
+
+        Raises:
+            AttributeError: Another attribute, or some environments only: they share attributes.
+        """
+        if attr_name != "task" or list(self._get_indices(indices)) != list(range(self.num_envs)):
+            raise AttributeError(
+                f"{attr_name} cannot be set: the environments share their attributes"
+            )
+        self.envs.task = value
 
     def env_method(
         self, method_name: str, *args: Any, indices: Any = None, **kwargs: Any

@@ -20,7 +20,7 @@ from flatland.gym.recreation import Recreated
 from flatland.gym.settings import Settings
 from flatland.gym.situation import Rows
 from flatland.gym.stage import Image, Stage
-from flatland.gym.tasks import Occupied
+from flatland.gym.tasks import Occupied, Task
 
 if TYPE_CHECKING:
     from flatland.gym.buildings import Buildings
@@ -134,6 +134,20 @@ class FlatlandVectorEnv(Recreated, VectorEnv[Any, Any, Any]):
     def goals(self) -> DoubleArray:
         """A copy of all goals (x, y) in the world frame [m], shape (num_envs, 2)."""
         return self._episodes.situation.goals.copy()
+
+    @property
+    def task(self) -> Task:
+        """The task, settable: starts and goals of all further episodes.
+
+        Running episodes keep their goals; the `goal_radius` applies at once. A task that is
+        impossible in a building is a `WorldError`, and the previous one remains.
+        """
+        return self._episodes.settings.task
+
+    @task.setter
+    def task(self, task: Task) -> None:
+        self._stage.set_task(task)
+        self._replace_argument("task", task)
 
     @property
     def episodes(self) -> Episodes:
