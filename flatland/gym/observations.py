@@ -40,6 +40,13 @@ class ObservationPart(ABC):
             ValueError: The part does not support this number of beams.
         """
 
+    def check(self, situation: Situation) -> None:  # noqa: B027 - most parts need nothing
+        """Checks that the part can be computed; called once for an environment.
+
+        Raises:
+            ValueError: It cannot.
+        """
+
     @abstractmethod
     def write(self, situation: Situation, out: FloatArray) -> None:
         """Writes the numbers of all agents to `out`, shape (n, size), float32."""
@@ -219,17 +226,16 @@ class LastAction(ObservationPart):
         """Returns the number of numbers."""
         return self.numbers
 
-    def write(self, situation: Situation, out: FloatArray) -> None:
-        """Writes the action.
-
-        Raises:
-            ValueError: Actions have another number of numbers.
-        """
+    def check(self, situation: Situation) -> None:
+        """Checks that actions have as many numbers."""
         if situation.actions.shape[1] != self.numbers:
             raise ValueError(
                 f"LastAction({self.numbers}) requires actions of {self.numbers} numbers, got "
                 f"{situation.actions.shape[1]}"
             )
+
+    def write(self, situation: Situation, out: FloatArray) -> None:
+        """Writes the action."""
         out[:] = situation.actions
 
 
@@ -301,6 +307,15 @@ class ObservationLayout:
             self.space = spaces.Dict(boxes)
         else:
             self.space = spaces.Box(low, high, dtype=np.float32)
+
+    def check(self, situation: Situation) -> None:
+        """Checks that all parts can be computed.
+
+        Raises:
+            ValueError: One cannot.
+        """
+        for part, _ in self._columns:
+            part.check(situation)
 
     def has(self, kind: type[ObservationPart]) -> bool:
         """Returns whether there is a part of a class."""

@@ -28,6 +28,7 @@ def test_the_page_names_all_parts() -> None:
     text = PAGE.read_text()
     parts = (
         flatland.gym.ObservationPart,
+        flatland.gym.Action,
         flatland.gym.Randomization,
         flatland.gym.Reward,
         flatland.gym.Ending,
