@@ -22,12 +22,14 @@ from flatland.gym.buildings import Buildings, RandomBuildings
 from flatland.gym.endings import AnyOf, Arrived, Collided, Ending, Strayed
 from flatland.gym.env import FlatlandEnv
 from flatland.gym.evaluation import Outcomes, evaluate
+from flatland.gym.maps import Costmap, LocalMap
 from flatland.gym.observations import (
     Goal,
     LastAction,
     Observation,
     ObservationPart,
     Scan,
+    Stacked,
     Velocity,
 )
 from flatland.gym.places import Places
@@ -75,6 +77,7 @@ __all__ = [
     "Collided",
     "CommandLatency",
     "Contact",
+    "Costmap",
     "DiscreteAction",
     "DriveLimits",
     "Ending",
@@ -86,6 +89,7 @@ __all__ = [
     "HolonomicAction",
     "Jerkiness",
     "LastAction",
+    "LocalMap",
     "Observation",
     "ObservationLatency",
     "ObservationPart",
@@ -107,6 +111,7 @@ __all__ = [
     "ScanNoise",
     "Settings",
     "Situation",
+    "Stacked",
     "SteeringAction",
     "Step",
     "Strayed",

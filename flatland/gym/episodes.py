@@ -79,7 +79,8 @@ class Episodes:
         n = len(agents)
         limits = settings.action.velocity_limits(first)
         self.situation = Situation(n, beams, first.laser.range, low, high, limits)
-        self.layout.check(self.situation)
+        self.situation.agents = self.agents
+        self.layout.prepare(self.situation)
         self.randomization = copy.copy(settings.randomization)
         self.randomization.prepare(n, beams, self.layout.size)
         self._present: FloatArray = np.zeros((n, self.layout.size), np.float32)

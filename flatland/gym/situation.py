@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
 
 from flatland.geometry import BoolArray, DoubleArray, FloatArray
 from flatland.physics import AgentRows
+
+if TYPE_CHECKING:
+    from flatland.gym.agents import Agent
 
 Rows = npt.NDArray[np.intp]
 
@@ -43,6 +47,7 @@ class Situation:
         velocity_limits: Greatest velocities (forward, sideways, yaw rate), the units of observed
             velocities [m/s, rad/s], shape (3,).
         steps: Number of steps since the start of the episode, shape (n,).
+        agents: The agents, for what the arrays do not contain; they must not be changed.
     """
 
     def __init__(
@@ -87,6 +92,7 @@ class Situation:
         self.actions: DoubleArray = np.zeros((n, len(low)))
         self.previous_actions: DoubleArray = np.zeros((n, len(low)))
         self.steps: npt.NDArray[np.int64] = np.zeros(n, np.int64)
+        self.agents: Sequence[Agent] = ()
         self._core: AgentRows | None = None
 
     @property
@@ -116,6 +122,8 @@ class Situation:
         part = Situation(0, 0, self.max_range, self.low, self.high, self.velocity_limits)
         for name, values in self._rows().items():
             setattr(part, name, values[rows])
+        if self.agents:
+            part.agents = [self.agents[row] for row in rows.tolist()]
         return part
 
     def put(self, rows: Rows, part: Situation) -> None:
@@ -125,7 +133,7 @@ class Situation:
 
     def _rows(self) -> dict[str, npt.NDArray[Any]]:
         """Returns the arrays with one row per agent by name."""
-        shared = ("max_range", "low", "high", "velocity_limits", "_core")
+        shared = ("max_range", "low", "high", "velocity_limits", "agents", "_core")
         return {name: values for name, values in vars(self).items() if name not in shared}
 
     def locate(self, goal_radius: float) -> None:

@@ -3,10 +3,19 @@
 from __future__ import annotations
 
 import pytest
-from stable_baselines3 import DQN
+from stable_baselines3 import DQN, PPO
 from stable_baselines3.common.env_checker import check_env
 
-from flatland.gym import DiscreteAction, FlatlandEnv, make_vec
+from flatland.gym import (
+    Costmap,
+    DiscreteAction,
+    FlatlandEnv,
+    Goal,
+    LocalMap,
+    Observation,
+    Stacked,
+    make_vec,
+)
 from flatland.gym.stable_baselines import StableVector
 
 pytestmark = [
@@ -28,4 +37,25 @@ def test_deep_q_learning_with_discrete_actions() -> None:
     actions, _ = model.predict(envs.reset(), deterministic=True)
     assert actions.shape == (4,)
     assert model.num_timesteps >= 400
+    envs.close()
+
+
+@pytest.mark.parametrize(
+    ("policy", "observation"),
+    [
+        ("CnnPolicy", Observation(Costmap(40))),
+        ("CnnPolicy", Observation(Stacked(LocalMap(36, 0.2), 2))),
+        ("MultiInputPolicy", Observation(Costmap(36), Goal(), as_dict=True)),
+    ],
+)
+def test_a_convolutional_network_learns_from_images(policy: str, observation: Observation) -> None:
+    single = FlatlandEnv("corridor", observation=observation)
+    check_env(single)
+    single.close()
+    envs = StableVector(
+        make_vec("flatland/Corridor-v0", 2, autoreset_mode="SameStep", observation=observation)
+    )
+    model = PPO(policy, envs, n_steps=16, batch_size=16, n_epochs=1, seed=0)
+    model.learn(64)
+    assert model.predict(envs.reset())[0].shape == (2, 2)
     envs.close()
