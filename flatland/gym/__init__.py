@@ -22,6 +22,7 @@ from flatland.gym.buildings import Buildings, RandomBuildings
 from flatland.gym.endings import AnyOf, Arrived, Collided, Ending, Strayed
 from flatland.gym.env import FlatlandEnv
 from flatland.gym.evaluation import Outcomes, evaluate
+from flatland.gym.fleet_vector import FleetVectorEnv
 from flatland.gym.maps import Costmap, LocalMap
 from flatland.gym.observations import (
     Goal,
@@ -84,6 +85,7 @@ __all__ = [
     "FixedGoal",
     "FlatlandEnv",
     "FlatlandVectorEnv",
+    "FleetVectorEnv",
     "Friction",
     "Goal",
     "HolonomicAction",

@@ -180,12 +180,15 @@ class Episodes:
         )
         return numbers
 
-    def step(self, actions: DoubleArray, rows: Rows | None = None) -> None:
-        """Carries out actions for one step of the environment, and observes all agents.
+    def step(
+        self, actions: DoubleArray, rows: Rows | None = None, observed: Rows | None = None
+    ) -> None:
+        """Carries out actions for one step of the environment, and observes agents.
 
         Args:
             actions: Numbers in [-1, 1] of all agents, as `read_actions` returns them.
             rows: Agents that act; None for all. The others stand still.
+            observed: Agents that must be observed; None for all.
         """
         s = self.situation
         commands = np.zeros((len(s), 3))
@@ -202,7 +205,7 @@ class Episodes:
             agents = [self.agents[row] for row in acting_rows.tolist()]
             step_agents(agents, commands[chosen], n, self._num_threads)
             s.collided[chosen] = [agent.touches.touched for agent in agents]
-            self.look()
+            self.look(observed)
             return
         acting = np.zeros(len(s), np.bool_)
         acting[chosen] = True

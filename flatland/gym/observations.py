@@ -346,6 +346,7 @@ class ObservationLayout:
     Attributes:
         space: Space of one observation.
         size: Number of columns.
+        blank: An observation of zeros, limited to the bounds, shape (size,), float32.
     """
 
     def __init__(self, observation: Observation, beams: int) -> None:
@@ -365,6 +366,9 @@ class ObservationLayout:
             self._shapes[part.name] = part.shape(beams)
             start = end
         self.size = start
+        self.blank: FloatArray = np.zeros(self.size, np.float32)
+        for part, columns in self._columns:
+            self.blank[columns] = min(max(0.0, part.low), part.high)
         # A single part has its own shape; several are concatenated.
         self._single = part if len(self._columns) == 1 and not self._as_dict else None
         boxes: dict[str, spaces.Space[Any]] = {

@@ -184,14 +184,14 @@ class FlatlandVectorEnv(Recreated, VectorEnv[Any, Any, Any]):
         self._stage.check_open()
         mask, places = _checked_options(options or {}, self.num_envs)
         rows = np.flatnonzero(mask)
-        seeds = _checked_seeds(seed, self.num_envs)
+        seeds = checked_seeds(seed, self.num_envs)
         for row in rows.tolist():
             if seeds[row] is not None:
                 self._rngs[row], self._seeds[row] = seeding.np_random(seeds[row])
         self._begin(rows, places)
         self._episodes.look(None if len(rows) == self.num_envs else rows)
         self._stage.show()
-        return self._present(), self._infos(mask)
+        return self._present(), masked_infos(self._episodes, mask)
 
     def step(self, actions: Any) -> tuple[Any, DoubleArray, BoolArray, BoolArray, dict[str, Any]]:
         """Carries out one action in each environment.
@@ -237,7 +237,7 @@ class FlatlandVectorEnv(Recreated, VectorEnv[Any, Any, Any]):
             self._has_ended = np.zeros(self.num_envs, np.bool_)
         else:
             self._has_ended = ended
-        infos.update(self._infos(np.ones(self.num_envs, np.bool_)))
+        infos.update(masked_infos(self._episodes, np.ones(self.num_envs, np.bool_)))
         self._stage.show()
         return self._present(), rewards, terminated, truncated, infos
 
@@ -291,19 +291,11 @@ class FlatlandVectorEnv(Recreated, VectorEnv[Any, Any, Any]):
         infos = {
             "final_obs": observations,
             "_final_obs": ended.copy(),
-            "final_info": self._infos(ended),
+            "final_info": masked_infos(self._episodes, ended),
             "_final_info": ended.copy(),
         }
         self._begin(rows)
         self._episodes.look(rows)
-        return infos
-
-    def _infos(self, mask: BoolArray) -> dict[str, Any]:
-        """Returns the infos of some environments as arrays with masks."""
-        infos: dict[str, Any] = {}
-        for name, values in self._episodes.infos().items():
-            infos[name] = np.where(mask, values, np.zeros(1, values.dtype))
-            infos[f"_{name}"] = mask.copy()
         return infos
 
     def _present(self) -> Any:
@@ -323,12 +315,12 @@ def _checked_options(
     unknown = sorted(set(options) - set(known))
     if unknown:
         raise ValueError(f"options must be among {', '.join(known)}, got {', '.join(unknown)}")
-    reset = _checked_mask("reset_mask", options.get("reset_mask"), n)
+    reset = checked_mask("reset_mask", options.get("reset_mask"), n)
     if not reset.any():
         raise ValueError('options["reset_mask"] must contain True')
     places: list[dict[str, DoubleArray]] = [{} for _ in range(n)]
     for name, size in (("start", 3), ("goal", 2)):
-        mask = _checked_mask(f"{name}_mask", options.get(f"{name}_mask"), n)
+        mask = checked_mask(f"{name}_mask", options.get(f"{name}_mask"), n)
         if options.get(name) is None:
             if f"{name}_mask" in options:
                 raise ValueError(f'options["{name}_mask"] requires options["{name}"]')
@@ -344,7 +336,27 @@ def _checked_options(
     return reset, places
 
 
-def _checked_mask(name: str, mask: object, n: int) -> BoolArray:
+def masked_infos(episodes: Episodes, mask: BoolArray) -> dict[str, Any]:
+    """Returns the infos of some environments as arrays with masks.
+
+    Args:
+        episodes: The episodes of all environments.
+        mask: The environments, shape (n,).
+    """
+    infos: dict[str, Any] = {}
+    for name, values in episodes.infos().items():
+        infos[name] = np.where(mask, values, np.zeros(1, values.dtype))
+        infos[f"_{name}"] = mask.copy()
+    return infos
+
+
+def checked_mask(name: str, mask: object, n: int) -> BoolArray:
+    """Returns a mask of n environments, all of them for None.
+
+    Raises:
+        TypeError: It is not an array of bools.
+        ValueError: It has another shape.
+    """
     if mask is None:
         return np.ones(n, np.bool_)
     if not isinstance(mask, np.ndarray) or mask.dtype != np.bool_:
@@ -354,7 +366,16 @@ def _checked_mask(name: str, mask: object, n: int) -> BoolArray:
     return mask
 
 
-def _checked_seeds(seed: int | Sequence[int | None] | None, n: int) -> list[int | None]:
+def checked_seeds(seed: int | Sequence[int | None] | None, n: int) -> list[int | None]:
+    """Returns the seeds of n environments.
+
+    Args:
+        seed: Seed of the first one, or a list of all seeds.
+        n: Number of environments.
+
+    Raises:
+        ValueError: There is another number of seeds.
+    """
     if seed is None:
         return [None] * n
     if isinstance(seed, int | np.integer):

@@ -59,3 +59,16 @@ def test_a_convolutional_network_learns_from_images(policy: str, observation: Ob
     model.learn(64)
     assert model.predict(envs.reset())[0].shape == (2, 2)
     envs.close()
+
+
+def test_robots_of_fleets_learn_together() -> None:
+    envs = StableVector(
+        make_vec("flatland/Fleet-v0", 2, num_robots=3, autoreset_mode="SameStep", max_steps=8)
+    )
+    assert envs.num_envs == 6
+    model = PPO("MlpPolicy", envs, n_steps=32, batch_size=32, n_epochs=1, seed=0)
+    model.learn(6 * 64)
+    lengths = [episode["l"] for episode in model.ep_info_buffer]
+    assert len(lengths) > 6
+    assert max(lengths) <= 8
+    envs.close()
