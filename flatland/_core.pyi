@@ -549,6 +549,19 @@ class PhysicsBody(Handle):
             StaleHandleError: The body has already been destroyed.
             WorldLockedError: The world is stepping.
         """
+    def scale_shapes(self, factor: float) -> None:
+        """Multiplies the lengths of all shapes by a factor, relative to the origin of the body.
+
+        The densities do not change, so that the mass is multiplied by the square of the factor.
+
+        Args:
+            factor: The factor, from 0.1 to 10.
+
+        Raises:
+            ValueError: The factor or the resulting mass is out of range, or a shape is an edge.
+            StaleHandleError: The body was destroyed.
+            WorldLockedError: The world is stepping.
+        """
     @property
     def type(self) -> str:
         """Type of the body, `static`, `kinematic` or `dynamic`."""
@@ -857,10 +870,22 @@ class PhysicsFixture(Handle):
         """Radius of a circle [m], 0 for other shapes."""
     @property
     def density(self) -> float:
-        """Density [kg/m^2]."""
+        """Density [kg/m^2]; settable, which also sets the mass of the body.
+
+        Raises:
+            ValueError: The density is negative or not finite, or the mass of the body would be out of range.
+        """
+    @density.setter
+    def density(self, value: float) -> None: ...
     @property
     def friction(self) -> float:
-        """Friction coefficient."""
+        """Friction coefficient; settable, also for present contacts.
+
+        Raises:
+            ValueError: The coefficient is negative or not finite.
+        """
+    @friction.setter
+    def friction(self, value: float) -> None: ...
     @property
     def restitution(self) -> float:
         """Restitution coefficient."""
@@ -1925,7 +1950,8 @@ class AgentBatch:
             run: The steps, as `Run`; each world has a time of its own.
             steps: Whether the world of the agent steps, shape (n,).
             observes: Whether the agent is observed, after its steps, shape (n,).
-            velocities: Commanded forward speed and yaw rate [m/s, rad/s], shape (n, 2).
+            velocities: Commands (forward, sideways, omega), or (speed, 0, steering angle) for a drive that is
+                steered [m/s, rad/s, rad], shape (n, 3).
             times: Simulated times of the worlds [ns], shape (n,).
             noises: Stream and number of the update of each scan, shape (n, 2).
             poses: Receives (x, y, theta) of the bodies in the world frame, shape (n, 3).

@@ -30,6 +30,7 @@ if TYPE_CHECKING:
 
 # Their subclasses may do something else with a command.
 _DRIVES = (AckermannDrive, DiffDrive, OmniDrive, TricycleDrive)
+_STEERED = (AckermannDrive, TricycleDrive)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -48,6 +49,7 @@ class Agent:
         radius: Radius of the smallest disc around the origin of the first body that contains all
             solid footprints of the model [m].
         bits: Category bits of the solid footprints.
+        drive: The plugin that takes the command.
         max_speed: Limit of the forward speed of the drive [m/s], 0 for no limit.
         max_yaw_rate: Limit of the yaw rate of the drive [rad/s], 0 for no limit.
     """
@@ -61,6 +63,7 @@ class Agent:
     touches: Touches
     radius: float
     bits: int
+    drive: object
     max_speed: float
     max_yaw_rate: float
 
@@ -92,8 +95,10 @@ def find_agent(world: World, name: str, laser: str | None, command: str | None) 
         model.watch_contacts(),
         radius,
         bits,
+        source,
         _velocity_limit(source, "linear_dynamics"),
-        _velocity_limit(source, "angular_dynamics"),
+        # The angular limits of a drive that steers are those of the steering.
+        0.0 if isinstance(source, _STEERED) else _velocity_limit(source, "angular_dynamics"),
     )
 
 

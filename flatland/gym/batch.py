@@ -73,8 +73,8 @@ class Batch:
 
         Args:
             agents: The agents.
-            low: Lowest velocity command (v, omega) [m/s, rad/s].
-            high: Highest velocity command.
+            low: Lowest command, see `Action.bounds`.
+            high: Highest command.
         """
         return (
             len({id(agent.world) for agent in agents}) == len(agents)
@@ -87,7 +87,8 @@ class Batch:
         """Carries out commands for some steps of the worlds, and observes all agents.
 
         Args:
-            commands: Forward speed and yaw rate of each agent [m/s, rad/s], shape (n, 2).
+            commands: Forward and sideways velocity and yaw rate of each agent, or speed, 0 and
+                steering angle [m/s, rad/s, rad], shape (n, 3).
             acting: Agents that act, shape (n,); the worlds of others are not stepped.
             n: Number of steps.
 
@@ -126,8 +127,7 @@ class Batch:
                     and world.stepping.begin_unattended()
                 ):
                     begun.append(row)
-                    v, omega = values[row]
-                    agent.command.assign(Twist(v, 0.0, omega))
+                    agent.command.assign(Twist(*values[row]))
                 else:
                     others.append(row)
             if others:
@@ -178,15 +178,15 @@ def step_agents(agents: Sequence[Agent], commands: DoubleArray, n: int, num_thre
 
     Args:
         agents: The agents; their collected contacts are cleared first.
-        commands: Forward speed and yaw rate of each agent [m/s, rad/s], shape (len(agents), 2).
+        commands: Commands of the agents, as for `Batch.perform`, shape (len(agents), 3).
         n: Number of steps.
         num_threads: Number of threads, 0 for one per core.
 
     Raises:
         Exception: As `World.step`.
     """
-    for agent, (v, omega) in zip(agents, commands.tolist(), strict=True):
-        agent.command.set(Twist(v, 0.0, omega))
+    for agent, command in zip(agents, commands.tolist(), strict=True):
+        agent.command.set(Twist(*command))
         agent.touches.clear()
     worlds = list({id(agent.world): agent.world for agent in agents}.values())
     step_worlds(worlds, n, num_threads)

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from flatland.geometry import DoubleArray, FloatArray
-from flatland.gym.actions import limit_to_unit
+from flatland.gym.actions import VelocityAction, limit_to_unit
 from flatland.gym.observations import Goal, Scan, Velocity
 
 if TYPE_CHECKING:
@@ -65,11 +65,13 @@ class Controller(ABC):
                 observations nor actions.
 
         Raises:
-            ValueError: The observation lacks a part.
+            ValueError: The observation lacks a part, or the action is no `VelocityAction`.
         """
         inner: Any = env.unwrapped
         episodes = inner.episodes
         agent, situation = episodes.agents[0], episodes.situation
+        if not isinstance(episodes.settings.action, VelocityAction):
+            raise ValueError("controllers require environments with a VelocityAction")
         self.radius: float = agent.radius
         self.low: DoubleArray = situation.low
         self.high: DoubleArray = situation.high

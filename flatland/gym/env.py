@@ -9,11 +9,10 @@ import gymnasium
 from gymnasium.error import ResetNeeded
 
 from flatland.geometry import FloatArray
-from flatland.gym.actions import checked_actions
 from flatland.gym.recreation import Recreated
 from flatland.gym.settings import Settings
 from flatland.gym.stage import RENDER_MODES, Image, Stage
-from flatland.gym.tasks import Occupied
+from flatland.gym.tasks import Occupied, Task
 
 if TYPE_CHECKING:
     from flatland.gym.buildings import Buildings
@@ -90,6 +89,20 @@ class FlatlandEnv(Recreated, gymnasium.Env[Any, FloatArray]):
         return self._stage.goals[0][0]
 
     @property
+    def task(self) -> Task:
+        """The task, settable: starts and goals of all further episodes.
+
+        Running episodes keep their goals; the `goal_radius` applies at once. A task that is
+        impossible in a building is a `WorldError`, and the previous one remains.
+        """
+        return self._episodes.settings.task
+
+    @task.setter
+    def task(self, task: Task) -> None:
+        self._stage.set_task(task)
+        self._replace_argument("task", task)
+
+    @property
     def episodes(self) -> Episodes:
         """The episodes: agents, settings, and the layout of the observation."""
         return self._episodes
@@ -126,7 +139,8 @@ class FlatlandEnv(Recreated, gymnasium.Env[Any, FloatArray]):
         """Carries out an action.
 
         Args:
-            action: Forward speed and yaw rate, each from -1 to 1, shape (2,).
+            action: An element of the action space, such as forward speed and yaw rate from -1 to 1,
+                shape (2,).
 
         Returns:
             Observation, reward, whether the episode terminated, whether it was truncated, info.
@@ -139,7 +153,7 @@ class FlatlandEnv(Recreated, gymnasium.Env[Any, FloatArray]):
         self._stage.check_open()
         if not self._running:
             raise ResetNeeded("call reset() before step(): no episode has begun, or it has ended")
-        actions = checked_actions(action, None)
+        actions = self._episodes.read_actions(action, None)
         self._episodes.step(actions)
         rewards, terminated, truncated = self._episodes.judge()
         ended = bool(terminated[0]), bool(truncated[0])

@@ -5,6 +5,7 @@ from __future__ import annotations
 import copy
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -35,6 +36,7 @@ class Episodes:
         settings: The arguments of the environment.
         situation: Their state after the last step.
         layout: The observation space and its columns.
+        randomization: The domain randomization, prepared for the agents.
         observations: The observations of the last `look`, shape (n, layout.size), float32.
     """
 
@@ -66,6 +68,8 @@ class Episodes:
         self._buildings = list(buildings)
         self._tasks = [_prepared(settings.task, agent) for agent in firsts]
         check_alike(firsts)
+        for agent in firsts:
+            settings.randomization.check(agent)
         beams = first.laser.angles.count
         self.layout = settings.observation.layout(beams)
         low, high = settings.action.bounds(first)
@@ -73,8 +77,14 @@ class Episodes:
             if not np.array_equal(settings.action.bounds(agent), (low, high)):
                 raise WorldError("the drives of the agents must have the same limits")
         n = len(agents)
-        self.situation = Situation(n, beams, first.laser.range, low, high)
-        self.observations: FloatArray = np.zeros((n, self.layout.size), np.float32)
+        limits = settings.action.velocity_limits(first)
+        self.situation = Situation(n, beams, first.laser.range, low, high, limits)
+        self.situation.agents = self.agents
+        self.layout.prepare(self.situation)
+        self.randomization = copy.copy(settings.randomization)
+        self.randomization.prepare(n, beams, self.layout.size)
+        self._present: FloatArray = np.zeros((n, self.layout.size), np.float32)
+        self.observations = self._present  # or earlier ones, with latency
         self._lasers = [agent.laser for agent in agents]
         self._batch = None
         if Batch.is_possible(agents, low, high) and all(
@@ -82,11 +92,27 @@ class Episodes:
         ):
             self._batch = Batch(self.agents, self.situation, num_threads)
         self._all = np.arange(n)
+        self._columns = list(settings.action.columns)
 
     @property
     def goal_radius(self) -> float:
         """Distance to the goal at which an agent has arrived [m]."""
         return self._tasks[0].goal_radius
+
+    def set_task(self, task: Task, firsts: Sequence[Agent]) -> None:
+        """Replaces the task of all further episodes.
+
+        Args:
+            task: The task.
+            firsts: An agent of each building, whose worlds are in the state at the start.
+
+        Raises:
+            TypeError: It is no task.
+            WorldError: The task is impossible in a building; the previous one remains.
+        """
+        settings = replace(self.settings, task=task)
+        self._tasks = [_prepared(task, agent) for agent in firsts]
+        self.settings = settings
 
     def replace(self, row: int, agent: Agent, building: int) -> None:
         """Replaces an agent by one of another world, whose next episode begins.
@@ -112,6 +138,7 @@ class Episodes:
             ValueError: An option is unknown or invalid.
         """
         agent, s = self.agents[row], self.situation
+        self.randomization.begin(row, agent, rng)
         task = self._tasks[self._buildings[row]]
         start, goal = task.draw(agent, rng, occupied)
         if options:
@@ -142,26 +169,43 @@ class Episodes:
         )[0]:
             raise WorldError(f"the goal ({goal[0]:g}, {goal[1]:g}) is not free")
 
-    def step(self, actions: DoubleArray, rows: Rows | None = None) -> None:
-        """Carries out actions for one step of the environment, and observes all agents.
+    def read_actions(self, actions: object, n: int | None) -> DoubleArray:
+        """Returns actions as numbers from -1 to 1; see `Action.read`.
+
+        Raises:
+            InvalidAction: The actions are not elements of the space.
+        """
+        numbers: DoubleArray = self.settings.action.read(
+            actions, n, self.situation.low, self.situation.high
+        )
+        return numbers
+
+    def step(
+        self, actions: DoubleArray, rows: Rows | None = None, observed: Rows | None = None
+    ) -> None:
+        """Carries out actions for one step of the environment, and observes agents.
 
         Args:
-            actions: Actions in [-1, 1] of all agents, shape (n, 2).
+            actions: Numbers in [-1, 1] of all agents, as `read_actions` returns them.
             rows: Agents that act; None for all. The others stand still.
+            observed: Agents that must be observed; None for all.
         """
         s = self.situation
-        commands = s.low + (actions + 1.0) * (0.5 * (s.high - s.low))
+        commands = np.zeros((len(s), 3))
+        commands[:, self._columns] = s.low + (actions + 1.0) * (0.5 * (s.high - s.low))
         chosen: Rows | slice = slice(None) if rows is None else rows  # A slice is faster.
         s.previous_actions[chosen] = s.actions[chosen]
         s.actions[chosen] = actions[chosen]
         s.previous_distance[chosen] = s.distance[chosen]
         s.steps[chosen] += 1
+        acting_rows = self._all if rows is None else rows
+        self.randomization.change_commands(commands, s, acting_rows)
         n = self.settings.physics_steps
         if self._batch is None:
-            agents = [self.agents[row] for row in (self._all if rows is None else rows).tolist()]
+            agents = [self.agents[row] for row in acting_rows.tolist()]
             step_agents(agents, commands[chosen], n, self._num_threads)
             s.collided[chosen] = [agent.touches.touched for agent in agents]
-            self.look()
+            self.look(observed)
             return
         acting = np.zeros(len(s), np.bool_)
         acting[chosen] = True
@@ -180,12 +224,14 @@ class Episodes:
             self._observe()
             return
         self._measure(rows)
+        self.randomization.change_scans(s, rows)
         part = s.take(rows)
         part.locate(self.goal_radius)
-        observations = np.empty((len(rows), self.layout.size), np.float32)
+        observations = self._present[rows]
         self.layout.write(part, observations)
-        self.observations[rows] = observations
+        self._present[rows] = observations
         s.put(rows, part)
+        self.observations = self.randomization.change_observations(self._present, s, rows)
 
     def _measure(self, rows: Rows) -> None:
         """Reads poses and velocities of some agents, and performs scans."""
@@ -205,8 +251,12 @@ class Episodes:
 
     def _observe(self) -> None:
         """Computes the observations of all agents."""
+        self.randomization.change_scans(self.situation, self._all)
         self.situation.locate(self.goal_radius)
-        self.layout.write(self.situation, self.observations)
+        self.layout.write(self.situation, self._present)
+        self.observations = self.randomization.change_observations(
+            self._present, self.situation, self._all
+        )
 
     def judge(self) -> tuple[DoubleArray, BoolArray, BoolArray]:
         """Returns rewards, which episodes terminated and which were truncated, (n,) each."""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -13,21 +12,15 @@ from gymnasium.error import InvalidAction, ResetNeeded
 from gymnasium.utils import seeding
 from pettingzoo import ParallelEnv
 
-from flatland.entities.body import Body
 from flatland.geometry import FloatArray
-from flatland.gym.actions import checked_actions
-from flatland.gym.agents import Agent, check_alike
-from flatland.gym.buildings import Buildings
 from flatland.gym.checks import checked_count
 from flatland.gym.recreation import Recreated
-from flatland.gym.settings import Settings
+from flatland.gym.robots import begin_together, fleet_settings, spawn_robots, stop
 from flatland.gym.stage import RENDER_MODES, Image, Stage
-from flatland.gym.tasks import Occupied
-from flatland.gym.worlds import included_robot
-from flatland.values import Twist
+from flatland.gym.tasks import Task
 
 if TYPE_CHECKING:
-    from flatland.world import World
+    pass
 
 Steps = tuple[
     dict[str, Any], dict[str, float], dict[str, bool], dict[str, bool], dict[str, dict[str, Any]]
@@ -80,12 +73,7 @@ class FleetEnv(Recreated, ParallelEnv[str, Any, FloatArray]):  # type: ignore[mi
             ValueError: An argument is out of range.
         """
         num_robots = checked_count("num_robots", num_robots)
-        for name in ("agent", "command"):
-            if name in arguments:
-                raise TypeError(f"{name} is not an argument here: it is that of each robot")
-        if isinstance(world, Buildings):
-            raise TypeError("world must be a file or a name: several robots have one building")
-        settings = Settings.from_arguments({"world": world, **arguments})
+        settings = fleet_settings(world, arguments)
         self.possible_agents = [f"robot_{i}" for i in range(num_robots)]
         self.agents: list[str] = []
         self._row_of = {name: row for row, name in enumerate(self.possible_agents)}
@@ -93,7 +81,7 @@ class FleetEnv(Recreated, ParallelEnv[str, Any, FloatArray]):  # type: ignore[mi
         self._stage = Stage(
             settings,
             [settings.world_name],
-            lambda world: self._spawn(world, robot, settings),
+            lambda world: spawn_robots(world, self.possible_agents, robot, settings),
             render_mode=render_mode,
             web_port=web_port,
             metadata=self.metadata,
@@ -110,9 +98,23 @@ class FleetEnv(Recreated, ParallelEnv[str, Any, FloatArray]):  # type: ignore[mi
         """Returns the observation space, the same for all robots."""
         return self._observation_space
 
-    def action_space(self, agent: str) -> spaces.Box:
+    def action_space(self, agent: str) -> spaces.Space[Any]:
         """Returns the action space of a robot."""
         return self._action_spaces[agent]
+
+    @property
+    def task(self) -> Task:
+        """The task, settable: starts and goals of all further episodes.
+
+        Running episodes keep their goals; the `goal_radius` applies at once. A task that is
+        impossible in a building is a `WorldError`, and the previous one remains.
+        """
+        return self._episodes.settings.task
+
+    @task.setter
+    def task(self, task: Task) -> None:
+        self._stage.set_task(task)
+        self._replace_argument("task", task)
 
     @property
     def goals(self) -> dict[str, tuple[float, float]]:
@@ -142,13 +144,7 @@ class FleetEnv(Recreated, ParallelEnv[str, Any, FloatArray]):  # type: ignore[mi
             self._rng, _ = seeding.np_random(seed)
         self.agents = []
         self._stage.restore(0, self._rng)
-        occupied = Occupied()
-        for row, agent in enumerate(self._agents):
-            occupied.unplaced = _bodies(self._agents[row + 1 :])
-            self._episodes.begin(row, self._rng, occupied, {})
-            x, y = self._episodes.situation.goals[row].tolist()
-            occupied.goals.append((x, y))
-            agent.command.set(Twist())
+        begin_together(self._episodes, range(len(self._agents)), self._rng)
         self._episodes.look()
         self.agents = list(self.possible_agents)
         self._stage.show()
@@ -158,7 +154,7 @@ class FleetEnv(Recreated, ParallelEnv[str, Any, FloatArray]):  # type: ignore[mi
         """Carries out an action of each robot whose episode has not ended.
 
         Args:
-            actions: Forward speed and yaw rate, each from -1 to 1, by the names in `agents`.
+            actions: Elements of the action space by the names in `agents`.
 
         Returns:
             Observations, rewards, whether episodes terminated, whether they were truncated, and
@@ -179,14 +175,14 @@ class FleetEnv(Recreated, ParallelEnv[str, Any, FloatArray]):  # type: ignore[mi
                 f"actions must be those of {', '.join(live)}, got {', '.join(actions) or 'none'}"
             )
         rows = np.array([self._row_of[name] for name in live])
-        numbers = np.zeros((len(self._agents), 2))
-        numbers[rows] = checked_actions([actions[name] for name in live], len(live))
+        numbers = np.zeros_like(self._episodes.situation.actions)
+        numbers[rows] = self._episodes.read_actions([actions[name] for name in live], len(live))
         self._episodes.step(numbers, rows)
         rewards, terminated, truncated = self._episodes.judge()
         ended = terminated | truncated
         for name in live:
             if ended[self._row_of[name]]:
-                self._agents[self._row_of[name]].command.set(Twist())
+                stop(self._agents[self._row_of[name]])
         self.agents = [name for name in live if not ended[self._row_of[name]]]
         self._stage.show()
         return (
@@ -218,26 +214,9 @@ class FleetEnv(Recreated, ParallelEnv[str, Any, FloatArray]):  # type: ignore[mi
         """Closes the world and its view; further calls have no effect."""
         self._stage.close()
 
-    def _spawn(
-        self, world: World, robot: str | os.PathLike[str] | None, settings: Settings
-    ) -> list[Agent]:
-        """Adds the robots at free places."""
-        path = included_robot() if robot is None else robot
-        agents: list[Agent] = []
-        for name in self.possible_agents:
-            # This pose is never simulated: each reset places all robots.
-            world.spawn_model(path, name, name, if_blocked="allow")
-            agents.append(settings.find_agent(world, name))
-        check_alike(agents)
-        return agents
-
     def _observations(self, names: list[str]) -> dict[str, Any]:
         present, numbers = self._episodes.layout.present, self._episodes.observations
         return {name: present(numbers[self._row_of[name]]) for name in names}
 
     def _infos(self, names: list[str]) -> dict[str, dict[str, Any]]:
         return {name: self._episodes.info(self._row_of[name]) for name in names}
-
-
-def _bodies(agents: Sequence[Agent]) -> list[Body]:
-    return [body for agent in agents for body in agent.model.bodies]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import math
 from abc import ABC, abstractmethod
 from typing import TYPE_CHECKING, Any, Final, TypeVar
@@ -10,6 +11,7 @@ import numpy as np
 from gymnasium import spaces
 
 from flatland.geometry import DoubleArray, FloatArray
+from flatland.gym.checks import checked_count
 
 if TYPE_CHECKING:
     from flatland.gym.situation import Situation
@@ -26,11 +28,13 @@ class ObservationPart(ABC):
         name: Key of the part in a dictionary of observations.
         low: Lower bound of all numbers.
         high: Upper bound of all numbers.
+        dtype: Type of the numbers in an observation, float32 or uint8; `write` has float32.
     """
 
     name: str
     low: float = -1.0
     high: float = 1.0
+    dtype: type[np.float32 | np.uint8] = np.float32
 
     @abstractmethod
     def size(self, beams: int) -> int:
@@ -40,9 +44,29 @@ class ObservationPart(ABC):
             ValueError: The part does not support this number of beams.
         """
 
+    def shape(self, beams: int) -> tuple[int, ...]:
+        """Returns the shape in an observation, by default (size,); that of an image has 3 axes."""
+        return (self.size(beams),)
+
+    def prepare(self, situation: Situation) -> None:  # noqa: B027 - most parts need nothing
+        """Prepares a copy of the part for an environment.
+
+        Args:
+            situation: The state of the agents, before the first episode.
+
+        Raises:
+            ValueError: The part cannot be computed.
+        """
+
     @abstractmethod
     def write(self, situation: Situation, out: FloatArray) -> None:
-        """Writes the numbers of all agents to `out`, shape (n, size), float32."""
+        """Writes the numbers of all agents.
+
+        Args:
+            situation: The state of the agents.
+            out: Array for the numbers, shape (n, size), float32. It contains those of the previous
+                step, except for agents whose episode begins (`situation.steps` is 0).
+        """
 
 
 class Scan(ObservationPart):
@@ -148,18 +172,37 @@ class Goal(ObservationPart):
 
 
 class Velocity(ObservationPart):
-    """Forward speed and yaw rate, divided by the greatest that can be commanded."""
+    """Forward speed and yaw rate, divided by the greatest that can be commanded.
+
+    With `sideways`, the sideways velocity is between them, for drives that move sideways.
+    """
 
     name = "velocity"
 
+    def __init__(self, sideways: bool = False) -> None:
+        """Creates the part.
+
+        Args:
+            sideways: Whether the sideways velocity is observed.
+        """
+        self.sideways = sideways
+
     def size(self, beams: int) -> int:  # noqa: ARG002 - does not depend on the laser
-        """Returns 2."""
-        return 2
+        """Returns 2, or 3 with the sideways velocity."""
+        return 3 if self.sideways else 2
 
     def write(self, situation: Situation, out: FloatArray) -> None:
-        """Writes both velocities; a robot that is pushed may exceed the bounds, which are kept."""
-        limit = np.maximum(np.abs(situation.low), np.abs(situation.high))
-        situation.core.write_velocities(limit[0], limit[1], out)
+        """Writes the velocities; a robot that is pushed may exceed the bounds, which are kept."""
+        forward, sideways, turn = situation.velocity_limits
+        if not self.sideways:
+            situation.core.write_velocities(forward, turn, out)
+            return
+        both = np.empty((len(out), 2), np.float32)
+        situation.core.write_velocities(forward, turn, both)
+        vx, vy, _ = situation.velocities.T
+        theta = situation.poses[:, 2]
+        out[:, ::2] = both
+        out[:, 1] = np.clip((vy * np.cos(theta) - vx * np.sin(theta)) / sideways, -1.0, 1.0)
 
     def velocities_of(
         self, values: DoubleArray, low: DoubleArray, high: DoubleArray
@@ -179,17 +222,88 @@ class Velocity(ObservationPart):
 
 
 class LastAction(ObservationPart):
-    """The action of the last step, zero at the start of an episode."""
+    """The action of the last step as numbers, zero at the start of an episode."""
 
     name = "last_action"
 
+    def __init__(self, numbers: int = 2) -> None:
+        """Creates the part.
+
+        Args:
+            numbers: Numbers of an action: 2, or 3 for a `HolonomicAction`.
+
+        Raises:
+            ValueError: It is not 2 or 3.
+        """
+        if numbers not in (2, 3):
+            raise ValueError(f"numbers must be 2 or 3, got {numbers!r}")
+        self.numbers = numbers
+
     def size(self, beams: int) -> int:  # noqa: ARG002 - does not depend on the laser
-        """Returns 2."""
-        return 2
+        """Returns the number of numbers."""
+        return self.numbers
+
+    def prepare(self, situation: Situation) -> None:
+        """Checks that actions have as many numbers."""
+        if situation.actions.shape[1] != self.numbers:
+            raise ValueError(
+                f"LastAction({self.numbers}) requires actions of {self.numbers} numbers, got "
+                f"{situation.actions.shape[1]}"
+            )
 
     def write(self, situation: Situation, out: FloatArray) -> None:
         """Writes the action."""
         out[:] = situation.actions
+
+
+class Stacked(ObservationPart):
+    """The last values of a part, oldest first; the first ones of an episode are repeated.
+
+    Values are concatenated along the last axis: the channels of an image.
+    """
+
+    def __init__(self, part: ObservationPart, count: int) -> None:
+        """Creates the part.
+
+        Args:
+            part: The part.
+            count: Number of observations.
+
+        Raises:
+            ValueError: `count` is not an integer of at least 1.
+        """
+        self.part = part
+        self.count = checked_count("count", count)
+        self.name, self.low, self.high = part.name, part.low, part.high
+        self.dtype = part.dtype
+
+    def size(self, beams: int) -> int:
+        """Returns the number of all values."""
+        return self.count * self.part.size(beams)
+
+    def shape(self, beams: int) -> tuple[int, ...]:
+        """Returns the shape of the part, with a longer last axis."""
+        *outer, last = self.part.shape(beams)
+        return (*outer, self.count * last)
+
+    def prepare(self, situation: Situation) -> None:
+        """Prepares the part."""
+        self.part = copy.copy(self.part)
+        self.part.prepare(situation)
+        *outer, last = self.part.shape(situation.ranges.shape[1])
+        self._frames = (*outer, self.count, last)
+
+    def write(self, situation: Situation, out: FloatArray) -> None:
+        """Drops the oldest values and appends the present ones."""
+        n = len(out)
+        frames = out.reshape(n, *self._frames).copy()
+        newest = frames[..., -1, :].copy()
+        self.part.write(situation, newest.reshape(n, -1))  # a view
+        frames[..., :-1, :] = frames[..., 1:, :]
+        frames[..., -1, :] = newest
+        is_first = situation.steps == 0
+        frames[is_first] = newest[is_first][..., np.newaxis, :]
+        out[:] = frames.reshape(n, -1)
 
 
 class Observation:
@@ -220,7 +334,8 @@ class Observation:
         """Returns the space and the columns for a laser with a number of beams.
 
         Raises:
-            ValueError: A part cannot be computed from that many beams.
+            ValueError: A part cannot be computed from that many beams, or an image is one of
+                several parts of an array.
         """
         return ObservationLayout(self, beams)
 
@@ -231,6 +346,7 @@ class ObservationLayout:
     Attributes:
         space: Space of one observation.
         size: Number of columns.
+        blank: An observation of zeros, limited to the bounds, shape (size,), float32.
     """
 
     def __init__(self, observation: Observation, beams: int) -> None:
@@ -242,24 +358,45 @@ class ObservationLayout:
         """
         self._as_dict = observation.as_dict
         self._columns: list[tuple[ObservationPart, slice]] = []
+        self._shapes: dict[str, tuple[int, ...]] = {}
         start = 0
-        for part in observation.parts:
+        for part in map(copy.copy, observation.parts):
             end = start + part.size(beams)
             self._columns.append((part, slice(start, end)))
+            self._shapes[part.name] = part.shape(beams)
             start = end
         self.size = start
-        low, high = np.empty(self.size, np.float32), np.empty(self.size, np.float32)
+        self.blank: FloatArray = np.zeros(self.size, np.float32)
         for part, columns in self._columns:
-            low[columns], high[columns] = part.low, part.high
+            self.blank[columns] = min(max(0.0, part.low), part.high)
+        # A single part has its own shape; several are concatenated.
+        self._single = part if len(self._columns) == 1 and not self._as_dict else None
+        boxes: dict[str, spaces.Space[Any]] = {
+            part.name: spaces.Box(part.low, part.high, self._shapes[part.name], part.dtype)
+            for part, _ in self._columns
+        }
         self.space: spaces.Space[Any]
-        if self._as_dict:
-            boxes: dict[str, spaces.Space[Any]] = {
-                part.name: spaces.Box(low[columns], high[columns], dtype=np.float32)
-                for part, columns in self._columns
-            }
+        if self._single is not None:
+            self.space = boxes[part.name]
+        elif self._as_dict:
             self.space = spaces.Dict(boxes)
         else:
+            for name, box in boxes.items():
+                if box.shape is None or len(box.shape) > 1 or box.dtype != np.float32:
+                    raise ValueError(f"{name} beside other parts requires as_dict=True")
+            low, high = np.empty(self.size, np.float32), np.empty(self.size, np.float32)
+            for part, columns in self._columns:
+                low[columns], high[columns] = part.low, part.high
             self.space = spaces.Box(low, high, dtype=np.float32)
+
+    def prepare(self, situation: Situation) -> None:
+        """Prepares all parts.
+
+        Raises:
+            ValueError: One cannot be computed.
+        """
+        for part, _ in self._columns:
+            part.prepare(situation)
 
     def has(self, kind: type[ObservationPart]) -> bool:
         """Returns whether there is a part of a class."""
@@ -302,11 +439,16 @@ class ObservationLayout:
             numbers: One observation, shape (size,), or several, shape (n, size).
             copy: Whether the result is independent of `numbers`.
         """
+        if self._single is not None:
+            return self._shaped(self._single, numbers, copy)
         if not self._as_dict:
             return numbers.copy() if copy else numbers
         # The keys of the space are sorted.
         parts = sorted(self._columns, key=lambda column: column[0].name)
         return {
-            part.name: numbers[..., columns].copy() if copy else numbers[..., columns]
-            for part, columns in parts
+            part.name: self._shaped(part, numbers[..., columns], copy) for part, columns in parts
         }
+
+    def _shaped(self, part: ObservationPart, numbers: FloatArray, copy: bool) -> Any:
+        shaped = numbers.reshape(*numbers.shape[:-1], *self._shapes[part.name])
+        return shaped.astype(part.dtype, copy=copy)

@@ -22,6 +22,11 @@ class Recreated:
         self._arguments = (args, kwargs)
         return self
 
+    def _replace_argument(self, name: str, value: Any) -> None:
+        """Replaces a keyword argument of further copies."""
+        args, kwargs = self._arguments
+        self._arguments = (args, {**kwargs, name: value})
+
     def __reduce__(self) -> tuple[Any, ...]:
         """Returns the arguments, and the attributes that a copy keeps."""
         kept = {name: vars(self)[name] for name in self.kept_attributes if name in vars(self)}

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import functools
-from typing import TYPE_CHECKING, Any, Final, NoReturn
+from typing import TYPE_CHECKING, Any, Final, Literal, NoReturn, overload
 
 import gymnasium
 from gymnasium.envs.registration import VectorizeMode
@@ -15,6 +15,7 @@ from flatland.gym.settings import DEFAULT_STEPS
 
 if TYPE_CHECKING:
     from flatland.gym.fleet import FleetEnv
+    from flatland.gym.fleet_vector import FleetVectorEnv
     from flatland.gym.vector import FlatlandVectorEnv
 
 _BUILDINGS: Final = 16
@@ -46,35 +47,52 @@ def register_all() -> None:
             kwargs={**arguments, "max_steps": None},
         )
     for name in PARALLEL:
-        # Gymnasium has no environments with several agents: the entry point raises an error.
-        gymnasium.register(name, entry_point=functools.partial(_refuse, name))
+        # Gymnasium has no environments with several agents, apart from vectors of their robots: the
+        # entry point raises an error.
+        gymnasium.register(
+            name,
+            entry_point=functools.partial(_refuse, name),
+            vector_entry_point="flatland.gym.fleet_vector:FleetVectorEnv",
+            max_episode_steps=DEFAULT_STEPS,
+            kwargs={**PARALLEL[name], "max_steps": None},
+        )
 
 
-def make_vec(name: str, num_envs: int = 1, **arguments: Any) -> FlatlandVectorEnv:
+@overload
+def make_vec(
+    name: Literal["flatland/Fleet-v0"], num_envs: int = 1, **arguments: Any
+) -> FleetVectorEnv: ...
+
+
+@overload
+def make_vec(name: str, num_envs: int = 1, **arguments: Any) -> FlatlandVectorEnv: ...
+
+
+def make_vec(name: str, num_envs: int = 1, **arguments: Any) -> FlatlandVectorEnv | FleetVectorEnv:
     """Returns many environments that are stepped together, in the core and over all cores.
 
     Args:
         name: A registered name, such as `flatland/Navigate-v0`.
-        num_envs: Number of environments.
-        **arguments: See `FlatlandVectorEnv` and `Settings`. Either of `max_steps` and
-            `max_episode_steps` replaces the limit of the registered environment.
+        num_envs: Number of environments; of worlds for environments with several robots, each of
+            which is an environment of the vector.
+        **arguments: See `FlatlandVectorEnv`, `FleetVectorEnv` and `Settings`. Either of `max_steps`
+            and `max_episode_steps` replaces the limit of the registered environment.
 
     Raises:
-        gymnasium.error.Error: The name is unknown, or the environment has several robots.
+        gymnasium.error.Error: The name is unknown.
         FlatlandError: A file is missing or invalid, or the model cannot be an agent.
         TypeError: An argument is unknown or has the wrong type.
         ValueError: An argument is out of range.
     """
-    if name in PARALLEL:
-        _refuse(name)
-    if name not in SINGLE:
-        raise NameNotFound(f'environment "{name}" does not exist; known: {", ".join(SINGLE)}')
+    if name not in SINGLE and name not in PARALLEL:
+        known = ", ".join([*SINGLE, *PARALLEL])
+        raise NameNotFound(f'environment "{name}" does not exist; known: {known}')
     if arguments.get("max_steps") is not None:
         arguments.setdefault("max_episode_steps", arguments["max_steps"])
     envs: Any = gymnasium.make_vec(
         name, num_envs, vectorization_mode=VectorizeMode.VECTOR_ENTRY_POINT, **arguments
     )
-    vector: FlatlandVectorEnv = envs
+    vector: FlatlandVectorEnv | FleetVectorEnv = envs
     return vector
 
 

@@ -97,9 +97,9 @@ class Jerkiness(Reward):
     """The squared change of the action; to be scaled by a negative number."""
 
     def compute(self, situation: Situation) -> DoubleArray:
-        """Returns the sum of the squared changes of both numbers."""
+        """Returns the sum of the squared changes of all numbers."""
         change = situation.actions - situation.previous_actions
-        return np.asarray(change[:, 0] * change[:, 0] + change[:, 1] * change[:, 1])
+        return np.asarray((change * change).sum(axis=1))
 
 
 class Proximity(Reward):

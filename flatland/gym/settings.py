@@ -9,12 +9,13 @@ from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
-from flatland.gym.actions import VelocityAction
+from flatland.gym.actions import Action, VelocityAction
 from flatland.gym.agents import Agent, find_agent
 from flatland.gym.buildings import Buildings
 from flatland.gym.checks import checked_count
 from flatland.gym.endings import Ending, navigation_ending
 from flatland.gym.observations import Observation
+from flatland.gym.randomization import Randomization
 from flatland.gym.rewards import Reward, navigation_reward
 from flatland.gym.tasks import RandomGoal, Task
 from flatland.gym.worlds import find_world
@@ -42,6 +43,7 @@ class Settings:
         action: How actions are scaled.
         reward: The reward.
         ending: When an episode terminates.
+        randomization: What differs between episodes besides starts, goals and buildings.
         max_steps: Number of steps after which an episode is truncated; None for no limit.
         physics_steps: Number of steps of the world in a step of the environment.
         step_size: Simulated time of a step of the world [s].
@@ -54,9 +56,10 @@ class Settings:
     command: str | None = None
     task: Task = field(default_factory=RandomGoal)
     observation: Observation = field(default_factory=Observation)
-    action: VelocityAction = field(default_factory=VelocityAction)
+    action: Action = field(default_factory=VelocityAction)
     reward: Reward = field(default_factory=navigation_reward)
     ending: Ending = field(default_factory=navigation_ending)
+    randomization: Randomization = field(default_factory=Randomization)
     max_steps: int | None = DEFAULT_STEPS
     physics_steps: int = 20
     step_size: float = 0.005
@@ -141,9 +144,10 @@ class Settings:
 
 
 _KINDS: dict[str, type] = {
-    "action": VelocityAction,
+    "action": Action,
     "ending": Ending,
     "observation": Observation,
+    "randomization": Randomization,
     "reward": Reward,
     "task": Task,
 }

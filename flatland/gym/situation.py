@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
 
 from flatland.geometry import BoolArray, DoubleArray, FloatArray
 from flatland.physics import AgentRows
+
+if TYPE_CHECKING:
+    from flatland.gym.agents import Agent
 
 Rows = npt.NDArray[np.intp]
 
@@ -35,15 +39,25 @@ class Situation:
         arrived: Whether the agent is at its goal, shape (n,).
         collided: Whether a solid footprint of the agent touched anything during the step,
             shape (n,).
-        actions: Actions in [-1, 1], zero before the first step, shape (n, 2).
-        previous_actions: Actions of the step before, shape (n, 2).
-        low: Velocity command (v, omega) of the action (-1, -1) [m/s, rad/s], shape (2,).
-        high: Velocity command of the action (1, 1) [m/s, rad/s], shape (2,).
+        actions: Actions as numbers in [-1, 1], zero before the first step, shape (n, k): speed and
+            yaw rate, k = 2, for `VelocityAction`.
+        previous_actions: Actions of the step before, shape (n, k).
+        low: Command of the lowest action, such as (v, omega) [m/s, rad/s], shape (k,).
+        high: Command of the highest action, shape (k,).
+        velocity_limits: Greatest velocities (forward, sideways, yaw rate), the units of observed
+            velocities [m/s, rad/s], shape (3,).
         steps: Number of steps since the start of the episode, shape (n,).
+        agents: The agents, for what the arrays do not contain; they must not be changed.
     """
 
     def __init__(
-        self, n: int, beams: int, max_range: float, low: DoubleArray, high: DoubleArray
+        self,
+        n: int,
+        beams: int,
+        max_range: float,
+        low: DoubleArray,
+        high: DoubleArray,
+        velocity_limits: DoubleArray | None = None,
     ) -> None:
         """Creates arrays of zeros.
 
@@ -51,12 +65,18 @@ class Situation:
             n: Number of agents.
             beams: Number of beams of a laser.
             max_range: Range of the laser [m].
-            low: Velocity command of the action (-1, -1).
-            high: Velocity command of the action (1, 1).
+            low: Command of the lowest action.
+            high: Command of the highest action.
+            velocity_limits: Greatest velocities (forward, sideways, yaw rate); None for those of
+                the commands (v, omega) `low` and `high`.
         """
         self.max_range = max_range
         self.low = low
         self.high = high
+        if velocity_limits is None:
+            speed, turn = np.maximum(np.abs(low), np.abs(high))
+            velocity_limits = np.array([speed, speed, turn])
+        self.velocity_limits = velocity_limits
         self.poses: DoubleArray = np.zeros((n, 3))
         self.velocities: DoubleArray = np.zeros((n, 3))
         self.speed: DoubleArray = np.zeros(n)
@@ -69,9 +89,10 @@ class Situation:
         self.previous_distance: DoubleArray = np.zeros(n)
         self.arrived: BoolArray = np.zeros(n, np.bool_)
         self.collided: BoolArray = np.zeros(n, np.bool_)
-        self.actions: DoubleArray = np.zeros((n, 2))
-        self.previous_actions: DoubleArray = np.zeros((n, 2))
+        self.actions: DoubleArray = np.zeros((n, len(low)))
+        self.previous_actions: DoubleArray = np.zeros((n, len(low)))
         self.steps: npt.NDArray[np.int64] = np.zeros(n, np.int64)
+        self.agents: Sequence[Agent] = ()
         self._core: AgentRows | None = None
 
     @property
@@ -98,9 +119,11 @@ class Situation:
 
     def take(self, rows: Rows) -> Situation:
         """Returns a copy of some rows."""
-        part = Situation(0, 0, self.max_range, self.low, self.high)
+        part = Situation(0, 0, self.max_range, self.low, self.high, self.velocity_limits)
         for name, values in self._rows().items():
             setattr(part, name, values[rows])
+        if self.agents:
+            part.agents = [self.agents[row] for row in rows.tolist()]
         return part
 
     def put(self, rows: Rows, part: Situation) -> None:
@@ -110,7 +133,7 @@ class Situation:
 
     def _rows(self) -> dict[str, npt.NDArray[Any]]:
         """Returns the arrays with one row per agent by name."""
-        shared = ("max_range", "low", "high", "_core")
+        shared = ("max_range", "low", "high", "velocity_limits", "agents", "_core")
         return {name: values for name, values in vars(self).items() if name not in shared}
 
     def locate(self, goal_radius: float) -> None:

@@ -12,6 +12,7 @@ import numpy as np
 from gymnasium.vector import AutoresetMode
 
 from flatland.extras import require
+from flatland.gym.fleet_vector import FleetVectorEnv
 from flatland.gym.vector import FlatlandVectorEnv
 
 require("stable_baselines3", "flatland.gym.stable_baselines requires")
@@ -20,13 +21,13 @@ from stable_baselines3.common.vec_env import VecEnv
 
 
 class StableVector(VecEnv):  # type: ignore[misc, unused-ignore]
-    """Passes a `FlatlandVectorEnv` to stable-baselines3.
+    """Passes a `FlatlandVectorEnv` or a `FleetVectorEnv` to stable-baselines3.
 
     stable-baselines3 has a class of its own for several environments. It expects that an episode
     that ends is followed by the next one in the same step, and the last observation in the info.
     """
 
-    def __init__(self, envs: FlatlandVectorEnv) -> None:
+    def __init__(self, envs: FlatlandVectorEnv | FleetVectorEnv) -> None:
         """Wraps environments of the autoreset mode `SAME_STEP`.
 
         Raises:
@@ -68,7 +69,7 @@ class StableVector(VecEnv):  # type: ignore[misc, unused-ignore]
         observations, rewards, terminated, truncated, infos = self.envs.step(self._actions)
         ended = terminated | truncated
         self._returns += rewards
-        self._lengths += 1
+        self._lengths += infos.get("is_active", True)  # Robots of a fleet may wait.
         details: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]
         for row in np.flatnonzero(ended).tolist():
             final = infos["final_info"]
@@ -96,8 +97,16 @@ class StableVector(VecEnv):  # type: ignore[misc, unused-ignore]
         return [getattr(self.envs, attr_name) for _ in self._get_indices(indices)]
 
     def set_attr(self, attr_name: str, value: Any, indices: Any = None) -> None:
-        """Raises AttributeError: the environments share their attributes."""
-        raise AttributeError(f"{attr_name} cannot be set: the environments share their attributes")
+        """Sets the attribute `task` of all environments.
+
+        Raises:
+            AttributeError: Another attribute, or some environments only: they share attributes.
+        """
+        if attr_name != "task" or list(self._get_indices(indices)) != list(range(self.num_envs)):
+            raise AttributeError(
+                f"{attr_name} cannot be set: the environments share their attributes"
+            )
+        self.envs.task = value
 
     def env_method(
         self, method_name: str, *args: Any, indices: Any = None, **kwargs: Any

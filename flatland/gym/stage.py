@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from flatland.geometry import Vector2
     from flatland.gym.agents import Agent
     from flatland.gym.settings import Settings
+    from flatland.gym.tasks import Task
     from flatland.world import World
 
 Image = npt.NDArray[np.uint8]
@@ -118,6 +119,29 @@ class Stage:
         count = len(goals) // len(self.worlds)
         return [goals[start : start + count] for start in range(0, len(goals), count)]
 
+    def set_task(self, task: Task) -> None:
+        """Replaces the task of all further episodes; running ones and their goals remain.
+
+        Raises:
+            ClosedEnvironmentError: The environment is closed.
+            TypeError: It is no task.
+            WorldError: The task is impossible in a building; the previous one remains.
+        """
+        self.check_open()
+        with ExitStack() as undo:
+            firsts = []
+            for stock in self._stocks:
+                if len(self._stocks) == 1:
+                    # The world of an episode, which continues.
+                    first = self._used[0]
+                    undo.callback(first.world.restore, first.world.snapshot())
+                else:
+                    first = stock.take()
+                    undo.callback(stock.idle.append, first)
+                first.world.restore(first.start)
+                firsts.append(first.agents[0])
+            self.episodes.set_task(task, firsts)
+
     def restore(self, number: int, rng: np.random.Generator) -> None:
         """Returns a world to its state before any episode, with new random numbers of all plugins.
 
@@ -136,6 +160,7 @@ class Stage:
                 plugin.reseed(rng)
         for world_plugin in world.plugins:
             world_plugin.reseed(rng)
+        self.episodes.randomization.change_world(world, rng)
 
     def _enter(self, number: int, building: int) -> None:
         """Replaces a world by one of another building."""

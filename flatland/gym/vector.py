@@ -14,14 +14,13 @@ from gymnasium.vector.utils import batch_space
 
 from flatland.errors import WorldError
 from flatland.geometry import BoolArray, DoubleArray
-from flatland.gym.actions import checked_actions
 from flatland.gym.checks import checked_count
 from flatland.gym.env import FlatlandEnv
 from flatland.gym.recreation import Recreated
 from flatland.gym.settings import Settings
 from flatland.gym.situation import Rows
 from flatland.gym.stage import Image, Stage
-from flatland.gym.tasks import Occupied
+from flatland.gym.tasks import Occupied, Task
 
 if TYPE_CHECKING:
     from flatland.gym.buildings import Buildings
@@ -137,6 +136,20 @@ class FlatlandVectorEnv(Recreated, VectorEnv[Any, Any, Any]):
         return self._episodes.situation.goals.copy()
 
     @property
+    def task(self) -> Task:
+        """The task, settable: starts and goals of all further episodes.
+
+        Running episodes keep their goals; the `goal_radius` applies at once. A task that is
+        impossible in a building is a `WorldError`, and the previous one remains.
+        """
+        return self._episodes.settings.task
+
+    @task.setter
+    def task(self, task: Task) -> None:
+        self._stage.set_task(task)
+        self._replace_argument("task", task)
+
+    @property
     def episodes(self) -> Episodes:
         """The episodes: agents, settings, and the layout of the observation."""
         return self._episodes
@@ -171,20 +184,21 @@ class FlatlandVectorEnv(Recreated, VectorEnv[Any, Any, Any]):
         self._stage.check_open()
         mask, places = _checked_options(options or {}, self.num_envs)
         rows = np.flatnonzero(mask)
-        seeds = _checked_seeds(seed, self.num_envs)
+        seeds = checked_seeds(seed, self.num_envs)
         for row in rows.tolist():
             if seeds[row] is not None:
                 self._rngs[row], self._seeds[row] = seeding.np_random(seeds[row])
         self._begin(rows, places)
         self._episodes.look(None if len(rows) == self.num_envs else rows)
         self._stage.show()
-        return self._present(), self._infos(mask)
+        return self._present(), masked_infos(self._episodes, mask)
 
     def step(self, actions: Any) -> tuple[Any, DoubleArray, BoolArray, BoolArray, dict[str, Any]]:
         """Carries out one action in each environment.
 
         Args:
-            actions: Forward speed and yaw rate, each from -1 to 1, shape (num_envs, 2).
+            actions: An action for each environment, such as forward speed and yaw rate from -1 to
+                1, shape (num_envs, 2).
 
         Returns:
             Observations, rewards, which episodes terminated, which were truncated, infos. The
@@ -204,7 +218,7 @@ class FlatlandVectorEnv(Recreated, VectorEnv[Any, Any, Any]):
                 f"the episode of environment {row} has ended: call reset() with "
                 'options={"reset_mask": ...} before step()'
             )
-        numbers = checked_actions(actions, self.num_envs)
+        numbers = self._episodes.read_actions(actions, self.num_envs)
         # Only in the mode NEXT_STEP has any episode ended here.
         fresh = self._has_ended.copy()
         if fresh.any():
@@ -223,7 +237,7 @@ class FlatlandVectorEnv(Recreated, VectorEnv[Any, Any, Any]):
             self._has_ended = np.zeros(self.num_envs, np.bool_)
         else:
             self._has_ended = ended
-        infos.update(self._infos(np.ones(self.num_envs, np.bool_)))
+        infos.update(masked_infos(self._episodes, np.ones(self.num_envs, np.bool_)))
         self._stage.show()
         return self._present(), rewards, terminated, truncated, infos
 
@@ -277,19 +291,11 @@ class FlatlandVectorEnv(Recreated, VectorEnv[Any, Any, Any]):
         infos = {
             "final_obs": observations,
             "_final_obs": ended.copy(),
-            "final_info": self._infos(ended),
+            "final_info": masked_infos(self._episodes, ended),
             "_final_info": ended.copy(),
         }
         self._begin(rows)
         self._episodes.look(rows)
-        return infos
-
-    def _infos(self, mask: BoolArray) -> dict[str, Any]:
-        """Returns the infos of some environments as arrays with masks."""
-        infos: dict[str, Any] = {}
-        for name, values in self._episodes.infos().items():
-            infos[name] = np.where(mask, values, np.zeros(1, values.dtype))
-            infos[f"_{name}"] = mask.copy()
         return infos
 
     def _present(self) -> Any:
@@ -309,12 +315,12 @@ def _checked_options(
     unknown = sorted(set(options) - set(known))
     if unknown:
         raise ValueError(f"options must be among {', '.join(known)}, got {', '.join(unknown)}")
-    reset = _checked_mask("reset_mask", options.get("reset_mask"), n)
+    reset = checked_mask("reset_mask", options.get("reset_mask"), n)
     if not reset.any():
         raise ValueError('options["reset_mask"] must contain True')
     places: list[dict[str, DoubleArray]] = [{} for _ in range(n)]
     for name, size in (("start", 3), ("goal", 2)):
-        mask = _checked_mask(f"{name}_mask", options.get(f"{name}_mask"), n)
+        mask = checked_mask(f"{name}_mask", options.get(f"{name}_mask"), n)
         if options.get(name) is None:
             if f"{name}_mask" in options:
                 raise ValueError(f'options["{name}_mask"] requires options["{name}"]')
@@ -330,7 +336,27 @@ def _checked_options(
     return reset, places
 
 
-def _checked_mask(name: str, mask: object, n: int) -> BoolArray:
+def masked_infos(episodes: Episodes, mask: BoolArray) -> dict[str, Any]:
+    """Returns the infos of some environments as arrays with masks.
+
+    Args:
+        episodes: The episodes of all environments.
+        mask: The environments, shape (n,).
+    """
+    infos: dict[str, Any] = {}
+    for name, values in episodes.infos().items():
+        infos[name] = np.where(mask, values, np.zeros(1, values.dtype))
+        infos[f"_{name}"] = mask.copy()
+    return infos
+
+
+def checked_mask(name: str, mask: object, n: int) -> BoolArray:
+    """Returns a mask of n environments, all of them for None.
+
+    Raises:
+        TypeError: It is not an array of bools.
+        ValueError: It has another shape.
+    """
     if mask is None:
         return np.ones(n, np.bool_)
     if not isinstance(mask, np.ndarray) or mask.dtype != np.bool_:
@@ -340,7 +366,16 @@ def _checked_mask(name: str, mask: object, n: int) -> BoolArray:
     return mask
 
 
-def _checked_seeds(seed: int | Sequence[int | None] | None, n: int) -> list[int | None]:
+def checked_seeds(seed: int | Sequence[int | None] | None, n: int) -> list[int | None]:
+    """Returns the seeds of n environments.
+
+    Args:
+        seed: Seed of the first one, or a list of all seeds.
+        n: Number of environments.
+
+    Raises:
+        ValueError: There is another number of seeds.
+    """
     if seed is None:
         return [None] * n
     if isinstance(seed, int | np.integer):

@@ -31,16 +31,19 @@ class BodyDrive(ModelPlugin):
 
     Attributes:
         body: The driven body.
-        traction: Limits of the forces in mode `force`; None in mode `velocity`.
+        is_holonomic: Whether the drive moves the body sideways.
+        takes_steering: Whether the angular part of a command is a steering angle [rad] instead of a
+            yaw rate.
     """
 
     body: Body
-    traction: Traction | None
+    _traction: Traction | None = None
     _controller: DriveController
     _limits: tuple[DynamicsLimits, DynamicsLimits]  # linear, angular
     _odometer: Odometer
     _twist: Output[TwistWithCovariance] | None
-    _moves_sideways = False
+    is_holonomic = False
+    takes_steering = False
 
     @property
     def controller(self) -> DriveController:
@@ -78,6 +81,19 @@ class BodyDrive(ModelPlugin):
     def angular_dynamics(self, limits: DynamicsLimits) -> None:
         self._limits = self._limits[0], limits
         self.apply_limits()
+
+    @property
+    def traction(self) -> Traction | None:
+        """Limits of the forces in mode `force`, settable; None in mode `velocity`."""
+        return self._traction
+
+    @traction.setter
+    def traction(self, traction: Traction | None) -> None:
+        if traction is None and self._traction is not None:
+            raise ValueError("a drive with limits of forces cannot return to the mode velocity")
+        if traction is not None:
+            traction.apply(self.body, self._controller)
+        self._traction = traction
 
     def apply_limits(self) -> None:
         """Passes the limits to the controller."""
@@ -167,7 +183,7 @@ class BodyDrive(ModelPlugin):
                     odometer.child_frame_id,
                     (
                         forward + noise.sample(0),
-                        sideways + noise.sample(1) if self._moves_sideways else 0.0,
+                        sideways + noise.sample(1) if self.is_holonomic else 0.0,
                         yaw_rate + noise.sample(2),
                     ),
                     odometer.twist_covariance(pose, velocity),

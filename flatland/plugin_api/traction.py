@@ -31,33 +31,51 @@ class Traction:
         friction: Friction coefficient of the wheels on the ground; infinite without slip.
         grip_radius: Radius at which the friction of the wheels withstands a torque [m], 0 for the
             radius of gyration.
+        holonomic: Whether the motors push in all directions.
+        at_center: Whether the forces act at the centre of mass, as for a car, whose axles share the
+            load, or at the origin of the body.
     """
 
     max_force: float
     max_torque: float
     friction: float
     grip_radius: float
+    holonomic: bool = False
+    at_center: bool = False
+
+    def apply(self, body: Body, controller: DriveController) -> None:
+        """Sets the limits of the controller of a driven body.
+
+        Raises:
+            ValueError: A limit is negative or NaN, or the body is not dynamic.
+        """
+        controller.set_traction(
+            connected_bodies(body),
+            holonomic=self.holonomic,
+            at_center=self.at_center,
+            max_force=self.max_force,
+            max_torque=self.max_torque,
+            grip=self.friction * GRAVITY,
+            radius=self.grip_radius,
+        )
 
 
 def read_traction(
     config: YamlReader,
     body: Body,
-    controller: DriveController,
     *,
     holonomic: bool = False,
     needs_torque: bool = False,
     at_center: bool = False,
 ) -> Traction | None:
-    """Reads `mode` and the limits of forces, and sets the limits of a controller.
+    """Reads `mode` and the limits of forces.
 
     Args:
         config: Parameters of the drive.
         body: The driven body.
-        controller: Controller of the drive.
-        holonomic: Whether the motors push in all directions.
+        holonomic: See `Traction`.
         needs_torque: Whether `max_torque` is required.
-        at_center: Whether the forces act at the centre of mass, as for a car, whose axles
-            share the load, or at the origin of the body.
+        at_center: See `Traction`.
 
     Returns:
         The limits; None in mode `velocity`.
@@ -76,7 +94,7 @@ def read_traction(
             f'"mode: force" requires a dynamic body with a mass, but body "{body.name}" '
             + ("has none" if body.type == "dynamic" else f"is {body.type}")
         )
-    traction = Traction(
+    return Traction(
         max_force=config.get("max_force", "float", minimum=0),
         max_torque=(
             config.get("max_torque", "float", minimum=0)
@@ -85,17 +103,9 @@ def read_traction(
         ),
         friction=read_not_negative(config, "friction", 1.0),
         grip_radius=config.get("grip_radius", "float", 0.0, minimum=0, finite=True),
-    )
-    controller.set_traction(
-        connected_bodies(body),
         holonomic=holonomic,
         at_center=at_center,
-        max_force=traction.max_force,
-        max_torque=traction.max_torque,
-        grip=traction.friction * GRAVITY,
-        radius=traction.grip_radius,
     )
-    return traction
 
 
 def connected_bodies(body: Body) -> list[Body]:

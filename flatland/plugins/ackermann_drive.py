@@ -114,17 +114,18 @@ class AckermannDrive(BodyDrive):
         self.read_limits(config)
         self.geometry = CarGeometry.from_config(config, self.model, self.body)
         kind = self._read_command_type(config)
+        self.takes_steering = kind != "twist"
         self._controller = self.control(
             self.body.control_ackermann(
                 wheelbase=self.geometry.wheelbase,
                 track=self.geometry.track,
                 rear_center=self.geometry.rear_center,
                 front_joints=self.geometry.front_joints,
-                takes_twist=kind == "twist",
+                takes_twist=not self.takes_steering,
             )
         )
         self.apply_limits()
-        self.traction = read_traction(config, self.body, self._controller, at_center=True)
+        self.traction = read_traction(config, self.body, at_center=True)
         self.open_reports(config, self.geometry.rear_center)
         self._twist_command: Command[Twist] | None = None
         self._ackermann_command: Command[AckermannCommand] | None = None

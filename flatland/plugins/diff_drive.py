@@ -33,7 +33,7 @@ class DiffDrive(BodyDrive):
         self.read_limits(config)
         self._controller = self.control(self.body.control_velocity(holonomic=False))
         self.apply_limits()
-        self.traction = read_traction(config, self.body, self._controller, needs_torque=True)
+        self.traction = read_traction(config, self.body, needs_torque=True)
         self.open_reports(config)
         self._command = self.open_twist(config)
 

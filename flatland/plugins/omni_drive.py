@@ -36,7 +36,7 @@ class OmniDrive(BodyDrive):
     """
 
     _controller: OmniController
-    _moves_sideways = True
+    is_holonomic = True
 
     def on_initialize(self, config: YamlReader) -> None:
         """Reads the parameters and declares the ports.
@@ -57,9 +57,7 @@ class OmniDrive(BodyDrive):
             self.body.control_omni(rows, wheel_speed=speed, wheel_acceleration=acceleration)
         )
         self.apply_limits()
-        self.traction = read_traction(
-            config, self.body, self._controller, holonomic=True, needs_torque=True
-        )
+        self.traction = read_traction(config, self.body, holonomic=True, needs_torque=True)
         self.open_reports(config)
         self._command = self.open_twist(config)
 

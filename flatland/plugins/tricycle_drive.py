@@ -116,17 +116,18 @@ class TricycleDrive(BodyDrive):
         # Before the controller: the odometry is that before the wheels are steered.
         self._odometer.publish_at_rate(config, self._publish)
         self._command = self.open_twist(config)
+        self.takes_steering = read_choice(config, "command", _COMMANDS) == "steering"
         self._controller = self.control(
             self.body.control_tricycle(
                 self.geometry.front_joint,
                 steering_sign=self.geometry.steering_sign,
                 wheelbase=self.geometry.wheelbase,
                 rear_center=self.geometry.rear_center,
-                takes_twist=read_choice(config, "command", _COMMANDS) == "twist",
+                takes_twist=not self.takes_steering,
             )
         )
         self.apply_limits()
-        self.traction = read_traction(config, self.body, self._controller, at_center=True)
+        self.traction = read_traction(config, self.body, at_center=True)
 
     def read_limits(self, config: YamlReader) -> None:
         """Reads the limits, including those of the steering by the keys of older files."""

@@ -17,13 +17,13 @@ namespace {
 // Number of agents that a thread takes at a time.
 constexpr std::size_t kAgentsPerJob = 4;
 
-void set_target(Motion& motion, double forward, double omega) {
+void set_target(Motion& motion, const double* velocity) {
   std::visit(
       [&](auto& kind) {
         using Kind = std::decay_t<decltype(kind)>;
         if constexpr (std::is_same_v<Kind, TwistMotion> || std::is_same_v<Kind, OmniMotion> ||
                       std::is_base_of_v<SteeredMotion, Kind>) {
-          kind.target = {forward, 0.0, omega};
+          kind.target = {velocity[0], velocity[1], velocity[2]};
         }
       },
       motion);
@@ -51,8 +51,7 @@ std::vector<UnfinishedRun> AgentBatch::perform(const AgentCommands& commands, co
       if (commands.steps[i]) {
         Run own = run;
         own.time = commands.times[i];
-        const double* velocity = commands.velocities + 2 * i;
-        result = step(agents_[i], velocity[0], velocity[1], own);
+        result = step(agents_[i], commands.velocities + 3 * i, own);
         if (result.steps < run.n) {
           unfinished[i] = UnfinishedRun{i, std::move(result), nullptr};
           return;
@@ -75,11 +74,11 @@ std::vector<UnfinishedRun> AgentBatch::perform(const AgentCommands& commands, co
   return found;
 }
 
-RunResult AgentBatch::step(const Agent& agent, double forward, double omega, const Run& run) {
+RunResult AgentBatch::step(const Agent& agent, const double* velocity, const Run& run) {
   World& world = *agent.world;
   Controller* controller = world.jobs().find_controller(agent.controller);
   if (controller == nullptr) throw StaleHandleError("the controller was removed");
-  set_target(controller->motion, forward, omega);
+  set_target(controller->motion, velocity);
   TouchCollector* touches = world.contacts().touches.find(agent.touches);
   if (touches == nullptr) throw StaleHandleError("the collector was removed");
   touches->was_touched = false;

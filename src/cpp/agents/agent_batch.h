@@ -26,7 +26,7 @@ struct Agent {
 struct AgentCommands {
   const bool* steps;            // whether the world of the agent steps
   const bool* observes;         // whether the agent is observed, after its steps
-  const double* velocities;     // forward and yaw rate [m/s, rad/s], 2 numbers
+  const double* velocities;     // forward, sideways, yaw rate [m/s, rad/s], 3 numbers
   const std::int64_t* times;    // simulated time of the world [ns]
   const std::uint64_t* noises;  // key of the random numbers of a scan, and number of the scan
 };
@@ -61,7 +61,7 @@ class AgentBatch {
                                      const AgentObservations& rows, std::size_t num_threads);
 
  private:
-  RunResult step(const Agent& agent, double forward, double omega, const Run& run);
+  RunResult step(const Agent& agent, const double* velocity, const Run& run);
   void observe(std::size_t i, const AgentCommands& commands, const AgentObservations& rows);
 
   std::vector<Agent> agents_;

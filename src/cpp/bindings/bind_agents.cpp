@@ -63,7 +63,7 @@ class PyAgentBatch {
     const std::size_t readings = batch_.agents().front().finder->readings();
     check_rows(steps, agents, 1, "steps");
     check_rows(observes, agents, 1, "observes");
-    check_rows(velocities, agents, 2, "velocities");
+    check_rows(velocities, agents, 3, "velocities");
     check_rows(times, agents, 1, "times");
     check_rows(noises, agents, 2, "noises");
     check_rows(poses, agents, 3, "poses");
@@ -301,7 +301,8 @@ Args:
     run: The steps, as `Run`; each world has a time of its own.
     steps: Whether the world of the agent steps, shape (n,).
     observes: Whether the agent is observed, after its steps, shape (n,).
-    velocities: Commanded forward speed and yaw rate [m/s, rad/s], shape (n, 2).
+    velocities: Commands (forward, sideways, omega), or (speed, 0, steering angle) for a drive that is
+        steered [m/s, rad/s, rad], shape (n, 3).
     times: Simulated times of the worlds [ns], shape (n,).
     noises: Stream and number of the update of each scan, shape (n, 2).
     poses: Receives (x, y, theta) of the bodies in the world frame, shape (n, 3).

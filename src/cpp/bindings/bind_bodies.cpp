@@ -123,6 +123,22 @@ Raises:
     StaleHandleError: The body has already been destroyed.
     WorldLockedError: The world is stepping.
 )");
+  body.def(
+      "scale_shapes",
+      [](const BodyHandle& self, double factor) { scale_shapes(self.core(), self.id, factor); },
+      py::arg("factor"), R"(
+Multiplies the lengths of all shapes by a factor, relative to the origin of the body.
+
+The densities do not change, so that the mass is multiplied by the square of the factor.
+
+Args:
+    factor: The factor, from 0.1 to 10.
+
+Raises:
+    ValueError: The factor or the resulting mass is out of range, or a shape is an edge.
+    StaleHandleError: The body was destroyed.
+    WorldLockedError: The world is stepping.
+)");
   body.def_property_readonly(
       "type", [](const BodyHandle& self) { return type_name(read(self).GetType()); },
       "Type of the body, `static`, `kinematic` or `dynamic`.");

@@ -238,8 +238,24 @@ The counter-clockwise corners of a polygon, the end points of an edge; empty for
 }
 
 void bind_surface(py::class_<FixtureHandle, Handle>& fixture) {
-  def_reading(fixture, "density", &b2Fixture::GetDensity, "Density [kg/m^2].");
-  def_reading(fixture, "friction", &b2Fixture::GetFriction, "Friction coefficient.");
+  fixture.def_property(
+      "density", [](const FixtureHandle& self) { return read(self).GetDensity(); },
+      [](const FixtureHandle& self, double value) { set_density(self.core(), self.id, value); },
+      R"(
+Density [kg/m^2]; settable, which also sets the mass of the body.
+
+Raises:
+    ValueError: The density is negative or not finite, or the mass of the body would be out of range.
+)");
+  fixture.def_property(
+      "friction", [](const FixtureHandle& self) { return read(self).GetFriction(); },
+      [](const FixtureHandle& self, double value) { set_friction(self.core(), self.id, value); },
+      R"(
+Friction coefficient; settable, also for present contacts.
+
+Raises:
+    ValueError: The coefficient is negative or not finite.
+)");
   def_reading(fixture, "restitution", &b2Fixture::GetRestitution, "Restitution coefficient.");
   fixture.def_property(
       "is_sensor", [](const FixtureHandle& self) { return read(self).IsSensor(); },

@@ -1,5 +1,7 @@
 #include "world/bodies.h"
 
+#include <box2d/b2_contact.h>
+
 #include <algorithm>
 #include <cmath>
 #include <stdexcept>
@@ -55,6 +57,13 @@ void check_acceleration(float acceleration, const char* what) {
   if (!(std::abs(static_cast<double>(acceleration)) <= kMaxMagnitude)) {
     throw std::invalid_argument(std::string(what) + " is too large for the mass of the body");
   }
+}
+
+// Accounts for a new density or friction. A copy of a world that is restored to another one sets
+// those of moving bodies in any case.
+void surface_changed(World& world, b2Body* body) {
+  if (body->GetType() == b2_staticBody) world.structure_changed();
+  wake(world, body);
 }
 
 }  // namespace
@@ -269,6 +278,71 @@ void set_filter(World& world, Id fixture_id, std::uint16_t category_bits, std::u
   filter.maskBits = mask_bits;
   fixture->SetFilterData(filter);
   world.fixture_changed(fixture);
+}
+
+void set_density(World& world, Id fixture_id, double density) {
+  b2Fixture* fixture = world.change_fixture(fixture_id);
+  b2Body* body = fixture->GetBody();
+  const float checked = checked_not_negative(density, "density");
+  const float before = fixture->GetDensity();
+  fixture->SetDensity(0.0F);  // The check adds the shape with its new density.
+  try {
+    check_mass_with(*body, *fixture->GetShape(), checked);
+  } catch (const std::invalid_argument&) {
+    fixture->SetDensity(before);
+    throw;
+  }
+  fixture->SetDensity(checked);
+  body->ResetMassData();
+  surface_changed(world, body);
+}
+
+void set_friction(World& world, Id fixture_id, double friction) {
+  b2Fixture* fixture = world.change_fixture(fixture_id);
+  b2Body* body = fixture->GetBody();
+  fixture->SetFriction(checked_not_negative(friction, "friction"));
+  for (b2ContactEdge* edge = body->GetContactList(); edge != nullptr; edge = edge->next) {
+    edge->contact->ResetFriction();
+  }
+  surface_changed(world, body);
+}
+
+void scale_shapes(World& world, Id body_id, double factor) {
+  b2Body* body = world.change_body(body_id);
+  constexpr double kMin = 0.1;
+  constexpr double kMax = 10.0;
+  if (!(factor >= kMin && factor <= kMax)) {
+    throw std::invalid_argument("factor must be from 0.1 to 10, got " + to_text(factor));
+  }
+  // Of the largest mass, with which Box2D can compute.
+  constexpr double kMaxMass = 1e15;
+  const double growth = std::max(factor * factor, std::pow(factor, 4.0));
+  const auto mass = static_cast<double>(std::max(body->GetMass(), body->GetInertia()));
+  if (mass * growth > kMaxMass) {
+    throw std::invalid_argument("the mass of the body is too large for a factor of " +
+                                to_text(factor));
+  }
+  for (const b2Fixture* f = body->GetFixtureList(); f != nullptr; f = f->GetNext()) {
+    if (f->GetType() == b2Shape::e_circle || f->GetType() == b2Shape::e_polygon) continue;
+    throw std::invalid_argument("the body has edges, which cannot be scaled");
+  }
+  const auto scale = static_cast<float>(factor);
+  for (b2Fixture* f = body->GetFixtureList(); f != nullptr; f = f->GetNext()) {
+    if (f->GetType() == b2Shape::e_circle) {
+      auto& circle = static_cast<b2CircleShape&>(*f->GetShape());
+      circle.m_p *= scale;
+      circle.m_radius *= scale;
+    } else {
+      auto& polygon = static_cast<b2PolygonShape&>(*f->GetShape());
+      polygon.m_centroid *= scale;
+      for (int32 i = 0; i < polygon.m_count; ++i) polygon.m_vertices[i] *= scale;
+    }
+  }
+  body->ResetMassData();
+  world.structure_changed();
+  // Moves the boxes of the fixtures.
+  body->SetTransform(body->GetPosition(), body->GetAngle());
+  wake(world, body);
 }
 
 }  // namespace flatland

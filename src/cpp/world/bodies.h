@@ -83,5 +83,12 @@ b2Vec2 center_of(const b2Fixture& fixture);
 
 void set_sensor(World& world, Id fixture, bool is_sensor);
 void set_filter(World& world, Id fixture, std::uint16_t category_bits, std::uint16_t mask_bits);
+// Also sets the mass of the body. Throws std::invalid_argument if it would be out of range.
+void set_density(World& world, Id fixture, double density);
+// Also applies to present contacts.
+void set_friction(World& world, Id fixture, double friction);
+// Multiplies the lengths of all shapes by a factor, relative to the origin of the body, and sets
+// its mass. Throws std::invalid_argument if a shape is an edge or the mass would be out of range.
+void scale_shapes(World& world, Id body, double factor);
 
 }  // namespace flatland

@@ -223,14 +223,16 @@ class EngineCopier {
       get<members::BodyFixtures>(*body) = fixtures;
       get<members::BodyJoints>(*body) = joints;
       get<members::BodyContacts>(*body) = nullptr;
-      if (body->GetType() != b2_staticBody) revert_boxes(*from, *body);
+      if (body->GetType() != b2_staticBody) revert_fixtures(*from, *body);
       body = next;
     }
   }
 
-  static void revert_boxes(const b2Body& from, b2Body& to) {
+  static void revert_fixtures(const b2Body& from, b2Body& to) {
     const b2Fixture* source = from.GetFixtureList();
     for (b2Fixture* f = to.GetFixtureList(); f != nullptr; f = f->GetNext()) {
+      f->SetDensity(source->GetDensity());
+      f->SetFriction(source->GetFriction());
       get<members::FixtureProxies>(*f)->aabb = get<members::FixtureProxies>(*source)->aabb;
       source = source->GetNext();
     }

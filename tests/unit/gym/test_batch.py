@@ -111,15 +111,15 @@ def test_the_core_performs_all_steps_alone_after_those_with_first_updates(
 ) -> None:
     env = make(FlatlandVectorEnv, COUNT, room, ending=Arrived(), max_steps=1000)
     env.reset(seed=0)
-    actions, ones = np.full((COUNT, 2), 0.1), np.ones(COUNT, np.bool_)
+    commands, ones = np.tile([0.1, 0.0, 0.1], (COUNT, 1)), np.ones(COUNT, np.bool_)
     for _ in range(2):
-        env.step(actions)
+        env.step(np.full((COUNT, 2), 0.1))
     batch = env._episodes._batch
-    assert batch.perform(actions, ones, 20).tolist() == []
+    assert batch.perform(commands, ones, 20).tolist() == []
     env._stage.worlds[1].add_observer(Watcher())
-    assert batch.perform(actions, ones, 20).tolist() == [1]
+    assert batch.perform(commands, ones, 20).tolist() == [1]
     env._stage.worlds[2].physics.pre_solve = lambda *_: None
-    assert batch.perform(actions, ones, 20).tolist() == [1, 2]
+    assert batch.perform(commands, ones, 20).tolist() == [1, 2]
 
 
 def test_a_refused_call_of_the_core_advances_no_world(make: Make, room: Path) -> None:

@@ -13,7 +13,7 @@ import pytest
 from programs import run_program
 
 import flatland.gym
-from flatland.gym import FlatlandEnv, FlatlandVectorEnv
+from flatland.gym import FlatlandEnv, FlatlandVectorEnv, FleetVectorEnv
 
 Make = Callable[..., Any]
 
@@ -75,10 +75,20 @@ def test_vectors_are_made_by_name(make: Make) -> None:
         flatland.gym.make_parallel("flatland/Navigate-v0")
 
 
-def test_the_fleet_is_no_environment_of_gymnasium() -> None:
-    for make in (gymnasium.make, flatland.gym.make_vec):
-        with pytest.raises(gymnasium.error.UnsupportedMode, match=r"make_parallel\("):
-            make("flatland/Fleet-v0")
+def test_the_fleet_is_no_single_environment_of_gymnasium() -> None:
+    with pytest.raises(gymnasium.error.UnsupportedMode, match=r"make_parallel\("):
+        gymnasium.make("flatland/Fleet-v0")
+
+
+def test_vectors_of_fleets_are_made_by_name(make: Make) -> None:
+    for create in (flatland.gym.make_vec, gymnasium.make_vec):
+        envs = make(create, "flatland/Fleet-v0", num_envs=2, num_robots=3)
+        assert isinstance(envs, FleetVectorEnv)
+        assert envs.num_envs == 6
+        assert envs.spec.id == "flatland/Fleet-v0"
+        assert envs.episodes.settings.max_steps == 300
+    envs = make(flatland.gym.make_vec, "flatland/Fleet-v0", max_steps=400)
+    assert envs.episodes.settings.max_steps == 400
 
 
 def test_an_image_shows_the_goal(make: Make) -> None:

@@ -2,16 +2,22 @@
 
 from __future__ import annotations
 
+import copy
 import math
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
+import gymnasium
 import numpy as np
 import pytest
+from gymnasium.error import ClosedEnvironmentError
+from gymnasium.vector import AsyncVectorEnv
+from nested import assert_same
 
 import flatland
-from flatland.gym import FixedGoal, RandomGoal
+from flatland.gym import Buildings, FixedGoal, FlatlandVectorEnv, RandomGoal, make_parallel
 
 Make = Callable[..., Any]
 
@@ -154,3 +160,86 @@ def test_an_invalid_number_is_an_error(arguments: dict[str, Any]) -> None:
 def test_an_invalid_clearance_is_an_error(make: Make, room: Path) -> None:
     with pytest.raises(ValueError, match="clearance"):
         make(world=room, task=RandomGoal(clearance=-0.1))
+
+
+# -- curricula: the task changes between episodes ------------------------------------------------
+
+FORWARD = np.array([1.0, 0.2], np.float32)
+NEAR, FAR = RandomGoal((0.5, 1.0)), RandomGoal((4.0, 6.0))
+
+
+def test_the_next_episodes_have_the_new_task(make: Make) -> None:
+    env = make(gymnasium.make, "flatland/Corridor-v0", task=NEAR)
+    assert env.reset(seed=0)[1]["distance"] <= 1.0
+    env.unwrapped.task = FAR
+    assert env.unwrapped.task is FAR
+    assert env.reset(seed=0)[1]["distance"] >= 4.0
+    other = make(world="corridor", task=FAR)
+    env.reset(seed=1)
+    other.reset(seed=1)
+    assert env.unwrapped.goal == other.goal
+
+
+def test_a_running_episode_continues_exactly(make: Make) -> None:
+    changed, unchanged = (make(FlatlandVectorEnv, 3, "corridor", task=NEAR) for _ in range(2))
+    assert_same(changed.reset(seed=2), unchanged.reset(seed=2))
+    for step in range(8):
+        if step == 4:
+            changed.task = FAR
+        actions = np.tile(FORWARD, (3, 1))
+        assert_same(changed.step(actions), unchanged.step(actions))
+        hashes = [[world.state_hash() for world in env.worlds] for env in (changed, unchanged)]
+        assert hashes[0] == hashes[1]
+
+
+@pytest.mark.parametrize("world", ["corridor", Buildings(["corridor"] * 3)])
+def test_all_environments_of_a_vector_have_the_new_task(make: Make, world: Any) -> None:
+    envs = make(FlatlandVectorEnv, 4, world, task=NEAR, autoreset_mode="SameStep", max_steps=5)
+    envs.reset(seed=0)
+    for _ in range(7):
+        envs.step(np.tile(FORWARD, (4, 1)))
+    envs.task = FAR
+    _, infos = envs.reset(seed=1)
+    assert (infos["distance"] >= 4.0).all()
+    new = make(FlatlandVectorEnv, 4, world, task=FAR, autoreset_mode="SameStep", max_steps=5)
+    new.reset(seed=1)
+    np.testing.assert_array_equal(envs.goals, new.goals)
+    np.testing.assert_array_equal(envs.poses, new.poses)
+
+
+def test_processes_take_a_new_task(make: Make) -> None:
+    creators = [partial(gymnasium.make, "flatland/Corridor-v0", task=NEAR)] * 2
+    envs = make(AsyncVectorEnv, creators)
+    envs.reset(seed=0)
+    envs.set_attr("task", FAR)
+    assert (envs.reset(seed=0)[1]["distance"] >= 4.0).all()
+
+
+def test_a_fleet_takes_a_new_task(make: Make) -> None:
+    env = make(make_parallel, num_robots=2, task=NEAR)
+    env.reset(seed=0)
+    env.task = FAR
+    infos = env.reset(seed=0)[1]
+    assert all(info["distance"] >= 4.0 for info in infos.values())
+
+
+def test_a_copy_has_the_new_task(make: Make) -> None:
+    env = make(world="corridor", task=NEAR)
+    env.task = FAR
+    other = make(lambda: copy.deepcopy(env))
+    assert other.reset(seed=0)[1]["distance"] >= 4.0
+
+
+def test_an_impossible_task_is_an_error_and_the_previous_one_remains(make: Make) -> None:
+    env = make(world="corridor", task=NEAR)
+    env.reset(seed=0)
+    with pytest.raises(flatland.WorldError, match="cannot be reached"):
+        env.task = FixedGoal((1, 1, 0), (60, 1))
+    with pytest.raises(TypeError, match="task must be a Task"):
+        env.task = (1, 2)
+    assert env.task is NEAR
+    env.step(FORWARD)
+    assert env.reset(seed=0)[1]["distance"] <= 1.0
+    env.close()
+    with pytest.raises(ClosedEnvironmentError):
+        env.task = FAR

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from gymnasium.error import ClosedEnvironmentError, InvalidAction, ResetNeeded
 from gymnasium.vector import AutoresetMode, SyncVectorEnv
+from nested import assert_same
 
 from flatland.errors import WorldError
 from flatland.gym import FlatlandEnv, FlatlandVectorEnv, Goal, Observation, Scan, Velocity
@@ -24,23 +25,6 @@ def actions(n: int, steps: int, seed: int = 0) -> np.ndarray:
     numbers = np.random.default_rng(seed).uniform(-1, 1, (steps, n, 2))
     numbers[..., 0] = np.abs(numbers[..., 0])
     return numbers.astype(np.float32)
-
-
-def assert_same(left: Any, right: Any) -> None:
-    """Compares nested results bit by bit."""
-    if isinstance(left, dict):
-        assert sorted(left) == sorted(right)
-        for key in left:
-            assert_same(left[key], right[key])
-    elif isinstance(left, tuple) or (isinstance(left, np.ndarray) and left.dtype == object):
-        for one, other in zip(left, right, strict=True):
-            assert_same(one, other)
-    elif isinstance(left, np.ndarray):
-        assert left.dtype == right.dtype
-        assert left.shape == right.shape
-        assert left.tobytes() == right.tobytes()
-    else:
-        assert left == right
 
 
 @pytest.mark.parametrize(

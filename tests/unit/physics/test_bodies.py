@@ -298,3 +298,91 @@ def test_changed_filters_and_sensor_flags_apply_to_sleeping_bodies(world: Physic
     circle.is_sensor = False
     run(world, 200)
     assert bodies[1].pose[0] - bodies[0].pose[0] == pytest.approx(1, abs=0.02)
+
+
+def test_a_density_sets_the_mass(world: PhysicsWorld) -> None:
+    body = disc(world)
+    mass, inertia = body.mass, body.inertia
+    body.fixtures[0].density = 3.0
+    assert (body.mass, body.inertia) == pytest.approx((3 * mass, 3 * inertia))
+    for density in (-1.0, math.nan, 1e30):
+        with pytest.raises(ValueError, match=r"density|mass"):
+            body.fixtures[0].density = density
+    assert body.fixtures[0].density == 3.0
+    assert body.mass == pytest.approx(3 * mass)
+
+
+def test_friction_applies_to_present_contacts(world: PhysicsWorld) -> None:
+    def distance(friction: float) -> float:
+        """Returns how far a disc that is pressed on a wall slides."""
+        world = PhysicsWorld()
+        wall = world.create_body("static", (0, 0, 0))
+        wall.create_edges(np.array([[-50, 0, 50, 0]], np.float32), friction=1.0)
+        box = world.create_body("dynamic", (0, 0.5, 0))
+        box.create_polygon(
+            [(-0.5, -0.5), (0.5, -0.5), (0.5, 0.5), (-0.5, 0.5)], density=1.0, friction=1.0
+        )
+        for _ in range(100):
+            box.apply_force((0, -10), box.world_center)
+            world.step(STEP, 10, 10)
+        box.fixtures[0].friction = friction
+        box.set_velocity(1, 0, 0)
+        for _ in range(20):
+            box.apply_force((0, -10), box.world_center)
+            world.step(STEP, 10, 10)
+        x: float = box.pose[0]
+        world.close()
+        return x
+
+    assert distance(0.0) == pytest.approx(0.2, abs=1e-3)
+    assert distance(1.0) < 0.1
+    with pytest.raises(ValueError, match="friction"):
+        disc(world).fixtures[0].friction = -1.0
+
+
+def test_shapes_are_scaled_about_the_origin(world: PhysicsWorld) -> None:
+    body = world.create_body("dynamic", (1, 0, 0))
+    body.create_circle((0.5, 0), 0.25, density=2.0)
+    body.create_polygon([(0, 0), (1, 0), (1, 1), (0, 1)], density=1.0)
+    mass = body.mass
+    body.scale_shapes(2.0)
+    assert body.mass == pytest.approx(4 * mass)
+    circle, polygon = body.fixtures
+    assert (circle.center, circle.radius) == ((1, 0), 0.5)
+    assert sorted(polygon.vertices.tolist()) == [[0, 0], [0, 2], [2, 0], [2, 2]]
+    # Rays and discs meet the new shapes.
+    hit, _ = world.cast_rays((9, 1.5, math.pi), np.array([[10, 0]], np.float32), 0xFFFF)
+    assert 10 * hit[0] == pytest.approx(9 - 3, abs=0.01)
+    assert not world.free_discs([(2.9, 1.9, 0)], 0.05, 0xFFFF)[0]
+    for factor in (0.0, 11.0, math.nan):
+        with pytest.raises(ValueError, match="factor must be from"):
+            body.scale_shapes(factor)
+    wall = world.create_body("static", (0, 0, 0))
+    wall.create_edges(np.array([[-5, 0, 5, 0]], np.float32))
+    with pytest.raises(ValueError, match="edges"):
+        wall.scale_shapes(2.0)
+
+
+def test_a_scaled_body_collides_with_its_new_shape(world: PhysicsWorld) -> None:
+    wall = world.create_body("static", (0, 0, 0))
+    wall.create_edges(np.array([[2, -5, 2, 5]], np.float32))
+    body = disc(world)
+    body.scale_shapes(2.0)
+    body.set_velocity(1, 0, 0)
+    run(world, 200)
+    assert body.pose[0] == pytest.approx(1.0, abs=0.03)
+
+
+def test_a_copy_takes_densities_frictions_and_shapes_back(world: PhysicsWorld) -> None:
+    body = disc(world)
+    saved = world.copy()
+    for _ in range(2):
+        body.fixtures[0].density, body.fixtures[0].friction = 5.0, 0.7
+        world.become_copy_of(saved)
+        fixture = body.fixtures[0]
+        assert (fixture.density, fixture.friction) == (1.0, 0.0)
+        assert body.mass == pytest.approx(math.pi / 4)
+        body.scale_shapes(3.0)
+        world.become_copy_of(saved)
+        assert body.fixtures[0].radius == 0.5
+        assert body.mass == pytest.approx(math.pi / 4)
