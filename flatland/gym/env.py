@@ -9,18 +9,17 @@ import gymnasium
 from gymnasium.error import ResetNeeded
 
 from flatland.geometry import FloatArray
-from flatland.gym.recreation import Recreated
 from flatland.gym.settings import Settings
 from flatland.gym.stage import RENDER_MODES, Image, Stage
-from flatland.gym.tasks import Occupied, Task
+from flatland.gym.staged import Staged
+from flatland.gym.tasks import Occupied
 
 if TYPE_CHECKING:
     from flatland.gym.buildings import Buildings
-    from flatland.gym.episodes import Episodes
     from flatland.world import World
 
 
-class FlatlandEnv(Recreated, gymnasium.Env[Any, FloatArray]):
+class FlatlandEnv(Staged, gymnasium.Env[Any, FloatArray]):
     """A robot with a laser that drives to a goal.
 
     An action is a velocity command for `physics_steps` steps of the world. An episode depends on
@@ -87,25 +86,6 @@ class FlatlandEnv(Recreated, gymnasium.Env[Any, FloatArray]):
     def goal(self) -> tuple[float, float]:
         """The goal of the episode in the world frame [m]."""
         return self._stage.goals[0][0]
-
-    @property
-    def task(self) -> Task:
-        """The task, settable: starts and goals of all further episodes.
-
-        Running episodes keep their goals; the `goal_radius` applies at once. A task that is
-        impossible in a building is a `WorldError`, and the previous one remains.
-        """
-        return self._episodes.settings.task
-
-    @task.setter
-    def task(self, task: Task) -> None:
-        self._stage.set_task(task)
-        self._replace_argument("task", task)
-
-    @property
-    def episodes(self) -> Episodes:
-        """The episodes: agents, settings, and the layout of the observation."""
-        return self._episodes
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None

@@ -14,10 +14,9 @@ from pettingzoo import ParallelEnv
 
 from flatland.geometry import FloatArray
 from flatland.gym.checks import checked_count
-from flatland.gym.recreation import Recreated
 from flatland.gym.robots import begin_together, fleet_settings, spawn_robots, stop
 from flatland.gym.stage import RENDER_MODES, Image, Stage
-from flatland.gym.tasks import Task
+from flatland.gym.staged import Staged
 
 if TYPE_CHECKING:
     pass
@@ -27,7 +26,7 @@ Steps = tuple[
 ]
 
 
-class FleetEnv(Recreated, ParallelEnv[str, Any, FloatArray]):  # type: ignore[misc, unused-ignore]
+class FleetEnv(Staged, ParallelEnv[str, Any, FloatArray]):  # type: ignore[misc, unused-ignore]
     """Robots that drive to their goals in the same world, as obstacles in the scans of the others.
 
     A robot whose episode has ended stops and remains in the world as an obstacle.
@@ -101,20 +100,6 @@ class FleetEnv(Recreated, ParallelEnv[str, Any, FloatArray]):  # type: ignore[mi
     def action_space(self, agent: str) -> spaces.Space[Any]:
         """Returns the action space of a robot."""
         return self._action_spaces[agent]
-
-    @property
-    def task(self) -> Task:
-        """The task, settable: starts and goals of all further episodes.
-
-        Running episodes keep their goals; the `goal_radius` applies at once. A task that is
-        impossible in a building is a `WorldError`, and the previous one remains.
-        """
-        return self._episodes.settings.task
-
-    @task.setter
-    def task(self, task: Task) -> None:
-        self._stage.set_task(task)
-        self._replace_argument("task", task)
 
     @property
     def goals(self) -> dict[str, tuple[float, float]]:

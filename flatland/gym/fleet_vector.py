@@ -9,25 +9,23 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from gymnasium.error import ResetNeeded
 from gymnasium.utils import seeding
-from gymnasium.vector import AutoresetMode, VectorEnv
+from gymnasium.vector import AutoresetMode
 from gymnasium.vector.utils import batch_space
 
 from flatland.errors import WorldError
 from flatland.geometry import BoolArray, DoubleArray
 from flatland.gym.checks import checked_count
 from flatland.gym.env import FlatlandEnv
-from flatland.gym.recreation import Recreated
 from flatland.gym.robots import begin_together, fleet_settings, spawn_robots, stop
-from flatland.gym.stage import Image, Stage
+from flatland.gym.stage import Stage
+from flatland.gym.staged import StagedVector
 from flatland.gym.vector import checked_mask, checked_seeds, masked_infos
 
 if TYPE_CHECKING:
-    from flatland.gym.episodes import Episodes
-    from flatland.gym.tasks import Task
-    from flatland.world import World
+    pass
 
 
-class FleetVectorEnv(Recreated, VectorEnv[Any, Any, Any]):
+class FleetVectorEnv(StagedVector):
     """Worlds with several robots, each of which is an environment of the vector.
 
     The robots of world w are the environments from w * num_robots on. They have the results of a
@@ -119,39 +117,6 @@ class FleetVectorEnv(Recreated, VectorEnv[Any, Any, Any]):
     def np_random_seed(self) -> tuple[int | None, ...]:  # type: ignore[override]
         """The seeds of these generators."""
         return tuple(seed for seed in self._seeds for _ in range(self.num_robots))
-
-    @property
-    def worlds(self) -> tuple[World, ...]:
-        """The worlds, which must be stepped only by the vector."""
-        return tuple(self._stage.worlds)
-
-    @property
-    def poses(self) -> DoubleArray:
-        """A copy of the poses (x, y, theta) of all robots in the world frame, shape (num_envs, 3).
-
-        They are those of the last observations [m, m, rad].
-        """
-        return self._episodes.situation.poses.copy()
-
-    @property
-    def goals(self) -> DoubleArray:
-        """A copy of all goals (x, y) in the world frame [m], shape (num_envs, 2)."""
-        return self._episodes.situation.goals.copy()
-
-    @property
-    def task(self) -> Task:
-        """The task, settable; see `FlatlandVectorEnv.task`."""
-        return self._episodes.settings.task
-
-    @task.setter
-    def task(self, task: Task) -> None:
-        self._stage.set_task(task)
-        self._replace_argument("task", task)
-
-    @property
-    def episodes(self) -> Episodes:
-        """The episodes: agents, settings, and the layout of the observation."""
-        return self._episodes
 
     def reset(
         self,
@@ -248,20 +213,6 @@ class FleetVectorEnv(Recreated, VectorEnv[Any, Any, Any]):
         infos.update({"is_active": active, "_is_active": everyone})
         self._stage.show()
         return self._present(shown), rewards, terminated, truncated, infos
-
-    def render(self) -> tuple[Image, ...] | None:
-        """Returns an image of each world for `rgb_array`; for `human`, shows all worlds.
-
-        Raises:
-            ClosedEnvironmentError: The environments are closed.
-            FlatlandError: The viewer cannot listen on its port, or matplotlib is missing.
-        """
-        images = self._stage.render()
-        return None if images is None else tuple(images)
-
-    def close_extras(self, **kwargs: Any) -> None:  # noqa: ARG002 - as in the base class
-        """Closes all worlds and their views."""
-        self._stage.close()
 
     def _rng(self, number: int) -> np.random.Generator:
         rng = self._rngs[number]

@@ -199,19 +199,23 @@ class ScanNoise(_ScanPart):
             ranges[is_hit] = np.maximum(ranges[is_hit] + noise[is_hit], 0.0)
 
 
-class BeamDropout(_ScanPart):
-    """Beams that return nothing, each by chance: their ranges are those without a hit."""
+class _Dropout(_ScanPart):
+    """Loses a share of the measurements."""
 
     def __init__(self, share: Interval = (0.0, 0.05)) -> None:
         """Creates the part.
 
         Args:
-            share: Least and greatest share of the beams, from 0 to 1.
+            share: Least and greatest share that is lost, from 0 to 1.
 
         Raises:
             ValueError: A number is out of range.
         """
         super().__init__("share", share, 1.0)
+
+
+class BeamDropout(_Dropout):
+    """Beams that return nothing, each by chance: their ranges are those without a hit."""
 
     def change_scans(self, situation: Situation, rows: Rows) -> None:
         """Removes hits."""
@@ -220,19 +224,8 @@ class BeamDropout(_ScanPart):
             ranges[self._generators[row].random(len(ranges)) < self._strengths[row]] = np.nan
 
 
-class ScanDropout(_ScanPart):
+class ScanDropout(_Dropout):
     """Scans that are lost, each by chance: the previous one remains. The first one is not lost."""
-
-    def __init__(self, share: Interval = (0.0, 0.05)) -> None:
-        """Creates the part.
-
-        Args:
-            share: Least and greatest share of the scans, from 0 to 1.
-
-        Raises:
-            ValueError: A number is out of range.
-        """
-        super().__init__("share", share, 1.0)
 
     def prepare(self, n: int, beams: int, size: int) -> None:
         """Prepares the memory of the previous scans."""
@@ -258,7 +251,15 @@ class _Latency(Randomization):
         steps: Least and greatest delay [steps].
     """
 
-    def __init__(self, steps: tuple[int, int]) -> None:
+    def __init__(self, steps: tuple[int, int] = (0, 1)) -> None:
+        """Creates the part.
+
+        Args:
+            steps: Least and greatest delay [steps of the environment].
+
+        Raises:
+            ValueError: The delays are not two increasing integers of at least 0.
+        """
         low, high = _pair("steps", steps)
         low, high = checked_count("steps", low, 0), checked_count("steps", high, 0)
         if low > high:
@@ -298,17 +299,6 @@ class _Latency(Randomization):
 class CommandLatency(_Latency):
     """Commands that take effect later; before the first one, the robot stands still."""
 
-    def __init__(self, steps: tuple[int, int] = (0, 1)) -> None:
-        """Creates the part.
-
-        Args:
-            steps: Least and greatest delay [steps of the environment].
-
-        Raises:
-            ValueError: The delays are not two increasing integers of at least 0.
-        """
-        super().__init__(steps)
-
     def prepare(self, n: int, beams: int, size: int) -> None:
         """Prepares the memory of the commands."""
         del beams, size
@@ -325,17 +315,6 @@ class ObservationLatency(_Latency):
 
     Rewards and endings are those of the present.
     """
-
-    def __init__(self, steps: tuple[int, int] = (0, 1)) -> None:
-        """Creates the part.
-
-        Args:
-            steps: Least and greatest delay [steps of the environment].
-
-        Raises:
-            ValueError: The delays are not two increasing integers of at least 0.
-        """
-        super().__init__(steps)
 
     def prepare(self, n: int, beams: int, size: int) -> None:
         """Prepares the memory of the observations."""

@@ -9,26 +9,25 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from gymnasium.error import ResetNeeded
 from gymnasium.utils import seeding
-from gymnasium.vector import AutoresetMode, VectorEnv
+from gymnasium.vector import AutoresetMode
 from gymnasium.vector.utils import batch_space
 
 from flatland.errors import WorldError
 from flatland.geometry import BoolArray, DoubleArray
 from flatland.gym.checks import checked_count
 from flatland.gym.env import FlatlandEnv
-from flatland.gym.recreation import Recreated
 from flatland.gym.settings import Settings
 from flatland.gym.situation import Rows
-from flatland.gym.stage import Image, Stage
-from flatland.gym.tasks import Occupied, Task
+from flatland.gym.stage import Stage
+from flatland.gym.staged import StagedVector
+from flatland.gym.tasks import Occupied
 
 if TYPE_CHECKING:
     from flatland.gym.buildings import Buildings
     from flatland.gym.episodes import Episodes
-    from flatland.world import World
 
 
-class FlatlandVectorEnv(Recreated, VectorEnv[Any, Any, Any]):
+class FlatlandVectorEnv(StagedVector):
     """Equal environments whose worlds are stepped and scanned over all cores.
 
     Each environment gives the same numbers as a `FlatlandEnv` of the same seed, for any number of
@@ -113,46 +112,6 @@ class FlatlandVectorEnv(Recreated, VectorEnv[Any, Any, Any]):
     def np_random_seed(self) -> tuple[int | None, ...]:  # type: ignore[override]
         """The seeds of the random number generators."""
         return tuple(self._seeds)
-
-    @property
-    def worlds(self) -> tuple[World, ...]:
-        """The worlds of the environments, which must be stepped only by the vector.
-
-        With several buildings, each episode may be in another world.
-        """
-        return tuple(self._stage.worlds)
-
-    @property
-    def poses(self) -> DoubleArray:
-        """A copy of the poses (x, y, theta) of all robots in the world frame, shape (num_envs, 3).
-
-        They are those of the last observations [m, m, rad].
-        """
-        return self._episodes.situation.poses.copy()
-
-    @property
-    def goals(self) -> DoubleArray:
-        """A copy of all goals (x, y) in the world frame [m], shape (num_envs, 2)."""
-        return self._episodes.situation.goals.copy()
-
-    @property
-    def task(self) -> Task:
-        """The task, settable: starts and goals of all further episodes.
-
-        Running episodes keep their goals; the `goal_radius` applies at once. A task that is
-        impossible in a building is a `WorldError`, and the previous one remains.
-        """
-        return self._episodes.settings.task
-
-    @task.setter
-    def task(self, task: Task) -> None:
-        self._stage.set_task(task)
-        self._replace_argument("task", task)
-
-    @property
-    def episodes(self) -> Episodes:
-        """The episodes: agents, settings, and the layout of the observation."""
-        return self._episodes
 
     def reset(
         self,
@@ -240,20 +199,6 @@ class FlatlandVectorEnv(Recreated, VectorEnv[Any, Any, Any]):
         infos.update(masked_infos(self._episodes, np.ones(self.num_envs, np.bool_)))
         self._stage.show()
         return self._present(), rewards, terminated, truncated, infos
-
-    def render(self) -> tuple[Image, ...] | None:
-        """Returns an image of each environment for `rgb_array`; for `human`, shows all worlds.
-
-        Raises:
-            ClosedEnvironmentError: The environments are closed.
-            FlatlandError: The viewer cannot listen on its port, or matplotlib is missing.
-        """
-        images = self._stage.render()
-        return None if images is None else tuple(images)
-
-    def close_extras(self, **kwargs: Any) -> None:  # noqa: ARG002 - as in the base class
-        """Closes all worlds and their views."""
-        self._stage.close()
 
     def _rng(self, row: int) -> np.random.Generator:
         rng = self._rngs[row]
