@@ -38,6 +38,11 @@ class World:
     @property
     def closed(self) -> bool:
         """Whether the world is closed."""
+    @property
+    def time_ns(self) -> int:
+        """Simulated time [ns], settable; part of what `become_copy_of` copies."""
+    @time_ns.setter
+    def time_ns(self, value: int) -> None: ...
     def _step(
         self, dt: float, velocity_iterations: int, position_iterations: int
     ) -> tuple[list[int], list[int]] | None: ...
@@ -1901,13 +1906,55 @@ class AgentBatch:
             ValueError: Two agents have the same world, their numbers of readings differ, or a range finder
                 measures intensities.
         """
+    def replace(
+        self, row: int, agent: tuple[PhysicsBody, Controller, Touches, RangeFinder]
+    ) -> None:
+        """Replaces an agent by one of another world, which has no permission.
+
+        Args:
+            row: Index of the agent.
+            agent: As for the constructor.
+
+        Raises:
+            IndexError: There is no such agent.
+            ValueError: As for the constructor.
+        """
+    def permit(self, row: int) -> None:
+        """Permits to step the world of an agent without any code in between.
+
+        The permission ends with `JobQueue.interrupt` of the world. To be called before the caller examines
+        whether there is such code, so that later changes withdraw the permission.
+
+        Args:
+            row: Index of the agent.
+
+        Raises:
+            IndexError: There is no such agent.
+        """
+    def withdraw(self, row: int) -> None:
+        """Withdraws the permission of an agent.
+
+        Args:
+            row: Index of the agent.
+
+        Raises:
+            IndexError: There is no such agent.
+        """
+    def not_permitted(self, steps: npt.ArrayLike) -> list[int]:
+        """Returns the agents without a permission.
+
+        Args:
+            steps: Agents that are examined, shape (n,).
+
+        Raises:
+            ValueError: The array has another shape.
+        """
     def perform(
         self,
         run: tuple[int, int, int, float, int, int, bool, bool],
         steps: npt.ArrayLike,
         observes: npt.ArrayLike,
         velocities: npt.ArrayLike,
-        times: npt.ArrayLike,
         noises: npt.ArrayLike,
         poses: npt.ArrayLike,
         pose_rates: npt.ArrayLike,
@@ -1922,11 +1969,11 @@ class AgentBatch:
         threads.
 
         Args:
-            run: The steps, as `Run`; each world has a time of its own.
+            run: The steps, as `Run`; each world has a time of its own, which it advances if the steps are
+                complete.
             steps: Whether the world of the agent steps, shape (n,).
             observes: Whether the agent is observed, after its steps, shape (n,).
             velocities: Commanded forward speed and yaw rate [m/s, rad/s], shape (n, 2).
-            times: Simulated times of the worlds [ns], shape (n,).
             noises: Stream and number of the update of each scan, shape (n, 2).
             poses: Receives (x, y, theta) of the bodies in the world frame, shape (n, 3).
             pose_rates: Receives the velocities of their origins (vx, vy, omega), shape (n, 3).

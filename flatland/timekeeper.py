@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from flatland.physics import PhysicsWorld
+
 NANOSECONDS = 1_000_000_000
 
 MIN_STEP_SIZE = 1e-6
@@ -14,19 +16,18 @@ class Timekeeper:
     """The simulated time and the step size.
 
     Attributes:
-        sim_time_ns: Simulated time since the start [ns].
         step_size: Simulated time of one step [s].
         step_size_ns: Simulated time of one step [ns], exact.
     """
 
-    # Plain attributes, because they are read many times in every step.
-    __slots__ = ("sim_time_ns", "step_size", "step_size_ns")
+    __slots__ = ("_physics", "step_size", "step_size_ns")
 
-    def __init__(self, step_size: float = 0.005) -> None:
-        """Initializes the time to 0.
+    def __init__(self, step_size: float = 0.005, physics: PhysicsWorld | None = None) -> None:
+        """Creates a timekeeper.
 
         Args:
             step_size: Simulated time of one step [s], from 1e-6 to 1000; rounded to nanoseconds.
+            physics: The physics world, which has the time; None for a time of its own.
 
         Raises:
             ValueError: The step size is out of range or NaN.
@@ -37,7 +38,16 @@ class Timekeeper:
             )
         self.step_size_ns = round(step_size * NANOSECONDS)
         self.step_size = self.step_size_ns / NANOSECONDS
-        self.sim_time_ns = 0
+        self._physics = PhysicsWorld() if physics is None else physics
+
+    @property
+    def sim_time_ns(self) -> int:
+        """Simulated time since the start [ns]; settable."""
+        return self._physics.time_ns
+
+    @sim_time_ns.setter
+    def sim_time_ns(self, time_ns: int) -> None:
+        self._physics.time_ns = time_ns
 
     @property
     def sim_time(self) -> float:

@@ -100,7 +100,7 @@ class Episodes:
         self._lasers[row] = agent.laser
         self._buildings[row] = building
         if self._batch is not None:
-            self._batch.agents_changed()
+            self._batch.agent_changed(row)
 
     def begin(
         self, row: int, rng: np.random.Generator, occupied: Occupied, options: Mapping[str, Any]

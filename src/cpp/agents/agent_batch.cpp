@@ -31,14 +31,32 @@ void set_target(Motion& motion, double forward, double omega) {
 
 }  // namespace
 
-double AgentBatch::expected_time(const AgentCommands& commands, const Run& run) {
-  double seconds = 0.0;
+AgentBatch::AgentBatch(std::vector<Agent> agents)
+    : agents_(std::move(agents)), permitted_(agents_.size(), kNever) {}
+
+void AgentBatch::replace(std::size_t i, Agent agent) {
+  agents_[i] = std::move(agent);
+  withdraw(i);
+}
+
+void AgentBatch::permit(std::size_t i) { permitted_[i] = agents_[i].world->clear_interrupt(); }
+
+std::vector<std::size_t> AgentBatch::not_permitted(const bool* steps) const {
+  std::vector<std::size_t> found;
   for (std::size_t i = 0; i < agents_.size(); ++i) {
-    Run own = run;
-    own.time = commands.times[i];
-    if (commands.steps[i]) seconds += agents_[i].world->expected_time(own);
+    if (steps[i] && permitted_[i] != agents_[i].world->interrupts()) found.push_back(i);
   }
-  return seconds;
+  return found;
+}
+
+bool AgentBatch::takes_longer(double seconds, const AgentCommands& commands, const Run& run) {
+  double expected = 0.0;
+  for (std::size_t i = 0; i < agents_.size() && expected <= seconds; ++i) {
+    Run own = run;
+    own.time = agents_[i].world->time();
+    if (commands.steps[i]) expected += agents_[i].world->expected_time(own);
+  }
+  return expected > seconds;
 }
 
 std::vector<UnfinishedRun> AgentBatch::perform(const AgentCommands& commands, const Run& run,
@@ -49,14 +67,16 @@ std::vector<UnfinishedRun> AgentBatch::perform(const AgentCommands& commands, co
     RunResult result;
     try {
       if (commands.steps[i]) {
+        World& world = *agents_[i].world;
         Run own = run;
-        own.time = commands.times[i];
+        own.time = world.time();
         const double* velocity = commands.velocities + 2 * i;
         result = step(agents_[i], velocity[0], velocity[1], own);
         if (result.steps < run.n) {
           unfinished[i] = UnfinishedRun{i, std::move(result), nullptr};
           return;
         }
+        world.set_time(own.time + run.n * run.step);
       }
       if (commands.observes[i]) observe(i, commands, rows);
     } catch (const std::exception&) {

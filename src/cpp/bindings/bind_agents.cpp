@@ -5,7 +5,6 @@
 #include <memory>
 #include <string>
 #include <tuple>
-#include <unordered_set>
 #include <utility>
 #include <vector>
 
@@ -54,25 +53,44 @@ class PyAgentBatch {
     for (const PyAgent& agent : given) worlds_.push_back(std::get<0>(agent).world);
   }
 
+  void replace(std::size_t row, const PyAgent& given) {
+    check_row(row);
+    Agent agent = to_agent(given);
+    std::vector<Agent> others = batch_.agents();
+    others.erase(others.begin() + static_cast<std::ptrdiff_t>(row));
+    check_beside(agent, others);
+    batch_.replace(row, std::move(agent));
+    worlds_[row] = std::get<0>(given).world;
+  }
+  void permit(std::size_t row) {
+    check_row(row);
+    batch_.permit(row);
+  }
+  void withdraw(std::size_t row) {
+    check_row(row);
+    batch_.withdraw(row);
+  }
+  std::vector<std::size_t> not_permitted(const Rows<bool>& steps) const {
+    check_rows(steps, batch_.agents().size(), 1, "steps");
+    return batch_.not_permitted(steps.data());
+  }
+
   py::list perform(const PyRun& given_run, const Rows<bool>& steps, const Rows<bool>& observes,
-                   const Rows<double>& velocities, const Rows<std::int64_t>& times,
-                   const Rows<std::uint64_t>& noises, Rows<double>& poses, Rows<double>& pose_rates,
-                   Rows<double>& sensor_poses, Rows<float>& ranges, Rows<bool>& touched,
-                   std::size_t num_threads) {
+                   const Rows<double>& velocities, const Rows<std::uint64_t>& noises,
+                   Rows<double>& poses, Rows<double>& pose_rates, Rows<double>& sensor_poses,
+                   Rows<float>& ranges, Rows<bool>& touched, std::size_t num_threads) {
     const std::size_t agents = batch_.agents().size();
     const std::size_t readings = batch_.agents().front().finder->readings();
     check_rows(steps, agents, 1, "steps");
     check_rows(observes, agents, 1, "observes");
     check_rows(velocities, agents, 2, "velocities");
-    check_rows(times, agents, 1, "times");
     check_rows(noises, agents, 2, "noises");
     check_rows(poses, agents, 3, "poses");
     check_rows(pose_rates, agents, 3, "pose_rates");
     check_rows(sensor_poses, agents, 3, "sensor_poses");
     check_rows(ranges, agents, readings, "ranges");
     check_rows(touched, agents, 1, "touched");
-    const AgentCommands commands{steps.data(), observes.data(), velocities.data(), times.data(),
-                                 noises.data()};
+    const AgentCommands commands{steps.data(), observes.data(), velocities.data(), noises.data()};
     const AgentObservations rows{poses.mutable_data(), pose_rates.mutable_data(),
                                  sensor_poses.mutable_data(), ranges.mutable_data(),
                                  touched.mutable_data()};
@@ -80,7 +98,7 @@ class PyAgentBatch {
     run.check();
     // Safe without the GIL: the worlds are in use, and the caller keeps the arrays alive.
     Uses uses(batch_.agents());
-    const bool is_long = batch_.expected_time(commands, run) > kShortStep;
+    const bool is_long = batch_.takes_longer(kShortStep, commands, run);
     const auto unfinished = without_gil_if(is_long, uses, [&] {
       return batch_.perform(commands, run, rows, is_long ? num_threads : 1);
     });
@@ -108,20 +126,31 @@ class PyAgentBatch {
     std::vector<std::unique_ptr<World::ExclusiveUse>> uses_;
   };
 
-  static std::vector<Agent> to_agents(const std::vector<PyAgent>& given) {
-    if (given.empty()) throw py::value_error("a batch requires an agent");
-    std::vector<Agent> agents;
-    std::unordered_set<const World*> worlds;
-    for (const PyAgent& each : given) {
-      agents.push_back(to_agent(each));
-      if (!worlds.insert(agents.back().world).second) {
+  // Throws a ValueError unless the batch may contain an agent beside the others.
+  static void check_beside(const Agent& agent, const std::vector<Agent>& others) {
+    for (const Agent& other : others) {
+      if (other.world == agent.world) {
         throw py::value_error("the agents of a batch must have different worlds");
       }
-      if (agents.back().finder->readings() != agents.front().finder->readings()) {
+      if (other.finder->readings() != agent.finder->readings()) {
         throw py::value_error("the agents of a batch must have equal numbers of readings");
       }
     }
+  }
+
+  static std::vector<Agent> to_agents(const std::vector<PyAgent>& given) {
+    if (given.empty()) throw py::value_error("a batch requires an agent");
+    std::vector<Agent> agents;
+    for (const PyAgent& each : given) {
+      Agent agent = to_agent(each);
+      check_beside(agent, agents);
+      agents.push_back(std::move(agent));
+    }
     return agents;
+  }
+
+  void check_row(std::size_t row) const {
+    if (row >= batch_.agents().size()) throw py::index_error("there is no such agent");
   }
 
   AgentBatch batch_;
@@ -286,23 +315,64 @@ Raises:
     ValueError: Two agents have the same world, their numbers of readings differ, or a range finder
         measures intensities.
 )")
+      .def("replace", &PyAgentBatch::replace, py::arg("row"), py::arg("agent"), R"(
+Replaces an agent by one of another world, which has no permission.
+
+Args:
+    row: Index of the agent.
+    agent: As for the constructor.
+
+Raises:
+    IndexError: There is no such agent.
+    ValueError: As for the constructor.
+)")
+      .def("permit", &PyAgentBatch::permit, py::arg("row"), R"(
+Permits to step the world of an agent without any code in between.
+
+The permission ends with `JobQueue.interrupt` of the world. To be called before the caller examines
+whether there is such code, so that later changes withdraw the permission.
+
+Args:
+    row: Index of the agent.
+
+Raises:
+    IndexError: There is no such agent.
+)")
+      .def("withdraw", &PyAgentBatch::withdraw, py::arg("row"), R"(
+Withdraws the permission of an agent.
+
+Args:
+    row: Index of the agent.
+
+Raises:
+    IndexError: There is no such agent.
+)")
+      .def("not_permitted", &PyAgentBatch::not_permitted, py::arg("steps").noconvert(), R"(
+Returns the agents without a permission.
+
+Args:
+    steps: Agents that are examined, shape (n,).
+
+Raises:
+    ValueError: The array has another shape.
+)")
       .def("perform", &PyAgentBatch::perform, py::arg("run"), py::arg("steps").noconvert(),
            py::arg("observes").noconvert(), py::arg("velocities").noconvert(),
-           py::arg("times").noconvert(), py::arg("noises").noconvert(),
-           py::arg("poses").noconvert(), py::arg("pose_rates").noconvert(),
-           py::arg("sensor_poses").noconvert(), py::arg("ranges").noconvert(),
-           py::arg("touched").noconvert(), py::arg("num_threads"), R"(
+           py::arg("noises").noconvert(), py::arg("poses").noconvert(),
+           py::arg("pose_rates").noconvert(), py::arg("sensor_poses").noconvert(),
+           py::arg("ranges").noconvert(), py::arg("touched").noconvert(), py::arg("num_threads"),
+           R"(
 Sets the commands of agents, performs steps of their worlds, and observes them.
 
 All arrays are C-contiguous, with a row for each agent. The results do not depend on the number of
 threads.
 
 Args:
-    run: The steps, as `Run`; each world has a time of its own.
+    run: The steps, as `Run`; each world has a time of its own, which it advances if the steps are
+        complete.
     steps: Whether the world of the agent steps, shape (n,).
     observes: Whether the agent is observed, after its steps, shape (n,).
     velocities: Commanded forward speed and yaw rate [m/s, rad/s], shape (n, 2).
-    times: Simulated times of the worlds [ns], shape (n,).
     noises: Stream and number of the update of each scan, shape (n, 2).
     poses: Receives (x, y, theta) of the bodies in the world frame, shape (n, 3).
     pose_rates: Receives the velocities of their origins (vx, vy, omega), shape (n, 3).

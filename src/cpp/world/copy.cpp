@@ -400,6 +400,7 @@ void World::replace_others(const World& source, OtherParts parts) {
   jobs_ = std::move(parts.jobs);
   invalid_ = std::move(parts.invalid);
   last_step_time_ = source.last_step_time_;
+  set_time(source.time());
 }
 
 void World::clear() {
