@@ -1949,7 +1949,7 @@ class AgentBatch:
         Raises:
             ValueError: The array has another shape.
         """
-    def perform(
+    def start(
         self,
         run: tuple[int, int, int, float, int, int, bool, bool],
         steps: npt.ArrayLike,
@@ -1962,10 +1962,11 @@ class AgentBatch:
         ranges: npt.ArrayLike,
         touched: npt.ArrayLike,
         num_threads: int,
-    ) -> list[Any]:
-        """Sets the commands of agents, performs steps of their worlds, and observes them.
+    ) -> None:
+        """Sets the commands of agents, and begins to step their worlds and to observe them.
 
-        All arrays are C-contiguous, with a row for each agent. The results do not depend on the number of
+        Other threads do this until `finish`. Meanwhile these worlds and the arrays must not be used, except
+        for the rows of agents that neither step nor are observed. All arrays are C-contiguous, with a row for each agent. The results do not depend on the number of
         threads.
 
         Args:
@@ -1982,14 +1983,26 @@ class AgentBatch:
             touched: Receives whether an agent touched anything in its steps, shape (n,).
             num_threads: Maximum number of threads; 0 for one per core.
 
+        Raises:
+            ValueError: An array has another shape, a number is out of range, or `finish` was not called.
+            StaleHandleError: A world is closed.
+            WorldLockedError: A world is in use.
+        """
+    def stop_threads(self) -> None:
+        """Ends the threads of the batch; `start` creates new ones.
+
+        Raises:
+            ValueError: `finish` was not called.
+        """
+    def finish(self) -> list[Any]:
+        """Completes what `start` has begun.
+
         Returns:
             Agents whose steps are not complete, with what `JobQueue.run` returns or raises. They are not
             observed.
 
         Raises:
-            ValueError: An array has another shape, or a number is out of range.
-            StaleHandleError: A world is closed.
-            WorldLockedError: A world is in use.
+            ValueError: `start` was not called.
         """
 
 def boundary_edges(mask: npt.ArrayLike, resolution: float) -> npt.NDArray[np.float32]:

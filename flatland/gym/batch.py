@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -19,9 +19,6 @@ if TYPE_CHECKING:
     from flatland.gym.situation import Rows, Situation
     from flatland.physics import Controller, PhysicsBody, RangeFinder, RunResult, Touches
     from flatland.world import World
-
-
-_NO_ROWS = np.empty(0, np.intp)
 
 
 class Batch:
@@ -65,6 +62,10 @@ class Batch:
         agent.world.requests.share_lock(self._requests)
         (self._noisy.add if agent.laser.has_noise else self._noisy.discard)(row)
 
+    def close(self) -> None:
+        """Ends the threads; a further step starts new ones."""
+        self._core.stop_threads()
+
     @staticmethod
     def is_possible(agents: Sequence[Agent], low: DoubleArray, high: DoubleArray) -> bool:
         """Returns whether the core can step agents.
@@ -81,19 +82,23 @@ class Batch:
             and bool((np.abs([low, high]) <= MAX_COMMAND).all())
         )
 
-    def perform(self, commands: DoubleArray, acting: BoolArray, n: int) -> Rows:
+    def perform(
+        self, commands: DoubleArray, acting: BoolArray, n: int, meanwhile: Callable[[], object]
+    ) -> Rows:
         """Carries out commands for some steps of the worlds, and observes all agents.
 
         Args:
             commands: Forward speed and yaw rate of each agent [m/s, rad/s], shape (n, 2).
             acting: Agents that act, shape (n,); the worlds of others are not stepped.
             n: Number of steps.
+            meanwhile: Called while other threads step; it may change the worlds of agents that do
+                not act, and replace these agents. They are observed afterwards.
 
         Returns:
             The agents that remain to be observed.
 
         Raises:
-            Exception: As `World.step`.
+            Exception: As `World.step`, or raised by `meanwhile`.
         """
         # Code of a plugin that calls this holds the lock already.
         is_free = not self._requests.lock.is_owned
@@ -105,16 +110,31 @@ class Batch:
             ]
             alone = acting.copy()
             alone[others] = False
-            observes = np.ones(len(acting), np.bool_)
-            observes[others] = False
-            unfinished = self._call_core(commands, alone, observes, n)
-            if not others and not unfinished:
-                return _NO_ROWS
-            self._complete(unfinished, n)
+            self._start(commands, alone, alone, n)
+            try:
+                meanwhile()
+            finally:
+                unfinished = self._finish(alone)
+                self._commands[alone] = commands[alone]
+                self._counts += alone
+                self._complete(unfinished, n)
         step_agents([self._agents[row] for row in others], commands[others], n, self._num_threads)
-        rest = sorted([*others, *unfinished])
+        rest = [*others, *unfinished]
         self._situation.collided[rest] = [self._agents[row].touches.touched for row in rest]
-        return np.array(rest, np.intp)
+        return self._observe([*unfinished, *np.flatnonzero(~acting).tolist()], others)
+
+    def _observe(self, rows: Sequence[int], others: Sequence[int]) -> Rows:
+        """Observes agents; returns those for which the core cannot do this, and others."""
+        agents = self._agents
+        chosen = [row for row in rows if not agents[row].world.physics.has_materials]
+        if chosen:
+            steps, observes = np.zeros((2, len(agents)), np.bool_)
+            observes[chosen] = True
+            self._start(self._commands, steps, observes, 0)
+            for error in self._finish(observes).values():
+                if isinstance(error, Exception):
+                    raise error
+        return np.array(sorted({*rows, *others} - set(chosen)), np.intp)
 
     def _permit(self, row: int) -> bool:
         """Permits the core to step the world of an agent alone, if this is possible."""
@@ -135,42 +155,41 @@ class Batch:
         self._core.withdraw(row)
         return False
 
-    def _call_core(
-        self, commands: DoubleArray, alone: BoolArray, observes: BoolArray, n: int
-    ) -> dict[int, RunResult | Exception]:
+    def _start(self, commands: DoubleArray, steps: BoolArray, observes: BoolArray, n: int) -> None:
+        """Begins to carry out commands by n steps, and to observe agents."""
         agents, s = self._agents, self._situation
         world, timekeeper = agents[0].world, agents[0].world.timekeeper
         for row in self._noisy:
             self._noises[row] = agents[row].laser.next_computed
-        unfinished = dict(
-            self._core.perform(
-                Run(
-                    0,
-                    timekeeper.step_size_ns,
-                    n,
-                    timekeeper.step_size,
-                    world.velocity_iterations,
-                    world.position_iterations,
-                    False,
-                    False,
-                ),
-                alone,
-                observes,
-                np.ascontiguousarray(commands),
-                self._noises,
-                s.poses,
-                s.velocities,
-                self._sensor_poses,
-                s.ranges,
-                s.collided,
-                self._num_threads,
-            )
+        self._core.start(
+            Run(
+                0,
+                timekeeper.step_size_ns,
+                n,
+                timekeeper.step_size,
+                world.velocity_iterations,
+                world.position_iterations,
+                False,
+                False,
+            ),
+            steps,
+            observes,
+            np.ascontiguousarray(commands),
+            self._noises,
+            s.poses,
+            s.velocities,
+            self._sensor_poses,
+            s.ranges,
+            s.collided,
+            self._num_threads,
         )
-        np.copyto(self._commands, commands, where=alone[:, None])
-        self._counts += alone
+
+    def _finish(self, observes: BoolArray) -> dict[int, RunResult | Exception]:
+        """Completes what was begun; returns the rows with steps that remain."""
+        unfinished = dict(self._core.finish())
         for row in self._noisy:
             if observes[row] and row not in unfinished:
-                agents[row].laser.count_computed()
+                self._agents[row].laser.count_computed()
         return unfinished
 
     def _complete(self, unfinished: dict[int, RunResult | Exception], n: int) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import copy
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -83,6 +83,11 @@ class Episodes:
             self._batch = Batch(self.agents, self.situation, num_threads)
         self._all = np.arange(n)
 
+    def close(self) -> None:
+        """Ends the threads that step and scan."""
+        if self._batch is not None:
+            self._batch.close()
+
     @property
     def goal_radius(self) -> float:
         """Distance to the goal at which an agent has arrived [m]."""
@@ -142,12 +147,19 @@ class Episodes:
         )[0]:
             raise WorldError(f"the goal ({goal[0]:g}, {goal[1]:g}) is not free")
 
-    def step(self, actions: DoubleArray, rows: Rows | None = None) -> None:
+    def step(
+        self,
+        actions: DoubleArray,
+        rows: Rows | None = None,
+        meanwhile: Callable[[], object] = lambda: None,
+    ) -> None:
         """Carries out actions for one step of the environment, and observes all agents.
 
         Args:
             actions: Actions in [-1, 1] of all agents, shape (n, 2).
             rows: Agents that act; None for all. The others stand still.
+            meanwhile: Called before the observation of the agents that do not act; may begin their
+                next episodes.
         """
         s = self.situation
         commands = s.low + (actions + 1.0) * (0.5 * (s.high - s.low))
@@ -158,6 +170,7 @@ class Episodes:
         s.steps[chosen] += 1
         n = self.settings.physics_steps
         if self._batch is None:
+            meanwhile()
             agents = [self.agents[row] for row in (self._all if rows is None else rows).tolist()]
             step_agents(agents, commands[chosen], n, self._num_threads)
             s.collided[chosen] = [agent.touches.touched for agent in agents]
@@ -165,7 +178,7 @@ class Episodes:
             return
         acting = np.zeros(len(s), np.bool_)
         acting[chosen] = True
-        self._measure(self._batch.perform(commands, acting, n))
+        self._measure(self._batch.perform(commands, acting, n, meanwhile))
         self._observe()
 
     def look(self, rows: Rows | None = None) -> None:

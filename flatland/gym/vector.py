@@ -208,8 +208,8 @@ class FlatlandVectorEnv(Recreated, VectorEnv[Any, Any, Any]):
         # Only in the mode NEXT_STEP has any episode ended here.
         fresh = self._has_ended.copy()
         if fresh.any():
-            self._begin(np.flatnonzero(fresh))
-            self._episodes.step(numbers, np.flatnonzero(~fresh))
+            begun = np.flatnonzero(fresh)
+            self._episodes.step(numbers, np.flatnonzero(~fresh), lambda: self._begin(begun))
         else:
             self._episodes.step(numbers)
         rewards, terminated, truncated = self._episodes.judge()

@@ -7,6 +7,7 @@
 #include <exception>
 #include <limits>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "rays/range_finder.h"
@@ -65,20 +66,36 @@ class AgentBatch {
 
   // Returns whether the wall time on one processor is expected to exceed a limit [s].
   bool takes_longer(double seconds, const AgentCommands& commands, const Run& run);
-  // Performs the steps of all agents at the times of their worlds and observes them, on several
-  // threads. The caller has exclusive use of the worlds. An agent with steps that remain is not
-  // observed, and the time of its world is that before the steps.
-  std::vector<UnfinishedRun> perform(const AgentCommands& commands, const Run& run,
-                                     const AgentObservations& rows, std::size_t num_threads);
+  // Begins to perform the steps of agents at the times of their worlds, and to observe agents, on
+  // several threads. The caller has exclusive use of the worlds of these agents until `finish`;
+  // other agents may be replaced.
+  void start(const AgentCommands& commands, const Run& run, const AgentObservations& rows,
+             std::size_t num_threads);
+  // Completes what `start` has begun. An agent with steps that remain is not observed, and the time
+  // of its world is that before the steps.
+  std::vector<UnfinishedRun> finish();
+  // Ends the threads; the next call of `start` starts new ones.
+  void stop_threads() { threads_.stop(); }
 
  private:
   static constexpr std::uint64_t kNever = std::numeric_limits<std::uint64_t>::max();
 
+  void perform(std::size_t i);
   RunResult step(const Agent& agent, double forward, double omega, const Run& run);
-  void observe(std::size_t i, const AgentCommands& commands, const AgentObservations& rows);
+  void observe(std::size_t i);
 
   std::vector<Agent> agents_;
   std::vector<std::uint64_t> permitted_;  // interrupts of the world at the time of the permission
+
+  ThreadPool threads_;
+
+  // What `start` has begun.
+  AgentCommands commands_{};
+  Run run_;
+  AgentObservations rows_{};
+  std::vector<std::size_t> chosen_;  // agents that step or are observed
+  std::vector<std::optional<UnfinishedRun>> unfinished_;
+  std::unique_ptr<ThreadPool::Work> work_;
 };
 
 }  // namespace flatland

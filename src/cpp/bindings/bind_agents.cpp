@@ -75,10 +75,11 @@ class PyAgentBatch {
     return batch_.not_permitted(steps.data());
   }
 
-  py::list perform(const PyRun& given_run, const Rows<bool>& steps, const Rows<bool>& observes,
-                   const Rows<double>& velocities, const Rows<std::uint64_t>& noises,
-                   Rows<double>& poses, Rows<double>& pose_rates, Rows<double>& sensor_poses,
-                   Rows<float>& ranges, Rows<bool>& touched, std::size_t num_threads) {
+  void start(const PyRun& given_run, const Rows<bool>& steps, const Rows<bool>& observes,
+             const Rows<double>& velocities, const Rows<std::uint64_t>& noises, Rows<double>& poses,
+             Rows<double>& pose_rates, Rows<double>& sensor_poses, Rows<float>& ranges,
+             Rows<bool>& touched, std::size_t num_threads) {
+    if (uses_) throw py::value_error("the batch has begun already");
     const std::size_t agents = batch_.agents().size();
     const std::size_t readings = batch_.agents().front().finder->readings();
     check_rows(steps, agents, 1, "steps");
@@ -96,12 +97,26 @@ class PyAgentBatch {
                                  touched.mutable_data()};
     const Run run = to_run(given_run);
     run.check();
-    // Safe without the GIL: the worlds are in use, and the caller keeps the arrays alive.
-    Uses uses(batch_.agents());
-    const bool is_long = batch_.takes_longer(kShortStep, commands, run);
-    const auto unfinished = without_gil_if(is_long, uses, [&] {
-      return batch_.perform(commands, run, rows, is_long ? num_threads : 1);
-    });
+    auto uses = std::make_unique<Uses>(batch_.agents(), commands);
+    is_long_ = batch_.takes_longer(kShortStep, commands, run);
+    // The arrays must exist until the end.
+    arrays_ = {steps,      observes,     velocities, noises, poses,
+               pose_rates, sensor_poses, ranges,     touched};
+    // Safe without the GIL: the worlds are in use.
+    batch_.start(commands, run, rows, is_long_ ? num_threads : 1);
+    uses_ = std::move(uses);
+  }
+
+  void stop_threads() {
+    if (uses_) throw py::value_error("`finish` was not called");
+    batch_.stop_threads();
+  }
+
+  py::list finish() {
+    if (!uses_) throw py::value_error("the batch has not begun");
+    const std::unique_ptr<Uses> uses = std::move(uses_);
+    const auto unfinished = without_gil_if(is_long_, *uses, [&] { return batch_.finish(); });
+    arrays_.clear();
     py::list list;
     for (const UnfinishedRun& each : unfinished) {
       py::object result = each.error ? error_of(each.error) : py::cast(result_tuple(each.result));
@@ -111,13 +126,14 @@ class PyAgentBatch {
   }
 
  private:
-  // Exclusive uses of all worlds that end together.
+  // Exclusive uses of the worlds of the agents that step or are observed; they end together.
   class Uses {
    public:
-    explicit Uses(const std::vector<Agent>& agents) {
+    Uses(const std::vector<Agent>& agents, const AgentCommands& commands) {
       uses_.reserve(agents.size());
-      for (const Agent& agent : agents) {
-        uses_.push_back(std::make_unique<World::ExclusiveUse>(*agent.world, World::kStepping));
+      for (std::size_t i = 0; i < agents.size(); ++i) {
+        if (!commands.steps[i] && !commands.observes[i]) continue;
+        uses_.push_back(std::make_unique<World::ExclusiveUse>(*agents[i].world, World::kStepping));
       }
     }
     void end() { uses_.clear(); }
@@ -153,8 +169,12 @@ class PyAgentBatch {
     if (row >= batch_.agents().size()) throw py::index_error("there is no such agent");
   }
 
-  AgentBatch batch_;
   std::vector<PyWorld> worlds_;
+  // From `start` to `finish`.
+  std::vector<py::object> arrays_;
+  std::unique_ptr<Uses> uses_;
+  bool is_long_ = false;
+  AgentBatch batch_;  // completes what it has begun before the members above end
 };
 
 // Computations on the arrays of a flatland.gym.Situation.
@@ -356,15 +376,16 @@ Args:
 Raises:
     ValueError: The array has another shape.
 )")
-      .def("perform", &PyAgentBatch::perform, py::arg("run"), py::arg("steps").noconvert(),
+      .def("start", &PyAgentBatch::start, py::arg("run"), py::arg("steps").noconvert(),
            py::arg("observes").noconvert(), py::arg("velocities").noconvert(),
            py::arg("noises").noconvert(), py::arg("poses").noconvert(),
            py::arg("pose_rates").noconvert(), py::arg("sensor_poses").noconvert(),
            py::arg("ranges").noconvert(), py::arg("touched").noconvert(), py::arg("num_threads"),
            R"(
-Sets the commands of agents, performs steps of their worlds, and observes them.
+Sets the commands of agents, and begins to step their worlds and to observe them.
 
-All arrays are C-contiguous, with a row for each agent. The results do not depend on the number of
+Other threads do this until `finish`. Meanwhile these worlds and the arrays must not be used, except
+for the rows of agents that neither step nor are observed. All arrays are C-contiguous, with a row for each agent. The results do not depend on the number of
 threads.
 
 Args:
@@ -381,14 +402,26 @@ Args:
     touched: Receives whether an agent touched anything in its steps, shape (n,).
     num_threads: Maximum number of threads; 0 for one per core.
 
+Raises:
+    ValueError: An array has another shape, a number is out of range, or `finish` was not called.
+    StaleHandleError: A world is closed.
+    WorldLockedError: A world is in use.
+)")
+      .def("stop_threads", &PyAgentBatch::stop_threads, R"(
+Ends the threads of the batch; `start` creates new ones.
+
+Raises:
+    ValueError: `finish` was not called.
+)")
+      .def("finish", &PyAgentBatch::finish, R"(
+Completes what `start` has begun.
+
 Returns:
     Agents whose steps are not complete, with what `JobQueue.run` returns or raises. They are not
     observed.
 
 Raises:
-    ValueError: An array has another shape, or a number is out of range.
-    StaleHandleError: A world is closed.
-    WorldLockedError: A world is in use.
+    ValueError: `start` was not called.
 )");
 }
 

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from gymnasium.vector import AutoresetMode
 
-from flatland.errors import StaleHandleError, WorldError
+from flatland.errors import StaleHandleError, WorldError, WorldLockedError
 from flatland.gym import FlatlandVectorEnv
 from flatland.gym.endings import Arrived
 from flatland.runtime.observer import WorldObserver
@@ -117,11 +117,11 @@ def test_the_core_performs_all_steps_alone_after_those_with_first_updates(
     for _ in range(2):
         env.step(actions)
     batch = env._episodes._batch
-    assert batch.perform(actions, ones, 20).tolist() == []
+    assert batch.perform(actions, ones, 20, lambda: None).tolist() == []
     env._stage.worlds[1].add_observer(Watcher())
-    assert batch.perform(actions, ones, 20).tolist() == [1]
+    assert batch.perform(actions, ones, 20, lambda: None).tolist() == [1]
     env._stage.worlds[2].physics.pre_solve = lambda *_: None
-    assert batch.perform(actions, ones, 20).tolist() == [1, 2]
+    assert batch.perform(actions, ones, 20, lambda: None).tolist() == [1, 2]
 
 
 def test_a_refused_call_of_the_core_advances_no_world(make: Make, room: Path) -> None:
@@ -181,7 +181,7 @@ def test_changes_from_outside_end_the_permission_of_the_core(
         world.pause()
     batch = env._episodes._batch
     for count in (1, 2):
-        assert batch.perform(actions, ones, 20).tolist() == [1]
+        assert batch.perform(actions, ones, 20, lambda: None).tolist() == [1]
         assert len(values) == (count if change == "on_set" else 0)
 
 
@@ -218,3 +218,39 @@ def test_requests_wait_for_the_end_of_all_steps(make: Make, room: Path) -> None:
     mover.join(60)
     assert not mover.is_alive()
     assert env.poses[1].tolist() == pytest.approx([3, 2, 1], abs=1e-4)
+
+
+def test_the_next_episodes_begin_while_other_worlds_step(make: Make, room: Path) -> None:
+    env = make(FlatlandVectorEnv, COUNT, room, ending=Arrived(), max_steps=1000, num_threads=2)
+    env.reset(seed=0)
+    actions, acting = np.full((COUNT, 2), 0.1), np.array([True, False, True])
+    env.step(actions)
+    refused: list[int] = []
+
+    def meanwhile() -> None:
+        for row, world in enumerate(env.worlds):
+            try:
+                world.move_model("robot", (3.0, 2.0, 1.0), "allow")
+            except WorldLockedError:
+                refused.append(row)
+
+    batch = env._episodes._batch
+    assert batch.perform(actions, acting, 20, meanwhile).tolist() == []
+    assert refused == [0, 2]
+    assert env.poses[1].tolist() == pytest.approx([3.0, 2.0, 1.0])
+    assert [world.time for world in env.worlds] == pytest.approx([0.2, 0.1, 0.2])
+
+
+def test_an_exception_while_worlds_step_leaves_them_complete(make: Make, room: Path) -> None:
+    env = make(FlatlandVectorEnv, COUNT, room, ending=Arrived(), max_steps=1000)
+    env.reset(seed=0)
+    actions, acting = np.full((COUNT, 2), 0.1), np.array([True, False, True])
+
+    def fail() -> None:
+        raise ValueError("no start")
+
+    with pytest.raises(ValueError, match="no start"):
+        env._episodes._batch.perform(actions, acting, 20, fail)
+    assert [world.time for world in env.worlds] == pytest.approx([0.1, 0.0, 0.1])
+    env.step(actions)
+    assert [world.time for world in env.worlds] == pytest.approx([0.2, 0.1, 0.2])
