@@ -1708,6 +1708,20 @@ class OldManifold:
     def tangent_impulses(self) -> npt.NDArray[np.float64]:
         """Impulse along the surface at each point [N s], shape (k,)."""
 
+def changed_contents(entries: Sequence[tuple[Any, ...]], missing: object) -> list[int]:
+    """Returns the indices of the objects whose contents are not the same objects as earlier.
+
+    Args:
+        entries: For each object a tuple: the object; a copy of its `__dict__`, or None if it has none;
+            the names of attributes that are ignored; the descriptors of its slots; a list of their
+            values; a copy of its items, None if it is not a container. The items of a dict are in a
+            dict.
+        missing: Value of a slot that is not set.
+
+    Raises:
+        ValueError: An entry has another number of members.
+    """
+
 class JobQueue:
     """The ordered jobs of a world: controllers, crowds, and callbacks at the rate of a clock.
 

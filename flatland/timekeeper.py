@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from flatland.physics import PhysicsWorld
+from typing import Protocol
 
 NANOSECONDS = 1_000_000_000
 
@@ -10,6 +10,25 @@ MIN_STEP_SIZE = 1e-6
 """Smallest step of the Box2D solver [s]."""
 MAX_STEP_SIZE = 1000.0
 """Largest step of the Box2D solver [s]."""
+
+
+class SimulatedTime(Protocol):
+    """What has the simulated time: a `flatland.physics.PhysicsWorld`.
+
+    Attributes:
+        time_ns: Simulated time [ns].
+    """
+
+    time_ns: int
+
+
+class _OwnTime:
+    """The simulated time of a timekeeper without a world."""
+
+    __slots__ = ("time_ns",)
+
+    def __init__(self) -> None:
+        self.time_ns = 0
 
 
 class Timekeeper:
@@ -20,14 +39,14 @@ class Timekeeper:
         step_size_ns: Simulated time of one step [ns], exact.
     """
 
-    __slots__ = ("_physics", "step_size", "step_size_ns")
+    __slots__ = ("_time", "step_size", "step_size_ns")
 
-    def __init__(self, step_size: float = 0.005, physics: PhysicsWorld | None = None) -> None:
+    def __init__(self, step_size: float = 0.005, time: SimulatedTime | None = None) -> None:
         """Creates a timekeeper.
 
         Args:
             step_size: Simulated time of one step [s], from 1e-6 to 1000; rounded to nanoseconds.
-            physics: The physics world, which has the time; None for a time of its own.
+            time: The physics world, which has the time; None for a time of its own.
 
         Raises:
             ValueError: The step size is out of range or NaN.
@@ -38,16 +57,16 @@ class Timekeeper:
             )
         self.step_size_ns = round(step_size * NANOSECONDS)
         self.step_size = self.step_size_ns / NANOSECONDS
-        self._physics = PhysicsWorld() if physics is None else physics
+        self._time = _OwnTime() if time is None else time
 
     @property
     def sim_time_ns(self) -> int:
         """Simulated time since the start [ns]; settable."""
-        return self._physics.time_ns
+        return self._time.time_ns
 
     @sim_time_ns.setter
     def sim_time_ns(self, time_ns: int) -> None:
-        self._physics.time_ns = time_ns
+        self._time.time_ns = time_ns
 
     @property
     def sim_time(self) -> float:
