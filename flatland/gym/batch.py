@@ -21,6 +21,9 @@ if TYPE_CHECKING:
     from flatland.world import World
 
 
+_NO_ROWS = np.empty(0, np.intp)
+
+
 class Batch:
     """Performs a step of an environment in one call of the core, for all agents that permit it.
 
@@ -115,16 +118,21 @@ class Batch:
                 meanwhile()
             finally:
                 unfinished = self._finish(alone)
-                self._commands[alone] = commands[alone]
+                np.copyto(self._commands, commands, where=alone[:, np.newaxis])
                 self._counts += alone
                 self._complete(unfinished, n)
-        step_agents([self._agents[row] for row in others], commands[others], n, self._num_threads)
-        rest = [*others, *unfinished]
-        self._situation.collided[rest] = [self._agents[row].touches.touched for row in rest]
-        return self._observe([*unfinished, *np.flatnonzero(~acting).tolist()], others)
+        if others:
+            agents = [self._agents[row] for row in others]
+            step_agents(agents, commands[others], n, self._num_threads)
+        for row in (*others, *unfinished):
+            self._situation.collided[row] = self._agents[row].touches.touched
+        idle = [] if acting.all() else np.flatnonzero(~acting).tolist()
+        return self._observe([*unfinished, *idle], others)
 
     def _observe(self, rows: Sequence[int], others: Sequence[int]) -> Rows:
         """Observes agents; returns those for which the core cannot do this, and others."""
+        if not rows and not others:
+            return _NO_ROWS
         agents = self._agents
         chosen = [row for row in rows if not agents[row].world.physics.has_materials]
         if chosen:
